@@ -5,6 +5,7 @@
 #include "ipc/json_abi.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cstddef>
@@ -22,13 +23,13 @@ using ipc::Call;
 void load(Context &context) {
     try {
         const ipc::Json described = ipc::to_json(context.library.descriptor());
-        ipc::description_from_json(described);
+        ipc::PluginDescription description = ipc::description_from_json(described);
         const std::size_t size = described.dump(-1, ' ', false, ipc::Json::error_handler_t::replace).size();
         if (size > ipc::max_descriptor_size)
             throw std::runtime_error(fmt::format(
                 "its descriptor takes {} bytes as JSON; the limit is {}: declare fewer options, or shorten texts",
                 size, ipc::max_descriptor_size));
-        context.facts = described;
+        context.facts = {std::move(description), {}};
     } catch (const std::exception &error) { // as arhost-worker or the host would report it
         throw Failure(error.what());
     }
@@ -254,7 +255,7 @@ void two_instances(Context &context) {
 void create_repeatedly(Context &context) {
     using Clock = std::chrono::steady_clock;
     constexpr int warm_up = 20, min_count = 100, max_count = 1000;
-    constexpr auto time_limit = 20s; // once min_count is reached
+    constexpr auto time_limit = 20s; // stop after this time, but not before min_count cycles
     constexpr long allowed_kib = 4096;
     const auto create_and_destroy = [&] {
         Instance instance(context.library);

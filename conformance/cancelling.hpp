@@ -16,7 +16,7 @@ inline void expect_ok_or_cancelled(const char *call, arhost_status status, const
         throw Failure(fmt::format("{}, {} returned {}; expected OK or CANCELLED", when, call, status_name(status)));
 }
 
-// Repeats `function`, the plugin's `call`, and cancels it after 100 ms.
+// Calls `function` until it is cancelled after 100 ms. `call`: its name for messages.
 template <class Function>
 void expect_to_be_cancelled(const Context &context, Host &host, const char *call, Function &&function) {
     using Clock = std::chrono::steady_clock;

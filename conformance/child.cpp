@@ -5,6 +5,7 @@
 #include "conformance/test.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
@@ -28,7 +29,7 @@ CallPage map_call_page() {
     return CallPage(ipc::Mapping(static_cast<std::byte *>(address), sizeof(ipc::Call)));
 }
 
-// As arhost-worker does before it opens a plugin. A sink writes to the scratch folder.
+// Enters the sandbox as arhost-worker does before it opens a plugin. The scratch folder is writable.
 sandbox::Level enter_sandbox(const Test &test, const Subject &subject) {
     sandbox::Policy policy = subject.policy;
     policy.writable.push_back(subject.scratch);
@@ -41,7 +42,7 @@ sandbox::Level enter_sandbox(const Test &test, const Subject &subject) {
 
 constexpr off_t min_space_mib = 16;
 
-// 0 if the folder's file system has min_space_mib free; otherwise an errno.
+// Returns 0 if min_space_mib are free on the folder's file system, otherwise an errno.
 int check_space(const std::filesystem::path &folder) {
     const std::filesystem::path file = folder / "space";
     const base::UniqueFd fd(::open(file.c_str(), O_CREAT | O_EXCL | O_WRONLY | O_CLOEXEC, 0600));
@@ -78,8 +79,8 @@ Result run(const Test &test, const Subject &subject, Context &context) {
     try {
         const sandbox::Level level = enter_sandbox(test, subject);
         run_in_sandbox(test, context);
-        if (!context.facts.empty())
-            context.facts["sandbox"] = sandbox::to_text(level);
+        if (context.facts)
+            context.facts->sandbox = sandbox::to_text(level);
         result.verdict = Verdict::pass;
         result.message = context.note;
     } catch (const Failure &failure) {
@@ -96,8 +97,8 @@ Result run(const Test &test, const Subject &subject, Context &context) {
         result.message = warning.what();
     } catch (const std::exception &error) {
         const auto *system = dynamic_cast<const std::system_error *>(&error);
-        const bool out_of_descriptors =
-            system && system->code() == std::errc::too_many_files_open; // the suite itself uses few
+        // Attributed to the plugin, because the suite opens only a few descriptors.
+        const bool out_of_descriptors = system && system->code() == std::errc::too_many_files_open;
         result.verdict = out_of_descriptors ? Verdict::fail : Verdict::error;
         result.message =
             out_of_descriptors ? "it leaks descriptors until the limit of open files is reached" : error.what();
@@ -161,10 +162,18 @@ int run_child(const std::string &name, const Subject &subject) {
     return EXIT_FAILURE;
 }
 
+ipc::Json to_json(const std::optional<Facts> &facts) {
+    if (!facts)
+        return ipc::Json::object();
+    ipc::Json json = ipc::to_json(facts->descriptor);
+    json["sandbox"] = facts->sandbox;
+    return json;
+}
+
 ipc::Json to_json(const Result &result) {
-    ipc::Json json = {{"test", result.test},       {"verdict", to_text(result.verdict)},
-                      {"message", result.message}, {"seconds", result.seconds},
-                      {"facts", result.facts},     {"images", ipc::Json::array()}};
+    ipc::Json json = {
+        {"test", result.test},       {"verdict", to_text(result.verdict)}, {"message", result.message},
+        {"seconds", result.seconds}, {"facts", to_json(result.facts)},     {"images", ipc::Json::array()}};
     for (const ReportImage &image : result.images)
         json["images"].push_back(
             {{"label", image.label}, {"width", image.width}, {"height", image.height}, {"png", image.png}});
@@ -182,9 +191,8 @@ Result result_from_json(const ipc::Json &json) {
         throw std::runtime_error("unknown verdict");
     result.verdict = static_cast<Verdict>(verdict - verdict_texts.begin());
     result.message = json.at("message").get<std::string>();
-    result.facts = json.at("facts");
-    if (result.facts != ipc::Json::object())
-        ipc::description_from_json(result.facts); // throws if invalid
+    if (const ipc::Json &facts = json.at("facts"); facts != ipc::Json::object())
+        result.facts = {ipc::description_from_json(facts), facts.at("sandbox").get<std::string>()};
     for (const ipc::Json &image : json.at("images"))
         result.images.push_back({image.at("label").get<std::string>(), image.at("png").get<std::string>(),
                                  image.at("width").get<unsigned>(), image.at("height").get<unsigned>()});

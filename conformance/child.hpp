@@ -48,6 +48,7 @@ pid_t start_process(std::vector<std::string> arguments, std::initializer_list<in
 // Runs one test and writes its result to `result_fd` as a line of JSON. Returns the exit status.
 int run_child(const std::string &test, const Subject &subject);
 
+ipc::Json to_json(const std::optional<Facts> &facts); // the descriptor and "sandbox"; an empty object without facts
 ipc::Json to_json(const Result &result);
 Result result_from_json(const ipc::Json &json);
 

@@ -12,7 +12,8 @@
 
 namespace arhost::conformance {
 
-// Sorted times in ms of up to 100 calls of `frame`: stops after 1 s and at least 11 calls, or when it returns false.
+// Returns the sorted durations (ms) of up to 100 calls. Stops after 1 s, but not before 11 calls, or if `frame`
+// returns false.
 template <class Frame> std::vector<double> frame_times_ms(Frame &&frame) {
     using Clock = std::chrono::steady_clock;
     constexpr std::size_t min_count = 11, max_count = 100;

@@ -149,8 +149,8 @@ std::string list(const std::vector<std::string> &patterns) {
 // Describes a need of the plugin that the policy does not allow, so that the host would create no instance. Empty if
 // all are allowed.
 std::string missing_need(const Result &loaded, const sandbox::Policy &policy) {
-    if (policy.mode != sandbox::Mode::none)
-        for (const std::string &need : loaded.facts.value("needs", std::vector<std::string>()))
+    if (policy.mode != sandbox::Mode::none && loaded.facts)
+        for (const std::string &need : loaded.facts->descriptor.needs)
             if (!policy.allows(need))
                 return fmt::format("it needs '{0}', which the sandbox does not allow: give --allow {0}", need);
     return {};
@@ -177,7 +177,7 @@ std::string reference_problem(std::span<const Test> tests, const RunSettings &se
             if (result.verdict != Verdict::pass)
                 return fmt::format("the reference '{}' cannot be used: {} failed: {}", file.string(), test.name,
                                    result.message);
-            if (const arhost_kind kind = result.facts.value("kind", arhost_kind{ARHOST_KIND_RAYTRACER});
+            if (const arhost_kind kind = result.facts ? result.facts->descriptor.kind : ARHOST_KIND_RAYTRACER;
                 kind != ARHOST_KIND_RAYTRACER)
                 return fmt::format("the reference '{}' is a {} but must be a ray tracer; give --reference FILE",
                                    file.string(), arhost::ipc::to_text(kind));
@@ -185,7 +185,7 @@ std::string reference_problem(std::span<const Test> tests, const RunSettings &se
     return {};
 }
 
-// Unbuffered. A full disk or a closed pipe ends the run.
+// Writes to stdout without buffering. A write error ends the run.
 void print(const std::string &text, int signals = -1) {
     try {
         base::write_all(STDOUT_FILENO, text, signals);
@@ -211,7 +211,7 @@ Report run(const RunSettings &settings, const std::vector<std::string> &patterns
     // Always first: abi.load reports the plugin's kind.
     run_all({report.tests.data(), 1}, settings, report.results, print_result);
     report.plugin = report.results.front().facts;
-    const arhost_kind kind = report.plugin.value("kind", 0);
+    const arhost_kind kind = report.plugin ? report.plugin->descriptor.kind : 0;
     std::vector<Test> selected;
     std::set<std::string_view> needed;
     std::for_each(report.tests.rbegin(), report.tests.rend(), [&](const Test &test) {

@@ -29,8 +29,7 @@ public:
     // Describes the first overwritten guard byte, as the end of a sentence; empty if there is none.
     std::string damage() const;
 
-    // The neighbouring pixels have the same alpha and nearly the same colour: there is no edge or reflected edge
-    // nearby.
+    // Returns whether the neighbouring pixels have the same alpha and nearly the same colour.
     bool is_smooth(std::uint32_t x, std::uint32_t y) const;
 
     std::string png_base64() const;
@@ -50,11 +49,12 @@ private:
     std::vector<Page> memory_;
 };
 
-// By more than `tolerance` codes. Colours are compared only where both alphas are nonzero.
+// Returns whether two pixels differ by more than `tolerance` codes. Colours are compared only where both alphas are
+// nonzero.
 bool differs(const Pixel &a, const Pixel &b, int tolerance);
 std::optional<std::array<unsigned, 2>> first_difference(const Picture &a, const Picture &b, int tolerance);
 
-// The difference of two pictures, multiplied by 5, opaque.
+// Returns the absolute difference of two pictures times 5, opaque.
 Picture difference(const Picture &a, const Picture &b);
 
 } // namespace arhost::conformance

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conformance/plugin_library.hpp"
 
-#include "conformance/test.hpp"
+#include "conformance/verdict.hpp"
 #include "worker/library.hpp"
 
 #include <fmt/format.h>

@@ -96,7 +96,7 @@ private:
     std::atomic<bool> cancelled_{false};
 };
 
-// From create to destroy.
+// An instance of the plugin; the destructor calls destroy.
 class Instance {
 public:
     // `overrides` take precedence over the user's settings. An output path keeps its file name but is placed in

@@ -17,7 +17,7 @@
 namespace arhost::conformance {
 namespace {
 
-constexpr double margin = 1.0 / 8; // width of the paper's margin relative to the marker's side
+constexpr double min_margin = 1.0 / 8; // width of the paper's margin relative to the marker's side
 
 // '#' is ink. Same orientation as in the AprilTag library.
 struct Tag {
@@ -81,10 +81,14 @@ glm::dvec3 ray_at(const shading::Lens &lens, double x, double y) {
 // Intersects rays (OpenCV's axes) with a marker's plane.
 struct View {
     const Placed &marker;
+    double cells;  // print pixels per marker side
+    double margin; // of the paper, relative to the marker's side
     glm::dmat3 marker_from_ray;
     std::uint32_t left, top, right, bottom; // pixels that may show it; right and bottom are exclusive
 
-    View(const arhost_intrinsics &camera, const Placed &placed) : marker(placed) {
+    View(const arhost_intrinsics &camera, const Placed &placed)
+        : marker(placed), cells(placed.print.side - 2.0 * placed.print.border),
+          margin(std::max(min_margin, placed.print.border / cells)) {
         const Pose &m = placed.camera_from_marker;
         const glm::dmat3 cv_from_gl(1, 0, 0, 0, -1, 0, 0, 0, -1);
         marker_from_ray = glm::inverse(cv_from_gl * glm::dmat3(m[0], m[1], m[3]));
@@ -105,8 +109,8 @@ struct View {
         right = clamped(high.x + margin_px, camera.width), bottom = clamped(high.y + margin_px, camera.height);
     }
 
-    // Intersection with the marker's plane in units of its side: (0, 0) is the print's top left, (1, 1) its bottom
-    // right.
+    // Intersection with the marker's plane in units of its side: (0, 0) is its top left corner, (1, 1) its bottom
+    // right corner.
     std::optional<glm::dvec2> intersect(const glm::dvec3 &ray) const {
         const glm::dvec3 at = marker_from_ray * ray;
         if (at.z <= 0)
@@ -118,9 +122,10 @@ struct View {
         const double low = std::min(at.x, at.y), high = std::max(at.x, at.y);
         if (low < -margin || high > 1 + margin)
             return std::nullopt;
-        if (low < 0 || high >= 1)
-            return paper_code;
         const auto [column, row] = cell(at);
+        const int side = static_cast<int>(marker.print.side);
+        if (std::min(column, row) < 0 || std::max(column, row) >= side)
+            return paper_code;
         return ink_code +
                (paper_code - ink_code) *
                    marker.print
@@ -128,8 +133,8 @@ struct View {
                    255;
     }
     std::pair<int, int> cell(const glm::dvec2 &at) const {
-        return {static_cast<int>(std::floor(at.x * marker.print.side)),
-                static_cast<int>(std::floor(at.y * marker.print.side))};
+        return {static_cast<int>(std::floor(at.x * cells + marker.print.border)),
+                static_cast<int>(std::floor(at.y * cells + marker.print.border))};
     }
 
     // Mean code of a pixel over `background`. The rays go through its top left corner and the corners right of and

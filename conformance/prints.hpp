@@ -21,11 +21,12 @@
 
 namespace arhost::conformance {
 
-// The printed square between a marker's corners.
+// A square print of a marker.
 struct Print {
     int id;
     std::uint32_t side;             // of `grey`, in pixels
     std::vector<std::uint8_t> grey; // 0 ink, 255 paper; the first row is the print's top
+    std::uint32_t border = 0;       // pixels of `grey` outside the square between the marker's corners, on each side
 
     Print mirrored() const;
 };
@@ -45,7 +46,7 @@ struct Grey {
     Grey part(std::uint32_t x0, std::uint32_t y0, std::uint32_t part_width, std::uint32_t part_height) const;
     Picture picture() const; // for the report
 };
-// With the codes code(x, y), clamped to 0 … 255.
+// Returns an image with the grey codes code(x, y), clamped to 0–255.
 template <class Code> Grey filled(std::uint32_t width, std::uint32_t height, Code &&code) {
     Grey image{width, height, std::vector<std::uint8_t>(std::size_t{width} * height)};
     for (std::uint32_t y = 0; y < height; ++y)
@@ -57,9 +58,11 @@ template <class Code> Grey filled(std::uint32_t width, std::uint32_t height, Cod
 // Marker to camera, as in arhost_marker.mt: GL eye space, mm.
 using Pose = glm::dmat4;
 
-// A marker that faces the camera upright, rotated by degrees about the camera's axes x, then y, then z.
+// Returns the pose of a marker that faces the camera upright, rotated by degrees about the camera's axes x, then y,
+// then z.
 Pose pose(const glm::dvec3 &centre, double about_x = 0, double about_y = 0, double about_z = 0);
-// Tilted back by `tilt` degrees in the direction `towards`, in degrees from the camera's x axis.
+// Returns the pose of a marker whose edge in the image direction `towards` (degrees from the camera's x axis) is
+// tilted away by `tilt` degrees.
 Pose tilted(const glm::dvec3 &centre, double tilt, double towards, double about_z = 0);
 
 struct Placed {
@@ -70,8 +73,8 @@ struct Placed {
 
 inline constexpr int paper_code = 220, ink_code = 30, background_code = 140;
 
-// Draws the prints, each on white paper with a margin of an eighth of its side. Each pixel is the mean of 32 rays
-// through the lens: nothing is resampled, and edges are exact to 1/64 px.
+// Draws the prints, each on white paper with a margin of at least an eighth of the marker's side. Each pixel is the
+// mean of 32 rays through the lens: nothing is resampled, and edges are exact to 1/64 px.
 Grey draw(const arhost_intrinsics &camera, std::span<const Placed> markers);
 inline Grey draw(const arhost_intrinsics &camera, const Placed &marker) {
     return draw(camera, std::span(&marker, 1));
@@ -79,7 +82,7 @@ inline Grey draw(const arhost_intrinsics &camera, const Placed &marker) {
 
 // Projects a point in GL eye space, which must be in view.
 glm::dvec2 pixel_of(const arhost_intrinsics &camera, const glm::dvec3 &eye_point);
-// In the corner order of arhost/tracker.h.
+// Returns the projected corners, ordered as in arhost/tracker.h.
 std::array<glm::dvec2, 4> corners_of(const arhost_intrinsics &camera, const Placed &marker);
 
 Grey blurred(const Grey &image, double sigma_px);

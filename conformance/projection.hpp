@@ -13,16 +13,16 @@
 
 namespace arhost::conformance {
 
-// A world point in the camera's OpenCV axes: x right, y down, z forward.
+// Returns a world point in the camera's OpenCV axes: x right, y down, z forward.
 glm::dvec3 in_camera(const arhost_camera &camera, const glm::dvec3 &world);
 
-// The pixel of a point in the camera's axes with z > 0; no lens distortion, or Brown's model.
+// Returns the pixel of a point in the camera's axes with z > 0; no lens distortion, or Brown's model.
 glm::dvec2 project(const arhost_intrinsics &intrinsics, const glm::dvec3 &point);
 
-// Centroid of a sphere's silhouette. The whole sphere must be in front of the camera.
+// Returns the centroid of a sphere's silhouette. The whole sphere must be in front of the camera.
 glm::dvec2 silhouette_centroid(const arhost_camera &camera, const glm::dvec3 &centre, double radius);
 
-// Centroid of the pixels with an alpha of 128 or more, equally weighted; nullopt if there are none.
+// Returns the centroid of the pixels with an alpha of 128 or more, equally weighted; nullopt if there are none.
 std::optional<glm::dvec2> centroid(const Picture &picture);
 
 } // namespace arhost::conformance

@@ -47,13 +47,15 @@ void inside_sphere(Context &context) {
 }
 
 void near_the_eye(Context &context) {
-    for (const double mm : {1.0, 0.05}) { // the surface is at 3/4 of it: down to 1.6e-4 of the scene's 230 mm
+    // Distance to the sphere's centre; its surface is at 0.75 × mm, at least 1.6e-4 × scene extent: beyond the near
+    // clip.
+    for (const double mm : {1.0, 0.05}) {
         scene::ArenaBuilder builder = one_sphere({0, 0, 0, 30}, glowing(glm::vec3(0.1f)));
         builder.add_object("near", builder.add_spheres({{0, 0, 200 - mm, mm / 4}}),
                            builder.add_material(glowing(glm::vec3(0.8f))));
         const Picture picture = Tracer(context, std::move(builder)).render(from_front());
         expect_pixels(picture, [&](auto x, auto y) {
-            constexpr double radius = 48; // px; the silhouette's is 51.6 (the sine of its half angle is 1/4)
+            constexpr double radius = 48; // px; the silhouette's radius is 51.6 px
             const Pixel p = picture.at(x, y);
             if (distance_from_centre(picture, x, y) < radius && (p[0] < 150 || p[3] < 250)) // correct: 231 and 255
                 return fmt::format("a bright sphere {} mm in front of the eye is not visible; the pixel is {}", mm,
@@ -104,7 +106,7 @@ void occluder(Context &context) {
 
 // Checks the shadow of ball_over_catcher around the image's centre.
 void expect_shadow(const Picture &picture, int alpha, const char *caster) {
-    constexpr int radius = 10; // px; the shadow's is at least 15
+    constexpr int radius = 10; // px; the shadow's radius is at least 15 px
     expect_pixels(picture, [&](auto x, auto y) {
         if (distance_from_centre(picture, x, y) > radius)
             return std::string();
@@ -129,7 +131,7 @@ void translucent_shadow(Context &context) {
 
 void catcher_in_light(Context &context) {
     const Picture picture = Tracer(context, ball_over_catcher(diffuse(glm::vec3(0.5f)))).render(from_front());
-    // Left of, above and below the shadow; also valid for mirrored images.
+    // Checks pixels left of, above and below the shadow; also valid for a mirrored image.
     expect_pixels(picture, [&](auto x, auto y) {
         const bool far = distance_from_centre(picture, x, y) > 24;
         const bool ball = std::abs(y - (picture.height() - 1) / 2.0) < 22;
@@ -140,7 +142,7 @@ void catcher_in_light(Context &context) {
 
 void stronger_shadow_wins(Context &context) {
     scene::ArenaBuilder builder = ball_over_catcher(diffuse(glm::vec3(0.5f)));
-    // Between lamp and ball, outside the image: its shadow covers half of the ball's and extends beyond it.
+    // A glass sphere between lamp and ball. Its shadow covers half of the ball's shadow and extends beyond it.
     builder.add_object("glass", builder.add_spheres({{90, 7, 120, 8}}), builder.add_material(glass()));
     const Picture picture = Tracer(context, std::move(builder)).render(from_front());
     // The glass ball's shadow (20 mm about y = 17.5) covers the upper half of the other (15 mm about y = 0).

@@ -29,7 +29,7 @@ void expect_near(const glm::dvec2 &actual, const glm::dvec2 &expected, double to
 }
 
 void pixel_centres(Context &context) {
-    // Pairs on both sides of the axis: their mean is on it, even if the image is mirrored.
+    // Cameras in pairs, symmetric about the axis: the mean centroid is on the axis even if the image is mirrored.
     constexpr int pairs = 10;
     Tracer tracer(context, one_sphere({0, 0, 0, 30}));
     glm::dvec2 sum(0);

@@ -19,8 +19,9 @@ void writes_every_pixel(Context &context) {
             const Pixel none{0, 0, 0, 0}, all{255, 255, 255, 255};
             return on_zeros.at(x, y) != none || on_ones.at(x, y) != all
                        ? ""
-                       : fmt::format("in a {}×{} image, the previous value is kept, 0x00 or 0xff", size.width,
-                                     size.height);
+                       : fmt::format("in a {}×{} image, render did not write this pixel: it kept its previous value "
+                                     "(0x00, then 0xff)",
+                                     size.width, size.height);
         });
     }
 }
@@ -69,8 +70,9 @@ void region(Context &context) {
             const int alpha = picture.alpha(x, y);
             return inside || alpha <= 2
                        ? ""
-                       : fmt::format("outside the reported region, {}×{} at ({}, {}), alpha is {}", info.region_width,
-                                     info.region_height, info.region_x, info.region_y, alpha);
+                       : fmt::format(
+                             "alpha is {} outside the reported region ({}×{} at ({}, {})); expected at most 2", alpha,
+                             info.region_width, info.region_height, info.region_x, info.region_y);
         });
     }
     if (!reported)

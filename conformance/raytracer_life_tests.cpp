@@ -106,7 +106,7 @@ void cancel_while_rendering(Context &context) {
 
 // ---- Unusual scenes --------------------------------------------------------------------------------
 
-// Only a sphere of this radius at the image's centre is visible.
+// Expects that only a sphere of this radius, at the image's centre, is visible.
 void expect_sphere(const Picture &picture, double radius_px, const char *scene) {
     expect_pixels(picture, [&](auto x, auto y) {
         const double r = distance_from_centre(picture, x, y);

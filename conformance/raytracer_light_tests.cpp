@@ -46,7 +46,7 @@ void srgb(Context &context) {
     }
 }
 
-// Compares a plane at z = 0 under a light with `irradiance(point)`, the formula.
+// Renders a lit plane and compares its brightness with `irradiance(point)`.
 template <class Irradiance> void expect_plane(Context &context, const arhost_light &light, Irradiance &&irradiance) {
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.1f);
@@ -65,7 +65,7 @@ template <class Irradiance> void expect_plane(Context &context, const arhost_lig
     }
     const Picture picture = Tracer(context, std::move(builder)).render(from_front());
     expect_pixels(picture, [&](auto x, auto y) {
-        const double scale = 199.0 / 200; // the upper side
+        const double scale = 199.0 / 200; // mm per px at the plane's upper side, z = 1
         const glm::dvec3 at((x - 79.5) * scale, (59.5 - y) * scale, 1);
         const int expected = srgb8_exact(double{0.8f} * (double{0.1f} + irradiance(at)));
         const int code = picture.at(x, y)[0];

@@ -13,8 +13,8 @@ namespace arhost::conformance {
 namespace {
 
 struct Part {
-    scene::TriangleMesh mesh; // either the mesh
-    scene::Spheres spheres;   // or the spheres are empty
+    scene::TriangleMesh mesh; // empty if the part has spheres
+    scene::Spheres spheres;   // empty if the part has a mesh
     std::uint32_t material;   // index in scene_of
     arhost_role role = ARHOST_ROLE_VIRTUAL;
     glm::mat4 transform{1};

@@ -4,6 +4,7 @@
 #include "base/text.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <sys/utsname.h>
@@ -91,7 +92,7 @@ std::string as_summary(const Report &report) {
 std::string as_json(const Report &report) {
     utsname system{};
     ::uname(&system);
-    ipc::Json json = {{"plugin", report.plugin},
+    ipc::Json json = {{"plugin", to_json(report.plugin)},
                       {"file", report.settings.subject.plugin.string()},
                       {"settings", report.settings.subject.settings},
                       {"seed", report.settings.subject.seed},

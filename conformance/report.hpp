@@ -13,7 +13,7 @@ struct Report {
     RunSettings settings;
     std::vector<Test> tests;
     std::vector<Result> results; // in the order of the tests
-    ipc::Json plugin;            // id, version, …; empty if it could not be opened
+    std::optional<Facts> plugin; // empty if it could not be opened
 
     std::size_t count(Verdict verdict) const;
     // 0: success; 1: a test failed, crashed or timed out; 2: an error of the suite, or no test ran.

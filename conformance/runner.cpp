@@ -7,6 +7,7 @@
 #include "ipc/protocol.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <array>
@@ -92,7 +93,7 @@ private:
 
 class Child {
 public:
-    // `alive`: the processes of all running tests. When a test ends, orphans that are not in it are killed.
+    // `alive`: the processes of all running tests. When a test ends, all other children of this process are killed.
     Child(const Test &test, const RunSettings &settings, std::set<pid_t> &alive)
         : test_(test), alive_(alive), begin_(Clock::now()),
           deadline_(begin_ +

@@ -4,6 +4,7 @@
 #include "conformance/child.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <csignal>
 #include <deque>
@@ -18,14 +19,14 @@ namespace {
 
 constexpr const char *helper = "sink.process";
 
-// Runs in the process: reads the work from standard input and writes a byte per frame to result_fd. If it fails, the
-// test's result follows.
+// Runs in the process: reads the parameters from standard input and writes a byte per frame to result_fd. If it
+// fails, the test's result follows.
 void work(Context &context) {
     SinkProcess::Work work{};
     std::cin >> work.frames >> work.size.width >> work.size.height >> work.folder;
     SinkRun run(context, work.folder);
     run.start(0, work.size);
-    std::deque<SealedOutput> frames; // prepared, so that the next write starts right after a frame's byte
+    std::deque<SealedOutput> frames; // created in advance, so that the next write follows the progress byte at once
     for (std::uint64_t n = 0; n < work.frames; ++n)
         frames.emplace_back(SealedOutput::Content{.sequence = n, .size = work.size});
     for (const SealedOutput &frame : frames) {

@@ -30,7 +30,7 @@ public:
     };
     explicit SealedOutput(const Content &content);
 
-    // Only while no sink reads it.
+    // Changes the record. Do not call while a sink reads it.
     template <class Change> void change(Change &&change) {
         record_.unseal();
         change(record());

@@ -281,7 +281,7 @@ std::map<std::string, Number> numbers_in(const std::string &path) {
 }
 
 // Replaces one frame at a time and finds where the files change. This works for files of constant size, and for one
-// file per frame with numbered names.
+// file per frame with numbered file names.
 void order(Context &context) {
     require_every_frame(context);
     constexpr std::uint64_t frames = 6;
@@ -369,7 +369,7 @@ void earlier_files(Context &context) {
     expect_same(run.files(), expected, "after a restart and a stop without a frame");
 }
 
-void no_place(Context &context) {
+void unwritable_output(Context &context) {
     SinkRun run(context, "file");
     const std::filesystem::path folder = context.library.scratch() / "file";
     std::filesystem::remove(folder);
@@ -576,8 +576,8 @@ constexpr Test tests[] = {
     {"sink.last-frame", "Its files contain the last frame.", kind, same, 30s, of_files<last_frame>},
     {"sink.earlier-files", "It does not change the files of an earlier run before its first frame.", kind, gate, 30s,
      of_files<earlier_files>},
-    {"sink.no-place", "start fails with an error message if its output cannot be written.", kind, gate, 30s,
-     of_files<no_place>},
+    {"sink.unwritable-output", "start fails with an error message if its output cannot be written.", kind, gate, 30s,
+     of_files<unwritable_output>},
     {"sink.killed", "A kill leaves no incomplete file under a final file name.", kind, same, 60s, of_files<killed>,
      true},
     {"sink.restart", "A restart after a kill keeps the frames before first_sequence and replaces the rest.", kind,

@@ -3,7 +3,6 @@
 // by throwing.
 #pragma once
 
-#include "conformance/picture.hpp"
 #include "conformance/plugin_library.hpp"
 #include "conformance/prints.hpp"
 #include "conformance/verdict.hpp"
@@ -14,43 +13,19 @@
 #include <filesystem>
 #include <random>
 #include <span>
-#include <stdexcept>
 #include <vector>
 
 namespace arhost::conformance {
 
-// The plugin violates the requirement: a sentence with numbers, and images that show the violation. Any other
-// std::exception is an error of the suite.
-class Failure : public std::runtime_error {
-public:
-    using std::runtime_error::runtime_error;
-    Failure with(std::string label, const Picture &picture) && {
-        pictures.emplace_back(std::move(label), picture);
-        return std::move(*this);
-    }
-    Failure at(unsigned x, unsigned y) && {
-        wrong_pixel = {x, y};
-        return std::move(*this);
-    }
-    std::vector<std::pair<std::string, Picture>> pictures;
-    std::optional<std::array<unsigned, 2>> wrong_pixel;
-};
-struct Skip : std::runtime_error {
-    using std::runtime_error::runtime_error;
-};
-struct Warning : std::runtime_error {
-    using std::runtime_error::runtime_error;
-};
-
 // Input of a test.
 struct Context {
     PluginLibrary &library;
-    std::filesystem::path reference;       // the ray tracer to compare images with
-    std::mt19937_64 random;                // seeded the same for every test
-    ipc::Json facts = ipc::Json::object(); // set by abi.load: the plugin's description
-    std::string note{};                    // reported with a pass: measurements
-    double timeout_factor = 1;             // multiplies each time limit
-    PrintFiles prints{};                   // markers that the tracker detects; empty: the suite's tags
+    std::filesystem::path reference; // the ray tracer to compare images with
+    std::mt19937_64 random;          // seeded the same for every test
+    std::optional<Facts> facts{};
+    std::string note{};        // measurements, reported if the test passes
+    double timeout_factor = 1; // multiplies each time limit
+    PrintFiles prints{};       // markers that the tracker detects; empty: the suite's tags
 
     double uniform(double low, double high) {
         // std::uniform_real_distribution differs between standard libraries.

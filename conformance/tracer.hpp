@@ -51,7 +51,7 @@ public:
 
 private:
     Instance instance_;
-    std::optional<SealedScene> scene_; // must outlive start to stop
+    std::optional<SealedScene> scene_; // must stay valid from start to stop
     const arhost_raytracer &functions_;
     std::optional<arhost_intrinsics> started_;
     std::optional<Picture> slot_; // the same memory for all images from start to stop

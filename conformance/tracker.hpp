@@ -56,7 +56,7 @@ public:
     std::vector<arhost_marker> track(const Grey &image) {
         return track(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8));
     }
-    // Like track, in the first frame after a start: without history to smooth with.
+    // Restarts the tracker and tracks one frame, so there is no history to smooth with.
     std::vector<arhost_marker> track_first(const SealedFrame &frame);
     std::vector<arhost_marker> track_first(const Grey &image) {
         return track_first(SealedFrame(image, ARHOST_PIXEL_FORMAT_GREY8));

@@ -276,7 +276,7 @@ void out_of_order(Context &context) {
 
 constexpr double orthonormal = 1e-9; // arhost/tracker.h
 
-// Describes why a matrix is not a rigid transform, as the end of a sentence; empty if it is one.
+// Returns why the matrix is not a rigid transform, as a predicate ("is not finite"); empty if it is rigid.
 std::string not_rigid(const double *m, double tolerance) {
     if (!std::all_of(m, m + 16, [](double value) { return std::isfinite(value); }))
         return "is not finite";
@@ -335,7 +335,7 @@ void record(Context &context) {
 }
 
 // Records of a marker that is out of view, if there are any.
-void not_seen(Context &context) {
+void out_of_view(Context &context) {
     constexpr std::uint32_t visible_for = 3, lost_for = 12;
     Started started(context);
     const Grey here = started.at(started.marker.camera_from_marker), empty_frame = without_print();
@@ -413,8 +413,8 @@ constexpr Test tests[] = {
     {"tracker.threads", "The result does not depend on the number of threads.", kind, gate, 20s, threads},
     {"tracker.frames-before", "A DETECTED record depends only on the current frame.", kind, "tracker.deterministic",
      20s, frames_before},
-    {"tracker.not-seen", "A marker out of view is omitted, PREDICTED or LOST, with its age and a rigid pose.", kind,
-     "tracker.frames-before", 20s, not_seen},
+    {"tracker.out-of-view", "A marker out of view is omitted, PREDICTED or LOST, with its age and a rigid pose.",
+     kind, "tracker.frames-before", 20s, out_of_view},
     {"tracker.settles", "The pose of a marker at rest is correct within 60 frames, smoothed or not.", kind, gate, 30s,
      settles},
     {"tracker.out-of-order", "Dropped, repeated and older frames are handled like any other.", kind,

@@ -218,7 +218,7 @@ void fisheye(Context &context) {
 }
 
 constexpr arhost_kind kind = ARHOST_KIND_TRACKER;
-// Without these, all poses are wrong for the same reason.
+// Prerequisites: if one fails, the other pose tests fail for the same reason.
 constexpr const char *gate = "tracker.track", *axes_gate = "tracker.axes", *pose_gate = "tracker.millimetres";
 constexpr Test tests[] = {
     {"tracker.axes",

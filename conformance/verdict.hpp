@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-// The result of a test.
+// The result of a test, and the exceptions by which it ends.
 #pragma once
 
-#include "ipc/channel.hpp"
+#include "conformance/picture.hpp"
+#include "ipc/json_abi.hpp"
 
 #include <array>
 #include <cstddef>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace arhost::conformance {
@@ -28,11 +31,40 @@ inline std::string_view to_text(Verdict verdict) {
     return verdict_texts[static_cast<std::size_t>(verdict)];
 }
 
+// The plugin violates the requirement: a sentence with numbers, and images that show the violation. Any other
+// std::exception is an error of the suite.
+class Failure : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+    Failure with(std::string label, const Picture &picture) && {
+        pictures.emplace_back(std::move(label), picture);
+        return std::move(*this);
+    }
+    Failure at(unsigned x, unsigned y) && {
+        wrong_pixel = {x, y};
+        return std::move(*this);
+    }
+    std::vector<std::pair<std::string, Picture>> pictures;
+    std::optional<std::array<unsigned, 2>> wrong_pixel;
+};
+struct Skip : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+struct Warning : std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
 // An image for the report.
 struct ReportImage {
     std::string label;
     std::string png; // base64
     unsigned width = 0, height = 0;
+};
+
+// Set by abi.load.
+struct Facts {
+    ipc::PluginDescription descriptor;
+    std::string sandbox; // active and missing layers, from sandbox::to_text
 };
 
 struct Result {
@@ -42,7 +74,7 @@ struct Result {
     double seconds = 0;
     std::vector<ReportImage> images{};
     std::optional<std::array<unsigned, 2>> wrong_pixel{}; // of the images
-    ipc::Json facts = ipc::Json::object();                // set by abi.load: the descriptor
+    std::optional<Facts> facts{};
 };
 
 } // namespace arhost::conformance

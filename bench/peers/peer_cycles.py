@@ -180,7 +180,7 @@ def rays(case):
     bunny = scene.collection.objects[0]
     socket = bunny.active_material.node_tree.nodes["Glass BSDF"].inputs["Color"]
     socket.default_value = grey(1)
-    # Primary rays, and one ray after each hit regardless of the limit.
+    # Counts primary rays plus one ray per hit; the depth limit does not affect these.
     scene.render.film_transparent = True
     count = 1 + float((rendered(case, 1)[..., 3] > 0).mean())
     scene.render.film_transparent = False

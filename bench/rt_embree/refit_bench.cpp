@@ -96,8 +96,8 @@ void measure(const char *name, const TriangleMesh &mesh, std::initializer_list<f
     Bvh refitted(device.get(), positions, mesh), rebuilt(device.get(), positions, mesh);
     rt_embree::BvhQuality quality;
     quality.record_build(view);
-    std::printf("%s, %zu triangles\n%8s %8s %10s %10s %10s %12s %12s %16s\n", name, mesh.triangles.size(), "amount",
-                "degr.", "measure ms", "refit ms", "build ms", "refit rays", "new rays", "rebuild pays in");
+    std::printf("%s, %zu triangles\n%8s %8s %10s %10s %10s %12s %12s %22s\n", name, mesh.triangles.size(), "amount",
+                "degr.", "measure ms", "refit ms", "build ms", "refit rays", "new rays", "rebuild pays off after");
     for (const float amount : amounts) {
         std::minstd_rand random(1);
         std::uniform_real_distribution<float> unit(-1, 1);
@@ -114,9 +114,9 @@ void measure(const char *name, const TriangleMesh &mesh, std::initializer_list<f
         std::printf("%8.2f %8.2f %10.2f %10.2f %10.2f %12.2f %12.2f ", static_cast<double>(amount), degradation,
                     measuring, refit, build, old_rays, new_rays);
         if (old_rays > new_rays)
-            std::printf("%9.1f frames\n", (build - refit) / (old_rays - new_rays));
+            std::printf("%15.1f frames\n", (build - refit) / (old_rays - new_rays));
         else
-            std::printf("%16s\n", "-");
+            std::printf("%22s\n", "-");
     }
 }
 

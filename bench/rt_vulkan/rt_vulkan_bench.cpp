@@ -51,7 +51,7 @@ void sort_along_morton_curve(scene::TriangleMesh &mesh) {
               [&](const auto &a, const auto &b) { return morton_code(a) < morton_code(b); });
 }
 
-// Returns a scene of the bunny without lights, whose render time is mostly that of visibility, as in the case
+// Returns a scene of the bunny without lights, whose render time is dominated by ray traversal, as in the case
 // `primary` of rt_embree_bench.cpp.
 scene::Arena unlit_bunny() {
     auto [mesh, name] = bench::bunny(ARHOST_SHARED_DATA);

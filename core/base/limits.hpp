@@ -10,7 +10,7 @@ namespace arhost::base {
 
 struct RestartLimits {
     std::uint32_t proven_after_frames = 10; // frames in total, see RestartPolicy
-    std::uint32_t quarantine_after = 5;     // consecutive failures before giving up
+    std::uint32_t quarantine_after = 5;     // consecutive failures after which a component is disabled
     std::chrono::milliseconds first_delay{250};
     std::chrono::milliseconds longest_delay{10'000};
 };

@@ -9,6 +9,7 @@
 #include "host/probe.hpp"
 #include "run_config/schema.hpp"
 
+#include <nlohmann/json.hpp>
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>

@@ -225,7 +225,8 @@ void OverlayChecks::check(ContractChecks &checks, std::uint64_t frame, const arh
         for (std::uint32_t x = 0; x < camera.intrinsics.width; ++x, alpha += 4) {
             if (*alpha == 0)
                 continue;
-            const bool in_region = x - region.x < region.width && y - region.y < region.height; // unsigned arithmetic
+            // Left of or above the region, the subtraction wraps to a large number.
+            const bool in_region = x - region.x < region.width && y - region.y < region.height;
             if (outside_region.empty() && !in_region)
                 outside_region = fmt::format(
                     "pixel ({}, {}) is outside the reported region, but has alpha {}; the region is {} x {} px at "

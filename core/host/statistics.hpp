@@ -4,15 +4,18 @@
 #pragma once
 
 #include "host/contract_checks.hpp"
-#include "supervise/component.hpp"
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
 #include <chrono>
 #include <cstdint>
 #include <map>
 #include <string>
 #include <vector>
+
+namespace arhost::supervise {
+class Component;
+}
 
 namespace arhost::host {
 

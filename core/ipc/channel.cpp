@@ -2,6 +2,7 @@
 #include "ipc/channel.hpp"
 
 #include "ipc/fd_passing.hpp"
+#include "ipc/message.hpp"
 
 #include <poll.h>
 #include <sys/socket.h>

@@ -7,20 +7,16 @@
 
 #include "base/unique_fd.hpp"
 
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 
-#include <optional>
+#include <initializer_list>
 #include <utility>
-#include <vector>
 
 namespace arhost::ipc {
 
 using Json = nlohmann::json;
 
-struct Message {
-    Json body; // an object with a string "type"
-    std::vector<base::UniqueFd> fds;
-};
+struct Message; // message.hpp
 
 enum class ReceiveState {
     message,

@@ -9,6 +9,7 @@
 
 #include <arhost/arhost.h>
 
+#include <optional>
 #include <string>
 #include <vector>
 

@@ -82,23 +82,27 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Progress, fraction, what)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Failed, status, text)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Reads, path, node)
 
-// "kind" is the index of the setup's type in the variant.
 void to_json(Json &json, const Create &create) {
     json["options"] = create.options;
-    std::visit([&](const auto &setup) { json["setup"] = setup; }, create.setup);
-    json["kind"] = create.setup.index();
+    std::visit(
+        [&]<class T>(const T &setup) {
+            json["setup"] = setup;
+            json["kind"] = T::kind;
+        },
+        create.setup);
 }
 
-template <std::size_t index = 0> Setup setup_from_json(const Json &json, std::size_t kind) {
-    if constexpr (index < std::variant_size_v<Setup>)
-        return kind == index ? Setup(json.get<std::variant_alternative_t<index, Setup>>())
-                             : setup_from_json<index + 1>(json, kind);
-    throw ProtocolViolation("unknown kind of setup");
+template <std::size_t index = 0> Setup setup_from_json(const Json &json, const std::string &kind) {
+    if constexpr (index < std::variant_size_v<Setup>) {
+        using T = std::variant_alternative_t<index, Setup>;
+        return kind == T::kind ? Setup(json.get<T>()) : setup_from_json<index + 1>(json, kind);
+    }
+    throw ProtocolViolation("unknown kind of setup '" + kind + "'");
 }
 
 void from_json(const Json &json, Create &create) {
     create = {json.at("options").get<std::vector<OptionValue>>(),
-              setup_from_json(json.at("setup"), json.at("kind").get<std::size_t>())};
+              setup_from_json(json.at("setup"), json.at("kind").get<std::string>())};
 }
 
 } // namespace messages

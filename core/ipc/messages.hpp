@@ -8,6 +8,7 @@
 #pragma once
 
 #include "ipc/json_abi.hpp"
+#include "ipc/message.hpp"
 #include "sandbox/sandbox.hpp"
 
 #include <stdexcept>
@@ -44,22 +45,27 @@ struct ListDevices {
     static constexpr const char *type = "list-devices";
 };
 
+// `kind` names the setup in Create's JSON.
 struct SourceSetup {
+    static constexpr const char *kind = "source";
     std::uint64_t first_sequence = 0;
     double fps = 0;
     bool paced = false;
     std::optional<arhost_intrinsics> intrinsics;
 };
 struct TrackerSetup {
+    static constexpr const char *kind = "tracker";
     arhost_frame_format format{};
     arhost_intrinsics intrinsics{};
     std::vector<arhost_marker_config> markers;
 };
 struct RaytracerSetup {
+    static constexpr const char *kind = "raytracer";
     std::uint32_t width = 0, height = 0;
     arhost_intrinsics intrinsics{};
 };
 struct SinkSetup {
+    static constexpr const char *kind = "sink";
     std::uint32_t width = 0, height = 0;
     double fps = 0;
     std::uint64_t first_sequence = 0;
@@ -111,9 +117,9 @@ struct Devices {
 // The plugin has started.
 struct Ready {
     static constexpr const char *type = "ready";
-    std::optional<arhost_frame_format> format;   // only of a source
-    std::uint64_t frame_count = 0;               // only of a source; 0: unknown
-    std::optional<arhost_intrinsics> intrinsics; // only of a source that knows its camera
+    std::optional<arhost_frame_format> format;   // set only by a source
+    std::uint64_t frame_count = 0;               // set only by a source; 0: unknown
+    std::optional<arhost_intrinsics> intrinsics; // set only by a source that knows its camera
 };
 
 struct Attached {

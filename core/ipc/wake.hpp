@@ -17,7 +17,7 @@
 
 namespace arhost::ipc {
 
-// The counter; part of the page of the side that calls `wake`.
+// The futex counter that wakes the worker. It is in the page that the host writes and the worker maps read-only.
 struct WakeWord {
     alignas(64) std::atomic<std::uint32_t> count;
 };

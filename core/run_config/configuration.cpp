@@ -122,7 +122,7 @@ FilesInUse files_read_by(const Configuration &configuration) {
     if (configuration.source) {
         read_all_of(*configuration.source);
         if (const auto path = path_of(configuration.source->node))
-            files.read_numbered(path->input_path()); // for a printf pattern, also registers the matching files
+            files.read_numbered(path->input_path()); // for a numbered file name, also registers the matching files
     }
     if (configuration.tracker)
         read_all_of(*configuration.tracker);

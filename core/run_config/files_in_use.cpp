@@ -16,7 +16,7 @@ bool are_digits(std::string_view text) {
     return text.find_first_not_of("0123456789") == std::string_view::npos;
 }
 
-// Parses a file name with a printf pattern; returns nullopt if sinks would not accept `name` as a pattern.
+// Parses a numbered file name; returns nullopt if sinks would not accept `name` as one.
 std::optional<NumberedName> numbered_name(const std::string &name) try {
     return NumberedName(name);
 } catch (const std::invalid_argument &) {

@@ -13,7 +13,7 @@
 namespace arhost::run_config {
 
 // Ensures that no output overwrites a file that the run reads or that another output writes. Detects symbolic and
-// hard links to the same file. A printf pattern (frame-%04d.png) represents all existing files that match it. All
+// hard links to the same file. A numbered file name (frame-%04d.png) represents all existing files that match it. All
 // functions throw yaml::Error, whose position is that of the output.
 class FilesInUse {
 public:

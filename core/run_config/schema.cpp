@@ -66,9 +66,10 @@ std::vector<Key> make_table() {
     };
     add_component(keys,
                   {"source", map, false, "",
-                   "Where frames come from. Optional if there is a `trajectory`; the frames are then black."},
+                   "Source of the video frames. Optional if there is a `trajectory`; the frames are then black."},
                   "source_synthetic",
-                  {{"path", input_path, false, "", "Input file or printf pattern, for plugins that read files."},
+                  {{"path", input_path, false, "",
+                    "Input file or numbered file name (frame_%05d.png), for plugins that read files."},
                    {"fps", real, false, "0", "Frames per second; 0: the source's own rate."},
                    conform});
     add(keys, "",
@@ -113,7 +114,7 @@ std::vector<Key> make_table() {
          {"coordinates.rotations", list, false, "", "One or two rotations, applied if the profiles differ."},
          {"coordinates.rotations[].degrees", real, true, "", "Angle in degrees, counter-clockwise."},
          {"coordinates.rotations[].axis", reals, true, "", "Three numbers, not all zero."}});
-    add_component(keys, {"outputs", list, false, "", "Where augmented frames go."}, "sink_video",
+    add_component(keys, {"outputs", list, false, "", "Outputs for the augmented frames."}, "sink_video",
                   {{"path", output_path, false, "",
                     "Output file, for plugins that write files; its folder becomes writable."}});
     add(keys, "",
@@ -122,10 +123,11 @@ std::vector<Key> make_table() {
             {"live.max_latency_ms", integer, false, "500",
              "If tracking and tracing take longer than this, in ms, frames are shown without overlay."},
 
-            {"restart", map, false, "", "How failed components are restarted."},
+            {"restart", map, false, "", "Restart policy for failed components."},
             {"restart.proven_after_frames", integer, false, "10",
              "A component that has delivered this many frames is restarted without delay or limit."},
-            {"restart.quarantine_after", integer, false, "5", "Consecutive failures before giving up."},
+            {"restart.quarantine_after", integer, false, "5",
+             "Consecutive failures after which a component is disabled."},
             {"restart.first_delay_ms", integer, false, "250",
              "Delay after the first failure, in ms; it doubles with each failure."},
             {"restart.longest_delay_ms", integer, false, "10000", "Longest delay, in ms."},

@@ -44,7 +44,7 @@ bool set_attributes(int tree, const char *path, unsigned flags, std::uint64_t at
     return ::syscall(SYS_mount_setattr, tree, path, flags, &change, sizeof change) == 0;
 }
 
-// What the new root contains.
+// The paths of the new root.
 class Contents {
 public:
     void grant(const fs::path &path, std::uint64_t attributes) {

@@ -46,7 +46,7 @@ bool contains(const std::filesystem::path &folder, const std::filesystem::path &
 // Grants read access to an absolute path that an option names. Returns false if the path does not exist or is too
 // broad: a folder that contains the home folder, or a path in /dev, /proc or /sys.
 bool allow_read(Policy &policy, const std::filesystem::path &file);
-// Like allow_read. If the path is a printf pattern (frame-%04d.png), grants access to its folder.
+// Like allow_read. If the path is a numbered file name (frame-%04d.png), grants access to its folder.
 void allow_read_files(Policy &policy, const std::filesystem::path &file_or_pattern);
 
 constexpr std::array<std::string_view, 4> modes = {"standard", "permissive", "strict", "none"};

@@ -260,10 +260,10 @@ void Component::on_died(const Death &death) {
         return stopped(is_sink ? ARHOST_STATUS_ERROR_INTERNAL : ARHOST_STATUS_OK, reason);
     }
     if (!configuration_error_.empty())
-        return give_up(configuration_error_, true);
+        return fall_back_or_disable(configuration_error_, true);
     // The process died before Hello, but the host did not kill it, so its library is unusable.
     if (description_.id.empty() && !death.by_host && death.signal != SIGKILL)
-        return give_up(plugin().string() + ": " + death.how, true);
+        return fall_back_or_disable(plugin().string() + ": " + death.how, true);
     restart(reason);
 }
 
@@ -276,14 +276,15 @@ void Component::record_crash(Crash crash) {
 void Component::restart(const std::string &reason) {
     const auto delay = policy_.delay_after_death(std::uniform_real_distribution<double>(0, 1)(jitter_));
     if (!delay)
-        return give_up(reason + "; it failed " + std::to_string(policy_.failures()) + " times in a row", false);
+        return fall_back_or_disable(reason + "; it failed " + std::to_string(policy_.failures()) + " times in a row",
+                                    false);
     const std::string wait = delay->count() ? " in " + std::to_string(delay->count()) + " ms" : "";
     context_.log(ARHOST_SEVERITY_WARNING, name_, reason + "; restarting it" + wait);
     ++restarts_;
     restart_timer_ = context_.reactor.at(Reactor::Clock::now() + *delay, [this] { spawn(); });
 }
 
-void Component::give_up(const std::string &reason, bool is_configuration_error) {
+void Component::fall_back_or_disable(const std::string &reason, bool is_configuration_error) {
     if (candidate_ + 1 < plugins_.size()) {
         context_.log(ARHOST_SEVERITY_WARNING, name_,
                      reason + "; falling back to " + plugins_[candidate_ + 1].stem().string());

@@ -44,7 +44,7 @@ public:
         // Called when the plugin has started. Returns the layout of its output slots (count 0: no slots); throws if
         // the values in `ready` are unsuitable.
         std::function<ipc::SlotLayout(const ipc::messages::Ready &ready)> ready;
-        std::function<void()> running; // commands may be submitted
+        std::function<void()> running; // called when the component accepts commands
         std::function<void(const ipc::Command &, const ipc::Result &)> result;
         // Called when the process has died. `unanswered`: the commands without a result, oldest first; the worker was
         // executing the first one.
@@ -110,7 +110,7 @@ private:
     void stop_when_idle();
     void record_crash(Crash crash);
     void restart(const std::string &reason);
-    void give_up(const std::string &reason, bool is_configuration_error);
+    void fall_back_or_disable(const std::string &reason, bool is_configuration_error);
     void stopped(arhost_status status, const std::string &text);
     void set_progress_deadline(std::chrono::milliseconds limit, const char *what);
     void set_frame_deadline();

@@ -106,7 +106,7 @@ void Process::receive_messages(int max_messages) {
             return;
         case ReceiveState::closed:
             channel_watch_.cancel();
-            // The worker usually exits next. If it has only closed its end, it is useless.
+            // A worker that closed its channel but does not exit within 1 s is killed.
             if (!ending())
                 kill_deadline_ = context_.reactor.at(Reactor::Clock::now() + std::chrono::seconds(1),
                                                      [this] { end("closed its control channel"); });

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Decides when a dead component is restarted, and when it is quarantined, which means that it is not restarted again.
+// Decides when a dead component is restarted, and when it is disabled, which means that it is not restarted again.
 #pragma once
 
 #include "base/limits.hpp"
@@ -17,12 +17,13 @@ public:
 
     void frame_done() { ++frames_in_process_, ++frames_total_; }
 
-    // Call this when the process has died. Returns the delay before the next start, or nullopt for quarantine.
+    // Call this when the process has died. Returns the delay before the next start, or nullopt if the component is to
+    // be disabled.
     //
     // A component is proven when it has completed proven_after_frames in total. If it is proven and the dead process
     // completed at least one frame, it restarts at once, however often it dies. Any other death counts as a failure:
     // the delay starts at first_delay and doubles with each failure up to longest_delay; after quarantine_after
-    // failures in a row, the component is quarantined. `jitter` (0 to 1) adds up to a quarter of the delay, so that
+    // failures in a row, the component is disabled. `jitter` (0 to 1) adds up to a quarter of the delay, so that
     // components that share a failed device do not restart at the same time.
     std::optional<std::chrono::milliseconds> delay_after_death(double jitter);
 

@@ -23,7 +23,7 @@ std::string joined(std::span<const std::string_view> list) {
     return text;
 }
 
-[[noreturn]] void refuse(const std::filesystem::path &file, const std::string &why) {
+[[noreturn]] void reject(const std::filesystem::path &file, const std::string &why) {
     throw std::runtime_error(file.string() + ": " + why);
 }
 
@@ -32,7 +32,7 @@ using NamedFunctions = std::initializer_list<std::pair<const char *, bool>>; // 
 void check_functions(const std::filesystem::path &file, NamedFunctions functions, const std::string &owner) {
     for (const auto &[name, is_present] : functions)
         if (!is_present)
-            refuse(file, "its function '" + std::string(name) + "' is NULL, but " + owner + " must have it");
+            reject(file, "its function '" + std::string(name) + "' is NULL, but " + owner + " must have it");
 }
 
 // Minimum sizes of the structs: their sizes in ABI version 1 (docs/abi.md).
@@ -48,13 +48,13 @@ void check_kind(const std::filesystem::path &file, const void *functions, PerFra
                 const std::string &owner) {
     const auto &f = *static_cast<const Functions *>(functions);
     if (f.struct_size < functions_size<Functions>)
-        refuse(file, "its function table is too small for " + owner + "; build it against this arhost's headers");
+        reject(file, "its function table is too small for " + owner + "; build it against this arhost's headers");
     check_functions(file, {{"start", f.start}, {name, f.*per_frame}, {"stop", f.stop}}, owner);
 }
 
 void check_kind(const std::filesystem::path &file, const arhost_plugin &plugin) {
     if (!plugin.functions)
-        refuse(file, "its function table (arhost_plugin.functions) is NULL");
+        reject(file, "its function table (arhost_plugin.functions) is NULL");
     switch (plugin.descriptor->kind) {
     case ARHOST_KIND_SOURCE:
         return check_kind<arhost_source>(file, plugin.functions, &arhost_source::read, "read", "a source");
@@ -66,11 +66,11 @@ void check_kind(const std::filesystem::path &file, const arhost_plugin &plugin) 
     case ARHOST_KIND_SINK:
         return check_kind<arhost_sink>(file, plugin.functions, &arhost_sink::write, "write", "a sink");
     default:
-        refuse(file, "its kind is " + std::to_string(plugin.descriptor->kind) + ", which is invalid");
+        reject(file, "its kind is " + std::to_string(plugin.descriptor->kind) + ", which is invalid");
     }
 }
 
-// Parts of the messages of glibc's dlopen if it can obtain no memory: which one depends on how far it got.
+// Substrings of dlopen's out-of-memory messages; the message depends on the step that failed.
 constexpr const char *dlopen_memory_errors[] = {"annot allocate ", "cannot create ", "cannot map zero-fill pages",
                                                 "cannot change memory protections", "failed to map segment"};
 
@@ -88,15 +88,15 @@ const arhost_entry_point &open_library(const std::filesystem::path &file) {
                 "'--reads FOLDER' to plugins and conform)";
         else if (std::ranges::any_of(dlopen_memory_errors, mentions))
             hint = " (out of memory: 'memory_mb' may be too small)";
-        refuse(file, "cannot be loaded: " + reason + hint);
+        reject(file, "cannot be loaded: " + reason + hint);
     }
     const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
     if (!entry)
-        refuse(file, "is not an arhost plugin: it exports no symbol 'arhost_entry'");
+        reject(file, "is not an arhost plugin: it exports no symbol 'arhost_entry'");
     if (entry->struct_size < entry_point_size)
-        refuse(file, "its arhost_entry is too small; build it against this arhost's headers");
+        reject(file, "its arhost_entry is too small; build it against this arhost's headers");
     if (!entry->negotiate)
-        refuse(file, "its arhost_entry has no negotiate function");
+        reject(file, "its arhost_entry has no negotiate function");
     return *entry;
 }
 
@@ -106,28 +106,28 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
     const arhost_status status = entry.negotiate(&offer, &answer);
     const std::string versions = "this arhost supports only ABI version " + std::to_string(ARHOST_ABI_VERSION);
     if (status != ARHOST_STATUS_OK)
-        refuse(file,
+        reject(file,
                "does not support the offered ABI version; " + versions + ": build the plugin against its headers");
     if (answer.abi_version < offer.oldest_abi_version || answer.abi_version > offer.newest_abi_version)
-        refuse(file, "chose ABI version " + std::to_string(answer.abi_version) + "; " + versions +
+        reject(file, "chose ABI version " + std::to_string(answer.abi_version) + "; " + versions +
                          ": build the plugin against its headers");
     const arhost_plugin *plugin = answer.plugin;
     if (!plugin)
-        refuse(file, "its negotiate returned no arhost_plugin");
+        reject(file, "its negotiate returned no arhost_plugin");
     if (plugin->struct_size < plugin_size)
-        refuse(file, "its arhost_plugin is too small; build it against this arhost's headers");
+        reject(file, "its arhost_plugin is too small; build it against this arhost's headers");
     if (!plugin->descriptor)
-        refuse(file, "its arhost_plugin has no descriptor");
+        reject(file, "its arhost_plugin has no descriptor");
     if (plugin->descriptor->struct_size < descriptor_size)
-        refuse(file, "its arhost_descriptor is too small; build it against this arhost's headers");
+        reject(file, "its arhost_descriptor is too small; build it against this arhost's headers");
     if (!plugin->descriptor->id)
-        refuse(file, "its arhost_descriptor has no id");
+        reject(file, "its arhost_descriptor has no id");
     const std::string id = plugin->descriptor->id;
     if (file.stem() != id && file.stem() != "lib" + id) // some build tools prepend "lib" to the file name
-        refuse(file, "its id is '" + id + "'; rename the file to match");
+        reject(file, "its id is '" + id + "'; rename the file to match");
     for (const char *const *need = plugin->descriptor->needs; need && *need; ++need)
         if (std::ranges::find(sandbox::allowances, *need) == sandbox::allowances.end())
-            refuse(file, std::string("it needs '") + *need +
+            reject(file, std::string("it needs '") + *need +
                              "', which this arhost cannot allow; a plugin may "
                              "need " +
                              joined(sandbox::allowances));
@@ -135,15 +135,15 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
         file, {{"create", plugin->create}, {"destroy", plugin->destroy}, {"get_extension", plugin->get_extension}},
         "every plugin");
     if (plugin->descriptor->option_count > 0 && !plugin->descriptor->options)
-        refuse(file, "its arhost_descriptor.option_count is not 0, but its options are NULL");
+        reject(file, "its arhost_descriptor.option_count is not 0, but its options are NULL");
     if (plugin->descriptor->option_count > 0 &&
         (plugin->descriptor->options->struct_size < option_size ||
          plugin->descriptor->options->struct_size % alignof(arhost_option_descriptor) != 0))
-        refuse(file, "the struct_size of its options does not match arhost_option_descriptor");
+        reject(file, "the struct_size of its options does not match arhost_option_descriptor");
     const auto options = ipc::options_of(*plugin->descriptor);
     if (const auto found = std::ranges::find(options, nullptr, &arhost_option_descriptor::key);
         found != options.end())
-        refuse(file, "its option " + std::to_string(found - options.begin()) + " has no key");
+        reject(file, "its option " + std::to_string(found - options.begin()) + " has no key");
     check_kind(file, *plugin);
     return *plugin;
 }

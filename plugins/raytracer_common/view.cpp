@@ -11,7 +11,7 @@ namespace {
 
 using Vec3d = shading::Vec3T<double>;
 
-[[noreturn]] void refuse(const std::string &message) {
+[[noreturn]] void reject(const std::string &message) {
     throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, message);
 }
 
@@ -25,15 +25,15 @@ void check_setup(const arhost_raytracer_setup &setup) {
     const arhost_intrinsics &in = *setup.intrinsics;
     if (setup.width < 1 || setup.height < 1 || setup.width > ARHOST_MAX_IMAGE_SIDE ||
         setup.height > ARHOST_MAX_IMAGE_SIDE)
-        refuse("the image's width and height must be 1 to " + std::to_string(ARHOST_MAX_IMAGE_SIDE) + " px");
+        reject("the image's width and height must be 1 to " + std::to_string(ARHOST_MAX_IMAGE_SIDE) + " px");
     if (in.width != setup.width || in.height != setup.height)
-        refuse("the intrinsics are for images of " + std::to_string(in.width) + "x" + std::to_string(in.height) +
+        reject("the intrinsics are for images of " + std::to_string(in.width) + "x" + std::to_string(in.height) +
                " px, but the image to render has " + std::to_string(setup.width) + "x" +
                std::to_string(setup.height) + " px");
     if (!all_finite({&in.fx, 4}))
-        refuse("the intrinsics' focal lengths and principal point must be finite");
+        reject("the intrinsics' focal lengths and principal point must be finite");
     if (!(in.fx > 0) || !(in.fy > 0))
-        refuse("the intrinsics' focal lengths must be above 0");
+        reject("the intrinsics' focal lengths must be above 0");
     const std::uint32_t count = in.coefficient_count;
     const bool fits = in.distortion == ARHOST_DISTORTION_NONE ? count == 0
                       : in.distortion == ARHOST_DISTORTION_BROWN
@@ -41,14 +41,14 @@ void check_setup(const arhost_raytracer_setup &setup) {
                       : in.distortion == ARHOST_DISTORTION_FISHEYE ? count == 4
                                                                    : false;
     if (!fits)
-        refuse("distortion model " + std::to_string(in.distortion) + " with " + std::to_string(count) +
+        reject("distortion model " + std::to_string(in.distortion) + " with " + std::to_string(count) +
                " coefficients is not supported (arhost/camera.h)");
     if (!all_finite({in.coefficients, count}))
-        refuse("the distortion coefficients must be finite");
+        reject("the distortion coefficients must be finite");
     if (setup.scene->magic != ARHOST_SCENE_MAGIC)
-        refuse("the scene is not an arena: its magic number is wrong (arhost/scene.h)");
+        reject("the scene does not begin with ARHOST_SCENE_MAGIC (arhost/scene.h)");
     if (setup.scene->version != ARHOST_SCENE_VERSION)
-        refuse("the scene's arena has version " + std::to_string(setup.scene->version) + ", but version " +
+        reject("the scene's arena has version " + std::to_string(setup.scene->version) + ", but version " +
                std::to_string(ARHOST_SCENE_VERSION) + " is required");
 }
 
@@ -67,18 +67,18 @@ bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
 
 Pose::Pose(const arhost_camera &camera) {
     if (!all_finite(camera.eye) || !all_finite(camera.look_at) || !all_finite(camera.up))
-        refuse("the camera's eye, look_at and up must be finite");
+        reject("the camera's eye, look_at and up must be finite");
     constexpr double limit_mm = 1e12; // farther away, numbers exceed the range of float or of Embree
     if (std::any_of(camera.eye, camera.eye + 3, [](double number) { return std::abs(number) > limit_mm; }))
-        refuse("the camera's eye must be within 1e12 mm of the world origin along each axis");
+        reject("the camera's eye must be within 1e12 mm of the world origin along each axis");
     eye = {camera.eye[0], camera.eye[1], camera.eye[2]};
     const Vec3d w = eye - Vec3d{camera.look_at[0], camera.look_at[1], camera.look_at[2]};
     const Vec3d up{camera.up[0], camera.up[1], camera.up[2]};
     const Vec3d u = cross(up, w);
     if (!(length(w) > 0))
-        refuse("the camera's look_at must differ from its eye");
+        reject("the camera's look_at must differ from its eye");
     if (!(length(u) > 1e-9 * length(up) * length(w)))
-        refuse("the camera's up is parallel to its view direction");
+        reject("the camera's up is parallel to its view direction");
     forward = w * (-1 / length(w));
     right = u * (1 / length(u));
     down = cross(forward, right);

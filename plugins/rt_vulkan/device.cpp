@@ -179,7 +179,7 @@ Buffer Buffer::imported(const Device &device, void *memory, VkDeviceSize size) {
                                           .allocationSize = info.size,
                                           .memoryTypeIndex = types[0]};
     VkDeviceMemory handle = VK_NULL_HANDLE;
-    // A driver may refuse to import some kinds of host memory.
+    // Some drivers cannot import every kind of host memory.
     if (vk.vkAllocateMemory(device.handle(), &allocation, nullptr, &handle) != VK_SUCCESS)
         return {};
     buffer.memory_ = Memory(device, handle);

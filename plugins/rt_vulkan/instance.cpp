@@ -366,7 +366,7 @@ const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, 
     if (wanted == "auto")
         return *std::max_element(devices.begin(), devices.end(),
                                  [](const PhysicalDevice &a, const PhysicalDevice &b) { return rank(a) < rank(b); });
-    const auto refuse = [&](const std::string &why) {
+    const auto reject = [&](const std::string &why) {
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "option 'device': " + why + " '" + wanted + "'; available: " + list_of(devices) +
                           "; use a number, a UUID, a unique part of a name, or 'auto'");
@@ -384,9 +384,9 @@ const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, 
     }
     const auto &matches = exact.empty() ? partial : exact;
     if (matches.size() > 1)
-        refuse("more than one device matches");
+        reject("more than one device matches");
     if (matches.empty())
-        refuse("no device matches");
+        reject("no device matches");
     return *matches[0];
 }
 

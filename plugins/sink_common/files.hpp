@@ -15,7 +15,7 @@
 
 namespace arhost::files {
 
-// Makes an error such as "cannot write 'out/film.mp4': No space left on device (free some space, or choose another
+// Makes an error such as "cannot write 'out/video.mp4': No space left on device (free some space, or choose another
 // path)".
 Failure io_failure(const std::string &what, const std::filesystem::path &file, int error_number);
 
@@ -29,7 +29,7 @@ void check_can_write(const std::filesystem::path &file);
 // Deletes a file if it exists.
 void remove_file(const std::filesystem::path &file);
 
-// Returns the path of a hidden file in the same folder: `out/film.mp4` → `out/.film.mp4<suffix>`.
+// Returns the path of a hidden file in the same folder: `out/video.mp4` → `out/.video.mp4<suffix>`.
 std::filesystem::path hidden_sibling(const std::filesystem::path &file, std::string_view suffix);
 
 class File {

@@ -10,7 +10,7 @@
 namespace arhost::video {
 
 struct EncoderSettings {
-    int width, height; // size of the input in px; the film is padded to even sizes
+    int width, height; // size of the input in px; the video is padded to even sizes
     AVRational fps;
     std::string codec; // "h264" or "mpeg4"
     int crf;

@@ -50,10 +50,10 @@ bool same_codec(const AVCodecParameters &a, const AVCodecParameters &b) {
                               std::span(b.extradata, static_cast<std::size_t>(b.extradata_size)));
 }
 
-// The joined film. The first frame creates its file and writes the header.
-class Film {
+// The joined video. The first frame creates its file and writes the header.
+class Video {
 public:
-    Film(const fs::path &path, const char *format, AVRational fps) : path_(path), format_(format), fps_(fps) {}
+    Video(const fs::path &path, const char *format, AVRational fps) : path_(path), format_(format), fps_(fps) {}
 
     std::int64_t frames() const { return frames_; }
 
@@ -120,16 +120,16 @@ private:
 
 } // namespace
 
-Segment segment_of(const fs::path &film, std::int64_t first) {
-    return {files::hidden_sibling(film, std::string(name_middle) + std::to_string(first) + std::string(name_end)),
+Segment segment_of(const fs::path &video, std::int64_t first) {
+    return {files::hidden_sibling(video, std::string(name_middle) + std::to_string(first) + std::string(name_end)),
             first};
 }
 
-std::vector<Segment> find_segments(const fs::path &film) {
-    const std::string start = files::hidden_sibling(film, name_middle).filename().string();
+std::vector<Segment> find_segments(const fs::path &video) {
+    const std::string start = files::hidden_sibling(video, name_middle).filename().string();
     std::vector<Segment> found;
     for (const fs::directory_entry &entry :
-         fs::directory_iterator(film.has_parent_path() ? film.parent_path() : fs::path("."))) {
+         fs::directory_iterator(video.has_parent_path() ? video.parent_path() : fs::path("."))) {
         const std::string name = entry.path().filename().string();
         if (!name.starts_with(start) || !name.ends_with(name_end) || name.size() <= start.size() + name_end.size())
             continue;
@@ -164,9 +164,9 @@ void SegmentWriter::flush(int code) {
     check_written(output_->pb->error, path_);
 }
 
-std::int64_t join(const std::vector<Segment> &segments, const fs::path &film, const char *format, AVRational fps,
+std::int64_t join(const std::vector<Segment> &segments, const fs::path &video, const char *format, AVRational fps,
                   const std::function<void(double)> &progress, const std::function<void(const std::string &)> &warn) {
-    Film joined(film, format, fps);
+    Video joined(video, format, fps);
     for (std::size_t i = 0; i < segments.size(); ++i) {
         const fs::path &path = segments[i].path;
         AVFormatContext *context = nullptr;
@@ -181,7 +181,7 @@ std::int64_t join(const std::vector<Segment> &segments, const fs::path &film, co
         const InputPointer segment(context);
         if (segment->nb_streams != 1)
             throw Failure(ARHOST_STATUS_ERROR_IO,
-                          "'" + path.string() + "' cannot be read as a segment of the film; delete it");
+                          "'" + path.string() + "' cannot be read as a segment of the video; delete it");
         joined.append(*segment, path,
                       i + 1 < segments.size() ? segments[i + 1].first : std::numeric_limits<std::int64_t>::max(),
                       progress);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A film is written in segments, which are joined at the end. Each start of the sink begins a new segment. A segment
+// A video is written in segments, which are joined at the end. Each start of the sink begins a new segment. A segment
 // is a Matroska file with one cluster per frame, because all complete clusters of a truncated file can be read. (The
 // same is true for fragmented MP4, but there libav loses the gaps between frames.)
 #pragma once
@@ -19,8 +19,8 @@ struct Segment {
     std::int64_t first;         // number of its first frame
 };
 
-Segment segment_of(const std::filesystem::path &film, std::int64_t first);
-std::vector<Segment> find_segments(const std::filesystem::path &film); // sorted by `first`
+Segment segment_of(const std::filesystem::path &video, std::int64_t first);
+std::vector<Segment> find_segments(const std::filesystem::path &video); // sorted by `first`
 
 class SegmentWriter {
 public:
@@ -35,10 +35,10 @@ private:
     OutputPointer output_;
 };
 
-// Copies the packets of all segments to `film`. `format` is libav's name of the file format ("mp4"). If two segments
-// have the same frame, takes it from the later segment. Returns the number of frames; if it is 0, `film` is unusable.
-// Calls `progress` regularly with a fraction from 0 to 1, and `warn` with messages for the user.
-std::int64_t join(const std::vector<Segment> &segments, const std::filesystem::path &film, const char *format,
+// Copies the packets of all segments to `video`. `format` is libav's name of the file format ("mp4"). If two segments
+// have the same frame, takes it from the later segment. Returns the number of frames; if it is 0, `video` is
+// unusable. Calls `progress` regularly with a fraction from 0 to 1, and `warn` with messages for the user.
+std::int64_t join(const std::vector<Segment> &segments, const std::filesystem::path &video, const char *format,
                   AVRational fps, const std::function<void(double)> &progress,
                   const std::function<void(const std::string &)> &warn);
 

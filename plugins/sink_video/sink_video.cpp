@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// sink_video: writes a film. Encodes each frame immediately and writes it to a segment file. Each restart begins a
-// new segment. At the end, joins all segments without re-encoding and atomically replaces the film.
+// sink_video: writes a video. Encodes each frame immediately and writes it to a segment file. Each restart begins a
+// new segment. At the end, joins all segments without re-encoding and atomically replaces the video.
 #include "encoder.hpp"
 #include "segments.hpp"
 #include "sink_common/files.hpp"
@@ -40,7 +40,7 @@ AVRational rational(double fps) {
     if (fps < 0.001 || fps > 500)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "the source has " + std::to_string(fps) +
-                          " frames per second, but a film must have 0.001 to 500; set 'fps' of the source");
+                          " frames per second, but a video must have 0.001 to 500; set 'fps' of the source");
     return av_d2q(fps, 65535); // MPEG-4 stores the denominator in 16 bits
 }
 
@@ -116,12 +116,12 @@ private:
             else
                 has_beginning |= segment.first == 0;
         files::remove_file(partial_);
-        // When the film is complete, stop() deletes segment 0 first. A restarted sink therefore knows from the
-        // missing segment 0 that the film is complete.
+        // When the video is complete, stop() deletes segment 0 first. A restarted sink therefore knows from the
+        // missing segment 0 that the video is complete.
         std::error_code ignored;
         finished_ = first_ > 0 && !has_beginning && fs::exists(path_, ignored);
         if (first_ > 0 && !has_beginning && !finished_)
-            host_.warn("the part of the film before frame " + std::to_string(first_) + " is lost: '" +
+            host_.warn("the part of the video before frame " + std::to_string(first_) + " is lost: '" +
                        segment_of(path_, 0).path.string() + "' does not exist");
         writer_.emplace(segment_of(path_, first_).path, encoder_->context());
     }
@@ -130,7 +130,7 @@ private:
         try {
             const std::int64_t frames = join(
                 segments, partial_, format_, settings_.fps,
-                [&](double fraction) { host_.progress(fraction, "finishing the film"); },
+                [&](double fraction) { host_.progress(fraction, "finishing the video"); },
                 [&](const std::string &text) { host_.warn(text); });
             if (frames == 0)
                 host_.warn("'" + path_.string() + "' was not written, because there were no frames");
@@ -151,14 +151,14 @@ private:
     std::optional<SegmentWriter> writer_;
     std::int64_t first_ = 0; // number of the first frame
     bool failed_ = false;    // the segment could not be opened
-    bool finished_ = false;  // a previous process completed the film, but was killed before it acknowledged this
+    bool finished_ = false;  // a previous process completed the video, but was killed before it acknowledged this
 };
 
 constexpr const char *codecs[] = {"h264", "mpeg4", nullptr};
 constexpr const char *presets[] = {"ultrafast", "superfast", "veryfast", "faster",   "fast",
                                    "medium",    "slow",      "slower",   "veryslow", nullptr};
 constexpr arhost_option_descriptor options[] = {
-    option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The film to write: .mp4, .mkv or .mov."),
+    option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "Video file to write: .mp4, .mkv or .mov."),
     option(ARHOST_OPTION_TEXT, "codec", "h264", "Video codec: h264 or mpeg4.", 0, 0, codecs),
     option(ARHOST_OPTION_INTEGER, "crf", "18",
            "Quality: 0 (best; lossless with h264) to 51 (worst); 18 is visually lossless.", 0, 51),
@@ -171,11 +171,11 @@ constexpr arhost_descriptor descriptor = {
     sizeof(arhost_descriptor),
     ARHOST_KIND_SINK,
     "sink_video",
-    "Film",
+    "Video",
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "Writes frames to a film file; survives kills and restarts.",
+    "Writes frames to a video file; survives kills and restarts.",
     0,
     std::size(options),
     options,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Text for messages about paths.
+// Formats paths and the contents of folders for messages.
 #pragma once
 
 #include <filesystem>

@@ -29,8 +29,8 @@ private:
     cv::Mat image_; // the current image, 8-bit, 1 or 3 channels
 };
 
-// Returns the files that match a numbered name ("frames/image_%04d.png"), from number `start` (−1: the lowest number
-// that exists) up to the first missing number. Throws Failure if there are no such files.
+// Returns the files that match a numbered file name ("frames/image_%04d.png"), from number `start` (−1: the lowest
+// number that exists) up to the first missing number. Throws Failure if there are no such files.
 std::vector<std::filesystem::path> numbered_files(const std::filesystem::path &path, std::int64_t start,
                                                   const Host &host);
 

@@ -41,7 +41,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     : name_("the video " + quoted(file)), host_(host), log_(log),
       packet_(libav::allocated<libav::PacketPointer>(av_packet_alloc())),
       frame_(libav::allocated<libav::FramePointer>(av_frame_alloc())) {
-    const auto refuse = [&](const std::string &why) {
+    const auto rejection = [&](const std::string &why) {
         if (host_.cancelled())
             return Failure(ARHOST_STATUS_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
         return Failure(ARHOST_STATUS_ERROR_CONFIGURATION, name_ + " cannot be read: " + why + log_.take_reason());
@@ -60,14 +60,14 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     const int opened = checked(avformat_open_input(&context, ("file:" + file.string()).c_str(), nullptr, &options));
     av_dict_free(&options);
     if (opened < 0)
-        throw refuse(libav::error_text(opened));
+        throw rejection(libav::error_text(opened));
     file_.reset(context);
     if (const int found = checked(avformat_find_stream_info(context, nullptr)); found < 0)
-        throw refuse(libav::error_text(found));
+        throw rejection(libav::error_text(found));
 
     const int index = av_find_best_stream(context, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
     if (index < 0 || context->streams[index]->disposition & AV_DISPOSITION_ATTACHED_PIC)
-        throw refuse("it has no video stream");
+        throw rejection("it has no video stream");
     stream_ = context->streams[index];
     for (unsigned i = 0; i < context->nb_streams; ++i)
         if (context->streams[i] != stream_)
@@ -75,8 +75,8 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
 
     const AVCodec *decoder = avcodec_find_decoder(stream_->codecpar->codec_id);
     if (!decoder)
-        throw refuse(std::string("libavcodec on this machine has no decoder for '") +
-                     avcodec_get_name(stream_->codecpar->codec_id) + "'; convert it: ffmpeg -i … -c:v libx264 …");
+        throw rejection(std::string("libavcodec on this machine has no decoder for '") +
+                        avcodec_get_name(stream_->codecpar->codec_id) + "'; convert it: ffmpeg -i … -c:v libx264 …");
     codec_ = libav::allocated<libav::CodecPointer>(avcodec_alloc_context3(decoder));
     checked(avcodec_parameters_to_context(codec_.get(), stream_->codecpar));
     codec_->pkt_timebase = stream_->time_base;
@@ -85,7 +85,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     codec_->thread_type = FF_THREAD_SLICE;
     codec_->thread_count = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U));
     if (const int ready = checked(avcodec_open2(codec_.get(), decoder, nullptr)); ready < 0)
-        throw refuse(std::string("the decoder '") + decoder->name + "' cannot start: " + libav::error_text(ready));
+        throw rejection(std::string("the decoder '") + decoder->name + "' cannot start: " + libav::error_text(ready));
 
     const AVRational rate = av_guess_frame_rate(context, stream_, nullptr);
     fps_ = rate.num > 0 && rate.den > 0 ? av_q2d(rate) : 30.0;
@@ -95,7 +95,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     if (first == ARHOST_STATUS_ERROR_CANCELLED)
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "opening " + name_ + " was cancelled");
     if (first >= ARHOST_STATUS_END)
-        throw refuse("none of its pictures can be decoded" + (end_fault_.empty() ? decoder_fault_ : end_fault_));
+        throw rejection("none of its pictures can be decoded" + (end_fault_.empty() ? decoder_fault_ : end_fault_));
 }
 
 arhost_status Decoder::next() {
@@ -199,7 +199,8 @@ int Decoder::quarter_turns() const {
     const bool mirrored = static_cast<double>(matrix[0]) * matrix[4] < static_cast<double>(matrix[1]) * matrix[3];
     if (mirrored || !(std::abs(clockwise - 90 * quarters) < 0.5))
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      name_ + " is marked as " + (mirrored ? "mirrored" : "rotated by an angle") +
+                      name_ + " is marked as " +
+                          (mirrored ? "mirrored" : "rotated by an angle that is no multiple of 90°") +
                           ", which is unsupported; convert it with ffmpeg -i … -c:v libx264 …");
     return (static_cast<int>(quarters) + 4) % 4;
 }
@@ -268,7 +269,7 @@ void Video::check_size() const {
                           "×" + std::to_string(height_));
 }
 
-// Warns once, although a loop reaches the same position repeatedly.
+// Warns only once per fault: a video that is played in a loop has the same fault in each pass.
 void Video::warn_once(const std::string &fault, bool &warned) const {
     if (fault.empty() || warned)
         return;

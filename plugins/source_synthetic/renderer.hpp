@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The camera: samples the desk through the lens, then adds vignetting, blur, noise and the sRGB curve.
+// The simulated camera: samples the image of the desk through the lens model, then applies vignetting, blur, noise
+// and the sRGB curve.
 #pragma once
 
 #include "desk.hpp"

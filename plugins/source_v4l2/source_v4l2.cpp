@@ -145,7 +145,7 @@ private:
         const std::string camera = "the camera '" + path_ + "' (" + device_->card() + ")";
         if (set.pixelformat != chosen.fourcc)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          camera + " refuses " + arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
+                          camera + " rejects " + arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
                               ", although it lists " + device_->describe_formats());
         if (demanded && size != Size{set.width, set.height})
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
@@ -203,7 +203,7 @@ private:
         format.yuv_range = range == V4L2_QUANTIZATION_FULL_RANGE ? ARHOST_YUV_RANGE_FULL : ARHOST_YUV_RANGE_LIMITED;
     }
 
-    // Waits for a picture and describes its format. Only a picture tells the chroma subsampling.
+    // Waits for a picture and describes its format. The chroma subsampling is known only from a picture.
     void describe_first_picture(arhost_frame_format &format) {
         for (const auto give_up = Clock::now() + silence_limit;;) {
             host_.progress(-1, "waiting for the camera's first picture");

@@ -31,7 +31,7 @@ public:
     nlohmann::json json(const std::string &name) const { return nlohmann::json::parse(read(name)); }
     std::filesystem::path path(const std::string &name) const { return run_.path(name); }
 
-    // A link to the wrong plugin of this kind that selects the defect.
+    // Creates a link to the wrong plugin; the link's name selects the defect.
     std::filesystem::path link_wrong(const std::string &defect, const std::string &kind = "rt") const {
         const std::filesystem::path link = path(kind + "_" + defect + ".so");
         std::filesystem::create_symlink(std::string(ARHOST_WRONG_PLUGIN_DIRECTORY "/") +

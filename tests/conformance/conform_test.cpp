@@ -292,7 +292,7 @@ TEST(Conform, PassesNoDescriptorsToThePlugin) {
     EXPECT_THAT(run.output(), Not(HasSubstr("secret")));
 }
 
-// The process that rt_hangs_beside_a_process started.
+// Returns the pid of the process that rt_hangs_with_child_process started.
 pid_t wait_for_process(const ConformRun &run) {
     const std::string label = "process ";
     for (int i = 0; i < 5000; ++i) {
@@ -307,8 +307,8 @@ pid_t wait_for_process(const ConformRun &run) {
 
 TEST(Conform, KillsProcessesStartedByATest) {
     ConformRun run;
-    EXPECT_EQ(run.run({run.link_wrong("hangs_beside_a_process").string(), "--only", "abi.create", "--allow",
-                       "processes"}), // no timeout factor: abi.load must end in time
+    EXPECT_EQ(run.run({run.link_wrong("hangs_with_child_process").string(), "--only", "abi.create", "--allow",
+                       "processes"}), // default timeout factor, because abi.load must not time out
               1);
     EXPECT_THAT(run.output(), HasSubstr("timeout  abi.create"));
     EXPECT_FALSE(is_alive(wait_for_process(run)));
@@ -318,8 +318,8 @@ TEST(Conform, LeavesNothingBehindIfInterrupted) {
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
         ConformRun run;
         std::filesystem::create_directory(run.path("tmp"));
-        run.start({run.link_wrong("hangs_beside_a_process").string(), "--only", "abi.create", "--allow", "processes",
-                   "--json", "results.json"},
+        run.start({run.link_wrong("hangs_with_child_process").string(), "--only", "abi.create", "--allow",
+                   "processes", "--json", "results.json"},
                   [&] {
                       ::setenv("TMPDIR", run.path("tmp").c_str(), 1);
                       std::signal(signal, SIG_DFL); // this test's parent may ignore it
@@ -350,7 +350,7 @@ TEST(Conform, FailsInvalidDescriptors) {
         {{"long_name", "abi.load", "the descriptor's 'name' has 5000000 bytes; the maximum is 4096"},
          {"many_options", "abi.load", "bytes as JSON; the limit is 130048: declare fewer options"},
          {"option_without_key", "abi.load", "its option 1 has no key"},
-         {"description_is_no_utf8", "abi.descriptor", "the descriptor's description is not UTF-8: \"Bas\ufffd"}}};
+         {"description_not_utf8", "abi.descriptor", "the descriptor's description is not UTF-8: \"Bas\ufffd"}}};
     for (const auto &[defect, test, why] : cases) {
         ConformRun run;
         EXPECT_EQ(run.run({run.link_wrong(defect).string(), "--only", "abi.*"}), 1);
@@ -523,8 +523,8 @@ TEST(Conform, RunsThePluginInTheSandbox) {
 
 TEST(Conform, LetsAPluginWriteOnlyToTheTestsFolder) {
     ConformRun run;
-    const std::string plugin = run.link_wrong("caches_beside_its_library", "sink").string();
-    const std::filesystem::path cache = run.path("sink_caches_beside_its_library.cache");
+    const std::string plugin = run.link_wrong("writes_beside_library", "sink").string();
+    const std::filesystem::path cache = run.path("sink_writes_beside_library.cache");
     EXPECT_EQ(run.run({plugin, "--only", "sink.start"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("cannot write " + cache.string()));
     EXPECT_FALSE(std::filesystem::exists(cache));
@@ -534,7 +534,7 @@ TEST(Conform, LetsAPluginWriteOnlyToTheTestsFolder) {
 
 TEST(Conform, ReportsAnUnknownNeed) {
     ConformRun run;
-    EXPECT_EQ(run.run({run.link_wrong("needs_what_is_unknown").string(), "--only", "abi.load"}), 1);
+    EXPECT_EQ(run.run({run.link_wrong("unknown_need").string(), "--only", "abi.load"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("it needs 'bluetooth', which this arhost cannot allow; a plugin may need "
                                         "video, usb, gpu, display, network, processes"));
 }

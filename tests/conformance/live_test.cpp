@@ -153,8 +153,8 @@ TEST(LiveConformance, ReportsSourceViolations) {
     expect_violations(writes_later, {"source.frame-stays"});
     expect_violations(with_counters("ahead_ms: 300", "", ""), {"source.capture-time"});
     for (const auto &[defect, check] :
-         {std::pair("changes_clocks", "source.clock"), std::pair("begins_before_0", "source.capture-time"),
-          std::pair("times_jump", "source.rate"), std::pair("microseconds", "source.rate")}) {
+         {std::pair("changes_clocks", "source.clock"), std::pair("negative_media_time", "source.capture-time"),
+          std::pair("times_jump", "source.rate"), std::pair("times_in_microseconds", "source.rate")}) {
         Parts parts;
         parts.source = wrong("source", defect, "fps: 50");
         parts.camera = "{width: 62, height: 46, fx: 70}";
@@ -173,7 +173,7 @@ TEST(LiveConformance, ReportsTrackerViolations) {
 
 TEST(LiveConformance, ReportsRayTracerViolations) {
     expect_violations(with_raytracer("opaque_background"), {"raytracer.place", "raytracer.region"});
-    expect_violations(with_raytracer("small_region"), {"raytracer.region"});
+    expect_violations(with_raytracer("region_too_narrow"), {"raytracer.region"});
     Parts writes_later = with_counters("", "", "writes_later: true");
     writes_later.output =
         "{plugin: sink_counter, path: counted.txt, options: {delay_ms: 10}}"; // images wait in the queue

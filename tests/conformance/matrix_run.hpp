@@ -19,7 +19,7 @@ inline std::string whole_suite(const WrongPlugin &wrong) {
 inline void expect_found(const WrongPlugin &wrong, const std::string &tests) {
     ConformRun run;
     const std::filesystem::path plugin = run.link_wrong(wrong.defect, wrong.kind);
-    const bool hangs = wrong.verdict == "timeout"; // shortens the wait
+    const bool hangs = wrong.verdict == "timeout"; // a plugin that hangs gets a short timeout
     const int status = run.run({plugin.string(), "--only", tests, "--jobs", "1", "--timeout-factor",
                                 hangs ? "0.3" : "3", "--json", "results.json"});
     std::vector<std::string> found_by;
@@ -27,7 +27,7 @@ inline void expect_found(const WrongPlugin &wrong, const std::string &tests) {
     for (const nlohmann::json &result : report.at("results"))
         if (const std::string verdict = result.at("verdict"); verdict != "pass" && verdict != "skip") {
             if (verdict == "warn" && wrong.verdict != "warn")
-                continue; // this machine is slow
+                continue; // ignore speed warnings: the machine may be slow
             found_by.push_back(result.at("test"));
             EXPECT_EQ(verdict, wrong.verdict) << found_by.back();
         }

@@ -20,7 +20,7 @@ INSTANTIATE_TEST_SUITE_P(
                     OwnPlugin{"FileVideo", "source_file", {"path=in/a.mp4"}},
                     OwnPlugin{"Camera", "source_v4l2", {}, "video"},
                     OwnPlugin{"Images", "sink_images", {"path=%03d.png"}},
-                    OwnPlugin{"Video", "sink_video", {"path=film.mp4"}},
+                    OwnPlugin{"Video", "sink_video", {"path=video.mp4"}},
                     OwnPlugin{"Poses", "sink_poses", {"path=poses.jsonl"}},
                     OwnPlugin{"Trajectory", "sink_trajectory", {"path=run.trajectory.jsonl"}},
                     OwnPlugin{"Null", "sink_null", {}}, OwnPlugin{"Window", "sink_window", {}, "display"}),

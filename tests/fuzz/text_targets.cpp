@@ -82,7 +82,7 @@ void run_pattern(Bytes bytes) {
         pattern.number(text.substr(std::min(name.size() + 1, text.size())));
         for (const std::uint64_t number : {std::uint64_t(0), std::uint64_t(12345), ~std::uint64_t(0)})
             if (pattern.number(pattern.name(number)) != number)
-                throw std::logic_error("a numbered name does not read back " + pattern.name(number));
+                throw std::logic_error("a numbered file name does not read back " + pattern.name(number));
     } catch (const std::invalid_argument &) {
     }
 }

@@ -72,17 +72,17 @@ TEST_P(AllowList, ContainsTheCallsOf) {
     EXPECT_THAT(missing_calls(run), testing::IsEmpty());
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Plugins, AllowList,
-    testing::Values(
-        Case{"SyntheticArucoEmbreeVideo", "source: {plugin: source_synthetic}\n"
-                                          "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
-                                          "raytracer: {plugin: rt_embree, scene: scene.yaml}\n"
-                                          "outputs: [{plugin: sink_video, path: out/video.mkv}, "
-                                          "{plugin: sink_poses, path: out/poses.jsonl}, {plugin: sink_null}]\n"},
-        Case{"FileAprilTagImages", "source: {plugin: source_file, path: in/video.mp4}\n"
-                                   "camera: {width: 1280, height: 720, fx: 900}\n"
-                                   "tracker: {plugin: tracker_apriltag, markers: [{id: 0, side_mm: 80}]}\n"
-                                   "outputs: [{plugin: sink_images, path: out/frame-%04d.png}, "
-                                   "{plugin: sink_trajectory, path: out/path.txt}]\n"}),
-    [](const auto &info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(Plugins, AllowList,
+                         testing::Values(Case{"SyntheticArucoEmbreeVideo",
+                                              "source: {plugin: source_synthetic}\n"
+                                              "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+                                              "raytracer: {plugin: rt_embree, scene: scene.yaml}\n"
+                                              "outputs: [{plugin: sink_video, path: out/video.mkv}, "
+                                              "{plugin: sink_poses, path: out/poses.jsonl}, {plugin: sink_null}]\n"},
+                                         Case{"FileAprilTagImages",
+                                              "source: {plugin: source_file, path: in/video.mp4}\n"
+                                              "camera: {width: 1280, height: 720, fx: 900}\n"
+                                              "tracker: {plugin: tracker_apriltag, markers: [{id: 0, side_mm: 80}]}\n"
+                                              "outputs: [{plugin: sink_images, path: out/frame-%04d.png}, "
+                                              "{plugin: sink_trajectory, path: out/path.txt}]\n"}),
+                         [](const auto &info) { return info.param.name; });

@@ -91,9 +91,9 @@ const std::vector<Case> cases = {
      small_scene,
      {"run.yaml:3:", "source_counter has no option 'path'"}},
     {"PluginRejectsOptions",
-     replaced(good, "scene.yaml, options: {", "scene.yaml, options: {refuse: true"),
+     replaced(good, "scene.yaml, options: {", "scene.yaml, options: {reject: true"),
      small_scene,
-     {"run.yaml:5:", "raytracer", "rejected, as the option 'refuse' requests"}},
+     {"run.yaml:5:", "raytracer", "rejected, as the option 'reject' requests"}},
     {"NoPlugin",
      replaced(good, "rt_counter", "no_plugin"),
      small_scene,
@@ -332,12 +332,12 @@ TEST(Check, FailsIfTheSceneLoadsTooSlowly) {
 TEST(BadInput, KeepsTheOutputsOfAnEarlierRun) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 5}}\n"
                   "outputs:\n- {plugin: sink_poses, path: poses.jsonl}\n- {plugin: sink_images, path: last.png}\n"
-                  "- {plugin: sink_video, path: film.mp4}\n- {plugin: sink_video, path: film.avi}\n");
-    for (const char *name : {"poses.jsonl", "last.png", "film.mp4"})
+                  "- {plugin: sink_video, path: video.mp4}\n- {plugin: sink_video, path: video.avi}\n");
+    for (const char *name : {"poses.jsonl", "last.png", "video.mp4"})
         run.write(name, "old");
     EXPECT_EQ(run.run(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("film.avi"));
-    for (const char *name : {"poses.jsonl", "last.png", "film.mp4"})
+    EXPECT_THAT(run.output(), HasSubstr("video.avi"));
+    for (const char *name : {"poses.jsonl", "last.png", "video.mp4"})
         EXPECT_EQ(run.read(name), "old") << name;
     for (const auto &entry : std::filesystem::directory_iterator(run.path("")))
         EXPECT_NE(entry.path().filename().string()[0], '.') << entry.path() << " was left behind";
@@ -370,7 +370,7 @@ TEST(BadCommandLine, IsRejected) {
     }
 }
 
-TEST(FullDisk, OnStandardOutputIsAnError) {
+TEST(FullDisk, FailsIfStandardOutputCannotBeWritten) {
     ArhostRun run(good);
     run.write("scene.yaml", small_scene);
     for (const std::vector<std::string> &arguments :

@@ -16,8 +16,8 @@ using testing::HasSubstr;
 
 namespace {
 
-int frames_of(const std::filesystem::path &film) {
-    cv::VideoCapture video(film.string());
+int frames_of(const std::filesystem::path &file) {
+    cv::VideoCapture video(file.string());
     cv::Mat picture;
     int count = 0;
     while (video.read(picture))
@@ -25,7 +25,7 @@ int frames_of(const std::filesystem::path &film) {
     return count;
 }
 
-std::string film_yaml(const std::string &outputs) {
+std::string video_yaml(const std::string &outputs) {
     return "version: 1\nsource: {plugin: source_synthetic, options: {frames: 40, width: 160, height: 120}}\n"
            "outputs:\n" +
            outputs;
@@ -86,16 +86,16 @@ TEST(Motion, IsRenderedAtTheFramesTime) {
     EXPECT_GT(different_pixels("0020.png"), 200);
 }
 
-TEST(Film, TruncatedInputIsReportedByTheExitStatus) {
-    ArhostRun run(film_yaml("- {plugin: sink_video, path: film.mkv}\n"));
+TEST(VideoFile, ATruncatedInputSetsTheExitStatus) {
+    ArhostRun run(video_yaml("- {plugin: sink_video, path: video.mkv}\n"));
     ASSERT_EQ(run.run(), 0) << run.output();
-    ASSERT_EQ(frames_of(run.path("film.mkv")), 40);
-    const std::string film = run.read("film.mkv");
-    run.write("film.mkv", film.substr(0, film.size() * 6 / 10));
-    run.write("again.yaml", "version: 1\nsource: {plugin: source_file, path: film.mkv}\n"
+    ASSERT_EQ(frames_of(run.path("video.mkv")), 40);
+    const std::string video = run.read("video.mkv");
+    run.write("video.mkv", video.substr(0, video.size() * 6 / 10));
+    run.write("again.yaml", "version: 1\nsource: {plugin: source_file, path: video.mkv}\n"
                             "outputs: [{plugin: sink_poses, path: poses.jsonl}]\nstats: stats.json\n");
     EXPECT_EQ(run.run({"--config", "again.yaml"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("film.mkv' is truncated: it ends after frame "));
+    EXPECT_THAT(run.output(), HasSubstr("video.mkv' is truncated: it ends after frame "));
     EXPECT_THAT(
         run.output(),
         HasSubstr("again.yaml:2:9: source: the input is truncated; the frames before the truncation are kept"));
@@ -106,10 +106,10 @@ TEST(Film, TruncatedInputIsReportedByTheExitStatus) {
     EXPECT_EQ(run.stats()["frames"]["composited"], kept);
 }
 
-TEST(Film, OnAFullDiskFailsButOtherOutputsContinue) {
-    ArhostRun run(film_yaml("- {plugin: sink_video, path: full/film.mp4}\n"
-                            "- {plugin: sink_images, path: \"full/%04d.png\"}\n"
-                            "- {plugin: sink_images, path: \"%04d.png\"}\n"));
+TEST(VideoFile, AFullDiskFailsItButOtherOutputsContinue) {
+    ArhostRun run(video_yaml("- {plugin: sink_video, path: full/video.mp4}\n"
+                             "- {plugin: sink_images, path: \"full/%04d.png\"}\n"
+                             "- {plugin: sink_images, path: \"%04d.png\"}\n"));
     std::filesystem::create_directory(run.path("full"));
     constexpr int no_mount = 99;
     run.start({"--config", "run.yaml"}, [] {

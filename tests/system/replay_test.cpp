@@ -83,7 +83,7 @@ TEST(Replay, ReproducesTheRecordedImagesByteForByte) {
     EXPECT_EQ(run.stats()["frames"]["augmented"], 40 - lost);
 }
 
-TEST(Replay, WithPipelineRunsTheTrackerButUsesTheRecordedPoses) {
+TEST(Replay, PipelineOptionRunsTheTrackerButUsesTheRecordedPoses) {
     ArhostRun run(recording());
     ASSERT_EQ(run.run(), 0) << run.output();
     // Without the occlusion, the tracker finds the marker in more frames than in the recorded run.
@@ -108,7 +108,7 @@ TEST(Replay, WithPipelineRunsTheTrackerButUsesTheRecordedPoses) {
     EXPECT_FALSE(run.exists("recorded.stats.json")) << "the configuration's own outputs are ignored";
 }
 
-TEST(Replay, WithoutPipelineRunsOnlyTheRayTracer) {
+TEST(Replay, RunsOnlyTheRayTracerByDefault) {
     ArhostRun run;
     record_counted(run, 50, "lost_from: 10, lost_to: 20");
     ASSERT_EQ(run.run({"replay", "--trajectory", "t.txt", "--scene", "scene.yaml", "--raytracer", "rt_counter",
@@ -125,7 +125,7 @@ TEST(Replay, WithoutPipelineRunsOnlyTheRayTracer) {
     EXPECT_GT(stats["fps"], 0.0);
 }
 
-TEST(Replay, WithoutPipelineUsesABlackBackground) {
+TEST(Replay, UsesABlackBackgroundByDefault) {
     ArhostRun run;
     record_counted(run, 30, "lost_from: 10, lost_to: 20");
     ASSERT_EQ(run.run({"replay", "--trajectory", "t.txt", "--scene", "scene.yaml", "--raytracer", "rt_counter",
@@ -216,7 +216,7 @@ TEST(Replay, ReadsTheDissertationsTrajectories) {
     EXPECT_EQ(run.stats()["frames"]["augmented"], 4289);
 }
 
-TEST(Replay, WithPipelineNeedsNoConfiguration) {
+TEST(Replay, PipelineOptionNeedsNoConfiguration) {
     ArhostRun run;
     record_counted(run, 4);
     ASSERT_EQ(run.run({"replay", "--trajectory", "t.txt", "--scene", "scene.yaml", "--with-pipeline", "--frames", "3",

@@ -157,7 +157,7 @@ TEST(Supervision, APluginThatCallsExitIsRestarted) {
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 2);
 }
 
-TEST(Supervision, GivingUpABackendLosesNoFrame) {
+TEST(Supervision, DisablingABackendLosesNoFrame) {
     struct Case {
         const char *tracker, *raytracer, *component;
     };
@@ -175,7 +175,7 @@ TEST(Supervision, GivingUpABackendLosesNoFrame) {
     }
 }
 
-TEST(Supervision, GivingUpAnOutputLosesNoFrameOfTheOthers) {
+TEST(Supervision, DisablingAnOutputLosesNoFrameOfTheOthers) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 60}}\n"
                   "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: second.txt, "
                   "options: {crash_at: 20}}\nrestart: {proven_after_frames: 1000, quarantine_after: 1}\n");
@@ -301,7 +301,7 @@ TEST_P(FatalError, RestartsTheWorker) {
         EXPECT_EQ(run.stats()["restarts"][component], 2) << component << ": the frame is retried once";
 }
 
-TEST_P(FatalError, OnEveryFrameEndsThePlugin) {
+TEST_P(FatalError, DisablesThePluginIfEveryFrameFails) {
     ArhostRun run(counting("lockstep", "frames: 40", "", "answer: " + std::to_string(GetParam().first),
                            "restart: {first_delay_ms: 1, quarantine_after: 3}\n"));
     run.write("scene.yaml", small_scene);
@@ -329,7 +329,7 @@ TEST(Supervision, APluginThatNeverWorksFailsTheRun) {
     EXPECT_FALSE(run.exists("counted.txt")) << "a run that could not start must not create outputs";
 }
 
-TEST(Supervision, TheFallbackReplacesAPluginThatIsGivenUp) {
+TEST(Supervision, TheFallbackReplacesADisabledPlugin) {
     ArhostRun run(counting("lockstep", "frames: 30", "", "crash_in_create: true",
                            "restart: {first_delay_ms: 1, quarantine_after: 2}\n"));
     run.write("scene.yaml", small_scene);
@@ -389,7 +389,7 @@ TEST(Supervision, SurvivesRandomKillsAndStops) {
     expect_all_frames_in_order(run, frames);
 }
 
-TEST(Supervision, ASinkThatCannotWriteIsGivenUpAndOthersContinue) {
+TEST(Supervision, ASinkThatCannotWriteIsDisabledAndOthersContinue) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 50}}\n"
                   "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: second.txt, "
                   "options: {error_at: 5}}\n");
@@ -415,7 +415,7 @@ TEST(Supervision, ACaptureTimeInTheFutureCausesARestartWithoutLosingFrames) {
     EXPECT_EQ(run.stats()["restarts"]["source"], 1);
 }
 
-TEST(Supervision, ASourceWithOnlyFutureCaptureTimesIsGivenUp) {
+TEST(Supervision, ASourceWithOnlyFutureCaptureTimesIsDisabled) {
     ArhostRun run(counting("lockstep", "frames: 30, ahead_ms: 3600000", "", "",
                            "restart: {first_delay_ms: 1, quarantine_after: 3}\n"));
     run.write("scene.yaml", small_scene);

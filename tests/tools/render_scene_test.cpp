@@ -61,7 +61,7 @@ TEST_F(RenderScene, ShowsMovingObjectsAtTheGivenTime) {
     EXPECT_EQ(picture("moving", ""), picture("moving", "--time 0"));
 }
 
-TEST_F(RenderScene, RefusesToOverwriteSceneInputs) {
+TEST_F(RenderScene, RejectsAnOutputThatIsASceneInput) {
     const fs::path scene = folder() / "wood.png";
     std::ofstream(scene) << "version: 1\n";
     const std::string named = " " + scene.string() + " --output " + (folder() / "link.png").string();
@@ -136,26 +136,26 @@ TEST_F(RenderScene, PassesOptionsToThePlugin) {
 }
 
 TEST_F(RenderScene, ReportsErrorsOfThePluginAndItsOptions) {
-    const auto refused = [&](const std::string &options, const std::string &samples = "") {
+    const auto rejected = [&](const std::string &options, const std::string &samples = "") {
         EXPECT_EQ(picture("demo", options, samples), "") << options;
         EXPECT_TRUE(failed()) << options;
         return printed();
     };
-    EXPECT_THAT(refused("--raytracer rt_embre"),
+    EXPECT_THAT(rejected("--raytracer rt_embre"),
                 HasSubstr("--raytracer: there is no plugin 'rt_embre'; did you mean 'rt_embree'?"));
-    EXPECT_THAT(refused("--raytracer ./nowhere.so"), HasSubstr("--raytracer: there is no plugin '"));
-    EXPECT_THAT(refused("--raytracer sink_null"), HasSubstr("--raytracer: 'sink_null' is a sink, not a ray tracer"));
-    EXPECT_THAT(refused("--raytracer " ARHOST_TEST_PLUGIN_DIRECTORY "/no_plugin.so"),
+    EXPECT_THAT(rejected("--raytracer ./nowhere.so"), HasSubstr("--raytracer: there is no plugin '"));
+    EXPECT_THAT(rejected("--raytracer sink_null"), HasSubstr("--raytracer: 'sink_null' is a sink, not a ray tracer"));
+    EXPECT_THAT(rejected("--raytracer " ARHOST_TEST_PLUGIN_DIRECTORY "/no_plugin.so"),
                 HasSubstr("is not an arhost plugin"));
-    EXPECT_THAT(refused("--set sampels=4"), HasSubstr("--set: sampels: unknown key; did you mean 'samples'?"));
-    EXPECT_THAT(refused("--set samples=1000"), HasSubstr("--set: samples: "));
-    EXPECT_THAT(refused("--set samples"), HasSubstr("--set samples: the argument must be key=value"));
-    EXPECT_THAT(refused("--raytracer " + counter, "--samples 2"), HasSubstr("--samples: samples: unknown key"));
-    // The plugin's log message, followed by the failed call.
+    EXPECT_THAT(rejected("--set sampels=4"), HasSubstr("--set: sampels: unknown key; did you mean 'samples'?"));
+    EXPECT_THAT(rejected("--set samples=1000"), HasSubstr("--set: samples: "));
+    EXPECT_THAT(rejected("--set samples"), HasSubstr("--set samples: the argument must be key=value"));
+    EXPECT_THAT(rejected("--raytracer " + counter, "--samples 2"), HasSubstr("--samples: samples: unknown key"));
+    // Expects the plugin's log message, then the failed call.
     EXPECT_THAT(
-        refused("--set refuse=true --raytracer " + counter),
+        rejected("--set reject=true --raytracer " + counter),
         HasSubstr(
-            "rejected, as the option 'refuse' requests\nrender-scene: rt_counter: create: configuration error"));
-    EXPECT_THAT(refused("--set error_at=13 --eye 0,0,513 --raytracer " + counter),
+            "rejected, as the option 'reject' requests\nrender-scene: rt_counter: create: configuration error"));
+    EXPECT_THAT(rejected("--set error_at=13 --eye 0,0,513 --raytracer " + counter),
                 HasSubstr("rt_counter: render: internal error"));
 }

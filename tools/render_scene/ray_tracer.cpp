@@ -9,6 +9,8 @@
 #include "scene/motion.hpp"
 #include "worker/library.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>

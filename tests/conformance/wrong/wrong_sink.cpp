@@ -22,7 +22,7 @@ Failure write_failure(const std::string &file) {
     return Failure(ARHOST_STATUS_ERROR_IO, "cannot write " + file + ": " + std::strerror(errno));
 }
 
-// Unbuffered.
+// Writes to a file without buffering.
 void write_file(const std::string &file, const std::string &bytes, int flags) {
     const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | flags, 0666);
     if (fd < 0)
@@ -71,27 +71,27 @@ public:
         if (has("hang_in_start"))
             hang();
         is_starting_ = true;
-        if (has("starts_once") && std::exchange(is_in_use, true))
+        if (has("cannot_restart") && std::exchange(is_in_use, true))
             throw Failure(ARHOST_STATUS_ERROR_IO, "the file is busy");
         if (has("start_cancelled_is_internal") && host_.cancelled())
             throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "unexpected cancellation");
-        if (has("caches_beside_its_library"))
+        if (has("writes_beside_library"))
             write_file(library_file().replace_extension(".cache"), "sizes", O_TRUNC);
-        if (has("refuses_odd_sizes_without_a_word") && setup.width % 2)
+        if (has("rejects_odd_sizes_silently") && setup.width % 2)
             throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "");
         if (has("leaks_descriptors_in_start"))
             (void)::dup(0);
         shared_path = path_;
         fresh_ = setup.first_sequence == 0;
-        log_ = fresh_ || has("forgets_on_restart") ? "" : kept_before(setup.first_sequence);
+        log_ = fresh_ || has("truncates_log_on_restart") ? "" : kept_before(setup.first_sequence);
         waiting_.clear();
         next_ = setup.first_sequence;
-        if (!has("looks_for_no_place")) {
+        if (!has("no_write_check_in_start")) {
             fs::create_directories(fs::path(path_).parent_path());
             write_file(path_ + ".try", "", O_TRUNC);
             ::unlink((path_ + ".try").c_str());
         }
-        if (has("empties_at_start") && fresh_)
+        if (has("truncates_log_in_start") && fresh_)
             write_file(path_ + ".log", "", O_TRUNC);
         if (!fresh_ && !has("writes_no_file"))
             write_file(path_ + ".log", log_, O_TRUNC);
@@ -114,7 +114,7 @@ public:
             crash();
         if (has("crash_on_64_markers") && record.marker_count == ARHOST_MAX_MARKERS)
             crash();
-        if (has("wants_every_number") && record.sequence != next_)
+        if (has("rejects_gaps") && record.sequence != next_)
             throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "a frame is missing");
         if (has("cancelled_is_internal") && host_.cancelled())
             return ARHOST_STATUS_ERROR_INTERNAL;
@@ -131,15 +131,15 @@ public:
             return ARHOST_STATUS_OK;
         const auto begin = std::chrono::steady_clock::now();
         std::string pixels;
-        for (std::uint32_t y = 0; y < output.height + has("reads_a_row_more"); ++y)
+        for (std::uint32_t y = 0; y < output.height + has("reads_past_the_frame"); ++y)
             pixels.append(reinterpret_cast<const char *>(output.bgr) + std::size_t{stride(output)} * y,
                           std::size_t{3} * output.width);
-        if (has("writes_the_frame_before"))
+        if (has("writes_previous_frame"))
             pixels.swap(before_);
         const std::string line =
-            has("writes_the_frame_before") ? std::to_string(record.sequence) + "\n" : line_of(record);
+            has("writes_previous_frame") ? std::to_string(record.sequence) + "\n" : line_of(record);
         waiting_.emplace_back(record.sequence, pixels, line);
-        if (!(has("writes_frames_in_pairs") && waiting_.size() < 2) && !has("keeps_all_to_its_end"))
+        if (!(has("writes_frames_in_pairs") && waiting_.size() < 2) && !has("buffers_until_stop"))
             write_waiting();
         is_late_ = has("drops_frames_on_a_slow_disk") && path_.find("/slow/") != std::string::npos &&
                    std::chrono::steady_clock::now() - begin > std::chrono::milliseconds(80);
@@ -169,14 +169,14 @@ private:
     };
 
     static std::uint32_t stride(const arhost_output &output) {
-        return has("rows_follow_each_other") ? 3 * output.width : output.stride;
+        return has("ignores_the_stride") ? 3 * output.width : output.stride;
     }
 
     std::string kept_before(std::uint64_t first) const {
         std::ifstream old(path_ + ".log");
         std::string kept;
         for (std::string line; std::getline(old, line);)
-            if (has("writes_twice_on_restart") || std::stoull(line) < first)
+            if (has("repeats_frames_on_restart") || std::stoull(line) < first)
                 kept += line + "\n";
         return kept;
     }
@@ -194,7 +194,7 @@ private:
         if (lines.empty() || has("writes_no_file"))
             return;
         const bool is_first = std::exchange(fresh_, false) && !has("appends_to_an_old_log");
-        if (has("newest_first")) {
+        if (has("reverses_log")) {
             log_ = is_first ? lines : lines + log_;
             write_file(path + ".part", log_, O_TRUNC);
             fs::rename(path + ".part", path + ".log");
@@ -208,7 +208,7 @@ private:
             return;
         const std::uint64_t number = has("writes_each_frame_twice") ? 2 * frame.sequence : frame.sequence;
         const std::string name = path + std::to_string(number), part = path + ".part";
-        if (has("half_files")) {
+        if (has("partial_files")) {
             const std::size_t half = frame.pixels.size() / 2;
             write_file(name, frame.pixels.substr(0, half), O_TRUNC);
             std::this_thread::sleep_for(std::chrono::milliseconds(20));
@@ -217,12 +217,12 @@ private:
             try {
                 write_file(part, frame.pixels, O_TRUNC);
             } catch (const Failure &) {
-                if (has("half_files_on_a_full_disk"))
+                if (has("partial_files_on_a_full_disk"))
                     fs::rename(part, name);
                 throw;
             }
-            // Before the rename: after a kill between the two, the files must equal those after some frame.
-            if (has("exchanges_frames") && frame.sequence % 4 == 3)
+            // Swap before the rename, so that a kill between the two leaves the files of a completed frame.
+            if (has("swaps_frames") && frame.sequence % 4 == 3)
                 ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, (path + std::to_string(frame.sequence - 1)).c_str(),
                             RENAME_EXCHANGE);
             fs::rename(part, name);
@@ -231,12 +231,12 @@ private:
             write_file(part, frame.pixels, O_TRUNC);
             fs::rename(part, path + std::to_string(number + 1));
         }
-        if (has("writes_more_files")) // their names sort first
+        if (has("writes_extra_files")) // file names that sort before the frames' files
             for (const std::string &more : {"a" + std::to_string(frame.sequence), std::string("last")}) {
                 write_file(part, frame.line, O_TRUNC);
                 fs::rename(part, fs::path(path).replace_filename(more));
             }
-        if (has("dates_its_files"))
+        if (has("writes_timestamps"))
             write_file(name, std::to_string(std::chrono::steady_clock::now().time_since_epoch().count()), O_APPEND);
     }
 

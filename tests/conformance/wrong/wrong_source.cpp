@@ -36,7 +36,7 @@ public:
             crash();
         if (has("hang_in_start"))
             hang();
-        if (has("starts_once") && std::exchange(is_in_use, true))
+        if (has("cannot_restart") && std::exchange(is_in_use, true))
             throw Failure(ARHOST_STATUS_ERROR_IO, "the device is busy");
         if (has("start_cancelled_is_internal") && host_.cancelled())
             throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "unexpected cancellation");
@@ -44,7 +44,7 @@ public:
             start_failed_ = true;
             throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled");
         }
-        if (has("one_rate_alone") && setup.fps > 0 && setup.fps != 25)
+        if (has("one_frame_rate") && setup.fps > 0 && setup.fps != 25)
             throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, "only 25 frames/s are supported");
         if (has("opens_a_socket")) {
             const int fd = ::socket(AF_INET, SOCK_DGRAM, 0);
@@ -55,7 +55,7 @@ public:
         if (has("leaks_descriptors_in_start"))
             (void)::dup(0);
         delivered_ = 0;
-        fps_ = setup.fps > 0 && !has("own_rate") ? setup.fps : 25;
+        fps_ = setup.fps > 0 && !has("ignores_frame_rate") ? setup.fps : 25;
         paced_ = setup.paced != 0;
         first_ = position = setup.first_sequence;
         start_time_ = Clock::now() - time_of(first_);
@@ -67,14 +67,16 @@ public:
         format.height = 46;
         format.fps = fps_;
         arhost_frame_layout(&format);
-        if (has("own_stride"))
+        if (has("stride_without_padding"))
             format.stride[0] = 3 * format.width;
-        if (has("small_slot"))
+        if (has("slot_too_small"))
             format.byte_size -= 64;
-        properties.frame_count = has("frame_more") ? frames_ + 1 : has("frame_less") ? frames_ - 1 : frames_;
+        properties.frame_count = has("frame_count_too_high")  ? frames_ + 1
+                                 : has("frame_count_too_low") ? frames_ - 1
+                                                              : frames_;
         properties.has_intrinsics = 1;
         arhost_intrinsics &camera = properties.intrinsics;
-        camera.width = has("camera_of_other_size") ? 640 : format.width;
+        camera.width = has("intrinsics_of_other_size") ? 640 : format.width;
         camera.height = format.height;
         camera.fx = has("no_focal_length") ? 0 : 70;
         camera.fy = 70;
@@ -103,25 +105,26 @@ public:
             std::this_thread::sleep_for(std::chrono::milliseconds(120));
         if (has("cancelled_is_internal") && host_.cancelled())
             return ARHOST_STATUS_ERROR_INTERNAL;
-        std::uint64_t n = has("one_position_for_all") ? position : first_ + delivered_;
-        if (has("resumes_one_late") && first_ > 0)
+        std::uint64_t n = has("shared_position") ? position : first_ + delivered_;
+        if (has("resumes_one_frame_late") && first_ > 0)
             ++n;
         if (has("resumes_at_0"))
             n -= first_;
         if (n >= frames_ && has("crash_at_end"))
             crash();
-        if (n >= frames_ && has("end_that_comes_back") && !std::exchange(at_end_, true))
+        if (n >= frames_ && has("frames_after_end") && !std::exchange(at_end_, true))
             return ARHOST_STATUS_END;
-        if (n >= frames_ && has("end_is_an_error"))
+        if (n >= frames_ && has("error_instead_of_end"))
             return ARHOST_STATUS_ERROR_IO;
-        if (n >= frames_ && !has("end_that_comes_back"))
+        if (n >= frames_ && !has("frames_after_end"))
             return ARHOST_STATUS_END;
         if (paced_) {
-            if (const auto due = start_time_ + time_of(n); has("deaf_while_it_waits"))
+            if (const auto due = start_time_ + time_of(n); has("ignores_cancel_while_waiting"))
                 std::this_thread::sleep_until(due);
             else if (!host_.wait_until(due))
-                return has("waits_end_in_internal") ? ARHOST_STATUS_ERROR_INTERNAL : ARHOST_STATUS_ERROR_CANCELLED;
-            if (has("silent_about_skipped")) {
+                return has("cancelled_wait_is_internal") ? ARHOST_STATUS_ERROR_INTERNAL
+                                                         : ARHOST_STATUS_ERROR_CANCELLED;
+            if (has("skips_silently")) {
                 const auto late = static_cast<std::uint64_t>(std::max(0.0, delay_s(n) * fps_));
                 n += late;
                 delivered_ += late;
@@ -161,15 +164,15 @@ private:
             info.capture_ns = time_of(4).count();
         if (has("times_jump") && n >= 6)
             info.capture_ns += 3'600'000'000'000;
-        if (has("skips_minus_1") && n > 0)
+        if (has("skipped_count_underflow") && n > 0)
             info.skipped = 0xffffffff;
-        if (has("begins_before_0"))
+        if (has("negative_media_time"))
             info.capture_ns -= 1'000'000'000;
-        if (has("microseconds"))
+        if (has("times_in_microseconds"))
             info.capture_ns /= 1000;
-        if (has("times_from_now"))
+        if (has("times_since_creation"))
             info.capture_ns += created_.time_since_epoch().count();
-        if (has("unix_time")) {
+        if (has("times_since_unix_epoch")) {
             info.clock = ARHOST_CLOCK_MONOTONIC;
             info.capture_ns += 1'700'000'000'000'000'000;
         }
@@ -189,9 +192,9 @@ private:
 
     void paint(std::uint64_t n, const arhost_frame_buffer &buffer) const {
         const arhost_frame_format &format = *buffer.format;
-        if (has("another_in_each_instance"))
+        if (has("differs_per_instance"))
             n += instance_;
-        if (has("depends_on_reads_before") && delivered_ > 1)
+        if (has("depends_on_earlier_reads") && delivered_ > 1)
             n += 100;
         const std::uint32_t rows = format.height - has("unwritten_row"),
                             columns = format.width - has("unwritten_column");
@@ -209,9 +212,9 @@ private:
                     grey[x] = bgr[3 * x + 1];
             }
         }
-        if (has("writes_behind"))
+        if (has("writes_past_end"))
             std::memset(buffer.plane[0] + format.byte_size, 0, 64);
-        if (has("writes_before"))
+        if (has("writes_before_start"))
             buffer.plane[0][-1] = 0;
     }
 

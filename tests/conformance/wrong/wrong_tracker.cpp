@@ -54,19 +54,19 @@ Wrong &wrong(arhost_instance *instance) {
 // ---- Modified input ----------------------------------------------------------------------------------
 
 arhost_intrinsics modify(arhost_intrinsics in) {
-    if (has("half_a_pixel")) {
+    if (has("pixel_centres_at_half")) {
         in.cx += 0.5;
         in.cy += 0.5;
     }
     if (has("focal_1_percent"))
         in.fx *= 1.01, in.fy *= 1.01;
-    if (has("square_pixels"))
+    if (has("fx_as_fy"))
         in.fy = in.fx;
     if (has("centred_principal_point")) {
         in.cx = (in.width - 1) / 2.0;
         in.cy = (in.height - 1) / 2.0;
     }
-    if (has("no_lens") || (has("fisheye_is_none") && in.distortion == ARHOST_DISTORTION_FISHEYE)) {
+    if (has("no_lens") || (has("ignores_fisheye") && in.distortion == ARHOST_DISTORTION_FISHEYE)) {
         in.distortion = ARHOST_DISTORTION_NONE;
         in.coefficient_count = 0;
     }
@@ -79,23 +79,23 @@ arhost_intrinsics modify(arhost_intrinsics in) {
 
 std::vector<arhost_marker_config> listed_in(const arhost_tracker_setup &setup) {
     std::vector<arhost_marker_config> all;
-    const std::size_t step = has("steps_by_its_own_size") ? sizeof(arhost_marker_config) : setup.markers->struct_size;
+    const std::size_t step = has("ignores_struct_size") ? sizeof(arhost_marker_config) : setup.markers->struct_size;
     for (std::uint32_t i = 0; i < setup.marker_count; ++i) {
         const auto *bytes = reinterpret_cast<const std::byte *>(setup.markers) + i * step;
         all.push_back(*reinterpret_cast<const arhost_marker_config *>(bytes));
         all.back().struct_size = sizeof(arhost_marker_config);
     }
-    if (has("side_is_half"))
+    if (has("side_as_half_side"))
         for (arhost_marker_config &marker : all)
             marker.side_mm *= 2;
-    if (has("one_side"))
+    if (has("one_side_for_all_markers"))
         for (arhost_marker_config &marker : all)
             marker.side_mm = all[0].side_mm;
-    if (has("ignores_the_list"))
+    if (has("reports_unlisted_markers"))
         for (const int id : {31, 7, 586, 2})
             if (std::ranges::find(all, id, &arhost_marker_config::id) == all.end())
                 all.push_back({sizeof(arhost_marker_config), id, 80});
-    if (has("order_of_ids"))
+    if (has("sorted_by_id"))
         std::ranges::sort(all, {}, &arhost_marker_config::id);
     return all;
 }
@@ -182,7 +182,7 @@ void modify(Wrong &self, arhost_marker &marker, const arhost_marker_config &conf
                 std::swap(m[4 * i + j], m[4 * j + i]);
     if (has("metres"))
         std::for_each_n(m + 12, 3, [](double &x) { x /= 1000; });
-    if (has("corner_is_the_origin"))
+    if (has("origin_at_corner"))
         move_along(-config.side_mm / 2, -config.side_mm / 2);
     if (has("single_precision"))
         std::for_each_n(m, 12, [](double &x) { x = static_cast<float>(x); });
@@ -192,7 +192,7 @@ void modify(Wrong &self, arhost_marker &marker, const arhost_marker_config &conf
         marker.mt_alternative[5] = std::numeric_limits<double>::quiet_NaN();
     if (has("no_struct_size"))
         marker.struct_size = 0;
-    if (has("family_without_end"))
+    if (has("unterminated_family"))
         std::memset(marker.family, 'x', sizeof marker.family);
     if (has("age_counts_frames"))
         marker.age_frames = self.tracks + 1;
@@ -201,7 +201,7 @@ void modify(Wrong &self, arhost_marker &marker, const arhost_marker_config &conf
     if (has("corners_at_half"))
         for (auto &corner : marker.corners_px)
             corner[0] += 0.5, corner[1] += 0.5;
-    if (has("whole_pixels"))
+    if (has("rounded_corners"))
         for (auto &corner : marker.corners_px)
             corner[0] = std::round(corner[0]), corner[1] = std::round(corner[1]);
     const bool has_other = marker.mt_alternative[15] != 0;
@@ -225,9 +225,9 @@ void modify_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &r
         modify(self, marker, *std::ranges::find(self.listed, marker.id, &arhost_marker_config::id));
     if (has("swapped_ids") && markers.size() > 1)
         std::swap(markers[0].id, markers[1].id);
-    if (has("finds_large_ones_only") && !markers.empty() && longest_side_px(markers[0]) < 60)
+    if (has("finds_only_large_markers") && !markers.empty() && longest_side_px(markers[0]) < 60)
         drop_all();
-    if (has("gives_up_when_tilted") && !markers.empty() && markers[0].mt[10] < std::cos(0.9))
+    if (has("finds_nothing_when_tilted") && !markers.empty() && markers[0].mt[10] < std::cos(0.9))
         drop_all();
     const Pixels pixels(frame);
     if ((has("needs_sharp_edges") && pixels.max_step() < 90 && pixels.max_code() > 200) ||
@@ -246,7 +246,7 @@ void modify_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &r
         marker.mt[14] = -distance;
     }
     const bool has_last = self.last->marker_count > 0;
-    const bool predicts = has("predicts") || has("age_stays_1") || has("forgets_its_pose");
+    const bool predicts = has("predicts") || has("lost_age_is_1") || has("lost_without_pose");
     if ((has("smooths") || predicts) && !markers.empty() && has_last) {
         for (int i = 12; i < 15; ++i)
             markers[0].mt[i] = (markers[0].mt[i] + self.last->markers[0].mt[i]) / 2;
@@ -256,12 +256,12 @@ void modify_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &r
     if (predicts && markers.empty() && has_last) {
         result = *self.last;
         arhost_marker &lost = result.markers[0];
-        lost.age_frames = has("age_stays_1") ? 1 : lost.age_frames + 1;
+        lost.age_frames = has("lost_age_is_1") ? 1 : lost.age_frames + 1;
         lost.state = lost.age_frames > 5 ? ARHOST_MARKER_LOST : ARHOST_MARKER_PREDICTED;
-        if (has("forgets_its_pose") && lost.state == ARHOST_MARKER_LOST)
+        if (has("lost_without_pose") && lost.state == ARHOST_MARKER_LOST)
             std::fill_n(lost.mt, 12, 0.0);
     }
-    if (has("never_settles") && !markers.empty()) {
+    if (has("never_updates_pose") && !markers.empty()) {
         if (!has_last)
             *self.last = result;
         std::copy_n(self.last->markers[0].mt, 16, markers[0].mt);
@@ -269,9 +269,9 @@ void modify_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &r
         return;
     }
     const arhost_tracker_result now = result;
-    if ((has("stale_pose") || (has("holds_what_is_gone") && result.marker_count == 0)) && has_last)
+    if ((has("stale_pose") || (has("reports_lost_as_detected") && result.marker_count == 0)) && has_last)
         result = *self.last;
-    if (has("only_fresh_frames") && frame.sequence == self.last_sequence && self.tracks > 0)
+    if (has("ignores_repeated_frames") && frame.sequence == self.last_sequence && self.tracks > 0)
         drop_all();
     *self.last = now;
 }
@@ -287,7 +287,7 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
     for (const auto &declared : std::span(real().descriptor->options, real().descriptor->option_count)) {
         modified.push_back(*arhost_find_option(options, count, declared.key));
         modified.back().struct_size = sizeof(arhost_option);
-        if (declared.key == std::string_view("corner_refinement") && has("trusts_rough_corners"))
+        if (declared.key == std::string_view("corner_refinement") && has("uses_occluder_edges"))
             modified.back().text = "none";
     }
     const arhost_status status = real().create(host, modified.data(), count, &created->real);
@@ -310,7 +310,7 @@ arhost_status start(arhost_instance *instance, const arhost_tracker_setup *setup
     if (has("leaves_a_thread"))
         std::thread(hang).detach();
     const bool again = std::exchange(was_started, true);
-    if (has("starts_once") && again)
+    if (has("cannot_restart") && again)
         return ARHOST_STATUS_ERROR_INTERNAL;
     if (!again)
         first_camera = *setup->intrinsics;
@@ -368,7 +368,7 @@ arhost_status track(arhost_instance *instance, const arhost_frame *input, arhost
         leak_memory(4096);
     if (has("cancelled_is_internal") && self.host->cancelled(self.host))
         return ARHOST_STATUS_ERROR_INTERNAL;
-    if (has("refuses_older_frames") && self.tracks > 0 && frame.capture_ns < self.last_capture_ns)
+    if (has("rejects_older_frames") && self.tracks > 0 && frame.capture_ns < self.last_capture_ns)
         return ARHOST_STATUS_ERROR_INVALID_ARGUMENT;
     if (has("finds_nothing"))
         return ARHOST_STATUS_OK;
@@ -382,11 +382,11 @@ arhost_status track(arhost_instance *instance, const arhost_frame *input, arhost
         format.grey_stride = format.stride[0];
     }
     arhost_status status = real_functions().track(self.real, &frame, result);
-    if (status == ARHOST_STATUS_OK && has("mirrored_too") && result->marker_count == 0) {
+    if (status == ARHOST_STATUS_OK && has("finds_mirrored_prints") && result->marker_count == 0) {
         mirror(self, frame);
         status = real_functions().track(self.real, &frame, result);
     }
-    if (status == ARHOST_STATUS_OK && has("a_record_a_sighting") && result->marker_count == 1) {
+    if (status == ARHOST_STATUS_OK && has("one_record_per_detection") && result->marker_count == 1) {
         const arhost_marker first = result->markers[0];
         std::uint8_t *copy = copied(self, frame);
         const auto [left, right] = std::ranges::minmax(

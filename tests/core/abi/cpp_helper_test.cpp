@@ -10,8 +10,8 @@ namespace {
 class Thrower {
 public:
     Thrower(const arhost::Host &, const arhost::Options &options) {
-        if (options.boolean("refuse"))
-            throw arhost::Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "refused");
+        if (options.boolean("reject"))
+            throw arhost::Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "rejected");
     }
     void start(const arhost_tracker_setup &) { throw std::runtime_error("no luck"); }
     void track(const arhost_frame &, arhost_tracker_result &) { throw std::bad_alloc(); }
@@ -23,7 +23,7 @@ public:
     }
     static inline bool no_devices = false;
 };
-constexpr arhost_option_descriptor options[] = {arhost::option(ARHOST_OPTION_BOOL, "refuse", "false", "Fails")};
+constexpr arhost_option_descriptor options[] = {arhost::option(ARHOST_OPTION_BOOL, "reject", "false", "Fails")};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_TRACKER,
                                           "thrower",
@@ -59,14 +59,14 @@ TEST(CppHelper, ConvertsExceptionsToStatusesAndMessages) {
     EXPECT_EQ(answer.abi_version, ARHOST_ABI_VERSION);
     const auto &tracker = *static_cast<const arhost_tracker *>(answer.plugin->functions);
 
-    arhost_option refuse{sizeof refuse, ARHOST_OPTION_BOOL, "refuse", 1, 0, ""};
+    arhost_option reject{sizeof reject, ARHOST_OPTION_BOOL, "reject", 1, 0, ""};
     arhost_instance *instance = nullptr;
-    EXPECT_EQ(answer.plugin->create(&host, &refuse, 1, &instance), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_EQ(logged, "refused");
+    EXPECT_EQ(answer.plugin->create(&host, &reject, 1, &instance), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_EQ(logged, "rejected");
     EXPECT_EQ(instance, nullptr);
 
-    refuse.integer = 0;
-    ASSERT_EQ(answer.plugin->create(&host, &refuse, 1, &instance), ARHOST_STATUS_OK);
+    reject.integer = 0;
+    ASSERT_EQ(answer.plugin->create(&host, &reject, 1, &instance), ARHOST_STATUS_OK);
     const arhost_tracker_setup setup{};
     EXPECT_EQ(tracker.start(instance, &setup), ARHOST_STATUS_ERROR_INTERNAL);
     EXPECT_EQ(logged, "no luck");

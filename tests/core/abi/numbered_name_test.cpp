@@ -35,7 +35,7 @@ TEST(NumberedName, RejectsOtherNames) {
 
 class InvalidNumberedName : public testing::TestWithParam<const char *> {};
 
-TEST_P(InvalidNumberedName, IsRefusedWithTheCorrectSyntax) {
+TEST_P(InvalidNumberedName, IsRejectedWithTheCorrectSyntax) {
     try {
         const NumberedName pattern(GetParam());
         FAIL() << "nothing was thrown";

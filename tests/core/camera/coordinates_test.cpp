@@ -29,12 +29,12 @@ Coordinates parsed(const std::string &text) {
 } // namespace
 
 // The example of the dissertation: -ar 1 -rt 2 -g 90 -x 1 -y 0 -z 0.
-TEST(Coordinates, OfTheDissertationsExampleMapXyzToXzMinusY) {
+TEST(Coordinates, DissertationsExampleMapsXyzToXzMinusY) {
     const Coordinates coordinates{1, 2, {{90, {1, 0, 0}}}};
     EXPECT_EQ(to_scene(coordinates, {1, 2, 3}), glm::dvec3(1, 3, -2));
 }
 
-TEST(Coordinates, OfEqualProfilesDoNotRotate) {
+TEST(Coordinates, EqualProfilesDoNotRotate) {
     EXPECT_EQ(rotation_of({1, 1, {}}), glm::dmat4(1));
     EXPECT_EQ(rotation_of({3, 3, {}}), glm::dmat4(1));
 }
@@ -81,7 +81,7 @@ TEST(Coordinates, FollowTheScenesAxes) {
     EXPECT_EQ(problem_with(default_for(ARHOST_AXES_Y_UP)), "");
 }
 
-TEST(Coordinates, ThatAreInvalidHaveAnExplanation) {
+TEST(Coordinates, ExplainsInvalidCoordinates) {
     const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
     EXPECT_EQ(problem_with({1, 2, {{90, {0, 0, 0}}}}),
               "rotation 1: the axis must not be (0, 0, 0); for the x axis, write [1, 0, 0]");

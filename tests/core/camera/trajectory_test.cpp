@@ -160,7 +160,7 @@ TEST_F(Trajectories, RejectPathsThatAreNotRegularFiles) {
     EXPECT_THAT(error_of([&] { read_trajectory(file()); }), HasSubstr("is not a regular file"));
 }
 
-TEST_F(Trajectories, OfTheDissertationHaveNoIntrinsicsAnd30FramesPerSecond) {
+TEST_F(Trajectories, DissertationFormatHasNoIntrinsicsAnd30FramesPerSecond) {
     const Trajectory trajectory = read(record + record + record);
     EXPECT_FALSE(trajectory.intrinsics);
     EXPECT_FALSE(trajectory.clock);
@@ -173,7 +173,7 @@ TEST_F(Trajectories, OfTheDissertationHaveNoIntrinsicsAnd30FramesPerSecond) {
     EXPECT_THAT(trajectory.frames[1].view->up, ElementsAre(0.0461728, 0.497528, 0.866218));
 }
 
-TEST_F(Trajectories, OfTheDissertationAllowEmptyLinesForFramesWithoutACamera) {
+TEST_F(Trajectories, DissertationFormatAllowsEmptyLinesForFramesWithoutACamera) {
     const Trajectory trajectory = read("\n" + record + " \r\n" + record + "\n");
     ASSERT_EQ(trajectory.frames.size(), 5u);
     for (const std::size_t empty : {0, 2, 4})
@@ -181,7 +181,7 @@ TEST_F(Trajectories, OfTheDissertationAllowEmptyLinesForFramesWithoutACamera) {
     EXPECT_TRUE(trajectory.frames[3].view);
 }
 
-TEST_F(Trajectories, OfTheDissertationIgnoreATruncatedLastLine) {
+TEST_F(Trajectories, DissertationFormatIgnoresATruncatedLastLine) {
     for (std::size_t cut = 1; cut + 2 < record.size(); ++cut) {
         const Trajectory trajectory = read(record + record.substr(0, cut));
         EXPECT_EQ(trajectory.frames.size(), 1u) << record.substr(0, cut);
@@ -193,7 +193,7 @@ TEST_F(Trajectories, OfTheDissertationIgnoreATruncatedLastLine) {
     EXPECT_EQ(whole.warning, "");
 }
 
-TEST_F(Trajectories, OfTheDissertationErrorsNamePositionAndFix) {
+TEST_F(Trajectories, DissertationFormatErrorsNamePositionAndFix) {
     EXPECT_THAT(error("what is this\n"), HasSubstr("1:1: 'what' is not a number; a line has nine"));
     EXPECT_THAT(error(record + "1 2 x 4 5 6 7 8 9\n"), HasSubstr("2:5: 'x' is not a number"));
     EXPECT_THAT(error(record + "1 2 nan 4 5 6 7 8 9\n"), HasSubstr("2:5: 'nan' is not a number"));

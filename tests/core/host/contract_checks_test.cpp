@@ -211,7 +211,7 @@ TEST(SourceChecks, RequireTheConfiguredRate) {
     EXPECT_THAT(configured({{0}, {100 * ms, 1}}), HasSubstr("1 skipped frames require 0.200 s"));
 }
 
-TEST(SourceChecks, AllowUnevenTimesOfAFilm) {
+TEST(SourceChecks, AllowUnevenTimesOfAVideo) {
     EXPECT_EQ(violations_of_times({10, false, false}, ARHOST_CLOCK_MEDIA, {{0}, {1}, {60'000 * ms}}, 0), "");
 }
 

@@ -43,11 +43,11 @@ TEST(InProcess, IgnoresDeadlines) {
 }
 
 TEST(InProcess, ReportsAPluginThatRejectsItsOptions) {
-    ArhostRun run(counting("lockstep", "frames: 2", "", "refuse: true"));
+    ArhostRun run(counting("lockstep", "frames: 2", "", "reject: true"));
     run.write("scene.yaml", small_scene);
     EXPECT_EQ(run_in_process(run), 2);
     EXPECT_THAT(run.read("output.txt"), HasSubstr("run.yaml:5:"));
-    EXPECT_THAT(run.read("output.txt"), HasSubstr("rejected, as the option 'refuse' requests"));
+    EXPECT_THAT(run.read("output.txt"), HasSubstr("rejected, as the option 'reject' requests"));
 }
 
 // A worker thread cannot be killed, but it ends by itself if the host closes the channel while it waits for a

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ipc/channel.hpp"
 #include "ipc/json_abi.hpp"
+#include "ipc/message.hpp"
 
 #include <gtest/gtest.h>
 

@@ -72,6 +72,13 @@ TEST(Messages, PreserveTheSetupOfEachKind) {
     EXPECT_EQ(std::get<messages::SinkSetup>(sink.setup).intrinsics, std::nullopt);
 }
 
+TEST(Messages, NameTheKindOfSetup) {
+    EXPECT_EQ(encode(messages::Create{{}, messages::SourceSetup{}}).at("kind"), "source");
+    EXPECT_EQ(encode(messages::Create{{}, messages::TrackerSetup{format(), lens(), {}}}).at("kind"), "tracker");
+    EXPECT_EQ(encode(messages::Create{{}, messages::RaytracerSetup{64, 48, lens()}}).at("kind"), "raytracer");
+    EXPECT_EQ(encode(messages::Create{{}, messages::SinkSetup{}}).at("kind"), "sink");
+}
+
 TEST(Messages, PreserveThePolicyAndTheSlotLayout) {
     sandbox::Policy policy;
     policy.mode = sandbox::Mode::strict;
@@ -112,7 +119,7 @@ TEST(Messages, PreserveWhatAWorkerReports) {
     EXPECT_EQ(sent(messages::Reads{"/a", "1:2"}).node, "1:2");
 }
 
-TEST(Messages, WithMissingOrMistypedFieldsViolateTheProtocol) {
+TEST(Messages, MissingOrMistypedFieldsViolateTheProtocol) {
     EXPECT_THAT(violation<messages::Log>({{"severity", 1}}), HasSubstr("malformed message 'log': "));
     EXPECT_THAT(violation<messages::Log>({{"severity", "high"}, {"text", ""}}), HasSubstr("malformed message 'log'"));
     EXPECT_THAT(violation<messages::Hello>({{"descriptor", 5}, {"sandbox", ""}}), HasSubstr("'hello'"));
@@ -121,6 +128,6 @@ TEST(Messages, WithMissingOrMistypedFieldsViolateTheProtocol) {
     EXPECT_THAT(violation<messages::Stopped>({{"status", 1}}), HasSubstr("'stopped'"));
     EXPECT_THAT(violation<messages::Reads>({{"path", 7}, {"node", "1:2"}}), HasSubstr("'reads'"));
     Json create = encode(messages::Create{{}, messages::SinkSetup{}});
-    create["kind"] = 4;
-    EXPECT_EQ(violation<messages::Create>(create), "unknown kind of setup");
+    create["kind"] = "camera";
+    EXPECT_EQ(violation<messages::Create>(create), "unknown kind of setup 'camera'");
 }

@@ -148,7 +148,7 @@ TEST_F(FilesInUseTest, RecognisesOutputsThatCanCollideBeforeTheirFilesExist) {
     EXPECT_TRUE(collide("f-%04d.png", "to_none.json"));
 }
 
-TEST_F(FilesInUseTest, RefusesAnOutputThatIsReadLater) {
+TEST_F(FilesInUseTest, RejectsAnOutputThatIsReadLater) {
     file("wood.png");
     FilesInUse files;
     files.write(node("wood.png"));

@@ -73,7 +73,7 @@ std::vector<float> floats(const Arena &a, std::size_t i = 0) {
 
 } // namespace
 
-TEST(Textures, FromPngHaveTheTopRowFirstAndStraightAlpha) {
+TEST(Textures, PngsHaveTheTopRowFirstAndStraightAlpha) {
     const Arena arena = Scene("a.png", png(1, 2, 4, {10, 20, 30, 40, 50, 60, 70, 80})).load_texture("a.png");
     ASSERT_EQ(arena.scene().textures.count, 1u);
     EXPECT_EQ(texture(arena).format, ARHOST_TEXEL_SRGB8);
@@ -98,7 +98,7 @@ TEST(Textures, AreExpandedToRgba) {
     EXPECT_EQ(grey_jpeg[255], 255);
 }
 
-TEST(Textures, WithFloatsAreLinearAndClamped) {
+TEST(Textures, FloatsAreLinearAndClamped) {
     const Arena radiance = Scene("a.hdr", hdr(1, 2, {'\x80', 64, 32, '\x81', 1, 2, 4, '\x88'})).load_texture("a.hdr");
     EXPECT_EQ(texture(radiance).format, ARHOST_TEXEL_RGBA32F);
     EXPECT_EQ(texture(radiance).height, 2u);
@@ -125,7 +125,7 @@ TEST(Textures, HaveWrapModeAndEncoding) {
     EXPECT_EQ(texture(arena).wrap_v, ARHOST_WRAP_MIRROR);
 }
 
-TEST(Textures, FromTheSameFileAreStoredOnce) {
+TEST(Textures, TheSameFileIsStoredOnce) {
     const Arena arena =
         Scene("a.png", png(1, 1, 1, {7}))
             .load("materials:\n  a: {model: metallic-roughness, texture: a.png, emission_texture: ./a.png, "

@@ -438,14 +438,14 @@ TEST(Normals, AreSharedAcrossTextureSeams) {
     EXPECT_EQ(mesh.normals[mesh.triangles[0].x], mesh.normals[mesh.triangles[1].x]);
 }
 
-TEST(Normals, InTheFileAreDroppedIfSmoothIsFalse) {
+TEST(Normals, NormalsInTheFileAreDroppedIfSmoothIsFalse) {
     const std::string text = three_vertices + "vn 0 0 1\nf 1//1 2//1 3//1\n";
     EXPECT_EQ(load_text("a.obj", text).mesh.normals.size(), 3u);
     EXPECT_EQ(load_text("a.obj", text, {true}).mesh.normals.size(), 3u);
     EXPECT_TRUE(load_text("a.obj", text, {false}).mesh.normals.empty());
 }
 
-TEST(Normals, WithLengthZeroAreComputed) {
+TEST(Normals, NormalsOfLengthZeroAreComputed) {
     const TriangleMesh mesh =
         load_text("a.obj",
                   three_vertices + "v 9 9 9\nv 9 9 9\nvn 0 0 0\nvn 1 0 0\nf 1//1 2//2 3//1\nf 4//1 5//1 4//1\n")

@@ -6,7 +6,7 @@
 using namespace arhost::supervise;
 using namespace std::chrono_literals;
 
-TEST(RestartPolicy, DoublesTheDelayAndThenQuarantines) {
+TEST(RestartPolicy, DoublesTheDelayAndThenDisables) {
     RestartPolicy policy(
         {.proven_after_frames = 10, .quarantine_after = 5, .first_delay = 250ms, .longest_delay = 1500ms});
     EXPECT_EQ(policy.delay_after_death(0), 250ms);

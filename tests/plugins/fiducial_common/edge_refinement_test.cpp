@@ -30,7 +30,7 @@ Errors errors(bool inverted) {
     for (int i = 0; i < 8; ++i) {
         const Mt mt =
             pose_of(tilt(generator), tilt(generator), 400, tilt(generator), tilt(generator), turn(generator));
-        cv::Mat picture = render(camera, {{april_tag("tag36h11", i).with_margin(2), 100, mt}}, 4);
+        cv::Mat picture = render(camera, {{april_tag("tag36h11", i).with_margin(2), 100, mt}});
         if (inverted)
             picture = 255 - picture;
         add_noise(picture, 2, i + 1);
@@ -62,7 +62,7 @@ TEST(EdgeRefinement, FindsAHiddenCorner) {
     const Mt mt = pose_of(5, -3, 300, 20, 15, 25);
     const auto truth = corners_of(mt, camera, 100);
     for (const int grey : {20, 128, 230}) {
-        cv::Mat picture = render(camera, {{april_tag("tag36h11", 4).with_margin(2), 100, mt}}, 4);
+        cv::Mat picture = render(camera, {{april_tag("tag36h11", 4).with_margin(2), 100, mt}});
         cv::circle(picture, truth[2], 12, cv::Scalar(grey), cv::FILLED);
         Corners rough = truth;
         rough[2] += (truth[0] - truth[2]) / cv::norm(truth[0] - truth[2]) * 6;

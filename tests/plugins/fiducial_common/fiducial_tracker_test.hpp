@@ -30,7 +30,7 @@ inline double angle_degrees(const double *a, const Mt &b) {
 }
 
 inline cv::Mat picture_of(const std::vector<Placed> &markers) {
-    cv::Mat picture = render(test_camera, markers, 4);
+    cv::Mat picture = render(test_camera, markers);
     cv::GaussianBlur(picture, picture, {}, 0.6);
     add_noise(picture, 1.5, 1);
     return picture;
@@ -111,7 +111,7 @@ TEST_P(FiducialTracker, CorrectsLensDistortion) {
     lens.coefficient_count = 4;
     lens.coefficients[0] = -0.2;
     const Mt truth = pose_of(140, 80, 450, 20, -15, 10);
-    const cv::Mat straight = render(test_camera, {{tag(8), 110, truth}}, 4);
+    const cv::Mat straight = render(test_camera, {{tag(8), 110, truth}});
     cv::Mat_<cv::Vec2f> source(straight.size());
     std::vector<cv::Point2d> distorted, ideal;
     for (int y = 0; y < source.rows; ++y)

@@ -60,7 +60,8 @@ inline void expect_april_tag_photo(Tracker &tracker) {
         for (int k = 3; k >= 0; --k) { // the file's order is counter-clockwise from the bottom left
             double row = 0, column = 0;
             corners >> row >> column;
-            EXPECT_LT(corner_distance_px(marker, k, {column - 0.5, row - 0.5}), 0.5); // its pixel centres are at +0.5
+            EXPECT_LT(corner_distance_px(marker, k, {column - 0.5, row - 0.5}),
+                      0.5); // in the file, pixel centres are at +0.5
         }
         std::getline(poses >> std::ws, title);
         double t[3], u[3]; // translation in metres and rotation vector, in OpenCV's camera axes

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Renders printed markers at known poses. Each pixel is the mean of several rays and is not resampled, so that edges
-// are exactly at their projections.
+// Printed markers at known poses.
 #pragma once
 
+#include "conformance/prints.hpp"
 #include "tracker_support.hpp"
 
+#include <glm/gtc/type_ptr.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -94,41 +95,20 @@ struct Placed {
     Mt mt;
 };
 
-// Renders markers with grey values of 220 for paper, 30 for ink and 140 for the background. The camera must have no
-// lens distortion.
-inline cv::Mat render(const arhost_intrinsics &camera, const std::vector<Placed> &markers, int rays_per_side = 6) {
-    std::vector<cv::Matx33d> marker_from_pixel;
-    for (const Placed &placed : markers) {
-        const Mt &m = placed.mt;
-        const cv::Matx33d eye_from_marker(m[0], m[4], m[12], -m[1], -m[5], -m[13], -m[2], -m[6], -m[14]);
-        const cv::Matx33d pixel_from_eye(camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1);
-        marker_from_pixel.push_back((pixel_from_eye * eye_from_marker).inv());
+// Renders markers with the conformance suite's renderer.
+inline cv::Mat render(const arhost_intrinsics &camera, const std::vector<Placed> &markers) {
+    std::vector<conformance::Placed> placed;
+    for (const auto &[print, side_mm, mt] : markers) {
+        const int side = print.cells.cols, border = (side - print.corner_cells) / 2;
+        placed.push_back({{0,
+                           static_cast<std::uint32_t>(side),
+                           {print.cells.begin(), print.cells.end()},
+                           static_cast<std::uint32_t>(border)},
+                          side_mm,
+                          glm::make_mat4(mt.data())});
     }
-    const auto grey_at = [&](double u, double v) {
-        for (std::size_t i = 0; i < markers.size(); ++i) {
-            const Print &print = markers[i].print;
-            const cv::Vec3d at = marker_from_pixel[i] * cv::Vec3d(u, v, 1);
-            if (at[2] <= 0)
-                continue;
-            const double cell_mm = markers[i].side_mm / print.corner_cells, half = print.cells.cols / 2.0;
-            const int column = static_cast<int>(std::floor(at[0] / at[2] / cell_mm + half));
-            const int row = static_cast<int>(std::floor(half - at[1] / at[2] / cell_mm));
-            if (column >= 0 && row >= 0 && column < print.cells.cols && row < print.cells.rows)
-                return print.cells(row, column) ? 220 : 30;
-        }
-        return 140;
-    };
-    cv::Mat_<uint8_t> picture(static_cast<int>(camera.height), static_cast<int>(camera.width));
-    const double n = rays_per_side;
-    for (int y = 0; y < picture.rows; ++y)
-        for (int x = 0; x < picture.cols; ++x) {
-            int sum = 0;
-            for (int j = 0; j < rays_per_side; ++j)
-                for (int i = 0; i < rays_per_side; ++i)
-                    sum += grey_at(x + (i + 0.5) / n - 0.5, y + (j + 0.5) / n - 0.5);
-            picture(y, x) = static_cast<uint8_t>(std::lround(sum / (n * n)));
-        }
-    return picture;
+    conformance::Grey drawn = conformance::draw(camera, placed);
+    return cv::Mat(static_cast<int>(drawn.height), static_cast<int>(drawn.width), CV_8U, drawn.codes.data()).clone();
 }
 
 // Adds normally distributed noise; the same seed gives the same noise.

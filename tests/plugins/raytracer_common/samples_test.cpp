@@ -26,7 +26,7 @@ TEST(SamplePositions, HaveOneInEachRowAndColumnAndAreCentred) {
     }
 }
 
-TEST(SamplePositions, OfTheSequenceStartAtTheCentreAndContinue) {
+TEST(SamplePositions, SequenceStartsAtTheCentreAndContinues) {
     const auto all = sample_positions(0, 12), later = sample_positions(5, 7);
     EXPECT_EQ(all[0].x, 0);
     EXPECT_EQ(all[0].y, 0);
@@ -37,7 +37,7 @@ TEST(SamplePositions, OfTheSequenceStartAtTheCentreAndContinue) {
     }
 }
 
-TEST(SamplePositions, OfTheSequenceStayEvenlyDistributed) {
+TEST(SamplePositions, SequenceStaysEvenlyDistributed) {
     for (const std::uint32_t first : {0u, 1000u, 60000u}) {
         std::array<int, 64> cells{};
         for (const Sample &sample : sample_positions(first, 4096)) {

@@ -120,7 +120,7 @@ TEST(AlphaCutoff, LetLightThrough) {
     EXPECT_EQ(picture.alpha(140, 60), 0) << "light through the hole";
 }
 
-TEST(AlphaCutoff, OfACatcherReceiveNoShadow) {
+TEST(AlphaCutoff, HolesInACatcherReceiveNoShadow) {
     ArenaBuilder builder;
     builder.add_light(light(0, 0, 1000, 1));
     builder.add_object("roof", builder.add_triangles(square(20, 300)), builder.add_material(flat(1, 1, 1)));

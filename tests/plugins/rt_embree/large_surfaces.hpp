@@ -14,14 +14,14 @@
 
 namespace arhost::test {
 
-// How a surface gets its size and position.
-enum class Grown { BUILT, MOVED, SCALED, SCALED_IN_MOTION, MORPHED };
+// How the surface's size and position are set.
+enum class Placement { BUILT, MOVED, SCALED, SCALED_IN_MOTION, MORPHED };
 
 struct LargeSurface {
     const char *name;
     bool is_sphere;
     double size_mm; // the sphere's radius, or half the square's side
-    Grown grown = Grown::BUILT;
+    Placement placement = Placement::BUILT;
 };
 inline std::ostream &operator<<(std::ostream &stream, const LargeSurface &surface) {
     return stream << surface.name;
@@ -32,16 +32,16 @@ inline const LargeSurface large_surfaces[] = {{"Sphere2m", true, 1e3},
                                               {"Sphere20m", true, 1e4},
                                               {"Sphere200m", true, 1e5},
                                               {"Sphere2km", true, 1e6},
-                                              {"SphereScaledTo200m", true, 1e5, Grown::SCALED},
-                                              {"SphereThatGrowsTo200m", true, 1e5, Grown::SCALED_IN_MOTION},
+                                              {"SphereScaledTo200m", true, 1e5, Placement::SCALED},
+                                              {"SphereThatGrowsTo200m", true, 1e5, Placement::SCALED_IN_MOTION},
                                               {"Square2m", false, 1e3},
                                               {"Square20m", false, 1e4},
                                               {"Square200m", false, 1e5},
                                               {"Square2km", false, 1e6},
-                                              {"SquareFrom200mAway", false, 1e3, Grown::MOVED},
-                                              {"SquareScaledTo200m", false, 1e5, Grown::SCALED},
-                                              {"SquareThatGrowsTo200m", false, 1e5, Grown::SCALED_IN_MOTION},
-                                              {"SquareThatMorphsTo200m", false, 1e5, Grown::MORPHED}};
+                                              {"SquareFrom200mAway", false, 1e3, Placement::MOVED},
+                                              {"SquareScaledTo200m", false, 1e5, Placement::SCALED},
+                                              {"SquareThatGrowsTo200m", false, 1e5, Placement::SCALED_IN_MOTION},
+                                              {"SquareThatMorphsTo200m", false, 1e5, Placement::MORPHED}};
 
 // Returns the surface's axes at the origin as columns: two tangents and the normal.
 inline glm::dmat3 surface_axes() {
@@ -52,16 +52,16 @@ inline glm::dmat3 surface_axes() {
 
 inline scene::ArenaBuilder scene_with(const LargeSurface &surface) {
     const glm::dmat3 axes = surface_axes();
-    const bool is_built = surface.grown == Grown::BUILT || surface.grown == Grown::MOVED;
+    const bool is_built = surface.placement == Placement::BUILT || surface.placement == Placement::MOVED;
     const double size = is_built ? surface.size_mm : 1;
     const auto scale = static_cast<float>(surface.size_mm);
-    const glm::dvec3 away = surface.grown == Grown::MOVED ? glm::dvec3(2e5, -1e5, 5e4) : glm::dvec3(0);
+    const glm::dvec3 away = surface.placement == Placement::MOVED ? glm::dvec3(2e5, -1e5, 5e4) : glm::dvec3(0);
 
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
     builder.settings.duration_s = 2;
-    scene::Motion motion{.moves = surface.grown == Grown::SCALED_IN_MOTION,
-                         .deforms = surface.grown == Grown::MORPHED};
+    scene::Motion motion{.moves = surface.placement == Placement::SCALED_IN_MOTION,
+                         .deforms = surface.placement == Placement::MORPHED};
     if (motion.moves || motion.deforms)
         motion.node = builder.add_node({.animated = true, .morph_weights = {0}});
     if (motion.moves)
@@ -85,7 +85,7 @@ inline scene::ArenaBuilder scene_with(const LargeSurface &surface) {
         }
         geometry = builder.add_triangles(std::move(mesh));
     }
-    glm::mat4x3 world_from_object(surface.grown == Grown::SCALED ? scale : 1.0f);
+    glm::mat4x3 world_from_object(surface.placement == Placement::SCALED ? scale : 1.0f);
     world_from_object[3] = glm::vec3(away);
     builder.add_object("surface", geometry, builder.add_material(diffuse(1, 1, 1)), ARHOST_ROLE_VIRTUAL,
                        world_from_object, motion);

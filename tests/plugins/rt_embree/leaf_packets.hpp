@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Calls leaf functions with packets of 16 lanes. There is one call_leaf per instruction set of the kernel.
+// Calls the shading functions of arhost/shading/leaf/ with packets of 16 lanes, for comparison with their scalar
+// versions. Each namespace has the call_leaf that is compiled for one instruction set, like the kernel.
 #pragma once
 
 namespace rt_embree {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Compares the brightness of a white plane under each type of light with the light's formula.
+// For each type of light, compares the brightness of a lit white plane with the analytic value.
 #include "tracer.hpp"
 
 #include <glm/geometric.hpp>
@@ -104,7 +104,7 @@ TEST(RectangleLight, EmitsToOneSideOnly) {
     expect_irradiance(over_a_plane(panel), [](glm::dvec3) { return 0; });
 }
 
-TEST(SphereLight, WithZeroRadiusIsAPointLight) {
+TEST(SphereLight, IsAPointLightIfItsRadiusIsZero) {
     arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {30, -20, 90}, 0.7f);
     bulb.radius = 1e-3f;
     expect_irradiance(over_a_plane(bulb), [](glm::dvec3 p) {

@@ -91,7 +91,7 @@ arhost_intrinsics with_lens(arhost_distortion distortion, std::vector<double> k)
     return in;
 }
 
-TEST(Silhouette, OfASphereMatchesTheLensModel) {
+TEST(Silhouette, SphereMatchesTheLensModel) {
     const arhost_intrinsics lenses[] = {with_lens(ARHOST_DISTORTION_NONE, {}),
                                         with_lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}),
                                         with_lens(ARHOST_DISTORTION_BROWN, {0.2, -0.1, 0, 0, 0.01}),
@@ -108,7 +108,7 @@ TEST(Silhouette, OfASphereMatchesTheLensModel) {
         }
 }
 
-TEST(Silhouette, OfASphereOnTheAxisIsSymmetricAboutThePrincipalPoint) {
+TEST(Silhouette, SphereOnTheAxisIsSymmetricAboutThePrincipalPoint) {
     arhost_intrinsics in = pinhole(101, 81);
     in.cx = 30; // pixel centres are integers, so the picture is symmetric about this column and row
     in.cy = 50;
@@ -121,7 +121,7 @@ TEST(Silhouette, OfASphereOnTheAxisIsSymmetricAboutThePrincipalPoint) {
     EXPECT_EQ(picture.alpha(30, 50), 255);
 }
 
-TEST(Silhouette, OfASphereBehindAFisheyeCameraIsVisible) {
+TEST(Silhouette, SphereBehindAFisheyeCameraIsVisible) {
     arhost_intrinsics in = pinhole(300, 300, 60);
     in.distortion = ARHOST_DISTORTION_FISHEYE;
     in.coefficient_count = 4;
@@ -196,7 +196,7 @@ TEST(Alpha, InwardFacingCatchersAreInvisibleFromOutsideButReflected) {
     }
 }
 
-TEST(Alpha, OfShadowsIsSetByTheScene) {
+TEST(Alpha, SceneSetsShadowAlpha) {
     ArenaBuilder builder;
     builder.settings.shadow_alpha_opaque = 0.8f;
     builder.settings.shadow_alpha_translucent = 0.1f;
@@ -903,7 +903,7 @@ TEST(UnusualScenes, CameraInsideGlassSeesThroughIt) {
 
 // ---- Rejected input --------------------------------------------------------------------------------
 
-class RejectedInput : public testing::Test {
+class Render : public testing::Test {
 protected:
     arhost_status render(const arhost_camera &camera) {
         EXPECT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
@@ -913,17 +913,17 @@ protected:
     Tracer tracer{one_sphere({0, 0, 200, 30})};
 };
 
-TEST_F(RejectedInput, OfAnUpParallelToTheView) {
+TEST_F(Render, RejectsAnUpParallelToTheView) {
     EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_THAT(tracer.plugin().log(), testing::HasSubstr("up is parallel"));
     EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(RejectedInput, OfALookAtEqualToTheEye) {
+TEST_F(Render, RejectsALookAtEqualToTheEye) {
     EXPECT_EQ(render(camera({1, 2, 3}, {1, 2, 3}, {0, 0, 1})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(RejectedInput, OfNonFiniteNumbers) {
+TEST_F(Render, RejectsNonFiniteNumbers) {
     const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
     EXPECT_EQ(render(camera({nan, 0, 0}, {0, 0, 1}, {0, 1, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_EQ(render(camera({0, 0, 0}, {0, infinity, 1}, {0, 1, 0})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
@@ -931,19 +931,19 @@ TEST_F(RejectedInput, OfNonFiniteNumbers) {
     EXPECT_THAT(tracer.plugin().log(), testing::HasSubstr("must be finite"));
 }
 
-TEST_F(RejectedInput, OfIntrinsicsOtherThanAtStart) {
+TEST_F(Render, RejectsIntrinsicsOtherThanAtStart) {
     arhost_camera other = opencv_axes(pinhole());
     other.intrinsics.cx += 1;
     EXPECT_EQ(render(other), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(RejectedInput, OfAnImageOfADifferentSize) {
+TEST_F(Render, RejectsAnImageOfADifferentSize) {
     ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
     Picture small(pinhole(100, 150));
     EXPECT_EQ(tracer.try_render(opencv_axes(pinhole()), small), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(RejectedInput, OfInvalidIntrinsics) {
+TEST_F(Render, StartRejectsInvalidIntrinsics) {
     arhost_intrinsics in = pinhole();
     in.fx = 0;
     EXPECT_EQ(tracer.start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
@@ -958,12 +958,12 @@ TEST_F(RejectedInput, OfInvalidIntrinsics) {
     EXPECT_EQ(tracer.start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(RejectedInput, OfStartOnceCancelled) {
+TEST_F(Render, StartFailsOnceCancelled) {
     tracer.plugin().cancel();
     EXPECT_EQ(tracer.start(pinhole()), ARHOST_STATUS_ERROR_CANCELLED);
 }
 
-TEST_F(RejectedInput, OfRenderOnceCancelled) {
+TEST_F(Render, FailsOnceCancelled) {
     ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
     tracer.plugin().cancel();
     Picture picture(pinhole());

@@ -96,7 +96,7 @@ INSTANTIATE_TEST_SUITE_P(Paths, FailingDevice, testing::Values("plain", "query",
                          [](const auto &info) { return info.param; });
 
 // Some drivers report ray tracing extensions on GPUs without ray tracing hardware.
-TEST_P(FailingDevice, ThatLacksAnAnnouncedPathUsesThePrecedingPath) {
+TEST_P(FailingDevice, FallsBackIfAnAnnouncedPathFails) {
     if (GetParam() == "plain")
         GTEST_SKIP() << "no path precedes the path 'plain'";
     inject_failure(GetParam() == "query" ? "device-with:VK_KHR_ray_query" : "pipelines:1");
@@ -114,7 +114,7 @@ TEST_P(FailingDevice, ThatLacksAnAnnouncedPathUsesThePrecedingPath) {
                 HasSubstr("that this is unsupported"));
 }
 
-TEST_P(FailingDevice, ThatLacksAFunctionIsReported) {
+TEST_P(FailingDevice, ReportsAMissingFunction) {
     const std::string function = GetParam() == "plain"   ? "vkGetMemoryHostPointerPropertiesEXT"
                                  : GetParam() == "query" ? "vkCmdBuildAccelerationStructuresKHR"
                                                          : "vkCmdTraceRaysKHR";
@@ -125,7 +125,7 @@ TEST_P(FailingDevice, ThatLacksAFunctionIsReported) {
     expect_recovery();
 }
 
-TEST_P(FailingDevice, LossAtStartIsReported) {
+TEST_P(FailingDevice, ReportsLossAtStart) {
     for (const char *when : {"submit:1", "submit:4", "wait:1", "wait:4"}) {
         inject_failure(when);
         EXPECT_THAT(log_of(ARHOST_STATUS_ERROR_DEVICE_LOST, [&] { return start(); }), HasSubstr(lost)) << when;
@@ -133,7 +133,7 @@ TEST_P(FailingDevice, LossAtStartIsReported) {
     expect_recovery();
 }
 
-TEST_P(FailingDevice, LossInMidRunIsReported) {
+TEST_P(FailingDevice, ReportsLossInMidRun) {
     for (const char *when : {"submit:1", "wait:1"}) {
         inject_failure("");
         ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->plugin().log();
@@ -154,7 +154,7 @@ TEST_P(FailingDevice, LossAtTheFirstImageEndsCleanly) {
 }
 
 // start() allocates memory several times. In each round, one of these allocations and all later ones fail.
-TEST_P(FailingDevice, OutOfMemoryAtStartIsReported) {
+TEST_P(FailingDevice, ReportsOutOfMemoryAtStart) {
     int nth = 1;
     for (;; ++nth) {
         inject_failure("allocate:" + std::to_string(nth));
@@ -170,7 +170,7 @@ TEST_P(FailingDevice, OutOfMemoryAtStartIsReported) {
 }
 
 // Memory for the image is allocated when the first image is rendered.
-TEST_P(FailingDevice, OutOfMemoryInMidRunIsReported) {
+TEST_P(FailingDevice, ReportsOutOfMemoryInMidRun) {
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->plugin().log();
     inject_failure("allocate:1");
     EXPECT_THAT(log_of(ARHOST_STATUS_ERROR_OUT_OF_MEMORY, [&] { return render(); }), HasSubstr(out_of_memory));
@@ -192,7 +192,7 @@ protected:
     ScratchFolder folder_;
 };
 
-TEST_F(OldDevice, IsRefusedIfSelected) {
+TEST_F(OldDevice, IsRejectedIfSelected) {
     const EnvironmentVariable old("ARHOST_TEST_VULKAN_IS_OLD", "all");
     std::ofstream(folder_.path() / "scene.yaml") << small_scene;
     Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {{"device", "0"}}, "rt_vulkan");

@@ -47,7 +47,7 @@ struct LoggingHost {
                      [](const arhost_host *, const char *) -> const void * { return nullptr; }};
 };
 
-template <class Call> std::string refusal(arhost_status status, Call call) {
+template <class Call> std::string rejection(arhost_status status, Call call) {
     try {
         call();
     } catch (const Failure &failure) {
@@ -92,13 +92,13 @@ protected:
 TEST_F(RichScene, MatchesRtEmbree) {
     expect_rt_embrees_picture(from_the_side(small), {});
 }
-TEST_F(RichScene, WithSeveralSamplesMatchesRtEmbree) {
+TEST_F(RichScene, SeveralSamplesMatchRtEmbree) {
     expect_rt_embrees_picture(from_the_side(small), {{"samples", "3"}, {"light_samples", "2"}});
 }
-TEST_F(RichScene, WithOnePathThroughGlassMatchesRtEmbree) {
+TEST_F(RichScene, OnePathThroughGlassMatchesRtEmbree) {
     expect_rt_embrees_picture(from_the_side(small), {{"glass", "path"}});
 }
-TEST_F(RichScene, ThroughALensMatchesRtEmbree) {
+TEST_F(RichScene, LensMatchesRtEmbree) {
     expect_rt_embrees_picture(from_the_side(with_lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.001, -0.002})), {});
     expect_rt_embrees_picture(from_the_side(with_lens(ARHOST_DISTORTION_FISHEYE, {0.02, -0.01, 0, 0})),
                               {{"samples", "2"}});
@@ -141,7 +141,7 @@ TEST_F(RichScene, RepeatedGivesTheSameBytes) {
     EXPECT_EQ(tracer.render(from_the_side(small)).pixels(), first);
 }
 
-// ---- Each path -------------------------------------------------------------------------------------
+// ---- Each traversal path ---------------------------------------------------------------------------
 
 namespace {
 
@@ -379,16 +379,16 @@ TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
               std::tuple(tight.x, tight.y, x1, y1));
 }
 
-// ---- Loader, device, path and cache ----------------------------------------------------------------
+// ---- Vulkan loader, device, traversal path, pipeline cache -----------------------------------------
 
 TEST(Loader, ReportsAMissingLibrary) {
     LoggingHost logging;
     EXPECT_THAT(
-        refusal(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                [&] { rt_vulkan::Instance(Host(&logging.host), false, "libvulkan-none.so.1"); }),
+        rejection(ARHOST_STATUS_ERROR_UNSUPPORTED,
+                  [&] { rt_vulkan::Instance(Host(&logging.host), false, "libvulkan-none.so.1"); }),
         testing::AllOf(HasSubstr("no Vulkan loader"), HasSubstr("libvulkan-none.so.1"), HasSubstr("libvulkan1")));
-    EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                        [&] { rt_vulkan::Instance(Host(&logging.host), false, "libm.so.6"); }),
+    EXPECT_THAT(rejection(ARHOST_STATUS_ERROR_UNSUPPORTED,
+                          [&] { rt_vulkan::Instance(Host(&logging.host), false, "libm.so.6"); }),
                 HasSubstr("libm.so.6 is not a Vulkan loader"));
 }
 
@@ -432,11 +432,11 @@ TEST(Device, IsChosenByNumberNameOrUuid) {
     devices[2].name = "Little GPU";
     EXPECT_EQ(chosen("0F112233-4455-6677-8899-aabbccddeeff"), "Little GPU");
     for (const char *none : {"3", "radeon", "", "0011"})
-        EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen(none); }),
+        EXPECT_THAT(rejection(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen(none); }),
                     testing::AllOf(HasSubstr("option 'device': no device matches"), HasSubstr("1 'Big GPU'"),
                                    HasSubstr("6d657361")))
             << none;
-    EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("gpu"); }), HasSubstr("more than one"));
+    EXPECT_THAT(rejection(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("gpu"); }), HasSubstr("more than one"));
     devices[1].properties.limits.maxPerStageDescriptorStorageBuffers = 13;
     EXPECT_EQ(chosen("auto"), "Little GPU") << "'Big GPU' supports too few storage buffers";
     EXPECT_EQ(chosen("big"), "Big GPU") << "a device selected by name is checked only at start";
@@ -454,13 +454,13 @@ TEST(Path, IsChosenFromThoseTheDeviceSupports) {
     device.properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU;
     const auto chosen = [&](const char *wanted) { return rt_vulkan::choose_paths(device, wanted); };
     EXPECT_EQ(chosen("auto"), Paths{Path::plain});
-    EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("query"); }),
+    EXPECT_THAT(rejection(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("query"); }),
                 testing::AllOf(HasSubstr("option 'path'"), HasSubstr("'Little GPU' does not support 'query'"),
                                HasSubstr("it supports plain")));
     device.paths = {Path::plain, Path::query};
     EXPECT_EQ(chosen("auto"), (Paths{Path::query, Path::plain}));
     EXPECT_EQ(chosen("plain"), Paths{Path::plain});
-    EXPECT_THAT(refusal(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("pipeline"); }),
+    EXPECT_THAT(rejection(ARHOST_STATUS_ERROR_CONFIGURATION, [&] { chosen("pipeline"); }),
                 HasSubstr("it supports plain, query"));
     device.paths = {Path::plain, Path::query, Path::pipeline};
     EXPECT_EQ(chosen("auto"), (Paths{Path::pipeline, Path::query, Path::plain}));
@@ -470,7 +470,7 @@ TEST(Path, IsChosenFromThoseTheDeviceSupports) {
     EXPECT_EQ(chosen("pipeline"), Paths{Path::pipeline});
 }
 
-TEST(Device, UnknownNameIsRefused) {
+TEST(Device, RejectsAnUnknownName) {
     ARHOST_REQUIRE_VULKAN();
     PluginUnderTest plugin("rt_vulkan");
     EXPECT_EQ(plugin.create({{"device", "no such device"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
@@ -497,7 +497,7 @@ TEST(Device, IsListedByTheHost) {
     }
 }
 
-TEST(Device, LackingARequirementIsRefused) {
+TEST(Device, RejectsADeviceThatLacksARequirement) {
     ARHOST_REQUIRE_VULKAN();
     LoggingHost logging;
     const Host host(&logging.host);
@@ -509,8 +509,8 @@ TEST(Device, LackingARequirementIsRefused) {
     const auto complaint = [&](auto change) {
         rt_vulkan::PhysicalDevice device = usable;
         change(device);
-        return refusal(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                       [&] { rt_vulkan::Renderer(setup, {}, host, device, shaders); });
+        return rejection(ARHOST_STATUS_ERROR_UNSUPPORTED,
+                         [&] { rt_vulkan::Renderer(setup, {}, host, device, shaders); });
     };
     EXPECT_THAT(complaint([](auto &device) { device.properties.apiVersion = VK_API_VERSION_1_0; }),
                 testing::AllOf(HasSubstr(usable.name), HasSubstr("1.1 is required"), HasSubstr("option 'device'")));
@@ -657,7 +657,7 @@ protected:
     std::optional<Tracer> tracer;
 };
 
-TEST_F(InvalidInput, CamerasAreRefused) {
+TEST_F(InvalidInput, CamerasAreRejected) {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     EXPECT_THAT(tracer->plugin().log(), HasSubstr("up is parallel"));
@@ -670,7 +670,7 @@ TEST_F(InvalidInput, CamerasAreRefused) {
     EXPECT_EQ(tracer->try_render(from_the_side(small), other), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
 }
 
-TEST_F(InvalidInput, IntrinsicsAreRefused) {
+TEST_F(InvalidInput, IntrinsicsAreRejected) {
     arhost_intrinsics in = small;
     in.fx = 0;
     EXPECT_EQ(tracer->start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);

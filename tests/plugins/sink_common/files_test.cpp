@@ -90,7 +90,7 @@ TEST(Files, AnUnwritableFolderIsNamed) {
     EXPECT_THAT(message, HasSubstr("writable path"));
 }
 
-TEST(Files, APipeIsRefusedWithoutBlocking) {
+TEST(Files, APipeIsRejectedWithoutBlocking) {
     const test::ScratchFolder folder;
     ASSERT_EQ(mkfifo((folder.path() / "pipe").c_str(), 0666), 0);
     const auto [status, message] = failure_of([&] { File(folder.path() / "pipe", O_RDWR); });
@@ -119,7 +119,7 @@ TEST(Files, RemovingAMissingFileSucceeds) {
     EXPECT_THAT(message, HasSubstr("cannot delete"));
 }
 
-TEST(Files, CheckRefusesNonRegularFiles) {
+TEST(Files, CheckRejectsNonRegularFiles) {
     EXPECT_THROW(check_can_write("/dev/full"), arhost::Failure);
     EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
 }

@@ -216,7 +216,7 @@ TEST_F(SinkImages, AnImageOfAnEarlierRunIsDeletedAtTheFirstFrame) {
 
 // ---- Errors ----------------------------------------------------------------------------------------
 
-TEST_F(SinkImages, ConflictingOptionsAreRefused) {
+TEST_F(SinkImages, ConflictingOptionsAreRejected) {
     struct Case {
         std::string path;
         std::map<std::string, std::string> options;
@@ -278,7 +278,7 @@ TEST_F(SinkImages, MissingFoldersAreCreated) {
     EXPECT_TRUE(shows(path("a/b/0.png"), 0));
 }
 
-TEST_F(SinkImages, AFolderAsPathIsRefused) {
+TEST_F(SinkImages, AFolderAsPathIsRejected) {
     std::filesystem::create_directory(path("sub.png"));
     SinkUnderTest s = sink("sub.png");
     EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_CONFIGURATION);

@@ -323,7 +323,7 @@ TEST_F(SinkPoses, AnUnwritableFolderIsAnIoErrorThatNamesThePath) {
     EXPECT_THAT(s.log(), HasSubstr("locked/log.jsonl"));
 }
 
-TEST_F(SinkPoses, AFolderAsPathIsRefused) {
+TEST_F(SinkPoses, AFolderAsPathIsRejected) {
     SinkUnderTest s("sink_poses", {{"path", folder_.path().string()}});
     EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_IO);
     EXPECT_THAT(s.log(), HasSubstr("add a file name"));

@@ -135,7 +135,7 @@ TEST_F(SinkTrajectory, WritesTheDissertationsNineNumbersOfSixDigits) {
     EXPECT_EQ(read_text(file()), "7.39486 -721.148 500.637 1e-07 1.23457e+06 0 0 1 0.333333 \n\n");
 }
 
-TEST_F(SinkTrajectory, InFormatDissertationLineNumbersAreFrameNumbers) {
+TEST_F(SinkTrajectory, LineNumbersOfFormatDissertationAreFrameNumbers) {
     write_frames("dissertation", {1, 2, 3, 6, 9});
     const Trajectory trajectory = read_trajectory(file());
     EXPECT_EQ(trajectory.end(), 10u);
@@ -160,7 +160,7 @@ TEST_F(SinkTrajectory, ANonFiniteCameraIsTreatedAsMissing) {
     }
 }
 
-TEST_F(SinkTrajectory, ARunWithoutACameraIsRefused) {
+TEST_F(SinkTrajectory, ARunWithoutACameraIsRejected) {
     SinkUnderTest s = sink("arhost");
     s.knows_camera = false;
     EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_CONFIGURATION);

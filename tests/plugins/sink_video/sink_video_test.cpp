@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "film.hpp"
+#include "video.hpp"
 
 #include <gmock/gmock.h>
 
@@ -23,15 +23,15 @@ std::vector<std::uint64_t> numbers(std::uint64_t first, std::uint64_t end) {
 }
 
 struct Difference {
-    double psnr_db, bias[3]; // bias: mean of (film − frame) for B, G and R
+    double psnr_db, bias[3]; // bias: mean of (video − frame) for B, G and R
 };
 
-Difference compare(const FilmFrame &film, const Picture &frame) {
+Difference compare(const VideoFrame &video, const Picture &frame) {
     double squares = 0, sums[3]{};
     for (int y = 0; y < frame.height(); ++y)
         for (int x = 0; x < frame.width(); ++x)
             for (int c = 0; c < 3; ++c) {
-                const double d = film.pixel(x, y)[c] - frame.pixel(x, y)[c];
+                const double d = video.pixel(x, y)[c] - frame.pixel(x, y)[c];
                 squares += d * d;
                 sums[c] += d;
             }
@@ -70,26 +70,26 @@ protected:
 
 } // namespace
 
-// ---- The film --------------------------------------------------------------------------------------
+// ---- The video --------------------------------------------------------------------------------------
 
 TEST_F(SinkVideo, HasEveryFrameOnceInOrder) {
     run(sink(), 0, 40);
     EXPECT_THAT(names(), ElementsAre("demo.mp4"));
-    const Film film = read_film(path());
-    EXPECT_EQ(film.codec, "h264");
-    EXPECT_EQ(film.numbers(), numbers(0, 40));
-    EXPECT_EQ(av_cmp_q(film.fps, {30, 1}), 0);
-    EXPECT_NEAR(film.duration_s, 40 / 30.0, 1e-3);
+    const Video video = read_video(path());
+    EXPECT_EQ(video.codec, "h264");
+    EXPECT_EQ(video.numbers(), numbers(0, 40));
+    EXPECT_EQ(av_cmp_q(video.fps, {30, 1}), 0);
+    EXPECT_NEAR(video.duration_s, 40 / 30.0, 1e-3);
 }
 
 TEST_F(SinkVideo, IsTaggedAsBt709LimitedRange) {
     for (const std::string name : {"a.mp4", "a.mkv", "a.mov"}) {
         run(sink({{"path", path(name).string()}}), 0, 1);
-        const Film film = read_film(path(name));
-        EXPECT_EQ(film.range, AVCOL_RANGE_MPEG) << name;
-        EXPECT_EQ(film.matrix, AVCOL_SPC_BT709) << name;
-        EXPECT_EQ(film.primaries, AVCOL_PRI_BT709) << name;
-        EXPECT_EQ(film.transfer, AVCOL_TRC_BT709) << name;
+        const Video video = read_video(path(name));
+        EXPECT_EQ(video.range, AVCOL_RANGE_MPEG) << name;
+        EXPECT_EQ(video.matrix, AVCOL_SPC_BT709) << name;
+        EXPECT_EQ(video.primaries, AVCOL_PRI_BT709) << name;
+        EXPECT_EQ(video.transfer, AVCOL_TRC_BT709) << name;
     }
 }
 
@@ -99,10 +99,10 @@ TEST_F(SinkVideo, ColoursAreCorrect) {
         ASSERT_EQ(s.start(320, 240), ARHOST_STATUS_OK);
         ASSERT_EQ(s.write(0, 3), ARHOST_STATUS_OK);
         ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
-        const Film film = read_film(path());
-        ASSERT_EQ(film.frames.size(), 3u);
+        const Video video = read_video(path());
+        ASSERT_EQ(video.frames.size(), 3u);
         for (std::uint64_t i = 0; i < 3; ++i) {
-            const Difference d = compare(film.frames[i], Picture(320, 240, i));
+            const Difference d = compare(video.frames[i], Picture(320, 240, i));
             EXPECT_GE(d.psnr_db, 35) << codec;
             for (const double bias : d.bias)
                 EXPECT_LT(std::abs(bias), 1.5) << codec;
@@ -117,9 +117,9 @@ TEST_F(SinkVideo, OddSizesArePaddedByRepeatingTheEdge) {
         ASSERT_EQ(s.start(w, h), ARHOST_STATUS_OK) << s.log();
         ASSERT_EQ(s.write(picture, make_record(0)), ARHOST_STATUS_OK);
         ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
-        const Film film = read_film(path());
-        ASSERT_EQ(film.frames.size(), 1u);
-        const FilmFrame &frame = film.frames[0];
+        const Video video = read_video(path());
+        ASSERT_EQ(video.frames.size(), 1u);
+        const VideoFrame &frame = video.frames[0];
         EXPECT_EQ(frame.width, (w + 1) / 2 * 2);
         EXPECT_EQ(frame.height, (h + 1) / 2 * 2);
         EXPECT_GE(compare(frame, picture).psnr_db, 35);
@@ -148,9 +148,9 @@ TEST_F(SinkVideo, KeepsTheFrameRate) {
                                       {0.0, AVRational{30, 1}},
                                       {std::nan(""), AVRational{30, 1}}}) {
         run(sink(), 0, 4, fps);
-        const Film film = read_film(path());
-        EXPECT_EQ(av_cmp_q(film.fps, wanted), 0) << fps << " became " << film.fps.num << "/" << film.fps.den;
-        EXPECT_EQ(film.numbers(), numbers(0, 4));
+        const Video video = read_video(path());
+        EXPECT_EQ(av_cmp_q(video.fps, wanted), 0) << fps << " became " << video.fps.num << "/" << video.fps.den;
+        EXPECT_EQ(video.numbers(), numbers(0, 4));
     }
 }
 
@@ -160,13 +160,13 @@ TEST_F(SinkVideo, FrameNumbersAreRecoveredAtHighAndLowRates) {
         ASSERT_EQ(s.start(width, height, 0, fps), ARHOST_STATUS_OK);
         ASSERT_EQ(s.write(0, 50), ARHOST_STATUS_OK);
         ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
-        EXPECT_EQ(read_film(path()).numbers(), numbers(0, 50)) << fps;
-        EXPECT_NEAR(read_film(path()).duration_s, 50 / fps, 1.01e-3)
+        EXPECT_EQ(read_video(path()).numbers(), numbers(0, 50)) << fps;
+        EXPECT_NEAR(read_video(path()).duration_s, 50 / fps, 1.01e-3)
             << fps; // MP4 stores the duration in whole milliseconds
     }
 }
 
-TEST_F(SinkVideo, AnInvalidFrameRateIsRefused) {
+TEST_F(SinkVideo, AnInvalidFrameRateIsRejected) {
     for (const double fps : {1e-6, 501.0, std::numeric_limits<double>::infinity()}) {
         SinkUnderTest s = sink();
         EXPECT_EQ(s.start(width, height, 0, fps), ARHOST_STATUS_ERROR_CONFIGURATION) << fps;
@@ -180,9 +180,9 @@ TEST_F(SinkVideo, DroppedFramesKeepTheirDuration) {
     for (const std::uint64_t i : {3, 4, 9, 10, 20})
         ASSERT_EQ(s.write(i), ARHOST_STATUS_OK);
     ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
-    const Film film = read_film(path());
-    EXPECT_THAT(film.numbers(), ElementsAre(3, 4, 9, 10, 20));
-    EXPECT_NEAR(film.duration_s, 18 / 30.0, 1e-3); // the film starts with the first frame
+    const Video video = read_video(path());
+    EXPECT_THAT(video.numbers(), ElementsAre(3, 4, 9, 10, 20));
+    EXPECT_NEAR(video.duration_s, 18 / 30.0, 1e-3); // the video starts with the first frame
 }
 
 TEST_F(SinkVideo, TheSameFramesGiveTheSameBytes) {
@@ -191,14 +191,14 @@ TEST_F(SinkVideo, TheSameFramesGiveTheSameBytes) {
     EXPECT_EQ(read_text(path()), read_text(path("again.mp4")));
 }
 
-TEST_F(SinkVideo, SeveralThreadsGiveDeterministicFilms) {
+TEST_F(SinkVideo, SeveralThreadsGiveDeterministicVideos) {
     run(sink({{"threads", "3"}}), 0, 10);
     run(sink({{"threads", "3"}, {"path", path("again.mp4").string()}}), 0, 10);
     EXPECT_EQ(read_text(path()), read_text(path("again.mp4")));
-    EXPECT_EQ(read_film(path()).numbers(), numbers(0, 10));
+    EXPECT_EQ(read_video(path()).numbers(), numbers(0, 10));
 }
 
-TEST_F(SinkVideo, AHigherCrfGivesASmallerFilm) {
+TEST_F(SinkVideo, AHigherCrfGivesASmallerVideo) {
     for (const std::string codec : {"h264", "mpeg4"}) {
         run(sink({{"codec", codec}, {"path", path("fine.mp4").string()}}), 0, 5);
         run(sink({{"codec", codec}, {"crf", "40"}, {"path", path("coarse.mp4").string()}}), 0, 5);
@@ -208,8 +208,8 @@ TEST_F(SinkVideo, AHigherCrfGivesASmallerFilm) {
 
 TEST_F(SinkVideo, TheIndexIsAtTheStartForStreaming) {
     run(sink(), 0, 5);
-    const std::string film = read_text(path());
-    EXPECT_LT(film.find("moov"), film.find("mdat"));
+    const std::string video = read_text(path());
+    EXPECT_LT(video.find("moov"), video.find("mdat"));
 }
 
 // ---- Kills and restarts ----------------------------------------------------------------------------
@@ -218,12 +218,12 @@ TEST_F(SinkVideo, ARestartGivesTheSameFramesAsARunWithoutOne) {
     for (const std::uint64_t restart : {1, 2, 7, 10}) {
         run_and_die(0, 10);
         run(sink(), restart, 15);
-        EXPECT_EQ(read_film(path()).numbers(), numbers(0, 15)) << "restarted at " << restart;
+        EXPECT_EQ(read_video(path()).numbers(), numbers(0, 15)) << "restarted at " << restart;
         EXPECT_THAT(names(), ElementsAre("demo.mp4"));
     }
 }
 
-TEST_F(SinkVideo, ManyRestartsGiveOneFilm) {
+TEST_F(SinkVideo, ManyRestartsGiveOneVideo) {
     run_and_die(0, 1);
     run_and_die(1, 2);
     run_and_die(2, 2); // the sink was killed before it wrote a frame
@@ -231,18 +231,18 @@ TEST_F(SinkVideo, ManyRestartsGiveOneFilm) {
     run_and_die(5, 6); // the host repeats frames from 5 on
     run_and_die(6, 6);
     run(sink(), 6, 12);
-    const Film film = read_film(path());
-    EXPECT_EQ(film.numbers(), numbers(0, 12));
+    const Video video = read_video(path());
+    EXPECT_EQ(video.numbers(), numbers(0, 12));
     std::vector<std::int64_t> times(12);
     std::iota(times.begin(), times.end(), 0);
-    EXPECT_EQ(film.times(), times);
+    EXPECT_EQ(video.times(), times);
     EXPECT_THAT(names(), ElementsAre("demo.mp4"));
 }
 
-TEST_F(SinkVideo, ARestartWithoutFurtherFramesStillWritesTheFilm) {
+TEST_F(SinkVideo, ARestartWithoutFurtherFramesStillWritesTheVideo) {
     run_and_die(0, 5);
     run(sink(), 5, 5);
-    EXPECT_EQ(read_film(path()).numbers(), numbers(0, 5));
+    EXPECT_EQ(read_video(path()).numbers(), numbers(0, 5));
 }
 
 TEST_F(SinkVideo, RestartsWorkForEveryCodecAndContainer) {
@@ -255,7 +255,7 @@ TEST_F(SinkVideo, RestartsWorkForEveryCodecAndContainer) {
                 ASSERT_EQ(s.write(0, 5), ARHOST_STATUS_OK);
             }
             run(sink(options), 4, 8);
-            EXPECT_EQ(read_film(path(name)).numbers(), numbers(0, 8)) << name << " " << codec;
+            EXPECT_EQ(read_video(path(name)).numbers(), numbers(0, 8)) << name << " " << codec;
         }
 }
 
@@ -264,7 +264,7 @@ TEST_F(SinkVideo, SurvivesAKillAtAnyMoment) {
     for (const std::uint64_t frames : {1, 12, 3, 5})
         next = write_until_killed("sink_video", with_path(), width, height, next, frames);
     run(sink(), next, next + 2);
-    EXPECT_EQ(read_film(path()).numbers(), numbers(0, next + 2));
+    EXPECT_EQ(read_video(path()).numbers(), numbers(0, next + 2));
     EXPECT_THAT(names(), ElementsAre("demo.mp4"));
 }
 
@@ -272,13 +272,13 @@ TEST_F(SinkVideo, ATruncatedSegmentIsPlayable) {
     run_and_die(0, 6);
     const auto segment = path(".demo.mp4.from0.mkv");
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv"));
-    EXPECT_EQ(read_film(segment).numbers(), numbers(0, 6));
+    EXPECT_EQ(read_video(segment).numbers(), numbers(0, 6));
     const std::string bytes = read_text(segment);
     const std::size_t last_frame = bytes.rfind("\x1f\x43\xb6\x75"); // a Matroska cluster's id
     for (std::size_t size = last_frame; size < bytes.size(); size += 1 + (bytes.size() - last_frame) / 40) {
         std::ofstream(segment, std::ios::binary | std::ios::trunc) << bytes.substr(0, size);
         run(sink(), 5, 7);
-        EXPECT_EQ(read_film(path()).numbers(), numbers(0, 7)) << "cut at " << size - last_frame;
+        EXPECT_EQ(read_video(path()).numbers(), numbers(0, 7)) << "cut at " << size - last_frame;
     }
 }
 
@@ -290,30 +290,30 @@ TEST_F(SinkVideo, AnEmptySegmentHasNoFrames) {
     ASSERT_EQ(s.write(4, 6), ARHOST_STATUS_OK);
     ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_THAT(s.log(), HasSubstr("3 cannot read a frame from '" + path(".demo.mp4.from3.mkv").string()));
-    EXPECT_THAT(read_film(path()).numbers(), ElementsAre(0, 1, 2, 4, 5));
+    EXPECT_THAT(read_video(path()).numbers(), ElementsAre(0, 1, 2, 4, 5));
 }
 
-TEST_F(SinkVideo, AKillWhileFinishingLeavesAWholeFilm) {
+TEST_F(SinkVideo, AKillWhileFinishingLeavesAWholeVideo) {
     run_and_die(0, 5);
     run_and_die(5, 8);
     const std::string first = read_text(path(".demo.mp4.from0.mkv")), second = read_text(path(".demo.mp4.from5.mkv"));
     run(sink(), 8, 8);
-    const std::string film = read_text(path());
+    const std::string video = read_text(path());
 
-    // Simulates a kill after the film was written, but before its segments were deleted.
+    // Simulates a kill after the video was written, but before its segments were deleted.
     std::ofstream(path(".demo.mp4.from0.mkv")) << first;
     std::ofstream(path(".demo.mp4.from5.mkv")) << second;
     run(sink(), 8, 8);
-    EXPECT_EQ(read_text(path()), film);
+    EXPECT_EQ(read_text(path()), video);
 
     // Simulates a kill after the first segment was deleted.
     std::ofstream(path(".demo.mp4.from5.mkv")) << second;
     run(sink(), 8, 8);
-    EXPECT_EQ(read_text(path()), film);
+    EXPECT_EQ(read_text(path()), video);
 
     // Simulates a kill after all segments were deleted.
     run(sink(), 8, 8);
-    EXPECT_EQ(read_text(path()), film);
+    EXPECT_EQ(read_text(path()), video);
     EXPECT_THAT(names(), ElementsAre("demo.mp4"));
 }
 
@@ -323,7 +323,7 @@ TEST_F(SinkVideo, AFreshStartRemovesSegmentsOfAnEarlierRun) {
     std::ofstream(path(".demo.mp4.partial")) << "x";
     std::ofstream(path(".demo.mp4.from7.txt")) << "unrelated";
     run(sink(), 0, 3);
-    EXPECT_EQ(read_film(path()).numbers(), numbers(0, 3));
+    EXPECT_EQ(read_video(path()).numbers(), numbers(0, 3));
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from7.txt", "demo.mp4"));
 }
 
@@ -335,22 +335,22 @@ TEST_F(SinkVideo, ARunThatFailsToStartKeepsEarlierSegments) {
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv"));
 }
 
-TEST_F(SinkVideo, AnOlderFilmStaysUntilTheNewOneIsComplete) {
+TEST_F(SinkVideo, AnOlderVideoStaysUntilTheNewOneIsComplete) {
     run(sink(), 0, 3);
     const std::string old = read_text(path());
     run_and_die(0, 5);
     EXPECT_EQ(read_text(path()), old);
     run(sink(), 5, 6);
-    EXPECT_EQ(read_film(path()).numbers(), numbers(0, 6));
+    EXPECT_EQ(read_video(path()).numbers(), numbers(0, 6));
 }
 
 TEST_F(SinkVideo, ARestartWithoutItsFirstSegmentWarnsAndKeepsTheRest) {
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(width, height, 5), ARHOST_STATUS_OK);
-    EXPECT_THAT(s.log(), HasSubstr("3 the part of the film before frame 5 is lost"));
+    EXPECT_THAT(s.log(), HasSubstr("3 the part of the video before frame 5 is lost"));
     ASSERT_EQ(s.write(5, 8), ARHOST_STATUS_OK);
     ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
-    EXPECT_EQ(read_film(path()).numbers(), numbers(5, 8));
+    EXPECT_EQ(read_video(path()).numbers(), numbers(5, 8));
 }
 
 TEST_F(SinkVideo, SegmentsWithOtherOptionsAreNotJoined) {
@@ -363,7 +363,7 @@ TEST_F(SinkVideo, SegmentsWithOtherOptionsAreNotJoined) {
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv", ".demo.mp4.from3.mkv")); // the segments are kept
 }
 
-TEST_F(SinkVideo, NoFramesGiveAWarningAndNoFilm) {
+TEST_F(SinkVideo, NoFramesGiveAWarningAndNoVideo) {
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
@@ -373,7 +373,7 @@ TEST_F(SinkVideo, NoFramesGiveAWarningAndNoFilm) {
 
 // ---- Errors ----------------------------------------------------------------------------------------
 
-TEST_F(SinkVideo, AnUnknownExtensionIsRefused) {
+TEST_F(SinkVideo, AnUnknownExtensionIsRejected) {
     for (const char *name : {"demo.avi", "demo", "demo.mp4.txt"}) {
         SinkUnderTest s = sink({{"path", path(name).string()}});
         EXPECT_EQ(s.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
@@ -392,10 +392,10 @@ TEST_F(SinkVideo, AFullDiskIsAnIoErrorAndEarlierFramesAreKept) {
         EXPECT_THAT(s.log(), HasSubstr(".demo.mp4.from0.mkv"));
     }
     run(sink(), 3, 6);
-    EXPECT_EQ(read_film(path()).numbers(), numbers(0, 6));
+    EXPECT_EQ(read_video(path()).numbers(), numbers(0, 6));
 }
 
-TEST_F(SinkVideo, AFullDiskWhileFinishingKeepsTheFramesAndTheOlderFilm) {
+TEST_F(SinkVideo, AFullDiskWhileFinishingKeepsTheFramesAndTheOlderVideo) {
     run(sink(), 0, 2);
     const std::string old = read_text(path());
     {
@@ -408,8 +408,8 @@ TEST_F(SinkVideo, AFullDiskWhileFinishingKeepsTheFramesAndTheOlderFilm) {
     }
     EXPECT_EQ(read_text(path()), old);
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv", "demo.mp4"));
-    run(sink(), 8, 8); // when the disk has free space, a restart finishes the film
-    EXPECT_EQ(read_film(path()).numbers(), numbers(0, 8));
+    run(sink(), 8, 8); // when the disk has free space, a restart finishes the video
+    EXPECT_EQ(read_video(path()).numbers(), numbers(0, 8));
 }
 
 TEST_F(SinkVideo, AnUnwritableFolderFailsAtTheStart) {
@@ -423,22 +423,22 @@ TEST_F(SinkVideo, ThePathIsNotParsedAsAUrlOrPattern) {
     const auto odd = path("a:b %d, c'd.mp4");
     run(sink({{"path", odd.string()}}), 0, 2);
     EXPECT_THAT(names(), ElementsAre("a:b %d, c'd.mp4"));
-    EXPECT_EQ(read_film(odd).numbers(), numbers(0, 2));
+    EXPECT_EQ(read_video(odd).numbers(), numbers(0, 2));
 }
 
 TEST_F(SinkVideo, MissingFoldersAreCreated) {
     run(sink({{"path", path("a/b/demo.mp4").string()}}), 0, 2);
-    EXPECT_EQ(read_film(path("a/b/demo.mp4")).numbers(), numbers(0, 2));
+    EXPECT_EQ(read_video(path("a/b/demo.mp4")).numbers(), numbers(0, 2));
 }
 
-TEST_F(SinkVideo, AFolderAsPathIsRefused) {
+TEST_F(SinkVideo, AFolderAsPathIsRejected) {
     std::filesystem::create_directory(path());
     SinkUnderTest s = sink();
     EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(s.log(), HasSubstr("is a folder"));
 }
 
-TEST_F(SinkVideo, AFrameOfAnotherSizeIsRefused) {
+TEST_F(SinkVideo, AFrameOfAnotherSizeIsRejected) {
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     EXPECT_EQ(s.write(Picture(width - 2, height, 0), make_record(0)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);

@@ -87,8 +87,8 @@ std::string pattern_in(const ScratchFolder &folder) {
 }
 
 // Checks that the source fails to start with this status, and with one error message that contains all of `words`.
-void expect_refusal(const std::map<std::string, std::string> &options, arhost_status status,
-                    const std::vector<std::string> &words, arhost_source_setup setup = {}) {
+void expect_rejection(const std::map<std::string, std::string> &options, arhost_status status,
+                      const std::vector<std::string> &words, arhost_source_setup setup = {}) {
     SourceUnderTest source("source_file");
     EXPECT_EQ(source.start(options, setup), status) << source.log();
     const std::string errors = source.log(ARHOST_SEVERITY_ERROR);
@@ -185,7 +185,7 @@ TEST(ImageSequence, UsesTheConfiguredRate) {
     EXPECT_EQ(source.read(2).info.capture_ns, 250'000'000);
 }
 
-TEST(ImageSequence, RefusesAChangedSizeAndNamesTheFile) {
+TEST(ImageSequence, RejectsAChangedSizeAndNamesTheFile) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1});
     write_images(folder.path(), {2}, 50, 32);
@@ -303,41 +303,41 @@ TEST(SingleImage, ConvertsSixteenBitsToEightAndDropsAlpha) {
 
 // ---- Unreadable input ------------------------------------------------------------------------------
 
-TEST(Refusal, NamesAMissingFileAndListsTheFolder) {
+TEST(Rejection, NamesAMissingFileAndListsTheFolder) {
     ScratchFolder folder;
     write_images(folder.path(), {0});
-    expect_refusal({{"path", (folder.path() / "film.mp4").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                   {"film.mp4' cannot be opened", "image_0000.png"});
-    expect_refusal({{"path", "/nowhere/film.mp4"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"'/nowhere/film.mp4'"});
+    expect_rejection({{"path", (folder.path() / "video.mp4").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
+                     {"video.mp4' cannot be opened", "image_0000.png"});
+    expect_rejection({{"path", "/nowhere/video.mp4"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"'/nowhere/video.mp4'"});
 }
 
-TEST(Refusal, NamesTheFirstNumberedFileAndListsTheFolder) {
+TEST(Rejection, NamesTheFirstNumberedFileAndListsTheFolder) {
     ScratchFolder folder;
-    expect_refusal({{"path", pattern_in(folder)}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                   {"no file matches", "looked for", "image_0000.png' first", "is empty"});
+    expect_rejection({{"path", pattern_in(folder)}}, ARHOST_STATUS_ERROR_CONFIGURATION,
+                     {"no file matches", "looked for", "image_0000.png' first", "is empty"});
     write_bytes(folder.path() / "image_1.png", {});    // too few digits for %04d
     write_bytes(folder.path() / "image_-001.png", {}); // no sign is allowed
     write_bytes(folder.path() / "notes.txt", {});
-    expect_refusal({{"path", pattern_in(folder)}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                   {"has 3 entries", "image_1.png", "notes.txt"});
+    expect_rejection({{"path", pattern_in(folder)}}, ARHOST_STATUS_ERROR_CONFIGURATION,
+                     {"has 3 entries", "image_1.png", "notes.txt"});
     write_images(folder.path(), {3, 4});
-    expect_refusal({{"path", pattern_in(folder)}, {"start", "0"}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                   {"image_0000.png' first", "2 matching files, with numbers from 3 to 4", "'start'"});
-    expect_refusal({{"path", "/nowhere/image_%d.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                   {"/nowhere/image_0.png", "cannot be listed"});
+    expect_rejection({{"path", pattern_in(folder)}, {"start", "0"}}, ARHOST_STATUS_ERROR_CONFIGURATION,
+                     {"image_0000.png' first", "2 matching files, with numbers from 3 to 4", "'start'"});
+    expect_rejection({{"path", "/nowhere/image_%d.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION,
+                     {"/nowhere/image_0.png", "cannot be listed"});
 }
 
-TEST(Refusal, AllowsOneDecimalNumberInANumberedName) {
+TEST(Rejection, AllowsOneDecimalNumberInANumberedName) {
     for (const char *name : {"a_%s.png", "a_%n.png", "a_%4d.png", "a_%04x.png", "a_%00d.png", "a_%099d.png",
                              "a_%-4d.png", "a_%*d.png", "a_%ld.png", "a_%", "a_%04", "a_%1$d.png"})
-        expect_refusal({{"path", std::string("/frames/") + name}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                       {name, "is not %d or %0Nd", "%05d"});
-    expect_refusal({{"path", "/frames/a_%d_%d.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"a second number, '%d'"});
-    expect_refusal({{"path", "/frames/%d/a.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"there is no %d"});
-    expect_refusal({{"path", "/frames/100%%.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"there is no %d"});
+        expect_rejection({{"path", std::string("/frames/") + name}}, ARHOST_STATUS_ERROR_CONFIGURATION,
+                         {name, "is not %d or %0Nd", "%05d"});
+    expect_rejection({{"path", "/frames/a_%d_%d.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"a second number, '%d'"});
+    expect_rejection({{"path", "/frames/%d/a.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"there is no %d"});
+    expect_rejection({{"path", "/frames/100%%.png"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"there is no %d"});
 }
 
-TEST(Refusal, NumberedNamesMayHavePercentSignsAndVaryingDigits) {
+TEST(Rejection, NumberedNamesMayHavePercentSignsAndVaryingDigits) {
     ScratchFolder folder;
     cv::imwrite((folder.path() / "50%_9.png").string(), colourful(8, 8, 9));
     cv::imwrite((folder.path() / "50%_10.png").string(), colourful(8, 8, 10));
@@ -347,65 +347,66 @@ TEST(Refusal, NumberedNamesMayHavePercentSignsAndVaryingDigits) {
     EXPECT_EQ(source.read(1).bytes, bytes_of(colourful(8, 8, 10)));
 }
 
-TEST(Refusal, ReportsAFolder) {
+TEST(Rejection, ReportsAFolder) {
     ScratchFolder folder;
     write_images(folder.path(), {0});
-    expect_refusal({{"path", folder.path().string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                   {"is a folder", "image_%04d.png", "image_0000.png"});
-    expect_refusal({{"path", "/dev/null"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"is not a regular file"});
+    expect_rejection({{"path", folder.path().string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
+                     {"is a folder", "image_%04d.png", "image_0000.png"});
+    expect_rejection({{"path", "/dev/null"}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"is not a regular file"});
 }
 
-TEST(Refusal, ReportsEmptyAndInvalidFilesOnce) {
+TEST(Rejection, ReportsEmptyAndInvalidFilesOnce) {
     ScratchFolder folder;
     Bytes garbage(20'000);
     std::uint32_t random = 1;
     for (std::uint8_t &byte : garbage)
         byte = static_cast<std::uint8_t>((random = random * 1664525u + 1013904223u) >> 24);
-    for (const char *name : {"film.mp4", "film.avi", "film"}) {
+    for (const char *name : {"video.mp4", "video.avi", "video"}) {
         write_bytes(folder.path() / name, {});
-        expect_refusal({{"path", (folder.path() / name).string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                       {name, "cannot be read"});
+        expect_rejection({{"path", (folder.path() / name).string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
+                         {name, "cannot be read"});
         write_bytes(folder.path() / name, garbage);
-        expect_refusal({{"path", (folder.path() / name).string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                       {name, "cannot be read"});
+        expect_rejection({{"path", (folder.path() / name).string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
+                         {name, "cannot be read"});
     }
     write_bytes(folder.path() / "image.png", garbage);
-    expect_refusal({{"path", (folder.path() / "image.png").string()}}, ARHOST_STATUS_ERROR_IO,
-                   {"image.png' cannot be read"});
+    expect_rejection({{"path", (folder.path() / "image.png").string()}}, ARHOST_STATUS_ERROR_IO,
+                     {"image.png' cannot be read"});
 }
 
-TEST(Refusal, ReportsMissingPermission) {
+TEST(Rejection, ReportsMissingPermission) {
     ScratchFolder folder;
-    const fs::path file = folder.path() / "film.mp4";
+    const fs::path file = folder.path() / "video.mp4";
     write_bytes(file, {1, 2, 3});
     fs::permissions(file, fs::perms::none);
     fs::permissions(folder.path(), fs::perms::all);
     const bool root = geteuid() == 0;
     ASSERT_EQ(seteuid(root ? 65534 : geteuid()), 0); // permissions do not limit root
-    expect_refusal({{"path", file.string()}}, ARHOST_STATUS_ERROR_CONFIGURATION, {"film.mp4", "Permission denied"});
+    expect_rejection({{"path", file.string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
+                     {"video.mp4", "Permission denied"});
     ASSERT_EQ(seteuid(root ? 0 : geteuid()), 0);
 }
 
-TEST(Refusal, ReportsAFileWithoutVideo) {
+TEST(Rejection, ReportsAFileWithoutVideo) {
     ARHOST_REQUIRE_FFMPEG();
     ScratchFolder folder;
     ffmpeg(folder.path(), "-f lavfi -i sine=duration=0.2 tone.wav");
-    expect_refusal({{"path", (folder.path() / "tone.wav").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                   {"tone.wav", "no video stream"});
+    expect_rejection({{"path", (folder.path() / "tone.wav").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
+                     {"tone.wav", "no video stream"});
 }
 
-TEST(Refusal, ReportsAnUnknownCodec) {
+TEST(Rejection, ReportsAnUnknownCodec) {
     ARHOST_REQUIRE_FFMPEG();
-    const VideoFile video("film.avi", "-c:v mpeg4");
+    const VideoFile video("video.avi", "-c:v mpeg4");
     Bytes bytes = bytes_of(video.file());
     const std::string fourcc = "FMP4", unknown = "QQQQ";
     for (auto at = bytes.begin(); (at = std::search(at, bytes.end(), fourcc.begin(), fourcc.end())) != bytes.end();)
         at = std::copy(unknown.begin(), unknown.end(), at);
     write_bytes(video.file(), bytes);
-    expect_refusal(video.options(), ARHOST_STATUS_ERROR_CONFIGURATION, {"film.avi", "no decoder"});
+    expect_rejection(video.options(), ARHOST_STATUS_ERROR_CONFIGURATION, {"video.avi", "no decoder"});
 }
 
-TEST(Refusal, ReportsACameraOfAnotherSize) {
+TEST(Rejection, ReportsACameraOfAnotherSize) {
     ScratchFolder folder;
     write_images(folder.path(), {0});
     arhost_intrinsics camera{};
@@ -414,8 +415,8 @@ TEST(Refusal, ReportsACameraOfAnotherSize) {
     camera.height = 480;
     arhost_source_setup setup{};
     setup.intrinsics = &camera;
-    expect_refusal({{"path", pattern_in(folder)}}, ARHOST_STATUS_ERROR_CONFIGURATION,
-                   {"48×32", "calibration is for 640×480"}, setup);
+    expect_rejection({{"path", pattern_in(folder)}}, ARHOST_STATUS_ERROR_CONFIGURATION,
+                     {"48×32", "calibration is for 640×480"}, setup);
 }
 
 // ---- Videos ----------------------------------------------------------------------------------------
@@ -537,9 +538,9 @@ TEST(Video, AppliesTheRotationOfItsMetadata) {
     for (const char *codec : {"-c:v libx264 -pix_fmt yuv420p", "-c:v libx264rgb -qp 0 -pix_fmt rgb24"})
         for (const char *degrees : {"90", "180", "270"}) {
             SCOPED_TRACE(std::string(codec) + " " + degrees);
-            const VideoFile video("film.mp4", codec, "96x64", 3);
+            const VideoFile video("video.mp4", codec, "96x64", 3);
             ffmpeg(video.folder(),
-                   "-i film.mp4 -c copy -metadata:s:v rotate=" + std::string(degrees) + " turned.mp4");
+                   "-i video.mp4 -c copy -metadata:s:v rotate=" + std::string(degrees) + " turned.mp4");
             SourceUnderTest source("source_file");
             ASSERT_EQ(source.start({{"path", (video.folder() / "turned.mp4").string()}}), ARHOST_STATUS_OK)
                 << source.log();
@@ -564,7 +565,7 @@ TEST(Video, ARestartAtAnyFrameGivesTheSameFrames) {
     for (const char *codec :
          {h264, "-c:v libx264 -x264-params open-gop=1:keyint=10:bframes=3:b-pyramid=strict", "-c:v mpeg4 -bf 2"}) {
         SCOPED_TRACE(codec);
-        const VideoFile video("film.mp4", codec);
+        const VideoFile video("video.mp4", codec);
         SourceUnderTest source("source_file");
         ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
         const auto whole = source.read_all();
@@ -586,7 +587,7 @@ TEST(Video, ARestartAtAnyFrameGivesTheSameFrames) {
 
 TEST(Video, TimeContinuesInALoop) {
     ARHOST_REQUIRE_FFMPEG();
-    const VideoFile video("film.mp4", h264, "96x64", 6);
+    const VideoFile video("video.mp4", h264, "96x64", 6);
     SourceUnderTest source("source_file");
     auto options = video.options();
     options["loop"] = "true";
@@ -608,7 +609,7 @@ TEST(Video, TimeContinuesInALoop) {
 
 TEST(Video, KeepsVariableRateTimesUnlessARateIsConfigured) {
     ARHOST_REQUIRE_FFMPEG();
-    const VideoFile video("film.mkv", "-vf setpts=N*N/25/TB -vsync vfr -c:v libx264", "96x64", 5);
+    const VideoFile video("video.mkv", "-vf setpts=N*N/25/TB -vsync vfr -c:v libx264", "96x64", 5);
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
     for (std::uint64_t n = 0; n < 5; ++n)
@@ -620,7 +621,7 @@ TEST(Video, KeepsVariableRateTimesUnlessARateIsConfigured) {
     EXPECT_EQ(source.read(4).info.capture_ns, 400'000'000);
 }
 
-TEST(Video, WithOneFrameDeliversOneFrame) {
+TEST(Video, DeliversASingleFrame) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("one.mp4", h264, "96x64", 1);
     SourceUnderTest source("source_file");
@@ -636,8 +637,8 @@ TEST(Video, TruncatedIsPlayedToTheLastFrameWithAWarning) {
     struct Case {
         const char *name, *codec;
     };
-    for (const Case &c : {Case{"film.mp4", "-c:v libx264 -g 5 -movflags +faststart"},
-                          Case{"film.avi", "-c:v mjpeg -q:v 2"}, Case{"film.mkv", "-c:v libx264 -g 5"}}) {
+    for (const Case &c : {Case{"video.mp4", "-c:v libx264 -g 5 -movflags +faststart"},
+                          Case{"video.avi", "-c:v mjpeg -q:v 2"}, Case{"video.mkv", "-c:v libx264 -g 5"}}) {
         SCOPED_TRACE(c.name);
         const VideoFile video(c.name, c.codec, "160x120", 40);
         SourceUnderTest source("source_file");
@@ -668,8 +669,8 @@ TEST(Video, TruncatedIsPlayedToTheLastFrameWithAWarning) {
 
 TEST(Video, AviMayHaveFewerFramesThanHeaderSlots) {
     ARHOST_REQUIRE_FFMPEG();
-    const VideoFile video("film.mp4", "-c:v mpeg4 -bf 0", "96x64", 40);
-    ffmpeg(video.folder(), "-i film.mp4 -c copy copied.avi"); // the header of copied.avi says 80 frames
+    const VideoFile video("video.mp4", "-c:v mpeg4 -bf 0", "96x64", 40);
+    ffmpeg(video.folder(), "-i video.mp4 -c copy copied.avi"); // the header of copied.avi says 80 frames
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start({{"path", (video.folder() / "copied.avi").string()}}), ARHOST_STATUS_OK) << source.log();
     const auto frames = source.read_all();
@@ -678,18 +679,18 @@ TEST(Video, AviMayHaveFewerFramesThanHeaderSlots) {
     EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
 }
 
-TEST(Video, WithoutIndexNamesWhatIsMissing) {
+TEST(Video, NamesAMissingIndex) {
     ARHOST_REQUIRE_FFMPEG();
-    const VideoFile video("film.mp4", h264); // the file's index is at its end
+    const VideoFile video("video.mp4", h264); // the file's index is at its end
     Bytes half = bytes_of(video.file());
     half.resize(half.size() / 2);
     write_bytes(video.file(), half);
-    expect_refusal(video.options(), ARHOST_STATUS_ERROR_CONFIGURATION, {"film.mp4", "moov atom not found"});
+    expect_rejection(video.options(), ARHOST_STATUS_ERROR_CONFIGURATION, {"video.mp4", "moov atom not found"});
 }
 
 TEST(Video, DamagedInTheMiddleContinuesWithAWarningAndSeeksToTheSameBytes) {
     ARHOST_REQUIRE_FFMPEG();
-    const VideoFile video("film.avi", "-c:v mpeg4 -g 8", "160x120", 40);
+    const VideoFile video("video.avi", "-c:v mpeg4 -g 8", "160x120", 40);
     Bytes bytes = bytes_of(video.file());
     for (std::size_t i = bytes.size() / 2; i < bytes.size() / 2 + 1500; ++i)
         bytes[i] = static_cast<std::uint8_t>(i * 37);
@@ -703,7 +704,7 @@ TEST(Video, DamagedInTheMiddleContinuesWithAWarningAndSeeksToTheSameBytes) {
     EXPECT_EQ(source.read(25).bytes, whole[25].bytes);
 }
 
-TEST(Video, RefusesAChangedSize) {
+TEST(Video, RejectsAChangedSize) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile small("a.ts", "-c:v libx264", "96x64", 10), large("b.ts", "-c:v libx264", "128x96", 10);
     Bytes both = bytes_of(small.file());
@@ -718,7 +719,7 @@ TEST(Video, RefusesAChangedSize) {
 
 TEST(Video, DecoderMessagesGoToTheDebugLogNotStderr) {
     ARHOST_REQUIRE_FFMPEG();
-    const VideoFile video("film.avi", "-c:v mpeg4 -g 8", "160x120", 20);
+    const VideoFile video("video.avi", "-c:v mpeg4 -g 8", "160x120", 20);
     Bytes bytes = bytes_of(video.file());
     for (std::size_t i = bytes.size() / 2; i < bytes.size() / 2 + 1500; ++i)
         bytes[i] = static_cast<std::uint8_t>(i * 37);
@@ -733,7 +734,7 @@ TEST(Video, DecoderMessagesGoToTheDebugLogNotStderr) {
 
 TEST(Video, StopsDecodingWhenCancelled) {
     ARHOST_REQUIRE_FFMPEG();
-    const VideoFile video("film.mp4", h264);
+    const VideoFile video("video.mp4", h264);
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
     source.plugin().cancel();
@@ -779,7 +780,7 @@ TEST(Paced, DeliversNoFrameEarly) {
 
 TEST(Paced, SkipsAndCountsLateFrames) {
     ARHOST_REQUIRE_FFMPEG();
-    const VideoFile video("film.mp4", h264);
+    const VideoFile video("video.mp4", h264);
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
     const auto whole = source.read_all();

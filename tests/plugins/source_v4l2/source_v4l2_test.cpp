@@ -27,7 +27,7 @@ using Bytes = std::vector<std::uint8_t>;
 
 namespace {
 
-std::string refusal(const std::map<std::string, std::string> &options, arhost_status expected) {
+std::string rejection(const std::map<std::string, std::string> &options, arhost_status expected) {
     SourceUnderTest source("source_v4l2");
     EXPECT_EQ(source.start(options), expected) << source.log();
     const std::string errors = source.log(ARHOST_SEVERITY_ERROR);
@@ -101,8 +101,8 @@ Bytes without_segments(const Bytes &jpeg, std::uint8_t marker) {
 
 // ---- Messages --------------------------------------------------------------------------------------
 
-TEST(V4l2Refusal, NamesAMissingDeviceAndAlternatives) {
-    const std::string text = refusal({{"device", "/dev/video-none"}}, ARHOST_STATUS_ERROR_CONFIGURATION);
+TEST(V4l2Rejection, NamesAMissingDeviceAndAlternatives) {
+    const std::string text = rejection({{"device", "/dev/video-none"}}, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(text, HasSubstr("device: '/dev/video-none' does not exist"));
     if (fs::exists("/dev/video0")) {
         EXPECT_THAT(text, HasSubstr("/dev/video0"));
@@ -113,18 +113,18 @@ TEST(V4l2Refusal, NamesAMissingDeviceAndAlternatives) {
     }
 }
 
-TEST(V4l2Refusal, ReportsADeviceThatIsNotAVideoDevice) {
-    EXPECT_THAT(refusal({{"device", "/dev/null"}}, ARHOST_STATUS_ERROR_CONFIGURATION),
+TEST(V4l2Rejection, ReportsADeviceThatIsNotAVideoDevice) {
+    EXPECT_THAT(rejection({{"device", "/dev/null"}}, ARHOST_STATUS_ERROR_CONFIGURATION),
                 HasSubstr("'/dev/null' is not a video device"));
     ScratchFolder folder;
     std::ofstream(folder.path() / "file") << "text";
-    EXPECT_THAT(refusal({{"device", (folder.path() / "file").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION),
+    EXPECT_THAT(rejection({{"device", (folder.path() / "file").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION),
                 HasSubstr("is not a video device"));
-    EXPECT_THAT(refusal({{"device", folder.path().string()}}, ARHOST_STATUS_ERROR_CONFIGURATION),
+    EXPECT_THAT(rejection({{"device", folder.path().string()}}, ARHOST_STATUS_ERROR_CONFIGURATION),
                 HasSubstr("is a folder"));
 }
 
-TEST(V4l2Refusal, NamesTheGroupThatMayOpenACamera) {
+TEST(V4l2Rejection, NamesTheGroupThatMayOpenACamera) {
     ScratchFolder folder;
     std::ofstream(folder.path() / "video0") << "";
     fs::permissions(folder.path() / "video0", fs::perms::none);
@@ -132,13 +132,13 @@ TEST(V4l2Refusal, NamesTheGroupThatMayOpenACamera) {
     const bool root = geteuid() == 0;
     ASSERT_EQ(seteuid(root ? 65534 : geteuid()), 0); // permissions do not limit root
     const std::string text =
-        refusal({{"device", (folder.path() / "video0").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION);
+        rejection({{"device", (folder.path() / "video0").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION);
     ASSERT_EQ(seteuid(root ? 0 : geteuid()), 0);
     EXPECT_THAT(text, HasSubstr("group 'video'"));
 }
 
-TEST(V4l2Refusal, RequiresBothSidesOfASizeOrNeither) {
-    EXPECT_THAT(refusal({{"width", "640"}}, ARHOST_STATUS_ERROR_CONFIGURATION), HasSubstr("set both or neither"));
+TEST(V4l2Rejection, RequiresBothSidesOfASizeOrNeither) {
+    EXPECT_THAT(rejection({{"width", "640"}}, ARHOST_STATUS_ERROR_CONFIGURATION), HasSubstr("set both or neither"));
 }
 
 TEST(V4l2, DeclaresVideoNeedsAndLiveCapability) {
@@ -153,7 +153,7 @@ TEST(V4l2, DeclaresVideoNeedsAndLiveCapability) {
 
 // ---- Motion-JPEG -----------------------------------------------------------------------------------
 
-TEST(Jpeg, WithChroma420BecomesI420WithoutConversion) {
+TEST(Jpeg, Chroma420BecomesI420WithoutConversion) {
     const Bytes jpeg = make_jpeg(96, 64, TJSAMP_420);
     const Decoded frame = decode(jpeg, jpeg);
     ASSERT_TRUE(frame.good) << frame.fault;
@@ -171,7 +171,7 @@ TEST(Jpeg, WithChroma420BecomesI420WithoutConversion) {
         }
 }
 
-TEST(Jpeg, WithOtherSubsamplingsOrOddSizesBecomesBgr) {
+TEST(Jpeg, OtherSubsamplingsAndOddSizesBecomeBgr) {
     struct Case {
         int width, height, subsampling;
     };
@@ -202,7 +202,7 @@ TEST(Jpeg, GreyStaysGrey) {
         }
 }
 
-TEST(Jpeg, WithoutHuffmanTablesUsesTheStandardTables) {
+TEST(Jpeg, UsesTheStandardTablesIfItHasNoHuffmanTables) {
     const Bytes whole = make_jpeg(96, 64, TJSAMP_420), bare = without_segments(whole, 0xc4);
     ASSERT_LT(bare.size(), whole.size());
     const Decoded expected = decode(whole, whole), frame = decode(bare, whole);
@@ -212,7 +212,7 @@ TEST(Jpeg, WithoutHuffmanTablesUsesTheStandardTables) {
             ASSERT_EQ(frame.at(0, x, y), expected.at(0, x, y));
 }
 
-TEST(Jpeg, WithPaddingAroundItsEndIsIntact) {
+TEST(Jpeg, IsIntactIfItsEndIsPadded) {
     const Bytes whole = make_jpeg(96, 64, TJSAMP_422);
     Bytes padded = whole;
     padded.insert(padded.end() - 2, 5, 0);
@@ -233,7 +233,7 @@ TEST(Jpeg, TruncatedAnywhereIsDamaged) {
     }
 }
 
-TEST(Jpeg, WithChangedSizeOrSubsamplingIsDamaged) {
+TEST(Jpeg, IsDamagedIfItsSizeOrSubsamplingChanges) {
     const Bytes first = make_jpeg(96, 64, TJSAMP_420);
     EXPECT_THAT(decode(make_jpeg(80, 64, TJSAMP_420), first).fault, HasSubstr("80×64"));
     EXPECT_THAT(decode(make_jpeg(192, 128, TJSAMP_420), first).fault, HasSubstr("192×128"));

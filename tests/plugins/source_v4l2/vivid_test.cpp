@@ -296,13 +296,13 @@ TEST_F(Vivid, UsesTheSizeOfTheCalibration) {
                 HasSubstr("320×180 is configured, but the camera calibration is for 640×480"));
 }
 
-TEST_F(Vivid, RefusesAnUnsupportedSizeAndNamesTheNearest) {
+TEST_F(Vivid, RejectsAnUnsupportedSizeAndNamesTheNearest) {
     EXPECT_EQ(start(30, {{"width", "650"}, {"height", "470"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has no size 650×470 in YUYV"));
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("the nearest are 640×480"));
 }
 
-TEST_F(Vivid, RefusesAnUnsupportedFormatAndListsTheSupportedOnes) {
+TEST_F(Vivid, RejectsAnUnsupportedFormatAndListsTheSupportedOnes) {
     EXPECT_EQ(start(30, {{"format", "mjpeg"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("offers no mjpeg"));
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("YUYV (320×180 60 fps, 640×360 40 fps"));

@@ -38,8 +38,8 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     self->delay_ms = arhost_find_option(options, option_count, "delay_ms")->real;
     self->writes_later = arhost_find_option(options, option_count, "writes_later")->integer;
     self->device_time_ns = arhost_find_option(options, option_count, "device_time_ns")->integer;
-    if (arhost_find_option(options, option_count, "refuse")->integer) {
-        host->log(host, ARHOST_SEVERITY_ERROR, "rejected, as the option 'refuse' requests");
+    if (arhost_find_option(options, option_count, "reject")->integer) {
+        host->log(host, ARHOST_SEVERITY_ERROR, "rejected, as the option 'reject' requests");
         free(self);
         return ARHOST_STATUS_ERROR_CONFIGURATION;
     }
@@ -130,7 +130,7 @@ static const arhost_option_descriptor options[] = {
      "Also writes to the previous image"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "device_time_ns", "0", 0, 0, NULL,
      "Reported device time; negative values wrap to huge ones"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "refuse", "false", 0, 0, NULL, "Fails in create"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "reject", "false", 0, 0, NULL, "Fails in create"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "crash_in_create", "false", 0, 0, NULL,
      "Crashes in create"},
 };

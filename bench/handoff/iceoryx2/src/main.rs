@@ -92,7 +92,8 @@ impl Receiver {
     fn receive(&self, polling: bool) -> Result<Message, Box<dyn Error>> {
         let end = Instant::now() + Duration::from_secs(10); // the other side may have died
         while Instant::now() < end {
-            // Consume the event first, which follows its message: a leftover event would end the next wait.
+            // Consume the event before the message. The sender signals after sending; a leftover event would end the
+            // next wait early.
             if !polling {
                 self.listener.timed_wait_one(Duration::from_secs(1))?;
             }
@@ -113,7 +114,7 @@ fn run_server(run: &str, rounds: usize, polling: bool) -> Result<(), Box<dyn Err
         Receiver::open(&node, "forward", run)?,
         Sender::open(&node, "backward", run)?,
     );
-    println!("ready"); // messages sent before the receiver exists would be lost
+    println!("ready"); // the client waits for this line: messages sent before the receiver exists would be lost
     for _ in 0..=rounds {
         let request = requests.receive(polling)?;
         let forward_ns = now_ns() - request.sent_ns;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost-cpp/numbered_name.hpp: file names with a frame number, "frame_%05d.png". Sources that read numbered files
-// and sinks that write them share this parser, so a source can read every name that a sink writes.
+// arhost-cpp/numbered_name.hpp: numbered file names, such as "frame_%05d.png". Sources that read numbered files and
+// sinks that write them share this parser, so a source can read every name that a sink writes.
 #pragma once
 
 #include <algorithm>

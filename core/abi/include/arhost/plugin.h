@@ -28,9 +28,9 @@
  * - Ownership: a pointer passed in a call belongs to the caller and is valid until the call returns. Memory is never
  *   allocated on one side and freed on the other.
  * - Each struct begins with `struct_size`: the size of the struct in bytes, as known to the side that fills it in.
- *   Never access a field beyond this size. Consecutive elements of an array are as many bytes apart as the
- *   `struct_size` of the first element says. Elements without a `struct_size` (arhost/motion.h, arhost/scene.h) never
- *   grow, so they are sizeof(element) bytes apart.
+ *   Never access a field beyond this size. The stride of an array is the `struct_size` of its first
+ *   element. Elements without a `struct_size` (arhost/motion.h, arhost/scene.h) never grow, so their stride is
+ *   sizeof(element).
  * - Strings are UTF-8 and NUL-terminated. Pointers are not NULL unless documented otherwise.
  * - No function throws an exception or exits by longjmp.
  */

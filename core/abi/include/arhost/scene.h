@@ -105,7 +105,7 @@ typedef struct arhost_material {
     float exponent;          /* Phong exponent, >= 1 */
     float reflectivity[3];   /* Kr; glass: tint of reflected light */
     float emission[3];       /* emitted radiance, 0 to 1e6 */
-    float alpha_cutoff;      /* the surface is absent where the alpha of colour_texture is lower; 0: absent nowhere */
+    float alpha_cutoff;      /* alpha test: surface points whose colour_texture alpha is lower are cut out; 0: none */
 
     /* Metallic-roughness. */
     float metallic, roughness;           /* 0 to 1 */

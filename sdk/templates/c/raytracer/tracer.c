@@ -305,8 +305,8 @@ static incident_light incident_from(const arhost_light *light, const surface *s)
     return in;
 }
 
-/* What blocks the light: SOLID for any opaque object, GLASS, or 0. Proxies for real objects cast no shadows on each
- * other: the video already contains those. */
+/* Returns SOLID if an opaque object blocks the light, GLASS if only glass does, otherwise 0. Proxies for real objects
+ * cast no shadows on each other: the video already contains those. */
 static unsigned blocked_by(const tracer *self, const incident_light *light, const surface *s) {
     const ray shadow_ray = {s->position, light->direction, light->distance};
     if (nearest_hit(self, shadow_ray, s->is_real ? SOLID : SOLID | CATCHER | OCCLUDER, 0).object)

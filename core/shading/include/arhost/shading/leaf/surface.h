@@ -15,11 +15,11 @@ ARHOST_LEAF Vec3 normalize_or(Vec3 a, Vec3 fallback) {
 
 // Distance from the surface at which secondary rays start, to avoid self-intersection; world space, mm. The error of
 // a hit point is a few times 2^-24 of the magnitudes from which it was computed: `position` (the hit point), `ray`
-// (from the ray's origin to the hit point) and `reach` (the largest offsets of the geometry along each axis). `reach`
-// is weighted by the unit `normal`, because only errors along the normal matter: the height of a level floor, for
-// example, is exact however large the floor is.
-ARHOST_LEAF Float offset_from_surface(Vec3 position, Vec3 ray, Vec3 normal, Vec3 reach) {
-    Float along_normal = abs(normal.x) * reach.x + abs(normal.y) * reach.y + abs(normal.z) * reach.z;
+// (from the ray's origin to the hit point) and `extent` (maximum distance of the object's points from its origin
+// along each world axis). `extent` is weighted by the unit `normal`, because only errors along the normal matter: the
+// height of a level floor, for example, is exact however large the floor is.
+ARHOST_LEAF Float offset_from_surface(Vec3 position, Vec3 ray, Vec3 normal, Vec3 extent) {
+    Float along_normal = abs(normal.x) * extent.x + abs(normal.y) * extent.y + abs(normal.z) * extent.z;
     return (largest(position) + largest(ray) + along_normal) * Float(1.0 / 524288.0);
 }
 

@@ -22,7 +22,7 @@ extern "C" {
 
 namespace arhost::test {
 
-struct FilmFrame {
+struct VideoFrame {
     int width, height;
     std::int64_t time; // presentation time in units of 1/fps
     std::vector<std::uint8_t> bgr;
@@ -38,7 +38,7 @@ struct FilmFrame {
     }
 };
 
-struct Film {
+struct Video {
     std::string codec;
     AVRational fps;
     double duration_s;
@@ -46,24 +46,24 @@ struct Film {
     AVColorSpace matrix;
     AVColorPrimaries primaries;
     AVColorTransferCharacteristic transfer;
-    std::vector<FilmFrame> frames;
+    std::vector<VideoFrame> frames;
 
     std::vector<std::uint64_t> numbers() const {
         std::vector<std::uint64_t> all;
-        for (const FilmFrame &frame : frames)
+        for (const VideoFrame &frame : frames)
             all.push_back(frame.number());
         return all;
     }
     std::vector<std::int64_t> times() const {
         std::vector<std::int64_t> all;
-        for (const FilmFrame &frame : frames)
+        for (const VideoFrame &frame : frames)
             all.push_back(frame.time);
         return all;
     }
 };
 
-inline FilmFrame to_bgr(const AVFrame &frame) {
-    FilmFrame out{frame.width, frame.height, 0, std::vector<std::uint8_t>(3ull * frame.width * frame.height)};
+inline VideoFrame to_bgr(const AVFrame &frame) {
+    VideoFrame out{frame.width, frame.height, 0, std::vector<std::uint8_t>(3ull * frame.width * frame.height)};
     const std::unique_ptr<SwsContext, decltype(&sws_freeContext)> sws(
         sws_getContext(frame.width, frame.height, static_cast<AVPixelFormat>(frame.format), frame.width, frame.height,
                        AV_PIX_FMT_BGR24, SWS_BICUBIC | SWS_ACCURATE_RND | SWS_FULL_CHR_H_INT | SWS_BITEXACT, nullptr,
@@ -82,7 +82,7 @@ inline FilmFrame to_bgr(const AVFrame &frame) {
     return out;
 }
 
-inline Film read_film(const std::filesystem::path &path) {
+inline Video read_video(const std::filesystem::path &path) {
     AVFormatContext *format = nullptr;
     if (avformat_open_input(&format, path.c_str(), nullptr, nullptr) < 0)
         throw std::runtime_error("cannot open " + path.string());
@@ -101,22 +101,22 @@ inline Film read_film(const std::filesystem::path &path) {
     if (avcodec_open2(codec.get(), decoder, nullptr) < 0)
         throw std::runtime_error("cannot open the decoder");
 
-    Film film{decoder->name,
-              stream.avg_frame_rate,
-              static_cast<double>(format->duration) / AV_TIME_BASE,
-              parameters.color_range,
-              parameters.color_space,
-              parameters.color_primaries,
-              parameters.color_trc,
-              {}};
+    Video video{decoder->name,
+                stream.avg_frame_rate,
+                static_cast<double>(format->duration) / AV_TIME_BASE,
+                parameters.color_range,
+                parameters.color_space,
+                parameters.color_primaries,
+                parameters.color_trc,
+                {}};
     const auto free_packet = [](AVPacket *p) { av_packet_free(&p); };
     const auto free_frame = [](AVFrame *p) { av_frame_free(&p); };
     const std::unique_ptr<AVPacket, decltype(free_packet)> packet(av_packet_alloc(), free_packet);
     const std::unique_ptr<AVFrame, decltype(free_frame)> frame(av_frame_alloc(), free_frame);
     const auto take = [&] {
         while (avcodec_receive_frame(codec.get(), frame.get()) == 0) {
-            film.frames.push_back(to_bgr(*frame));
-            film.frames.back().time =
+            video.frames.push_back(to_bgr(*frame));
+            video.frames.back().time =
                 av_rescale_q(frame->best_effort_timestamp, stream.time_base, av_inv_q(stream.r_frame_rate));
         }
     };
@@ -128,7 +128,7 @@ inline Film read_film(const std::filesystem::path &path) {
     }
     avcodec_send_packet(codec.get(), nullptr);
     take();
-    return film;
+    return video;
 }
 
 } // namespace arhost::test
