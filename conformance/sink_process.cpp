@@ -85,7 +85,7 @@ void SinkProcess::kill() {
     ::kill(pid_, SIGTERM);
     int status = 0;
     pid_t reaped = 0;
-    for (int i = 0; i < 500 && reaped == 0; ++i) { // the plugin may handle the signal
+    for (int i = 0; i < 500 && reaped == 0; ++i) { // the plugin may catch SIGTERM
         std::this_thread::sleep_for(2ms);
         reaped = ::waitpid(pid_, &status, WNOHANG);
     }

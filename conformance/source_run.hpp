@@ -55,7 +55,8 @@ struct Request {
     const arhost_intrinsics *intrinsics = nullptr;
 };
 
-// An instance is started once; a further start creates a new instance.
+// Runs one source plugin. A plugin instance can be started only once, so each further start replaces it with a new
+// instance.
 class SourceRun {
 public:
     explicit SourceRun(Context &context);

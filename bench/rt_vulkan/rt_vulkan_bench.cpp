@@ -5,7 +5,9 @@
 //   rt-vulkan-bench trace bunny|SCENE.yaml WIDTH HEIGHT ROUNDS auto|all [EYE_X Y Z AT_X Y Z]
 //
 // compares the time of an image with that of a bare trace: a shader that traces the same primary rays with the same
-// trace(), but writes only distances (bare.glsl). Prints one line of JSON per path.
+// trace(), but writes only distances (bare.glsl). `auto` measures the path that the plugin would choose on this GPU
+// (compute shader, ray queries or ray tracing pipeline), `all` each path that the GPU supports. Prints one line of
+// JSON per path.
 //
 //   rt-vulkan-bench run IMAGES EVERY SCENE.yaml…
 //

@@ -43,8 +43,8 @@ struct Result {
     arhost_status status;
     std::uint32_t reserved;
     std::int64_t busy_ns;      // time spent in the plugin function
-    arhost_frame_info frame;   // only of `read`
-    arhost_render_info render; // only of `render`
+    arhost_frame_info frame;   // set only by CommandKind::read
+    arhost_render_info render; // set only by CommandKind::render
 };
 
 // The plugin function that a worker is executing, for crash reports.

@@ -13,8 +13,8 @@ namespace arhost::trajectory {
 void append_header(std::string &text, const arhost_intrinsics &intrinsics, arhost_clock clock, double fps);
 void append_frame(std::string &text, const arhost_record &record);
 
-// Format `dissertation`: nine numbers per line, with six significant digits, each followed by a space. A frame
-// without a camera gets an empty line, which the programs of the dissertation skip.
+// Format `dissertation` (docs/trajectories.md): the nine numbers of eye, look-at point and up vector per line, with
+// six significant digits, each followed by a space. A frame without a camera gets an empty line.
 void append_dissertation_frame(std::string &text, const arhost_record &record);
 
 } // namespace arhost::trajectory

@@ -65,9 +65,11 @@ private:
 constexpr const char *formats[] = {"arhost", "dissertation", nullptr};
 constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "The trajectory to write, one line per frame."),
-    arhost::option(ARHOST_OPTION_TEXT, "format", "arhost",
-                   "arhost: JSON lines with time stamps and intrinsics; dissertation: nine numbers per line.", 0, 0,
-                   formats),
+    arhost::option(
+        ARHOST_OPTION_TEXT, "format", "arhost",
+        "arhost: JSON lines with time stamps and intrinsics; dissertation: eye, look-at point and up vector per "
+        "line (docs/trajectories.md).",
+        0, 0, formats),
 };
 
 constexpr arhost_descriptor descriptor = {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-//! One-way latency of a 128-byte message to another process and of the response, over iceoryx2 samples, with a sleeping
-//! (events) and a polling receiver. Same rounds and statistics as bench_handoff.cpp.
+//! Measures the one-way latency of a 128-byte message to another process, and of the response on its way back. Both
+//! are sent as iceoryx2 samples. The receiver either sleeps until an iceoryx2 event arrives, or polls. The rounds and
+//! statistics are those of bench_handoff.cpp.
 use iceoryx2::port::{
     listener::Listener, notifier::Notifier, publisher::Publisher, subscriber::Subscriber,
 };
