@@ -58,6 +58,7 @@ inline const std::vector<WrongPlugin> wrong_sinks = of_kind(
         {"writes_each_frame_twice", "writes each frame twice", "fail", {"sink.order"}},
         {"exchanges_frames", "swaps every fourth frame with the previous one", "fail", {"sink.order"}},
         {"newest_first", "writes the newest frame's line first", "fail", {"sink.order"}},
+        {"blackens_a_frame_of_a_film", "writes a film in which every fifth frame is black", "fail", {"sink.order"}},
         {"writes_the_frame_before", "writes the previous frame", "fail", {"sink.last-frame", "sink.restart"}},
         {"empties_at_start", "empties an earlier run's log in start", "fail", {"sink.earlier-files"}},
         {"looks_for_no_place", "start does not check that it can write", "fail", {"sink.no-place"}},
