@@ -6,10 +6,12 @@
 #include "conformance/sink_process.hpp"
 #include "conformance/sink_run.hpp"
 #include "conformance/slow_disk.hpp"
+#include "conformance/source_run.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <csignal>
 #include <deque>
 #include <fstream>
@@ -280,8 +282,79 @@ std::map<std::string, Number> numbers_in(const std::string &path) {
     return numbers;
 }
 
+// Brightness of each pixel.
+using Grey = std::vector<double>;
+
+Grey grey_of(const arhost_output &output) {
+    Grey grey;
+    for (std::uint32_t y = 0; y < output.height; ++y)
+        for (std::uint32_t x = 0; x < output.width; ++x) {
+            const std::uint8_t *bgr = output.bgr + std::size_t{output.stride} * y + std::size_t{3} * x;
+            grey.push_back(0.114 * bgr[0] + 0.587 * bgr[1] + 0.299 * bgr[2]);
+        }
+    return grey;
+}
+
+Grey grey_of(const arhost_frame_format &format, const Frame &frame) {
+    const bool is_colour =
+        format.pixel_format == ARHOST_PIXEL_FORMAT_BGR8 || format.pixel_format == ARHOST_PIXEL_FORMAT_RGB8;
+    const std::size_t step = is_colour ? 3 : format.pixel_format == ARHOST_PIXEL_FORMAT_YUYV ? 2 : 1;
+    Grey grey;
+    for (std::size_t i = 0; i < std::size_t{format.width} * format.height; ++i) // the first plane has the brightness
+        grey.push_back(frame.pixels[i * step + (is_colour ? 1 : 0)]);
+    return grey;
+}
+
+// Pearson's correlation coefficient, which does not depend on the range of the brightness; 0 for a uniform picture.
+double correlation(const Grey &a, const Grey &b) {
+    const auto n = static_cast<double>(a.size());
+    double sum_a = 0, sum_b = 0, aa = 0, bb = 0, ab = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+        sum_a += a[i];
+        sum_b += b[i];
+        aa += a[i] * a[i];
+        bb += b[i] * b[i];
+        ab += a[i] * b[i];
+    }
+    const double variances = (n * aa - sum_a * sum_a) * (n * bb - sum_b * sum_b);
+    return variances > 0 ? (n * ab - sum_a * sum_b) / std::sqrt(variances) : 0;
+}
+
+// Decodes a video of the frames 0 to `frames` − 1 with source_file, which is next to the reference. Throws Failure if
+// the video's pictures are not these frames in order. Returns false if the file is not a video.
+bool check_video(Context &context, const std::filesystem::path &video, std::uint64_t frames) {
+    const std::filesystem::path decoder = context.reference.parent_path() / "source_file.so";
+    if (!std::filesystem::is_regular_file(decoder))
+        return false;
+    PluginLibrary library(decoder, {{"path", video}}, context.library.calls());
+    Context of_decoder{library, context.reference, context.random};
+    SourceRun source(of_decoder);
+    const arhost_status status = source.try_start();
+    if (status != ARHOST_STATUS_OK)
+        return false;
+    source.accept(status);
+    const std::vector<Frame> pictures = source.read_up_to(frames + 1);
+    const std::string name = video.filename();
+    if (pictures.size() != frames)
+        throw Failure(fmt::format("'{}' has {} pictures, but {} frames were written", name, pictures.size(), frames));
+    std::vector<Grey> written;
+    for (std::uint64_t n = 0; n < frames; ++n)
+        written.push_back(grey_of(SealedOutput({n}).output()));
+    for (std::uint64_t n = 0; n < frames; ++n) {
+        const Grey shown = grey_of(source.format(), pictures[n]);
+        if (shown.size() != written[n].size())
+            throw Failure(fmt::format("the pictures in '{}' have {} x {} px", name, source.format().width,
+                                      source.format().height));
+        constexpr double similar = 0.5; // different frames are noise, whose correlation is near 0
+        if (const double same = correlation(shown, written[n]); same < similar)
+            throw Failure(fmt::format("picture {} in '{}' does not show frame {}: their correlation is {:.2f}", n,
+                                      name, n, same));
+    }
+    return true;
+}
+
 // Replaces one frame at a time and finds where the files change. This works for files of constant size, and for one
-// file per frame with numbered file names.
+// file per frame with numbered file names. Videos are decoded.
 void order(Context &context) {
     require_every_frame(context);
     constexpr std::uint64_t frames = 6;
@@ -345,8 +418,11 @@ void order(Context &context) {
             before = &file;
         }
     }
+    for (const auto &[name, of_file] : changes)
+        if (!reported && of_file.size() == frames) // the file contains all frames
+            reported = check_video(context, context.library.scratch() / std::to_string(frames) / name, frames);
     if (!reported)
-        throw Skip("the position of a frame in its files is unknown without decoding");
+        throw Skip("the position of a frame in its files is unknown, and they are not videos");
 }
 
 void last_frame(Context &context) {

@@ -1,14 +1,66 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/command_line.hpp"
 
+#include "base/command_line_pages.hpp"
 #include "base/text.hpp"
 
 #include <CLI/CLI.hpp>
 
 #include <array>
 #include <cstdint>
+#include <cstdio>
 
 namespace arhost::base {
+namespace {
+
+// Returns the choices of CLI::IsMember, whose description is "{a,b,c}".
+std::vector<std::string> choices_of(const CLI::Option &option) {
+    const std::string type = option.get_type_name();
+    const std::size_t begin = type.find('{'), end = type.rfind('}');
+    if (begin == std::string::npos || end == std::string::npos || end < begin)
+        return {};
+    return CLI::detail::split(type.substr(begin + 1, end - begin - 1), ',');
+}
+
+PageOption page_option(const CLI::Option &option) {
+    PageOption page;
+    for (const std::string &name : option.get_snames())
+        page.names.push_back("-" + name);
+    for (const std::string &name : option.get_lnames())
+        page.names.push_back("--" + name);
+    page.positional = option.get_positional() ? option.get_name(true) : "";
+    page.help = option.get_description();
+    page.choices = choices_of(option);
+    const bool is_flag = option.get_items_expected_max() == 0;
+    if (!is_flag)
+        page.value = page.choices.empty() ? CLI::detail::split(option.get_type_name(), ':').front() : "";
+    if (!is_flag && page.value.empty())
+        page.value = page.positional.empty() ? "VALUE" : page.positional;
+    page.is_required = option.get_required();
+    page.is_repeatable = option.get_expected_max() > 1;
+    return page;
+}
+
+void add_options(PageCommand &command, const CLI::App &app) {
+    const bool is_group = app.get_name().empty() && app.get_parent(); // repeats its parent's --help
+    for (const CLI::Option *option : app.get_options())
+        if (!option->get_group().empty() && !(is_group && option == app.get_help_ptr())) // hidden: no group
+            command.options.push_back(page_option(*option));
+}
+
+PageCommand page_command(const CLI::App &app) {
+    PageCommand command{app.get_name(), app.get_description(), app.get_prefix_command(), {}};
+    add_options(command, app);
+    for (const CLI::App *group : app.get_subcommands([](const CLI::App *sub) { return sub->get_name().empty(); }))
+        add_options(command, *group);
+    return command;
+}
+
+std::vector<const CLI::App *> named_subcommands(const CLI::App &app) {
+    return app.get_subcommands([](const CLI::App *sub) { return !sub->get_name().empty(); });
+}
+
+} // namespace
 
 Option Option::required() {
     return Option(option_->required());
@@ -59,7 +111,7 @@ CommandLine::CommandLine(const std::string &description, const std::string &name
 CommandLine::CommandLine(std::shared_ptr<CLI::App> app) : app_(std::move(app)) {}
 
 void CommandLine::version(const std::string &text) {
-    app_->set_version_flag("--version", text);
+    app_->set_version_flag("-V,--version", text);
 }
 
 CommandLine CommandLine::group(const std::string &name, const std::string &description) {
@@ -103,6 +155,16 @@ Option CommandLine::flag(const std::string &names, bool &value, const std::strin
 }
 
 std::optional<int> CommandLine::parse(int argc, char **argv) {
+    if (argc == 3 && std::string_view(argv[1]) == "--generate") {
+        if (app_->get_name().empty())
+            app_->name(std::filesystem::path(argv[0]).filename().string());
+        std::vector<PageCommand> commands;
+        for (const CLI::App *sub : named_subcommands(*app_))
+            commands.push_back(page_command(*sub));
+        const std::string page = generate_page(argv[2], page_command(*app_), commands);
+        std::fputs(page.c_str(), stdout);
+        return page.empty() ? 2 : 0;
+    }
     try {
         app_->parse(argc, argv);
         return std::nullopt;
@@ -119,8 +181,17 @@ std::vector<std::string> CommandLine::arguments() const {
     return app_->remaining();
 }
 
-std::string CommandLine::help() const {
-    return app_->help();
+std::vector<std::string> CommandLine::subcommands() const {
+    std::vector<std::string> names;
+    for (const CLI::App *sub : named_subcommands(*app_))
+        names.push_back(sub->get_name());
+    return names;
+}
+
+std::string CommandLine::help(const std::string &subcommand) const {
+    const CLI::App *app = subcommand.empty() ? app_.get() : app_->get_subcommand(subcommand);
+    const std::string name = subcommand.empty() ? app_->get_name() : app_->get_name() + " " + subcommand;
+    return app_->get_formatter()->make_help(app, name, CLI::AppFormatMode::Normal);
 }
 
 } // namespace arhost::base

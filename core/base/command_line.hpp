@@ -38,8 +38,11 @@ private:
     CLI::Option *option_;
 };
 
+// Also writes the program's man page and shell completions: if the only arguments are `--generate man`, or bash, zsh
+// or fish, parse() prints that text, from the definitions of options and commands. The build uses this.
 class CommandLine {
 public:
+    // `name`: the name in --help and in the man page, such as "arhost conform" for arhost-conform.
     explicit CommandLine(const std::string &description, const std::string &name = "");
 
     void version(const std::string &text);
@@ -57,7 +60,8 @@ public:
     std::optional<int> parse(int argc, char **argv);
     bool selected() const; // whether the user has given this subcommand
     std::vector<std::string> arguments() const;
-    std::string help() const;
+    std::vector<std::string> subcommands() const;
+    std::string help(const std::string &subcommand = "") const;
 
 private:
     explicit CommandLine(std::shared_ptr<CLI::App> app);

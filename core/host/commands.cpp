@@ -2,11 +2,14 @@
 #include "host/commands.hpp"
 
 #include "base/atomic_file.hpp"
+#include "base/file_identity.hpp"
 #include "base/text.hpp"
 #include "camera/coordinates.hpp"
 #include "host/console.hpp"
+#include "host/outcome.hpp"
 #include "host/pipeline.hpp"
 #include "host/probe.hpp"
+#include "run_config/access.hpp"
 #include "run_config/schema.hpp"
 
 #include <nlohmann/json.hpp>
@@ -15,6 +18,8 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
 #include <fstream>
 #include <sys/resource.h>
 #include <sys/signalfd.h>
@@ -75,6 +80,18 @@ void lift_deadlines(run_config::Configuration &configuration) {
     std::for_each(configuration.outputs.begin(), configuration.outputs.end(), lift);
 }
 
+// Throws if an output would overwrite one of arhost's own programs, libraries and plugins.
+void protect_programs(const run_config::FilesInUse &files) {
+    for (const char *program :
+         {"arhost", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-worker", "render-scene"})
+        files.check_read(base::identity_of(own_folder() / program));
+    std::error_code ignored;
+    for (fs::recursive_directory_iterator entry(own_prefix() / "lib/arhost", ignored), end; !ignored && entry != end;
+         entry.increment(ignored))
+        if (entry->is_regular_file(ignored))
+            files.check_read(base::identity_of(entry->path()));
+}
+
 run_config::Configuration parse_configuration(yaml::Node &root, const Arguments &arguments) {
     for (const std::string &setting : arguments.settings) {
         const std::size_t equals = setting.find('=');
@@ -91,6 +108,7 @@ run_config::Configuration parse_configuration(yaml::Node &root, const Arguments 
         configuration.coordinates = coordinates;
     if (arguments.in_process)
         lift_deadlines(configuration);
+    protect_programs(configuration.files);
     return configuration;
 }
 
@@ -120,8 +138,7 @@ run_config::Configuration replay_configuration(const Arguments &arguments, const
     constexpr const char *default_pipeline =
         "version: 1\n"
         "source: {plugin: source_synthetic, options: {frames: 0, id: 0, side_mm: 80}}\n"
-        "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: "
-        "80}]}\n"
+        "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
         "raytracer: {plugin: rt_embree}\n";
     yaml::Node root =
         !arguments.file.empty()
@@ -211,7 +228,7 @@ void log_contract_checks(const ContractChecks &checks, Console &console) {
                         " contract checks passed");
 }
 
-int run(const run_config::Configuration &configuration, bool verbose, supervise::Starter &launcher) {
+int run(const run_config::Configuration &configuration, const Arguments &arguments, supervise::Starter &launcher) {
     sigset_t signals;
     ::sigemptyset(&signals);
     ::sigaddset(&signals, SIGINT);
@@ -222,7 +239,7 @@ int run(const run_config::Configuration &configuration, bool verbose, supervise:
         nullptr); // blocked before the console's thread starts, because that thread must not receive these signals
     const base::UniqueFd signal_fd = base::checked(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
 
-    Console console(verbose);
+    Console console(arguments.verbose);
     show_warnings(configuration, console);
     ipc::Reactor reactor;
     Pipeline *running = nullptr;
@@ -251,9 +268,15 @@ int run(const run_config::Configuration &configuration, bool verbose, supervise:
     });
 
     const bool completed = pipeline.run();
-    if (!completed)
+    if (!completed && !pipeline.failure_was_logged())
         console.log(ARHOST_SEVERITY_ERROR, "arhost", pipeline.failure());
     const Statistics &statistics = pipeline.statistics();
+    const auto problem =
+        completed ? problem_with_run(configuration, statistics, pipeline.looked_for()) : std::nullopt;
+    const bool is_accepted = problem && problem->is_missing_target && arguments.allow_no_target;
+    if (problem)
+        console.log(is_accepted || stopped_by_signal ? ARHOST_SEVERITY_WARNING : ARHOST_SEVERITY_ERROR,
+                    problem->component, problem->text);
     log_contract_checks(statistics.contract_checks, console);
     bool written = true;
     if (configuration.stats && statistics.frames_in > 0)
@@ -272,7 +295,117 @@ int run(const run_config::Configuration &configuration, bool verbose, supervise:
         return run_failed;
     if (!completed)
         return pipeline.failed_by_configuration() ? bad_configuration : run_failed;
-    return stopped_by_signal ? interrupted : success;
+    if (stopped_by_signal)
+        return interrupted;
+    return problem && !is_accepted ? run_failed : success;
+}
+
+// Checks the plugins, fallbacks included, and their options.
+void check_plugins(const run_config::Configuration &configuration, supervise::Context &context) {
+    const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
+        ipc::PluginDescription plugin;
+        for (std::size_t i = 0; i < component.plugins.size(); ++i) {
+            const ProbeResult result = probe(context, component.plugins[i], component.policy);
+            if (const auto *reason = std::get_if<std::string>(&result))
+                component.node.require(i == 0 ? "plugin" : "fallback").fail(*reason);
+            plugin = std::get<ipc::PluginDescription>(result);
+            run_config::options_for(plugin, kind, component, i);
+        }
+        return plugin;
+    };
+    if (configuration.source)
+        check_component(*configuration.source, ARHOST_KIND_SOURCE);
+    if (configuration.tracker)
+        check_component(*configuration.tracker, ARHOST_KIND_TRACKER);
+    if (configuration.raytracer)
+        check_component(*configuration.raytracer, ARHOST_KIND_RAYTRACER);
+    std::vector<run_config::OutputFile> files = configuration.report_files();
+    for (const run_config::ComponentConfiguration &output : configuration.outputs) {
+        const ipc::PluginDescription plugin = check_component(output, ARHOST_KIND_SINK);
+        if (const auto path = run_config::path_of(output.node))
+            files.push_back({*path, (plugin.capabilities & (1u << 3)) != 0});
+    }
+    run_config::expect_distinct(files);
+}
+
+void check_scene(const run_config::Configuration &configuration, supervise::Context &context) {
+    std::optional<std::string> outcome;
+    const SceneLoading loading(
+        context, configuration.raytracer->scene, configuration.sandbox, configuration.raytracer->limits.start,
+        configuration.files,
+        {[&](const ipc::SharedMemory &) { outcome = ""; }, [&](const std::string &reason) { outcome = reason; }});
+    while (!outcome)
+        context.reactor.run_once();
+    if (!outcome->empty())
+        throw yaml::Error(*outcome);
+}
+
+class TemporaryFolder {
+public:
+    TemporaryFolder() : path_((fs::temp_directory_path() / "arhost-check-XXXXXX").string()) {
+        if (!::mkdtemp(path_.data()))
+            throw std::runtime_error("cannot create a folder in " + fs::temp_directory_path().string() + ": " +
+                                     std::strerror(errno));
+    }
+    ~TemporaryFolder() {
+        std::error_code ignored;
+        fs::remove_all(path_, ignored);
+    }
+    TemporaryFolder(const TemporaryFolder &) = delete;
+    TemporaryFolder &operator=(const TemporaryFolder &) = delete;
+    fs::path path() const { return path_; }
+
+private:
+    std::string path_;
+};
+
+// Starts all components once, without restarts, and prints what they report. The outputs may write only to a
+// temporary folder; messages name their own folder instead.
+void check_by_opening(run_config::Configuration configuration, supervise::Context context) {
+    const TemporaryFolder scratch;
+    std::vector<std::pair<std::string, std::string>> folders; // temporary folder, the output's own folder
+    const auto restart_never = [](run_config::ComponentConfiguration &component) {
+        component.limits.restart.quarantine_after = 1;
+    };
+    for (std::size_t i = 0; i < configuration.outputs.size(); ++i) {
+        run_config::ComponentConfiguration &output = configuration.outputs[i];
+        restart_never(output);
+        const auto path = run_config::path_of(output.node);
+        if (!path)
+            continue;
+        const fs::path folder = Pipeline::check_folder(scratch.path(), i), own = path->output_path().parent_path();
+        fs::create_directory(folder);
+        folders.emplace_back(folder, own);
+        std::erase_if(output.policy.writable, [&](const fs::path &writable) {
+            return writable == own || writable == base::real_path(path->output_path()).parent_path();
+        });
+        output.policy.writable.push_back(folder);
+    }
+    if (configuration.source)
+        restart_never(*configuration.source);
+    if (configuration.tracker)
+        restart_never(*configuration.tracker);
+    if (configuration.raytracer)
+        restart_never(*configuration.raytracer);
+    const auto with_own_folders = [&](std::string text) {
+        for (const auto &[temporary, own] : folders)
+            for (std::size_t at = 0; (at = text.find(temporary, at)) != std::string::npos; at += own.size())
+                text.replace(at, temporary.size(), own);
+        return text;
+    };
+    context.log = [&, log = context.log](arhost_severity severity, const std::string &component,
+                                         const std::string &text) {
+        log(severity, component, with_own_folders(text));
+    };
+    Pipeline pipeline(configuration, context, [](const Progress &) {});
+    if (!pipeline.check(scratch.path())) {
+        const std::string reason = with_own_folders(pipeline.failure());
+        if (pipeline.failed_by_configuration())
+            throw yaml::Error(reason);
+        throw std::runtime_error(reason);
+    }
+    for (const std::string &line : pipeline.findings())
+        std::printf("%s\n", base::printable(line).c_str());
 }
 
 // Returns the lines that `arhost plugins --devices` prints for a plugin; empty if the plugin cannot list devices.
@@ -311,48 +444,24 @@ fs::path own_folder() {
 }
 
 int run(const Arguments &arguments, supervise::Starter &launcher) {
-    return run(read_configuration(arguments), arguments.verbose, launcher);
+    return run(read_configuration(arguments), arguments, launcher);
 }
 
 int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Starter &launcher) {
-    return run(replay_configuration(arguments, replay), arguments.verbose, launcher);
+    return run(replay_configuration(arguments, replay), arguments, launcher);
 }
 
-int check(const Arguments &arguments, supervise::Starter &launcher) {
+int check(const Arguments &arguments, bool open, supervise::Starter &launcher) {
     Console console(arguments.verbose);
     const run_config::Configuration configuration = read_configuration(arguments);
     show_warnings(configuration, console);
     ipc::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
-
-    const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
-        for (std::size_t i = 0; i < component.plugins.size(); ++i) {
-            const ProbeResult result = probe(context, component.plugins[i], component.policy);
-            if (const auto *reason = std::get_if<std::string>(&result))
-                component.node.require(i == 0 ? "plugin" : "fallback").fail(*reason);
-            run_config::options_for(std::get<ipc::PluginDescription>(result), kind, component, i);
-        }
-    };
-    if (configuration.source)
-        check_component(*configuration.source, ARHOST_KIND_SOURCE);
-    if (configuration.tracker)
-        check_component(*configuration.tracker, ARHOST_KIND_TRACKER);
-    if (configuration.raytracer)
-        check_component(*configuration.raytracer, ARHOST_KIND_RAYTRACER);
-    for (const run_config::ComponentConfiguration &output : configuration.outputs)
-        check_component(output, ARHOST_KIND_SINK);
-
-    if (configuration.raytracer) {
-        std::optional<std::string> outcome;
-        const SceneLoading loading(
-            context, configuration.raytracer->scene, configuration.sandbox, configuration.raytracer->limits.start,
-            configuration.files,
-            {[&](const ipc::SharedMemory &) { outcome = ""; }, [&](const std::string &reason) { outcome = reason; }});
-        while (!outcome)
-            reactor.run_once();
-        if (!outcome->empty())
-            throw yaml::Error(*outcome);
-    }
+    check_plugins(configuration, context);
+    if (open)
+        check_by_opening(configuration, context);
+    else if (configuration.raytracer)
+        check_scene(configuration, context);
     std::printf("%s: OK\n", base::printable(arguments.file).c_str());
     return success;
 }

@@ -24,7 +24,8 @@ struct Arguments {
     std::optional<double> g1, g2;
     double axis1[3] = {0, 0, 0}, axis2[3] = {0, 0, 0};
     bool verbose = false;
-    bool in_process = false; // run the plugins in the host's process, without timeouts and sandbox
+    bool allow_no_target = false; // a run in which the tracker sees no marker succeeds
+    bool in_process = false;      // run the plugins in the host's process, without timeouts and sandbox
 };
 
 // Command-line options of `arhost replay`.
@@ -43,7 +44,9 @@ struct PluginsArguments {
 
 int run(const Arguments &arguments, supervise::Starter &launcher);
 int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Starter &launcher);
-int check(const Arguments &arguments, supervise::Starter &launcher);
+// Checks a configuration. If `open`, also starts source, tracker, ray tracer and outputs as a run does, and prints
+// what it found; outputs then write to a temporary folder.
+int check(const Arguments &arguments, bool open, supervise::Starter &launcher);
 int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, supervise::Starter &launcher);
 int print_schema(bool markdown);
 // Replaces this process with arhost-conform (exec), because the host process never loads a plugin itself.

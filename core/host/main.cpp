@@ -49,7 +49,10 @@ int main(int argc, char **argv) {
 
     CommandLine app(
         "arhost overlays ray-traced objects on live video. Sources, trackers, ray tracers and outputs are plugins,\n"
-        "each in its own process; a YAML file selects and configures them.");
+        "each in its own process; a YAML file selects and configures them.\n"
+        "Exit status: 0 success; 1 the run had failures; 2 invalid command line, configuration, scene or plugin;\n"
+        "130 interrupted (docs/config.md).",
+        "arhost");
     app.version("arhost " ARHOST_VERSION);
 
     Arguments arguments;
@@ -59,9 +62,11 @@ int main(int argc, char **argv) {
             .one_value_each();
         command.flag("-v,--verbose", arguments.verbose, "Log debug messages of components");
     };
-    app.option("--config", arguments.file, "The configuration to run (docs/config.md)").type_name("FILE");
+    app.option("--config,FILE", arguments.file, "The configuration to run (docs/config.md)").type_name("FILE");
     add_configuration_options(app);
     app.option("--frames", arguments.frames, "Stop after N frames").type_name("N").range(0.0, 1e15);
+    app.flag("--allow-no-target", arguments.allow_no_target,
+             "Exit with status 0 even if the tracker has seen no marker in any frame");
     CommandLine axes =
         app.group("Coordinates",
                   "The dissertation's options (docs/camera.md); they override 'coordinates:' in the configuration");
@@ -69,13 +74,13 @@ int main(int argc, char **argv) {
                 "Profile of the tracker: 1 x-right y-back z-up, 2 x-right y-up z-front, 3 other");
     axes.option("--rt", arguments.rt, "Profile of the scene");
     axes.option("--g1,--g", arguments.g1, "First rotation, in degrees");
-    axes.option("--x1,--x", arguments.axis1[0], "Axis of the rotation");
-    axes.option("--y1,--y", arguments.axis1[1]);
-    axes.option("--z1,--z", arguments.axis1[2]);
+    axes.option("--x1,--x", arguments.axis1[0], "Axis of the first rotation: x");
+    axes.option("--y1,--y", arguments.axis1[1], "Axis of the first rotation: y");
+    axes.option("--z1,--z", arguments.axis1[2], "Axis of the first rotation: z");
     axes.option("--g2", arguments.g2, "Second rotation, in degrees");
-    axes.option("--x2", arguments.axis2[0], "Axis of the rotation");
-    axes.option("--y2", arguments.axis2[1]);
-    axes.option("--z2", arguments.axis2[2]);
+    axes.option("--x2", arguments.axis2[0], "Axis of the second rotation: x");
+    axes.option("--y2", arguments.axis2[1], "Axis of the second rotation: y");
+    axes.option("--z2", arguments.axis2[2], "Axis of the second rotation: z");
 
     ReplayArguments replay_arguments;
     CommandLine replay_command = app.subcommand("replay", "Render a recorded trajectory (docs/trajectories.md)");
@@ -103,8 +108,11 @@ int main(int argc, char **argv) {
         .type_name("FILE");
     add_configuration_options(replay_command);
 
-    CommandLine check_command = app.subcommand("check", "Check a configuration, its plugins' options and its scene");
+    bool no_open = false;
+    CommandLine check_command = app.subcommand("check", "Check a configuration: open everything that a run opens");
     check_command.option("FILE", arguments.file, "The configuration").required();
+    check_command.flag("--no-open", no_open,
+                       "Check only the file, the plugins' options and the scene, for example without the camera");
     add_configuration_options(check_command);
 
     PluginsArguments plugins_arguments;
@@ -133,10 +141,20 @@ int main(int argc, char **argv) {
     new_plugin_command.option("--into", plugin.into, "Parent folder (default: current folder)").type_name("DIR");
     CommandLine conform_command =
         app.raw_subcommand("conform", "Test whether a plugin conforms to the ABI (docs/conformance.md)");
+    std::string helped;
+    const std::vector<std::string> commands = app.subcommands();
+    CommandLine help_command = app.subcommand("help", "Print help about arhost or a command");
+    help_command.option("COMMAND", helped, "The command").one_of(commands);
 
     if (const auto status = app.parse(argc, argv))
         return checked_output(*status);
     const auto command = [&]() -> int {
+        if (help_command.selected() && helped == "conform") // its options are defined in another program
+            return conform({"--help"});
+        if (help_command.selected()) {
+            std::fputs(app.help(helped).c_str(), stdout);
+            return success;
+        }
         if (schema_command.selected())
             return print_schema(markdown);
         if (new_plugin_command.selected())
@@ -147,7 +165,7 @@ int main(int argc, char **argv) {
         if (replay_command.selected())
             return replay(arguments, replay_arguments, launcher);
         if (check_command.selected())
-            return check(arguments, launcher);
+            return check(arguments, !no_open, launcher);
         if (plugins_command.selected())
             return list_plugins(arguments, plugins_arguments, launcher);
         if (arguments.file.empty()) {

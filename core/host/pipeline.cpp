@@ -2,6 +2,9 @@
 #include "host/pipeline.hpp"
 
 #include "camera/coordinates.hpp"
+#include "run_config/access.hpp"
+
+#include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
 
@@ -36,6 +39,41 @@ bool Pipeline::run() {
     return failure_.empty();
 }
 
+bool Pipeline::check(const std::filesystem::path &scratch) {
+    check_scratch_ = scratch;
+    return run();
+}
+
+std::filesystem::path Pipeline::check_folder(const std::filesystem::path &scratch, std::size_t output) {
+    return scratch / std::to_string(output);
+}
+
+std::vector<std::string> Pipeline::findings() const {
+    std::vector<std::string> lines;
+    const std::string size = fmt::format("{} x {} px", format_->width, format_->height);
+    if (source_)
+        lines.push_back(fmt::format("source: {}: {}{}{}", source_->description().id, size,
+                                    format_->fps > 0 ? fmt::format(", {:g} fps", format_->fps) : "",
+                                    frame_count_ > 0 ? fmt::format(", {} frames", frame_count_) : ""));
+    if (intrinsics_.width > 0)
+        lines.push_back(fmt::format("camera: fx {:g} px, fy {:g} px, cx {:g} px, cy {:g} px", intrinsics_.fx,
+                                    intrinsics_.fy, intrinsics_.cx, intrinsics_.cy));
+    if (tracker_)
+        lines.push_back(fmt::format("tracker: {}: {}", tracker_->description().id, looked_for_));
+    if (raytracer_)
+        lines.push_back(
+            fmt::format("raytracer: {}: {}", raytracer_->description().id, configuration_.raytracer->scene.string()));
+    for (std::size_t i = 0; i < sinks_.size(); ++i) {
+        const auto path = run_config::path_of(configuration_.outputs[i].node);
+        const std::string file = path ? path->output_path().string() : "";
+        std::error_code ignored;
+        lines.push_back(fmt::format(
+            "output: {}{}{}", sinks_[i]->component->description().id, path ? ": " + file : "",
+            path && std::filesystem::is_regular_file(file, ignored) ? " (a run replaces the existing file)" : ""));
+    }
+    return lines;
+}
+
 std::vector<Component *> Pipeline::components() const {
     std::vector<Component *> all;
     for (const auto *component : {&source_, &tracker_, &raytracer_})
@@ -47,12 +85,8 @@ std::vector<Component *> Pipeline::components() const {
 }
 
 void Pipeline::pump() {
-    if (abandoned_) {
-        for (Component *component : components())
-            component->kill();
-        phase_ = Phase::finished;
-        return;
-    }
+    if (abandoned_)
+        return kill_components();
     if (phase_ < Phase::running)
         advance_phase();
     if (phase_ == Phase::running) {
@@ -104,7 +138,7 @@ void Pipeline::advance_phase() {
     }
     if (phase_ == Phase::outputs &&
         std::all_of(sinks_.begin(), sinks_.end(), [&](const auto &sink) { return is_ready(sink->component); }))
-        phase_ = Phase::running;
+        check_scratch_ ? kill_components() : void(phase_ = Phase::running);
 }
 
 bool Pipeline::no_more_frames() const {
@@ -146,10 +180,18 @@ void Pipeline::stop_components() {
             sink->component->stop();
 }
 
-void Pipeline::fail(const std::string &reason, bool is_configuration_error) {
-    context_.log(ARHOST_SEVERITY_DEBUG, "arhost", reason);
+void Pipeline::kill_components() {
+    for (Component *component : components())
+        component->kill();
+    phase_ = Phase::finished;
+}
+
+void Pipeline::fail(const std::string &reason, bool is_configuration_error, bool was_logged) {
+    if (!was_logged)
+        context_.log(ARHOST_SEVERITY_DEBUG, "arhost", reason);
     if (failure_.empty()) {
         failure_ = reason;
+        failure_was_logged_ = was_logged;
         failed_by_configuration_ = is_configuration_error && phase_ < Phase::running;
     }
     abandoned_ = abandoned_ || phase_ < Phase::running;

@@ -37,7 +37,16 @@ public:
     // Runs until all frames are output. Returns false if the run failed or a component was disabled; failure() then
     // returns the reason as a message for the user.
     bool run();
+    // Starts all components as run() does, but processes no frame. The outputs write to subfolders of `scratch`
+    // instead of their own folders; the permissions of their components must match. Returns as run().
+    bool check(const std::filesystem::path &scratch);
+    static std::filesystem::path check_folder(const std::filesystem::path &scratch, std::size_t output);
+    // Describes the started components, one per line, for the user.
+    std::vector<std::string> findings() const;
+
     const std::string &failure() const { return failure_; }
+    bool failure_was_logged() const { return failure_was_logged_; }
+    const std::string &looked_for() const { return looked_for_; }
     bool failed_by_configuration() const { return failed_by_configuration_; }
 
     // Handles Ctrl-C. The first call lets the frames in progress finish and then ends the run; a second call ends the
@@ -55,7 +64,8 @@ private:
     void make_tracker();
     void make_raytracer();
     void make_outputs();
-    void make_sink(const run_config::ComponentConfiguration &output, const std::string &name);
+    void make_sink(std::size_t index, const std::string &name);
+    void expect_distinct_files(std::size_t index, const ipc::PluginDescription &plugin);
     void load_scene();
     supervise::Component::Callbacks common_callbacks(const std::string &name, const yaml::Node &node);
 
@@ -73,6 +83,7 @@ private:
     void check_buffers_unmodified(const Frame &frame);
     void cancel_stages();
     void stop_components();
+    void kill_components();
 
     void on_read(const ipc::Command &command, const ipc::Result &result);
     void start_frame(std::unique_ptr<Frame> frame);
@@ -93,7 +104,8 @@ private:
     void drop_overtaken(std::uint64_t shown);
 
     void disable_sink(SinkQueue &sink);
-    void fail(const std::string &reason, bool is_configuration_error);
+    // `was_logged`: the user has already seen the reason.
+    void fail(const std::string &reason, bool is_configuration_error, bool was_logged = false);
     void on_disabled(const std::string &name, const yaml::Node &node, const std::string &reason,
                      bool is_configuration_error);
 
@@ -109,6 +121,7 @@ private:
 
     std::unique_ptr<supervise::Component> source_, tracker_, raytracer_;
     std::vector<std::unique_ptr<SinkQueue>> sinks_;
+    std::map<std::size_t, run_config::OutputFile> output_files_; // by the output's index
     std::shared_ptr<SlotPool> source_slots_, tracker_slots_, raytracer_slots_, output_slots_;
 
     std::optional<arhost_frame_format> format_;
@@ -116,6 +129,7 @@ private:
     arhost_intrinsics intrinsics_{};
     std::shared_ptr<LensWarp> warp_; // null if the ray tracer supports lens distortion
     std::set<std::int32_t> marker_ids_;
+    std::string looked_for_; // the markers and dictionary of the current tracker, for messages
 
     std::deque<Lease> reads_; // slots of the pending read commands, oldest first
     std::uint64_t next_read_ = 0;
@@ -131,7 +145,8 @@ private:
     std::optional<SourceChecks> source_checks_; // for the current plugin; survives restarts
     std::optional<OverlayChecks> overlay_checks_;
     std::string failure_;
-    bool failed_by_configuration_ = false;
+    bool failed_by_configuration_ = false, failure_was_logged_ = false;
+    std::optional<std::filesystem::path> check_scratch_; // set by check()
 };
 
 } // namespace arhost::host

@@ -4,6 +4,8 @@
 #include "host/pipeline.hpp"
 
 #include "camera/calibration.hpp"
+#include "host/outcome.hpp"
+#include "run_config/access.hpp"
 
 #include <algorithm>
 
@@ -136,8 +138,9 @@ void Pipeline::make_tracker() {
         marker_ids_.insert(marker.id);
     Component::Callbacks callbacks = common_callbacks("tracker", tracker.node);
     callbacks.hello = [this, &tracker](const PluginDescription &plugin, std::size_t candidate) {
-        return Component::Create{{run_config::options_for(plugin, ARHOST_KIND_TRACKER, tracker, candidate),
-                                  messages::TrackerSetup{*format_, intrinsics_, tracker.markers}},
+        std::vector<OptionValue> options = run_config::options_for(plugin, ARHOST_KIND_TRACKER, tracker, candidate);
+        looked_for_ = describe_targets(tracker.markers, plugin, options);
+        return Component::Create{{std::move(options), messages::TrackerSetup{*format_, intrinsics_, tracker.markers}},
                                  {}};
     };
     callbacks.ready = [](const messages::Ready &) {
@@ -195,16 +198,17 @@ void Pipeline::make_outputs() {
         if (std::any_of(sinks_.begin(), sinks_.end(),
                         [&](const auto &sink) { return sink->component->name() == name; }))
             name += "#" + std::to_string(i);
-        make_sink(output, name);
+        make_sink(i, name);
     }
 }
 
-void Pipeline::make_sink(const run_config::ComponentConfiguration &output, const std::string &name) {
+void Pipeline::make_sink(std::size_t index, const std::string &name) {
+    const run_config::ComponentConfiguration &output = configuration_.outputs[index];
     sinks_.push_back(std::make_unique<SinkQueue>(statistics_));
     SinkQueue *sink = sinks_.back().get();
     sink->max_waiting = live_ ? live_sink_depth : 0;
     Component::Callbacks callbacks = common_callbacks(name, output.node);
-    callbacks.hello = [this, &output, sink](const PluginDescription &plugin, std::size_t candidate) {
+    callbacks.hello = [this, &output, index, sink](const PluginDescription &plugin, std::size_t candidate) {
         if (plugin.capabilities & ARHOST_CAPABILITY_REALTIME_SINK)
             sink->max_waiting = live_sink_depth; // a window drops frames instead of delaying other outputs
         messages::SinkSetup setup{format_->width, format_->height, format_->fps, sink->first_sequence(), {}};
@@ -212,7 +216,12 @@ void Pipeline::make_sink(const run_config::ComponentConfiguration &output, const
             setup.fps = configuration_.source->fps;
         if (intrinsics_.width > 0)
             setup.intrinsics = intrinsics_;
-        return Component::Create{{run_config::options_for(plugin, ARHOST_KIND_SINK, output, candidate), setup}, {}};
+        std::vector<OptionValue> options = run_config::options_for(plugin, ARHOST_KIND_SINK, output, candidate);
+        expect_distinct_files(index, plugin);
+        for (OptionValue &option : options)
+            if (check_scratch_ && option.type == ARHOST_OPTION_OUTPUT_PATH && !option.text.empty())
+                option.text = check_folder(*check_scratch_, index) / std::filesystem::path(option.text).filename();
+        return Component::Create{{std::move(options), setup}, {}};
     };
     callbacks.result = [this, sink, name](const Command &command, const Result &result) {
         sink->on_result(command, result);
@@ -225,7 +234,7 @@ void Pipeline::make_sink(const run_config::ComponentConfiguration &output, const
         const std::string reason = "cannot write frame " + std::to_string(command.sequence) + ": " +
                                    status_text(result.status) + "; see the output's messages above";
         context_.log(ARHOST_SEVERITY_ERROR, name, reason);
-        fail(name + ": " + reason, false);
+        fail(name + ": " + reason, false, true);
         disable_sink(*sink);
         sink->component->stop();
     };
@@ -240,6 +249,16 @@ void Pipeline::make_sink(const run_config::ComponentConfiguration &output, const
     sink->component->start();
 }
 
+// Compares the output's file with those of the plugins that are already known.
+void Pipeline::expect_distinct_files(std::size_t index, const PluginDescription &plugin) {
+    if (const auto path = run_config::path_of(configuration_.outputs[index].node))
+        output_files_.insert_or_assign(index, run_config::OutputFile{*path, (plugin.capabilities & (1u << 3)) != 0});
+    std::vector<run_config::OutputFile> files = configuration_.report_files();
+    for (const auto &[other, file] : output_files_)
+        files.push_back(file);
+    run_config::expect_distinct(files);
+}
+
 void Pipeline::disable_sink(SinkQueue &sink) {
     sink.failed = true;
     sink.clear();
@@ -252,10 +271,13 @@ void Pipeline::on_disabled(const std::string &name, const yaml::Node &node, cons
                            bool is_configuration_error) {
     // Configuration errors already start with a position in the file or with an option's name.
     const bool located = reason.starts_with(node.file().string() + ":") || reason.starts_with("--");
-    fail(located ? reason : node.where() + ": " + name + ": " + reason, is_configuration_error);
-    if (phase_ != Phase::running)
+    const std::string text = located ? reason : node.where() + ": " + name + ": " + reason;
+    const bool runs = phase_ == Phase::running;
+    if (runs)
+        context_.log(ARHOST_SEVERITY_ERROR, "arhost", text + "; the video continues without it");
+    fail(text, is_configuration_error, runs);
+    if (!runs)
         return;
-    context_.log(ARHOST_SEVERITY_ERROR, name, reason + "; the video continues without it");
     if (name == "source")
         input_ended_ = true;
 }

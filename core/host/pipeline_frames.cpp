@@ -178,6 +178,7 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
         skip(frame, "tracker");
         return tracker_->end_process(std::string("contract violation: ") + problem);
     }
+    ++statistics_.tracker_results;
     if (configuration_.tracker->conform)
         check_markers(statistics_.contract_checks, frame.record, intrinsics_, configuration_.tracker->markers);
     frame.times.tracker = std::chrono::nanoseconds(result.busy_ns);

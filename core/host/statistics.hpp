@@ -45,6 +45,7 @@ struct FrameTimes {
 
 struct Statistics {
     std::uint64_t frames_in = 0;                  // frames received from the source
+    std::uint64_t tracker_results = 0;            // frames for which the tracker delivered a result in time
     std::uint64_t tracked = 0;                    // frames with at least one detected marker
     std::uint64_t augmented = 0;                  // frames composited with an overlay
     std::uint64_t composited = 0;                 // frames sent to the outputs, augmented or not

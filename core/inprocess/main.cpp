@@ -21,11 +21,15 @@ int main(int argc, char **argv) {
     app.version("arhost-inprocess " ARHOST_VERSION);
     host::Arguments arguments;
     arguments.in_process = true;
-    app.option("--config", arguments.file, "The configuration to run (docs/config.md)").type_name("FILE").required();
+    app.option("--config,FILE", arguments.file, "The configuration to run (docs/config.md)")
+        .type_name("FILE")
+        .required();
     app.option("--set", arguments.settings, "Override a value: key.path=value (repeatable)")
         .type_name("KEY=VALUE")
         .one_value_each();
     app.option("--frames", arguments.frames, "Stop after N frames").type_name("N").range(0.0, 1e15);
+    app.flag("--allow-no-target", arguments.allow_no_target,
+             "Exit with status 0 even if the tracker has seen no marker in any frame");
     app.flag("-v,--verbose", arguments.verbose, "Log debug messages of components");
     if (const auto status = app.parse(argc, argv))
         return *status;

@@ -5,6 +5,7 @@
 #include "run_config/access.hpp"
 #include "run_config/options.hpp"
 #include "run_config/schema.hpp"
+#include "run_config/user_view.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -147,7 +148,25 @@ std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, 
             component.node.require(configured ? "plugin" : "fallback")
                 .fail("'" + plugin.id + "' needs '" + need + "', which the sandbox blocks: add 'allow: [" + need +
                       "]' to " + component.node.path() + " (docs/security.md)");
-    return resolve_options(plugin, configured ? component.options : std::nullopt, component.path, component.node);
+    const std::optional<yaml::Node> options = configured ? component.options : std::nullopt;
+    std::vector<ipc::OptionValue> values = resolve_options(plugin, options, component.path, component.node);
+    for (const ipc::OptionDeclaration &declared : plugin.options) {
+        const auto option = options ? options->find(declared.key) : std::nullopt;
+        const auto node = declared.key == "path" && component.path ? component.path : option;
+        if (node && declared.type == ARHOST_OPTION_INPUT_PATH)
+            expect_readable(*node);
+        else if (node && declared.type == ARHOST_OPTION_OUTPUT_PATH)
+            expect_writable(*node);
+    }
+    return values;
+}
+
+std::vector<OutputFile> Configuration::report_files() const {
+    std::vector<OutputFile> reports;
+    for (const char *key : {"stats", "timeline"})
+        if (const auto report = node.find(key))
+            reports.push_back({*report, false});
+    return reports;
 }
 
 Configuration parse(const yaml::Node &root, const std::filesystem::path &built_in_plugins) {
@@ -245,8 +264,10 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
                 node->fail("'" + node->text() +
                            (error ? "' cannot be accessed: " + error.message() : "' is not a regular file") +
                            "; choose another path");
-            if (type != character) // character devices such as /dev/null may be used several times
+            if (type != character) { // character devices such as /dev/null may be used several times
                 configuration.files.write(*node);
+                expect_writable(*node);
+            }
         }
     if (!configuration.source && !configuration.raytracer)
         trajectory_node->fail("a trajectory needs a 'source' that delivers frames or a 'raytracer' that renders it");

@@ -65,11 +65,14 @@ struct Configuration {
     std::vector<std::string> warnings{};
     std::optional<std::filesystem::path> stats{}, timeline{}; // absolute
     FilesInUse files{};                                       // without the files to which the scene refers
+
+    std::vector<OutputFile> report_files() const; // the files that the host writes: `stats` and `timeline`
 };
 
 // Returns the option values for creating a component's plugin. `candidate` is 0 for the plugin itself and 1 for the
 // fallback, for which the configured options are ignored and all options have their defaults. Throws yaml::Error if
-// the plugin has the wrong kind, needs a permission that is not allowed, or does not accept the options.
+// the plugin has the wrong kind, needs a permission that is not allowed, or does not accept the options, or if an
+// input file cannot be read or an output file cannot be written.
 std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
                                           const ComponentConfiguration &component, std::size_t candidate);
 

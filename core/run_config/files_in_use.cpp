@@ -23,10 +23,14 @@ std::optional<NumberedName> numbered_name(const std::string &name) try {
     return std::nullopt;
 }
 
-// Returns whether two file names or patterns can produce the same name. Two patterns can if they differ only in
-// digits, as f0%d and f%d do.
-bool can_collide(const std::string &a, const std::string &b) {
-    const auto p = numbered_name(a), q = numbered_name(b);
+std::optional<NumberedName> pattern_of(const OutputFile &output) {
+    return output.is_numbered ? numbered_name(output.path.output_path().filename()) : std::nullopt;
+}
+
+// Returns whether two file names, or their patterns `p` and `q`, can produce the same name. Two patterns can if they
+// differ only in digits, as f0%d and f%d do.
+bool can_collide(const std::string &a, const std::optional<NumberedName> &p, const std::string &b,
+                 const std::optional<NumberedName> &q) {
     if (!p || !q)
         return p ? p->number(b).has_value() : q ? q->number(a).has_value() : a == b;
     const auto by_size = [](auto &x, auto &y) { return x.size() < y.size(); };
@@ -37,23 +41,43 @@ bool can_collide(const std::string &a, const std::string &b) {
            are_digits(std::string_view(longer_suffix).substr(0, longer_suffix.size() - suffix.size()));
 }
 
-std::vector<FileIdentity> files_of(const fs::path &file_or_pattern) {
-    std::vector<FileIdentity> files{base::identity_of(file_or_pattern)};
-    if (const auto pattern = numbered_name(file_or_pattern.filename())) {
-        std::error_code ignored; // the component that uses an unreadable folder reports it
-        for (fs::directory_iterator entry(file_or_pattern.parent_path(), ignored), end; entry != end;
-             entry.increment(ignored))
+// Returns the existing files that match the pattern; empty if there is no pattern.
+std::vector<FileIdentity> files_of(const std::optional<NumberedName> &pattern, const fs::path &folder) {
+    std::vector<FileIdentity> files;
+    std::error_code ignored; // the component that uses an unreadable folder reports it
+    if (pattern)
+        for (fs::directory_iterator entry(folder, ignored), end; entry != end; entry.increment(ignored))
             if (pattern->number(entry->path().filename().string()))
                 files.push_back(base::identity_of(entry->path()));
-    }
     return files;
+}
+std::vector<FileIdentity> files_of(const fs::path &pattern) {
+    return files_of(numbered_name(pattern.filename()), pattern.parent_path());
+}
+
+// Returns the existing files that the output may overwrite.
+std::vector<FileIdentity> files_of(const OutputFile &output) {
+    const fs::path path = output.path.output_path();
+    const auto pattern = pattern_of(output);
+    return pattern ? files_of(pattern, path.parent_path()) : std::vector{base::identity_of(path)};
 }
 
 // Returns the file name or pattern that the output writes, with symbolic links resolved.
-fs::path written_by(const yaml::Node &output) {
-    const fs::path path = output.output_path();
-    return numbered_name(path.filename()) ? base::real_path(path.parent_path()) / path.filename()
-                                          : base::real_path(path);
+fs::path written_by(const OutputFile &output) {
+    const fs::path path = output.path.output_path();
+    return pattern_of(output) ? base::real_path(path.parent_path()) / path.filename() : base::real_path(path);
+}
+
+bool can_collide(const OutputFile &a, const OutputFile &b) {
+    const fs::path one = written_by(a), other = written_by(b);
+    if (one.parent_path() == other.parent_path() &&
+        can_collide(one.filename(), pattern_of(a), other.filename(), pattern_of(b)))
+        return true;
+    const std::vector<FileIdentity> files = files_of(b);
+    return std::ranges::any_of(files_of(a), [&](const FileIdentity &file) {
+        return std::ranges::any_of(
+            files, [&](const FileIdentity &same) { return file.path == same.path || file.node == same.node; });
+    });
 }
 
 [[noreturn]] void refuse(const yaml::Node &output, const std::string &file_read) {
@@ -71,6 +95,7 @@ void FilesInUse::read(const fs::path &file) {
 }
 
 void FilesInUse::read_numbered(const fs::path &file_or_pattern) {
+    read(file_or_pattern);
     for (const FileIdentity &file : files_of(file_or_pattern)) {
         check_read(file);
         add(file, {});
@@ -78,21 +103,18 @@ void FilesInUse::read_numbered(const fs::path &file_or_pattern) {
 }
 
 void FilesInUse::write(const yaml::Node &output) {
-    const std::vector<FileIdentity> files = files_of(output.output_path());
-    for (const FileIdentity &file : files)
-        if (const Use *use = find(file); use && use->output)
-            output.fail("another output already writes '" + output.text() + "'; choose another path");
-        else if (use)
+    const FileIdentity named = base::identity_of(output.output_path());
+    const std::vector<FileIdentity> matching = files_of(output.output_path());
+    if (const Use *use = find(named); use && use->output && !use->by_pattern)
+        output.fail("another output already writes '" + output.text() + "'; choose another path");
+    else if (use && !use->output)
+        refuse(output, use->path);
+    for (const FileIdentity &file : matching)
+        if (const Use *use = find(file); use && !use->output)
             refuse(output, use->path);
-    const fs::path path = written_by(output);
-    for (const yaml::Node &other : outputs_)
-        if (const fs::path theirs = written_by(other);
-            path.parent_path() == theirs.parent_path() && can_collide(path.filename(), theirs.filename()))
-            output.fail("another output, '" + other.text() + "', can write a file of the same name as '" +
-                        output.text() + "'; choose another path");
-    for (const FileIdentity &file : files)
-        add(file, output);
-    outputs_.push_back(output);
+    add(named, output);
+    for (const FileIdentity &file : matching)
+        add(file, output, true);
 }
 
 void FilesInUse::check_read(const FileIdentity &file) const {
@@ -107,9 +129,20 @@ const FilesInUse::Use *FilesInUse::find(const FileIdentity &file) const {
     return nullptr;
 }
 
-void FilesInUse::add(const FileIdentity &file, const std::optional<yaml::Node> &output) {
+void FilesInUse::add(const FileIdentity &file, const std::optional<yaml::Node> &output, bool by_pattern) {
     for (const std::string &key : {file.path, file.node})
-        uses_.try_emplace(key, Use{file.path, output});
+        if (const auto [use, is_new] = uses_.try_emplace(key, Use{file.path, output, by_pattern});
+            !is_new && use->second.by_pattern && !by_pattern)
+            use->second = {file.path, output, false};
+}
+
+void expect_distinct(const std::vector<OutputFile> &outputs) {
+    for (std::size_t i = 0; i < outputs.size(); ++i)
+        for (std::size_t j = 0; j < i; ++j)
+            if ((outputs[i].is_numbered || outputs[j].is_numbered) && can_collide(outputs[i], outputs[j]))
+                outputs[i].path.fail("another output, '" + outputs[j].path.text() +
+                                     "', can write a file of the same name as '" + outputs[i].path.text() +
+                                     "'; choose another path");
 }
 
 } // namespace arhost::run_config

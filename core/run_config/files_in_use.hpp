@@ -13,14 +13,14 @@
 namespace arhost::run_config {
 
 // Ensures that no output overwrites a file that the run reads or that another output writes. Detects symbolic and
-// hard links to the same file. A numbered file name (frame-%04d.png) represents all existing files that match it. All
-// functions throw yaml::Error, whose position is that of the output.
+// hard links to the same file. All functions throw yaml::Error, whose position is that of the output.
 class FilesInUse {
 public:
     // Registers a file or folder that the run reads. `file` must be an absolute path.
     void read(const std::filesystem::path &file);
     void read_numbered(const std::filesystem::path &file_or_pattern);
-    // Registers an output; its value is a file name or a pattern.
+    // Registers an output. Which plugins write numbered files is not known yet, so a name like frame-%04d.png
+    // (frame-%04d.png) must not match a file that the run reads, but may match the file of another output.
     void write(const yaml::Node &output);
 
     // Checks a file that a worker has reported as read. To be called after all calls of write(). Only compares names
@@ -31,12 +31,21 @@ private:
     struct Use {
         std::string path;
         std::optional<yaml::Node> output; // the output that writes the file; nullopt if the run reads the file
+        bool by_pattern = false;          // the output's name matches the file as a pattern
     };
     const Use *find(const base::FileIdentity &file) const;
-    void add(const base::FileIdentity &file, const std::optional<yaml::Node> &output);
+    void add(const base::FileIdentity &file, const std::optional<yaml::Node> &output, bool by_pattern = false);
 
-    std::vector<yaml::Node> outputs_;
     std::map<std::string, Use> uses_; // each file has two keys: its real path and its "device:inode"
 };
+
+// An output file of a plugin that is known.
+struct OutputFile {
+    yaml::Node path;
+    bool is_numbered; // the plugin has ARHOST_CAPABILITY_NUMBERED_FILES, so the path may be a pattern
+};
+
+// Throws yaml::Error if a pattern can produce the name of another output's file.
+void expect_distinct(const std::vector<OutputFile> &outputs);
 
 } // namespace arhost::run_config

@@ -166,12 +166,20 @@ Arena::Arena(std::size_t byte_size)
         throw std::bad_alloc();
 }
 
+std::string Origins::message(const Fault &fault) const {
+    const std::vector<std::size_t> &origins = tables_[static_cast<std::size_t>(fault.table)];
+    const std::size_t text = fault.index < origins.size() ? origins[fault.index] : 0;
+    return text == 0 ? fault.text : texts_[text - 1] + ": " + fault.text;
+}
+
 std::uint32_t ArenaBuilder::add_triangles(TriangleMesh mesh) {
+    origins_.add(Table::geometries);
     geometries_.emplace_back(std::move(mesh));
     return static_cast<std::uint32_t>(geometries_.size() - 1);
 }
 
 std::uint32_t ArenaBuilder::add_spheres(Spheres spheres) {
+    origins_.add(Table::geometries);
     geometries_.emplace_back(std::move(spheres));
     return static_cast<std::uint32_t>(geometries_.size() - 1);
 }
@@ -183,32 +191,38 @@ std::uint32_t ArenaBuilder::add_name(const std::string &name) {
 }
 
 std::uint32_t ArenaBuilder::add_texture(const std::string &name, Texture texture) {
+    origins_.add(Table::textures);
     textures_.emplace_back(add_name(name), std::move(texture));
     return static_cast<std::uint32_t>(textures_.size() - 1);
 }
 
 std::uint32_t ArenaBuilder::add_node(MotionNode node) {
+    origins_.add(Table::nodes);
     nodes_.push_back(std::move(node));
     return static_cast<std::uint32_t>(nodes_.size() - 1);
 }
 
 std::uint32_t ArenaBuilder::add_channel(Channel channel) {
+    origins_.add(Table::channels);
     channels_.push_back(std::move(channel));
     return static_cast<std::uint32_t>(channels_.size() - 1);
 }
 
 std::uint32_t ArenaBuilder::add_skin(Skin skin) {
+    origins_.add(Table::skins);
     skins_.push_back(std::move(skin));
     return static_cast<std::uint32_t>(skins_.size() - 1);
 }
 
 std::uint32_t ArenaBuilder::add_material(const arhost_material &material) {
+    origins_.add(Table::materials);
     materials_.push_back(material);
     return static_cast<std::uint32_t>(materials_.size() - 1);
 }
 
 std::uint32_t ArenaBuilder::add_object(const std::string &name, std::uint32_t geometry, std::uint32_t material,
                                        arhost_role role, const glm::mat4x3 &world_from_object, const Motion &motion) {
+    origins_.add(Table::objects);
     arhost_object object{};
     object.geometry = geometry;
     object.material = material;
@@ -224,6 +238,7 @@ std::uint32_t ArenaBuilder::add_object(const std::string &name, std::uint32_t ge
 }
 
 std::uint32_t ArenaBuilder::add_light(const arhost_light &light) {
+    origins_.add(Table::lights);
     lights_.push_back(light);
     return static_cast<std::uint32_t>(lights_.size() - 1);
 }

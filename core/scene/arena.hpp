@@ -13,10 +13,12 @@
 #include <glm/vec3.hpp>
 #include <glm/vec4.hpp>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <variant>
@@ -94,6 +96,34 @@ struct Settings {
     float duration_s = 0;
 };
 
+// The tables of an arena, and the scene as a whole.
+enum class Table { scene, geometries, textures, materials, objects, lights, nodes, channels, skins };
+constexpr std::size_t table_count = 9;
+
+// A violation of the rules in arhost/scene.h, for example "object 2 'ball' refers to material 7, but the scene has
+// only 3".
+struct Fault {
+    std::string text;
+    Table table = Table::scene; // the element that violates the rule; index 0 for Table::scene
+    std::size_t index = 0;
+};
+
+// Where the elements of an arena come from, as the user knows it: "scene.yaml:6:5: objects[0]".
+class Origins {
+public:
+    // Sets the origin of the elements that are added from now on.
+    void set(std::string origin) { texts_.push_back(std::move(origin)); }
+    void add(Table table) { of_table(table).push_back(texts_.size()); }
+    // Returns the fault's text after its origin, or only the text if the origin is unknown.
+    std::string message(const Fault &fault) const;
+
+private:
+    std::vector<std::size_t> &of_table(Table table) { return tables_[static_cast<std::size_t>(table)]; }
+
+    std::vector<std::string> texts_;
+    std::array<std::vector<std::size_t>, table_count> tables_; // for each element: the number of its text; 0: none
+};
+
 // 64-byte aligned memory that holds an arena.
 class Arena {
 public:
@@ -121,6 +151,9 @@ class ArenaBuilder {
 public:
     Settings settings;
     Environment environment;
+
+    void set_origin(std::string origin) { origins_.set(std::move(origin)); } // of the elements added from now on
+    const Origins &origins() const { return origins_; }
 
     // Each function returns the index of the new element.
     std::uint32_t add_triangles(TriangleMesh mesh);
@@ -163,12 +196,15 @@ private:
     std::vector<Channel> channels_;
     std::vector<Skin> skins_;
     std::string names_;
+    Origins origins_;
 };
 
-// Validates an arena that another process wrote. Returns "" if it is valid, otherwise a description of the first
-// problem, to be appended to a text such as "the scene is invalid: "; for example "object 2 'ball' refers to material
-// 7, but the scene has only 3". Checks every offset, count, index, enumerator and number, so ray tracers may use them
-// unchecked if nobody can write to the arena any more. Takes linear time in the size of the arena for any content.
+// Validates an arena that another process wrote. Returns the first fault; nullopt if it is valid. Checks every
+// offset, count, index, enumerator and number, so ray tracers may use them unchecked if nobody can write to the arena
+// any more. Takes linear time in the size of the arena for any content.
+std::optional<Fault> find_fault(std::span<const std::byte> arena);
+
+// Returns the text of find_fault, or "" if the arena is valid.
 std::string validate(std::span<const std::byte> arena);
 
 } // namespace arhost::scene

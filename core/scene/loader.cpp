@@ -56,6 +56,8 @@ double linear_from_srgb(double encoded) {
 glm::vec3 colour_of(const Node &node, double maximum = 1) {
     const std::string requirement = "must be '#rrggbb' (sRGB), a number or a list of three (linear light, 0 to " +
                                     std::string(maximum == 1 ? "1)" : "1e6)");
+    if (node.is_null())
+        node.fail(requirement + ", but is empty; '#' starts a comment, so write '#rrggbb' in quotes");
     if (!node.is_scalar() && !node.is_sequence())
         node.fail(requirement);
     glm::dvec3 colour;
@@ -565,23 +567,32 @@ public:
         root_.allow_keys({"version", "axes", "max_depth", "ambient", "background", "shadow_alpha", "coloured_shadows",
                           "environment", "materials", "lights", "objects"});
         builder_.settings = settings_of(root_);
-        if (const auto environment = root_.find("environment"))
+        if (const auto environment = root_.find("environment")) {
+            set_origin(*environment);
             builder_.environment = environment_of(*environment, builder_.settings.axes, textures_);
+        }
         const Node materials = root_.require("materials");
         for (const auto &[name, node] : materials.entries()) {
+            set_origin(node);
             if (!materials_.emplace(name, builder_.add_material(material_of(node, textures_))).second)
                 node.fail("another material has the same name; rename or remove one of them");
         }
         if (const auto lights = root_.find("lights"))
-            for (const Node &node : lights->items())
+            for (const Node &node : lights->items()) {
+                set_origin(node);
                 builder_.add_light(light_of(node, builder_.settings.axes));
+            }
         const std::vector<Node> objects = root_.require("objects").items();
-        for (std::size_t i = 0; i < objects.size(); ++i)
+        for (std::size_t i = 0; i < objects.size(); ++i) {
+            set_origin(objects[i]);
             add_object(objects[i], i, objects.size());
+        }
         return std::move(builder_);
     }
 
 private:
+    void set_origin(const Node &node) { builder_.set_origin(node.where() + ": " + node.path()); }
+
     void add_object(const Node &node, std::size_t index, std::size_t count) {
         node.allow_keys({"name", "mesh", "gltf", "animation", "smooth", "stand_in", "sphere", "cuboid", "plane",
                          "transform", "motion", "material", "role"});

@@ -92,29 +92,36 @@ public:
         skins_ = view<arhost_skin>(scene_->skins, "the table of skins");
         names_ = view<char>(scene_->names, "the table of names");
         check_names();
-        for (std::size_t i = 0; i < nodes_.size(); ++i)
-            check_node(i);
-        for (std::size_t i = 0; i < channels_.size(); ++i)
-            check_channel(i);
-        for (std::size_t i = 0; i < skins_.size(); ++i)
-            check_skin(i);
-        for (std::size_t i = 0; i < materials_.size(); ++i)
-            check_material(i);
-        for (std::size_t i = 0; i < objects_.size(); ++i)
-            check_object(i);
-        check_deforming();
-        for (std::size_t i = 0; i < textures_.size(); ++i)
-            check_texture(i);
+        for_each(Table::nodes, nodes_.size(), [&](std::size_t i) { check_node(i); });
+        for_each(Table::channels, channels_.size(), [&](std::size_t i) { check_channel(i); });
+        for_each(Table::skins, skins_.size(), [&](std::size_t i) { check_skin(i); });
+        for_each(Table::materials, materials_.size(), [&](std::size_t i) { check_material(i); });
+        for_each(Table::objects, objects_.size(), [&](std::size_t i) { check_object(i); });
+        find_deformers();
+        for_each(Table::geometries, geometries_.size(), [&](std::size_t i) { check_deformer(i); });
+        for_each(Table::textures, textures_.size(), [&](std::size_t i) { check_texture(i); });
         check_environment();
-        for (std::size_t i = 0; i < lights_.size(); ++i)
-            check_light(i);
+        for_each(Table::lights, lights_.size(), [&](std::size_t i) { check_light(i); });
         std::vector<Box> boxes;
-        for (std::size_t i = 0; i < geometries_.size(); ++i)
-            boxes.push_back(check_geometry(i));
-        check_bounds(boxes);
+        for_each(Table::geometries, geometries_.size(), [&](std::size_t i) { boxes.push_back(check_geometry(i)); });
+        for_each(Table::objects, objects_.size(), [&](std::size_t i) { check_extent(i, boxes); });
+        check_bounds();
+        for_each(Table::objects, objects_.size(), [&](std::size_t i) { check_in_bounds(i, boxes); });
     }
 
+    // The element that was being checked.
+    Table table() const { return table_; }
+    std::size_t index() const { return index_; }
+
 private:
+    template <class Check> void for_each(Table table, std::size_t count, const Check &check) {
+        table_ = table;
+        for (index_ = 0; index_ < count; ++index_)
+            check(index_);
+        table_ = Table::scene;
+        index_ = 0;
+    }
+
     void check_header() {
         if (reinterpret_cast<std::uintptr_t>(arena_.data()) % arena_alignment != 0)
             fail("its memory is not aligned to 64 bytes");
@@ -143,8 +150,6 @@ private:
         check_floats({&scene_->duration_s, 1}, 0, duration_limit_s, "duration_s");
         check_floats({&scene_->shadow_alpha_opaque, 1}, 0, 1, "shadow_alpha_opaque");
         check_floats({&scene_->shadow_alpha_translucent, 1}, 0, 1, "shadow_alpha_translucent");
-        check_floats(scene_->bounds_min, -4 * coordinate_limit_mm, 4 * coordinate_limit_mm, "bounds_min");
-        check_floats(scene_->bounds_max, -4 * coordinate_limit_mm, 4 * coordinate_limit_mm, "bounds_max");
     }
 
     // Checks that the buffer and its spare bytes are inside the arena, and returns its elements. The total size of
@@ -236,19 +241,22 @@ private:
         return true;
     }
 
-    // Finds the object that deforms each geometry. No other object may use a deforming geometry.
-    void check_deforming() {
+    // Finds the object that deforms each geometry.
+    void find_deformers() {
         deformers_.assign(geometries_.size(), ARHOST_NONE);
-        std::vector<std::uint32_t> uses(geometries_.size(), 0);
+        uses_.assign(geometries_.size(), 0);
         for (std::uint32_t i = 0; i < objects_.size(); ++i) {
-            ++uses[objects_[i].geometry];
+            ++uses_[objects_[i].geometry];
             if (objects_[i].deforms)
                 deformers_[objects_[i].geometry] = i;
         }
-        for (std::size_t i = 0; i < geometries_.size(); ++i)
-            if (deformers_[i] != ARHOST_NONE && uses[i] > 1)
-                fail(name_of(deformers_[i]) + " deforms geometry " + std::to_string(i) +
-                     ", which another object uses too");
+    }
+
+    // No other object may use a deforming geometry.
+    void check_deformer(std::size_t i) const {
+        if (deformers_[i] != ARHOST_NONE && uses_[i] > 1)
+            fail(name_of(deformers_[i]) + " deforms geometry " + std::to_string(i) +
+                 ", which another object uses too");
     }
 
     void check_texture(std::size_t i) {
@@ -578,20 +586,37 @@ private:
         return box_of(spheres);
     }
 
-    void check_bounds(const std::vector<Box> &boxes) const {
+    Box box_of_object(std::size_t i, const std::vector<Box> &boxes) const {
+        return transformed(objects_[i].world_from_object, boxes[objects_[i].geometry]);
+    }
+
+    // The bounding box of an object that deforms changes over time.
+    void check_extent(std::size_t i, const std::vector<Box> &boxes) const {
+        constexpr float limit = 4 * coordinate_limit_mm;
+        const Box box = objects_[i].deforms ? Box{glm::vec3(0), glm::vec3(0)} : box_of_object(i, boxes);
+        for (int axis = 0; axis < 3; ++axis)
+            if (!within(box.min[axis], -limit, limit) || !within(box.max[axis], -limit, limit))
+                fail(name_of(i) + " extends beyond " + number(limit) + " mm");
+    }
+
+    void check_bounds() const {
+        check_floats(scene_->bounds_min, -4 * coordinate_limit_mm, 4 * coordinate_limit_mm, "bounds_min");
+        check_floats(scene_->bounds_max, -4 * coordinate_limit_mm, 4 * coordinate_limit_mm, "bounds_max");
+        for (int axis = 0; axis < 3; ++axis)
+            if (scene_->bounds_min[axis] > scene_->bounds_max[axis])
+                fail("bounds_min is above bounds_max");
+    }
+
+    void check_in_bounds(std::size_t i, const std::vector<Box> &boxes) const {
+        if (objects_[i].deforms)
+            return;
         const glm::vec3 low(scene_->bounds_min[0], scene_->bounds_min[1], scene_->bounds_min[2]);
         const glm::vec3 high(scene_->bounds_max[0], scene_->bounds_max[1], scene_->bounds_max[2]);
-        if (!(low.x <= high.x && low.y <= high.y && low.z <= high.z))
-            fail("bounds_min is above bounds_max");
         const glm::vec3 margin = (high - low) * tolerance + glm::abs(low) * 1e-6f + glm::abs(high) * 1e-6f;
-        for (std::size_t i = 0; i < objects_.size(); ++i) {
-            if (objects_[i].deforms) // its bounding box changes over time
-                continue;
-            const Box box = transformed(objects_[i].world_from_object, boxes[objects_[i].geometry]);
-            const glm::vec3 below = low - box.min - margin, above = box.max - high - margin;
-            if (!(std::max({below.x, below.y, below.z, above.x, above.y, above.z}) <= 0))
-                fail(name_of(i) + " is outside the scene's bounds");
-        }
+        const Box box = box_of_object(i, boxes);
+        const glm::vec3 below = low - box.min - margin, above = box.max - high - margin;
+        if (!(std::max({below.x, below.y, below.z, above.x, above.y, above.z}) <= 0))
+            fail(name_of(i) + " is outside the scene's bounds");
     }
 
     std::span<const std::byte> arena_;
@@ -607,17 +632,26 @@ private:
     std::span<const arhost_skin> skins_;
     std::span<const char> names_;
     std::vector<std::uint32_t> deformers_; // for each geometry: index of the object that deforms it, or ARHOST_NONE
+    std::vector<std::uint32_t> uses_;      // for each geometry: number of objects that use it
+    Table table_ = Table::scene;
+    std::size_t index_ = 0;
 };
 
 } // namespace
 
-std::string validate(std::span<const std::byte> arena) {
+std::optional<Fault> find_fault(std::span<const std::byte> arena) {
+    Checker checker(arena);
     try {
-        Checker(arena).run();
-        return {};
+        checker.run();
+        return std::nullopt;
     } catch (const Invalid &found) {
-        return found.text;
+        return Fault{found.text, checker.table(), checker.index()};
     }
+}
+
+std::string validate(std::span<const std::byte> arena) {
+    const std::optional<Fault> fault = find_fault(arena);
+    return fault ? fault->text : "";
 }
 
 } // namespace arhost::scene

@@ -121,6 +121,12 @@ void Process::receive_messages(int max_messages) {
                 const auto [severity, text] = parse<messages::Log>(message);
                 log(severity, text.substr(0, 4000));
             } else {
+                ready_ = ready_ || is<messages::Ready>(message);
+                if (is<messages::Failed>(message) &&
+                    held_error_ == parse<messages::Failed>(message).text.substr(0, 4000))
+                    held_error_.reset();
+                else if (ready_)
+                    print_held_error();
                 callbacks_.message(message);
             }
         } catch (const ProtocolViolation &violation) {
@@ -131,11 +137,24 @@ void Process::receive_messages(int max_messages) {
     }
 }
 
-// Logs a line of the worker, unless the worker logs too many per second. Counts warnings separately, so that other
-// lines do not displace them.
 void Process::log(arhost_severity severity, const std::string &text) {
-    constexpr int max_per_second = 100;
     append_to_tail(text);
+    print_held_error();
+    if (severity == ARHOST_SEVERITY_ERROR && !ready_)
+        held_error_ = text;
+    else
+        print(severity, text);
+}
+
+void Process::print_held_error() {
+    if (const auto text = std::exchange(held_error_, std::nullopt))
+        print(ARHOST_SEVERITY_ERROR, *text);
+}
+
+// Prints a line of the worker, unless the worker logs too many per second. Counts warnings separately, so that other
+// lines do not displace them.
+void Process::print(arhost_severity severity, const std::string &text) {
+    constexpr int max_per_second = 100;
     if (const auto now = Reactor::Clock::now(); now >= log_second_ends_) {
         report_suppressed_lines();
         log_second_ends_ = now + std::chrono::seconds(1);
@@ -219,6 +238,7 @@ void Process::on_death() {
         read_output(1 << 20);
     if (!partial_line_.empty())
         append_to_tail(partial_line_);
+    print_held_error();
     report_suppressed_lines();
     const Exit exit = context_.launcher.wait_exit(spawned_.pid);
     Death death;

@@ -11,6 +11,7 @@
 
 #include <deque>
 #include <functional>
+#include <optional>
 #include <string>
 
 namespace arhost::supervise {
@@ -80,6 +81,8 @@ private:
     void on_death();
     void receive_results();
     void log(arhost_severity severity, const std::string &text);
+    void print(arhost_severity severity, const std::string &text);
+    void print_held_error();
     void report_suppressed_lines();
     void append_to_tail(const std::string &line);
 
@@ -92,6 +95,9 @@ private:
     ipc::CommandProducer commands_;
     ipc::ResultConsumer results_;
     std::string end_reason_, partial_line_;
+    // The last error that the worker logged before Ready. It is not printed if Failed reports the same text.
+    std::optional<std::string> held_error_;
+    bool ready_ = false;
     std::deque<std::string> tail_;
     ipc::Reactor::Clock::time_point log_second_ends_{};
     struct LineCount { // lines within the current second

@@ -20,10 +20,14 @@ int load_scene(Link &link, const ipc::messages::Load &load) {
         link.send(ipc::messages::Reads{identity.path, identity.node});
     };
     scene::ArenaBuilder builder = scene::load_scene(load.scene, callbacks);
+    const scene::Origins origins = builder.origins();
     const ipc::SharedMemory memory = ipc::SharedMemory::create("arhost-scene", builder.byte_size());
     {
         const ipc::Mapping mapping = memory.map(ipc::Access::read_write);
         std::move(builder).write(mapping.bytes());
+        // The host validates the arena, too, but does not know which part of the scene file an element comes from.
+        if (const auto fault = scene::find_fault(mapping.bytes()))
+            throw yaml::Error(origins.message(*fault));
     } // unmaps the memory, because the host can freeze it only if no writable mapping exists
     link.send(ipc::messages::Loaded{}, {memory.fd()});
     return EXIT_SUCCESS;

@@ -2,6 +2,7 @@
 #include "yaml/yaml.hpp"
 
 #include "base/text.hpp"
+#include "yaml/hints.hpp"
 
 #include <yaml-cpp/eventhandler.h>
 
@@ -79,6 +80,12 @@ std::filesystem::path without_dots(const std::filesystem::path &path) {
             result /= part;
     }
     return result;
+}
+
+void expect_size_within_limit(std::uintmax_t byte_size, const std::filesystem::path &file) {
+    if (byte_size > max_file_bytes)
+        throw Error(file.string() + ": is larger than " + std::to_string(max_file_bytes >> 20) +
+                    " MB, the limit for YAML files; put large meshes into .obj, .ply or glTF files");
 }
 
 YAML::Mark mark_of(const std::string &text, std::size_t position) {
@@ -203,6 +210,8 @@ Node Node::load(const std::filesystem::path &file) {
             std::filesystem::absolute(file).native())) // relative paths in the file would not be valid UTF-8 either
         throw Error(std::filesystem::absolute(file).string() +
                     ": the file's path is not valid UTF-8; rename the file or the folder");
+    if (const std::uintmax_t byte_size = std::filesystem::file_size(file, ignored); !ignored)
+        expect_size_within_limit(byte_size, file);
     std::string content;
     errno = 0;
     try {
@@ -221,7 +230,9 @@ Node Node::parse(const std::string &text, const std::string &name) {
     try {
         return Node(read(text), "", document);
     } catch (const YAML::Exception &error) {
-        throw Error(position_in(name, error.mark) + "YAML syntax: " + error.msg);
+        const std::string hint =
+            error.mark.is_null() ? "" : hint_for_syntax_error(text, static_cast<std::size_t>(error.mark.line));
+        throw Error(position_in(name, error.mark) + "YAML syntax: " + error.msg + hint);
     }
 }
 
@@ -305,16 +316,19 @@ void Node::fail(const std::string &message) const {
 }
 
 void Node::allow_keys(std::span<const std::string_view> keys) const {
+    expect_map();
     std::set<std::string> seen;
-    for (const auto &[key, value] : entries()) {
-        const std::string_view known[] = {key};
-        if (std::find(keys.begin(), keys.end(), known[0]) == keys.end()) {
-            const std::string near = nearest(key, keys);
-            value.fail("unknown key; " +
-                       (near.empty() ? "known keys: " + listed(keys) : "did you mean '" + near + "'?"));
+    for (const auto &entry : node_) {
+        const std::string &key = entry.first.Scalar();
+        const Node at_key(entry.first, child_path(path_, key), document_);
+        if (std::find(keys.begin(), keys.end(), std::string_view(key)) == keys.end()) {
+            const std::string hint = hint_for_missing_space(key), near = nearest(key, keys);
+            at_key.fail("unknown key" + (!hint.empty()  ? hint
+                                         : near.empty() ? "; known keys: " + listed(keys)
+                                                        : "; did you mean '" + near + "'?"));
         }
         if (!seen.insert(key).second)
-            value.fail("duplicate key; keep one of them");
+            at_key.fail("duplicate key; keep one of them");
     }
 }
 
@@ -331,13 +345,19 @@ Node Node::require(std::string_view key) const {
     fail("the key '" + std::string(key) + "' is missing");
 }
 
-std::vector<std::pair<std::string, Node>> Node::entries() const {
+void Node::expect_map() const {
     if (!node_.IsMap())
-        fail(is_null() ? "must be a map of keys, but is empty" : "must be a map of keys");
-    std::vector<std::pair<std::string, Node>> found;
-    for (const auto &entry : node_) {
+        fail(is_null() ? "must be a map of keys, but is empty"
+                       : "must be a map of keys" + (is_scalar() ? hint_for_missing_space(node_.Scalar()) : ""));
+    for (const auto &entry : node_)
         if (!entry.first.IsScalar())
             fail("the keys of a map must be scalars");
+}
+
+std::vector<std::pair<std::string, Node>> Node::entries() const {
+    expect_map();
+    std::vector<std::pair<std::string, Node>> found;
+    for (const auto &entry : node_) {
         const std::string key = entry.first.Scalar();
         found.emplace_back(key, Node(entry.second, child_path(path_, key), document_));
     }

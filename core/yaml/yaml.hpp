@@ -28,6 +28,9 @@ public:
     using std::runtime_error::runtime_error;
 };
 
+// Larger files are rejected, because reading them would take seconds.
+constexpr std::size_t max_file_bytes = 16 << 20;
+
 // A value in a document. Is cheap to copy and keeps the document alive.
 class Node {
 public:
@@ -42,7 +45,7 @@ public:
         return *this;
     }
 
-    // Reads a file. Throws Error if it cannot be read or has a syntax error.
+    // Reads a file. Throws Error if it cannot be read, is larger than max_file_bytes or has a syntax error.
     static Node load(const std::filesystem::path &file);
     // Parses `text`. `name` is used as the file name in error messages.
     static Node parse(const std::string &text, const std::string &name);
@@ -67,8 +70,8 @@ public:
     std::string where() const;                                // "file:line:column"
     [[noreturn]] void fail(const std::string &message) const; // throws Error with where() and path()
 
-    // For maps. `allow_keys` rejects duplicate keys and unknown keys (and suggests the most similar known key); it
-    // must be called before the lookups.
+    // For maps. `allow_keys` rejects duplicate keys and unknown keys (and suggests the most similar known key), at
+    // the position of the key; it must be called before the lookups.
     void allow_keys(std::span<const std::string_view> keys) const;
     void allow_keys(std::initializer_list<std::string_view> keys) const {
         allow_keys(std::span(keys.begin(), keys.size()));
@@ -109,6 +112,7 @@ private:
     };
     Node(const YAML::Node &node, std::string path, std::shared_ptr<Document> document)
         : node_(node), path_(std::move(path)), document_(std::move(document)) {}
+    void expect_map() const;
     std::string scalar(const char *expected) const;
     std::filesystem::path path_below(const std::filesystem::path &folder) const;
     std::string option() const; // the option that overrides this node; "" if there is none

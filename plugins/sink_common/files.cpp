@@ -43,11 +43,30 @@ void require_regular_file(int fd, const std::filesystem::path &path) {
     }
 }
 
+// Whether only a change of the configuration or of permissions helps, so the host must not retry.
+bool is_permanent(int error_number) {
+    switch (error_number) {
+    case EACCES:
+    case EPERM:
+    case EROFS:
+    case ENOENT:
+    case ENOTDIR:
+    case EEXIST:
+    case EISDIR:
+    case ENAMETOOLONG:
+    case ELOOP:
+        return true;
+    default:
+        return false;
+    }
+}
+
 } // namespace
 
 Failure io_failure(const std::string &what, const std::filesystem::path &file, int error_number) {
-    return Failure(ARHOST_STATUS_ERROR_IO, what + " '" + file.string() + "': " + std::strerror(error_number) + " (" +
-                                               advice_for(error_number) + ")");
+    return Failure(is_permanent(error_number) ? ARHOST_STATUS_ERROR_CONFIGURATION : ARHOST_STATUS_ERROR_IO,
+                   what + " '" + file.string() + "': " + std::strerror(error_number) + " (" +
+                       advice_for(error_number) + ")");
 }
 
 void make_parent_folders(const std::filesystem::path &file) {

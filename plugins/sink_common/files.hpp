@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// File operations of the sinks. If they fail, they throw arhost::Failure (ARHOST_STATUS_ERROR_IO) with a message that
-// names the file, the reason that the system gives, and what to change.
+// File operations of the sinks. If they fail, they throw arhost::Failure with a message that names the file, the
+// reason that the system gives, and what to change. The status is ARHOST_STATUS_ERROR_CONFIGURATION if retrying
+// cannot help, for example without permission, otherwise ARHOST_STATUS_ERROR_IO.
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>

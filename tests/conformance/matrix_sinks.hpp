@@ -61,6 +61,7 @@ inline const std::vector<WrongPlugin> wrong_sinks = of_kind(
         {"writes_each_frame_twice", "writes each frame twice", "fail", {"sink.order"}},
         {"swaps_frames", "swaps every fourth frame with the previous one", "fail", {"sink.order"}},
         {"reverses_log", "writes the newest frame's line first", "fail", {"sink.order"}},
+        {"blackens_a_video_frame", "writes a video in which every fifth frame is black", "fail", {"sink.order"}},
         {"writes_previous_frame", "writes the previous frame", "fail", {"sink.last-frame", "sink.restart"}},
         {"truncates_log_in_start", "empties an earlier run's log in start", "fail", {"sink.earlier-files"}},
         {"no_write_check_in_start", "start does not check that it can write", "fail", {"sink.unwritable-output"}},

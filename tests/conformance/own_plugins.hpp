@@ -39,6 +39,10 @@ inline void expect_to_pass(const OwnPlugin &configuration) {
     EXPECT_EQ(run.wait(std::chrono::minutes(3)), 0) << run.output();
     const nlohmann::json report = nlohmann::json::parse(run.read("results.json"));
     for (const nlohmann::json &result : report.at("results"))
+        if (configuration.plugin == "sink_video" && result.at("test") == "sink.order") {
+            EXPECT_EQ(result.at("verdict"), "pass") << result;
+        }
+    for (const nlohmann::json &result : report.at("results"))
         if (result.at("verdict") == "skip" && result.at("test").get<std::string>().ends_with(".start"))
             GTEST_SKIP() << result.at("message").get<std::string>();
 }

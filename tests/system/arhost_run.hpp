@@ -96,6 +96,15 @@ public:
                info.si_pid == 0;
     }
     std::string output() const { return read("output.txt"); }
+    // The output without lines about layers of the sandbox that this machine lacks.
+    std::string messages() const {
+        std::istringstream lines(output());
+        std::string kept;
+        for (std::string line; std::getline(lines, line);)
+            if (line.find(": sandbox: ") == std::string::npos)
+                kept += line + "\n";
+        return kept;
+    }
     pid_t pid() const { return pid_; }
     pid_t launcher() const {
         const std::vector<pid_t> found = children(pid_);

@@ -41,7 +41,7 @@ const std::vector<Case> cases = {
     {"UnknownKey",
      replaced(good, "deadline_ms", "deadlinems"),
      small_scene,
-     {"run.yaml:4:", "tracker.deadlinems", "did you mean 'deadline_ms'"}},
+     {"run.yaml:4:82: ", "tracker.deadlinems", "did you mean 'deadline_ms'"}},
     {"ConformOfAnOutput",
      replaced(good, "path: counted.txt", "path: counted.txt, conform: true"),
      small_scene,
@@ -51,6 +51,16 @@ const std::vector<Case> cases = {
      replaced(good, "side_mm: 80", "side_mm: wide"),
      small_scene,
      {"run.yaml:4:", "tracker.markers[0].side_mm", "must be a number, but is 'wide'"}},
+    {"MissingVideo",
+     replaced(good, "source_counter,", "source_file, path: f-001.png,"),
+     small_scene,
+     {"run.yaml:3:", "source.path: there is no file '", "did you mean 'f-0001.png'?"}},
+    {"SceneBeyondTheLimits",
+     good,
+     replaced(
+         small_scene, "material: m}]",
+         "material: m},\n  {cuboid: {size: 1e9}, material: m, motion: {keys: [{at_s: 0, scale: 1e3}, {at_s: 1}]}}]"),
+     {"scene.yaml:5:3: objects[1]: object 1 'cuboid 1' extends beyond 4e+09 mm"}},
     {"MarkerTwice",
      replaced(good, "[{id: 3, side_mm: 80}]", "[{id: 3, side_mm: 80}, {id: 3, side_mm: 60}]"),
      small_scene,
@@ -327,6 +337,45 @@ TEST(Check, FailsIfTheSceneLoadsTooSlowly) {
     run.write("scene.yaml", big_scene());
     EXPECT_EQ(run.run({"check", "run.yaml", "--set", "raytracer.start_deadline_ms=20"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("scene.yaml: the scene loader failed: made no progress for 20 ms"));
+}
+
+// The message is the user's view, and the run neither retries nor repeats it.
+TEST(BadInput, OfAnUnwritableFolderIsReportedOnce) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 5}}\n"
+                  "outputs: [{plugin: sink_video, path: out/film.mp4}]\n");
+    std::filesystem::create_directory(run.path("out"));
+    ::chmod(run.path("").c_str(), 0755);
+    ::chmod(run.path("out").c_str(), 0555);
+    run.start({"run.yaml"}, [] {
+        if (::geteuid() == 0 && (::setgid(65534) != 0 || ::setuid(65534) != 0))
+            ::_exit(126);
+    });
+    EXPECT_EQ(run.wait(), 2);
+    ::chmod(run.path("out").c_str(), 0755);
+    EXPECT_THAT(run.messages(),
+                testing::MatchesRegex("error: arhost: run.yaml:3:38: outputs.0..path: no file can be "
+                                      "created in the folder '.*/out': Permission denied; choose another "
+                                      "path\n"));
+}
+
+TEST(BadInput, OfAPluginIsReportedOnce) {
+    ArhostRun run(replaced(good, "scene.yaml, options: {", "scene.yaml, options: {refuse: true"));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run(), 2);
+    const std::string reason = "rejected, as the option 'refuse' requests\n", output = run.output();
+    EXPECT_THAT(output, HasSubstr("error: arhost: run.yaml:5:12: raytracer: " + reason));
+    EXPECT_EQ(output.find(reason), output.rfind(reason)) << output;
+}
+
+TEST(BadInput, DoesNotOverwriteArhostItself) {
+    for (const char *file : {"/bin/arhost-worker", "/lib/arhost/plugins/sink_window.so"}) {
+        ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 5}}\n"
+                      "outputs: [{plugin: sink_poses, path: " ARHOST_BINARY_DIRECTORY +
+                      std::string(file) + "}]\n");
+        EXPECT_EQ(run.run(), 2);
+        EXPECT_THAT(run.output(), HasSubstr("run.yaml:3:38: outputs[0].path: '"));
+        EXPECT_THAT(run.output(), HasSubstr("' is a file that this run reads; choose another path"));
+    }
 }
 
 TEST(BadInput, KeepsTheOutputsOfAnEarlierRun) {

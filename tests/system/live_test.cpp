@@ -58,8 +58,11 @@ TEST(Live, CancelsAnUnneededImageAtTheEnd) {
     ArhostRun run(counting("live", "frames: 40", "", "delay_ms: 600000", "live: {max_latency_ms: 100}\n",
                            std::chrono::minutes(10)));
     run.write("scene.yaml", small_scene);
-    ASSERT_EQ(run.run(), 0) << run.output();
+    ASSERT_EQ(run.run(), 1) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("cancelled while waiting"));
+    EXPECT_THAT(run.output(),
+                testing::ContainsRegex("error: raytracer: none of the [0-9]+ frames shown has an overlay "
+                                       "\\([0-9]+ frames: latency\\); raise 'live.max_latency_ms'"));
     EXPECT_EQ(run.stats()["frames"]["in"], 40);
     EXPECT_EQ(dropped(run.stats()) + counted(run).size(), 40u) << run.stats().dump(1);
     EXPECT_EQ(run.stats()["restarts"]["raytracer"], 0);

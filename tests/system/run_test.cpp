@@ -5,6 +5,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cstdlib>
+
 using namespace arhost::test;
 using testing::HasSubstr;
 using testing::Not;
@@ -378,6 +381,75 @@ TEST(CommandLine, PrintsVersionHelpAndPlugins) {
     EXPECT_EQ(run.run({"--nonsense"}), 2);
 }
 
+TEST(CommandLine, TakesTheConfigurationAsArgument) {
+    ArhostRun run(counting("lockstep", "frames: 3", "", ""));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run({"run.yaml"}), 0) << run.output();
+    EXPECT_EQ(counted(run).size(), 3u);
+    EXPECT_EQ(run.run({"--frames", "2", "run.yaml"}), 0) << run.output();
+    EXPECT_EQ(counted(run).size(), 2u);
+    EXPECT_EQ(run.run({"run.yaml", "other.yaml"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("not expected: other.yaml"));
+}
+
+TEST(CommandLine, HelpDescribesCommands) {
+    ArhostRun run;
+    EXPECT_EQ(run.run({"-V"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("arhost 0."));
+    EXPECT_EQ(run.run({"help"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("Usage: arhost [OPTIONS] [FILE] [SUBCOMMAND]"));
+    const std::string help = run.output();
+    EXPECT_EQ(run.run({"--help"}), 0);
+    EXPECT_EQ(run.output(), help);
+    EXPECT_EQ(run.run({"help", "check"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("Usage: arhost check [OPTIONS] FILE"));
+    EXPECT_EQ(run.run({"help", "conform"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("Usage: arhost conform [OPTIONS] [PLUGIN]"));
+    EXPECT_EQ(run.run({"help", "nonsense"}), 2);
+}
+
+TEST(CommandLine, CompletesInBash) {
+    ArhostRun run;
+    run.write("lab.yaml", "");
+    run.write("plugins/x.so", "");
+    const auto completed = [&](const std::string &words) {
+        const std::string script =
+            "cd '" + run.path("").string() +
+            "'; source '" ARHOST_BINARY_DIRECTORY "/pages/arhost.bash'; COMP_WORDS=(" + words +
+            "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _arhost; printf '%s ' \"${COMPREPLY[@]}\" >completed";
+        const std::string command = "bash -c \"$SCRIPT\"";
+        ::setenv("SCRIPT", script.c_str(), 1);
+        EXPECT_EQ(std::system(command.c_str()), 0);
+        return run.read("completed");
+    };
+    EXPECT_EQ(completed("arhost ch"), "check ");
+    EXPECT_EQ(completed("arhost la"), "lab.yaml ");
+    EXPECT_EQ(completed("arhost plug"), "plugins ") << "the command, not the folder";
+    EXPECT_EQ(completed("arhost --config la"), "lab.yaml ");
+    EXPECT_EQ(completed("arhost --set la"), " ");
+    EXPECT_EQ(completed("arhost --allow"), "--allow-no-target ");
+    EXPECT_EQ(completed("arhost check la"), "lab.yaml ");
+    EXPECT_EQ(completed("arhost check --no"), "--no-open ");
+    EXPECT_EQ(completed("arhost new-plugin ra"), "raytracer ");
+    EXPECT_EQ(completed("arhost new-plugin raytracer x --language py"), "python ");
+    EXPECT_EQ(completed("arhost help rep"), "replay ");
+    EXPECT_EQ(completed("arhost conform --timeo"), "--timeout-factor ");
+    EXPECT_EQ(completed("arhost conform plugins/"), "plugins/x.so ");
+    EXPECT_EQ(completed("arhost conform --reads pl"), "plugins ");
+}
+
+TEST(CommandLine, HasAManPageForEachProgram) {
+    const std::filesystem::path pages = ARHOST_BINARY_DIRECTORY "/pages";
+    for (const char *program :
+         {"arhost", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-worker", "render-scene"})
+        EXPECT_TRUE(std::filesystem::is_regular_file(pages / (std::string(program) + ".1.gz"))) << program;
+    ArhostRun run;
+    EXPECT_EQ(run.run({"--generate", "man"}), 0);
+    for (const char *part : {"\n.SH SYNOPSIS\n\\fBarhost\\fR [\\fIOPTIONS\\fR] [\\fIFILE\\fR]\n",
+                             "\n.SS arhost check\n", "\\fB\\-\\-no\\-open\\fR\n", "one of: c, cpp, rust, python"})
+        EXPECT_THAT(run.output(), HasSubstr(part));
+}
+
 TEST(CommandLine, ListsDevicesOfPluginsThatSupportIt) {
     ArhostRun run;
     // Shader caches are written to the scratch folder.
@@ -422,8 +494,83 @@ TEST(CommandLine, ChecksAConfigurationWithoutRunningIt) {
     ArhostRun run(counting("lockstep", "frames: 5", "", ""));
     run.write("scene.yaml", small_scene);
     EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("run.yaml: OK"));
+    EXPECT_THAT(run.output(), HasSubstr("source: source_counter: 64 x 48 px, 30 fps, 5 frames\n"
+                                        "camera: fx 64 px, fy 64 px, cx 31.5 px, cy 23.5 px\n"
+                                        "tracker: tracker_counter: marker 3 (seal no)\n"
+                                        "raytracer: rt_counter: "));
+    EXPECT_THAT(run.output(),
+                HasSubstr("\noutput: sink_counter: " + run.path("counted.txt").string() + "\nrun.yaml: OK"));
     EXPECT_FALSE(run.exists("counted.txt"));
+}
+
+TEST(CommandLine, CheckFindsWhatWouldStopTheRun) {
+    const auto finds = [](const std::string &sources, const std::string &outputs, const std::string &more = "") {
+        ArhostRun run("version: 1\nsource: {" + sources + "}\noutputs:\n" + outputs + more);
+        run.write("film.mp4", "old");
+        EXPECT_EQ(run.run({"check", "run.yaml"}), 2) << run.output();
+        EXPECT_FALSE(run.exists("out")) << "check created a folder";
+        EXPECT_EQ(run.read("film.mp4"), "old");
+        EXPECT_EQ(run.output().find("arhost-check-"), std::string::npos) << run.output();
+        const std::string messages = run.messages();
+        EXPECT_EQ(std::ranges::count(messages, '\n'), 1) << "the error is printed once\n" << messages;
+        return messages;
+    };
+    const std::string counter = "plugin: source_counter, options: {frames: 5}";
+    const std::string film = "- {plugin: sink_video, path: film.mp4}\n";
+    EXPECT_THAT(finds("plugin: source_file, path: flim.mp4", film),
+                HasSubstr("error: run.yaml:2:37: source.path: there is no file '"));
+    EXPECT_THAT(finds("plugin: source_file, path: film.mp4", film), HasSubstr("film.mp4' cannot be read: "));
+    EXPECT_THAT(
+        finds(counter, film + "- {plugin: sink_video, path: out/film.avi}\n"),
+        testing::ContainsRegex("error: run.yaml:5:3: sink_video#1: path: '.*/out/film.avi' must end in .mp4"));
+    EXPECT_THAT(finds(counter, film + "- {plugin: sink_poses, path: film.mp4/a.jsonl}\n"),
+                HasSubstr("run.yaml:5:30: outputs[1].path: '"));
+    EXPECT_THAT(finds(counter, film,
+                      "camera: {width: 640, height: 480, fx: 600}\ntracker: {plugin: tracker_counter, "
+                      "markers: [{id: 3, side_mm: 80}]}\n"),
+                HasSubstr("run.yaml:5:9: camera: "));
+    EXPECT_THAT(
+        finds(counter, "- {plugin: sink_images, path: f-%d.png}\n- {plugin: sink_poses, path: f-1.png}\n"),
+        HasSubstr("run.yaml:5:30: outputs[1].path: another output, 'f-%d.png', can write a file of the same"));
+}
+
+TEST(CommandLine, CheckOpensNothingOnRequest) {
+    ArhostRun run("version: 1\nsource: {plugin: source_v4l2, allow: [video], options: {device: /dev/video-none}}\n");
+    EXPECT_EQ(run.run({"check", "run.yaml"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("/dev/video-none"));
+    EXPECT_EQ(run.run({"check", "--no-open", "run.yaml"}), 0) << run.output();
+}
+
+TEST(Run, FailsIfTheTrackerSeesNoMarker) {
+    ArhostRun run(counting("lockstep", "frames: 5", "lost_to: 100", ""));
+    run.write("scene.yaml", small_scene);
+    const std::string message =
+        "no marker was seen in any of 5 frames, so no frame has an overlay; it looked for marker 3 "
+        "(seal no);";
+    EXPECT_EQ(run.run(), 1);
+    EXPECT_THAT(run.output(), HasSubstr("error: tracker: " + message));
+    EXPECT_EQ(counted(run).size(), 5u);
+    EXPECT_EQ(run.run({"run.yaml", "--allow-no-target"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("warning: tracker: " + message));
+}
+
+TEST(Run, FailsIfTheTrackerFailsInEveryFrame) {
+    ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {width: 64, height: 48, frames: 5}}\n"
+                  "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
+                  "outputs: [{plugin: sink_counter, path: counted.txt}]\n");
+    EXPECT_EQ(run.run({"run.yaml", "--allow-no-target"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("error: tracker: it delivered no result: it failed in every frame"));
+    EXPECT_EQ(counted(run).size(), 5u);
+}
+
+TEST(Run, TakesAPercentSignLiterallyIfThePluginWritesOneFile) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 3}}\noutputs:\n"
+                  "- {plugin: sink_poses, path: p-%d.jsonl}\n- {plugin: sink_poses, path: p-1.jsonl}\n");
+    for (int i = 0; i < 2; ++i) { // the files exist in the second run
+        EXPECT_EQ(run.run(), 0) << run.output();
+        EXPECT_FALSE(run.read("p-%d.jsonl").empty());
+        EXPECT_EQ(run.read("p-%d.jsonl"), run.read("p-1.jsonl"));
+    }
 }
 
 TEST(Run, DistortsImagesOfARayTracerWithoutLensSupport) {

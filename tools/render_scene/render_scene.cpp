@@ -78,9 +78,11 @@ cv::Mat render(const std::string &file, View view, double time_s, const RayTrace
             throw std::runtime_error(output + ": the scene reads this file; choose another output file");
     };
     callbacks.reads(file);
-    const arhost::scene::Arena arena = arhost::scene::load_scene(std::filesystem::path(file), callbacks).build();
-    if (const std::string wrong = arhost::scene::validate(arena.bytes()); !wrong.empty())
-        throw std::runtime_error(file + ": " + wrong);
+    arhost::scene::ArenaBuilder builder = arhost::scene::load_scene(std::filesystem::path(file), callbacks);
+    const arhost::scene::Origins origins = builder.origins();
+    const arhost::scene::Arena arena = std::move(builder).build();
+    if (const auto fault = arhost::scene::find_fault(arena.bytes()))
+        throw std::runtime_error(origins.message(*fault));
     if (view.up == Vector{})
         view.up[arena.scene().axes == ARHOST_AXES_Z_UP ? 2 : 1] = 1;
     return ray_tracer.render(arena.scene(), camera_of(view), time_s);

@@ -263,11 +263,36 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           options,
                                           nullptr};
 
+// sink_video, which gets a black picture instead of every fifth frame.
+const arhost_plugin &black_video() {
+    static const arhost_plugin &video = open_plugin(ARHOST_PLUGIN_DIRECTORY "/sink_video.so");
+    static arhost_option_descriptor video_options[8];
+    static arhost_descriptor named = *video.descriptor;
+    static arhost_sink functions = *static_cast<const arhost_sink *>(video.functions);
+    static arhost_plugin plugin = video;
+    std::copy_n(video.descriptor->options, named.option_count, video_options);
+    video_options[0].default_value = "video.mp4";
+    named.options = video_options;
+    named.id = library_name().c_str();
+    functions.write = [](arhost_instance *instance, const arhost_output *output) {
+        arhost_output black = *output;
+        const std::vector<std::uint8_t> pixels(std::size_t{output->stride} * output->height);
+        if (output->record->sequence % 5 == 3)
+            black.bgr = pixels.data();
+        return static_cast<const arhost_sink *>(video.functions)->write(instance, &black);
+    };
+    plugin.descriptor = &named;
+    plugin.functions = &functions;
+    return plugin;
+}
+
 } // namespace
 
 extern "C" {
 extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {
     sizeof arhost_entry, [](const arhost_offer *offer, arhost_answer *answer) {
+        if (has("blackens_a_video_frame"))
+            return negotiate(offer, answer, black_video());
         static arhost_sink functions = detail::sink_functions<Files>;
         if (has("no_write"))
             functions.write = nullptr;

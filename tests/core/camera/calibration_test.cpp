@@ -282,7 +282,7 @@ TEST(CameraBlock, ErrorsNameLineKeyAndFix) {
     EXPECT_EQ(error_of([] { parsed("width: 0\nheight: 480\nfx: 600\n"); }),
               "lab.yaml:1:8: width: must be 1 to 16384, but is 0");
     EXPECT_EQ(error_of([] { parsed("width: 640\nheight: 480\nfx: 600\nf: 1\n"); }),
-              "lab.yaml:4:4: f: unknown key; did you mean 'fx'?");
+              "lab.yaml:4:1: f: unknown key; did you mean 'fx'?");
     EXPECT_EQ(error_of([] { parsed("{width: 640, height: 480, fx: 600, distortion: {model: brown}}"); }),
               "lab.yaml:1:48: distortion: the key 'coefficients' is missing; it lists the model's coefficients");
     EXPECT_EQ(error_of([] { parsed("{width: 640, height: 480, fx: 600, distortion: {model: lens}}"); }),
@@ -291,7 +291,7 @@ TEST(CameraBlock, ErrorsNameLineKeyAndFix) {
               "lab.yaml:1:8: file: the calibration file " +
                   (std::filesystem::current_path() / "camera.yaml").string() + " does not exist");
     EXPECT_EQ(error_of([] { parsed("{file: camera.yaml, fx: 640}"); }),
-              "lab.yaml:1:25: fx: unknown key; known keys: file, width, height");
+              "lab.yaml:1:21: fx: unknown key; known keys: file, width, height");
 }
 
 TEST(CameraBlock, RequiresWidthAndHeightTogether) {

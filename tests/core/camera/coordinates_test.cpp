@@ -129,7 +129,7 @@ TEST(Coordinates, ErrorsInYamlNameTheLine) {
         "lab.yaml:1:1: the profiles ar 1 and rt 2 differ, so a rotation is needed; from 1 to 2 it is 90 degrees "
         "about [1, 0, 0]");
     EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotation: []\n"); }),
-              "lab.yaml:3:11: rotation: unknown key; did you mean 'rotations'?");
+              "lab.yaml:3:1: rotation: unknown key; did you mean 'rotations'?");
 }
 
 } // namespace arhost::camera

@@ -47,11 +47,11 @@ TEST_F(Access, GrantsNothingByDefault) {
 }
 
 TEST_F(Access, ASourceMayReadItsFile) {
-    file("film.mp4");
-    file("film.mp4.key");
-    EXPECT_THAT(of("{plugin: source_file, path: film.mp4}", false).readable, ElementsAre(folder / "film.mp4"));
-    EXPECT_THAT(of("{plugin: source_file, options: {path: film.mp4}}", false).readable,
-                ElementsAre(folder / "film.mp4"));
+    file("video.mp4");
+    file("video.mp4.key");
+    EXPECT_THAT(of("{plugin: source_file, path: video.mp4}", false).readable, ElementsAre(folder / "video.mp4"));
+    EXPECT_THAT(of("{plugin: source_file, options: {path: video.mp4}}", false).readable,
+                ElementsAre(folder / "video.mp4"));
 }
 
 TEST_F(Access, APatternGrantsItsFolder) {
@@ -71,15 +71,15 @@ TEST_F(Access, PathsNeverGrantDevicesOrBroadFolders) {
 }
 
 TEST_F(Access, AnOutputMayWriteToItsFolder) {
-    const std::string path = (folder / "out/film.mp4").string();
+    const std::string path = (folder / "out/video.mp4").string();
     EXPECT_THAT(of("{plugin: sink_video, path: " + path + "}", true).writable, ElementsAre(folder / "out"));
     EXPECT_THAT(of("{plugin: sink_video, options: {path: " + path + "}}", true).writable,
                 ElementsAre(folder / "out"));
 }
 
 TEST_F(Access, ALinkedOutputMayAlsoWriteToTheTargetsFolder) {
-    file("there/film.mp4");
-    fs::create_symlink(folder / "there/film.mp4", folder / "link.mp4");
+    file("there/video.mp4");
+    fs::create_symlink(folder / "there/video.mp4", folder / "link.mp4");
     EXPECT_THAT(of("{plugin: sink_video, path: " + (folder / "link.mp4").string() + "}", true).writable,
                 ElementsAre(folder, folder / "there"));
 }
@@ -121,7 +121,7 @@ TEST_F(Access, DotDotAfterALinkStartsAtItsTarget) {
     EXPECT_THAT(of("{plugin: p, reads: [link/..]}", false).readable, ElementsAre(folder / "there"));
     const std::string up = (folder / "link/..").string();
     EXPECT_THAT(of("{plugin: p, writes: [" + up + "]}", false).writable, ElementsAre(folder / "there"));
-    EXPECT_THAT(of("{plugin: p, path: " + up + "/film.mp4}", true).writable, ElementsAre(folder / "there"));
+    EXPECT_THAT(of("{plugin: p, path: " + up + "/video.mp4}", true).writable, ElementsAre(folder / "there"));
 }
 
 TEST_F(Access, EnvironmentVariablesAreGrantedByName) {
@@ -138,12 +138,12 @@ TEST_F(Access, WarnsIfAnOutputMayWriteToHomeOrTheWorkingDirectory) {
         return warning_of_output(Node::load(folder / "run.yaml").require("path"), "my_sink");
     };
     const std::string home = fs::canonical(std::getenv("HOME")).string();
-    EXPECT_THAT(warning(home + "/film.mp4"),
+    EXPECT_THAT(warning(home + "/video.mp4"),
                 HasSubstr("run.yaml:1:7: path: 'my_sink' may write to everything in and below '" + home + "'"));
-    EXPECT_THAT(warning("film.mp4"), HasSubstr("give this output its own folder, as in 'path: output/film.mp4'"));
-    EXPECT_THAT(warning("/film.mp4"), HasSubstr("everything in and below '/'"));
-    EXPECT_EQ(warning("out/film.mp4"), "");
-    EXPECT_EQ(warning((folder / "film.mp4").string()), "");
+    EXPECT_THAT(warning("video.mp4"), HasSubstr("give this output its own folder, as in 'path: output/video.mp4'"));
+    EXPECT_THAT(warning("/video.mp4"), HasSubstr("everything in and below '/'"));
+    EXPECT_EQ(warning("out/video.mp4"), "");
+    EXPECT_EQ(warning((folder / "video.mp4").string()), "");
 }
 
 TEST_F(Access, UnknownPermissionsAreErrors) {

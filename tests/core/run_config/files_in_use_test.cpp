@@ -124,10 +124,8 @@ TEST_F(FilesInUseTest, RecognisesFilesOfOtherOutputs) {
 
 TEST_F(FilesInUseTest, RecognisesOutputsThatCanCollideBeforeTheirFilesExist) {
     const auto collide = [&](const std::string &one, const std::string &other) {
-        FilesInUse files;
-        files.write(node(one));
-        const std::string error = error_of([&] { files.write(node(other)); });
-        EXPECT_THAT(error, testing::AnyOf("", HasSubstr("can write a file of the same name"), HasSubstr("already")));
+        const std::string error = error_of([&] { expect_distinct({{node(one), true}, {node(other), true}}); });
+        EXPECT_THAT(error, testing::AnyOf("", HasSubstr("can write a file of the same name")));
         return !error.empty();
     };
     EXPECT_TRUE(collide("f%d.png", "f1%d.png"));
@@ -146,6 +144,26 @@ TEST_F(FilesInUseTest, RecognisesOutputsThatCanCollideBeforeTheirFilesExist) {
     EXPECT_TRUE(collide("link/f%d.png", "there/f7.png"));
     fs::create_symlink("f-0001.png", folder / "to_none.json");
     EXPECT_TRUE(collide("f-%04d.png", "to_none.json"));
+}
+
+TEST_F(FilesInUseTest, TakesANameAsAPatternOnlyIfThePluginWritesNumberedFiles) {
+    for (const bool exist : {false, true}) {
+        if (exist)
+            file("p-1.jsonl");
+        FilesInUse files;
+        files.write(node("p-%d.jsonl"));
+        EXPECT_EQ(error_of([&] { files.write(node("p-1.jsonl")); }), "");
+        EXPECT_THAT(error_of([&] { files.write(node("./p-1.jsonl")); }),
+                    HasSubstr("another output already writes '"));
+        const auto error = [&](bool first, bool second) {
+            return error_of([&] { expect_distinct({{node("p-%d.jsonl"), first}, {node("p-1.jsonl"), second}}); });
+        };
+        EXPECT_EQ(error(false, false), "");
+        EXPECT_EQ(error(false, true), "");
+        EXPECT_THAT(error(true, false), HasSubstr("p-%d.jsonl', can write a file of the same name as '"));
+    }
+    fs::create_hard_link(folder / "p-1.jsonl", folder / "other.txt");
+    EXPECT_NE(error_of([&] { expect_distinct({{node("p-%d.jsonl"), true}, {node("other.txt"), false}}); }), "");
 }
 
 TEST_F(FilesInUseTest, RejectsAnOutputThatIsReadLater) {

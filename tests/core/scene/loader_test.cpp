@@ -365,10 +365,9 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
     EXPECT_EQ(error_of("version: 1\naxes: zup\n"),
               "s.yaml:2:7: axes: 'zup' is not one of z-up, y-up; did you mean 'z-up'?");
     EXPECT_EQ(error_of("version: 1\naxes: z-up\nmaterial: {}\n"),
-              "s.yaml:3:11: material: unknown key; did you mean 'materials'?");
+              "s.yaml:3:1: material: unknown key; did you mean 'materials'?");
     EXPECT_EQ(error_of(start + "max_depth: 101\n"), "s.yaml:5:12: max_depth: must be 0 to 100, but is 101");
-    EXPECT_EQ(error_of(start + "objects: []\nobjects: []\n"),
-              "s.yaml:6:10: objects: duplicate key; keep one of them");
+    EXPECT_EQ(error_of(start + "objects: []\nobjects: []\n"), "s.yaml:6:1: objects: duplicate key; keep one of them");
     EXPECT_EQ(error_of(start + "  grey: {model: mirror}\nobjects: []\n"),
               "s.yaml:5:9: materials.grey: another material has the same name; rename or remove one of them");
     EXPECT_EQ(error_of(start + "  red: {model: difuse, diffuse: 1}\n"),
@@ -376,12 +375,14 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
               "metallic-roughness; did you mean "
               "'diffuse'?");
     EXPECT_EQ(error_of(start + "  red: {model: mirror, diffuse: 1}\n"),
-              "s.yaml:5:33: materials.red.diffuse: unknown key; known keys: model, reflectivity");
+              "s.yaml:5:24: materials.red.diffuse: unknown key; known keys: model, reflectivity");
     EXPECT_EQ(
         error_of(start + "  red: {model: diffuse, diffuse: '#ff00'}\n"),
         "s.yaml:5:34: materials.red.diffuse: must be '#rrggbb' (sRGB), a number or a list of three (linear light, "
         "0 to 1), is '#ff00'");
     EXPECT_THAT(error_of(start + "  red: {model: diffuse, diffuse: '#gg0000'}\n"), HasSubstr("is '#gg0000'"));
+    EXPECT_THAT(error_of(start + "  red:\n    model: diffuse\n    diffuse: #ff0000\n"),
+                HasSubstr("but is empty; '#' starts a comment, so write '#rrggbb' in quotes"));
     EXPECT_THAT(error_of(start + "  red: {model: diffuse, diffuse: '#-10000'}\n"), HasSubstr("is '#-10000'"));
     EXPECT_EQ(
         error_of(start + "  red: {model: diffuse, diffuse: [0, 1.5, 0]}\n"),
@@ -412,6 +413,33 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
               "s.yaml:6:31: objects[0].plane.normal: must have a length between 1e-9 and 1e9");
 }
 
+TEST(SceneErrors, OfTheArenaNameTheirOrigin) {
+    const auto fault_of = [](const std::string &text) {
+        ArenaBuilder builder = load_scene(Node::parse(text, "s.yaml"));
+        const Origins origins = builder.origins();
+        const Arena arena = std::move(builder).build();
+        const std::optional<Fault> fault = find_fault(arena.bytes());
+        return fault ? origins.message(*fault) : "none";
+    };
+    const std::string objects = start + "objects:\n  - {sphere: {radius: 1}, material: grey}\n";
+    EXPECT_EQ(fault_of(objects), "none");
+    EXPECT_EQ(fault_of(objects + "  - cuboid: {size: 1e9}\n    material: grey\n"
+                                 "    motion: {keys: [{at_s: 0, scale: 1000}, {at_s: 1, scale: 1}]}\n"),
+              "s.yaml:7:5: objects[1]: object 1 'cuboid 1' extends beyond 4e+09 mm");
+
+    ArenaBuilder builder;
+    builder.add_material(make_material(ARHOST_MATERIAL_MIRROR));
+    builder.set_origin("here");
+    arhost_material wrong = make_material(ARHOST_MATERIAL_MIRROR);
+    wrong.exponent = 0;
+    builder.add_material(wrong);
+    const Origins origins = builder.origins();
+    EXPECT_EQ(origins.message(find_fault(std::move(builder).build().bytes()).value()),
+              "here: material 1: exponent is 0, outside 1 to 1e+09");
+    EXPECT_EQ(origins.message({"x", Table::materials, 0}), "x") << "it was added before the origin was set";
+    EXPECT_EQ(origins.message({"x", Table::scene, 0}), "x");
+}
+
 TEST(SceneErrors, NameTheStepOfATransform) {
     const auto with = [](const std::string &steps) {
         return error_of(start + "objects:\n  - sphere: {radius: 1}\n    material: grey\n    transform:\n" + steps);
@@ -425,7 +453,7 @@ TEST(SceneErrors, NameTheStepOfATransform) {
               "s.yaml:9:9: objects[0].transform[0]: each step of a transform must have exactly one of the keys "
               "translate, scale and rotate");
     EXPECT_EQ(with("      - scale: 1\n      - skale: 1\n"),
-              "s.yaml:10:16: objects[0].transform[1].skale: unknown key; did you mean 'scale'?");
+              "s.yaml:10:9: objects[0].transform[1].skale: unknown key; did you mean 'scale'?");
     EXPECT_EQ(with("      - scale: [1, 1, 2]\n"),
               "s.yaml:9:7: objects[0].transform: scales a sphere non-uniformly, which is not supported; use the same "
               "factor for all axes");

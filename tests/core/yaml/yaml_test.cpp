@@ -6,6 +6,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+
 using arhost::yaml::Error;
 using arhost::yaml::Node;
 using testing::HasSubstr;
@@ -40,18 +42,61 @@ TEST(Yaml, SuggestsTheNearestKeyForAnUnknownOne) {
     EXPECT_EQ(error_of([&] {
                   node.allow_keys({"tracker", "source"});
               }),
-              "a.yaml:1:9: traker: unknown key; did you mean 'tracker'?");
+              "a.yaml:1:1: traker: unknown key; did you mean 'tracker'?");
     EXPECT_THAT(error_of([&] { node.allow_keys({"source", "mode"}); }), HasSubstr("known keys: source, mode"));
 }
 
 TEST(Yaml, RejectsDuplicateKeys) {
     const Node node = Node::parse("mode: live\nmode: lockstep\n", "a.yaml");
-    EXPECT_EQ(error_of([&] { node.allow_keys({"mode"}); }), "a.yaml:2:7: mode: duplicate key; keep one of them");
+    EXPECT_EQ(error_of([&] { node.allow_keys({"mode"}); }), "a.yaml:2:1: mode: duplicate key; keep one of them");
 }
 
 TEST(Yaml, SyntaxErrorsNameTheirPosition) {
     EXPECT_THAT(error_of([] { Node::parse("a: [1, 2\nb: 3\n", "a.yaml"); }),
                 testing::MatchesRegex("a.yaml:[0-9]+:[0-9]+: YAML syntax: .*"));
+}
+
+TEST(Yaml, HintsAtFrequentSyntaxErrors) {
+    const auto error = [](const std::string &text) { return error_of([&] { Node::parse(text, "a.yaml"); }); };
+    const std::string tab = " is indented with a tab; use spaces";
+    EXPECT_THAT(error("a:\n\tb: 1\n"), testing::EndsWith("; line 2" + tab));
+    EXPECT_THAT(error("a:\n  b: 1\n\tc: 2\n"), testing::EndsWith("; line 3" + tab));
+    EXPECT_THAT(error("outputs:\n  \t- {plugin: x}\n"), testing::EndsWith("; line 2" + tab));
+    const std::string space = "write a space after the colon: ";
+    EXPECT_THAT(error("a:\n  width:640\n  height: 480\n"),
+                testing::EndsWith("; in line 2, " + space + "'width: 640'"));
+    EXPECT_THAT(error("a:\n  - x:1\n    y: 2\n"), testing::EndsWith("; in line 2, " + space + "'x: 1'"));
+    const std::string hash = "'#' starts a comment; put the value in quotes: ";
+    EXPECT_THAT(error("m: {c: {diffuse: #ff0000}}\nx: 1\ny: 2\n"),
+                testing::EndsWith("; in line 1, " + hash + "'#ff0000'"));
+    EXPECT_THAT(error("m: [#a, 1]\n"), testing::Not(HasSubstr(hash))) << "no blank precedes this '#'";
+    for (const char *other :
+         {"a: [1, 2\nb: 3\n", "a: b: c\n", "a: {url: http://x # why\nb: 1\n", "a: 1\n b:\n- c # d\n"})
+        EXPECT_THAT(error(other), testing::Not(testing::AnyOf(HasSubstr(tab), HasSubstr(space), HasSubstr(hash))))
+            << other;
+}
+
+TEST(Yaml, HintsAtAMissingSpaceInValidYaml) {
+    EXPECT_EQ(error_of([] {
+                  Node::parse("{width:640, height: 480}", "a.yaml").allow_keys({"width", "height"});
+              }),
+              "a.yaml:1:2: width:640: unknown key; write a space after the colon: 'width: 640'");
+    EXPECT_EQ(error_of([] {
+                  Node::parse("camera:\n  width:640\n  height:480\n", "a.yaml").require("camera").find("width");
+              }),
+              "a.yaml:2:3: camera: must be a map of keys; write a space after the colon: 'width: 640'");
+    EXPECT_EQ(error_of([] { Node::parse("camera: file.yaml\n", "a.yaml").require("camera").find("width"); }),
+              "a.yaml:1:9: camera: must be a map of keys");
+}
+
+TEST(Yaml, RejectsLargeFilesAtOnce) {
+    const arhost::test::ScratchFolder scratch;
+    const std::filesystem::path file = scratch.path() / "large.yaml";
+    std::ofstream(file) << "a: 1\n#";
+    EXPECT_EQ(Node::load(file).require("a").integer(), 1);
+    std::filesystem::resize_file(file, arhost::yaml::max_file_bytes + 1);
+    EXPECT_THAT(error_of([&] { Node::load(file); }),
+                HasSubstr("large.yaml: is larger than 16 MB, the limit for YAML"));
 }
 
 TEST(Yaml, RejectsASecondDocument) {

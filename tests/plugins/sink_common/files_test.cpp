@@ -62,7 +62,7 @@ TEST(Files, ReplaceOfAFolderFailsAndNamesIt) {
     std::filesystem::create_directory(target);
     const auto [status, message] =
         failure_of([&] { replace_file(target, hidden_sibling(target, ".partial"), bytes_of("x")); });
-    EXPECT_EQ(status, ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(status, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(message, HasSubstr(target.string()));
 }
 
@@ -77,7 +77,7 @@ TEST(Files, AFileInPlaceOfAFolderIsNamed) {
     const test::ScratchFolder folder;
     std::ofstream(folder.path() / "a") << "x";
     const auto [status, message] = failure_of([&] { make_parent_folders(folder.path() / "a/b/c.txt"); });
-    EXPECT_EQ(status, ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(status, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(message, HasSubstr((folder.path() / "a/b").string()));
 }
 
@@ -85,7 +85,7 @@ TEST(Files, AnUnwritableFolderIsNamed) {
     const test::ScratchFolder folder;
     const test::UnwritableFolder locked(folder.path() / "locked");
     const auto [status, message] = failure_of([&] { File(folder.path() / "locked/a", O_WRONLY | O_CREAT); });
-    EXPECT_EQ(status, ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(status, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(message, HasSubstr("locked/a"));
     EXPECT_THAT(message, HasSubstr("writable path"));
 }
@@ -115,7 +115,7 @@ TEST(Files, RemovingAMissingFileSucceeds) {
     const test::ScratchFolder folder;
     remove_file(folder.path() / "nothing");
     const auto [status, message] = failure_of([&] { remove_file(folder.path()); });
-    EXPECT_EQ(status, ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(status, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(message, HasSubstr("cannot delete"));
 }
 
@@ -137,6 +137,7 @@ TEST(Files, CheckChangesNothing) {
     check_can_write(link);
     EXPECT_TRUE(std::filesystem::is_symlink(link));
     EXPECT_FALSE(std::filesystem::exists(target));
-    EXPECT_EQ(failure_of([&] { check_can_write(folder.path()); }).first, ARHOST_STATUS_ERROR_IO);
-    EXPECT_EQ(failure_of([&] { check_can_write(folder.path() / "none/log.txt"); }).first, ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(failure_of([&] { check_can_write(folder.path()); }).first, ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_EQ(failure_of([&] { check_can_write(folder.path() / "none/log.txt"); }).first,
+              ARHOST_STATUS_ERROR_CONFIGURATION);
 }

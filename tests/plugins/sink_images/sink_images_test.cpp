@@ -268,7 +268,7 @@ TEST_F(SinkImages, AnUnwritableFolderFailsAtTheStart) {
     const UnwritableFolder locked(path("locked"));
     for (const std::string name : {"locked/%d.png", "locked/demo.png"}) {
         SinkUnderTest s = sink(name);
-        EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_IO);
+        EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_CONFIGURATION);
         EXPECT_THAT(s.log(), HasSubstr("Permission denied"));
     }
 }

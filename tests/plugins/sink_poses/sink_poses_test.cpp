@@ -316,16 +316,16 @@ TEST_F(SinkPoses, AFullDiskLeavesWholeLinesAndAMessage) {
     EXPECT_EQ(read_text(log()), uninterrupted(4));
 }
 
-TEST_F(SinkPoses, AnUnwritableFolderIsAnIoErrorThatNamesThePath) {
+TEST_F(SinkPoses, AnUnwritableFolderIsAConfigurationErrorThatNamesThePath) {
     const UnwritableFolder locked(folder_.path() / "locked");
     SinkUnderTest s("sink_poses", {{"path", (folder_.path() / "locked/log.jsonl").string()}});
-    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(s.log(), HasSubstr("locked/log.jsonl"));
 }
 
 TEST_F(SinkPoses, AFolderAsPathIsRejected) {
     SinkUnderTest s("sink_poses", {{"path", folder_.path().string()}});
-    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(s.log(), HasSubstr("add a file name"));
 }
 

@@ -254,9 +254,9 @@ TEST_P(SinkTrajectoryInEachFormat, AFullDiskLeavesWholeLinesAndAMessage) {
 INSTANTIATE_TEST_SUITE_P(Formats, SinkTrajectoryInEachFormat, testing::Values("arhost", "dissertation"),
                          [](const auto &info) { return std::string(info.param); });
 
-TEST_F(SinkTrajectory, AnUnwritableFolderIsAnIoErrorThatNamesThePath) {
+TEST_F(SinkTrajectory, AnUnwritableFolderIsAConfigurationErrorThatNamesThePath) {
     const UnwritableFolder locked(folder_.path() / "locked");
     SinkUnderTest s = sink("arhost", folder_.path() / "locked/run.trajectory");
-    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(s.log(), HasSubstr("locked/run.trajectory"));
 }

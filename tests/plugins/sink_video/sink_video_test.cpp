@@ -415,7 +415,7 @@ TEST_F(SinkVideo, AFullDiskWhileFinishingKeepsTheFramesAndTheOlderVideo) {
 TEST_F(SinkVideo, AnUnwritableFolderFailsAtTheStart) {
     const UnwritableFolder locked(path("locked"));
     SinkUnderTest s = sink({{"path", path("locked/demo.mp4").string()}});
-    EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(s.log(), HasSubstr("locked/.demo.mp4.partial': Permission denied"));
 }
 

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: Apache-2.0
+# Man pages and shell completions. The programs print them from the definitions of their options (--generate).
+find_program(GZIP gzip REQUIRED)
+set(pages_directory ${CMAKE_BINARY_DIR}/pages)
+file(MAKE_DIRECTORY ${pages_directory})
+set(pages)
+foreach(program arhost arhost-conform arhost-inprocess render-scene)
+  set(page ${pages_directory}/${program}.1.gz)
+  add_custom_command(OUTPUT ${page} DEPENDS ${program} VERBATIM
+                     COMMAND ${program} --generate man > ${program}.1
+                     COMMAND ${GZIP} -9nf ${program}.1
+                     WORKING_DIRECTORY ${pages_directory})
+  list(APPEND pages ${page})
+endforeach()
+# Programs that only arhost starts.
+foreach(program arhost-launcher arhost-worker)
+  file(CREATE_LINK arhost.1.gz ${pages_directory}/${program}.1.gz SYMBOLIC)
+  install(FILES ${pages_directory}/${program}.1.gz DESTINATION share/man/man1)
+endforeach()
+install(FILES ${pages} DESTINATION share/man/man1)
+
+# zsh autoloads the file as a function, so its last line calls the function.
+foreach(shell bash zsh fish)
+  set(last_line)
+  if(shell STREQUAL zsh)
+    set(last_line COMMAND ${CMAKE_COMMAND} -E echo "_arhost \"$@\"" >> arhost.zsh)
+  endif()
+  add_custom_command(OUTPUT ${pages_directory}/arhost.${shell} DEPENDS arhost arhost-conform VERBATIM
+                     COMMAND arhost --generate ${shell} > arhost.${shell}
+                     COMMAND arhost-conform --generate ${shell} >> arhost.${shell}
+                     ${last_line}
+                     WORKING_DIRECTORY ${pages_directory})
+  list(APPEND pages ${pages_directory}/arhost.${shell})
+endforeach()
+install(FILES ${pages_directory}/arhost.bash DESTINATION share/bash-completion/completions RENAME arhost)
+install(FILES ${pages_directory}/arhost.zsh DESTINATION share/zsh/vendor-completions RENAME _arhost)
+install(FILES ${pages_directory}/arhost.fish DESTINATION share/fish/vendor_completions.d)
+add_custom_target(pages ALL DEPENDS ${pages})

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_config/user_view.hpp"
+
+#include "base/file_identity.hpp"
+#include "sandbox/sandbox.hpp"
+
+#include <arhost-cpp/numbered_name.hpp>
+
+#include <cerrno>
+#include <cstring>
+#include <set>
+#include <unistd.h>
+
+namespace arhost::run_config {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::set<std::string> names_in(const fs::path &folder, const yaml::Node &node) {
+    std::error_code error;
+    std::set<std::string> names;
+    for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+        names.insert(entry->path().filename().string());
+    if (error)
+        node.fail("the folder '" + folder.string() + "' cannot be listed: " + error.message());
+    return names;
+}
+
+void expect_match(const fs::path &pattern_path, const std::set<std::string> &names, const yaml::Node &node) {
+    std::optional<NumberedName> pattern;
+    try {
+        pattern.emplace(pattern_path.filename().string());
+    } catch (const std::invalid_argument &error) {
+        node.fail("there is no file '" + pattern_path.string() + "', and it is not a valid pattern: " + error.what());
+    }
+    for (const std::string &name : names)
+        if (pattern->number(name))
+            return;
+    node.fail("no file matches '" + pattern_path.string() + "'; its folder has " + std::to_string(names.size()) +
+              " entries" + (names.empty() ? "" : ", such as '" + *names.begin() + "'"));
+}
+
+} // namespace
+
+void expect_readable(const yaml::Node &node) {
+    const fs::path file = node.input_path();
+    std::error_code error;
+    const fs::file_status status = fs::status(file, error);
+    if (fs::exists(status)) {
+        if (::access(file.c_str(), R_OK) != 0)
+            node.fail("'" + file.string() + "' cannot be read: " + std::strerror(errno));
+        return;
+    }
+    if (error && status.type() != fs::file_type::not_found)
+        node.fail("'" + file.string() + "' cannot be accessed: " + error.message());
+    const fs::path folder = file.parent_path();
+    if (!fs::is_directory(folder, error))
+        node.fail("there is no file '" + file.string() + "', as there is no folder '" + folder.string() + "'");
+    const std::set<std::string> names = names_in(folder, node);
+    if (file.filename().string().find('%') != std::string::npos)
+        return expect_match(file, names, node);
+    const std::vector<std::string_view> candidates(names.begin(), names.end());
+    const std::string near = yaml::nearest(file.filename().string(), candidates);
+    node.fail("there is no file '" + file.string() + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+}
+
+void expect_writable(const yaml::Node &node) {
+    const fs::path path = node.output_path();
+    if (sandbox::contains("/dev", path) || sandbox::contains("/proc", path))
+        return;
+    const fs::path file = base::real_path(path);
+    std::error_code error;
+    if (fs::exists(file, error) && ::access(file.c_str(), W_OK) != 0)
+        node.fail("'" + file.string() + "' cannot be written: " + std::strerror(errno) + "; choose another path");
+    fs::path folder = file.parent_path();
+    while (folder.has_relative_path() && !fs::exists(folder, error))
+        folder = folder.parent_path();
+    if (!fs::is_directory(folder, error))
+        node.fail("'" + folder.string() + "' is a file, not a folder; choose another path");
+    if (::access(folder.c_str(), W_OK | X_OK) != 0)
+        node.fail("no file can be created in the folder '" + folder.string() + "': " + std::strerror(errno) +
+                  "; choose another path");
+}
+
+} // namespace arhost::run_config

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Checks files with the user's permissions before a plugin opens them. The plugin would report what its sandbox
+// shows, for example "permission denied" for a file that does not exist.
+#pragma once
+
+#include "yaml/yaml.hpp"
+
+namespace arhost::run_config {
+
+// Throws yaml::Error if the input file at `node` does not exist or cannot be read. For a numbered file name whose
+// literal name does not exist, throws if no file matches it.
+void expect_readable(const yaml::Node &node);
+
+// Throws yaml::Error if the output file at `node` is write-protected, or if no file can be created in its folder.
+// Creates and changes nothing. Paths in /dev and /proc are not checked.
+void expect_writable(const yaml::Node &node);
+
+} // namespace arhost::run_config
