@@ -35,8 +35,8 @@ targets = {"mitsuba": {"diffuse": 3, "mirror": 3, "glass-path": 2, "glass-tree":
 largest_mask_difference = 0.005
 
 
-def install():
-    """Installs the peers into build/peers-venv, and LLVM if Mitsuba finds none."""
+def install_llvm():
+    """Installs LLVM if Mitsuba finds none."""
     if not glob.glob("/usr/lib/*/libLLVM*.so*") + glob.glob("/usr/lib/llvm-*/lib/libLLVM*.so*"):
         print(f"Installing for Mitsuba with apt-get: {llvm_package}", flush=True)
         as_root = [] if os.geteuid() == 0 else ["sudo"] if shutil.which("sudo") else None
@@ -46,6 +46,10 @@ def install():
             subprocess.run([*as_root, "apt-get", "update", "-q"], check=False)
             subprocess.run([*as_root, "env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "-q", "-y",
                             "--no-install-recommends", llvm_package], check=False)
+
+
+def install(wanted):
+    """Installs packages (name: version) into build/peers-venv."""
     if not os.path.exists(venv_python):
         suitable = [path for path in (sys.executable, "/usr/bin/python3", shutil.which("python3.11"))
                     if path and subprocess.run([path, "-c", "import sys, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))"],
@@ -53,7 +57,7 @@ def install():
         if not suitable:
             raise SystemExit("peers: Python 3.11 with venv is required (Debian 12: python3-venv)")
         subprocess.run([suitable[0], "-m", "venv", venv], check=True)
-    for name, version in packages.items():
+    for name, version in wanted.items():
         installed = subprocess.run([venv_python, "-c", f"import importlib.metadata as m; print(m.version('{name}'))"],
                                capture_output=True, text=True, check=False).stdout.strip()
         if installed == version:
@@ -114,7 +118,8 @@ def main():
     if not os.path.exists(os.path.join(binaries, "rt-embree-peers")):
         raise SystemExit("peers: build/release/bin/rt-embree-peers is missing: build it with tools/test")
     os.makedirs(folder, exist_ok=True)
-    install()
+    install_llvm()
+    install(packages)
 
     available = sorted(os.sched_getaffinity(0))
     if len(available) > threads:
@@ -208,4 +213,5 @@ def main():
         raise SystemExit("peers: the masks differ by more than 0.5 %: the scenes are not the same")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -142,7 +142,7 @@ arhost_material make_material(arhost_material_model model) {
     material.fresnel_minimum = 0.04f;
     material.fresnel_maximum = 1;
     copy(glm::vec3(1), material.refraction);
-    copy(glm::vec3(1), material.shadow_attenuation);
+    copy(glm::vec3(default_shadow_attenuation), material.shadow_attenuation);
     material.importance_cutoff = 0.01f;
     material.reflection_depth = material.refraction_depth = max_depth_limit;
     return material;

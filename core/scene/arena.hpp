@@ -31,6 +31,9 @@ using Spheres = std::vector<glm::vec4>; // centre and radius
 // Returns a material of the model `model` with the usual default in each field and without textures. Glass and
 // mirrors transmit and reflect all light; materials of the other models are black.
 arhost_material make_material(arhost_material_model model);
+// The default of arhost_material::shadow_attenuation for colourless glass. Two surfaces then dim a lamp about as much
+// as the default translucent shadow of a catcher does.
+inline constexpr float default_shadow_attenuation = 0.6f;
 // Returns a white light at the origin that points along −z. An area light is 1 mm wide.
 arhost_light make_light(arhost_light_type type);
 

@@ -164,9 +164,10 @@ arhost_material glass_of(const Node &node) {
         glass.fresnel_maximum = real_or(*fresnel, "maximum", glass.fresnel_minimum, 1, glass.fresnel_maximum);
     }
     set(glass.reflectivity, colour_or(node, "reflection", glm::vec3(1)));
-    set(glass.refraction, colour_or(node, "refraction", glm::vec3(1)));
+    const glm::vec3 refraction = colour_or(node, "refraction", glm::vec3(1));
+    set(glass.refraction, refraction);
     set(glass.extinction, extinction_of(node));
-    set(glass.shadow_attenuation, colour_or(node, "shadow_attenuation", glm::vec3(1)));
+    set(glass.shadow_attenuation, colour_or(node, "shadow_attenuation", default_shadow_attenuation * refraction));
     set(glass.cutoff_colour, colour_or(node, "cutoff_colour", glm::vec3(0)));
     glass.importance_cutoff = real_or(node, "importance_cutoff", 0, 1, glass.importance_cutoff);
     glass.reflection_depth = depth_or(node, "reflection_depth", glass.reflection_depth);

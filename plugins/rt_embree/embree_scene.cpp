@@ -120,7 +120,7 @@ bool needs_catcher_bvh(const arhost_scene &arena) {
     return any_catcher && 8 * catcher_triangles <= all_triangles;
 }
 
-// Rounds `alpha` to a multiple of 1/255, so that the mean over several samples yields the same 8-bit code.
+// Rounds `alpha` to a multiple of 1/255, so that rounding errors of the shader do not change the 8-bit code.
 float quantized_alpha(float alpha) {
     return static_cast<float>(arhost::shading::code_8bit(double{alpha}) / 255);
 }
@@ -208,9 +208,14 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     const auto lights = elements<arhost_light>(arena, arena.lights);
     view_.lights = lights.data();
     view_.light_count = arena.lights.count;
+    view_.has_extended_lights = std::any_of(lights.begin(), lights.end(), [](const arhost_light &light) {
+        return light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE;
+    });
     view_.max_depth = arena.max_depth;
     copy3(arena.ambient, view_.ambient);
     copy3(arena.background, view_.background);
+    view_.has_background = arena.environment.texture == ARHOST_NONE &&
+                           std::any_of(arena.background, arena.background + 3, [](float c) { return c > 0; });
     view_.shadow_alpha_opaque = quantized_alpha(arena.shadow_alpha_opaque);
     view_.shadow_alpha_translucent = quantized_alpha(arena.shadow_alpha_translucent);
     view_.coloured_shadows = arena.coloured_shadows != 0;

@@ -55,6 +55,17 @@ struct Environment {
     const float *rows, *columns; // cumulative sums for importance sampling (arhost/scene.h)
 };
 
+// Sums over the samples of a pixel.
+enum SumRow : int {
+    light_row,        // three rows: linear radiance of the virtual objects
+    coverage_row = 3, // number of samples that hit a virtual object; the remaining rows are unused without catchers
+    caught_row,       // number of samples that hit a catcher
+    irradiance_row,   // on the catcher, without shadows
+    hidden_row, // three rows: the parts of it that opaque and that translucent objects hide, and 0; for coloured
+                // shadows, the part hidden in each channel
+    sum_rows = hidden_row + 3
+};
+
 struct Scene {
     RTCScene root;
     RTCScene catchers;         // contains only the catchers; may be the same as `root`
@@ -72,7 +83,10 @@ struct Scene {
     float shadow_alpha_opaque, shadow_alpha_translucent;
     bool coloured_shadows;
     bool has_catchers, has_occluders, has_glass;
+    bool has_extended_lights; // lamps with an area
+    bool has_background;      // a background that is not black, and no environment
     bool has_instances;
+    int sum_row_count() const { return has_catchers ? sum_rows : caught_row; }
     const arhost::shading::Srgb8Table *srgb8;
     const float *linear_of_srgb8; // linear value of each of the 256 sRGB codes
 };
@@ -100,7 +114,7 @@ struct Frame {
     const arhost::raytracer_common::Sample *samples;
     std::int32_t sample_count;
     std::uint32_t first_sample; // number of samples accumulated before this frame; offset into the random sequences
-    float *history[4];          // sums of accumulated samples, as Scratch::sum but for all tiles; NULL: off
+    float *history[sum_rows];   // sums of accumulated samples, as Scratch::sum but for all tiles; NULL: off
     std::int32_t light_samples; // shadow rays per shaded point to each area light
     bool single_path;           // glass spawns one random ray instead of two
     std::uint8_t *rgba;
@@ -121,16 +135,18 @@ inline constexpr std::int32_t tile_side = 32, tile_pixels = tile_side * tile_sid
 // Secondary rays that wait to be traced, all of the same depth. `values` consists of `rows` arrays, each with room
 // for `capacity` rays.
 struct RayQueue {
-    static constexpr int rows = 10; // origin, direction, throughput (three floats each), pixel index (an int's bits)
+    // Origin, direction, throughput (three floats each), reciprocal of the direction's density per steradian (0 for
+    // mirrors and glass, whose direction is not random), pixel index (an int's bits).
+    static constexpr int rows = 11;
     float *values;
     std::int32_t count, capacity;
 };
 
 // A thread's working memory for one tile. The arrays have one value per pixel, in the order of Rays::blocks.
 struct Scratch {
-    float *radiance[3], *alpha; // of the current sample: linear radiance, straight alpha
-    float *sum[4];              // over all samples: sRGB-encoded, premultiplied colour; alpha
-    RayQueue *queues;           // one queue per depth, from 0 to Scene::max_depth
+    float *radiance[3];   // linear radiance of the current sample
+    float *sum[sum_rows]; // over all samples
+    RayQueue *queues;     // one queue per depth, from 0 to Scene::max_depth
 };
 
 // Renders a tile. Returns the bounding rectangle of the pixels with non-zero alpha, enlarged to whole blocks of 4×4

@@ -98,14 +98,15 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
     // three packets (trace_queued_rays() in scatter.inl). Whole packets are read even from partly filled queues, so
     // each row needs space for one more packet.
     constexpr std::int32_t packet = 16, first_capacity = 2 * tile_pixels + packet, capacity = 4 * packet;
-    constexpr int pixel_rows = 8;
+    constexpr int pixel_rows = 3 + sum_rows;
     storage_.resize(std::size_t{pixel_rows} * tile_pixels +
                     std::size_t{RayQueue::rows} * (first_capacity + std::size_t{max_depth} * capacity));
     float *next = storage_.data();
     const auto take = [&](std::int32_t count) { return std::exchange(next, next + count); };
-    for (float **row : {&scratch_.radiance[0], &scratch_.radiance[1], &scratch_.radiance[2], &scratch_.alpha,
-                        &scratch_.sum[0], &scratch_.sum[1], &scratch_.sum[2], &scratch_.sum[3]})
-        *row = take(tile_pixels);
+    for (float *&row : scratch_.radiance)
+        row = take(tile_pixels);
+    for (float *&row : scratch_.sum)
+        row = take(tile_pixels);
     for (std::uint32_t depth = 0; depth <= max_depth; ++depth) {
         const std::int32_t size = depth == 0 ? first_capacity : capacity;
         queues_[depth] = {take(RayQueue::rows * size), 0, size};
@@ -123,7 +124,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
         scratch_.emplace_back(setup.scene->max_depth);
     if (settings.accumulate)
-        history_.resize(4 * ray_table_.tiles().size() * tile_pixels);
+        history_.resize(sum_rows * ray_table_.tiles().size() * tile_pixels);
 }
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
@@ -140,28 +141,28 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     for (const Box &box : scene_.visible_boxes())
         windows.push_back(window_of(box, pose));
 
-    std::array<float *, 4> history{};
+    const std::vector<Tile> &tiles = ray_table_.tiles();
     if (!history_.empty()) {
         if (motion || !history_camera_ || !same_view(*history_camera_, camera))
             history_samples_ = 0;
         history_camera_ = camera;
         samples_ = arhost::raytracer_common::sample_positions(
             history_samples_, history_samples_ < max_accumulated_samples ? samples_per_frame_ : 0);
-        for (std::size_t i = 0; i < 4; ++i)
-            history[i] = history_.data() + i * (history_.size() / 4);
     }
-    const Frame frame{scene_.view(),
-                      ray_table_.rays(),
-                      camera_of(pose),
-                      samples_.data(),
-                      static_cast<std::int32_t>(samples_.size()),
-                      history_samples_,
-                      {history[0], history[1], history[2], history[3]},
-                      light_samples_,
-                      single_path_,
-                      image.rgba,
-                      image.stride};
-    const std::vector<Tile> &tiles = ray_table_.tiles();
+    Frame frame{scene_.view(),
+                ray_table_.rays(),
+                camera_of(pose),
+                samples_.data(),
+                static_cast<std::int32_t>(samples_.size()),
+                history_samples_,
+                {},
+                light_samples_,
+                single_path_,
+                image.rgba,
+                image.stride};
+    if (!history_.empty())
+        for (std::size_t i = 0; i < sum_rows; ++i)
+            frame.history[i] = history_.data() + i * tiles.size() * tile_pixels;
     Rectangle drawn{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(), 0, 0};
     std::mutex drawn_mutex;
     threads_.for_each(tiles.size(), [&](std::size_t i, std::size_t thread) {

@@ -79,6 +79,10 @@ struct Primitive {
     float edge_2[3], unused_2;
 };
 
+struct Sums {
+    float light[3], coverage, hidden[3], irradiance, caught, unused[3];
+};
+
 inline constexpr std::uint32_t max_samples = 256; // per pixel and frame
 
 struct Frame {
@@ -100,7 +104,8 @@ struct Frame {
 };
 
 static_assert(sizeof(Object) == 208 && sizeof(Material) == 176 && sizeof(Light) == 80 && sizeof(Texture) == 32 &&
-              sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Frame) == 208 + 16 * max_samples);
+              sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Sums) == 48 &&
+              sizeof(Frame) == 208 + 16 * max_samples);
 
 // The bindings of the descriptor set, in order: 0 is the frame.
 enum Binding : std::uint32_t {

@@ -166,7 +166,7 @@ void Renderer::make_buffers(const arhost_intrinsics &intrinsics, Path path) {
         const Bytes part = std::as_bytes(std::span(table.values));
         buffers_[rays_binding] = make_buffer(rays_binding, {&part, 1}, 0);
     }
-    buffers_[history_binding] = make_buffer(history_binding, {}, settings_.accumulate ? 16 * pixels : 0);
+    buffers_[history_binding] = make_buffer(history_binding, {}, settings_.accumulate ? sizeof(Sums) * pixels : 0);
     buffers_[image_binding] = make_buffer(image_binding, {}, 4 * pixels);
     buffers_[drawn_binding] = make_buffer(drawn_binding, {}, drawn_size);
     buffers_[frame_binding] =

@@ -13,10 +13,14 @@ namespace {
 
 constexpr int block = 4; // side of a block, px
 
-// Traces the primary rays of a block and shades their hits. Returns the alpha of each pixel, and sets `coloured` if
-// any of the pixels can have radiance. Catchers do not hide the virtual objects behind them; occluders hide
-// everything.
-ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool active, bool &coloured) {
+ARHOST_INLINE void add_to_sum(Scratch &scratch, int row, int first_pixel, Float more) {
+    float *to = scratch.sum[row] + first_pixel;
+    store(to, load(to) + more);
+}
+
+// Traces the primary rays of a block and shades their hits. Returns whether any of the pixels can have radiance.
+// Catchers do not hide the virtual objects behind them; occluders hide everything.
+ARHOST_INLINE bool primary(Work &work, int first_pixel, Vec3 direction, Bool active) {
     const Scene &scene = work.frame.scene;
     const Vec3 eye = splat(work.frame.camera.eye);
     const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0};
@@ -30,26 +34,27 @@ ARHOST_INLINE Float primary(Work &work, int first_pixel, Vec3 direction, Bool ac
                 occluded = occluded | here;
         });
     const Bool is_virtual = hit & ~occluded, rest = active & ~is_virtual;
-
-    coloured = any(is_virtual) || (scene.has_catchers && scene.coloured_shadows);
-    if (coloured)
-        for (float *plane : work.scratch.radiance)
-            store(plane + first_pixel, Float(0.0f));
-    Float alpha = select(is_virtual, Float(1.0f), Float(0.0f));
     if (scene.has_catchers && any(rest)) {
         RTCRayHit16 to_catcher;
         set_ray(to_catcher.ray, eye, direction, select(hit, load(rays.ray.tfar), Float(far_away)), Int(catcher_mask));
         const Bool caught = trace(scene, scene.catchers, make_query(Coherence::coherent, true), to_catcher, rest);
         if (any(caught)) {
-            const CatcherShadow shadow = catcher_shadow(work.frame, to_catcher, caught, random_of(work, paths));
-            alpha = select(caught, shadow.alpha, alpha);
-            if (scene.coloured_shadows)
-                add_radiance(work, paths, shadow.colour, caught);
+            const CatcherLight light = catcher_light(work.frame, to_catcher, caught, random_of(work, paths));
+            const Vec3 hidden = select(caught, light.hidden, black());
+            add_to_sum(work.scratch, caught_row, first_pixel, select(caught, Float(1.0f), Float(0.0f)));
+            add_to_sum(work.scratch, irradiance_row, first_pixel, select(caught, light.irradiance, Float(0.0f)));
+            add_to_sum(work.scratch, hidden_row, first_pixel, hidden.x);
+            add_to_sum(work.scratch, hidden_row + 1, first_pixel, hidden.y);
+            add_to_sum(work.scratch, hidden_row + 2, first_pixel, hidden.z);
         }
     }
-    if (any(is_virtual))
-        shade(work, rays, is_virtual, paths);
-    return alpha;
+    if (!any(is_virtual))
+        return false;
+    for (float *plane : work.scratch.radiance)
+        store(plane + first_pixel, Float(0.0f));
+    add_to_sum(work.scratch, coverage_row, first_pixel, select(is_virtual, Float(1.0f), Float(0.0f)));
+    shade(work, rays, is_virtual, paths);
+    return true;
 }
 
 // Loads a block's ray directions or their derivatives. `z`: the z component if only x and y are stored.
@@ -78,59 +83,85 @@ ARHOST_INLINE Int rgba8(Int r, Int g, Int b, Int a) {
     return r | (g << Int(8)) | (b << Int(16)) | (a << Int(24));
 }
 
-ARHOST_INLINE Vec3 radiance_of(const Scratch &scratch, int first_pixel) {
-    return {load(scratch.radiance[0] + first_pixel), load(scratch.radiance[1] + first_pixel),
-            load(scratch.radiance[2] + first_pixel)};
-}
-
-// Returns a block's RGBA pixels for images with a single sample per pixel.
-ARHOST_INLINE Int encode(const Frame &frame, const Scratch &scratch, int first_pixel, bool coloured) {
-    const Int alpha = to_int(code_8bit(load(scratch.alpha + first_pixel)));
-    if (!coloured)
-        return alpha << Int(24);
-    const Vec3 radiance = radiance_of(scratch, first_pixel);
-    const auto &table = *frame.scene.srgb8;
-    return rgba8(srgb8(table, radiance.x), srgb8(table, radiance.y), srgb8(table, radiance.z), alpha);
-}
-
-// Adds the current sample to the pixels' sums. Colours are sRGB-encoded and premultiplied, as the compositor blends
-// them.
-ARHOST_INLINE void accumulate(Scratch &scratch, int first_pixel, bool coloured, bool first) {
-    const Float alpha = load(scratch.alpha + first_pixel);
-    Vec3 colour = black();
-    if (coloured) {
-        const Vec3 radiance = radiance_of(scratch, first_pixel);
-        colour = Vec3{srgb_encode(radiance.x), srgb_encode(radiance.y), srgb_encode(radiance.z)} * alpha;
-    }
-    const Float values[4] = {colour.x, colour.y, colour.z, alpha};
-    for (int i = 0; i < 4; ++i) {
-        float *to = scratch.sum[i] + first_pixel;
-        store(to, first ? values[i] : load(to) + values[i]);
-    }
+// Adds the radiance of the current sample to the pixels' sums. It is averaged in linear light and encoded only once:
+// sRGB codes are not linear and limited to 1, so that their mean would darken noise and highlights.
+ARHOST_INLINE void accumulate(Scratch &scratch, int first_pixel) {
+    for (int i = 0; i < 3; ++i)
+        add_to_sum(scratch, light_row + i, first_pixel, bounded_radiance(load(scratch.radiance[i] + first_pixel)));
 }
 
 // Adds the sums of previous frames to the sums of this frame, and stores the totals for the next frame. A frame has
 // no samples once accumulation is complete; its totals are those of the previous frame.
 ARHOST_INLINE void add_history(const Frame &frame, Scratch &scratch, std::size_t first_of_tile, int first_pixel) {
-    for (int i = 0; i < 4; ++i) {
+    for (int i = 0; i < frame.scene.sum_row_count(); ++i) {
         float *kept = frame.history[i] + first_of_tile + first_pixel, *sum = scratch.sum[i] + first_pixel;
-        if (frame.sample_count == 0)
-            store(sum, load(kept));
-        else if (frame.first_sample > 0)
+        if (frame.first_sample > 0)
             store(sum, load(kept) + load(sum));
         store(kept, load(sum));
     }
 }
 
-ARHOST_INLINE Int mean(const Scratch &scratch, int first_pixel, std::uint32_t count) {
-    const Float alpha = load(scratch.sum[3] + first_pixel);
-    // Dividing the summed colour by the summed alpha gives a colour with straight alpha: the sample count cancels
-    // out.
-    const Float scale = Float(1.0f) / max(alpha, Float(1e-6f));
-    const auto code = [&](int i) __attribute__((always_inline)) {
-        return to_int(code_8bit(load(scratch.sum[i] + first_pixel) * scale));
-    };
-    return rgba8(code(0), code(1), code(2), to_int(code_8bit(alpha * Float(1.0f / static_cast<float>(count)))));
+// The overlay at shadow catchers.
+struct CatcherShadow {
+    Float alpha;
+    Vec3 colour; // sRGB-encoded
+};
+
+ARHOST_INLINE CatcherShadow catcher_shadow(const Scene &scene, const Scratch &scratch, int first_pixel) {
+    const Float irradiance = load(scratch.sum[irradiance_row] + first_pixel);
+    Float fraction[3];
+    for (int i = 0; i < 3; ++i)
+        fraction[i] = fraction_of(load(scratch.sum[hidden_row + i] + first_pixel), irradiance);
+    const Float opaque = scene.shadow_alpha_opaque, translucent = scene.shadow_alpha_translucent;
+    if (!scene.coloured_shadows)
+        return {shadow_alpha(fraction[0], fraction[1], opaque, translucent), black()};
+    // Each colour channel has its own alpha, but the image has one alpha for all: the largest. The shadow's colour
+    // compensates for channels that this alpha would darken too much.
+    Vec3 of_channel;
+    of_channel.x = shadow_alpha(fraction[0], Float(0.0f), opaque, translucent);
+    of_channel.y = shadow_alpha(fraction[1], Float(0.0f), opaque, translucent);
+    of_channel.z = shadow_alpha(fraction[2], Float(0.0f), opaque, translucent);
+    const Float alpha = largest(of_channel);
+    return {alpha,
+            {shadow_colour_encoded(of_channel.x, alpha), shadow_colour_encoded(of_channel.y, alpha),
+             shadow_colour_encoded(of_channel.z, alpha)}};
+}
+
+// Returns a block's RGBA pixels, the means of `count` samples. Virtual objects and catchers are averaged apart and
+// then blended by their shares of the pixel in sRGB, as the compositor blends them with the video: edges thus have no
+// halo on any background.
+ARHOST_INLINE Int mean(const Frame &frame, const Scratch &scratch, int first_pixel, std::uint32_t count) {
+    const Scene &scene = frame.scene;
+    const Float samples(static_cast<float>(count)), covered = load(scratch.sum[coverage_row] + first_pixel);
+    const Float coverage = covered * Float(1.0f / static_cast<float>(count));
+    const Float per_hit = Float(1.0f) / max(covered, Float(1.0f));
+    Vec3 light;
+    light.x = load(scratch.sum[light_row] + first_pixel) * per_hit;
+    light.y = load(scratch.sum[light_row + 1] + first_pixel) * per_hit;
+    light.z = load(scratch.sum[light_row + 2] + first_pixel) * per_hit;
+    const auto &table = *scene.srgb8;
+    Int red = srgb8(table, light.x), green = srgb8(table, light.y), blue = srgb8(table, light.z);
+    Float alpha = coverage;
+    if (scene.has_catchers) {
+        const Float caught = load(scratch.sum[caught_row] + first_pixel);
+        Bool shadowed = bool_of(false);
+        for (int i = 0; i < 3; ++i)
+            shadowed = shadowed | (load(scratch.sum[hidden_row + i] + first_pixel) > Float(0.0f));
+        if (any(shadowed)) {
+            const CatcherShadow shadow = catcher_shadow(scene, scratch, first_pixel);
+            const Float more = select(shadowed, shadow.alpha * fraction_of(caught, samples), Float(0.0f));
+            alpha = coverage + more;
+            const Float scale = Float(1.0f) / max(alpha, Float(1e-6f));
+            const auto blended = [&](Int object, Float linear, Float encoded_shadow) __attribute__((always_inline)) {
+                const Float colour = (srgb_encode(linear) * coverage + encoded_shadow * more) * scale;
+                return select(shadowed, to_int(code_8bit(colour)), object);
+            };
+            red = blended(red, light.x, shadow.colour.x);
+            green = blended(green, light.y, shadow.colour.y);
+            blue = blended(blue, light.z, shadow.colour.z);
+        }
+    }
+    return rgba8(red, green, blue, to_int(code_8bit(alpha)));
 }
 
 ARHOST_INLINE void write_block(const Frame &frame, int x, int y, int width, int height, Int pixels) {
@@ -161,8 +192,9 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
     Rectangle drawn{all.x1, all.y1, all.x0, all.y0};
     const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();
     Work work{frame, scratch, 0, Int(all.x0 * 65536 + all.y0) ^ Int(0x51ed270b), 0};
-    bool coloured[tile_pixels / lanes];
-    const bool has_sums = frame.sample_count != 1 || frame.history[0];
+    bool has_light[tile_pixels / lanes];
+    for (int i = 0; i < frame.scene.sum_row_count(); ++i)
+        __builtin_memset(scratch.sum[i], 0, tile_pixels * sizeof(float));
 
     for (std::int32_t i = 0; i < frame.sample_count; ++i) {
         work.sample = frame.first_sample + static_cast<std::uint32_t>(i);
@@ -171,21 +203,20 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
             const Vec3 direction = direction_in_world(frame, rays + number * frame.rays.block_size(), i);
             const Bool inside = (column < Int(width)) & (row < Int(height)) &
                                 (direction.x == direction.x); // false if NaN: the pixel has no ray
-            store(scratch.alpha + first_pixel, primary(work, first_pixel, direction, inside, coloured[number]));
+            has_light[number] = primary(work, first_pixel, direction, inside);
         });
         trace_queued_rays(work);
-        if (has_sums)
-            for_each_block(all, [&](int number, int, int, int, int) {
-                accumulate(scratch, number * lanes, coloured[number], i == 0);
-            });
+        for_each_block(all, [&](int number, int, int, int, int) {
+            if (has_light[number])
+                accumulate(scratch, number * lanes);
+        });
     }
     for_each_block(all, [&](int number, int x, int y, int width, int height) {
         const int first_pixel = number * lanes;
         if (frame.history[0])
             add_history(frame, scratch, tile.first_block * lanes, first_pixel);
         const Int pixels =
-            has_sums ? mean(scratch, first_pixel, frame.first_sample + static_cast<std::uint32_t>(frame.sample_count))
-                     : encode(frame, scratch, first_pixel, coloured[number]);
+            mean(frame, scratch, first_pixel, frame.first_sample + static_cast<std::uint32_t>(frame.sample_count));
         write_block(frame, x, y, width, height, pixels);
         if (any((pixels >> Int(24)) != Int(0))) { // lanes outside the image have alpha 0
             drawn.x0 = x < drawn.x0 ? x : drawn.x0;

@@ -9,22 +9,27 @@ enum Purpose : int { environment_purpose = 1, glass_purpose, rough_purpose, firs
 
 // A sampled point of a light source, relative to the surface point of each lane.
 struct LightSample {
-    Vec3 to_light; // vector from the surface to the sampled point; of unit length if the light is infinitely far
-    float t_far;   // end of the shadow ray in lengths of `to_light`: 1, or infinity
-    bool from_environment;
+    Vec3 to_light;    // vector from the surface to the sampled point; of unit length if the light is infinitely far
+    float t_far;      // end of the shadow ray in lengths of `to_light`: 1, or infinity
     Vec3 direction;   // of `to_light`, unit length
     Float cosine;     // cosine of the angle of incidence; 0 if the light is behind the surface
+    Vec3 intensity;   // linear colour
     Float irradiance; // at perpendicular incidence, per unit of intensity
+    Float density;    // number of samples of the light source times their density per steradian; 0 if reflected rays
+                      // cannot hit the light source
+    bool is_background; // seen in reflections only
 };
 
-ARHOST_INLINE LightSample make_light_sample(const Surface &s, Vec3 to_light, float t_far, Float irradiance) {
+ARHOST_INLINE LightSample make_light_sample(const Surface &s, Vec3 to_light, float t_far, Vec3 intensity) {
     LightSample sample;
     sample.to_light = to_light;
     sample.t_far = t_far;
-    sample.from_environment = false;
     sample.direction = normalize(to_light);
-    sample.cosine = lambert_on_facet(s.normal, s.geometric_normal, sample.direction);
-    sample.irradiance = irradiance;
+    sample.cosine = lambert(s.normal, sample.direction);
+    sample.intensity = intensity;
+    sample.irradiance = Float(1.0f);
+    sample.density = Float(0.0f);
+    sample.is_background = false;
     return sample;
 }
 
@@ -32,24 +37,77 @@ ARHOST_INLINE bool is_extended(const arhost_light &light) {
     return light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE;
 }
 
-// `uv` selects the sampled point of an area light.
-ARHOST_INLINE LightSample sample_light(const arhost_light &light, const Surface &s, Pair uv) {
+ARHOST_INLINE Float falloff_of(const arhost_light &light, Vec3 to_light) {
+    return point_light_falloff(bool_of(light.falloff == ARHOST_FALLOFF_INVERSE_SQUARE), dot(to_light, to_light));
+}
+
+// The irradiance and the density of a LightSample, but the density of one sample.
+struct Arriving {
+    Float irradiance, density;
+};
+// `to_centre`, `to_point`: vectors to the centre and to a point of an area light.
+ARHOST_INLINE Arriving arriving_from_point(const arhost_light &light, Vec3 to_centre, Vec3 to_point) {
+    const auto squared = [](const float *a) { return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]; };
+    const Vec3 direction = normalize(to_point);
+    const Float distance_squared = dot(to_point, to_point), falloff = falloff_of(light, to_point);
+    if (light.type == ARHOST_LIGHT_SPHERE) {
+        const float area = 3.14159265f * light.radius * light.radius;
+        return {falloff, density_over_area(distance_squared, Float(area), dot(normalize(to_centre), direction))};
+    }
+    const float area = 4 * __builtin_sqrtf(squared(light.axis_u) * squared(light.axis_v));
+    const Float cosine = lambert(splat(light.direction), -direction);
+    return {falloff * cosine, density_over_area(distance_squared, Float(area), cosine)};
+}
+
+// `uv` selects the sampled point of an area light, of which `count` are sampled.
+ARHOST_INLINE LightSample sample_light(const arhost_light &light, const Surface &s, Pair uv, int count) {
     if (light.type == ARHOST_LIGHT_DIRECTIONAL)
-        return make_light_sample(s, -splat(light.direction), far_away, Float(1.0f));
-    Vec3 to_light = splat(light.position) - s.position;
-    if (light.type == ARHOST_LIGHT_RECTANGLE)
-        to_light = vector_to_rectangle(to_light, splat(light.axis_u), splat(light.axis_v), uv.u, uv.v);
-    else if (light.type == ARHOST_LIGHT_SPHERE)
-        to_light = vector_to_disc(to_light, Float(light.radius), uv.u, uv.v);
-    const Bool falls_off = bool_of(light.falloff == ARHOST_FALLOFF_INVERSE_SQUARE);
-    LightSample sample = make_light_sample(s, to_light, 1, point_light_falloff(falls_off, dot(to_light, to_light)));
+        return make_light_sample(s, -splat(light.direction), far_away, splat(light.intensity));
+    const Vec3 to_centre = splat(light.position) - s.position;
+    if (is_extended(light)) {
+        const Vec3 to_point =
+            light.type == ARHOST_LIGHT_SPHERE
+                ? vector_to_disc(to_centre, Float(light.radius), uv.u, uv.v)
+                : vector_to_rectangle(to_centre, splat(light.axis_u), splat(light.axis_v), uv.u, uv.v);
+        const Arriving arriving = arriving_from_point(light, to_centre, to_point);
+        LightSample sample = make_light_sample(s, to_point, 1, splat(light.intensity));
+        sample.irradiance = arriving.irradiance;
+        sample.density = arriving.density * Float(static_cast<float>(count));
+        return sample;
+    }
+    LightSample sample = make_light_sample(s, to_centre, 1, splat(light.intensity));
+    sample.irradiance = falloff_of(light, to_centre);
     if (light.type == ARHOST_LIGHT_SPOT)
         sample.irradiance =
             sample.irradiance * spot_attenuation(dot(splat(light.direction), -sample.direction),
                                                  Float(light.cosine_inner), Float(light.cosine_outer));
-    if (light.type == ARHOST_LIGHT_RECTANGLE)
-        sample.irradiance = sample.irradiance * lambert(splat(light.direction), -sample.direction);
     return sample;
+}
+
+// Returns the light of lamps with an area that arrives along secondary rays before `t_far`, where the rays hit a
+// surface. Lamps do not hide each other or anything else. `inverse_density`: see RayQueue.
+ARHOST_INLINE Vec3 arriving_from_lamps(const Frame &frame, Vec3 origin, Vec3 direction, Float t_far,
+                                       Float inverse_density) {
+    Vec3 sum = black();
+    for (std::uint32_t i = 0; i < frame.scene.light_count; ++i) {
+        const arhost_light &light = frame.scene.lights[i];
+        if (!is_extended(light))
+            continue;
+        const Vec3 to_centre = splat(light.position) - origin;
+        const Float t = light.type == ARHOST_LIGHT_SPHERE
+                            ? distance_to_disc(to_centre, Float(light.radius), direction)
+                            : distance_to_rectangle(to_centre, splat(light.direction), splat(light.axis_u),
+                                                    splat(light.axis_v), direction);
+        const Bool arrives = (t > Float(0.0f)) & (t < t_far);
+        if (!any(arrives))
+            continue;
+        const Arriving arriving = arriving_from_point(light, to_centre, direction * t);
+        const Float sampled = arriving.density * Float(static_cast<float>(frame.light_samples));
+        const Float radiance = arriving.irradiance * arriving.density * Float(3.14159265f) /
+                               (Float(1.0f) + sampled * inverse_density); // the divisor: balance_weight
+        sum = sum + splat(light.intensity) * select(arrives, radiance, Float(0.0f));
+    }
+    return sum;
 }
 
 // The visibility of a light source from the surface point of each lane.
@@ -59,13 +117,13 @@ struct Visibility {
     Vec3 tint;       // transmittance of the glass in between
 };
 
-// Returns the transmittance of the glass between the surface points and a light source. Sets `is_tinted` for lanes
-// with glass in between.
-ARHOST_INLINE Vec3 glass_tint(const Scene &scene, Vec3 origin, const LightSample &sample, Bool active,
+// Returns the transmittance of the glass between `origin` and a light source. `to_light`: vector from `origin` to the
+// sampled point. Sets `is_tinted` for lanes with glass in between.
+ARHOST_INLINE Vec3 glass_tint(const Scene &scene, Vec3 origin, Vec3 to_light, const LightSample &sample, Bool active,
                               Bool &is_tinted) {
     constexpr int max_surfaces =
         64; // ignores further surfaces: rays may alternate endlessly between coincident faces
-    Vec3 tint = white(), start = origin, remaining = sample.to_light;
+    Vec3 tint = white(), start = origin, remaining = to_light;
     for (int i = 0; i < max_surfaces && any(active); ++i) {
         RTCRayHit16 rays;
         set_ray(rays.ray, start, remaining, Float(sample.t_far), Int(glass_mask));
@@ -75,8 +133,13 @@ ARHOST_INLINE Vec3 glass_tint(const Scene &scene, Vec3 origin, const LightSample
         is_tinted = is_tinted | active;
         const Surface s = surface_at(scene, rays, active);
         const Float cosine = abs(dot(s.normal, sample.direction));
+        const Float inside = select(s.back_face, s.distance, Float(0.0f)); // mm
         for_each_object(scene, rays.hit, active, [&](const Object &object, Bool here) {
-            tint = select(here, tint * glass_shadow(splat(object.material->shadow_attenuation), cosine), tint);
+            const arhost_material &glass = *object.material;
+            tint = select(here,
+                          tint * glass_shadow(splat(glass.shadow_attenuation), cosine) *
+                              bouguer(splat(glass.extinction), inside),
+                          tint);
         });
         const Vec3 next = s.position - s.geometric_normal * s.offset;
         if (sample.t_far < far_away)
@@ -89,8 +152,8 @@ ARHOST_INLINE Vec3 glass_tint(const Scene &scene, Vec3 origin, const LightSample
 
 // Real surfaces (catchers and occluders) cast no virtual shadow on each other: the video already shows their shadows.
 ARHOST_INLINE Visibility visibility_of(const Scene &scene, const LightSample &sample, const Surface &s, Bool active) {
-    const Vec3 origin = s.position + s.geometric_normal * s.offset;
-    const Vec3 to_light = sample.t_far < far_away ? sample.to_light - s.geometric_normal * s.offset : sample.to_light;
+    const Vec3 above = s.lift + s.geometric_normal * s.offset, origin = s.position + above;
+    const Vec3 to_light = sample.t_far < far_away ? sample.to_light - above : sample.to_light;
     RTCRay16 rays;
     set_ray(rays, origin, to_light, Float(sample.t_far),
             select(s.is_real, Int(opaque_mask), Int(opaque_mask | catcher_mask | occluder_mask)));
@@ -99,7 +162,7 @@ ARHOST_INLINE Visibility visibility_of(const Scene &scene, const LightSample &sa
     visibility.is_tinted = bool_of(false);
     visibility.tint = white();
     if (scene.has_glass && any(visibility.unoccluded))
-        visibility.tint = glass_tint(scene, origin, sample, visibility.unoccluded, visibility.is_tinted);
+        visibility.tint = glass_tint(scene, origin, to_light, sample, visibility.unoccluded, visibility.is_tinted);
     return visibility;
 }
 
@@ -117,34 +180,67 @@ ARHOST_INLINE Int search(const float *sums, Int first, std::int32_t count, Float
     return low;
 }
 
-ARHOST_INLINE Vec3 environment_light(const Scene &scene, Vec3 direction) {
-    const Environment &environment = scene.environment;
-    if (!environment.image)
-        return splat(scene.background);
-    const Vec3 d = transform(environment.environment_from_world, direction);
-    return sample_texture(scene, *environment.image, equirectangular_u(d), equirectangular_v(d)).colour *
-           Float(environment.intensity);
+// Returns cumulative sum `i` − 1 (0 if i is 0), and the difference between it and cumulative sum `i`.
+ARHOST_INLINE Pair step_of_sums(const float *sums, Int first, Int i) {
+    const Float before =
+        select(Int(0) < i, gather(sums, first + select(Int(0) < i, i - Int(1), Int(0))), Float(0.0f));
+    return {before, gather(sums, first + i) - before};
 }
 
-struct EnvironmentSample {
-    LightSample light_sample;
-    Vec3 intensity; // linear colour; `light_sample.irradiance` accounts for the sampling density
-};
+// Density per steradian of sample_environment() in a texel, from the steps of the cumulative sums.
+ARHOST_INLINE Float environment_density(const Texture &image, Float row_step, Float column_step, Float v) {
+    const Float texels = Float(static_cast<float>(image.width) * static_cast<float>(image.height));
+    return equirectangular_density(row_step * column_step * texels, v);
+}
+
+// Uniform density of sample_background() per steradian: 1/2π.
+constexpr float background_density = 0.159154943f;
+
+// Returns the light that arrives along secondary rays that hit no surface, from the environment or the background.
+// `inverse_density`: see RayQueue.
+ARHOST_INLINE Vec3 arriving_from_environment(const Frame &frame, Vec3 direction, Float inverse_density) {
+    const Environment &environment = frame.scene.environment;
+    const bool is_random = any(inverse_density > Float(0.0f));
+    Vec3 light = splat(frame.scene.background);
+    Float density = background_density;
+    if (environment.image) {
+        const Texture &image = *environment.image;
+        const Vec3 d = transform(environment.environment_from_world, direction);
+        const Float u = equirectangular_u(d), v = equirectangular_v(d);
+        light = sample_texture(frame.scene, image, u, v).colour * Float(environment.intensity);
+        if (is_random) {
+            const auto texel = [](Float at, std::int32_t size) __attribute__((always_inline)) {
+                return to_int(
+                    min(max(at * Float(static_cast<float>(size)), Float(0.0f)), Float(static_cast<float>(size - 1))));
+            };
+            const Int row = texel(v, image.height), first = row * Int(image.width);
+            density = environment_density(image, step_of_sums(environment.rows, Int(0), row).v,
+                                          step_of_sums(environment.columns, first, texel(u, image.width)).v, v);
+        }
+    }
+    const Float sampled = density * Float(static_cast<float>(frame.light_samples));
+    return is_random ? light * (Float(1.0f) / (Float(1.0f) + sampled * inverse_density)) : light; // balance_weight
+}
+
+// Samples a direction of the hemisphere uniformly.
+ARHOST_INLINE LightSample sample_background(const Scene &scene, const Surface &s, Pair uv, int count) {
+    LightSample sample =
+        make_light_sample(s, hemisphere_direction(s.normal, uv.u, uv.v), far_away, splat(scene.background));
+    sample.irradiance = irradiance_of_density(Float(background_density));
+    sample.density = Float(background_density * static_cast<float>(count));
+    sample.is_background = true;
+    return sample;
+}
 
 // Samples a direction in proportion to the environment's luminance. `uv`: random numbers from 0 to 1.
-ARHOST_INLINE EnvironmentSample sample_environment(const Scene &scene, const Surface &s, Pair uv) {
+ARHOST_INLINE LightSample sample_environment(const Scene &scene, const Surface &s, Pair uv, int count) {
     const Environment &environment = scene.environment;
     const Texture &image = *environment.image;
     const Int row = search(environment.rows, Int(0), image.height, uv.v);
-    const auto step = [](const float *sums, Int first, Int i) __attribute__((always_inline)) {
-        const Float before =
-            select(Int(0) < i, gather(sums, first + select(Int(0) < i, i - Int(1), Int(0))), Float(0.0f));
-        return Pair{before, gather(sums, first + i) - before};
-    };
-    const Pair row_step = step(environment.rows, Int(0), row);
+    const Pair row_step = step_of_sums(environment.rows, Int(0), row);
     const Int first = row * Int(image.width);
     const Int column = search(environment.columns, first, image.width, uv.u);
-    const Pair column_step = step(environment.columns, first, column);
+    const Pair column_step = step_of_sums(environment.columns, first, column);
     const Float x = to_float(column) + fraction_of_step(uv.u, column_step.u, column_step.v);
     const Float y = to_float(row) + fraction_of_step(uv.v, row_step.u, row_step.v);
     const Float u = x * Float(1.0f / static_cast<float>(image.width)),
@@ -153,47 +249,69 @@ ARHOST_INLINE EnvironmentSample sample_environment(const Scene &scene, const Sur
     // The inverse of a rotation matrix is its transpose.
     const float *m = environment.environment_from_world;
     const Vec3 to_light{dot(splat(m), d), dot(splat(m + 3), d), dot(splat(m + 6), d)};
-    const Float texels = Float(static_cast<float>(image.width) * static_cast<float>(image.height));
-    const Float density = equirectangular_density(row_step.v * column_step.v * texels, v);
-    EnvironmentSample sample;
-    sample.light_sample = make_light_sample(s, to_light, far_away, irradiance_of_density(density));
-    sample.light_sample.from_environment = true;
+    const Float density = environment_density(image, row_step.v, column_step.v, v);
     // The colour is not interpolated, because the density is not: the light of a bright neighbouring texel would be
     // divided by the low density of this texel, which causes bright noise.
-    sample.intensity = texel_at(scene, image, column, row).colour * Float(environment.intensity);
+    const Vec3 light = texel_at(scene, image, column, row).colour * Float(environment.intensity);
+    LightSample sample = make_light_sample(s, to_light, far_away, light);
+    sample.irradiance = irradiance_of_density(density);
+    sample.density = density * Float(static_cast<float>(count));
     return sample;
 }
 
-// Calls use(light_sample, intensity, fraction) for each sample of each light source. `fraction` is the reciprocal of
-// the number of samples of that light source.
+// Calls use(light_sample, fraction) for each sample of each light source: the lamps, then the environment or, if
+// `background`, the background. `fraction` is the reciprocal of the number of samples of that light source.
 template <class Use>
-ARHOST_INLINE void for_each_light(const Frame &frame, const Surface &s, const Random &random, Use use) {
+ARHOST_INLINE void for_each_light(const Frame &frame, const Surface &s, const Random &random, bool background,
+                                  Use use) {
     const Scene &scene = frame.scene;
-    for (std::uint32_t i = 0; i < scene.light_count; ++i) {
-        const arhost_light &light = scene.lights[i];
-        const int count = is_extended(light) ? frame.light_samples : 1;
-        for (int point = 0; point < count; ++point) {
+    const bool has_environment = scene.environment.image != nullptr;
+    const std::uint32_t count = scene.light_count + (has_environment || background ? 1 : 0);
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const bool is_lamp = i < scene.light_count, has_points = !is_lamp || is_extended(scene.lights[i]);
+        const int purpose = is_lamp ? first_lamp_purpose + static_cast<int>(i) : environment_purpose;
+        const int points = has_points ? frame.light_samples : 1;
+        for (int point = 0; point < points; ++point) {
             Pair uv{Float(0.5f), Float(0.5f)};
-            if (is_extended(light))
-                uv = pair(random, first_lamp_purpose + static_cast<int>(i), point, count);
-            use(sample_light(light, s, uv), splat(light.intensity), 1 / static_cast<float>(count));
+            if (has_points)
+                uv = pair(random, purpose, point, points);
+            LightSample sample;
+            if (is_lamp)
+                sample = sample_light(scene.lights[i], s, uv, points);
+            else if (has_environment)
+                sample = sample_environment(scene, s, uv, points);
+            else
+                sample = sample_background(scene, s, uv, points);
+            use(sample, 1 / static_cast<float>(points));
         }
     }
-    if (scene.environment.image)
-        for (int point = 0; point < frame.light_samples; ++point) {
-            const EnvironmentSample sample =
-                sample_environment(scene, s, pair(random, environment_purpose, point, frame.light_samples));
-            use(sample.light_sample, sample.intensity, 1 / static_cast<float>(frame.light_samples));
-        }
+}
+
+// Returns the share of the light of a sample that a rough surface reflects to the eye, without the Fresnel term. A
+// ray that is reflected at random can also arrive at the light source, except through glass; balance_weight() divides
+// the light between them.
+ARHOST_INLINE Float rough_lobe(const Surface &s, Vec3 to_eye, Vec3 half_vector, const LightSample &sample,
+                               const Visibility &visibility, bool rays_follow) {
+    const Float cosine_eye = dot(s.normal, to_eye), cosine_half = dot(s.normal, half_vector);
+    const Float lobe = ggx_lobe(sample.cosine, cosine_eye, cosine_half, s.alpha);
+    if (!rays_follow)
+        return lobe;
+    const Bool reflects = dot(s.geometric_normal, sample.direction) > Float(0.0f);
+    const Float density = select(reflects, ggx_reflection_density(cosine_eye, cosine_half, s.alpha), Float(0.0f));
+    const Bool through_glass = visibility.is_tinted & (sample.density > Float(0.0f));
+    return select(through_glass, Float(0.0f), lobe * balance_weight(sample.density, density));
 }
 
 // Returns the radiance that surfaces other than mirrors and glass send towards the ray's origin: ambient light,
-// emission and the reflected direct light.
-ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_eye, Bool active,
+// emission and the reflected direct light. `rays_follow`: whether rough surfaces also reflect rays.
+ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_eye, bool rays_follow, Bool active,
                                 const Random &random) {
     Vec3 sum = s.ambient * splat(frame.scene.ambient) + s.emission;
-    for_each_light(frame, s, random, [&](const LightSample &sample, Vec3 intensity, float fraction) {
-        const Bool facing = active & (sample.cosine > Float(0.0f)) & (sample.irradiance > Float(0.0f));
+    const bool background = s.any_rough && frame.scene.has_background;
+    for_each_light(frame, s, random, background, [&](const LightSample &sample, float fraction) {
+        Bool facing = active & (sample.cosine > Float(0.0f)) & (sample.irradiance > Float(0.0f));
+        if (sample.is_background)
+            facing = facing & s.is_rough;
         if (!any(facing))
             return;
         const Visibility visibility = visibility_of(frame.scene, sample, s, facing);
@@ -206,63 +324,43 @@ ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_ey
         if (s.any_rough) {
             const Vec3 half_vector = normalize(sample.direction + to_eye);
             const Vec3 fresnel = schlick(s.specular, dot(to_eye, half_vector));
-            const Float lobe = ggx_lobe(sample.cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
-            // The secondary ray adds the specular reflection of the environment.
-            const Vec3 specular = sample.from_environment ? black() : fresnel * lobe;
-            reflected = select(s.is_rough, s.diffuse * (white() - fresnel) * sample.cosine + specular, reflected);
+            const Vec3 diffuse = sample.is_background ? black() : s.diffuse * (white() - fresnel) * sample.cosine;
+            const Float lobe = rough_lobe(s, to_eye, half_vector, sample, visibility, rays_follow);
+            reflected = select(s.is_rough, diffuse + fresnel * lobe, reflected);
         }
-        sum = sum + reflected * visibility.tint * intensity *
+        sum = sum + reflected * visibility.tint * sample.intensity *
                         select(visibility.unoccluded, sample.irradiance * Float(fraction), Float(0.0f));
     });
     return sum;
 }
 
-// The overlay's alpha and colour at a shadow catcher.
-struct CatcherShadow {
-    Float alpha;
-    Vec3 colour; // linear
+// The light at a shadow catcher.
+struct CatcherLight {
+    Float irradiance; // without shadows
+    Vec3 hidden;      // see hidden_row
 };
 
-// Computes the shadow on a catcher from the fraction of its irradiance that virtual objects block.
-ARHOST_INLINE CatcherShadow catcher_shadow(const Frame &frame, const RTCRayHit16 &rays, Bool active,
-                                           const Random &random) {
+// Computes the parts of a catcher's irradiance that virtual objects hide. Objects of glass do not hide a light, but
+// tint it.
+ARHOST_INLINE CatcherLight catcher_light(const Frame &frame, const RTCRayHit16 &rays, Bool active,
+                                         const Random &random) {
     const Scene &scene = frame.scene;
     const Surface s = surface_at(scene, rays, active);
-    Float irradiance = 0.0f, hidden_part = 0.0f, tinted_part = 0.0f;
-    Vec3 weighted_colour = black(); // weighted sum of each channel's alpha; used for coloured shadows only
-    for_each_light(frame, s, random, [&](const LightSample &sample, Vec3 intensity, float fraction) {
+    CatcherLight light{Float(0.0f), black()};
+    for_each_light(frame, s, random, false, [&](const LightSample &sample, float fraction) {
         const Bool facing = active & (sample.cosine > Float(0.0f));
         if (!any(facing))
             return;
-        const Float power = intensity.x + intensity.y + intensity.z;
+        const Float power = sample.intensity.x + sample.intensity.y + sample.intensity.z;
         const Float weight = select(facing, sample.cosine * sample.irradiance * power * Float(fraction), Float(0.0f));
         const Visibility visibility = visibility_of(scene, sample, s, facing);
-        const Bool hidden = facing & ~visibility.unoccluded;
-        irradiance = irradiance + weight;
-        hidden_part = hidden_part + select(hidden, weight, Float(0.0f));
-        tinted_part =
-            tinted_part + select(facing & visibility.is_tinted, weight, Float(0.0f)); // a tinted light is not hidden
-        if (scene.coloured_shadows) {
-            const Vec3 opaque = white() * Float(scene.shadow_alpha_opaque);
-            const Vec3 through = select(visibility.is_tinted, opaque * (white() - visibility.tint), black());
-            weighted_colour = weighted_colour + select(hidden, opaque, through) * weight;
-        }
+        const Bool is_hidden = facing & ~visibility.unoccluded, is_tinted = facing & visibility.is_tinted;
+        light.irradiance = light.irradiance + weight;
+        const Float hidden = select(is_hidden, weight, Float(0.0f)), tinted = select(is_tinted, weight, Float(0.0f));
+        if (scene.coloured_shadows)
+            light.hidden = light.hidden + Vec3{hidden, hidden, hidden} + (white() - visibility.tint) * tinted;
+        else
+            light.hidden = light.hidden + Vec3{hidden, tinted, Float(0.0f)};
     });
-    const Float alpha =
-        shadow_alpha(fraction_of_light(hidden_part, irradiance), fraction_of_light(tinted_part, irradiance),
-                     Float(scene.shadow_alpha_opaque), Float(scene.shadow_alpha_translucent));
-    CatcherShadow shadow{select(active, alpha, Float(0.0f)), black()};
-    if (scene.coloured_shadows) {
-        // Each colour channel has its own alpha, but the image has one alpha for all: the largest. The shadow's
-        // colour compensates for channels that this alpha would darken too much.
-        const Vec3 channel_alpha{fraction_of_light(weighted_colour.x, irradiance),
-                                 fraction_of_light(weighted_colour.y, irradiance),
-                                 fraction_of_light(weighted_colour.z, irradiance)};
-        shadow.alpha = select(active, largest(channel_alpha), Float(0.0f));
-        const auto colour = [&](Float channel) __attribute__((always_inline)) {
-            return srgb_decode(shadow_colour_encoded(channel, shadow.alpha));
-        };
-        shadow.colour = {colour(channel_alpha.x), colour(channel_alpha.y), colour(channel_alpha.z)};
-    }
-    return shadow;
+    return light;
 }

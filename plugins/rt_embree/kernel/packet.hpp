@@ -343,9 +343,10 @@ ARHOST_INLINE Float turn_of(Float x, Float y) {
 }
 
 #define ARHOST_LEAF ARHOST_INLINE
+#include <arhost/shading/leaf/colour.h>
+
 #include <arhost/shading/leaf/alpha.h>
 #include <arhost/shading/leaf/bsdf.h>
-#include <arhost/shading/leaf/colour.h>
 #include <arhost/shading/leaf/environment.h>
 #include <arhost/shading/leaf/lens.h>
 #include <arhost/shading/leaf/light.h>

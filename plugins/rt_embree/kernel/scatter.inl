@@ -53,11 +53,13 @@ ARHOST_INLINE void add_radiance(Work &work, const Paths &paths, Vec3 radiance, B
     }
 }
 
-// Adds a secondary ray for each active lane to the queue of the depth of `from`.
-ARHOST_INLINE void enqueue(Work &work, const Paths &from, Vec3 origin, Vec3 direction, Vec3 throughput, Bool active) {
+// Adds a secondary ray for each active lane to the queue of the depth of `from`. `inverse_density`: see RayQueue.
+ARHOST_INLINE void enqueue(Work &work, const Paths &from, Vec3 origin, Vec3 direction, Vec3 throughput, Bool active,
+                           Float inverse_density = 0.0f) {
     alignas(64) float by_lane[RayQueue::rows][lanes];
-    const Float values[] = {origin.x,    origin.y,     origin.z,     direction.x,  direction.y,
-                            direction.z, throughput.x, throughput.y, throughput.z, float_of(from.pixel)};
+    const Float values[] = {
+        origin.x,     origin.y,     origin.z,     direction.x,     direction.y,         direction.z,
+        throughput.x, throughput.y, throughput.z, inverse_density, float_of(from.pixel)};
     for (int row = 0; row < RayQueue::rows; ++row)
         store(by_lane[row], values[row]);
     RayQueue &queue = work.scratch.queues[from.depth];
@@ -71,8 +73,8 @@ ARHOST_INLINE void enqueue(Work &work, const Paths &from, Vec3 origin, Vec3 dire
     queue.count += __builtin_popcount(mask_of(active.lane));
 }
 
-// Mirror and metal rays below this throughput are invisible.
-constexpr float min_mirror_throughput = 1e-4f;
+// Reflected rays below this throughput are invisible.
+constexpr float min_throughput = 1e-4f;
 
 ARHOST_INLINE Vec3 reflected(const Surface &s, Vec3 direction) {
     return mirror_direction_off_facet(direction, s.normal, s.geometric_normal);
@@ -81,7 +83,7 @@ ARHOST_INLINE Vec3 reflected(const Surface &s, Vec3 direction) {
 ARHOST_INLINE void reflect(Work &work, const Paths &paths, const Surface &s, Vec3 direction, Vec3 reflectance,
                            Bool active) {
     const Vec3 throughput = paths.throughput * reflectance;
-    active = active & (largest(throughput) > Float(min_mirror_throughput));
+    active = active & (largest(throughput) > Float(min_throughput));
     if (any(active))
         enqueue(work, paths, s.position + s.geometric_normal * s.offset, reflected(s, direction), throughput, active);
 }
@@ -144,10 +146,6 @@ ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surfac
                 reflected_throughput, reflects);
 }
 
-// Rough reflections with a throughput of at most this value are not traced: at a radiance of 1 they would add about
-// half a step of 1/255 in linear light.
-constexpr float min_throughput = 2e-3f;
-
 // Queues rays that are reflected off a randomly sampled microfacet.
 ARHOST_INLINE void scatter_rough(Work &work, const Paths &paths, const Surface &s, Vec3 to_eye, Bool active) {
     const Pair uv = pair(random_of(work, paths), rough_purpose, 0, 1);
@@ -157,10 +155,12 @@ ARHOST_INLINE void scatter_rough(Work &work, const Paths &paths, const Surface &
     // Sampling visible normals already accounts for the masking of `to_eye`.
     const Vec3 reflectance = schlick(s.specular, dot(to_eye, half_vector)) * ggx_masking(cosine, s.alpha);
     const Vec3 throughput = paths.throughput * reflectance;
+    const Float density = ggx_reflection_density(dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
     active = active & (cosine > Float(0.0f)) & (dot(direction, s.geometric_normal) > Float(0.0f)) &
              (largest(throughput) > Float(min_throughput));
     if (any(active))
-        enqueue(work, paths, s.position + s.geometric_normal * s.offset, direction, throughput, active);
+        enqueue(work, paths, s.position + s.geometric_normal * s.offset, direction, throughput, active,
+                Float(1.0f) / max(density, Float(1e-30f)));
 }
 
 // Adds the radiance of the hit surfaces and queues their secondary rays.
@@ -169,11 +169,13 @@ ARHOST_INLINE void shade(Work &work, const RTCRayHit16 &rays, Bool active, const
     const Surface s = surface_at(scene, rays, active);
     const Vec3 direction = normalize(direction_of(rays.ray));
     const Bool lit = active & s.is_lit;
+    const bool rays_follow = paths.depth < scene.max_depth;
     if (any(lit))
-        add_radiance(work, paths, direct_light(work.frame, s, -direction, lit, random_of(work, paths)), lit);
+        add_radiance(work, paths, direct_light(work.frame, s, -direction, rays_follow, lit, random_of(work, paths)),
+                     lit);
     if (!s.any_scattering)
         return;
-    if (paths.depth >= scene.max_depth) {
+    if (!rays_follow) {
         // At the depth limit, glass shows its cutoff colour.
         for_each_object(scene, rays.hit, active, [&](const Object &object, Bool here) {
             if (object.material->model == ARHOST_MATERIAL_GLASS)
@@ -203,14 +205,22 @@ ARHOST_INLINE void trace_queued_packet(Work &work, std::uint32_t depth) {
     const auto row = [&](int i) __attribute__((always_inline)) {
         return load(queue.values + i * queue.capacity + first);
     };
-    const Paths paths{select(active, bits_of(row(9)), Int(0)), 0, {row(6), row(7), row(8)}, depth + 1};
+    const Paths paths{select(active, bits_of(row(10)), Int(0)), 0, {row(6), row(7), row(8)}, depth + 1};
+    const Vec3 origin{row(0), row(1), row(2)}, direction{row(3), row(4), row(5)};
+    const Float inverse_density = select(active, row(9), Float(0.0f));
     RTCRayHit16 rays;
-    set_ray(rays.ray, {row(0), row(1), row(2)}, {row(3), row(4), row(5)}, Float(far_away), Int(all_masks));
+    set_ray(rays.ray, origin, direction, Float(far_away), Int(all_masks));
     queue.count = first;
     const Bool hit = trace(work.frame.scene, work.frame.scene.root, make_query(Coherence::incoherent), rays, active);
     const Bool missed = active & ~hit;
     if (any(missed))
-        add_radiance(work, paths, environment_light(work.frame.scene, direction_of(rays.ray)), missed);
+        add_radiance(work, paths, arriving_from_environment(work.frame, direction, inverse_density), missed);
+    if (work.frame.scene.has_extended_lights) {
+        const Vec3 light = arriving_from_lamps(work.frame, origin, direction, load(rays.ray.tfar), inverse_density);
+        const Bool lit = active & (largest(light) > Float(0.0f));
+        if (any(lit))
+            add_radiance(work, paths, light, lit);
+    }
     if (any(hit))
         shade(work, rays, hit, paths);
 }

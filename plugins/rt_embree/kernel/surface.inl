@@ -11,6 +11,7 @@ struct Surface {
     Vec3 geometric_normal, normal;
     Bool back_face; // the ray hit the back face; `geometric_normal` has been flipped
     Float offset;   // mm: distance of a secondary ray's origin from the surface
+    Vec3 lift;      // mm: from the hit to the curved surface where shadow rays start (lift_to_corner)
     Float distance; // mm, from the ray origin
     Vec3 ambient, diffuse, specular, emission;
     Float exponent; // Phong exponent
@@ -22,22 +23,49 @@ struct Surface {
     bool any_specular, any_rough, any_scattering;
 };
 
-// Interpolates a vertex attribute at the hits. Lanes outside `here` yield values of triangle 0, which the caller
-// ignores. `stride` is in bytes and a multiple of 4 (arhost/scene.h).
+// A vertex attribute of `components` numbers.
 template <int components> struct Attribute { Float of[components]; };
+
+// Barycentric coordinates of the hits.
+struct Weights {
+    Float of[3];
+};
+ARHOST_INLINE Weights weights_of(const RTCHit16 &hit) {
+    const Float u = load(hit.u), v = load(hit.v);
+    return {{Float(1.0f) - u - v, u, v}};
+}
+
+// Calls use(corner, attribute) for the three corners of the triangles hit. Lanes outside `here` yield values of
+// triangle 0, which the caller ignores. `stride` is in bytes and a multiple of 4 (arhost/scene.h).
+template <int components, class Use>
+ARHOST_INLINE void for_each_corner(const Object &object, const float *values, std::uint32_t stride,
+                                   const RTCHit16 &hit, Bool here, Use use) {
+    const Int first = select(here, load(hit.primID), Int(0)) * Int(static_cast<int>(object.index_stride / 4));
+    for (int corner = 0; corner < 3; ++corner) {
+        const Int at = gather(object.indices + corner, first) * Int(static_cast<int>(stride / 4));
+        Attribute<components> value;
+        for (int i = 0; i < components; ++i)
+            value.of[i] = gather(values + i, at);
+        use(corner, value);
+    }
+}
+// Interpolates a vertex attribute at the hits.
 template <int components>
 ARHOST_INLINE Attribute<components> interpolated(const Object &object, const float *values, std::uint32_t stride,
                                                  const RTCHit16 &hit, Bool here) {
-    const Int corner = select(here, load(hit.primID), Int(0)) * Int(static_cast<int>(object.index_stride / 4));
-    const Float u = load(hit.u), v = load(hit.v);
-    const Float weight[3] = {Float(1.0f) - u - v, u, v};
+    const Weights weights = weights_of(hit);
     Attribute<components> sum{};
-    for (int number = 0; number < 3; ++number) {
-        const Int at = gather(object.indices + number, corner) * Int(static_cast<int>(stride / 4));
-        for (int i = 0; i < components; ++i)
-            sum.of[i] = sum.of[i] + gather(values + i, at) * weight[number];
-    }
+    for_each_corner<components>(
+        object, values, stride, hit,
+        here, [&](int corner, const Attribute<components> &value) __attribute__((always_inline)) {
+            for (int i = 0; i < components; ++i)
+                sum.of[i] = sum.of[i] + value.of[i] * weights.of[corner];
+        });
     return sum;
+}
+
+ARHOST_INLINE Vec3 vector_of(const Attribute<3> &a) {
+    return {a.of[0], a.of[1], a.of[2]};
 }
 
 // Samples a texture at the hits; returns white if the object has no texture coordinates. `texture`: an index, not
@@ -78,6 +106,25 @@ ARHOST_INLINE Vec3 mapped_normal(const Scene &scene, const Object &object, Vec3 
     return perturbed_normal(normal, facet, along_u, along_v, texel);
 }
 
+// Returns the vector from the hits to the curved surface that the vertex normals describe (lift_to_corner), in object
+// space. `side`: −1 in lanes whose rays come from the side opposite to the vertex normals, else 1.
+ARHOST_INLINE Vec3 lift_of(const Object &object, Float side, const RTCHit16 &hit, Bool here) {
+    const Weights weights = weights_of(hit);
+    Vec3 corners[3], position = black(), lift = black();
+    for_each_corner<3>(
+        object, object.positions, object.position_stride, hit,
+        here, [&](int corner, const Attribute<3> &value) __attribute__((always_inline)) {
+            corners[corner] = vector_of(value);
+            position = position + corners[corner] * weights.of[corner];
+        });
+    for_each_corner<3>(
+        object, object.normals, object.normal_stride, hit,
+        here, [&](int corner, const Attribute<3> &value) __attribute__((always_inline)) {
+            lift = lift + lift_to_corner(corners[corner] - position, vector_of(value) * side) * weights.of[corner];
+        });
+    return lift;
+}
+
 ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bool active) {
     const RTCHit16 &hit = rays.hit;
     const Vec3 direction = direction_of(rays.ray);
@@ -85,7 +132,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     const Vec3 step = direction * load(rays.ray.tfar);
 
     Surface s; // without `= {}`, which GCC compiles to a slow string instruction
-    s.ambient = s.diffuse = s.specular = s.emission = black();
+    s.ambient = s.diffuse = s.specular = s.emission = s.lift = black();
     s.exponent = s.alpha = Float(0.0f);
     s.is_lit = s.is_rough = s.is_real = bool_of(false);
     s.any_specular = s.any_rough = s.any_scattering = false;
@@ -96,14 +143,13 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     Vec3 reach = black();
     for_each_object(scene, hit, active, [&](const Object &object, Bool here) {
         Vec3 geometric = facet, normal = facet;
-        if (object.normals) {
-            const auto n = interpolated<3>(object, object.normals, object.normal_stride, hit, here);
-            normal = {n.of[0], n.of[1], n.of[2]};
-        }
+        if (object.normals)
+            normal = vector_of(interpolated<3>(object, object.normals, object.normal_stride, hit, here));
         if (object.has_transform) {
             geometric = transform(object.normal_transform, geometric);
             normal = transform(object.normal_transform, normal);
         }
+        const Vec3 vertex_normal = normal;
         if (object.material->model == ARHOST_MATERIAL_METALLIC_ROUGHNESS &&
             object.material->normal_texture != ARHOST_NONE && object.texcoords)
             normal = mapped_normal(scene, object, geometric, normal, hit, here);
@@ -118,6 +164,11 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         if (material.model == ARHOST_MATERIAL_MIRROR || material.model == ARHOST_MATERIAL_GLASS)
             return;
         s.is_lit = s.is_lit | here;
+        if (object.normals) {
+            const Bool from_behind = dot(vertex_normal, geometric) * dot(geometric, direction) > Float(0.0f);
+            const Vec3 lift = lift_of(object, select(from_behind, Float(-1.0f), Float(1.0f)), hit, here);
+            s.lift = select(here, object.has_transform ? transform(object.transform, lift) : lift, s.lift);
+        }
         Vec3 ambient = splat(material.ambient), diffuse = splat(material.diffuse);
         if (material.colour_texture != ARHOST_NONE) {
             const Vec3 colour = sample_object_texture(scene, object, material.colour_texture, hit, here).colour;

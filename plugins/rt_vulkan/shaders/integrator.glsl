@@ -5,21 +5,20 @@
 
 const int PRIMARY_STAGE = 1, CATCHER_STAGE = 2, PATH_STAGE = 3;
 
-// Renders a sample; returns its linear radiance and alpha. Catchers do not hide the virtual objects behind them, so
-// primary rays ignore catchers. Occluders hide everything behind them.
-vec4 trace_sample(vec3 direction, Random random) {
+// Renders a sample and adds it to the pixel's sums. Catchers do not hide the virtual objects behind them, so primary rays
+// ignore catchers. Occluders hide everything behind them.
+void trace_sample(vec3 direction, Random random, inout Sums sums) {
     vec3 light = vec3(0.0);
-    float alpha = 0.0;
     stack_size = 0;
     int stage = PRIMARY_STAGE;
-    Path path = Path(frame.eye, direction, vec3(1.0), 0u);
+    Path path = Path(frame.eye, direction, vec3(1.0), 0.0, 0u);
     Ray ray = Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK);
     for (;;) {
         Hit hit = trace(ray, false, stage == CATCHER_STAGE);
         bool is_hit = hit.object != NONE;
         if (stage == PRIMARY_STAGE) {
             if (is_hit && objects[hit.object].role == VIRTUAL) {
-                alpha = 1.0;
+                sums.coverage += 1.0;
             } else {
                 if (!has_catchers)
                     break;
@@ -28,8 +27,10 @@ vec4 trace_sample(vec3 direction, Random random) {
                 stage = CATCHER_STAGE;
                 continue;
             }
-        } else if (stage == PATH_STAGE && !is_hit) {
-            light += path.throughput * environment_light(ray.direction);
+        } else if (stage == PATH_STAGE) {
+            light += path.throughput * arriving_from_lamps(ray.origin, ray.direction, hit.t, path.inverse_density);
+            if (!is_hit)
+                light += path.throughput * arriving_from_environment(ray.direction, path.inverse_density);
         }
         if (is_hit) {
             Surface s = surface_at(ray, hit, true);
@@ -40,9 +41,14 @@ vec4 trace_sample(vec3 direction, Random random) {
             if (is_lit && !catches)
                 add_material(s, hit);
             if (is_lit || catches) {
-                DirectLight sum = direct_light(s, -direction, catches, path_random);
-                if (catches)
-                    return catcher_shadow(sum);
+                bool rays_follow = path.depth < frame.max_depth;
+                DirectLight sum = direct_light(s, -direction, catches, rays_follow, path_random);
+                if (catches) {
+                    sums.caught += 1.0;
+                    sums.irradiance += sum.irradiance;
+                    sums.hidden += sum.hidden;
+                    return;
+                }
                 light += path.throughput * sum.light;
             }
             light += scatter(path, s, direction, material, path_random);
@@ -53,7 +59,9 @@ vec4 trace_sample(vec3 direction, Random random) {
         ray = Ray(path.origin, path.direction, INFINITY, ALL_MASKS);
         stage = PATH_STAGE;
     }
-    return vec4(light, alpha);
+    // Radiance is averaged in linear light and encoded only once: sRGB codes are not linear and limited to 1, so that
+    // their mean would darken noise and highlights.
+    sums.light += vec3(bounded_radiance(light.x), bounded_radiance(light.y), bounded_radiance(light.z));
 }
 
 // Reads a ray direction in camera axes, or one of its derivatives, from `rays`. `z`: the z component if only x and y
@@ -93,32 +101,41 @@ uint code_of(float value) {
     return uint(code_8bit(value));
 }
 
-// Returns a pixel's RGBA code: that of a single sample without averaging, or the mean of all samples so far.
+// Returns a pixel's RGBA code, the mean of all samples so far. Virtual objects and catchers are averaged apart and then
+// blended by their shares of the pixel in sRGB, as the compositor blends them with the video: edges thus have no halo on
+// any background.
 uint shade_pixel(uvec2 position) {
     uint pixel = position.y * frame.width + position.x;
-    vec4 sum = vec4(0.0), value = vec4(0.0);
-    bool averages = frame.sample_count != 1u || frame.accumulates != 0u;
+    Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, 0.0, 0.0, 0.0, 0.0);
     for (uint i = 0u; i < frame.sample_count; ++i) {
         vec3 direction;
-        value = vec4(0.0);
         if (direction_of(pixel, frame.samples[i].xy, direction))
-            value = trace_sample(direction, random_of_pixel(position, frame.first_sample + i));
-        // Averages premultiplied, sRGB-encoded colours, as the compositor blends them.
-        if (averages)
-            sum += vec4(vec3(srgb_encode(value.x), srgb_encode(value.y), srgb_encode(value.z)) * value.a, value.a);
+            trace_sample(direction, random_of_pixel(position, frame.first_sample + i), sums);
     }
-    if (!averages)
-        return packed(uvec4(srgb8(value.x), srgb8(value.y), srgb8(value.z), code_of(value.a)));
     if (frame.accumulates != 0u) {
-        if (frame.first_sample > 0u)
-            sum += history[pixel];
-        history[pixel] = sum;
+        if (frame.first_sample > 0u) {
+            sums.light += history[pixel].light;
+            sums.coverage += history[pixel].coverage;
+            sums.hidden += history[pixel].hidden;
+            sums.irradiance += history[pixel].irradiance;
+            sums.caught += history[pixel].caught;
+        }
+        history[pixel] = sums;
     }
-    // Dividing the summed colour by the summed alpha gives a colour with straight alpha: the sample count cancels out.
-    float scale = 1.0 / max(sum.a, 1e-6);
     float count = float(frame.first_sample + frame.sample_count);
-    return packed(
-        uvec4(code_of(sum.x * scale), code_of(sum.y * scale), code_of(sum.z * scale), code_of(sum.a * (1.0 / count))));
+    float coverage = sums.coverage * (1.0 / count), per_hit = 1.0 / max(sums.coverage, 1.0);
+    vec3 light = sums.light * per_hit;
+    if (!has_catchers || !(largest(sums.hidden) > 0.0))
+        return packed(uvec4(srgb8(light.x), srgb8(light.y), srgb8(light.z), code_of(coverage)));
+    vec4 shadow = catcher_shadow(vec3(fraction_of(sums.hidden.x, sums.irradiance),
+                                      fraction_of(sums.hidden.y, sums.irradiance),
+                                      fraction_of(sums.hidden.z, sums.irradiance)));
+    shadow.a *= fraction_of(sums.caught, count);
+    float alpha = coverage + shadow.a;
+    vec3 colour = (vec3(srgb_encode(light.x), srgb_encode(light.y), srgb_encode(light.z)) * coverage +
+                   shadow.rgb * shadow.a) *
+                  (1.0 / max(alpha, 1e-6));
+    return packed(uvec4(code_of(colour.x), code_of(colour.y), code_of(colour.z), code_of(alpha)));
 }
 
 void write_pixel(uvec2 position) {

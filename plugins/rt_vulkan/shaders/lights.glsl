@@ -10,38 +10,82 @@ struct Incidence {
     float cosine;     // cosine of the angle of incidence; 0 if the light is behind the surface
     float irradiance; // at perpendicular incidence, per unit of intensity
     vec3 intensity;
-    bool from_environment;
+    float density;      // number of samples of the light source times their density per steradian; 0 if reflected rays
+                        // cannot hit the light source
+    bool is_background; // seen in reflections only
 };
 
 Incidence incidence_along(Surface s, vec3 to_light, float t_max, float irradiance, vec3 intensity) {
     vec3 direction = normalize(to_light);
-    return Incidence(to_light, t_max, direction, lambert_on_facet(s.normal, s.geometric_normal, direction), irradiance,
-                     intensity, false);
+    return Incidence(to_light, t_max, direction, lambert(s.normal, direction), irradiance, intensity, 0.0, false);
 }
 
 bool is_extended(uint lamp) {
     return lights[lamp].type == RECTANGLE_LIGHT || lights[lamp].type == SPHERE_LIGHT;
 }
 
-// `sample_uv` selects the sampled point of an area light.
-Incidence incidence(uint lamp, Surface s, vec2 sample_uv) {
+// The irradiance that arrives from a point of an area light per unit of intensity (x), and the density of one sample (y).
+// `to_centre`, `to_point`: vectors to the light's centre and to the point.
+vec2 arriving_from_point(uint lamp, vec3 to_centre, vec3 to_point) {
+    vec3 direction = normalize(to_point);
+    float distance_squared = dot(to_point, to_point);
+    float falloff = point_light_falloff(lights[lamp].falloff == FALLOFF_INVERSE_SQUARE, distance_squared);
+    if (lights[lamp].type == SPHERE_LIGHT) {
+        float area = 3.14159265 * lights[lamp].radius * lights[lamp].radius;
+        return vec2(falloff, density_over_area(distance_squared, area, dot(normalize(to_centre), direction)));
+    }
+    vec3 axis_u = lights[lamp].axis_u, axis_v = lights[lamp].axis_v;
+    float area = 4.0 * sqrt(dot(axis_u, axis_u) * dot(axis_v, axis_v));
+    float cosine = lambert(lights[lamp].direction, -direction);
+    return vec2(falloff * cosine, density_over_area(distance_squared, area, cosine));
+}
+
+// `sample_uv` selects the sampled point of an area light, of which `count` are sampled.
+Incidence incidence(uint lamp, Surface s, vec2 sample_uv, uint count) {
     uint type = lights[lamp].type;
     vec3 intensity = lights[lamp].intensity, axis = lights[lamp].direction;
     if (type == DIRECTIONAL_LIGHT)
         return incidence_along(s, -axis, INFINITY, 1.0, intensity);
-    vec3 to_light = lights[lamp].position - s.position;
-    if (type == RECTANGLE_LIGHT)
-        to_light = vector_to_rectangle(to_light, lights[lamp].axis_u, lights[lamp].axis_v, sample_uv.x, sample_uv.y);
-    else if (type == SPHERE_LIGHT)
-        to_light = vector_to_disc(to_light, lights[lamp].radius, sample_uv.x, sample_uv.y);
+    vec3 to_centre = lights[lamp].position - s.position;
+    if (is_extended(lamp)) {
+        vec3 to_point = type == SPHERE_LIGHT
+                            ? vector_to_disc(to_centre, lights[lamp].radius, sample_uv.x, sample_uv.y)
+                            : vector_to_rectangle(to_centre, lights[lamp].axis_u, lights[lamp].axis_v, sample_uv.x,
+                                                  sample_uv.y);
+        vec2 arriving = arriving_from_point(lamp, to_centre, to_point);
+        Incidence result = incidence_along(s, to_point, 1.0, arriving.x, intensity);
+        result.density = arriving.y * float(count);
+        return result;
+    }
     bool falls_off = lights[lamp].falloff == FALLOFF_INVERSE_SQUARE;
-    Incidence arriving = incidence_along(s, to_light, 1.0, point_light_falloff(falls_off, dot(to_light, to_light)), intensity);
+    Incidence arriving =
+        incidence_along(s, to_centre, 1.0, point_light_falloff(falls_off, dot(to_centre, to_centre)), intensity);
     if (type == SPOT_LIGHT)
         arriving.irradiance *= spot_attenuation(dot(axis, -arriving.direction), lights[lamp].cosine_inner,
                                           lights[lamp].cosine_outer);
-    if (type == RECTANGLE_LIGHT)
-        arriving.irradiance *= lambert(axis, -arriving.direction);
     return arriving;
+}
+
+// Returns the light of lamps with an area that arrives along a secondary ray before `t_max`, where the ray hits a
+// surface. Lamps do not hide each other or anything else. `inverse_density`: see Path.
+vec3 arriving_from_lamps(vec3 origin, vec3 direction, float t_max, float inverse_density) {
+    vec3 sum = vec3(0.0);
+    for (uint lamp = 0u; lamp < frame.light_count; ++lamp) {
+        if (!is_extended(lamp))
+            continue;
+        vec3 to_centre = lights[lamp].position - origin;
+        float t = lights[lamp].type == SPHERE_LIGHT
+                      ? distance_to_disc(to_centre, lights[lamp].radius, direction)
+                      : distance_to_rectangle(to_centre, lights[lamp].direction, lights[lamp].axis_u,
+                                              lights[lamp].axis_v, direction);
+        if (!(t > 0.0) || !(t < t_max))
+            continue;
+        vec2 arriving = arriving_from_point(lamp, to_centre, direction * t);
+        float sampled = arriving.y * float(frame.light_samples);
+        sum += lights[lamp].intensity * (arriving.x * arriving.y * 3.14159265 /
+                                         (1.0 + sampled * inverse_density)); // the divisor: balance_weight
+    }
+    return sum;
 }
 
 // The visibility of a light source from a surface point.
@@ -56,10 +100,12 @@ struct Visibility {
 // the next. A single loop traces all of them, because trace() is inlined and its code is long.
 Visibility visibility(Incidence arriving, Surface s) {
     const int max_surfaces = 64; // ignores further surfaces: rays may alternate endlessly between coincident faces
-    vec3 start = s.position + s.geometric_normal * s.offset, to_light = arriving.to_light;
+    vec3 lift = s.lift + s.geometric_normal * s.offset, start = s.position + lift, to_light = arriving.to_light;
+    if (arriving.t_max < INFINITY)
+        to_light -= lift;
     bool is_finite_distance = arriving.t_max < INFINITY;
     uint mask = s.is_real ? OPAQUE_MASK : OPAQUE_MASK | CATCHER_MASK | OCCLUDER_MASK;
-    Ray ray = Ray(start, is_finite_distance ? to_light - s.geometric_normal * s.offset : to_light, arriving.t_max, mask);
+    Ray ray = Ray(start, to_light, arriving.t_max, mask);
     Visibility result = Visibility(false, false, vec3(1.0));
     for (int i = 0; i <= max_surfaces; ++i) {
         Hit hit = trace(ray, i == 0, false);
@@ -71,8 +117,10 @@ Visibility visibility(Incidence arriving, Surface s) {
         if (i > 0) {
             result.is_tinted = true;
             Surface glass = surface_at(ray, hit, false);
-            result.tint *= glass_shadow(materials[objects[hit.object].material].shadow_attenuation,
-                                     abs(dot(glass.normal, arriving.direction)));
+            uint material = objects[hit.object].material;
+            result.tint *= glass_shadow(materials[material].shadow_attenuation,
+                                        abs(dot(glass.normal, arriving.direction))) *
+                           bouguer(materials[material].extinction, glass.is_back_face ? glass.distance : 0.0);
             if (!(largest(result.tint) > 1e-3))
                 break;
             // The next ray starts behind the glass surface.
@@ -105,12 +153,44 @@ vec2 step_of_sums(uint first, int i) {
     return vec2(before, uintBitsToFloat(tables[first + uint(i)]) - before);
 }
 
-vec3 environment_light(vec3 direction) {
-    if (frame.environment_texture == NONE)
-        return frame.background;
-    vec3 d = frame.environment_from_world * direction;
-    return sample_texture(frame.environment_texture, vec2(equirectangular_u(d), equirectangular_v(d))).rgb *
-           frame.environment_intensity;
+// Density per steradian of sample_environment() in a texel, from the steps of the cumulative sums.
+float environment_density(float row_step, float column_step, float v) {
+    float texels = float(textures[frame.environment_texture].width) * float(textures[frame.environment_texture].height);
+    return equirectangular_density(row_step * column_step * texels, v);
+}
+
+// Uniform density of sample_background() per steradian: 1/2π.
+const float background_density = 0.159154943;
+
+// Returns the light that arrives along a secondary ray that hits no surface, from the environment or the background.
+// `inverse_density`: see Path.
+vec3 arriving_from_environment(vec3 direction, float inverse_density) {
+    vec3 light = frame.background;
+    float density = background_density;
+    if (frame.environment_texture != NONE) {
+        vec3 d = frame.environment_from_world * direction;
+        vec2 at = vec2(equirectangular_u(d), equirectangular_v(d));
+        light = sample_texture(frame.environment_texture, at).rgb * frame.environment_intensity;
+        if (inverse_density > 0.0) {
+            ivec2 size = ivec2(textures[frame.environment_texture].width, textures[frame.environment_texture].height);
+            ivec2 texel = ivec2(clamp(at * vec2(size), vec2(0.0), vec2(size - 1)));
+            density = environment_density(
+                step_of_sums(frame.environment_rows, texel.y).y,
+                step_of_sums(frame.environment_columns + uint(texel.y * size.x), texel.x).y, at.y);
+        }
+    }
+    float sampled = density * float(frame.light_samples);
+    return light / (1.0 + sampled * inverse_density); // the divisor: balance_weight
+}
+
+// Samples a direction of the hemisphere uniformly, for rough reflections of a scene without environment.
+Incidence sample_background(Surface s, vec2 sample_uv) {
+    vec3 direction = hemisphere_direction(s.normal, sample_uv.x, sample_uv.y);
+    Incidence arriving =
+        incidence_along(s, direction, INFINITY, irradiance_of_density(background_density), frame.background);
+    arriving.density = background_density * float(frame.light_samples);
+    arriving.is_background = true;
+    return arriving;
 }
 
 // Samples a direction in proportion to the environment's luminance. `sample_uv`: random numbers from 0 to 1.
@@ -125,92 +205,106 @@ Incidence sample_environment(Surface s, vec2 sample_uv) {
     float v = (float(row) + fraction_of_step(sample_uv.y, row_step.x, row_step.y)) * (1.0 / float(height));
     // The inverse of a rotation matrix is its transpose.
     vec3 direction = equirectangular_direction(u, v) * frame.environment_from_world;
-    float density = equirectangular_density(row_step.y * column_step.y * (float(width) * float(height)), v);
+    float density = environment_density(row_step.y, column_step.y, v);
     // The colour is not interpolated, because the density is not: the light of a bright neighbouring texel would be
     // divided by the low density of this texel, which causes bright noise.
     vec3 light = texel_at(frame.environment_texture, column, row).rgb * frame.environment_intensity;
     Incidence arriving = incidence_along(s, direction, INFINITY, irradiance_of_density(density), light);
-    arriving.from_environment = true;
+    arriving.density = density * float(frame.light_samples);
     return arriving;
 }
 
 // The effect of direct light at a surface point. For shadow catchers: the total irradiance, and the parts of it that
-// virtual objects block or tint. For other surfaces: `light`, the radiance towards the ray origin.
+// virtual objects hide (Sums.hidden). For other surfaces: `light`, the radiance towards the ray origin.
 struct DirectLight {
-    vec3 light;
-    float irradiance, blocked, tinted;
-    vec3 weighted_alpha; // weighted sum of each channel's alpha; used for coloured shadows only
+    vec3 light, hidden;
+    float irradiance;
 };
 
 void add_shadow(inout DirectLight sum, Incidence arriving, Visibility visible, float share) {
     float power = arriving.intensity.x + arriving.intensity.y + arriving.intensity.z;
     float weight = arriving.cosine * arriving.irradiance * power * share;
+    float hidden = visible.is_unoccluded ? 0.0 : weight, tinted = visible.is_tinted ? weight : 0.0;
     sum.irradiance += weight;
-    if (!visible.is_unoccluded)
-        sum.blocked += weight;
-    else if (visible.is_tinted)
-        sum.tinted += weight;
-    vec3 opaque = vec3(frame.shadow_alpha_opaque);
-    vec3 through = visible.is_tinted ? opaque * (vec3(1.0) - visible.tint) : vec3(0.0);
-    sum.weighted_alpha += (visible.is_unoccluded ? through : opaque) * weight;
+    if (frame.coloured_shadows != 0u)
+        sum.hidden += hidden + (vec3(1.0) - visible.tint) * tinted;
+    else
+        sum.hidden += vec3(hidden, tinted, 0.0);
 }
 
-void add_reflected(inout DirectLight sum, Surface s, vec3 to_eye, Incidence arriving, Visibility visible, float share) {
+// Returns the share of the arriving light that a rough surface reflects to the eye, without the Fresnel term. A ray that
+// is reflected at random can also arrive at the light source, except through glass; balance_weight() divides the light
+// between them.
+float rough_lobe(Surface s, vec3 to_eye, vec3 half_vector, Incidence arriving, Visibility visible, bool rays_follow) {
+    float cosine_eye = dot(s.normal, to_eye), cosine_half = dot(s.normal, half_vector);
+    float lobe = ggx_lobe(arriving.cosine, cosine_eye, cosine_half, s.alpha);
+    if (!rays_follow)
+        return lobe;
+    if (visible.is_tinted && arriving.density > 0.0)
+        return 0.0;
+    bool reflects = dot(s.geometric_normal, arriving.direction) > 0.0;
+    float density = reflects ? ggx_reflection_density(cosine_eye, cosine_half, s.alpha) : 0.0;
+    return lobe * balance_weight(arriving.density, density);
+}
+
+void add_reflected(inout DirectLight sum, Surface s, vec3 to_eye, Incidence arriving, Visibility visible,
+                   bool rays_follow, float share) {
     vec3 reflected = s.diffuse * arriving.cosine;
     if (s.is_rough) {
         vec3 half_vector = normalize(arriving.direction + to_eye);
         vec3 fresnel = schlick(s.specular, dot(to_eye, half_vector));
-        reflected *= vec3(1.0) - fresnel;
-        // The secondary ray adds the specular reflection of the environment.
-        if (!arriving.from_environment)
-            reflected +=
-                fresnel * ggx_lobe(arriving.cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+        vec3 diffuse = arriving.is_background ? vec3(0.0) : reflected * (vec3(1.0) - fresnel);
+        reflected = diffuse + fresnel * rough_lobe(s, to_eye, half_vector, arriving, visible, rays_follow);
     } else if (s.exponent > 0.0) {
         reflected += s.specular * phong(s.normal, arriving.direction, to_eye, s.exponent);
     }
     sum.light += reflected * visible.tint * arriving.intensity * (arriving.irradiance * share);
 }
 
-DirectLight direct_light(Surface s, vec3 to_eye, bool catches, Random random) {
-    DirectLight sum = DirectLight(s.ambient * frame.ambient + s.emission, 0.0, 0.0, 0.0, vec3(0.0));
-    uint count = frame.light_count + (frame.environment_texture != NONE ? 1u : 0u);
+// `rays_follow`: whether rough surfaces also reflect rays.
+DirectLight direct_light(Surface s, vec3 to_eye, bool catches, bool rays_follow, Random random) {
+    DirectLight sum = DirectLight(s.ambient * frame.ambient + s.emission, vec3(0.0), 0.0);
+    bool has_environment = frame.environment_texture != NONE;
+    bool background = !catches && s.is_rough && largest(frame.background) > 0.0;
+    uint count = frame.light_count + (has_environment || background ? 1u : 0u);
     for (uint lamp = 0u; lamp < count; ++lamp) {
-        bool is_environment = lamp == frame.light_count;
-        bool has_points = is_environment || is_extended(lamp);
+        bool is_lamp = lamp < frame.light_count, has_points = !is_lamp || is_extended(lamp);
         uint point_count = has_points ? frame.light_samples : 1u;
         float share = 1.0 / float(point_count);
         for (uint point = 0u; point < point_count; ++point) {
-            uint purpose = is_environment ? ENVIRONMENT_PURPOSE : FIRST_LAMP_PURPOSE + lamp;
+            uint purpose = is_lamp ? FIRST_LAMP_PURPOSE + lamp : ENVIRONMENT_PURPOSE;
             vec2 sample_uv = has_points ? pair(random, purpose, point, point_count) : vec2(0.5);
             Incidence arriving;
-            if (is_environment)
+            if (is_lamp)
+                arriving = incidence(lamp, s, sample_uv, point_count);
+            else if (has_environment)
                 arriving = sample_environment(s, sample_uv);
             else
-                arriving = incidence(lamp, s, sample_uv);
+                arriving = sample_background(s, sample_uv);
             if (!(arriving.cosine > 0.0) || !(catches || arriving.irradiance > 0.0))
                 continue;
             Visibility visible = visibility(arriving, s);
             if (catches)
                 add_shadow(sum, arriving, visible, share);
             else if (visible.is_unoccluded)
-                add_reflected(sum, s, to_eye, arriving, visible, share);
+                add_reflected(sum, s, to_eye, arriving, visible, rays_follow, share);
         }
     }
     return sum;
 }
 
-// Returns the overlay's linear colour and alpha at a shadow catcher.
-vec4 catcher_shadow(DirectLight sum) {
+// Returns the overlay's sRGB-encoded colour and alpha at a shadow catcher, from the fractions of light that are hidden
+// (Sums.hidden).
+vec4 catcher_shadow(vec3 fractions) {
+    float opaque = frame.shadow_alpha_opaque, translucent = frame.shadow_alpha_translucent;
     if (frame.coloured_shadows == 0u)
-        return vec4(vec3(0.0), shadow_alpha(fraction_of_light(sum.blocked, sum.irradiance),
-                                            fraction_of_light(sum.tinted, sum.irradiance),
-                                            frame.shadow_alpha_opaque, frame.shadow_alpha_translucent));
+        return vec4(vec3(0.0), shadow_alpha(fractions.x, fractions.y, opaque, translucent));
     // Each colour channel has its own alpha, but the image has one alpha for all: the largest. The shadow's colour
     // compensates for channels that this alpha would darken too much.
-    vec3 alphas = vec3(fraction_of_light(sum.weighted_alpha.x, sum.irradiance),
-                    fraction_of_light(sum.weighted_alpha.y, sum.irradiance),
-                    fraction_of_light(sum.weighted_alpha.z, sum.irradiance));
+    vec3 alphas = vec3(shadow_alpha(fractions.x, 0.0, opaque, translucent),
+                       shadow_alpha(fractions.y, 0.0, opaque, translucent),
+                       shadow_alpha(fractions.z, 0.0, opaque, translucent));
     float alpha = largest(alphas);
-    return vec4(srgb_decode(shadow_colour_encoded(alphas.x, alpha)), srgb_decode(shadow_colour_encoded(alphas.y, alpha)),
-                srgb_decode(shadow_colour_encoded(alphas.z, alpha)), alpha);
+    return vec4(shadow_colour_encoded(alphas.x, alpha), shadow_colour_encoded(alphas.y, alpha),
+                shadow_colour_encoded(alphas.z, alpha), alpha);
 }

@@ -5,20 +5,20 @@
 // A ray, and the throughput of the path from the pixel to this ray.
 struct Path {
     vec3 origin, direction, throughput;
+    // Reciprocal of the density of the direction per steradian; 0 for mirrors and glass, whose direction is not random.
+    float inverse_density;
     uint depth; // number of bounces so far
 };
 
 Path stack[stack_capacity];
 int stack_size;
 
-void push(Path from, vec3 origin, vec3 direction, vec3 throughput) {
-    stack[stack_size++] = Path(origin, direction, throughput, from.depth + 1u);
+void push(Path from, vec3 origin, vec3 direction, vec3 throughput, float inverse_density) {
+    stack[stack_size++] = Path(origin, direction, throughput, inverse_density, from.depth + 1u);
 }
 
-// Mirror and metal rays below this throughput are invisible.
-const float min_mirror_throughput = 1e-4;
-// Rough reflections below this throughput change no 8-bit code by half a step.
-const float min_rough_throughput = 2e-3;
+// Reflected rays below this throughput are invisible.
+const float min_throughput = 1e-4;
 
 // Returns the origin of rays that leave a surface on the side that faces the viewer.
 vec3 above(Surface s) {
@@ -27,8 +27,8 @@ vec3 above(Surface s) {
 
 void push_reflected(Path path, Surface s, vec3 direction, vec3 reflectance) {
     vec3 throughput = path.throughput * reflectance;
-    if (largest(throughput) > min_mirror_throughput)
-        push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), throughput);
+    if (largest(throughput) > min_throughput)
+        push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), throughput, 0.0);
 }
 
 // Pushes the reflected and the refracted ray, or only one of them, chosen at random, if frame.one_path is set. A ray
@@ -70,14 +70,14 @@ vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Rando
     float cutoff = materials[material].importance_cutoff;
     if (refracts) {
         if (path.depth < materials[material].refraction_depth && luminance(refracted_share) > cutoff)
-            push(path, s.position - s.geometric_normal * s.offset, refracted, refracted_share);
+            push(path, s.position - s.geometric_normal * s.offset, refracted, refracted_share, 0.0);
         else
             cut_off += refracted_share * cutoff_colour;
     }
     if (reflects) {
         if (path.depth < materials[material].reflection_depth && luminance(reflected_share) > cutoff)
             push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal),
-                    reflected_share);
+                    reflected_share, 0.0);
         else
             cut_off += reflected_share * cutoff_colour;
     }
@@ -93,8 +93,9 @@ void scatter_off_roughness(Path path, Surface s, vec3 to_eye, Random random) {
     // Sampling visible normals already accounts for the masking of `to_eye`.
     vec3 throughput =
         path.throughput * schlick(s.specular, dot(to_eye, half_vector)) * ggx_masking(cosine, s.alpha);
-    if (cosine > 0.0 && dot(direction, s.geometric_normal) > 0.0 && largest(throughput) > min_rough_throughput)
-        push(path, above(s), direction, throughput);
+    float density = ggx_reflection_density(dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+    if (cosine > 0.0 && dot(direction, s.geometric_normal) > 0.0 && largest(throughput) > min_throughput)
+        push(path, above(s), direction, throughput, 1.0 / max(density, 1e-30));
 }
 
 // Pushes the secondary rays of a surface. Returns the light that replaces rays that are cut off.

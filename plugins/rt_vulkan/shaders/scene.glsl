@@ -155,8 +155,18 @@ layout(std430, set = 0, binding = 10) readonly buffer Tables {
 layout(std430, set = 0, binding = 11) readonly buffer Rays {
     float rays[]; // result of make_ray_table() (view.hpp)
 };
+// Sums over the samples of a pixel.
+struct Sums {
+    vec3 light;       // linear radiance of the virtual objects
+    float coverage;   // number of samples that hit a virtual object
+    vec3 hidden;      // the parts of `irradiance` that opaque and that translucent objects hide, and 0; for coloured
+                      // shadows, the part hidden in each channel
+    float irradiance; // on the catcher, without shadows
+    float caught;     // number of samples that hit a catcher
+    float unused, unused_2, unused_3;
+};
 layout(std430, set = 0, binding = 12) buffer History {
-    vec4 history[]; // sums of all earlier samples: premultiplied, sRGB-encoded colour; alpha
+    Sums history[]; // of all earlier samples
 };
 layout(std430, set = 0, binding = 13) writeonly buffer Image {
     uint image_pixels[];

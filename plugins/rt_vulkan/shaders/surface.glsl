@@ -10,6 +10,7 @@ struct Surface {
     bool is_back_face; // the ray hit the back face; `geometric_normal` has been flipped
     float offset;      // mm: distance of a secondary ray's origin from the surface
     float distance;    // mm, from the ray origin
+    vec3 lift;         // mm: from the hit to the curved surface where shadow rays start (lift_to_corner)
     bool is_real;      // a catcher or occluder
     // add_material() sets the following members. They are 0 for mirrors and glass.
     vec3 ambient, diffuse, specular, emission;
@@ -26,6 +27,22 @@ vec3 normal_at(uint object, uint number, vec2 uv) {
         sum += vec3(attributes[from], attributes[from + 1u], attributes[from + 2u]) * weights[i];
     }
     return sum;
+}
+
+// Returns the vector from the hit to the curved surface that the vertex normals describe (lift_to_corner), in object
+// space. `side`: −1 if the ray comes from the side opposite to the vertex normals, else 1.
+vec3 lift_of(Hit hit, float side) {
+    uint first = objects[hit.object].first_index + 3u * primitives[hit.primitive].number;
+    vec3 weights = vec3(1.0 - hit.uv.x - hit.uv.y, hit.uv.x, hit.uv.y), lift = vec3(0.0);
+    // The corners relative to the first one, and the hit.
+    vec3 corners[3] = vec3[](vec3(0.0), -primitives[hit.primitive].edge_1, primitives[hit.primitive].edge_2);
+    vec3 position = corners[1] * weights.y + corners[2] * weights.z;
+    for (int i = 0; i < 3; ++i) {
+        uint from = objects[hit.object].first_normal + 3u * indices[first + uint(i)];
+        vec3 normal = vec3(attributes[from], attributes[from + 1u], attributes[from + 2u]) * side;
+        lift += lift_to_corner(corners[i] - position, normal) * weights[i];
+    }
+    return lift;
 }
 
 vec3 texture_colour(Hit hit, uint number) {
@@ -66,6 +83,7 @@ Surface surface_at(Ray ray, Hit hit, bool normal_maps) {
         geometric = objects[object].normal_transform * geometric;
         normal = objects[object].normal_transform * normal;
     }
+    vec3 vertex_normal = normal;
     if (has_textures && normal_maps && materials[material].model == METALLIC_ROUGHNESS &&
         materials[material].normal_texture != NONE && objects[object].first_texcoord != NONE)
         normal = normal_mapped(hit, geometric, normal);
@@ -79,6 +97,14 @@ Surface surface_at(Ray ray, Hit hit, bool normal_maps) {
     s.is_back_face = dot(s.geometric_normal, ray.direction) > 0.0;
     s.geometric_normal = facing(s.geometric_normal, -ray.direction);
     s.normal = shading_normal(normal, s.geometric_normal);
+    s.lift = vec3(0.0);
+    if (objects[object].first_normal != NONE && materials[material].model != MIRROR &&
+        materials[material].model != GLASS) {
+        bool from_behind = dot(vertex_normal, geometric) * dot(geometric, ray.direction) > 0.0;
+        s.lift = lift_of(hit, from_behind ? -1.0 : 1.0);
+        if ((objects[object].flags & HAS_TRANSFORM) != 0u)
+            s.lift = objects[object].transform * s.lift;
+    }
     s.ambient = s.diffuse = s.specular = s.emission = vec3(0.0);
     s.exponent = s.alpha = 0.0;
     s.is_rough = false;

@@ -158,13 +158,15 @@ TEST(SceneFile, DescribesGlass) {
              "0.85],\n"
              "    shadow_attenuation: [0.4, 0.7, 0.4], reflection_depth: 50, refraction_depth: 20,\n"
              "    importance_cutoff: 0.02, reflection: 0.5, refraction: 0.6}\n"
-             "  thick: {model: glass, extinction: [0.1, 0, 2]}\nobjects: []\n");
+             "  thick: {model: glass, extinction: [0.1, 0, 2]}\n"
+             "  tinted: {model: glass, refraction: [0.5, 1, 0.2]}\nobjects: []\n");
     EXPECT_EQ(material(arena, 1).model, ARHOST_MATERIAL_GLASS);
     const arhost_material &plain = material(arena, 0), &dragon = material(arena, 1);
     EXPECT_EQ(plain.index, 1.5f);
     EXPECT_FLOAT_EQ(plain.fresnel_minimum, 0.04f) << "((n − 1)/(n + 1))²";
     EXPECT_EQ(plain.fresnel_exponent, 5);
     EXPECT_THAT(plain.extinction, testing::Each(0.0f));
+    EXPECT_THAT(plain.shadow_attenuation, testing::Each(0.6f));
     EXPECT_EQ(dragon.fresnel_minimum, 0.1f);
     EXPECT_EQ(dragon.fresnel_maximum, 0.9f);
     // exp(−extinction · 110 mm) must equal the colour.
@@ -176,6 +178,8 @@ TEST(SceneFile, DescribesGlass) {
     EXPECT_EQ(dragon.reflectivity[0], 0.5f);
     EXPECT_EQ(dragon.refraction[2], 0.6f);
     EXPECT_THAT(material(arena, 2).extinction, ElementsAre(0.1f, 0, 2));
+    EXPECT_THAT(material(arena, 3).shadow_attenuation, ElementsAre(0.3f, 0.6f, 0.12f))
+        << "tinted like its refraction";
 }
 
 TEST(SceneFile, DescribesMetalAndMetallicRoughness) {

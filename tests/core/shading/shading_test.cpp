@@ -49,16 +49,38 @@ TEST(Light, FallsOffWithTheSquareOfTheDistanceOrNotAtAll) {
 
 TEST(Alpha, ClassesGiveTheirCodes) {
     EXPECT_EQ(code_8bit(shadow_alpha(0, 0, 0.6, 0.3)), 0);
-    EXPECT_EQ(code_8bit(shadow_alpha(1, 0, 0.6f, 0.3f)), 153);
-    EXPECT_EQ(code_8bit(shadow_alpha(0, 1, 0.6f, 0.3f)), 77);
-    EXPECT_EQ(shadow_alpha(0, 1, 0.6f, 0.3f), double{0.3f}) << "bit-exact: 76.5 is rounded";
+    EXPECT_EQ(code_8bit(shadow_alpha(1, 0, 153 / 255.0, 77 / 255.0)), 153);
+    EXPECT_EQ(code_8bit(shadow_alpha(0, 1, 153 / 255.0, 77 / 255.0)), 77);
 }
 
-TEST(Alpha, SeveralLightsAreWeightedByIrradiance) {
-    EXPECT_DOUBLE_EQ(fraction_of_light(3, 3 + 1), 0.75);
-    EXPECT_EQ(fraction_of_light(0.1 + 0.2, 0.1 + 0.2), 1);
-    EXPECT_EQ(fraction_of_light(0, 0), 0) << "without light there is no shadow";
-    EXPECT_DOUBLE_EQ(shadow_alpha(0.5, 0.25, 0.6, 0.3), 0.375);
+TEST(Alpha, PartsOfALightAreFractions) {
+    EXPECT_DOUBLE_EQ(fraction_of(3, 3 + 1), 0.75);
+    EXPECT_EQ(fraction_of(0.1 + 0.2, 0.1 + 0.2), 1);
+    EXPECT_EQ(fraction_of(0, 0), 0) << "without light there is no shadow";
+    EXPECT_EQ(fraction_of(0, 2), 0);
+}
+
+// The composite of a shadow and mid-grey video, in linear light relative to that of the video.
+double light_of_composite(double alpha) {
+    return srgb_decode(0.5 * (1 - alpha)) / srgb_decode(0.5);
+}
+
+TEST(Alpha, PartialShadowsHideTheirShareOfLinearLightOverMidGrey) {
+    const double opaque = light_of_composite(0.6), translucent = light_of_composite(0.3);
+    for (double share = 0; share <= 1; share += 0.05) {
+        EXPECT_NEAR(light_of_composite(shadow_alpha(share, 0, 0.6, 0.3)), 1 - share * (1 - opaque), 1e-9) << share;
+        EXPECT_NEAR(light_of_composite(shadow_alpha(0, share, 0.6, 0.3)), 1 - share * (1 - translucent), 1e-9);
+    }
+    EXPECT_NEAR(light_of_composite(shadow_alpha(0.5, 0.25, 0.6, 0.3)),
+                1 - 0.5 * (1 - opaque) - 0.25 * (1 - translucent), 1e-9);
+    // If the scene lets no light remain in a full shadow, 55 % of the light remain where 45 % are hidden.
+    EXPECT_NEAR(light_of_composite(shadow_alpha(0.45, 0, 1, 0.5)), 0.55, 1e-9);
+}
+
+TEST(Alpha, OfLightInvertsTheLightUnderAlpha) {
+    for (const double alpha : {0.0, 0.1, 0.3, 0.6, 0.99, 1.0})
+        EXPECT_NEAR(alpha_of_light(light_under_alpha(alpha)), alpha, 1e-7) << alpha;
+    EXPECT_EQ(alpha_of_light(1.001), 0) << "rounding errors do not make alpha negative";
 }
 
 TEST(Alpha, ShadowColourCompensatesTheCommonAlphaOverMidGrey) {
@@ -67,6 +89,44 @@ TEST(Alpha, ShadowColourCompensatesTheCommonAlphaOverMidGrey) {
         EXPECT_NEAR(alpha * colour + (1 - alpha) * 0.5, (1 - own) * 0.5, 1e-15);
     }
     EXPECT_EQ(shadow_colour_encoded(0, 0), 0) << "no shadow";
+}
+
+TEST(Light, DensityOverAnAreaIntegratesToOneOverItsSolidAngle) {
+    // The reciprocal of the density, averaged over the area, is its solid angle; here that of one face of a cube seen
+    // from the cube's centre: 4π/6.
+    double sum = 0;
+    constexpr int n = 200;
+    for (int i = 0; i < n * n; ++i) {
+        const Vec3 to{(i % n + 0.5) / n * 2 - 1, (i / n + 0.5) / n * 2 - 1, 1};
+        sum += 1 / density_over_area(dot(to, to), 4, 1 / length(to)) / (n * n);
+    }
+    EXPECT_NEAR(sum, 4 * pi / 6, 1e-3);
+}
+
+TEST(Light, RaysReachARectangleWithinItsSidesAndFromItsFrontOnly) {
+    const Vec3 centre{1, 2, 30}, facing{0, 0, -1}, u{3, 0, 0}, v{0, 5, 0};
+    const auto distance = [&](Vec3 to) { return distance_to_rectangle(centre, facing, u, v, normalize(to)); };
+    EXPECT_NEAR(distance({1, 2, 30}), length(Vec3{1, 2, 30}), 1e-12);
+    EXPECT_NEAR(distance({3.9, 6.9, 30}), length(Vec3{3.9, 6.9, 30}), 1e-12);
+    EXPECT_EQ(distance({4.1, 2, 30}), 0);
+    EXPECT_EQ(distance({1, -3.1, 30}), 0);
+    EXPECT_LE(distance({-1, -2, -30}), 0) << "behind the ray";
+    EXPECT_EQ(distance_to_rectangle(centre, -facing, u, v, normalize(centre)), 0) << "the back";
+}
+
+TEST(Light, RaysReachTheDiscThatASphereShows) {
+    const Vec3 centre{0, 0, 20};
+    EXPECT_NEAR(distance_to_disc(centre, 3, {0, 0, 1}), 20, 1e-12);
+    EXPECT_NEAR(distance_to_disc(centre, 3, normalize({2.9, 0, 20})), length(Vec3{2.9, 0, 20}), 1e-12);
+    EXPECT_EQ(distance_to_disc(centre, 3, normalize({3.1, 0, 20})), 0);
+    EXPECT_EQ(distance_to_disc(centre, 3, {0, 0, -1}), 0);
+}
+
+TEST(Light, WeightsOfTwoSamplingTechniquesAddUpToOne) {
+    EXPECT_DOUBLE_EQ(balance_weight(3, 1), 0.75);
+    EXPECT_DOUBLE_EQ(balance_weight(3, 1) + balance_weight(1, 3), 1);
+    EXPECT_EQ(balance_weight(3, 0), 1);
+    EXPECT_EQ(balance_weight(0, 5), 1) << "only this technique can sample the light";
 }
 
 TEST(Light, SpotIsFullInsideTheInnerConeAndDarkOutsideTheOuterCone) {
@@ -162,6 +222,19 @@ TEST(Sampling, SphereDiscFacesTheViewerAndIsSampledUniformly) {
     EXPECT_NEAR(mean_square, 18, 1e-9); // radius² / 2 for a uniform disc
 }
 
+TEST(Sampling, HemisphereIsUniform) {
+    const Vec3 normal = normalize({0.3, -0.5, 0.7});
+    Vec3 mean{0, 0, 0};
+    constexpr int n = 100;
+    for (int i = 0; i < n * n; ++i) {
+        const Vec3 d = hemisphere_direction(normal, (i / n + 0.5) / n, (i % n + 0.5) / n);
+        EXPECT_NEAR(length(d), 1, 1e-12);
+        EXPECT_GT(dot(d, normal), 0);
+        mean = mean + d * (1.0 / n / n);
+    }
+    EXPECT_NEAR(length(mean - normal * 0.5), 0, 1e-9) << "the mean cosine is ½";
+}
+
 TEST(Sampling, FractionOfStepIsLinearAndClamped) {
     EXPECT_NEAR(fraction_of_step(0.35, 0.3, 0.2), 0.25, 1e-12);
     EXPECT_EQ(fraction_of_step(0.3, 0.3, 0.2), 0);
@@ -181,6 +254,23 @@ TEST(Surface, NormalsAreFlippedToTheGivenSide) {
     EXPECT_NEAR(shading_normal({0, 3, -4}, up).z, 0.8, 1e-12) << "on the facet's side";
     EXPECT_NEAR(shading_normal({0, 3, -4}, up).y, -0.6, 1e-12);
     EXPECT_EQ(shading_normal({0, 1e-7, 0}, up).z, 1) << "vertex normals that cancel out";
+}
+
+// A triangle whose corners and normals are those of a unit sphere.
+TEST(Surface, LiftLeadsFromAFacetTowardsTheCurvedSurface) {
+    const Vec3 corners[3] = {normalize({0.2, 0, 1}), normalize({-0.1, 0.2, 1}), normalize({-0.1, -0.2, 1})};
+    const Vec3 middle = (corners[0] + corners[1] + corners[2]) * (1.0 / 3);
+    const auto lift = [&](double side) {
+        Vec3 sum{0, 0, 0};
+        for (const Vec3 &corner : corners)
+            sum = sum + lift_to_corner(corner - middle, corner * (7 * side)) * (1.0 / 3);
+        return sum;
+    };
+    const double sagitta = 1 - length(middle), height = length(middle + lift(1)) - 1;
+    EXPECT_GT(height, 0);
+    EXPECT_LT(height, 1.1 * sagitta) << "on the tangent planes, which are as far from the sphere as the facet";
+    EXPECT_EQ(length(lift(-1)), 0) << "seen from inside, the sphere is concave";
+    EXPECT_EQ(length(lift_to_corner({1, 0, 0}, {0, 0, 0})), 0);
 }
 
 TEST(Surface, TangentsPointAlongIncreasingTextureCoordinates) {
@@ -212,6 +302,13 @@ TEST(Surface, NormalMapRedTiltsAlongUAndGreenAgainstV) {
     stays(perturbed_normal(up, up, u, v, {0.8, 0.5, 0.1}));                // the result would point into the surface
     stays(perturbed_normal(up, up, up * 3, v, {0.8, 0.5, 0.9}));           // u is parallel to the normal
     is({0.8, 0.5, 0.9}, perturbed_normal(up, -up, u, v, {0.8, 0.5, 0.9})); // the sign of `facet` does not matter
+}
+
+TEST(Colour, RadianceIsBoundedFarAboveWhite) {
+    EXPECT_EQ(bounded_radiance(40), 40);
+    EXPECT_EQ(bounded_radiance(1e6), 100);
+    EXPECT_EQ(bounded_radiance(std::numeric_limits<double>::infinity()), 100);
+    EXPECT_EQ(bounded_radiance(-1), 0);
 }
 
 TEST(Colour, LuminanceIsOneForWhiteAndMostlyGreen) {

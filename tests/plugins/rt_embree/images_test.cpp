@@ -168,6 +168,7 @@ struct Tilt {
 Picture lit_square(const Tilt &tilt, bool by_texture, bool turned) {
     ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0);
+    builder.settings.background = glm::vec3(0);
     arhost_light sun = scene::make_light(ARHOST_LIGHT_DIRECTIONAL);
     set3(sun.direction, -0.6f, 0, -0.8f);
     builder.add_light(sun);

@@ -126,6 +126,86 @@ TEST(SphereLight, CastsSoftShadowsWithAFullyDarkCore) {
     EXPECT_GT(between, 200);
 }
 
+// A mirror of reflectivity 0.8 in the plane z = 0, whose surroundings are black.
+Picture of_a_mirror(const arhost_light &lamp) {
+    ArenaBuilder builder;
+    builder.settings.background = glm::vec3(0);
+    builder.add_object("mirror", builder.add_triangles(square(200)), builder.add_material(mirror(0.8f)));
+    builder.add_light(lamp);
+    return Tracer(std::move(builder)).render(from_above());
+}
+
+// Returns the point at z = 80 that a pixel of from_above() shows in the mirror z = 0.
+glm::dvec3 in_the_mirror(int x, int y) {
+    return on_the_floor(x, y) * 1.4 + glm::dvec3(0, 0, 80);
+}
+
+TEST(RectangleLight, IsVisibleInMirrors) {
+    constexpr double pi = 3.14159265;
+    for (const arhost_falloff falloff : {ARHOST_FALLOFF_NONE, ARHOST_FALLOFF_INVERSE_SQUARE}) {
+        const bool falls_off = falloff == ARHOST_FALLOFF_INVERSE_SQUARE;
+        arhost_light panel = placed(ARHOST_LIGHT_RECTANGLE, {10, -5, 80}, falls_off ? 500.0f : 0.05f);
+        panel.falloff = falloff;
+        set3(panel.axis_u, 40, 0, 0);
+        set3(panel.axis_v, 0, 25, 0);
+        const Picture picture = of_a_mirror(panel);
+        int seen = 0;
+        for (int y = 0; y < 150; y += 3)
+            for (int x = 0; x < 200; x += 3) {
+                const glm::dvec3 at = in_the_mirror(x, y), from = on_the_floor(x, y);
+                const double beyond = std::max(std::abs(at.x - 10) - 40, std::abs(at.y + 5) - 25);
+                if (std::abs(beyond) < 0.01)
+                    continue;
+                // The radiance that illuminates a surface at the mirror as the lamp does.
+                const double squared = falls_off ? 1 : glm::dot(at - from, at - from);
+                const double radiance = panel.intensity[0] * squared * pi / (80 * 50);
+                ASSERT_TRUE(is_code_of(picture.at(x, y)[0], beyond < 0 ? 0.8 * radiance : 0, 1e-3)) << x << " " << y;
+                seen += beyond < 0;
+            }
+        EXPECT_GT(seen, 100);
+        set3(panel.direction, 0, 0, 1);
+        EXPECT_EQ(of_a_mirror(panel).at(100, 74)[0], 0) << "its back is invisible";
+    }
+}
+
+TEST(SphereLight, IsVisibleInMirrorsAndThroughGlass) {
+    arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, 0, 80}, 500);
+    bulb.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
+    bulb.radius = 30;
+    const Picture picture = of_a_mirror(bulb);
+    EXPECT_NEAR(shading::srgb_decode(picture.at(100, 74)[0] / 255.0), 0.8 * 500 / (30 * 30), 0.01);
+    EXPECT_EQ(picture.at(160, 74)[0], 0);
+
+    ArenaBuilder builder;
+    builder.settings.background = glm::vec3(0);
+    arhost_material glass = scene::make_material(ARHOST_MATERIAL_GLASS);
+    glass.fresnel_minimum = glass.fresnel_maximum = 0;
+    builder.add_object("pane", builder.add_triangles(square(60, 150)), builder.add_material(glass));
+    builder.add_light(bulb);
+    arhost_camera towards_the_bulb = from_above();
+    EXPECT_NEAR(shading::srgb_decode(Tracer(std::move(builder)).render(towards_the_bulb).at(100, 74)[0] / 255.0),
+                500.0 / (30 * 30), 0.02);
+}
+
+TEST(ExtendedLights, BehindAnObjectAreNotVisibleInMirrors) {
+    arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, 0, 80}, 1);
+    bulb.radius = 10;
+    for (const bool screen : {false, true}) {
+        ArenaBuilder builder;
+        builder.settings.background = glm::vec3(0);
+        builder.settings.ambient = glm::vec3(0);
+        builder.add_object("mirror", builder.add_triangles(square(200)), builder.add_material(mirror(1)));
+        if (screen)
+            builder.add_object("screen", builder.add_triangles(square(20, 60)),
+                               builder.add_material(diffuse(1, 1, 1)));
+        builder.add_light(bulb);
+        // The screen is between the mirror and the lamp. Its lower side is not lit.
+        const Picture picture =
+            Tracer(std::move(builder)).render(camera({0, -100, 40}, {0, 0, -80}, {0, 0, 1}, pinhole(3, 3, 100)));
+        EXPECT_EQ(picture.at(1, 1)[0], screen ? 0 : 255);
+    }
+}
+
 TEST(ExtendedLights, AreIdenticalOnEachRunAndThreadCount) {
     arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, -20, 200}, 1);
     bulb.radius = 30;

@@ -72,6 +72,26 @@ inline scene::TriangleMesh textured_square(float half_side, float z) {
     return mesh;
 }
 
+// A ball of flat facets of 15°, with the normals of the ball.
+inline scene::TriangleMesh coarse_ball(float radius) {
+    constexpr int stacks = 12, slices = 24;
+    scene::TriangleMesh mesh;
+    for (int stack = 0; stack <= stacks; ++stack)
+        for (int slice = 0; slice < slices; ++slice) {
+            const double theta = std::numbers::pi * stack / stacks, phi = 2 * std::numbers::pi * slice / slices;
+            mesh.normals.emplace_back(std::sin(theta) * std::cos(phi), std::sin(theta) * std::sin(phi),
+                                      std::cos(theta));
+            mesh.positions.push_back(mesh.normals.back() * radius);
+        }
+    for (std::uint32_t stack = 0; stack < stacks; ++stack)
+        for (std::uint32_t slice = 0; slice < slices; ++slice) {
+            const std::uint32_t next = (slice + 1) % slices, above = stack * slices, below = above + slices;
+            mesh.triangles.push_back({above + slice, below + slice, above + next});
+            mesh.triangles.push_back({above + next, below + slice, below + next});
+        }
+    return mesh;
+}
+
 // Returns a scene that exercises random numbers, ray queues, textures and transcendental functions.
 inline ArenaBuilder rich_scene() {
     ArenaBuilder builder;
@@ -85,6 +105,12 @@ inline ArenaBuilder rich_scene() {
     set3(bulb.intensity, 0.6f, 0.5f, 0.4f);
     bulb.radius = 30;
     builder.add_light(bulb);
+    arhost_light panel = scene::make_light(ARHOST_LIGHT_RECTANGLE);
+    set3(panel.position, 60, 40, 150);
+    set3(panel.intensity, 0.2f, 0.2f, 0.3f);
+    set3(panel.axis_u, 20, 0, 0);
+    set3(panel.axis_v, 0, 30, 0);
+    builder.add_light(panel);
     builder.add_object("desk", builder.add_triangles(square(90)), builder.add_material(flat(0.7f, 0.6f, 0.5f)),
                        ARHOST_ROLE_CATCHER);
     arhost_material glass = scene::make_material(ARHOST_MATERIAL_GLASS);
@@ -103,6 +129,12 @@ inline ArenaBuilder rich_scene() {
     const glm::mat4x3 upright(1, 0, 0, 0, 0.3f, 1, 0, -1, 0.3f, 30, 20, 26);
     builder.add_object("rough", builder.add_triangles(sheet), builder.add_material(rough), ARHOST_ROLE_VIRTUAL,
                        upright);
+    arhost_material plastic = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
+    set3(plastic.diffuse, 0.3f, 0.5f, 0.8f);
+    plastic.metallic = 0;
+    plastic.roughness = 0.2f;
+    builder.add_object("smooth", builder.add_triangles(coarse_ball(12)), builder.add_material(plastic),
+                       ARHOST_ROLE_VIRTUAL, glm::mat4x3(1, 0, 0, 0, 1, 0, 0, 0, 1.3f, 10, -40, 16));
     builder.add_object("holed", builder.add_triangles(textured_square(15, 60)),
                        builder.add_material(half_a_hole(builder, 0.5f)));
     return builder;

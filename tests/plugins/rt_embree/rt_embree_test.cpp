@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "large_surfaces.hpp"
 #include "ray_table.hpp"
-#include "tracer.hpp"
+#include "rich_scene.hpp"
 
 #include <arhost/shading/lens.hpp>
 
@@ -232,24 +232,51 @@ TEST(Alpha, VirtualObjectBehindACatcherIsVisible) {
     EXPECT_GT(with.alphas().at(255), without.alphas().at(255) + 100);
 }
 
-TEST(Alpha, SeveralLightsShareTheShadowByIrradiance) {
+// Linear light of mid-grey video (sRGB 0.5) under a black overlay, relative to the light of the video.
+double light_left(double alpha) {
+    return shading::srgb_decode(0.5 * (1 - alpha)) / shading::srgb_decode(0.5);
+}
+
+TEST(Alpha, LightsThatAreHiddenInPartLeaveTheirShareOfLinearLight) {
     ArenaBuilder builder = sphere_over_catcher();
     builder.add_light(light(-60, -20, 200, 0.35f)); // half as strong as the other light, without falloff
     const Picture picture = Tracer(std::move(builder)).render(from_the_side());
     const auto counts = picture.alphas();
-    // Where only one light is blocked, alpha is about 2/3 or 1/3 of 153. The cosines change it slightly.
+    // A shadow of both lights leaves the light that alpha 0.6 leaves; a shadow of one light removes about 2/3 or 1/3
+    // of what the shadow of both removes. The cosines change it slightly.
     int strong = 0, weak = 0, both = 0;
     for (const auto &[alpha, count] : counts) {
-        strong += alpha > 96 && alpha < 110 ? count : 0;
-        weak += alpha > 43 && alpha < 57 ? count : 0;
+        const double removed = (1 - light_left(alpha / 255.0)) / (1 - light_left(0.6));
+        if (alpha == 0 || alpha == 255)
+            continue;
+        strong += std::abs(removed - 2.0 / 3) < 0.05 ? count : 0;
+        weak += std::abs(removed - 1.0 / 3) < 0.05 ? count : 0;
         both += alpha == 153 ? count : 0;
-        EXPECT_TRUE(alpha == 0 || alpha == 255 || alpha == 153 || (alpha > 96 && alpha < 110) ||
-                    (alpha > 43 && alpha < 57))
-            << alpha;
+        EXPECT_TRUE(alpha == 153 || std::abs(removed - 2.0 / 3) < 0.05 || std::abs(removed - 1.0 / 3) < 0.05)
+            << alpha << " " << removed;
     }
     EXPECT_GT(strong, 50);
     EXPECT_GT(weak, 50);
     EXPECT_GT(both, 20);
+}
+
+TEST(Alpha, OfSamplesPartlyInShadowLeavesTheirShareOfLinearLight) {
+    // The shadow of a roof covers the left half of a single pixel, which 64 samples show. The lamp is far away, so
+    // that the shadow is below the roof.
+    ArenaBuilder builder;
+    builder.add_object("floor", builder.add_triangles(square(10)), builder.add_material(diffuse(1, 1, 1)),
+                       ARHOST_ROLE_CATCHER);
+    builder.add_object(
+        "roof",
+        builder.add_triangles(
+            {{{-900, -900, 300}, {0, -900, 300}, {0, 900, 300}, {-900, 900, 300}}, {}, {}, {{0, 1, 2}, {0, 2, 3}}}),
+        builder.add_material(diffuse(1, 1, 1)));
+    arhost_light sun = arhost::scene::make_light(ARHOST_LIGHT_DIRECTIONAL);
+    builder.add_light(sun);
+    const Picture picture = Tracer(std::move(builder), {{"samples", "64"}})
+                                .render(camera({0, 0, 20}, {0, 0, 0}, {0, 1, 0}, pinhole(1, 1, 20)));
+    EXPECT_EQ(picture.at(0, 0)[0], 0);
+    EXPECT_NEAR(light_left(picture.alpha(0, 0) / 255.0), (1 + light_left(0.6)) / 2, 0.005);
 }
 
 TEST(Alpha, LightBehindACatcherCastsNoShadowOnIt) {
@@ -369,6 +396,37 @@ TEST(Light, SurfacesDoNotShadowThemselves) {
         Tracer(std::move(builder)).render(camera({30000, -20000, 10200}, {30000, -20000, 10000}, {0, 1, 0}));
     for (const Pixel &pixel : picture.pixels())
         ASSERT_GT(pixel[0], 40);
+}
+
+TEST(Light, SmoothMeshHasASmoothShadowTerminator) {
+    for (const bool is_instance : {false, true}) {
+        ArenaBuilder builder;
+        builder.settings.ambient = glm::vec3(0);
+        glm::mat4x3 place(1);
+        if (is_instance)
+            place = glm::mat4x3(glm::scale(glm::mat4(1), glm::vec3(60)));
+        builder.add_object("ball", builder.add_triangles(coarse_ball(is_instance ? 1 : 60)),
+                           builder.add_material(diffuse(1, 1, 1)), ARHOST_ROLE_VIRTUAL, place);
+        arhost_light sun = arhost::scene::make_light(ARHOST_LIGHT_DIRECTIONAL);
+        set3(sun.direction, -0.8f, -0.36f, -0.48f);
+        builder.add_light(sun);
+        const Picture picture = Tracer(std::move(builder)).render(from_above());
+        int near_terminator = 0;
+        for (int y = 0; y < 150; ++y)
+            for (int x = 0; x < 200; ++x) {
+                // Where the ray hits the ball that the facets approximate.
+                const glm::dvec3 eye(0, 0, 200), d = glm::normalize(on_the_floor(x, y) - eye);
+                const double b = glm::dot(eye, d), root = b * b - (200.0 * 200 - 57 * 57);
+                if (root < 0)
+                    continue;
+                const glm::dvec3 normal = glm::normalize(eye + d * (-b - std::sqrt(b * b - (200.0 * 200 - 60 * 60))));
+                const double expected = glm::dot(normal, glm::dvec3(0.8, 0.36, 0.48));
+                near_terminator += std::abs(expected) < 0.25;
+                ASSERT_NEAR(shading::srgb_decode(picture.at(x, y)[0] / 255.0), std::max(expected, 0.0), 0.03)
+                    << x << " " << y;
+            }
+        EXPECT_GT(near_terminator, 1000);
+    }
 }
 
 // ---- Mirrors ---------------------------------------------------------------------------------------
@@ -569,28 +627,93 @@ TEST(Samples, StopChangingTheImageAtTheAccumulationLimit) {
     EXPECT_EQ(after(20), enough);
 }
 
-TEST(Samples, CompositeToTheMeanOfPerSampleComposites) {
+// Renders a single pixel. The rectangle from x = −½ to `edge` has the colour `left`, the rest of the pixel `right`.
+Pixel pixel_of_two(const arhost_material &left, const arhost_material &right, float edge, const char *samples) {
+    const auto rectangle = [](float x0, float x1) {
+        return scene::TriangleMesh{
+            {{x0, -1, 0}, {x1, -1, 0}, {x1, 1, 0}, {x0, 1, 0}}, {}, {}, {{0, 1, 2}, {0, 2, 3}}};
+    };
+    ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(1);
+    builder.add_object("left", builder.add_triangles(rectangle(-1, edge)), builder.add_material(left));
+    builder.add_object("right", builder.add_triangles(rectangle(edge, 1)), builder.add_material(right));
+    return Tracer(std::move(builder), {{"samples", samples}})
+        .render(camera({0, 0, 20}, {0, 0, 0}, {0, 1, 0}, pinhole(1, 1, 20)))
+        .at(0, 0);
+}
+
+arhost_material glowing(float radiance) {
+    arhost_material material = arhost::scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
+    set3(material.emission, radiance, radiance, radiance);
+    material.roughness = 0;
+    return material;
+}
+
+TEST(Samples, AreAveragedInLinearLight) {
+    EXPECT_EQ(pixel_of_two(flat(0, 0, 0), flat(1, 0.5f, 0.1f), 0, "64"),
+              (Pixel{srgb8_exact(0.5), srgb8_exact(0.25), srgb8_exact(0.05), 255}));
+}
+
+TEST(Samples, BrighterThanWhiteCountInFull) {
+    EXPECT_EQ(pixel_of_two(flat(0, 0, 0), glowing(2), 0.25f, "64")[0], srgb8_exact(0.5));
+}
+
+TEST(Samples, BrighterThan100TimesWhiteCountAs100) {
+    // One of 256 samples shows the strip.
+    EXPECT_TRUE(is_code_of(pixel_of_two(glowing(1e6f), flat(0, 0, 0), -0.5f + 1 / 256.0f, "256")[0], 100 / 256.0));
+}
+
+// Composites in sRGB as the compositor does. At an edge, the composite must be between those of the two sides.
+TEST(Samples, EdgesHaveNoHaloOnAnyBackground) {
+    const auto scene = [] {
+        ArenaBuilder builder = sphere_over_catcher();
+        builder.add_object("lamp", builder.add_spheres({{30, -20, 20, 10}}), builder.add_material(glowing(30)));
+        return builder;
+    };
+    const arhost_intrinsics in = pinhole();
+    const Picture all = Tracer(scene(), {{"samples", "16"}}).render(from_the_side(in));
+    std::vector<Picture> singles;
+    for (const raytracer_common::Sample &sample : raytracer_common::sample_positions(16)) {
+        arhost_intrinsics shifted = in;
+        shifted.cx -= sample.x;
+        shifted.cy -= sample.y;
+        singles.push_back(Tracer(scene()).render(from_the_side(shifted)));
+    }
+    int edges = 0;
+    for (const double background : {0.0, 60.0, 130.0, 255.0})
+        for (std::uint32_t y = 0; y < in.height; ++y)
+            for (std::uint32_t x = 0; x < in.width; ++x)
+                for (int channel = 0; channel < 3; ++channel) {
+                    double low = 255, high = 0;
+                    for (const Picture &single : singles) {
+                        low = std::min(low, over(single.at(x, y), channel, background));
+                        high = std::max(high, over(single.at(x, y), channel, background));
+                    }
+                    edges += high - low > 20;
+                    const double composite = over(all.at(x, y), channel, background);
+                    // The tolerance is for the rounding errors of the alpha, of the colour and of the single images.
+                    ASSERT_GE(composite, low - 1.5) << x << " " << y << " over " << background;
+                    ASSERT_LE(composite, high + 1.5) << x << " " << y << " over " << background;
+                }
+    EXPECT_GT(edges, 1000);
+}
+
+TEST(Samples, CoverageIsTheShareOfSamplesThatHitAnObject) {
     constexpr int count = 8;
     const arhost_intrinsics in = pinhole();
-    const Picture all = Tracer(sphere_over_catcher(), {{"samples", std::to_string(count)}}).render(from_the_side(in));
-    std::vector<Picture> singles;
+    const Picture all =
+        Tracer(one_sphere({10, 5, 200, 40}), {{"samples", std::to_string(count)}}).render(opencv_axes(in));
+    std::vector<double> coverage(std::size_t{in.width} * in.height);
     for (const raytracer_common::Sample &sample : raytracer_common::sample_positions(count)) {
         arhost_intrinsics shifted = in;
         shifted.cx -= sample.x;
         shifted.cy -= sample.y;
-        singles.push_back(Tracer(sphere_over_catcher()).render(from_the_side(shifted)));
+        const Picture single = Tracer(one_sphere({10, 5, 200, 40})).render(opencv_axes(shifted));
+        for (std::uint32_t i = 0; i < coverage.size(); ++i)
+            coverage[i] += single.alpha(i % in.width, i / in.width) / static_cast<double>(count);
     }
-    for (const double background : {0.0, 255.0})
-        for (std::uint32_t y = 0; y < in.height; ++y)
-            for (std::uint32_t x = 0; x < in.width; ++x)
-                for (int channel = 0; channel < 3; ++channel) {
-                    double mean = 0;
-                    for (const Picture &single : singles)
-                        mean += over(single.at(x, y), channel, background) / count;
-                    // The tolerance is the sum of three rounding errors of half a code: of the alpha, of the colour
-                    // and of the single images.
-                    ASSERT_NEAR(over(all.at(x, y), channel, background), mean, 1.5) << x << " " << y;
-                }
+    for (std::uint32_t i = 0; i < coverage.size(); ++i)
+        ASSERT_NEAR(all.alpha(i % in.width, i / in.width), coverage[i], 0.5) << i;
 }
 
 // ---- Equivalence -----------------------------------------------------------------------------------

@@ -121,7 +121,8 @@ typedef struct arhost_material {
     float fresnel_minimum, fresnel_maximum; /* 0 to 1 */
     float refraction[3];                    /* tint of refracted light */
     float extinction[3];         /* 1/mm, >= 0; transmittance is exp(−extinction · path length inside) */
-    float shadow_attenuation[3]; /* transmittance of each surface for shadow rays at normal incidence, 0 to 1 */
+    float shadow_attenuation[3]; /* transmittance of each surface for shadow rays at normal incidence, 0 to 1;
+                                    `extinction` applies in addition */
     float cutoff_colour[3];      /* radiance assumed for rays that are not traced because of importance_cutoff */
     float importance_cutoff;     /* rays that would contribute less than this are not traced; 0 to 1 */
     uint32_t reflection_depth, refraction_depth; /* reflected and refracted rays are traced only from hits whose
@@ -212,7 +213,10 @@ enum {
 };
 
 /* An area light illuminates like the mean of point lights with this `intensity` that are distributed uniformly over
- * its area (for a sphere: over its visible disc). A very small area light therefore equals a point light. */
+ * its area (for a sphere: over its visible disc). A very small area light therefore equals a point light. Secondary
+ * rays see it as a transparent surface of this area (of a rectangle, the front only; of a sphere, the disc) with the
+ * radiance π · intensity / area for INVERSE_SQUARE; for NONE, multiplied by the square of the distance from the ray's
+ * origin. */
 typedef struct arhost_light {
     arhost_light_type type;
     arhost_falloff falloff;     /* NONE for directional lights */
@@ -250,9 +254,11 @@ typedef struct arhost_scene {
     float background[3]; /* radiance of secondary rays that hit nothing, if there is no environment; primary rays
                             that hit nothing give alpha 0 */
     float bounds_min[3], bounds_max[3]; /* world bounding box of all objects at time 0; animation may exceed it */
-    float shadow_alpha_opaque, shadow_alpha_translucent; /* alpha of full shadows on catchers; defaults 0.6 and 0.3 */
-    uint32_t coloured_shadows;                           /* non-zero: glass casts coloured shadows on catchers */
-    float duration_s;                                    /* period of the repeating animation, s; 0: static scene */
+    /* Alpha of catchers where a light is fully hidden; defaults 0.6 and 0.3. Partial shadows: shadow_alpha() of
+     * arhost/shading/leaf/alpha.h. */
+    float shadow_alpha_opaque, shadow_alpha_translucent;
+    uint32_t coloured_shadows; /* non-zero: glass casts coloured shadows on catchers */
+    float duration_s;          /* period of the repeating animation, s; 0: static scene */
     arhost_environment environment;
     arhost_buffer geometries; /* arhost_geometry, stride sizeof */
     arhost_buffer textures;   /* arhost_texture */

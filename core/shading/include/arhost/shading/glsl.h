@@ -27,9 +27,10 @@ Float turn_of(Float x, Float y) {
     return atan(x, x == 0.0 && y == 0.0 ? 1.0 : y) * 0.159154943091895; // atan(0, 0) is undefined in GLSL
 }
 
+#include "leaf/colour.h"
+
 #include "leaf/alpha.h"
 #include "leaf/bsdf.h"
-#include "leaf/colour.h"
 #include "leaf/environment.h"
 #include "leaf/lens.h"
 #include "leaf/light.h"

@@ -58,9 +58,10 @@ inline Float turn_of(Float x, Float y) {
 }
 
 #define ARHOST_LEAF inline
+#include "leaf/colour.h"
+
 #include "leaf/alpha.h"
 #include "leaf/bsdf.h"
-#include "leaf/colour.h"
 #include "leaf/environment.h"
 #include "leaf/lens.h"
 #include "leaf/light.h"

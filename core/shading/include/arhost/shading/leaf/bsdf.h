@@ -7,11 +7,6 @@ ARHOST_LEAF Float lambert(Vec3 normal, Vec3 to_light) {
     return max(dot(normal, to_light), Float(0.0));
 }
 
-// Lambert's law with an interpolated `normal`: 0 if the light is behind the triangle. `facet`: geometric normal.
-ARHOST_LEAF Float lambert_on_facet(Vec3 normal, Vec3 facet, Vec3 to_light) {
-    return select(dot(facet, to_light) > Float(0.0), lambert(normal, to_light), Float(0.0));
-}
-
 // Phong: (r·v)^n, where r is the light direction reflected about the normal; 0 for light from behind the surface
 // (Phong, Illumination for Computer Generated Pictures, CACM 18(6), 1975).
 ARHOST_LEAF Float phong(Vec3 normal, Vec3 to_light, Vec3 to_eye, Float exponent) {
@@ -100,20 +95,29 @@ ARHOST_LEAF Float ggx_distribution(Float cosine_half, Float alpha) {
     return a2 / (Float(3.14159265358979) * d * d);
 }
 
-// Smith's height-correlated masking-shadowing function divided by 4 (n·l) (n·v)
-// (Heitz, Understanding the Masking-Shadowing Function, JCGT 3(2), 2014, eq. 99).
-ARHOST_LEAF Float ggx_visibility(Float cosine_light, Float cosine_eye, Float alpha) {
+// Smith's masking function G1 is 2c divided by this: the fraction of the microfacets that is visible from a direction
+// at an angle with the cosine c to the normal.
+ARHOST_LEAF Float ggx_masking_divisor(Float cosine, Float alpha) {
     Float a2 = alpha * alpha;
-    Float light = cosine_eye * sqrt(cosine_light * cosine_light * (Float(1.0) - a2) + a2);
-    Float eye = cosine_light * sqrt(cosine_eye * cosine_eye * (Float(1.0) - a2) + a2);
-    return Float(0.5) / max(light + eye, Float(1e-7));
+    return cosine + sqrt(a2 + (Float(1.0) - a2) * cosine * cosine);
 }
 
-// Smith's masking function G1: the fraction of the microfacets that is visible from a direction. `cosine`: of the
-// angle between this direction and the normal.
+// Masking of the light, the fraction that remains if visible microfacets are sampled (ggx_half_vector in sampling.h).
 ARHOST_LEAF Float ggx_masking(Float cosine, Float alpha) {
-    Float a2 = alpha * alpha;
-    return Float(2.0) * cosine / max(cosine + sqrt(a2 + (Float(1.0) - a2) * cosine * cosine), Float(1e-7));
+    return Float(2.0) * cosine / max(ggx_masking_divisor(cosine, alpha), Float(1e-7));
+}
+
+// Smith's separable masking-shadowing function divided by 4 (n·l) (n·v), as in glTF 2.0, appendix B.
+ARHOST_LEAF Float ggx_visibility(Float cosine_light, Float cosine_eye, Float alpha) {
+    Float divisor = ggx_masking_divisor(cosine_light, alpha) * ggx_masking_divisor(cosine_eye, alpha);
+    return Float(1.0) / max(divisor, Float(1e-7));
+}
+
+// Density per steradian of directions that are reflected off sampled visible microfacets: G1 D / 4 (n·v). The lobe is
+// this density times ggx_masking of the light (times π).
+ARHOST_LEAF Float ggx_reflection_density(Float cosine_eye, Float cosine_half, Float alpha) {
+    return Float(0.5) * ggx_distribution(cosine_half, alpha) /
+           ggx_masking_divisor(max(cosine_eye, Float(1e-4)), alpha);
 }
 
 // GGX specular reflection without the Fresnel term. The factor π is needed because lamp intensities include Lambert's

@@ -15,6 +15,40 @@ ARHOST_LEAF Float spot_attenuation(Float cosine, Float cosine_inner, Float cosin
     return t * t * (Float(3.0) - Float(2.0) * t);
 }
 
+// Density per steradian of directions to points that are uniformly distributed over an area. `cosine`: of the angle
+// between the direction and the area's normal.
+ARHOST_LEAF Float density_over_area(Float distance_squared, Float area, Float cosine) {
+    return distance_squared / max(area * cosine, Float(1e-12));
+}
+
+// Distance along a ray to a rectangle, if the ray arrives at the side that `facing` points to; else at most 0.
+// `to_centre`: vector from the ray's origin to the centre; `axis_u`, `axis_v`: half sides.
+ARHOST_LEAF Float distance_to_rectangle(Vec3 to_centre, Vec3 facing, Vec3 axis_u, Vec3 axis_v, Vec3 direction) {
+    Float along = dot(direction, facing);
+    Float distance = dot(to_centre, facing) / min(along, Float(-1e-6));
+    Vec3 offset = direction * distance - to_centre;
+    Float beyond =
+        max(abs(dot(offset, axis_u)) - dot(axis_u, axis_u), abs(dot(offset, axis_v)) - dot(axis_v, axis_v));
+    return select(along < Float(0.0), select(beyond > Float(0.0), Float(0.0), distance), Float(0.0));
+}
+
+// Distance along a ray to the disc of a sphere that faces the ray's origin (vector_to_disc in sampling.h); 0 if the
+// ray misses it.
+ARHOST_LEAF Float distance_to_disc(Vec3 to_centre, Float radius, Vec3 direction) {
+    Float along = dot(direction, to_centre);
+    Float distance = dot(to_centre, to_centre) / max(along, Float(1e-12));
+    Vec3 offset = direction * distance - to_centre;
+    Float beyond = dot(offset, offset) - radius * radius;
+    return select(along > Float(0.0), select(beyond > Float(0.0), Float(0.0), distance), Float(0.0));
+}
+
+// Weight of a sample in multiple importance sampling with the balance heuristic (Veach and Guibas, Optimally
+// Combining Sampling Techniques, SIGGRAPH 1995). Each density is multiplied by the technique's number of samples. A
+// `density` of 0 stands for a light that no other technique can sample.
+ARHOST_LEAF Float balance_weight(Float density, Float other_density) {
+    return select(density > Float(0.0), density / max(density + other_density, Float(1e-30)), Float(1.0));
+}
+
 // Transmittance of a glass surface for shadow rays: 1 − Schlick's term with f0 = 1 − attenuation (coloured shadows,
 // as in the dissertation).
 ARHOST_LEAF Vec3 glass_shadow(Vec3 attenuation, Float cosine) {

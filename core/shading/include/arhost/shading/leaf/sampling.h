@@ -13,6 +13,14 @@ ARHOST_LEAF Vec3 bitangent_axis(Vec3 n) {
     return vec3(n.x * n.y * a, sign + n.y * n.y * a, -n.y);
 }
 
+// Samples a direction of the hemisphere around `normal` uniformly: its density is 1/2π per steradian.
+ARHOST_LEAF Vec3 hemisphere_direction(Vec3 normal, Float u, Float v) {
+    Float cosine = Float(1.0) - u;
+    Float sine = sqrt(max(Float(1.0) - cosine * cosine, Float(0.0)));
+    return tangent_axis(normal) * (sine * cosine_of_turn(v)) + bitangent_axis(normal) * (sine * sine_of_turn(v)) +
+           normal * cosine;
+}
+
 // Samples the normal of a GGX microfacet that is visible from `to_eye`, in coordinates with the surface normal along
 // z (Dupuy and Benyoub, Sampling Visible GGX Normals with Spherical Caps, CGF 42(8), 2023, listing 1).
 ARHOST_LEAF Vec3 ggx_visible_normal(Vec3 to_eye, Float alpha, Float u, Float v) {
