@@ -72,7 +72,7 @@ constexpr const char *allowed[] = {
     "clone", "exit", "exit_group", "futex", "futex_time64", "futex_waitv", "get_robust_list", "getcpu", "getpriority",
     "gettid", "rseq", "sched_get_priority_max", "sched_get_priority_min", "sched_getaffinity", "sched_getattr",
     "sched_getparam", "sched_getscheduler", "sched_setaffinity", "sched_setparam", "sched_setscheduler",
-    "sched_yield", "set_robust_list", "set_tid_address", "setpriority",
+    "set_mempolicy", "sched_yield", "set_robust_list", "set_tid_address", "setpriority",
     // signals
     "kill", "pause", "restart_syscall", "rt_sigaction", "rt_sigpending", "rt_sigprocmask", "rt_sigqueueinfo",
     "rt_sigreturn", "rt_sigsuspend", "rt_sigtimedwait", "rt_sigtimedwait_time64", "rt_tgsigqueueinfo", "sigaltstack",
