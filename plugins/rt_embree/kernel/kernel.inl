@@ -134,13 +134,17 @@ ARHOST_INLINE Int mean(const Frame &frame, const Scratch &scratch, int first_pix
     const Scene &scene = frame.scene;
     const Float samples(static_cast<float>(count)), covered = load(scratch.sum[coverage_row] + first_pixel);
     const Float coverage = covered * Float(1.0f / static_cast<float>(count));
-    const Float per_hit = Float(1.0f) / max(covered, Float(1.0f));
-    Vec3 light;
-    light.x = load(scratch.sum[light_row] + first_pixel) * per_hit;
-    light.y = load(scratch.sum[light_row + 1] + first_pixel) * per_hit;
-    light.z = load(scratch.sum[light_row + 2] + first_pixel) * per_hit;
-    const auto &table = *scene.srgb8;
-    Int red = srgb8(table, light.x), green = srgb8(table, light.y), blue = srgb8(table, light.z);
+    Vec3 light = black();
+    Int red(0), green(0), blue(0);
+    if (any(covered > Float(0.0f))) {
+        const Float per_hit = Float(1.0f) / max(covered, Float(1.0f));
+        light.x = load(scratch.sum[light_row] + first_pixel) * per_hit;
+        light.y = load(scratch.sum[light_row + 1] + first_pixel) * per_hit;
+        light.z = load(scratch.sum[light_row + 2] + first_pixel) * per_hit;
+        red = srgb8(*scene.srgb8, light.x);
+        green = srgb8(*scene.srgb8, light.y);
+        blue = srgb8(*scene.srgb8, light.z);
+    }
     Float alpha = coverage;
     if (scene.has_catchers) {
         const Float caught = load(scratch.sum[caught_row] + first_pixel);

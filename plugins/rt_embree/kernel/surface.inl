@@ -23,49 +23,23 @@ struct Surface {
     bool any_specular, any_rough, any_scattering;
 };
 
-// A vertex attribute of `components` numbers.
-template <int components> struct Attribute { Float of[components]; };
-
-// Barycentric coordinates of the hits.
-struct Weights {
-    Float of[3];
+// The corners of the triangles hit: their vertices, and the barycentric coordinates of the hits.
+struct Corners {
+    Int vertex[3];
+    Float weight[3];
 };
-ARHOST_INLINE Weights weights_of(const RTCHit16 &hit) {
-    const Float u = load(hit.u), v = load(hit.v);
-    return {{Float(1.0f) - u - v, u, v}};
-}
-
-// Calls use(corner, attribute) for the three corners of the triangles hit. Lanes outside `here` yield values of
-// triangle 0, which the caller ignores. `stride` is in bytes and a multiple of 4 (arhost/scene.h).
-template <int components, class Use>
-ARHOST_INLINE void for_each_corner(const Object &object, const float *values, std::uint32_t stride,
-                                   const RTCHit16 &hit, Bool here, Use use) {
+// Lanes outside `here` yield the corners of triangle 0, which the caller ignores.
+ARHOST_INLINE Corners corners_of(const Object &object, const RTCHit16 &hit, Bool here) {
     const Int first = select(here, load(hit.primID), Int(0)) * Int(static_cast<int>(object.index_stride / 4));
-    for (int corner = 0; corner < 3; ++corner) {
-        const Int at = gather(object.indices + corner, first) * Int(static_cast<int>(stride / 4));
-        Attribute<components> value;
-        for (int i = 0; i < components; ++i)
-            value.of[i] = gather(values + i, at);
-        use(corner, value);
-    }
-}
-// Interpolates a vertex attribute at the hits.
-template <int components>
-ARHOST_INLINE Attribute<components> interpolated(const Object &object, const float *values, std::uint32_t stride,
-                                                 const RTCHit16 &hit, Bool here) {
-    const Weights weights = weights_of(hit);
-    Attribute<components> sum{};
-    for_each_corner<components>(
-        object, values, stride, hit,
-        here, [&](int corner, const Attribute<components> &value) __attribute__((always_inline)) {
-            for (int i = 0; i < components; ++i)
-                sum.of[i] = sum.of[i] + value.of[i] * weights.of[corner];
-        });
-    return sum;
+    const Float u = load(hit.u), v = load(hit.v);
+    return {{gather(object.indices, first), gather(object.indices + 1, first), gather(object.indices + 2, first)},
+            {Float(1.0f) - u - v, u, v}};
 }
 
-ARHOST_INLINE Vec3 vector_of(const Attribute<3> &a) {
-    return {a.of[0], a.of[1], a.of[2]};
+// `stride` is in bytes and a multiple of 4 (arhost/scene.h).
+ARHOST_INLINE Vec3 gather_vector(const float *values, std::uint32_t stride, Int vertex) {
+    const Int at = vertex * Int(static_cast<int>(stride / 4));
+    return {gather(values, at), gather(values + 1, at), gather(values + 2, at)};
 }
 
 // Samples a texture at the hits; returns white if the object has no texture coordinates. `texture`: an index, not
@@ -74,8 +48,14 @@ ARHOST_INLINE Texel sample_object_texture(const Scene &scene, const Object &obje
                                           const RTCHit16 &hit, Bool here) {
     if (!object.texcoords)
         return {white(), Float(1.0f)};
-    const Attribute<2> at = interpolated<2>(object, object.texcoords, object.texcoord_stride, hit, here);
-    return sample_texture(scene, scene.textures[texture], at.of[0], at.of[1]);
+    const Corners corners = corners_of(object, hit, here);
+    Float u = 0.0f, v = 0.0f;
+    for (int i = 0; i < 3; ++i) {
+        const Int at = corners.vertex[i] * Int(static_cast<int>(object.texcoord_stride / 4));
+        u = u + gather(object.texcoords, at) * corners.weight[i];
+        v = v + gather(object.texcoords + 1, at) * corners.weight[i];
+    }
+    return sample_texture(scene, scene.textures[texture], u, v);
 }
 
 // Returns `normal`, perturbed by the object's normal map. `facet` is the geometric normal. The tangents are constant
@@ -108,20 +88,14 @@ ARHOST_INLINE Vec3 mapped_normal(const Scene &scene, const Object &object, Vec3 
 
 // Returns the vector from the hits to the curved surface that the vertex normals describe (lift_to_corner), in object
 // space. `side`: −1 in lanes whose rays come from the side opposite to the vertex normals, else 1.
-ARHOST_INLINE Vec3 lift_of(const Object &object, Float side, const RTCHit16 &hit, Bool here) {
-    const Weights weights = weights_of(hit);
-    Vec3 corners[3], position = black(), lift = black();
-    for_each_corner<3>(
-        object, object.positions, object.position_stride, hit,
-        here, [&](int corner, const Attribute<3> &value) __attribute__((always_inline)) {
-            corners[corner] = vector_of(value);
-            position = position + corners[corner] * weights.of[corner];
-        });
-    for_each_corner<3>(
-        object, object.normals, object.normal_stride, hit,
-        here, [&](int corner, const Attribute<3> &value) __attribute__((always_inline)) {
-            lift = lift + lift_to_corner(corners[corner] - position, vector_of(value) * side) * weights.of[corner];
-        });
+ARHOST_INLINE Vec3 lift_of(const Object &object, const Corners &corners, const Vec3 (&normals)[3], Float side) {
+    Vec3 positions[3], hit = black(), lift = black();
+    for (int i = 0; i < 3; ++i) {
+        positions[i] = gather_vector(object.positions, object.position_stride, corners.vertex[i]);
+        hit = hit + positions[i] * corners.weight[i];
+    }
+    for (int i = 0; i < 3; ++i)
+        lift = lift + lift_to_corner(positions[i] - hit, normals[i] * side) * corners.weight[i];
     return lift;
 }
 
@@ -143,8 +117,16 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     Vec3 reach = black();
     for_each_object(scene, hit, active, [&](const Object &object, Bool here) {
         Vec3 geometric = facet, normal = facet;
-        if (object.normals)
-            normal = vector_of(interpolated<3>(object, object.normals, object.normal_stride, hit, here));
+        Corners corners;
+        Vec3 normals[3];
+        if (object.normals) {
+            corners = corners_of(object, hit, here);
+            normal = black();
+            for (int i = 0; i < 3; ++i) {
+                normals[i] = gather_vector(object.normals, object.normal_stride, corners.vertex[i]);
+                normal = normal + normals[i] * corners.weight[i];
+            }
+        }
         if (object.has_transform) {
             geometric = transform(object.normal_transform, geometric);
             normal = transform(object.normal_transform, normal);
@@ -166,7 +148,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         s.is_lit = s.is_lit | here;
         if (object.normals) {
             const Bool from_behind = dot(vertex_normal, geometric) * dot(geometric, direction) > Float(0.0f);
-            const Vec3 lift = lift_of(object, select(from_behind, Float(-1.0f), Float(1.0f)), hit, here);
+            const Vec3 lift = lift_of(object, corners, normals, select(from_behind, Float(-1.0f), Float(1.0f)));
             s.lift = select(here, object.has_transform ? transform(object.transform, lift) : lift, s.lift);
         }
         Vec3 ambient = splat(material.ambient), diffuse = splat(material.diffuse);

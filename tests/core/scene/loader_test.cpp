@@ -166,7 +166,7 @@ TEST(SceneFile, DescribesGlass) {
     EXPECT_FLOAT_EQ(plain.fresnel_minimum, 0.04f) << "((n − 1)/(n + 1))²";
     EXPECT_EQ(plain.fresnel_exponent, 5);
     EXPECT_THAT(plain.extinction, testing::Each(0.0f));
-    EXPECT_THAT(plain.shadow_attenuation, testing::Each(0.6f));
+    EXPECT_THAT(plain.shadow_attenuation, testing::Each(testing::FloatEq(0.6f)));
     EXPECT_EQ(dragon.fresnel_minimum, 0.1f);
     EXPECT_EQ(dragon.fresnel_maximum, 0.9f);
     // exp(−extinction · 110 mm) must equal the colour.
@@ -178,7 +178,8 @@ TEST(SceneFile, DescribesGlass) {
     EXPECT_EQ(dragon.reflectivity[0], 0.5f);
     EXPECT_EQ(dragon.refraction[2], 0.6f);
     EXPECT_THAT(material(arena, 2).extinction, ElementsAre(0.1f, 0, 2));
-    EXPECT_THAT(material(arena, 3).shadow_attenuation, ElementsAre(0.3f, 0.6f, 0.12f))
+    EXPECT_THAT(material(arena, 3).shadow_attenuation,
+                ElementsAre(testing::FloatEq(0.3f), testing::FloatEq(0.6f), testing::FloatEq(0.12f)))
         << "tinted like its refraction";
 }
 
