@@ -52,7 +52,8 @@ public:
     void start_it(pid_t victim = 0) {
         start({"--config", "run.yaml"}, [this, victim] {
             ::setenv("HOSTILE_HOST", std::to_string(victim ? victim : ::getpid()).c_str(), 1);
-            ::setenv("HOSTILE_SECRET", "sesame", 1);
+            for (const char *secret : {"HOSTILE_SECRET", "VK_TOKEN", "LD_ACCESS_TOKEN"})
+                ::setenv(secret, "sesame", 1);
             ::setenv("HOSTILE_FOLDER", elsewhere_.path().c_str(), 1);
         });
     }

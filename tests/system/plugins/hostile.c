@@ -106,6 +106,8 @@ static void read_environment(const tracker *self) {
     char file[64];
     errno = ENOENT;
     report(self, "a secret variable", getenv("HOSTILE_SECRET") != NULL);
+    report(self, "a secret that begins like a driver's variable", getenv("VK_TOKEN") != NULL);
+    report(self, "a secret that begins like a linker's variable", getenv("LD_ACCESS_TOKEN") != NULL);
     report(self, "the initial environment", file_has("/proc/self/environ", "HOSTILE_SECRET="));
     snprintf(file, sizeof file, "/proc/%d/environ", (int)getppid());
     report(self, "the launcher's environment", file_has(file, "HOSTILE_SECRET="));
