@@ -34,7 +34,8 @@ std::string query(supervise::Context &context, const std::filesystem::path &plug
             reason = death.how;
         dead = true;
     };
-    supervise::Process process(context, plugin.stem().string(), std::move(callbacks),
+    supervise::WorkerBudget budget(context.log, plugin.stem().string());
+    supervise::Process process(context, budget, std::move(callbacks),
                                encode(messages::Open{plugin.string(), policy}));
     running = &process;
     const auto deadline = context.reactor.at(Reactor::Clock::now() + timeout, [&] {

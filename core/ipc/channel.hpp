@@ -20,6 +20,7 @@ using Json = nlohmann::json;
 struct Message {
     Json body; // an object with a string "type"
     std::vector<base::UniqueFd> fds;
+    std::size_t size = 0; // bytes received
 };
 
 enum class ReceiveState {
