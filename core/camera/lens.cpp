@@ -6,6 +6,11 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/type_ptr.hpp>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
 namespace arhost::camera {
 namespace {
 
@@ -26,6 +31,30 @@ std::optional<glm::dvec2> project(const arhost_intrinsics &intrinsics, const glm
         return std::nullopt;
     const glm::dvec2 p = distort(intrinsics, point_in_camera);
     return glm::dvec2(intrinsics.fx * p.x + intrinsics.cx, intrinsics.fy * p.y + intrinsics.cy);
+}
+
+std::string problem_with_lens(const arhost_intrinsics &intrinsics) {
+    if (intrinsics.distortion != ARHOST_DISTORTION_BROWN && intrinsics.distortion != ARHOST_DISTORTION_FISHEYE)
+        return {};
+    const shading::Lens lens(intrinsics);
+    // The largest distance of a corner from the principal point, on the plane z = 1. A fisheye lens sees a hemisphere
+    // at most near its centre.
+    const double right = std::max(intrinsics.cx, intrinsics.width - 1 - intrinsics.cx),
+                 bottom = std::max(intrinsics.cy, intrinsics.height - 1 - intrinsics.cy);
+    const double near_centre = std::min(0.1 * std::hypot(right / intrinsics.fx, bottom / intrinsics.fy), 0.2);
+    for (int direction = 0; direction < 8; ++direction) {
+        const double angle = direction * std::numbers::pi / 4;
+        const auto distorted = lens.distort({near_centre * std::cos(angle), near_centre * std::sin(angle), 1});
+        const double scale = distorted ? std::hypot(distorted->x, distorted->y) / near_centre : 0;
+        if (scale >= 0.5 && scale <= 2) // false for NaN
+            continue;
+        char what[64] = "folds the image";
+        if (distorted)
+            std::snprintf(what, sizeof what, "scales distances by %.3g", scale);
+        return std::string("the lens distortion is implausible: near the principal point it ") + what +
+               ", but lenses hardly distort there; correct its coefficients";
+    }
+    return {};
 }
 
 glm::dvec3 in_camera(const arhost_camera &camera, const glm::dvec3 &point_in_world) {

@@ -9,6 +9,7 @@
 #include <glm/vec3.hpp>
 
 #include <optional>
+#include <string>
 
 namespace arhost::camera {
 
@@ -16,6 +17,11 @@ namespace arhost::camera {
 // z ≤ 0. Far outside the image, a Brown polynomial may stop increasing and map points back into the image; as in
 // OpenCV, this is not detected.
 std::optional<glm::dvec2> project(const arhost_intrinsics &intrinsics, const glm::dvec3 &point_in_camera);
+
+// Returns why the lens distortion cannot be that of a real camera, or "". Near the principal point, where lenses
+// hardly distort, the distorted image must be between half and twice as large as the undistorted one. Real lenses
+// differ by a few percent there; other coefficients would make lens computations meaningless or very slow.
+std::string problem_with_lens(const arhost_intrinsics &intrinsics);
 
 // Transforms a point of the ray tracer's world (mm) to OpenCV camera axes.
 glm::dvec3 in_camera(const arhost_camera &camera, const glm::dvec3 &point_in_world);

@@ -69,7 +69,7 @@ std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
 void lift_deadlines(run_config::Configuration &configuration) {
     const auto lift = [](run_config::ComponentConfiguration &component) {
         base::Limits &limits = component.limits;
-        limits.start = limits.frame = limits.stop = std::chrono::hours(1000);
+        limits.start = limits.frame = limits.stop = limits.start_total = limits.stop_total = std::chrono::hours(1000);
     };
     if (configuration.source)
         lift(*configuration.source);
@@ -331,7 +331,7 @@ void check_plugins(const run_config::Configuration &configuration, supervise::Co
 void check_scene(const run_config::Configuration &configuration, supervise::Context &context) {
     std::optional<std::string> outcome;
     const SceneLoading loading(
-        context, configuration.raytracer->scene, configuration.sandbox, configuration.raytracer->limits.start,
+        context, configuration.raytracer->scene, configuration.sandbox, configuration.raytracer->limits,
         configuration.files,
         {[&](const ipc::SharedMemory &) { outcome = ""; }, [&](const std::string &reason) { outcome = reason; }});
     while (!outcome)

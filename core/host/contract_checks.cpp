@@ -88,13 +88,15 @@ std::string problem_with_pose(const arhost_marker &marker, const arhost_intrinsi
 struct Rectangle {
     glm::dvec2 min{1e30}, max{-1e30};
 };
-// Returns the bounds of the box in a pinhole camera's image; nullopt if a corner is not in front of the camera.
+// Returns the bounds of the box in the camera's image without lens distortion; nullopt if a corner is not in front of
+// the camera.
 std::optional<Rectangle> rectangle_of(const scene::Box &box, const arhost_camera &camera) {
     Rectangle bounds;
+    arhost_intrinsics pinhole = camera.intrinsics;
+    pinhole.distortion = ARHOST_DISTORTION_NONE;
     for (int corner = 0; corner < 8; ++corner) {
         const glm::vec3 part(corner & 1, corner >> 1 & 1, corner >> 2);
-        const auto at =
-            camera::project(camera.intrinsics, camera::in_camera(camera, glm::mix(box.min, box.max, part)));
+        const auto at = camera::project(pinhole, camera::in_camera(camera, glm::mix(box.min, box.max, part)));
         if (!at)
             return std::nullopt;
         bounds.min = glm::min(bounds.min, *at);
@@ -214,14 +216,38 @@ OverlayChecks::OverlayChecks(const arhost_scene &scene) {
 }
 
 void OverlayChecks::check(ContractChecks &checks, std::uint64_t frame, const arhost_camera &camera,
-                          const Region &region, const ImageView &overlay) const {
-    // With lens distortion, points far outside the image may be projected into it (camera/lens.hpp).
-    const bool is_pinhole = camera.intrinsics.distortion == ARHOST_DISTORTION_NONE;
+                          const Region &region, const ImageView &overlay) {
     const std::optional<Rectangle> rectangle = virtual_box_ ? rectangle_of(*virtual_box_, camera) : Rectangle();
-    const bool can_check_place = checks_place_ && is_pinhole && rectangle;
+    const bool can_check_place = checks_place_ && rectangle;
+    const bool is_pinhole = camera.intrinsics.distortion == ARHOST_DISTORTION_NONE;
+    if (!is_pinhole && can_check_place && !lens_)
+        lens_.emplace(camera.intrinsics);
+    // Returns the position of a pixel in the image without lens distortion; nullopt if no direction maps to it.
+    const auto undistorted = [&](std::uint32_t x, std::uint32_t y) -> std::optional<glm::dvec2> {
+        if (is_pinhole)
+            return glm::dvec2(x, y);
+        const auto ray = lens_->ray({static_cast<double>(x), static_cast<double>(y)});
+        if (!ray || ray->z <= 0)
+            return std::nullopt;
+        return glm::dvec2(camera.intrinsics.fx * ray->x / ray->z + camera.intrinsics.cx,
+                          camera.intrinsics.fy * ray->y / ray->z + camera.intrinsics.cy);
+    };
+    const auto check_place = [&](std::uint32_t x, std::uint32_t y) -> std::string {
+        const std::optional<glm::dvec2> at = undistorted(x, y);
+        if (!at || (at->x >= rectangle->min.x && at->x <= rectangle->max.x && at->y >= rectangle->min.y &&
+                    at->y <= rectangle->max.y))
+            return {};
+        return fmt::format("pixel ({}, {}): alpha is 255, but {}", x, y,
+                           virtual_box_ ? fmt::format("all virtual objects are between ({:.0f}, {:.0f}) and ({:.0f}, "
+                                                      "{:.0f}){}",
+                                                      rectangle->min.x, rectangle->min.y, rectangle->max.x,
+                                                      rectangle->max.y, is_pinhole ? "" : " before lens distortion")
+                                        : std::string("there is no virtual object"));
+    };
     std::string outside_region, misplaced;
     for (std::uint32_t y = first_of(frame); y < camera.intrinsics.height; y += sample_step) {
         const std::uint8_t *alpha = overlay.rgba + y * overlay.stride + 3;
+        std::optional<std::uint32_t> first, last; // opaque pixels of this row that are inside the region
         for (std::uint32_t x = 0; x < camera.intrinsics.width; ++x, alpha += 4) {
             if (*alpha == 0)
                 continue;
@@ -232,15 +258,18 @@ void OverlayChecks::check(ContractChecks &checks, std::uint64_t frame, const arh
                     "pixel ({}, {}) is outside the reported region, but has alpha {}; the region is {} x {} px at "
                     "({}, {})",
                     x, y, *alpha, region.width, region.height, region.x, region.y);
-            if (misplaced.empty() && can_check_place && *alpha == 255 && in_region &&
-                (x < rectangle->min.x || x > rectangle->max.x || y < rectangle->min.y || y > rectangle->max.y))
-                misplaced = fmt::format("pixel ({}, {}): alpha is 255, but {}", x, y,
-                                        virtual_box_ ? fmt::format("all virtual objects are between ({:.0f}, {:.0f}) "
-                                                                   "and ({:.0f}, {:.0f})",
-                                                                   rectangle->min.x, rectangle->min.y,
-                                                                   rectangle->max.x, rectangle->max.y)
-                                                     : std::string("there is no virtual object"));
+            if (*alpha == 255 && in_region) {
+                if (!first)
+                    first = x;
+                last = x;
+            }
         }
+        // The pixels between them cannot be further left or right. With lens distortion, they may be further up or
+        // down, which is not checked, because undistorting a pixel takes a microsecond.
+        if (can_check_place && first && misplaced.empty())
+            misplaced = check_place(*first, y);
+        if (can_check_place && last && misplaced.empty())
+            misplaced = check_place(*last, y);
     }
     checks.add("raytracer.region", frame, outside_region);
     if (can_check_place)

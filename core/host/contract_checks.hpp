@@ -10,6 +10,7 @@
 
 #include <arhost/frame.h>
 #include <arhost/scene.h>
+#include <arhost/shading/lens.hpp>
 #include <arhost/sink.h>
 #include <arhost/tracker.h>
 
@@ -84,16 +85,17 @@ std::size_t sample_hash(std::span<const std::byte> bytes, std::uint64_t frame);
 // Checks the images of a ray tracer:
 // raytracer.region: alpha is 0 outside the reported region.
 // raytracer.place: alpha is 255 only inside the projected bounding box of the virtual objects. Checked only for
-// static scenes and cameras without lens distortion.
+// static scenes.
 class OverlayChecks {
 public:
     explicit OverlayChecks(const arhost_scene &scene);
     // `overlay` must have the camera's image size.
     void check(ContractChecks &checks, std::uint64_t frame, const arhost_camera &camera, const Region &region,
-               const ImageView &overlay) const;
+               const ImageView &overlay);
 
 private:
     bool checks_place_ = false;             // whether raytracer.place is checked
+    std::optional<shading::Lens> lens_;     // of the camera, which is the same in all frames
     std::optional<scene::Box> virtual_box_; // world coordinates, mm; nullopt if the scene has no virtual object
 };
 

@@ -3,7 +3,7 @@
 // A video frame in the pipeline, and the validation of what workers report about it.
 #pragma once
 
-#include "compositor/lens_warp.hpp"
+#include "compositor/compositor.hpp"
 #include "host/slots.hpp"
 #include "host/statistics.hpp"
 
@@ -41,7 +41,6 @@ struct Frame {
     Lease result;               // slot in the tracker's memory, while tracking
     Lease overlay;              // slot in the ray tracer's memory
     arhost_render_info render{};
-    std::shared_ptr<LensWarp> warp; // lens distortion to apply to the overlay, or null
     arhost_record record{};
     std::optional<std::size_t> pixels_sample, overlay_sample; // hashes for the contract checks
     Clock::time_point received;

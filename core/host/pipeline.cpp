@@ -7,6 +7,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <utility>
 
 namespace arhost::host {
 
@@ -36,6 +37,8 @@ bool Pipeline::run() {
         context_.reactor.run_once();
         pump();
     }
+    if (!live_)
+        check_all_overlays();
     return failure_.empty();
 }
 
@@ -74,6 +77,14 @@ std::vector<std::string> Pipeline::findings() const {
     return lines;
 }
 
+// In mode lockstep, the output must be that of a run without failures.
+void Pipeline::check_all_overlays() {
+    for (const auto &[stage, count] : statistics_.skipped)
+        fail(std::to_string(count) + (count == 1 ? " frame has" : " frames have") + " no overlay because the " +
+                 stage + " failed; see its messages above",
+             false);
+}
+
 std::vector<Component *> Pipeline::components() const {
     std::vector<Component *> all;
     for (const auto *component : {&source_, &tracker_, &raytracer_})
@@ -95,7 +106,7 @@ void Pipeline::pump() {
         bool sinks_empty = true;
         for (const auto &sink : sinks_) {
             sink->pump();
-            sinks_empty = sinks_empty && (sink->empty() || sink->failed);
+            sinks_empty = sinks_empty && (sink->empty() || sink->closed);
         }
         if (no_more_frames() && reads_.empty()) {
             if (frames_.empty() && sinks_empty)
@@ -136,9 +147,14 @@ void Pipeline::advance_phase() {
         make_outputs(); // created last, so that a run that cannot start does not touch any file
         phase_ = Phase::outputs;
     }
-    if (phase_ == Phase::outputs &&
-        std::all_of(sinks_.begin(), sinks_.end(), [&](const auto &sink) { return is_ready(sink->component); }))
-        check_scratch_ ? kill_components() : void(phase_ = Phase::running);
+    if (phase_ == Phase::outputs && std::all_of(sinks_.begin(), sinks_.end(), [&](const auto &sink) {
+            return sink->closed || is_ready(sink->component);
+        })) {
+        if (check_scratch_)
+            return kill_components();
+        phase_ = Phase::running;
+        end_without_sinks();
+    }
 }
 
 bool Pipeline::no_more_frames() const {
@@ -158,10 +174,37 @@ void Pipeline::cancel_stages() {
             stage->cancel_call();
 }
 
+std::chrono::milliseconds Pipeline::longest_stop_deadline() const {
+    std::chrono::milliseconds longest{0};
+    const auto add = [&](const run_config::ComponentConfiguration &component) {
+        longest = std::max(longest, component.limits.stop);
+    };
+    if (configuration_.source)
+        add(*configuration_.source);
+    if (configuration_.tracker)
+        add(*configuration_.tracker);
+    if (configuration_.raytracer)
+        add(*configuration_.raytracer);
+    std::for_each(configuration_.outputs.begin(), configuration_.outputs.end(), add);
+    return longest;
+}
+
 void Pipeline::interrupt() {
     // Before the first frame nothing was written to the outputs, so there is nothing to finish.
     abandoned_ = interrupted_ || phase_ < Phase::running;
-    interrupted_ = true;
+    if (!std::exchange(interrupted_, true)) {
+        const std::chrono::milliseconds limit = longest_stop_deadline();
+        interrupt_deadline_ = context_.reactor.at(Reactor::Clock::now() + limit, [this, limit] {
+            std::string late;
+            for (const Component *component : components())
+                if (component->state() != Component::State::stopped)
+                    late += (late.empty() ? "" : ", ") + component->name();
+            fail("not stopped within " + std::to_string(limit.count()) +
+                     " ms after the signal (stop_deadline_ms): " + late + "; their files may be incomplete",
+                 false);
+            abandoned_ = true;
+        });
+    }
     end_run();
 }
 

@@ -49,8 +49,9 @@ public:
     const std::string &looked_for() const { return looked_for_; }
     bool failed_by_configuration() const { return failed_by_configuration_; }
 
-    // Handles Ctrl-C. The first call lets the frames in progress finish and then ends the run; a second call ends the
-    // run immediately. Must be called from the reactor.
+    // Handles Ctrl-C. The first call lets the frames in progress finish and then ends the run, after the longest
+    // stop_deadline_ms of the components at the latest; a second call ends the run immediately. Must be called from
+    // the reactor.
     void interrupt();
 
     const Statistics &statistics() const { return statistics_; }
@@ -82,6 +83,7 @@ private:
     ImageView overlay_of(const Frame &frame) const;
     void check_buffers_unmodified(const Frame &frame);
     void cancel_stages();
+    std::chrono::milliseconds longest_stop_deadline() const;
     void stop_components();
     void kill_components();
 
@@ -90,7 +92,7 @@ private:
     void set_camera_from_markers(Frame &frame);
     void set_camera_from_trajectory(Frame &frame) const;
     void on_camera_known(Frame &frame);
-    Frame *accept_result(const ipc::Command &command, const ipc::Result &result, const char *stage);
+    Frame *accept_result(const ipc::Command &command, const ipc::Result &result, supervise::Component &stage);
     void on_tracked(const ipc::Command &command, const ipc::Result &result);
     void on_rendered(const ipc::Command &command, const ipc::Result &result);
     void on_stage_lost(const std::vector<ipc::Command> &unanswered, Frame::Stage waiting);
@@ -99,11 +101,14 @@ private:
     bool may_skip(const supervise::Component *stage) const;
     bool is_behind() const;
     void skip(Frame &frame, const char *stage);
+    void check_all_overlays();
     void enqueue(Frame &frame, Frame::Stage stage);
     Frame *next_waiting(Frame::Stage stage);
     void drop_overtaken(std::uint64_t shown);
 
-    void disable_sink(SinkQueue &sink);
+    void end_sink(SinkQueue &sink, bool may_quit);
+    void close_sink(SinkQueue &sink);
+    void end_without_sinks(); // ends the run if all outputs are closed
     // `was_logged`: the user has already seen the reason.
     void fail(const std::string &reason, bool is_configuration_error, bool was_logged = false);
     void on_disabled(const std::string &name, const yaml::Node &node, const std::string &reason,
@@ -127,7 +132,6 @@ private:
     std::optional<arhost_frame_format> format_;
     std::uint64_t frame_count_ = 0;
     arhost_intrinsics intrinsics_{};
-    std::shared_ptr<LensWarp> warp_; // null if the ray tracer supports lens distortion
     std::set<std::int32_t> marker_ids_;
     std::string looked_for_; // the markers and dictionary of the current tracker, for messages
 
@@ -138,6 +142,7 @@ private:
     bool input_ended_ = false; // the source has ended, or no more frames are to be read from it
     bool interrupted_ = false;
     bool abandoned_ = false; // the run must end immediately
+    ipc::Reactor::Registration interrupt_deadline_;
     std::map<std::uint64_t, std::unique_ptr<Frame>> frames_;
     std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // with the number of its frame
 

@@ -4,6 +4,7 @@
 #include "host/pipeline.hpp"
 
 #include "camera/calibration.hpp"
+#include "camera/lens.hpp"
 #include "host/outcome.hpp"
 #include "run_config/access.hpp"
 
@@ -72,6 +73,8 @@ void Pipeline::make_source() {
         else if (configuration_.tracker)
             source.node.fail("this source does not report camera intrinsics: add 'camera: {file: calibration.yaml}' "
                              "(docs/camera.md)");
+        if (const std::string problem = camera::problem_with_lens(intrinsics_); !problem.empty())
+            configuration_.camera_node.value_or(source.node).fail(problem);
         if (configuration_.tracker || configuration_.trajectory) {
             try {
                 camera::check_size(intrinsics_, format.width, format.height);
@@ -127,9 +130,8 @@ void Pipeline::load_scene() {
         fail(reason, true);
         scene_loading_.reset();
     };
-    scene_loading_ =
-        std::make_unique<SceneLoading>(context_, raytracer.scene, configuration_.sandbox, raytracer.limits.start,
-                                       configuration_.files, std::move(callbacks));
+    scene_loading_ = std::make_unique<SceneLoading>(context_, raytracer.scene, configuration_.sandbox,
+                                                    raytracer.limits, configuration_.files, std::move(callbacks));
 }
 
 void Pipeline::make_tracker() {
@@ -161,18 +163,15 @@ void Pipeline::make_raytracer() {
     callbacks.hello = [this, &raytracer](const PluginDescription &plugin, std::size_t candidate) {
         std::vector<OptionValue> options =
             run_config::options_for(plugin, ARHOST_KIND_RAYTRACER, raytracer, candidate);
-        warp_.reset();
         if (intrinsics_.distortion != ARHOST_DISTORTION_NONE &&
-            !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION)) {
-            warp_ = std::make_shared<LensWarp>(intrinsics_);
+            !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION))
             context_.log(ARHOST_SEVERITY_WARNING, "raytracer",
                          plugin.id +
-                             " does not support lens distortion: the host warps the rendered images, which costs "
+                             " does not support lens distortion: its worker warps the rendered images, which costs "
                              "sharpness and time");
-        }
-        const arhost_intrinsics &traced = warp_ ? warp_->pinhole() : intrinsics_;
         return Component::Create{
-            {std::move(options), messages::RaytracerSetup{format_->width, format_->height, traced}}, arena_.fd()};
+            {std::move(options), messages::RaytracerSetup{format_->width, format_->height, intrinsics_}},
+            arena_.fd()};
     };
     callbacks.ready = [this](const messages::Ready &) {
         return SlotLayout{std::uint64_t(overlay_stride(format_->width)) * format_->height, stage_slot_count};
@@ -223,11 +222,11 @@ void Pipeline::make_sink(std::size_t index, const std::string &name) {
                 option.text = check_folder(*check_scratch_, index) / std::filesystem::path(option.text).filename();
         return Component::Create{{std::move(options), setup}, {}};
     };
-    callbacks.result = [this, sink, name](const Command &command, const Result &result) {
+    callbacks.result = [this, sink, name, &output](const Command &command, const Result &result) {
         sink->on_result(command, result);
         if (result.status == ARHOST_STATUS_END)
-            end_run();
-        if (result.status >= 0 || sink->failed)
+            end_sink(*sink, output.may_quit);
+        if (result.status >= 0 || sink->closed)
             return;
         // A restart would not help, for example if the disk is full. Keeps the files that are complete and continues
         // with the other outputs.
@@ -235,14 +234,14 @@ void Pipeline::make_sink(std::size_t index, const std::string &name) {
                                    status_text(result.status) + "; see the output's messages above";
         context_.log(ARHOST_SEVERITY_ERROR, name, reason);
         fail(name + ": " + reason, false, true);
-        disable_sink(*sink);
+        close_sink(*sink);
         sink->component->stop();
     };
     callbacks.lost = [sink](const std::vector<Command> &) { sink->on_lost(); };
-    callbacks.end_requested = [this] { end_run(); };
+    callbacks.end_requested = [this, sink, &output] { end_sink(*sink, output.may_quit); };
     callbacks.disabled = [this, sink, name, &output](const std::string &reason, bool is_configuration_error) {
         on_disabled(name, output.node, reason, is_configuration_error);
-        disable_sink(*sink);
+        close_sink(*sink);
     };
     sink->component = std::make_unique<Component>(context_, name, output.plugins, output.limits, output.policy,
                                                   std::move(callbacks));
@@ -259,11 +258,32 @@ void Pipeline::expect_distinct_files(std::size_t index, const PluginDescription 
     run_config::expect_distinct(files);
 }
 
-void Pipeline::disable_sink(SinkQueue &sink) {
-    sink.failed = true;
+// Called when a sink has returned ARHOST_STATUS_END.
+void Pipeline::end_sink(SinkQueue &sink, bool may_quit) {
+    const std::string &name = sink.component->name();
+    if (sink.closed || sink.has_quit)
+        return;
+    if (may_quit) {
+        sink.has_quit = true;
+        context_.log(ARHOST_SEVERITY_INFO, name, "ends the run");
+        return end_run();
+    }
+    close_sink(sink);
+    context_.log(ARHOST_SEVERITY_INFO, name,
+                 input_ended_ ? "has ended"
+                              : "has ended; the other outputs continue ('control: [quit]' lets it end the run)");
+    sink.component->stop();
+}
+
+void Pipeline::close_sink(SinkQueue &sink) {
+    sink.closed = true;
     sink.clear();
-    if (phase_ == Phase::running &&
-        std::all_of(sinks_.begin(), sinks_.end(), [](const auto &other) { return other->failed; }))
+    if (phase_ == Phase::running)
+        end_without_sinks();
+}
+
+void Pipeline::end_without_sinks() {
+    if (!sinks_.empty() && std::all_of(sinks_.begin(), sinks_.end(), [](const auto &sink) { return sink->closed; }))
         end_run();
 }
 

@@ -146,8 +146,8 @@ bool Pipeline::track() {
 }
 
 // Records the result of a stage and returns the result's frame; null if the frame was overtaken or the stage failed.
-Frame *Pipeline::accept_result(const Command &command, const Result &result, const char *stage) {
-    statistics_.stages[stage].add(std::chrono::nanoseconds(result.busy_ns));
+Frame *Pipeline::accept_result(const Command &command, const Result &result, Component &stage) {
+    statistics_.stages[stage.name()].add(std::chrono::nanoseconds(result.busy_ns));
     const auto found = frames_.find(command.sequence);
     if (found == frames_.end())
         return nullptr;
@@ -158,16 +158,16 @@ Frame *Pipeline::accept_result(const Command &command, const Result &result, con
         return nullptr;
     }
     if (result.status < 0) {
-        context_.log(ARHOST_SEVERITY_WARNING, stage,
-                     "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
-        skip(frame, stage);
+        stage.log(ARHOST_SEVERITY_WARNING,
+                  "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
+        skip(frame, stage.name().c_str());
         return nullptr;
     }
     return &frame;
 }
 
 void Pipeline::on_tracked(const Command &command, const Result &result) {
-    Frame *accepted = accept_result(command, result, "tracker");
+    Frame *accepted = accept_result(command, result, *tracker_);
     if (!accepted)
         return;
     Frame &frame = *accepted;
@@ -249,9 +249,6 @@ bool Pipeline::render() {
     command.sequence = frame->record.sequence;
     command.time_s = 1e-9 * static_cast<double>(frame->record.capture_ns);
     command.camera = frame->record.camera;
-    if (warp_)
-        command.camera.intrinsics = warp_->pinhole();
-    frame->warp = warp_;
     raytracer_->submit(command);
     return true;
 }
@@ -260,7 +257,7 @@ void Pipeline::on_rendered(const Command &command, const Result &result) {
     const std::chrono::nanoseconds busy(result.busy_ns), device = device_time(result.render, busy);
     if (device.count())
         statistics_.stages["device"].add(device);
-    Frame *accepted = accept_result(command, result, "raytracer");
+    Frame *accepted = accept_result(command, result, *raytracer_);
     if (!accepted)
         return;
     Frame &frame = *accepted;
@@ -362,7 +359,7 @@ bool Pipeline::compose() {
                 ready = it;
     if (ready == frames_.end() || ready->second->stage != Frame::Stage::done)
         return false;
-    const bool has_sink = std::any_of(sinks_.begin(), sinks_.end(), [](const auto &sink) { return !sink->failed; });
+    const bool has_sink = std::any_of(sinks_.begin(), sinks_.end(), [](const auto &sink) { return !sink->closed; });
     bool is_shown = true;
     if (has_sink) {
         std::optional<Lease> slot = output_slots_->acquire();
@@ -411,10 +408,6 @@ void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
     if (frame.record.overlay != ARHOST_OVERLAY_NONE) {
         overlay = overlay_of(frame);
         region = region_of(frame.render, format_->width, format_->height);
-        if (frame.warp) {
-            overlay = frame.warp->warp(overlay, region);
-            region = {0, 0, format_->width, format_->height};
-        }
     }
     // Copies the record only up to its last used marker.
     const std::size_t used = offsetof(arhost_record, markers) + frame.record.marker_count * sizeof(arhost_marker);

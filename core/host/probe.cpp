@@ -34,8 +34,8 @@ std::string query(supervise::Context &context, const std::filesystem::path &plug
             reason = death.how;
         dead = true;
     };
-    supervise::Process process(context, plugin.stem().string(), std::move(callbacks),
-                               messages::Open{plugin.string(), policy});
+    supervise::WorkerBudget budget(context.log, plugin.stem().string());
+    supervise::Process process(context, budget, std::move(callbacks), messages::Open{plugin.string(), policy});
     running = &process;
     const auto deadline = context.reactor.at(Reactor::Clock::now() + timeout, [&] {
         process.end(late + " within " + std::to_string(timeout.count()) + " s");

@@ -25,16 +25,20 @@ sandbox::Policy policy_of(sandbox::Mode mode) {
 } // namespace
 
 SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
-                           std::chrono::milliseconds timeout, run_config::FilesInUse files, Callbacks callbacks)
+                           const base::Limits &limits, run_config::FilesInUse files, Callbacks callbacks)
     : context_(context), callbacks_(std::move(callbacks)), files_(std::move(files)), scene_(scene.string()),
-      timeout_(timeout) {
+      timeout_(limits.start), budget_(context.log, "scene") {
     supervise::Process::Callbacks process_callbacks;
     process_callbacks.message = [this](Message &message) { on_message(message); };
     process_callbacks.result = [](const Result &) {};
     process_callbacks.died = [this](const supervise::Death &death) { on_died(death); };
-    process_ = std::make_unique<supervise::Process>(context, "scene", std::move(process_callbacks),
+    process_ = std::make_unique<supervise::Process>(context, budget_, std::move(process_callbacks),
                                                     messages::Load{scene_, policy_of(sandbox)});
     restart_deadline();
+    total_deadline_ = context_.reactor.at(Reactor::Clock::now() + limits.start_total, [this, limits] {
+        process_->end("took longer than " + std::to_string(limits.start_total.count()) +
+                      " ms, the limit in total (30 times raytracer.start_deadline_ms)");
+    });
 }
 
 void SceneLoading::on_message(Message &message) {
@@ -47,7 +51,7 @@ void SceneLoading::on_message(Message &message) {
         const auto reads = parse<messages::Reads>(message);
         check_read({reads.path, reads.node});
     } else if (is<messages::Progress>(message)) {
-        context_.log(ARHOST_SEVERITY_DEBUG, "scene", parse<messages::Progress>(message).what);
+        budget_.log(ARHOST_SEVERITY_DEBUG, parse<messages::Progress>(message).what);
     }
 }
 
@@ -74,6 +78,7 @@ void SceneLoading::fail(const std::string &reason) {
 
 void SceneLoading::on_died(const supervise::Death &death) {
     deadline_.cancel();
+    total_deadline_.cancel();
     const Callbacks callbacks = std::move(callbacks_);
     if (!failure_.empty() || !death.clean || !arena_)
         return callbacks.failed(failure_.empty() ? scene_ + ": the scene loader failed: " + death.how : failure_);

@@ -4,6 +4,7 @@
 // it.
 #pragma once
 
+#include "base/limits.hpp"
 #include "run_config/files_in_use.hpp"
 #include "sandbox/sandbox.hpp"
 #include "supervise/process.hpp"
@@ -23,10 +24,10 @@ public:
         std::function<void(ipc::SharedMemory arena)> loaded; // `arena` is frozen and validated
         std::function<void(const std::string &reason)> failed;
     };
-    // `timeout` is the maximum time between two messages of the loader. Loading fails if the scene refers to a file
-    // that the run writes, according to `files`.
+    // `limits.start` is the maximum time between two messages of the loader, `limits.start_total` the maximum time of
+    // loading. Loading fails if the scene refers to a file that the run writes, according to `files`.
     SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
-                 std::chrono::milliseconds timeout, run_config::FilesInUse files, Callbacks callbacks);
+                 const base::Limits &limits, run_config::FilesInUse files, Callbacks callbacks);
 
 private:
     void restart_deadline();
@@ -41,7 +42,8 @@ private:
     std::string scene_, failure_;
     base::UniqueFd arena_;
     std::chrono::milliseconds timeout_;
-    ipc::Reactor::Registration deadline_;
+    supervise::WorkerBudget budget_;
+    ipc::Reactor::Registration deadline_, total_deadline_;
     std::unique_ptr<supervise::Process> process_;
 };
 

@@ -6,7 +6,7 @@ namespace arhost::host {
 using namespace ipc;
 
 void SinkQueue::offer(OutputFramePointer frame) {
-    if (failed)
+    if (closed)
         return;
     waiting_.push_back(std::move(frame));
     if (max_waiting > 0 && waiting_.size() > max_waiting) {
@@ -16,7 +16,7 @@ void SinkQueue::offer(OutputFramePointer frame) {
 }
 
 void SinkQueue::pump() {
-    while (!failed && component->running() && !waiting_.empty() && component->in_flight() < max_in_flight) {
+    while (!closed && component->running() && !waiting_.empty() && component->in_flight() < max_in_flight) {
         const OutputFramePointer frame = waiting_.front();
         waiting_.pop_front();
         unconfirmed_.push_back(frame);

@@ -18,7 +18,8 @@ public:
     // Maximum number of waiting frames; if there are more, the queue drops the oldest. 0: unlimited, the run waits
     // for the sink.
     std::size_t max_waiting = 0;
-    bool failed = false; // accepts no more frames
+    bool closed = false;   // has failed or ended, and accepts no more frames
+    bool has_quit = false; // has ended the run; receives the remaining frames
 
     void offer(OutputFramePointer frame);
     void pump(); // submits waiting frames to the sink

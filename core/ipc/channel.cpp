@@ -4,6 +4,7 @@
 #include "ipc/fd_passing.hpp"
 #include "ipc/message.hpp"
 
+#include <algorithm>
 #include <poll.h>
 #include <sys/socket.h>
 
@@ -36,11 +37,14 @@ ReceiveState Channel::receive(Message &message, int timeout_ms) const {
         if (polled == 0 || (polled < 0 && errno == EINTR))
             return ReceiveState::none;
     }
-    std::vector<char> text(max_message_size);
+    const ssize_t waiting = ::recv(fd_.get(), nullptr, 0, MSG_PEEK | MSG_TRUNC | MSG_DONTWAIT);
+    std::vector<char> text(
+        std::clamp<std::size_t>(waiting < 0 ? 0 : static_cast<std::size_t>(waiting), 1, max_message_size));
     const auto [size, truncated] =
         receive_with_fds(fd_.get(), std::as_writable_bytes(std::span(text)), message.fds, MSG_DONTWAIT);
     if (size <= 0)
         return size < 0 && errno == EAGAIN ? ReceiveState::none : ReceiveState::closed;
+    message.size = static_cast<std::size_t>(size);
     if (truncated)
         return ReceiveState::malformed;
     message.body = Json::parse(text.data(), text.data() + size, nullptr, false);

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
@@ -205,7 +206,8 @@ arhost_intrinsics intrinsics_from_json(const Json &json) {
     i.distortion = json.at("distortion").get<arhost_distortion>();
     const auto coefficients = json.at("coefficients").get<std::vector<double>>();
     if (i.fx <= 0 || i.fy <= 0 || i.width < 1 || i.height < 1 || i.distortion < ARHOST_DISTORTION_NONE ||
-        i.distortion > ARHOST_DISTORTION_FISHEYE || coefficients.size() > ARHOST_MAX_DISTORTION)
+        i.distortion > ARHOST_DISTORTION_FISHEYE || coefficients.size() > ARHOST_MAX_DISTORTION ||
+        !std::all_of(coefficients.begin(), coefficients.end(), [](double k) { return std::isfinite(k); }))
         throw std::runtime_error("the camera's intrinsics are out of range");
     i.coefficient_count = static_cast<std::uint32_t>(coefficients.size());
     std::copy(coefficients.begin(), coefficients.end(), i.coefficients);

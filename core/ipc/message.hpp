@@ -15,6 +15,7 @@ namespace arhost::ipc {
 struct Message {
     nlohmann::json body; // an object with a string "type"
     std::vector<base::UniqueFd> fds;
+    std::size_t size = 0; // bytes received
 };
 
 } // namespace arhost::ipc

@@ -2,6 +2,7 @@
 #include "run_config/configuration.hpp"
 
 #include "camera/calibration.hpp"
+#include "camera/lens.hpp"
 #include "run_config/access.hpp"
 #include "run_config/options.hpp"
 #include "run_config/schema.hpp"
@@ -47,6 +48,19 @@ base::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
     return limits;
 }
 
+// Returns whether `control` lists `quit`.
+bool parse_control(const yaml::Node &control) {
+    bool may_quit = false;
+    for (const yaml::Node &command : control.items()) {
+        const std::string name =
+            command.choice({"quit", "freeze", "snapshot", "record", "load_scene", "swap", "set", "status"});
+        if (name != "quit")
+            command.fail("'" + name + "' is not available yet; the only command so far is 'quit'");
+        may_quit = true;
+    }
+    return may_quit;
+}
+
 // Settings that apply to all components.
 struct Shared {
     PluginPath plugin_path;
@@ -74,6 +88,8 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
         std::chrono::milliseconds(integer_or_default(node, schema_path + ".start_deadline_ms", 1, max_ms));
     component.limits.stop =
         std::chrono::milliseconds(integer_or_default(node, schema_path + ".stop_deadline_ms", 1, max_ms));
+    component.limits.start_total = base::Limits::total_factor * component.limits.start;
+    component.limits.stop_total = base::Limits::total_factor * component.limits.stop;
     component.limits.restart = shared.restart;
     component.policy = access_of(node, schema_path == "outputs[]");
     component.policy.mode = shared.sandbox;
@@ -85,6 +101,8 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
                   "the two");
     if (const auto conform = node.find("conform"))
         component.conform = conform->boolean();
+    if (const auto control = node.find("control"))
+        component.may_quit = parse_control(*control);
     return component;
 }
 
@@ -217,6 +235,9 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
             configuration.camera_node = trajectory_node;
         }
     }
+    if (configuration.camera)
+        if (const std::string problem = camera::problem_with_lens(*configuration.camera); !problem.empty())
+            configuration.camera_node->fail(problem);
     if (const auto node = root.find("tracker")) {
         configuration.tracker = parse_tracker(*node, shared);
         if (!configuration.source)

@@ -32,6 +32,7 @@ struct ComponentConfiguration {
     base::Limits limits;
     sandbox::Policy policy; // docs/security.md
     bool conform = false;   // check results at run time (docs/conformance.md)
+    bool may_quit = false;  // the output may end the run (`control: [quit]`)
 };
 
 struct SourceConfiguration : ComponentConfiguration {

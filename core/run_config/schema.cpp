@@ -114,9 +114,11 @@ std::vector<Key> make_table() {
          {"coordinates.rotations", list, false, "", "One or two rotations, applied if the profiles differ."},
          {"coordinates.rotations[].degrees", real, true, "", "Angle in degrees, counter-clockwise."},
          {"coordinates.rotations[].axis", reals, true, "", "Three numbers, not all zero."}});
-    add_component(keys, {"outputs", list, false, "", "Outputs for the augmented frames."}, "sink_video",
-                  {{"path", output_path, false, "",
-                    "Output file, for plugins that write files; its folder becomes writable."}});
+    add_component(
+        keys, {"outputs", list, false, "", "Outputs for the augmented frames."}, "sink_video",
+        {{"path", output_path, false, "", "Output file, for plugins that write files; its folder becomes writable."},
+         {"control", list, false, "nothing",
+          "Commands that the output may give: `quit` ends the run, for example when its window is closed."}});
     add(keys, "",
         {
             {"live", map, false, "", "Settings of mode `live`."},

@@ -39,11 +39,30 @@ bool is_file(const std::string &file, void *) { // rejects FIFOs, which would bl
     return std::filesystem::is_regular_file(file, ignored);
 }
 
-bool read_file(std::vector<unsigned char> *content, std::string *error, const std::string &file, void *reporter) {
-    static_cast<const Reporter *>(reporter)->reads(file);
+// What read_file needs to read the resources (buffers and images) of a glTF file.
+struct Resources {
+    const Reporter &reporter;
+    const std::string &gltf;                     // name of the glTF file, for messages
+    std::vector<std::filesystem::path> readable; // resolved files and folders
+};
+
+bool is_below(const std::filesystem::path &file, const std::filesystem::path &folder) {
+    return std::mismatch(folder.begin(), folder.end(), file.begin(), file.end()).first == folder.end();
+}
+
+bool read_file(std::vector<unsigned char> *content, std::string *error, const std::string &file, void *context) {
+    const auto &resources = *static_cast<const Resources *>(context);
+    std::error_code unresolved;
+    const std::filesystem::path resolved = std::filesystem::canonical(file, unresolved);
+    if (!unresolved &&
+        std::ranges::none_of(resources.readable, [&](const auto &folder) { return is_below(resolved, folder); }))
+        throw MeshError(
+            resources.gltf + ": refers to '" + resolved.string() +
+            "', which is outside its folder; move that file there, or list it under 'reads' in the scene");
+    resources.reporter.reads(file);
     std::error_code ignored;
-    if (is_file(file, nullptr) && std::filesystem::file_size(file, ignored) <= file_limit)
-        return tinygltf::ReadWholeFile(content, error, file, nullptr);
+    if (is_file(resolved, nullptr) && std::filesystem::file_size(resolved, ignored) <= file_limit)
+        return tinygltf::ReadWholeFile(content, error, resolved, nullptr);
     *error += file + ": is not a regular file, or is larger than 4 GiB";
     return false;
 }
@@ -114,16 +133,18 @@ void check_structure(const MeshFile &text) {
     }
 }
 
-tinygltf::Model parse(const std::filesystem::path &file, const Reporter &reporter) {
+tinygltf::Model parse(const std::filesystem::path &file, std::span<const std::filesystem::path> reads,
+                      const Reporter &reporter) {
     const MeshFile text = MeshFile::read(file, file_limit - 1, reporter);
     check_structure(text);
     tinygltf::TinyGLTF parser;
     parser.SetImageLoader(keep_image_bytes, nullptr);
-    parser.SetFsCallbacks(
-        {is_file, tinygltf::ExpandFilePath, read_file, tinygltf::WriteWholeFile, const_cast<Reporter *>(&reporter)});
+    const std::string folder = file.parent_path().string();
+    Resources resources{reporter, text.name(), {reads.begin(), reads.end()}};
+    resources.readable.push_back(std::filesystem::canonical(folder.empty() ? "." : folder));
+    parser.SetFsCallbacks({is_file, tinygltf::ExpandFilePath, read_file, tinygltf::WriteWholeFile, &resources});
     tinygltf::Model model;
     std::string error, warning;
-    const std::string folder = file.parent_path().string();
     const auto size = static_cast<unsigned int>(text.view().size());
     const bool good =
         text.view().starts_with("glTF")
@@ -311,7 +332,8 @@ public:
     GltfLoader(ArenaBuilder &builder, Textures &textures, const std::filesystem::path &file,
                const GltfPlacement &placement, const LoadCallbacks &callbacks)
         : builder_(builder), textures_(textures), file_(file), name_(file.string()), placement_(placement),
-          reporter_(callbacks, file.filename().string()), model_(parse(file, reporter_)), accessors_(model_, name_) {}
+          reporter_(callbacks, file.filename().string()), model_(parse(file, placement.reads, reporter_)),
+          accessors_(model_, name_) {}
 
     float load() {
         check_extensions();

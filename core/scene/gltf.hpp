@@ -9,7 +9,9 @@
 #include "scene/shapes.hpp"
 #include "scene/textures.hpp"
 
+#include <filesystem>
 #include <optional>
+#include <span>
 
 namespace arhost::scene {
 
@@ -25,6 +27,8 @@ struct GltfPlacement {
     arhost_role role = ARHOST_ROLE_VIRTUAL;
     std::optional<std::uint32_t> material; // index of a material that replaces all materials of the file
     std::optional<std::string> animation;  // name or index of an animation; absent: the objects do not move
+    // Files and folders, without links, from which buffers and images may be read, besides the file's own folder.
+    std::span<const std::filesystem::path> reads;
 };
 
 // Adds all meshes of the file's default scene. Returns the duration of the animation in seconds, or 0. Throws

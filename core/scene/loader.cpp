@@ -559,6 +559,15 @@ TriangleMesh mesh_of(const Node &object, const Node &path, const Transform &worl
     }
 }
 
+// Resolves all links.
+std::filesystem::path existing_path_of(const Node &node) {
+    std::error_code error;
+    std::filesystem::path path = std::filesystem::canonical(node.input_path(), error);
+    if (error)
+        node.fail("there is no file or folder '" + node.input_path().string() + "': " + error.message());
+    return path;
+}
+
 class SceneLoader {
 public:
     SceneLoader(const Node &root, const LoadCallbacks &callbacks)
@@ -566,7 +575,10 @@ public:
 
     ArenaBuilder load() {
         root_.allow_keys({"version", "axes", "max_depth", "ambient", "background", "shadow_alpha", "coloured_shadows",
-                          "environment", "materials", "lights", "objects"});
+                          "environment", "materials", "lights", "objects", "reads"});
+        if (const auto reads = root_.find("reads"))
+            for (const Node &node : reads->items())
+                reads_.push_back(existing_path_of(node));
         builder_.settings = settings_of(root_);
         if (const auto environment = root_.find("environment")) {
             set_origin(*environment);
@@ -623,8 +635,8 @@ private:
             // glTF is y-up by definition.
             const Transform to_scene_axes =
                 builder_.settings.axes == ARHOST_AXES_Z_UP ? Transform::rotation({1, 0, 0}, 90) : Transform();
-            add_gltf_file(node, shape, {name, world_from_object * to_scene_axes, motion_node, role, material, {}},
-                          part);
+            add_gltf_file(node, shape,
+                          {name, world_from_object * to_scene_axes, motion_node, role, material, {}, reads_}, part);
         } else {
             const std::uint32_t geometry = add_geometry(node, shape_key, shape, world_from_object, *material, part);
             const bool moves = motion_node != ARHOST_NONE;
@@ -742,6 +754,7 @@ private:
     ArenaBuilder builder_;
     Textures textures_;
     std::map<std::string, std::uint32_t> materials_;
+    std::vector<std::filesystem::path> reads_; // without links
 };
 
 } // namespace

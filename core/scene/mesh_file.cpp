@@ -17,6 +17,9 @@ namespace arhost::scene {
 namespace {
 
 constexpr std::size_t chunk = 1 << 20; // bytes read between two progress reports
+// A compressed file may expand to this multiple of its size, or to max_small_expansion bytes if that is more. Meshes
+// shrink to a third to a tenth; a file of only zeros shrinks to a thousandth.
+constexpr std::uint64_t max_expansion = 100, max_small_expansion = 16 << 20;
 
 class File {
 public:
@@ -85,14 +88,21 @@ public:
     GzipReader(const GzipReader &) = delete;
     GzipReader &operator=(const GzipReader &) = delete;
 
-    Bytes run(std::uint64_t byte_limit, const Reporter &reporter) {
+    Bytes run(std::uint64_t file_limit, const Reporter &reporter) {
+        const std::uint64_t expanded_limit =
+            std::max<std::uint64_t>(max_small_expansion, max_expansion * std::uint64_t(compressed_.size()));
+        const std::uint64_t byte_limit = std::min(file_limit, expanded_limit);
         Bytes out;
         out.resize(estimated_size(byte_limit));
         std::size_t written = 0, consumed = 0;
         while (true) {
             if (written == out.size()) {
                 if (out.size() >= byte_limit)
-                    fail(name_, "its decompressed content exceeds the limit of " + mebibytes(byte_limit));
+                    fail(name_, "its decompressed content exceeds the limit of " + mebibytes(byte_limit) +
+                                    (byte_limit == expanded_limit
+                                         ? " for a file of this size; meshes do not compress so well: decompress it "
+                                           "with gunzip if it is genuine"
+                                         : ""));
                 out.resize(std::min<std::uint64_t>(byte_limit, std::max(chunk, 2 * out.size())));
             }
             stream_.next_in = reinterpret_cast<Bytef *>(compressed_.data() + consumed);

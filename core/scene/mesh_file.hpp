@@ -35,7 +35,8 @@ private:
 // The content of a file, after gzip decompression if it is compressed.
 class MeshFile {
 public:
-    // Throws MeshError, also if the file or its decompressed content has more than `byte_limit` bytes.
+    // Throws MeshError, also if the file or its decompressed content has more than `byte_limit` bytes, or if the
+    // content is over 16 MiB and over 100 times as large as the compressed file.
     static MeshFile read(const std::filesystem::path &file, std::uint64_t byte_limit, const Reporter &reporter);
 
     const char *begin() const { return bytes_.get()->data(); }

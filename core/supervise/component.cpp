@@ -41,7 +41,8 @@ RegionPointer make_host_region(const char *name, const SlotLayout &layout) {
 Component::Component(Context &context, std::string name, std::vector<std::filesystem::path> plugins,
                      const base::Limits &limits, sandbox::Policy policy, Callbacks callbacks)
     : context_(context), name_(std::move(name)), plugins_(std::move(plugins)), limits_(limits),
-      sandbox_(std::move(policy)), callbacks_(std::move(callbacks)), policy_(limits.restart) {}
+      sandbox_(std::move(policy)), callbacks_(std::move(callbacks)), budget_(context.log, name_),
+      policy_(limits.restart) {}
 
 void Component::start() {
     spawn();
@@ -49,6 +50,7 @@ void Component::start() {
 
 void Component::spawn() {
     state_ = State::starting;
+    handshake_ = Handshake::opening;
     stop_sent_ = false;
     stop_response_.reset();
     configuration_error_.clear();
@@ -59,13 +61,14 @@ void Component::spawn() {
     callbacks.result = [this](const Result &result) { on_result(result); };
     callbacks.died = [this](const Death &death) { on_died(death); };
     try {
-        process_ = std::make_unique<Process>(context_, name_, std::move(callbacks),
+        process_ = std::make_unique<Process>(context_, budget_, std::move(callbacks),
                                              messages::Open{plugin().string(), sandbox_});
     } catch (const std::exception &error) { // handled like the death of a process
         state_ = State::waiting;
         return restart(error.what());
     }
     set_progress_deadline(limits_.start, "did not start");
+    set_total_deadline(limits_.start_total, "did not start");
 }
 
 void Component::stop() {
@@ -80,6 +83,7 @@ void Component::kill() {
     stop_requested_ = true;
     restart_timer_.cancel();
     deadline_.cancel();
+    total_deadline_.cancel();
     if (process_) {
         cpu_seconds_of_dead_ += process_->cpu_seconds();
         process_.reset();
@@ -121,23 +125,24 @@ void Component::on_message(Message &message) {
             set_progress_deadline(limits_.start, "did not start");
         else if (stop_sent_)
             set_progress_deadline(limits_.stop, "did not stop");
-    } else if (is<messages::Hello>(message) && state_ == State::starting) {
+    } else if (is<messages::Hello>(message) && handshake_ == Handshake::opening) {
         on_hello(message);
-    } else if (is<messages::Ready>(message) && state_ == State::starting) {
+    } else if (is<messages::Ready>(message) && handshake_ == Handshake::creating) {
         on_ready(message);
     } else if (is<messages::Attached>(message)) {
         on_attached(parse<messages::Attached>(message));
     } else if (is<messages::Failed>(message)) {
-        const auto [status, text] = parse<messages::Failed>(message);
+        const auto [status, whole_text] = parse<messages::Failed>(message);
+        const std::string text = whole_text.substr(0, WorkerBudget::max_text);
         if (state_ != State::starting)
-            context_.log(ARHOST_SEVERITY_WARNING, name_, text);
+            log(ARHOST_SEVERITY_WARNING, text);
         else if (status == ARHOST_STATUS_ERROR_CONFIGURATION || status == ARHOST_STATUS_ERROR_UNSUPPORTED)
             configuration_error_ = text;
         else
             failure_ = text;
     } else if (is<messages::Stopped>(message) && stop_sent_) {
         stop_response_ = parse<messages::Stopped>(message);
-    } else if (is<messages::End>(message)) {
+    } else if (is<messages::End>(message) && description_.kind == ARHOST_KIND_SINK) {
         callbacks_.end_requested();
     } else if (!is<messages::Detached>(message)) {
         process_->end("protocol violation: unexpected message " + message.body["type"].dump());
@@ -145,6 +150,7 @@ void Component::on_message(Message &message) {
 }
 
 void Component::on_hello(const Message &message) {
+    handshake_ = Handshake::creating;
     try {
         description_ = parse<messages::Hello>(message).descriptor;
         const Create create = callbacks_.hello(description_, candidate_);
@@ -160,6 +166,7 @@ void Component::on_hello(const Message &message) {
 }
 
 void Component::on_ready(const Message &message) {
+    handshake_ = Handshake::done;
     SlotLayout layout;
     try {
         layout = callbacks_.ready(parse<messages::Ready>(message));
@@ -190,6 +197,7 @@ void Component::on_attached(const messages::Attached &attached) {
 
 void Component::run() {
     deadline_.cancel();
+    total_deadline_.cancel();
     state_ = State::running;
     callbacks_.running();
     if (stop_requested_)
@@ -202,6 +210,7 @@ void Component::stop_when_idle() {
     stop_sent_ = true;
     process_->send_ordered(messages::Stop{});
     set_progress_deadline(limits_.stop, "did not stop");
+    set_total_deadline(limits_.stop_total, "did not stop");
 }
 
 void Component::on_result(const Result &result) {
@@ -209,6 +218,8 @@ void Component::on_result(const Result &result) {
         return process_->end("protocol violation: unexpected response");
     if (!is_valid_status(description_.kind, result.status))
         return process_->end("contract violation: its status is " + std::to_string(result.status));
+    if (result.status == ARHOST_STATUS_ERROR_DEVICE_LOST)
+        device_losses_.push_back(Reactor::Clock::now());
     if (needs_new_process(description_.kind, result.status))
         return process_->end(status_text(result.status)); // the command counts as unanswered, as after a crash
     const Command command = in_flight_.front();
@@ -226,6 +237,7 @@ void Component::on_died(const Death &death) {
     const std::unique_ptr<Process> dead = std::move(process_);
     cpu_seconds_of_dead_ += death.cpu_seconds;
     deadline_.cancel();
+    total_deadline_.cancel();
     output_.reset();
     pending_output_.reset();
     attached_inputs_.clear();
@@ -264,7 +276,20 @@ void Component::on_died(const Death &death) {
     // The process died before Hello, but the host did not kill it, so its library is unusable.
     if (description_.id.empty() && !death.by_host && death.signal != SIGKILL)
         return fall_back_or_disable(plugin().string() + ": " + death.how, true);
+    if (loses_its_device_often() && candidate_ + 1 < plugins_.size())
+        return fall_back_or_disable(reason + "; its device was lost " + std::to_string(device_losses_.size()) +
+                                        " times within a minute",
+                                    false);
     restart(reason);
+}
+
+// Restarts do not help against a device that is lost again and again, even if frames are delivered in between.
+bool Component::loses_its_device_often() {
+    constexpr std::size_t often = 3;
+    std::erase_if(device_losses_, [minute_ago = Reactor::Clock::now() - std::chrono::minutes(1)](const auto &time) {
+        return time < minute_ago;
+    });
+    return device_losses_.size() >= often;
 }
 
 void Component::record_crash(Crash crash) {
@@ -289,6 +314,7 @@ void Component::fall_back_or_disable(const std::string &reason, bool is_configur
         context_.log(ARHOST_SEVERITY_WARNING, name_,
                      reason + "; falling back to " + plugins_[candidate_ + 1].stem().string());
         ++candidate_;
+        device_losses_.clear();
         policy_ = RestartPolicy(limits_.restart);
         ++restarts_;
         restart_timer_ = context_.reactor.at(Reactor::Clock::now(), [this] { spawn(); });
@@ -308,6 +334,13 @@ void Component::stopped(arhost_status status, const std::string &text) {
 void Component::set_progress_deadline(std::chrono::milliseconds limit, const char *what) {
     deadline_ = context_.reactor.at(Reactor::Clock::now() + limit, [this, limit, what] {
         process_->end(std::string(what) + " within " + std::to_string(limit.count()) + " ms");
+    });
+}
+
+void Component::set_total_deadline(std::chrono::milliseconds limit, const char *what) {
+    total_deadline_ = context_.reactor.at(Reactor::Clock::now() + limit, [this, limit, what] {
+        process_->end(std::string(what) + " within " + std::to_string(limit.count()) +
+                      " ms in total, although it reported progress");
     });
 }
 

@@ -52,7 +52,7 @@ public:
         // Called when the component will not be restarted.
         std::function<void(const std::string &reason, bool is_configuration_error)> disabled;
         std::function<void(arhost_status, const std::string &text)> stopped; // after stop()
-        std::function<void()> end_requested;                                 // a sink's window was closed
+        std::function<void()> end_requested; // a sink has ended while it was idle; only called for sinks
     };
 
     struct Crash {
@@ -95,6 +95,8 @@ public:
     void submit(ipc::Command command, const RegionPointer &input = nullptr);
 
     std::uint32_t restarts() const { return restarts_; }
+    // Logs a line for which the worker is responsible (WorkerBudget::log).
+    void log(arhost_severity severity, const std::string &text) { budget_.log(severity, text); }
     double cpu_seconds() const { return cpu_seconds_of_dead_ + (process_ ? process_->cpu_seconds() : 0); }
     const std::deque<Crash> &crashes() const { return crashes_; } // the last 100
 
@@ -108,11 +110,13 @@ private:
     void on_died(const Death &death);
     void run();
     void stop_when_idle();
+    bool loses_its_device_often();
     void record_crash(Crash crash);
     void restart(const std::string &reason);
     void fall_back_or_disable(const std::string &reason, bool is_configuration_error);
     void stopped(arhost_status status, const std::string &text);
     void set_progress_deadline(std::chrono::milliseconds limit, const char *what);
+    void set_total_deadline(std::chrono::milliseconds limit, const char *what);
     void set_frame_deadline();
 
     Context &context_;
@@ -122,8 +126,12 @@ private:
     base::Limits limits_;
     sandbox::Policy sandbox_;
     Callbacks callbacks_;
+    WorkerBudget budget_;
     RestartPolicy policy_;
+    std::deque<ipc::Reactor::Clock::time_point> device_losses_; // within the last minute
     State state_ = State::idle;
+    enum class Handshake { opening, creating, done }; // waits for Hello; waits for Ready; has received both
+    Handshake handshake_ = Handshake::opening;
     bool stop_requested_ = false, stop_sent_ = false;
     std::optional<ipc::messages::Stopped> stop_response_;
     std::string configuration_error_, failure_; // text of Failed, or of an exception of `hello` or `ready`
@@ -139,7 +147,7 @@ private:
     double cpu_seconds_of_dead_ = 0;
     std::deque<Crash> crashes_;
     std::uint32_t deaths_in_stop_ = 0;
-    ipc::Reactor::Registration deadline_, restart_timer_;
+    ipc::Reactor::Registration deadline_, total_deadline_, restart_timer_;
     std::minstd_rand jitter_{std::random_device{}()};
 };
 

@@ -21,8 +21,8 @@ bool signal_process(const base::UniqueFd &pidfd, int signal) {
 
 } // namespace
 
-Process::Process(Context &context, std::string name, Callbacks callbacks, const Json &first, Isolation isolation)
-    : context_(context), name_(std::move(name)), callbacks_(std::move(callbacks)),
+Process::Process(Context &context, WorkerBudget &budget, Callbacks callbacks, const Json &first, Isolation isolation)
+    : context_(context), budget_(budget), callbacks_(std::move(callbacks)),
       spawned_(context.launcher.spawn(context.worker_program, isolation, context.log)),
       host_memory_(SharedMemory::create("arhost-host-page", sizeof(HostPage))),
       worker_memory_(SharedMemory::create("arhost-worker-page", sizeof(WorkerPage))),
@@ -33,7 +33,7 @@ Process::Process(Context &context, std::string name, Callbacks callbacks, const 
     Reactor &reactor = context_.reactor;
     channel_watch_ = reactor.watch(spawned_.channel.fd(), [this] { receive_messages(16); });
     doorbell_watch_ = reactor.watch(spawned_.doorbell.get(), [this] { on_doorbell(); });
-    output_watch_ = reactor.watch(spawned_.output.get(), [this] { read_output(4096); });
+    watch_output();
     death_watch_ = reactor.watch(spawned_.pidfd.get(), [this] { on_death(); });
     send_json(first, {host_memory_.fd(), worker_memory_.fd()});
 }
@@ -97,9 +97,10 @@ double Process::cpu_seconds() const {
     return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-// Receives at most `max_messages`, so that a flood of messages cannot delay the frames.
+// Receives at most `max_messages`, and no more after 256 KiB, so that a flood of messages cannot delay the frames.
 void Process::receive_messages(int max_messages) {
-    for (int i = 0; i < max_messages; ++i) {
+    std::size_t bytes = 0;
+    for (int i = 0; i < max_messages && bytes < (256 << 10); ++i) {
         Message message;
         switch (spawned_.channel.receive(message, 0)) {
         case ReceiveState::none:
@@ -116,10 +117,15 @@ void Process::receive_messages(int max_messages) {
         case ReceiveState::message:
             break;
         }
+        bytes += message.size;
+        if (!budget_.spend(message.size)) {
+            channel_watch_.cancel();
+            return end("protocol violation: it floods its control channel with messages");
+        }
         try {
             if (is<messages::Log>(message)) {
                 const auto [severity, text] = parse<messages::Log>(message);
-                log(severity, text.substr(0, 4000));
+                log(severity, text.substr(0, WorkerBudget::max_text));
             } else {
                 ready_ = ready_ || is<messages::Ready>(message);
                 if (is<messages::Failed>(message) &&
@@ -151,29 +157,8 @@ void Process::print_held_error() {
         print(ARHOST_SEVERITY_ERROR, *text);
 }
 
-// Prints a line of the worker, unless the worker logs too many per second. Counts warnings separately, so that other
-// lines do not displace them.
 void Process::print(arhost_severity severity, const std::string &text) {
-    constexpr int max_per_second = 100;
-    if (const auto now = Reactor::Clock::now(); now >= log_second_ends_) {
-        report_suppressed_lines();
-        log_second_ends_ = now + std::chrono::seconds(1);
-    }
-    LineCount &lines = severity >= ARHOST_SEVERITY_WARNING ? warnings_ : other_lines_;
-    if (lines.logged++ < max_per_second)
-        context_.log(severity, name_, text);
-    else
-        ++lines.suppressed;
-}
-
-void Process::report_suppressed_lines() {
-    for (const auto &[lines, severity] :
-         {std::pair{&other_lines_, ARHOST_SEVERITY_DEBUG}, {&warnings_, ARHOST_SEVERITY_WARNING}}) {
-        if (lines->suppressed > 0)
-            context_.log(severity, name_,
-                         "suppressed " + std::to_string(lines->suppressed) + " more log lines within one second");
-        *lines = {};
-    }
+    budget_.log(severity, text);
 }
 
 void Process::on_doorbell() {
@@ -203,6 +188,18 @@ void Process::receive_results() {
     }
 }
 
+// Reads at most 16 KiB per 10 ms. A worker that prints more waits until there is room in the pipe.
+void Process::watch_output() {
+    output_watch_ = context_.reactor.watch(spawned_.output.get(), [this] {
+        read_output(16 << 10);
+        if (!output_watch_.active())
+            return;
+        output_watch_.cancel();
+        output_pause_ =
+            context_.reactor.at(Reactor::Clock::now() + std::chrono::milliseconds(10), [this] { watch_output(); });
+    });
+}
+
 void Process::read_output(std::size_t max_bytes) {
     char bytes[4096];
     for (std::size_t total = 0; total < max_bytes; total += sizeof bytes) {
@@ -217,7 +214,8 @@ void Process::read_output(std::size_t max_bytes) {
                 partial_line_ += bytes[i];
                 continue;
             }
-            log(ARHOST_SEVERITY_DEBUG, partial_line_);
+            if (!partial_line_.empty())
+                log(ARHOST_SEVERITY_DEBUG, partial_line_);
             partial_line_.clear();
         }
     }
@@ -234,12 +232,11 @@ void Process::on_death() {
     if (channel_watch_.active())
         receive_messages(100'000);
     receive_results();
-    if (output_watch_.active())
+    if (output_watch_.active() || output_pause_.active())
         read_output(1 << 20);
     if (!partial_line_.empty())
         append_to_tail(partial_line_);
     print_held_error();
-    report_suppressed_lines();
     const Exit exit = context_.launcher.wait_exit(spawned_.pid);
     Death death;
     death.cpu_seconds = exit.cpu_seconds;
@@ -260,6 +257,7 @@ void Process::on_death() {
     channel_watch_.cancel();
     doorbell_watch_.cancel();
     output_watch_.cancel();
+    output_pause_.cancel();
     death_watch_.cancel();
     kill_deadline_.cancel();
     const auto died = std::move(callbacks_.died); // moved out, because the callback may destroy this object

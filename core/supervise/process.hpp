@@ -8,6 +8,7 @@
 #include "ipc/protocol.hpp"
 #include "ipc/reactor.hpp"
 #include "supervise/launcher.hpp"
+#include "supervise/worker_budget.hpp"
 
 #include <deque>
 #include <functional>
@@ -43,10 +44,11 @@ public:
         std::function<void(const Death &)> died;
     };
 
-    // Starts a worker and sends it the pages with `first`, a messages::Open or messages::Load.
+    // Starts a worker and sends it the pages with `first`, a messages::Open or messages::Load. `budget` must outlive
+    // the Process.
     template <class T>
-    Process(Context &context, std::string name, Callbacks callbacks, const T &first)
-        : Process(context, std::move(name), std::move(callbacks), ipc::encode(first),
+    Process(Context &context, WorkerBudget &budget, Callbacks callbacks, const T &first)
+        : Process(context, budget, std::move(callbacks), ipc::encode(first),
                   first.sandbox.mode == sandbox::Mode::none ? Isolation::none : Isolation::pid_namespace) {}
     ~Process(); // kills the process if it is still running
     Process(const Process &) = delete;
@@ -72,22 +74,22 @@ public:
     double cpu_seconds() const; // used so far
 
 private:
-    Process(Context &context, std::string name, Callbacks callbacks, const ipc::Json &first, Isolation isolation);
+    Process(Context &context, WorkerBudget &budget, Callbacks callbacks, const ipc::Json &first, Isolation isolation);
     void send_json(const ipc::Json &body, std::initializer_list<int> fds);
     void send_json_ordered(const ipc::Json &body, std::initializer_list<int> fds);
     void receive_messages(int max_messages);
     void on_doorbell();
+    void watch_output();
     void read_output(std::size_t max_bytes);
     void on_death();
     void receive_results();
     void log(arhost_severity severity, const std::string &text);
     void print(arhost_severity severity, const std::string &text);
     void print_held_error();
-    void report_suppressed_lines();
     void append_to_tail(const std::string &line);
 
     Context &context_;
-    std::string name_;
+    WorkerBudget &budget_;
     Callbacks callbacks_;
     Spawned spawned_;
     ipc::SharedMemory host_memory_, worker_memory_;
@@ -99,13 +101,9 @@ private:
     std::optional<std::string> held_error_;
     bool ready_ = false;
     std::deque<std::string> tail_;
-    ipc::Reactor::Clock::time_point log_second_ends_{};
-    struct LineCount { // lines within the current second
-        int logged = 0, suppressed = 0;
-    };
-    LineCount other_lines_, warnings_;
     std::uint64_t rings_ = 0, results_received_ = 0;
-    ipc::Reactor::Registration channel_watch_, doorbell_watch_, output_watch_, death_watch_, kill_deadline_;
+    ipc::Reactor::Registration channel_watch_, doorbell_watch_, output_watch_, output_pause_, death_watch_,
+        kill_deadline_;
 };
 
 } // namespace arhost::supervise

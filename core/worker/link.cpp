@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/link.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <poll.h>
@@ -10,6 +11,7 @@
 namespace arhost::worker {
 
 using namespace ipc;
+using Clock = std::chrono::steady_clock;
 
 Message Link::receive() const {
     Message message;
@@ -41,12 +43,34 @@ void Link::send_json(const Json &body, std::initializer_list<int> fds) const {
 }
 
 void Link::log(arhost_severity severity, const std::string &text) const {
-    channel_.send(encode(messages::Log{severity, text.substr(0, 4000)}), {}, false);
+    constexpr std::size_t max_text = 4000, max_cost = 100'000, cost_per_line = 500;
+    const std::string sent = text.substr(0, max_text);
+    {
+        const std::lock_guard lock(rates_->mutex);
+        if (const auto now = Clock::now(); now >= rates_->log_second_ends) {
+            rates_->log_second_ends = now + std::chrono::seconds(1);
+            std::fill(std::begin(rates_->log_costs), std::end(rates_->log_costs), 0);
+        }
+        std::size_t &cost = rates_->log_costs[severity >= ARHOST_SEVERITY_WARNING];
+        cost += std::max(sent.size(), cost_per_line);
+        if (cost > max_cost)
+            return;
+    }
+    channel_.send(encode(messages::Log{severity, sent}), {}, false);
 }
 
 void Link::progress(double fraction, const char *what) const {
+    {
+        const std::lock_guard lock(rates_->mutex);
+        const auto now = Clock::now();
+        if (now < rates_->next_progress)
+            return;
+        rates_->next_progress = now + std::chrono::milliseconds(5);
+    }
     // JSON cannot represent NaN and infinity.
-    channel_.send(encode(messages::Progress{std::isfinite(fraction) ? fraction : 0, what ? what : ""}), {}, false);
+    channel_.send(encode(messages::Progress{std::isfinite(fraction) ? fraction : 0,
+                                            std::string(what ? what : "").substr(0, 1000)}),
+                  {}, false);
 }
 
 void Link::map_pages(Message &open) {

@@ -8,6 +8,8 @@
 #include "ipc/protocol.hpp"
 
 #include <atomic>
+#include <chrono>
+#include <memory>
 #include <mutex>
 #include <string>
 
@@ -28,8 +30,11 @@ public:
     template <class T> void send(const T &message, std::initializer_list<int> fds = {}) const {
         send_json(ipc::encode(message), fds);
     }
-    void log(arhost_severity severity, const std::string &text) const; // never blocks
-    void progress(double fraction, const char *what) const;            // never blocks
+    // Both never block, and drop what exceeds their rates: per second, 200 warnings and errors and 200 other lines,
+    // or 100 KB of each; one progress report per 5 ms. The host prints fewer lines, and ends a worker that sends many
+    // more.
+    void log(arhost_severity severity, const std::string &text) const;
+    void progress(double fraction, const char *what) const;
 
     // Maps the pages whose descriptors accompanied `open`; they contain the rings.
     void map_pages(ipc::Message &open);
@@ -64,6 +69,12 @@ private:
                                                           std::memory_order_relaxed);
     }
 
+    struct Rates {
+        std::mutex mutex; // any thread of the plugin may log
+        std::chrono::steady_clock::time_point log_second_ends{}, next_progress{};
+        std::size_t log_costs[2] = {}; // of the lines in the current second; [1]: warnings and errors
+    };
+    std::unique_ptr<Rates> rates_ = std::make_unique<Rates>();
     ipc::Channel channel_;
     base::UniqueFd doorbell_;
     ipc::Mapping host_page_, worker_page_;

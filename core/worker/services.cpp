@@ -3,6 +3,7 @@
 
 #include "pixels/grey.hpp"
 #include "scene/motion.hpp"
+#include "worker/lens_warp.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -137,8 +138,9 @@ private:
 
 class RaytracerService final : public Service {
 public:
-    RaytracerService(const arhost_raytracer &raytracer, arhost_instance *instance)
-        : raytracer_(raytracer), instance_(instance) {}
+    RaytracerService(const Link &link, const arhost_raytracer &raytracer, arhost_instance *instance,
+                     bool supports_lenses)
+        : link_(link), raytracer_(raytracer), instance_(instance), supports_lenses_(supports_lenses) {}
 
     arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &fds,
                         messages::Ready &) override {
@@ -152,6 +154,11 @@ public:
         setup.height = height_ = message.height;
         setup.scene = &arena_.as<arhost_scene>();
         setup.intrinsics = &message.intrinsics;
+        if (message.intrinsics.distortion != ARHOST_DISTORTION_NONE && !supports_lenses_) {
+            warp_.emplace(message.intrinsics,
+                          [this](double fraction) { link_.progress(fraction, "computing the lens distortion"); });
+            setup.intrinsics = &warp_->pinhole();
+        }
         if (setup.scene->duration_s > 0)
             motion_.emplace(*setup.scene);
         return raytracer_.start(instance_, &setup);
@@ -178,14 +185,26 @@ public:
             request.motion = &motion;
         }
         result.render.struct_size = sizeof result.render;
-        return raytracer_.render(instance_, &request, &image, &result.render);
+        if (!warp_)
+            return raytracer_.render(instance_, &request, &image, &result.render);
+        request.camera.intrinsics = warp_->pinhole();
+        const arhost_image pinhole_image = warp_->pinhole_image();
+        const arhost_status status = raytracer_.render(instance_, &request, &pinhole_image, &result.render);
+        if (status == ARHOST_STATUS_OK) {
+            warp_->warp(result.render, image);
+            result.render.has_region = 0;
+        }
+        return status;
     }
 
     arhost_status stop() override { return raytracer_.stop(instance_), ARHOST_STATUS_OK; }
 
 private:
+    const Link &link_;
     const arhost_raytracer &raytracer_;
     arhost_instance *instance_;
+    bool supports_lenses_;
+    std::optional<LensWarp> warp_; // only for a distorting lens that the plugin does not support
     Mapping arena_;
     std::optional<scene::MotionEvaluator> motion_; // only for animated scenes
     std::uint32_t width_ = 0, height_ = 0;
@@ -244,14 +263,16 @@ const Memory::Region &Memory::input(std::uint32_t generation) const {
     return found->second;
 }
 
-std::unique_ptr<Service> make_service(const arhost_plugin &plugin, arhost_instance *instance) {
+std::unique_ptr<Service> make_service(const Link &link, const arhost_plugin &plugin, arhost_instance *instance) {
     switch (plugin.descriptor->kind) {
     case ARHOST_KIND_SOURCE:
         return std::make_unique<SourceService>(*static_cast<const arhost_source *>(plugin.functions), instance);
     case ARHOST_KIND_TRACKER:
         return std::make_unique<TrackerService>(*static_cast<const arhost_tracker *>(plugin.functions), instance);
     case ARHOST_KIND_RAYTRACER:
-        return std::make_unique<RaytracerService>(*static_cast<const arhost_raytracer *>(plugin.functions), instance);
+        return std::make_unique<RaytracerService>(
+            link, *static_cast<const arhost_raytracer *>(plugin.functions), instance,
+            (plugin.descriptor->capabilities & ARHOST_CAPABILITY_LENS_DISTORTION) != 0);
     default:
         return std::make_unique<SinkService>(*static_cast<const arhost_sink *>(plugin.functions), instance);
     }

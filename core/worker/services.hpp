@@ -39,6 +39,7 @@ public:
     virtual arhost_status stop() = 0;
 };
 
-std::unique_ptr<Service> make_service(const arhost_plugin &plugin, arhost_instance *instance);
+// The link must outlive the Service.
+std::unique_ptr<Service> make_service(const Link &link, const arhost_plugin &plugin, arhost_instance *instance);
 
 } // namespace arhost::worker

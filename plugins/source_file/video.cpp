@@ -4,10 +4,13 @@
 #include "folder.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <span>
+#include <string_view>
 #include <thread>
 
 namespace arhost {
@@ -35,6 +38,53 @@ std::optional<bool> is_short_avi(const std::filesystem::path &file) {
     return std::filesystem::file_size(file, error) < size + 8 && !error;
 }
 
+// Reads an EBML variable-length integer (RFC 8794, section 4) at `at` and moves `at` past it. Returns std::nullopt if
+// the size is unknown, as in a live recording, or if the bytes end.
+std::optional<std::uint64_t> ebml_size(std::span<const unsigned char> bytes, std::size_t &at) {
+    if (at >= bytes.size() || bytes[at] == 0)
+        return std::nullopt;
+    const auto length = static_cast<std::size_t>(std::countl_zero(bytes[at])) + 1;
+    if (length > bytes.size() - at)
+        return std::nullopt;
+    const std::uint64_t unknown = (std::uint64_t{1} << (7 * length)) - 1;
+    std::uint64_t value = 0;
+    for (std::size_t i = 0; i < length; ++i)
+        value = value << 8 | bytes[at + i];
+    at += length;
+    value &= unknown; // removes the length marker
+    return value == unknown ? std::nullopt : std::optional(value);
+}
+
+// Returns whether `file` is shorter than its Matroska segment, or std::nullopt if it is not a Matroska file or does
+// not declare the segment's size. libav reports nothing if such a file ends between two frames.
+std::optional<bool> is_short_matroska(const std::filesystem::path &file) {
+    constexpr std::string_view header_id = "\x1a\x45\xdf\xa3", segment_id = "\x18\x53\x80\x67";
+    std::ifstream stream(file, std::ios::binary);
+    unsigned char head[4096];
+    stream.read(reinterpret_cast<char *>(head), sizeof head);
+    const std::span<const unsigned char> bytes(head, static_cast<std::size_t>(stream.gcount()));
+    const auto has_id = [&](std::size_t at, std::string_view id) {
+        return at <= bytes.size() && bytes.size() - at >= id.size() &&
+               std::memcmp(bytes.data() + at, id.data(), id.size()) == 0;
+    };
+    std::size_t at = header_id.size();
+    if (!has_id(0, header_id))
+        return std::nullopt;
+    const std::optional<std::uint64_t> header_size = ebml_size(bytes, at);
+    if (!header_size || *header_size > bytes.size())
+        return std::nullopt;
+    at += *header_size;
+    if (!has_id(at, segment_id))
+        return std::nullopt;
+    at += segment_id.size();
+    const std::optional<std::uint64_t> segment_size = ebml_size(bytes, at);
+    std::error_code error;
+    const std::uint64_t size = std::filesystem::file_size(file, error);
+    if (!segment_size || error)
+        return std::nullopt;
+    return size < at || size - at < *segment_size;
+}
+
 } // namespace
 
 Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &log)
@@ -47,7 +97,9 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
         return Failure(ARHOST_STATUS_ERROR_CONFIGURATION, name_ + " cannot be read: " + why + log_.take_reason());
     };
     log_.take_reason();
-    short_avi_ = is_short_avi(file);
+    is_short_ = is_short_avi(file);
+    if (!is_short_)
+        is_short_ = is_short_matroska(file);
 
     AVFormatContext *context = avformat_alloc_context();
     if (!context)
@@ -168,11 +220,11 @@ void Decoder::take_time() {
 void Decoder::finish() {
     ended_ = true;
     const std::uint64_t declared = declared_count();
-    const bool has_all = short_avi_ ? !*short_avi_ : packets_ >= declared;
+    const bool has_all = is_short_ ? !*is_short_ : packets_ >= declared;
     if (!lost_data_ && read_error_ == 0 && end_fault_.empty() && has_all)
         return;
     truncation_ = name_ + " is truncated: it ends after frame " + std::to_string(count_ - 1);
-    if (declared > count_ && !short_avi_)
+    if (declared > count_ && !is_short_)
         truncation_ += " of " + std::to_string(declared);
     truncation_ += end_fault_.empty() ? decoder_fault_ : end_fault_;
 }

@@ -56,7 +56,8 @@ private:
     std::int64_t first_pts_ = AV_NOPTS_VALUE, media_ns_ = 0;
     bool lost_data_ = false; // data was lost or damaged since the previous picture
     bool ended_ = false;
-    std::optional<bool> short_avi_;
+    // Whether the file is shorter than its header declares; nullopt for a container that does not declare its size.
+    std::optional<bool> is_short_;
     int read_error_ = 0;                    // the error that ended reading; 0: the end of the file
     std::string decoder_fault_, end_fault_; // libav's last error while decoding, and at the end
     std::string damage_, truncation_;

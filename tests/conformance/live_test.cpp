@@ -191,15 +191,13 @@ TEST(LiveConformance, IsOffByDefault) {
 
 // ---- Lens, mode live, lost markers, restarts ----
 
-TEST(LiveConformance, SkipsPlaceIfTheRayTracerTracesTheLens) {
+TEST(LiveConformance, ChecksThePlaceWithLensDistortion) {
     Parts parts;
     parts.camera = lens;
-    std::set<std::string> checks = all_checks;
-    checks.erase("raytracer.place");
-    expect_no_violations(parts, checks);
+    expect_no_violations(parts, all_checks);
 }
 
-TEST(LiveConformance, ChecksPinholeImagesBeforeTheLensWarp) {
+TEST(LiveConformance, ChecksImagesThatTheWorkerWarpsToTheLens) {
     Parts parts = with_counters("", "", "");
     parts.camera = lens;
     parts.tracker = "{plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}"; // ignores the lens

@@ -582,6 +582,6 @@ TEST(Run, DistortsImagesOfARayTracerWithoutLensSupport) {
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0) << run.output();
     EXPECT_THAT(run.output(),
-                HasSubstr("rt_counter does not support lens distortion: the host warps the rendered images"));
+                HasSubstr("rt_counter does not support lens distortion: its worker warps the rendered images"));
     expect_every_frame_augmented(run, 5);
 }

@@ -82,13 +82,16 @@ public:
     fs::path target() const { return elsewhere_.path() / "target"; }
     std::string target_text() const { return read_file(target()); }
     // `victim` is the pid of a process that is attacked instead of the host, because a killed host cannot report.
-    // `prepare` is called in the child process before exec.
+    // `more`: further arguments. `prepare` is called in the child process before exec.
     void start_it(
-        pid_t victim = 0, const std::function<void()> &prepare = [] {}) {
-        start({"--config", "run.yaml"}, [this, victim, &prepare] {
+        pid_t victim = 0, const std::function<void()> &prepare = [] {}, const std::vector<std::string> &more = {}) {
+        std::vector<std::string> arguments = {"--config", "run.yaml"};
+        arguments.insert(arguments.end(), more.begin(), more.end());
+        start(arguments, [this, victim, &prepare] {
             system_v_.tell_by_environment();
             ::setenv("HOSTILE_HOST", std::to_string(victim ? victim : ::getpid()).c_str(), 1);
-            ::setenv("HOSTILE_SECRET", "sesame", 1);
+            for (const char *secret : {"HOSTILE_SECRET", "VK_TOKEN", "LD_ACCESS_TOKEN"})
+                ::setenv(secret, "sesame", 1);
             ::setenv("HOSTILE_FOLDER", elsewhere_.path().c_str(), 1);
             prepare();
         });
@@ -194,9 +197,16 @@ void expect_stopped(HostileRun &run) {
     expect_complete_video(run);
 }
 
+// Returns the expected exit status: 1 if a frame has no overlay, else 0.
+int status_by_overlays(const ArhostRun &run) {
+    const auto lines = counted(run, "out/counted.txt");
+    return std::any_of(lines.begin(), lines.end(), [](const CountedLine &line) { return line.overlay == "none"; });
+}
+
 // Checks that the plugin was terminated because of `reason`, a contract violation, and then restarted.
 void expect_ended(HostileRun &run, const std::string &reason, std::uint64_t before = 0) {
-    ASSERT_EQ(run.attack(), 0) << run.output();
+    const int status = run.attack();
+    EXPECT_EQ(status, status_by_overlays(run)) << run.output();
     EXPECT_THAT(run.output(), HasSubstr(reason));
     EXPECT_THAT(run.output(), Not(HasSubstr("SUCCEEDED")));
     EXPECT_GT(run.stats()["restarts"]["tracker"], 0);
@@ -565,7 +575,8 @@ TEST(Sandbox, RejectsAMemoryLimitWithAGpu) {
 TEST(Sandbox, SurvivesConcurrentChangesOfRingsAndSlots) {
     for (int i = 0; i < 3; ++i) {
         HostileRun run("race");
-        ASSERT_EQ(run.attack(), 0) << run.output();
+        const int status = run.attack();
+        EXPECT_EQ(status, status_by_overlays(run)) << run.output();
         EXPECT_THAT(run.output(), HasSubstr("start no race: stopped"));
         expect_frames_in_order(run);
     }
@@ -581,14 +592,16 @@ TEST(Sandbox, MalformedMessagesEndTheWorker) {
     for (const char *attack : {"no_json", "wrong_types", "out_of_turn", "nested"}) {
         SCOPED_TRACE(attack);
         HostileRun run(attack);
-        ASSERT_EQ(run.attack(), 0) << run.output();
+        const int status = run.attack();
+        EXPECT_EQ(status, status_by_overlays(run)) << run.output();
         EXPECT_GT(run.stats()["restarts"]["tracker"], 0) << run.output();
         expect_complete_video(run);
     }
     // "empty" has the effect of a closed channel; the socket rejects "oversized".
     for (const char *attack : {"empty", "oversized"}) {
         HostileRun run(attack);
-        ASSERT_EQ(run.attack(), 0) << run.output();
+        const int status = run.attack();
+        EXPECT_EQ(status, status_by_overlays(run)) << run.output();
         expect_complete_video(run);
     }
 }
@@ -596,6 +609,58 @@ TEST(Sandbox, MalformedMessagesEndTheWorker) {
 TEST(Sandbox, AFloodedDoorbellEndsTheWorker) {
     HostileRun run("doorbell");
     expect_ended(run, "floods its doorbell");
+}
+
+TEST(Sandbox, AFloodOfMessagesEndsTheWorker) {
+    for (const char *attack : {"large_messages", "small_messages"}) {
+        SCOPED_TRACE(attack);
+        HostileRun run(attack);
+        expect_ended(run, "protocol violation: it floods its control channel with messages");
+    }
+}
+
+TEST(Sandbox, OneBudgetLimitsTheLinesOfAWorker) {
+    for (const char *attack : {"failures", "lines"}) {
+        SCOPED_TRACE(attack);
+        HostileRun run(attack);
+        run.start_it(0, [] {}, {"-v"});
+        ASSERT_EQ(run.wait(), 0);
+        const std::string output = run.output();
+        EXPECT_LT(std::count(output.begin(), output.end(), '\n'), 400);
+        EXPECT_EQ(run.stats()["restarts"]["tracker"], 0);
+        expect_complete_video(run);
+    }
+}
+
+TEST(Sandbox, RefusesAnImplausibleLens) {
+    ArhostRun run("version: 1\nsource: {plugin: hostile_source, options: {attack: lens}}\n"
+                  "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
+                  "raytracer: {plugin: rt_counter, scene: scene.yaml}\noutputs: [{plugin: sink_null}]\n");
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("run.yaml:2:"));
+    EXPECT_THAT(run.output(), HasSubstr("the lens distortion is implausible: near the principal point it scales "
+                                        "distances by "));
+}
+
+TEST(Sandbox, ASecondHelloEndsTheWorker) {
+    HostileRun run("second_hello", "", "restart: {first_delay_ms: 1, quarantine_after: 2}\n");
+    EXPECT_NE(run.attack(), 0);
+    EXPECT_THAT(run.output(), HasSubstr("protocol violation: unexpected message \"hello\""));
+}
+
+// A stop that reports progress forever must not outlast a signal to the host by more than stop_deadline_ms.
+TEST(Sandbox, OneSignalEndsARunWhosePluginReportsProgressForever) {
+    HostileRun run("endless_stop");
+    run.start_it(0, [] {},
+                 {"--set", "source.stop_deadline_ms=400", "--set", "tracker.stop_deadline_ms=400", "--set",
+                  "raytracer.stop_deadline_ms=400", "--set", "outputs[0].stop_deadline_ms=400"});
+    while (run.running() && counted(run, "out/counted.txt").size() < frames)
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    send_signal(run.pid(), SIGTERM);
+    EXPECT_EQ(run.wait(), 1) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("not stopped within 400 ms after the signal (stop_deadline_ms): tracker; "));
+    expect_complete_video(run);
 }
 
 TEST(Sandbox, DescriptorFlagsDoNotBlockTheHost) {

@@ -82,7 +82,7 @@ TEST(Supervision, ACrashingFrameIsRetriedOnceThenSkipped) {
     for (const Case &c : {Case{"crash_at: 20", "", "tracker"}, Case{"", "crash_at: 20", "raytracer"}}) {
         ArhostRun run(counting("lockstep", "frames: 60", c.tracker, c.raytracer));
         run.write("scene.yaml", small_scene);
-        ASSERT_EQ(run.run(), 0) << run.output();
+        ASSERT_EQ(run.run(), 1) << run.output();
         expect_all_frames_in_order(run, 60);
         const auto lines = counted(run);
         for (std::uint64_t i = 0; i < 60; ++i)
@@ -101,17 +101,18 @@ TEST(Supervision, ACrashingFrameIsRetriedOnceThenSkipped) {
 TEST(Supervision, AHungPluginIsEndedAfterItsDeadline) {
     ArhostRun run(counting("lockstep", "frames: 40", "", "hang_at: 20"));
     run.write("scene.yaml", small_scene);
-    ASSERT_EQ(run.run(), 0) << run.output();
+    ASSERT_EQ(run.run(), 1) << run.output();
     expect_all_frames_in_order(run, 40);
     EXPECT_THAT(run.output(),
                 HasSubstr("hung: no answer within " + std::to_string(counting_deadline.count()) + " ms"));
     EXPECT_EQ(counted(run)[20].overlay, "none");
+    EXPECT_THAT(run.output(), HasSubstr("error: arhost: 1 frame has no overlay because the raytracer failed"));
 }
 
 TEST(Supervision, AHungPluginThatIgnoresSigabrtIsKilled) {
     ArhostRun run(counting("lockstep", "frames: 30", "hang_at: 20, ignore_abort: true", ""));
     run.write("scene.yaml", small_scene);
-    ASSERT_EQ(run.run(), 0) << run.output();
+    ASSERT_EQ(run.run(), 1) << run.output();
     expect_all_frames_in_order(run, 30);
     EXPECT_EQ(counted(run)[20].overlay, "none");
     const std::string how = run.stats()["crashes"][0]["how"];
@@ -151,7 +152,7 @@ TEST(Supervision, ASourceKilledDuringRestartContinues) {
 TEST(Supervision, APluginThatCallsExitIsRestarted) {
     ArhostRun run(counting("lockstep", "frames: 30", "exit_at: 15", ""));
     run.write("scene.yaml", small_scene);
-    ASSERT_EQ(run.run(), 0) << run.output();
+    ASSERT_EQ(run.run(), 1) << run.output();
     expect_all_frames_in_order(run, 30);
     EXPECT_EQ(counted(run)[15].overlay, "none");
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 2);
@@ -270,7 +271,7 @@ TEST(Supervision, NothingHangsIfAllProcessesAreStopped) {
 TEST(Supervision, AFrameWithAnErrorIsSkippedWithoutARestart) {
     ArhostRun run(counting("lockstep", "frames: 30", "error_at: 5", "error_at: 8"));
     run.write("scene.yaml", small_scene);
-    ASSERT_EQ(run.run(), 0) << run.output();
+    ASSERT_EQ(run.run(), 1) << run.output();
     expect_all_frames_in_order(run, 30);
     EXPECT_EQ(counted(run)[5].overlay, "none");
     EXPECT_EQ(counted(run)[8].overlay, "none");
@@ -289,7 +290,7 @@ TEST_P(FatalError, RestartsTheWorker) {
     const std::string error = ", error: " + std::to_string(GetParam().first);
     ArhostRun run(counting("lockstep", "frames: 40", "error_at: 15" + error, "error_at: 25" + error));
     run.write("scene.yaml", small_scene);
-    ASSERT_EQ(run.run(), 0) << run.output();
+    ASSERT_EQ(run.run(), 1) << run.output();
     expect_all_frames_in_order(run, 40);
     EXPECT_THAT(run.output(),
                 testing::ContainsRegex(GetParam().second + std::string("; .*, at frame 15; restarting it")));
@@ -310,10 +311,24 @@ TEST_P(FatalError, DisablesThePluginIfEveryFrameFails) {
     EXPECT_THAT(run.output(), HasSubstr("it failed 3 times in a row"));
 }
 
+TEST(Supervision, TheFallbackTakesOverFromADeviceThatIsLostRepeatedly) {
+    const std::string losses = "error_after: 8, error: " + std::to_string(ARHOST_STATUS_ERROR_DEVICE_LOST);
+    ArhostRun run(counting("lockstep", "frames: 60", "", losses, "restart: {first_delay_ms: 1}\n"));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_GT(run.stats()["restarts"]["raytracer"], 3) << "without a fallback, it is restarted each time";
+    ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.fallback=rt_counter"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("its device was lost 3 times within a minute; falling back to rt_counter"));
+    EXPECT_EQ(run.stats()["restarts"]["raytracer"], 3);
+    expect_all_frames_in_order(run, 60);
+    for (const CountedLine &line : counted(run))
+        EXPECT_EQ(line.overlay, std::to_string(line.sequence));
+}
+
 TEST(Supervision, ATrackerThatReportsNanIsEnded) {
     ArhostRun run(counting("lockstep", "frames: 30", "nan_at: 15", ""));
     run.write("scene.yaml", small_scene);
-    ASSERT_EQ(run.run(), 0) << run.output();
+    ASSERT_EQ(run.run(), 1) << run.output();
     expect_all_frames_in_order(run, 30);
     EXPECT_THAT(run.output(), HasSubstr("contract violation"));
     EXPECT_EQ(counted(run)[15].overlay, "none");
@@ -436,12 +451,35 @@ TEST(Supervision, ASourceThatDiesNearTheFrameLimitDeliversAllFrames) {
 
 TEST(Supervision, AClosedWindowEndsTheRunAndOtherOutputsFinish) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 100000}}\n"
-                  "outputs:\n- {plugin: sink_counter, path: window.txt, options: {end_at: 20}}\n"
+                  "outputs:\n- {plugin: sink_counter, path: window.txt, control: [quit], options: {end_at: 20}}\n"
                   "- {plugin: sink_counter, path: counted.txt, options: {delay_ms: 2}}\n");
     EXPECT_EQ(run.run(), 0) << run.output();
     EXPECT_TRUE(run.exists("counted.txt.done"));
     EXPECT_TRUE(run.exists("window.txt.done"));
+    EXPECT_THAT(run.output(), HasSubstr("sink_counter: ends the run"));
     expect_all_frames_in_order(run, counted(run).size());
+}
+
+TEST(Supervision, AnOutputWithoutPermissionToQuitEndsOnlyItself) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 100}}\n"
+                  "outputs:\n- {plugin: sink_counter, path: window.txt, options: {end_at: 20}}\n"
+                  "- {plugin: sink_counter, path: counted.txt}\n");
+    EXPECT_EQ(run.run(), 0) << run.output();
+    EXPECT_TRUE(run.exists("window.txt.done"));
+    EXPECT_TRUE(run.exists("counted.txt.done"));
+    expect_all_frames_in_order(run, 100);
+    EXPECT_THAT(run.output(), HasSubstr("sink_counter: has ended; the other outputs continue ('control: [quit]' lets "
+                                        "it end the run)"));
+}
+
+TEST(Supervision, ARunEndsWithItsLastOutput) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 100000}}\n"
+                  "outputs:\n- {plugin: sink_counter, path: a.txt, options: {end_at: 20}}\n"
+                  "- {plugin: sink_counter, path: counted.txt, options: {end_at: 30}}\n");
+    EXPECT_EQ(run.run(), 0) << run.output();
+    EXPECT_TRUE(run.exists("a.txt.done"));
+    EXPECT_GE(counted(run).size(), 31u);
+    EXPECT_LT(counted(run).size(), 1000u);
 }
 
 TEST(Supervision, AWorkerThatDiesAfterFinishingIsNotRestarted) {

@@ -2,9 +2,11 @@
 #include "camera/calibration.hpp"
 #include "camera/lens.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <opencv2/calib3d.hpp>
 
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -89,6 +91,23 @@ TEST(Lens, DoesNotProjectPointsBehindTheCamera) {
     const auto intrinsics = lens(ARHOST_DISTORTION_NONE, {});
     EXPECT_FALSE(project(intrinsics, {0, 0, 0}));
     EXPECT_FALSE(project(intrinsics, {10, 10, -500}));
+}
+
+TEST(Lens, IsRefusedIfItDistortsTheImagesCentre) {
+    EXPECT_EQ(problem_with_lens(lens(ARHOST_DISTORTION_NONE, {})), "");
+    EXPECT_EQ(problem_with_lens(lens(ARHOST_DISTORTION_BROWN, {-0.4, 0.2, 0.002, -0.001, -0.1})), "");
+    EXPECT_EQ(problem_with_lens(lens(ARHOST_DISTORTION_BROWN, {8, -30, 0, 0, 20, 8.3, -29, 18})), "")
+        << "rational models have large coefficients that compensate each other";
+    EXPECT_EQ(problem_with_lens(lens(ARHOST_DISTORTION_FISHEYE, {0.1, -0.05, 0.01, -0.002})), "");
+    for (const arhost_distortion model : {ARHOST_DISTORTION_BROWN, ARHOST_DISTORTION_FISHEYE})
+        for (std::size_t i = 0; i < (model == ARHOST_DISTORTION_BROWN ? ARHOST_MAX_DISTORTION : 4); ++i)
+            for (const double coefficient : {1e30, -1e30, 1e300, std::numeric_limits<double>::quiet_NaN()}) {
+                std::vector<double> coefficients(i + 1);
+                coefficients.back() = coefficient;
+                EXPECT_THAT(problem_with_lens(lens(model, coefficients)),
+                            testing::StartsWith("the lens distortion is implausible: near the principal point it "))
+                    << i << " " << coefficient;
+            }
 }
 
 } // namespace arhost::camera

@@ -105,7 +105,7 @@ struct View {
         pixels[4 * (640 * y + x) + 3] = static_cast<std::uint8_t>(alpha);
     }
     std::string violations(const Region &region = {0, 0, 640, 480}) const {
-        const OverlayChecks overlay(scene.scene());
+        OverlayChecks overlay(scene.scene());
         ContractChecks checks;
         for (std::uint64_t frame = 0; frame < 16; ++frame) // 16 frames, so that each row is checked once
             overlay.check(checks, frame, camera, region, {pixels.data(), 640 * 4});

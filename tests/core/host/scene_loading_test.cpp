@@ -37,12 +37,14 @@ struct FakeLoader final : supervise::Starter {
 struct SceneLoadingTest : testing::Test {
     // Returns the failure that is reported after the loader has sent these messages and exited.
     std::string reason_after(const std::vector<Json> &messages) {
+        base::Limits limits;
+        limits.start = limits.start_total = std::chrono::hours(1);
         run_config::FilesInUse files;
         for (const char *name : {"a.mp4", "b.mp4"})
             files.write(yaml::Node::parse("{path: '" + (folder / name).string() + "'}", "run.yaml").require("path"));
         std::string failure;
         host::SceneLoading loading(
-            context, folder / "scene.yaml", sandbox::Mode::permissive, std::chrono::hours(1), files,
+            context, folder / "scene.yaml", sandbox::Mode::permissive, limits, files,
             {[&](const SharedMemory &) { failure = "none"; }, [&](const std::string &reason) { failure = reason; }});
         for (const Json &message : messages)
             loader.channel.send(message);
@@ -76,6 +78,27 @@ TEST_F(SceneLoadingTest, DoesNotAccessFilesThatTheLoaderNames) {
     fs::create_symlink("a.mp4", folder / "link.mp4");
     for (const char *name : {"link.mp4", "%d.mp4"})
         EXPECT_THAT(reason_after({encode(messages::Reads{folder / name, "0:0"})}), HasSubstr("exited"));
+}
+
+TEST_F(SceneLoadingTest, EndsALoaderThatReportsProgressForever) {
+    base::Limits limits;
+    limits.start = std::chrono::hours(1);
+    limits.start_total = std::chrono::milliseconds(30);
+    std::string failure;
+    host::SceneLoading loading(
+        context, folder / "scene.yaml", sandbox::Mode::permissive, limits, {},
+        {[&](const SharedMemory &) { failure = "none"; }, [&](const std::string &reason) { failure = reason; }});
+    const Json progress = encode(messages::Progress{0.5, "still busy"});
+    Reactor::Registration next;
+    const std::function<void()> report = [&] {
+        if (!loader.channel.send(progress, {}, false)) // the host has ended the loader
+            ::eventfd_write(loader.death.get(), 1);
+        next = reactor.at(Reactor::Clock::now() + std::chrono::milliseconds(1), report);
+    };
+    report();
+    while (failure.empty())
+        reactor.run_once();
+    EXPECT_THAT(failure, HasSubstr("took longer than 30 ms, the limit in total"));
 }
 
 TEST_F(SceneLoadingTest, FailsIfTheLoaderViolatesTheProtocol) {

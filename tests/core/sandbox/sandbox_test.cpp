@@ -132,7 +132,12 @@ TEST_F(Sandbox, NamespacesBlockUnlistedDevices) {
 
 TEST_F(Sandbox, EnvironmentKeepsStandardAndGrantedVariables) {
     EXPECT_EQ(in_child([&] {
-                  for (const char *variable : {"A_TOKEN", "NVIDIA_API_KEY", "GIVEN", "LC_NUMERIC", "XDG_CACHE_HOME"})
+                  constexpr const char *secrets[] = {
+                      "A_TOKEN",   "NVIDIA_API_KEY", "LD_ACCESS_TOKEN", "VK_TOKEN",     "LP_API_KEY",   "MESA_TOKEN",
+                      "LC_SECRET", "OMP_KEY",        "PYTHON_API_KEY",  "OPENCV_TOKEN", "ARHOST_TOKEN", "PATHS"};
+                  for (const char *variable : secrets)
+                      ::setenv(variable, "value", 1);
+                  for (const char *variable : {"GIVEN", "LC_NUMERIC", "XDG_CACHE_HOME", "LD_LIBRARY_PATH"})
                       ::setenv(variable, "value", 1);
                   policy.environment = {"GIVEN"};
                   char *const secret = ::getenv("A_TOKEN");
@@ -140,8 +145,9 @@ TEST_F(Sandbox, EnvironmentKeepsStandardAndGrantedVariables) {
                   Checks check;
                   check.that(!::getenv("A_TOKEN"));
                   check.that(*secret == '\0');
-                  check.that(!::getenv("NVIDIA_API_KEY"));
-                  for (const char *variable : {"GIVEN", "LC_NUMERIC", "XDG_CACHE_HOME", "PATH"})
+                  for (const char *variable : secrets)
+                      check.that(!::getenv(variable));
+                  for (const char *variable : {"GIVEN", "LC_NUMERIC", "XDG_CACHE_HOME", "LD_LIBRARY_PATH", "PATH"})
                       check.that(::getenv(variable));
                   return check.result();
               }),

@@ -268,6 +268,46 @@ TEST(Gltf, ReportsAllFilesItReads) {
     EXPECT_THAT(read, testing::UnorderedElementsAre("sky.hdr", "wood.png", "a.gltf", "a.bin", "inner.png", "a.obj"));
 }
 
+// A glTF file may come from somebody else: its buffers and images must not be files of the user.
+TEST(Gltf, ReadsOnlyFilesBelowItsFolderAndThoseOfTheKeyReads) {
+    namespace fs = std::filesystem;
+    const ScratchFolder folder;
+    const Gltf gltf = triangle();
+    for (const char *sub : {"scene/models/parts", "home/.ssh"})
+        fs::create_directories(folder.path() / sub);
+    write_file(folder.path() / "home/.ssh/id_rsa", gltf.bytes);
+    write_file(folder.path() / "scene/models/parts/a.bin", gltf.bytes);
+    write_file(folder.path() / "scene/models-secret.bin", gltf.bytes);
+    fs::create_symlink(folder.path() / "home/.ssh/id_rsa", folder.path() / "scene/models/file-link.bin");
+    fs::create_directory_symlink(folder.path() / "home", folder.path() / "scene/models/folder-link");
+    fs::create_symlink("parts/a.bin", folder.path() / "scene/models/inner-link.bin");
+    const auto error_with = [&](const std::string &uri, const std::string &reads) -> std::string {
+        write_file(folder.path() / "scene/models/a.gltf", gltf.json(R"(, "uri": ")" + uri + "\""));
+        write_file(folder.path() / "scene/s.yaml",
+                   "version: 1\naxes: y-up\nmaterials: {}\n" + reads + "objects:\n  - {gltf: models/a.gltf}\n");
+        try {
+            load_scene(folder.path() / "scene/s.yaml");
+        } catch (const arhost::yaml::Error &error) {
+            return error.what();
+        }
+        return "no error";
+    };
+    for (const char *inside : {"parts/a.bin", "parts/../parts/a.bin", "inner-link.bin"})
+        EXPECT_EQ(error_with(inside, ""), "no error") << inside;
+    for (const char *outside : {"../../home/.ssh/id_rsa", "parts/../../../home/.ssh/id_rsa", "../models-secret.bin",
+                                "file-link.bin", "folder-link/.ssh/id_rsa", "%2e%2e/%2e%2e/home/.ssh/id_rsa"})
+        EXPECT_THAT(error_with(outside, ""),
+                    testing::AllOf(HasSubstr("a.gltf: refers to '"), HasSubstr("', which is outside its folder; move "
+                                                                               "that file there, or list it under "
+                                                                               "'reads' in the scene")))
+            << outside;
+    for (const char *reads :
+         {"reads: [../home]\n", "reads: [../home/.ssh/id_rsa]\n", "reads: [models/folder-link]\n"})
+        EXPECT_EQ(error_with("../../home/.ssh/id_rsa", reads), "no error") << reads;
+    EXPECT_THAT(error_with("../../home/.ssh/id_rsa", "reads: [models]\n"), HasSubstr("is outside its folder"));
+    EXPECT_THAT(error_with("parts/a.bin", "reads: [none]\n"), HasSubstr("s.yaml:4:9: reads[0]: there is no file"));
+}
+
 TEST(Gltf, ReportsHowItHandlesAlpha) {
     const auto with = [](const std::string &material) {
         Gltf gltf = triangle();

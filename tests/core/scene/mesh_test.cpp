@@ -383,6 +383,12 @@ TEST(MeshFile, IsRejectedAboveTheSizeLimit) {
     EXPECT_EQ(error_of("a.obj", std::string(5 << 20, '#'), options), "a.obj: is 5 MiB large; the limit is 4 MiB");
 }
 
+TEST(MeshFile, IsRejectedIfItExpandsToAHundredTimesItsSize) {
+    EXPECT_EQ(error_of("a.obj.gz", gzipped(std::string(17 << 20, '#'))),
+              "a.obj.gz: its decompressed content exceeds the limit of 16 MiB for a file of this size; meshes do "
+              "not compress so well: decompress it with gunzip if it is genuine");
+}
+
 TEST(MeshFile, IsRejectedIfTheFormatIsUnsupported) {
     EXPECT_EQ(error_of("a.stl", "solid x\n"), "a.stl: the format '.stl' is unsupported; convert the mesh to .obj or "
                                               ".ply (optionally compressed: .obj.gz, .ply.gz)");

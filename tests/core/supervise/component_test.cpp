@@ -30,9 +30,12 @@ struct Bench {
             events.push_back("hello " + description.id);
             std::vector<OptionValue> values;
             for (const OptionDeclaration &o : description.options)
-                values.push_back({o.key, o.type,
-                                  options.value(o.key, o.default_value ? std::atoi(o.default_value->c_str()) : 0),
-                                  0.0, ""});
+                values.push_back(
+                    {o.key, o.type,
+                     o.type == ARHOST_OPTION_TEXT
+                         ? 0
+                         : options.value(o.key, o.default_value ? std::atoi(o.default_value->c_str()) : 0),
+                     0.0, o.type == ARHOST_OPTION_TEXT ? options.value(o.key, "") : ""});
             for (OptionValue &value : values)
                 if (value.key == "width" || value.key == "height")
                     value.integer = 8;
@@ -122,6 +125,18 @@ TEST(Component, IsRestartedIfItsProcessIsStoppedBeyondTheDeadline) {
     ASSERT_TRUE(bench.until("lost 1"));
     EXPECT_NE(bench.component->crashes()[0].how.find("hung: no answer within 200 ms"), std::string::npos);
     ASSERT_TRUE(bench.until("running", 2));
+}
+
+// The deadlines of start and stop restart with each progress report, which must not keep a worker alive forever.
+TEST(Component, EndsAStartThatReportsProgressForever) {
+    Bench bench;
+    bench.make("hostile_source", {.start_total = 300ms, .restart = {.quarantine_after = 1}},
+               {{"attack", "endless_start"}});
+    ASSERT_TRUE(bench.until("disabled")) << bench.log;
+    ASSERT_EQ(bench.component->crashes().size(), 1u);
+    EXPECT_NE(bench.component->crashes()[0].how.find("did not start within 300 ms in total, although it reported "
+                                                     "progress"),
+              std::string::npos);
 }
 
 TEST(Component, IsDisabledIfItsLibraryIsUnusable) {

@@ -20,10 +20,12 @@ struct Conversation {
                                [](arhost_severity, const std::string &, const std::string &) {}};
     std::vector<Json> received;
     std::string death;
+    supervise::WorkerBudget budget;
     supervise::Process process;
 
     explicit Conversation(const std::string &plugin)
-        : process(context, plugin,
+        : budget(context.log, plugin),
+          process(context, budget,
                   {[this](Message &message) { received.push_back(message.body); }, [](const Result &) {},
                    [this](const supervise::Death &how) { death = how.how; }},
                   messages::Open{ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so", sandbox::Policy{}}) {}

@@ -667,6 +667,38 @@ TEST(Video, TruncatedIsPlayedToTheLastFrameWithAWarning) {
     }
 }
 
+// libav reports no error if the file ends exactly between two frames.
+TEST(Video, MatroskaCutBetweenTwoFramesIsTruncated) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("film.mkv", "-c:v mjpeg -q:v 2", "96x64", 30);
+    Bytes bytes = bytes_of(video.file());
+    // Each frame is a SimpleBlock (0xa3) with a JPEG; the file is cut before the fourth one.
+    const std::uint8_t jpeg[] = {0xff, 0xd8, 0xff};
+    auto frame = bytes.begin();
+    for (int i = 0; i < 4; ++i)
+        frame = std::search(frame + 1, bytes.end(), std::begin(jpeg), std::end(jpeg));
+    ASSERT_NE(frame, bytes.end());
+    while (*frame != 0xa3)
+        --frame;
+    bytes.erase(frame, bytes.end());
+    write_bytes(video.file(), bytes);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+    const auto frames = source.read_all();
+    ASSERT_EQ(frames.size(), 4u);
+    EXPECT_EQ(frames.back().status, ARHOST_STATUS_END_TRUNCATED);
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("film.mkv' is truncated: it ends after frame 2"));
+}
+
+TEST(Video, MatroskaOfUnknownSizeIsNotTruncated) {
+    ARHOST_REQUIRE_FFMPEG();
+    const VideoFile video("film.mkv", "-c:v mjpeg -q:v 2 -live 1", "96x64", 5);
+    SourceUnderTest source("source_file");
+    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+    EXPECT_EQ(source.read_all().back().status, ARHOST_STATUS_END);
+    EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
+}
+
 TEST(Video, AviMayHaveFewerFramesThanHeaderSlots) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("video.mp4", "-c:v mpeg4 -bf 0", "96x64", 40);

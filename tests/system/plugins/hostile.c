@@ -153,6 +153,8 @@ static void read_environment(const tracker *self) {
     char file[64];
     errno = ENOENT;
     report(self, "a secret variable", getenv("HOSTILE_SECRET") != NULL);
+    report(self, "a secret that begins like a driver's variable", getenv("VK_TOKEN") != NULL);
+    report(self, "a secret that begins like a linker's variable", getenv("LD_ACCESS_TOKEN") != NULL);
     report(self, "the initial environment", file_has("/proc/self/environ", "HOSTILE_SECRET="));
     snprintf(file, sizeof file, "/proc/%d/environ", (int)getppid());
     report(self, "the launcher's environment", file_has(file, "HOSTILE_SECRET="));
@@ -516,6 +518,54 @@ static void say_text(const char *text) {
     say(text, strlen(text));
 }
 
+/* Makes the host log a line for each message. */
+static void send_failures(void) {
+    int i;
+    for (i = 0; i < 5000; ++i)
+        say_text("{\"type\": \"failed\", \"status\": -8, \"text\": \"a failure after the start\"}");
+}
+
+/* Sends valid messages that are expensive to parse: 120 KB of numbers each. The host ends this process long before
+ * the last one. */
+static void send_large_messages(void) {
+    static char text[120 << 10];
+    const char head[] = "{\"type\": \"log\", \"severity\": 1, \"text\": \"\", \"numbers\": [0";
+    size_t used = sizeof head - 1;
+    int i;
+    memcpy(text, head, used);
+    for (; used + 4 < sizeof text; used += 2)
+        memcpy(text + used, ",0", 2);
+    memcpy(text + used, "]}", 2);
+    for (i = 0; i < 4000; ++i)
+        say(text, used + 2);
+}
+
+/* Sends many small messages. */
+static void send_small_messages(void) {
+    int i;
+    for (i = 0; i < 2000000; ++i)
+        say_text("{\"type\": \"detached\"}");
+}
+
+static void print_lines(void) {
+    int i;
+    for (i = 0; i < 20000; ++i)
+        printf("line %d\n", i);
+    fflush(stdout);
+}
+
+/* Repeats the first message of the worker, so that the host sets up the plugin again. */
+static void say_hello(void) {
+    say_text("{\"type\": \"hello\", \"sandbox\": \"\", \"descriptor\": {\"kind\": 2, \"id\": \"hostile\", "
+             "\"name\": \"\", \"version\": \"\", \"vendor\": \"\", \"licence\": \"\", \"description\": \"\", "
+             "\"capabilities\": 0, \"options\": [], \"needs\": []}}");
+}
+
+static void report_progress_forever(const tracker *self) {
+    for (;;)
+        self->host->progress(self->host, 0.5, "still busy");
+}
+
 static void attack(const tracker *self) {
     const char *name = self->attack;
     size_t i;
@@ -588,6 +638,14 @@ static void attack(const tracker *self) {
         say_text("");
     else if (!strcmp(name, "link")) {
         report(self, "a link", symlink(self->target, "stats.json.tmp") == 0);
+    } else if (!strcmp(name, "failures")) {
+        send_failures();
+    } else if (!strcmp(name, "large_messages")) {
+        send_large_messages();
+    } else if (!strcmp(name, "small_messages")) {
+        send_small_messages();
+    } else if (!strcmp(name, "lines")) {
+        print_lines();
     } else if (!strcmp(name, "pipe")) {
         report(self, "a pipe", mkfifo("stats.json.tmp", 0600) == 0);
     }
@@ -616,6 +674,8 @@ static const void *get_extension(const char *id) {
 
 static arhost_status start(arhost_instance *self, const arhost_tracker_setup *setup) {
     self->marker_id = setup->markers[0].id;
+    if (!strcmp(self->attack, "second_hello"))
+        say_hello();
     return ARHOST_STATUS_OK;
 }
 
@@ -637,7 +697,8 @@ static arhost_status track(arhost_instance *self, const arhost_frame *frame, arh
     return ARHOST_STATUS_OK;
 }
 static void stop(arhost_instance *self) {
-    (void)self;
+    if (!strcmp(self->attack, "endless_stop"))
+        report_progress_forever(self);
 }
 
 static const arhost_option_descriptor options[] = {

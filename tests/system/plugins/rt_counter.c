@@ -16,7 +16,8 @@
 
 struct arhost_instance {
     const arhost_host *host;
-    int64_t crash_at, hang_at, hang_until, error_at, error, answer;
+    int64_t crash_at, hang_at, hang_until, error_at, error_after, error, answer;
+    int64_t images; /* rendered so far */
     double delay_ms;
     int64_t writes_later, device_time_ns;
     uint8_t *last; /* previous image */
@@ -33,6 +34,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     self->hang_at = arhost_find_option(options, option_count, "hang_at")->integer;
     self->hang_until = arhost_find_option(options, option_count, "hang_until")->integer;
     self->error_at = arhost_find_option(options, option_count, "error_at")->integer;
+    self->error_after = arhost_find_option(options, option_count, "error_after")->integer;
     self->error = arhost_find_option(options, option_count, "error")->integer;
     self->answer = arhost_find_option(options, option_count, "answer")->integer;
     self->delay_ms = arhost_find_option(options, option_count, "delay_ms")->real;
@@ -85,7 +87,8 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
     }
     while (number == self->hang_at || (number > self->hang_at && number < self->hang_until))
         pause();
-    if (misbehave_if_requested() || number == self->error_at)
+    if (misbehave_if_requested() || number == self->error_at ||
+        (self->error_after >= 0 && self->images++ >= self->error_after))
         return (arhost_status)self->error;
     if (wait_or_cancel(self)) {
         self->host->log(self->host, ARHOST_SEVERITY_INFO, "cancelled while waiting");
@@ -121,7 +124,9 @@ static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error_at", "-1", 0, 0, NULL,
      "Returns an error for this frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error", "-8", 0, 0, NULL,
-     "Status to return with error_at"},
+     "Status to return with error_at and error_after"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "error_after", "-1", 0, 0, NULL,
+     "Returns an error after this many images; -1: never"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "answer", "1", 0, 0, NULL,
      "Status to return for each frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "delay_ms", "0", 0, 600000, NULL,

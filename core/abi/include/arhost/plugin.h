@@ -59,7 +59,7 @@ extern "C" {
 typedef int32_t arhost_status;
 enum {
     ARHOST_STATUS_OK = 1,
-    ARHOST_STATUS_END = 2, /* success; ends the run: no more frames, or the user closed the window of the sink */
+    ARHOST_STATUS_END = 2, /* success; a source has no more frames, or the user closed the window of a sink */
     ARHOST_STATUS_END_TRUNCATED = 3, /* the source's input is truncated; all readable frames were delivered */
 
     ARHOST_STATUS_ERROR_INVALID_ARGUMENT = -1, /* contract violation by the caller */

@@ -118,7 +118,7 @@ pub trait Raytracer: Plugin {
 
 pub trait Sink: Plugin {
     fn start(&mut self, setup: &arhost_sink_setup) -> Result<(), Failure>;
-    /// Returns false to end the run: the user closed the window.
+    /// Returns false if the user closed the window: the host then closes this output.
     fn write(&mut self, output: &Output) -> Result<bool, Failure>;
 }
 

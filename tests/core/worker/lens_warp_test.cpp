@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "compositor/lens_warp.hpp"
+#include "worker/lens_warp.hpp"
 
 #include <arhost/shading/lens.hpp>
 
@@ -9,6 +9,7 @@
 #include <cmath>
 
 using namespace arhost;
+using worker::LensWarp;
 
 namespace {
 
@@ -19,17 +20,28 @@ arhost_intrinsics lens(arhost_distortion distortion, std::vector<double> k) {
     return in;
 }
 
+constexpr std::uint32_t width = 320, height = 240;
+
 // Draws an antialiased disc in the pinhole image.
-std::vector<std::uint8_t> disc(double x0, double y0, double radius) {
-    std::vector<std::uint8_t> image(std::size_t{320} * 240 * 4);
-    for (int y = 0; y < 240; ++y)
-        for (int x = 0; x < 320; ++x) {
-            std::uint8_t *pixel = &image[4 * (y * 320 + x)];
+void draw_disc(const arhost_image &image, double x0, double y0, double radius) {
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x) {
+            std::uint8_t *pixel = image.rgba + std::size_t{y} * image.stride + 4 * x;
             pixel[0] = 200, pixel[1] = 100, pixel[2] = 50;
             pixel[3] =
                 static_cast<std::uint8_t>(255 * std::clamp(radius + 0.5 - std::hypot(x - x0, y - y0), 0.0, 1.0));
         }
-    return image;
+}
+
+// The image that LensWarp writes. Its old content must be replaced.
+struct LensImage {
+    std::vector<std::uint8_t> bytes = std::vector<std::uint8_t>(std::size_t{1344} * height, 77);
+    arhost_image image{sizeof image, 1344, width, height, bytes.data()};
+    const std::uint8_t *at(std::uint32_t x, std::uint32_t y) const { return &bytes[std::size_t{y} * 1344 + 4 * x]; }
+};
+
+void fill(const arhost_image &image) {
+    std::fill_n(image.rgba, std::size_t{image.stride} * height, std::uint8_t{255});
 }
 
 } // namespace
@@ -41,12 +53,13 @@ TEST(LensWarp, MapsPinholePixelsToTheirLensPosition) {
         const shading::Lens distortion(in);
         for (const auto &[px, py] : {std::pair{0.0, 0.0}, {0.4, 0.2}, {-0.5, -0.3}}) {
             const arhost_intrinsics &pinhole = warp.pinhole();
-            const auto image = disc(px * pinhole.fx + pinhole.cx, py * pinhole.fy + pinhole.cy, 6);
-            const ImageView warped = warp.warp({image.data(), 320 * 4}, {0, 0, 320, 240});
+            draw_disc(warp.pinhole_image(), px * pinhole.fx + pinhole.cx, py * pinhole.fy + pinhole.cy, 6);
+            const LensImage warped;
+            warp.warp({}, warped.image);
             double area = 0, x_sum = 0, y_sum = 0;
-            for (int y = 0; y < 240; ++y)
-                for (int x = 0; x < 320; ++x) {
-                    const std::uint8_t *pixel = warped.rgba + y * warped.stride + 4 * x;
+            for (std::uint32_t y = 0; y < height; ++y)
+                for (std::uint32_t x = 0; x < width; ++x) {
+                    const std::uint8_t *pixel = warped.at(x, y);
                     area += pixel[3];
                     x_sum += pixel[3] * x;
                     y_sum += pixel[3] * y;
@@ -70,18 +83,30 @@ TEST(LensWarp, CoversTheWholeLensImage) {
          {lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}), lens(ARHOST_DISTORTION_BROWN, {0.2, -0.1, 0, 0}),
           lens(ARHOST_DISTORTION_FISHEYE, {0.05, -0.01, 0.004, -0.001})}) {
         LensWarp warp(in);
-        const std::vector<std::uint8_t> opaque(std::size_t{320} * 240 * 4, 255);
-        const ImageView warped = warp.warp({opaque.data(), 320 * 4}, {0, 0, 320, 240});
-        for (int i = 0; i < 320 * 240; ++i)
-            ASSERT_EQ(warped.rgba[4 * i + 3], 255) << i % 320 << " " << i / 320;
+        fill(warp.pinhole_image());
+        const LensImage warped;
+        warp.warp({}, warped.image);
+        for (std::uint32_t i = 0; i < width * height; ++i)
+            ASSERT_EQ(warped.at(i % width, i / width)[3], 255) << i % width << " " << i / width;
     }
 }
 
 TEST(LensWarp, ReadsOnlyTheRegionEvenIfItExceedsTheImage) {
     LensWarp warp(lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}));
-    const std::vector<std::uint8_t> opaque(std::size_t{320} * 240 * 4, 255);
-    const ImageView none = warp.warp({opaque.data(), 320 * 4}, {10, 10, 0, 0});
-    EXPECT_TRUE(std::all_of(none.rgba, none.rgba + 320 * 240 * 4, [](std::uint8_t byte) { return byte == 0; }));
-    warp.warp({opaque.data(), 320 * 4},
-              {300, 200, 4'000'000'000u, 4'000'000'000u}); // AddressSanitizer detects reads outside the image
+    fill(warp.pinhole_image());
+    const LensImage none;
+    arhost_render_info region{sizeof region, 1, 10, 10, 0, 0, 0};
+    warp.warp(region, none.image);
+    for (std::uint32_t i = 0; i < width * height; ++i)
+        ASSERT_EQ(none.at(i % width, i / width)[3], 0);
+    region = {sizeof region, 1, 300, 200, 4'000'000'000u, 4'000'000'000u, 0};
+    warp.warp(region, none.image); // AddressSanitizer detects reads outside the image
+}
+
+TEST(LensWarp, RendersToMemoryThatAGpuCanImport) {
+    LensWarp warp(lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}));
+    const arhost_image image = warp.pinhole_image();
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(image.rgba) % 4096, 0u);
+    EXPECT_EQ(image.stride % 64, 0u);
+    EXPECT_EQ(warp.pinhole_image().rgba, image.rgba);
 }

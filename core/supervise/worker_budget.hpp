@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Limits what a worker can make the host do: handle messages, and write log lines. The budget belongs to a component,
+// so a restart of its worker does not renew it.
+#pragma once
+
+#include "ipc/reactor.hpp"
+#include "supervise/launcher.hpp"
+
+namespace arhost::supervise {
+
+class WorkerBudget {
+public:
+    using Clock = ipc::Reactor::Clock;
+
+    // Lines per second, for warnings (and errors) and other lines separately, so that neither displaces the other.
+    static constexpr int max_lines = 100;
+    // Cost of messages, in bytes. A worker that logs as much as arhost-worker lets its plugin stays far below.
+    static constexpr std::size_t cost_per_message = 512, cost_per_second = 2 << 20, max_cost = 16 << 20;
+    static constexpr std::size_t max_text = 4000; // bytes of a line; the rest is cut off
+
+    WorkerBudget(LogFunction log, std::string name) : log_(std::move(log)), name_(std::move(name)) {}
+    ~WorkerBudget() { report_suppressed_lines(); }
+    WorkerBudget(const WorkerBudget &) = delete;
+    WorkerBudget &operator=(const WorkerBudget &) = delete;
+
+    // Logs a line that a worker sent or caused. Counts lines beyond the limit; the next line of a later second is
+    // preceded by their number.
+    void log(arhost_severity severity, const std::string &text, Clock::time_point now = Clock::now());
+
+    // Deducts the cost of a message. Returns false if the budget is exhausted: it holds max_cost, and regains
+    // cost_per_second.
+    bool spend(std::size_t message_bytes, Clock::time_point now = Clock::now());
+
+private:
+    void report_suppressed_lines();
+
+    struct LineCount { // lines within the current second
+        int logged = 0, suppressed = 0;
+    };
+    LogFunction log_;
+    std::string name_;
+    Clock::time_point second_ends_{}, last_spent_{};
+    LineCount other_lines_, warnings_;
+    double left_ = max_cost;
+};
+
+} // namespace arhost::supervise

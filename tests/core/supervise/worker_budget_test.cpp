@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "supervise/worker_budget.hpp"
+
+#include <gmock/gmock.h>
+
+using namespace arhost::supervise;
+using namespace std::chrono_literals;
+
+namespace {
+
+struct Lines {
+    std::vector<std::string> all;
+    WorkerBudget budget{[this](arhost_severity severity, const std::string &component, const std::string &text) {
+                            all.push_back((severity >= ARHOST_SEVERITY_WARNING ? "warning " : "") + component + ": " +
+                                          text);
+                        },
+                        "tracker"};
+};
+
+const WorkerBudget::Clock::time_point start = WorkerBudget::Clock::time_point(1h);
+
+} // namespace
+
+TEST(WorkerBudget, LimitsTheLinesOfEachSecondAndReportsTheirNumber) {
+    Lines lines;
+    for (int i = 0; i < 1000; ++i) {
+        lines.budget.log(ARHOST_SEVERITY_WARNING, "w", start);
+        lines.budget.log(ARHOST_SEVERITY_DEBUG, "d", start + 500ms);
+    }
+    EXPECT_EQ(lines.all.size(), 2u * WorkerBudget::max_lines) << "neither kind displaces the other";
+    lines.all.clear();
+    lines.budget.log(ARHOST_SEVERITY_INFO, "later", start + 1s);
+    EXPECT_THAT(lines.all, testing::ElementsAre("tracker: suppressed 900 more log lines within one second",
+                                                "warning tracker: suppressed 900 more log lines within one second",
+                                                "tracker: later"));
+}
+
+TEST(WorkerBudget, CutsLongLines) {
+    Lines lines;
+    lines.budget.log(ARHOST_SEVERITY_INFO, std::string(1 << 20, 'x'), start);
+    EXPECT_EQ(lines.all.at(0).size(), std::string("tracker: ").size() + WorkerBudget::max_text);
+}
+
+TEST(WorkerBudget, LimitsTheNumberAndTheBytesOfMessages) {
+    for (const std::size_t size : {std::size_t{0}, std::size_t{120 << 10}}) {
+        Lines lines;
+        const std::size_t cost = size + WorkerBudget::cost_per_message, in_burst = WorkerBudget::max_cost / cost;
+        for (std::size_t i = 0; i < in_burst; ++i)
+            ASSERT_TRUE(lines.budget.spend(size, start)) << i;
+        EXPECT_FALSE(lines.budget.spend(size, start));
+        // After some seconds, it may send again, but no more than it has regained.
+        const std::size_t regained = (2 * WorkerBudget::cost_per_second - cost) / cost;
+        for (std::size_t i = 0; i < regained; ++i)
+            ASSERT_TRUE(lines.budget.spend(size, start + 2s)) << i;
+        EXPECT_FALSE(lines.budget.spend(2 * cost, start + 2s));
+    }
+}

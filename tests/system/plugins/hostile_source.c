@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A source of black frames that attempts one attack on the host during `start`.
+ */
+#include <arhost/arhost.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct arhost_instance {
+    const arhost_host *host;
+    char attack[32];
+    int64_t frames;
+};
+
+static arhost_status create(const arhost_host *host, const arhost_option *options, uint32_t option_count,
+                            arhost_instance **instance) {
+    arhost_instance *self = calloc(1, sizeof *self);
+    if (!self)
+        return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
+    self->host = host;
+    snprintf(self->attack, sizeof self->attack, "%s", arhost_find_option(options, option_count, "attack")->text);
+    self->frames = arhost_find_option(options, option_count, "frames")->integer;
+    *instance = self;
+    return ARHOST_STATUS_OK;
+}
+static void destroy(arhost_instance *self) {
+    free(self);
+}
+static const void *get_extension(const char *id) {
+    return (void)id, (const void *)0;
+}
+
+/* A lens whose rays the host cannot compute in reasonable time. */
+static void report_lens(arhost_source_properties *properties) {
+    arhost_intrinsics *lens = &properties->intrinsics;
+    int i;
+    properties->has_intrinsics = 1;
+    properties->format.width = properties->format.height = 4096;
+    lens->width = lens->height = 4096;
+    lens->fx = lens->fy = 4096;
+    lens->cx = lens->cy = 2047.5;
+    lens->distortion = ARHOST_DISTORTION_BROWN;
+    lens->coefficient_count = ARHOST_MAX_DISTORTION;
+    for (i = 0; i < ARHOST_MAX_DISTORTION; ++i)
+        lens->coefficients[i] = 1e30;
+}
+
+static arhost_status start(arhost_instance *self, const arhost_source_setup *setup,
+                           arhost_source_properties *properties) {
+    (void)setup;
+    properties->format.pixel_format = ARHOST_PIXEL_FORMAT_GREY8;
+    properties->format.width = properties->format.height = 64;
+    properties->format.fps = 30;
+    if (!strcmp(self->attack, "lens"))
+        report_lens(properties);
+    while (!strcmp(self->attack, "endless_start"))
+        self->host->progress(self->host, 0.5, "still busy");
+    return arhost_frame_layout(&properties->format) ? ARHOST_STATUS_OK : ARHOST_STATUS_ERROR_INTERNAL;
+}
+static arhost_status read_frame(arhost_instance *self, const arhost_frame_buffer *buffer, arhost_frame_info *info) {
+    if (buffer->sequence >= (uint64_t)self->frames)
+        return ARHOST_STATUS_END;
+    memset(buffer->plane[0], 0, (size_t)buffer->format->stride[0] * buffer->format->height);
+    info->clock = ARHOST_CLOCK_MEDIA;
+    info->capture_ns = (int64_t)buffer->sequence * 33333333;
+    return ARHOST_STATUS_OK;
+}
+static void stop(arhost_instance *self) {
+    (void)self;
+}
+
+static const arhost_option_descriptor options[] = {
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_TEXT, "attack", "none", 0, 0, NULL, "Name of the attack"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "frames", "10", 0, 0, NULL, "Number of frames"},
+};
+static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
+                                             ARHOST_KIND_SOURCE,
+                                             "hostile_source",
+                                             "Hostile source",
+                                             "0.1.0",
+                                             "arhost",
+                                             "Apache-2.0",
+                                             "Attempts attacks on the host, for tests.",
+                                             ARHOST_CAPABILITY_SEEK,
+                                             sizeof options / sizeof *options,
+                                             options,
+                                             NULL};
+static const arhost_source functions = {sizeof(arhost_source), start, read_frame, stop};
+static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
+
+static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
+    (void)offer;
+    answer->abi_version = ARHOST_ABI_VERSION;
+    answer->plugin = &plugin;
+    return ARHOST_STATUS_OK;
+}
+
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};
