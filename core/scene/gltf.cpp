@@ -39,7 +39,7 @@ bool is_file(const std::string &file, void *) { // rejects FIFOs, which would bl
     return std::filesystem::is_regular_file(file, ignored);
 }
 
-// What read_file needs to read the resources (buffers and images) of a glTF file.
+// Input of read_file: how to read the resources (buffers and images) of a glTF file.
 struct Resources {
     const Reporter &reporter;
     const std::string &gltf;                     // name of the glTF file, for messages
