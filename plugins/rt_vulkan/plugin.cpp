@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The plugin's entry points and options.
-#include "renderer.hpp"
+#include "self_check.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -107,6 +107,10 @@ private:
     // throws if none remains or another path would not help.
     bool try_start(const arhost_raytracer_setup &setup) {
         try {
+            if (paths_.size() > 1) // another path can be used instead
+                if (const std::string why = difference_from_plain(setup, settings_, host_, physical_, shaders_);
+                    !why.empty())
+                    throw arhost::Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, why);
             renderer_.emplace(setup, settings_, host_, physical_, shaders_);
             return true;
         } catch (const arhost::Failure &failure) {

@@ -226,7 +226,7 @@ TEST(Supervision, ForkedProcessesEndWithTheirWorker) {
 TEST(Supervision, StderrOfACrashedPluginNeedNotBeUtf8) {
     ArhostRun run(counting("lockstep", "frames: 30", "crash_at: 20", ""));
     run.write("scene.yaml", small_scene);
-    ASSERT_EQ(run.run(), 0) << run.output();
+    ASSERT_EQ(run.run(), 1) << run.output();
     EXPECT_THAT(run.stats()["crashes"][0]["log_tail"].get<std::string>(), HasSubstr("last words: \uFFFD"));
 }
 

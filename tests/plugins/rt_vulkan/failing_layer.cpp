@@ -210,6 +210,19 @@ VKAPI_ATTR VkResult VKAPI_CALL list_extensions(VkPhysicalDevice physical, const 
     return result;
 }
 
+VKAPI_ATTR void VKAPI_CALL trace_rays(VkCommandBuffer commands, const VkStridedDeviceAddressRegionKHR *generate,
+                                      const VkStridedDeviceAddressRegionKHR *miss,
+                                      const VkStridedDeviceAddressRegionKHR *hit,
+                                      const VkStridedDeviceAddressRegionKHR *callable, std::uint32_t width,
+                                      std::uint32_t height, std::uint32_t depth) {
+    const char *failure = std::getenv("ARHOST_TEST_VULKAN_FAILS");
+    if (failure && !std::strcmp(failure, "no-picture"))
+        return;
+    const std::lock_guard lock(mutex);
+    next<PFN_vkCmdTraceRaysKHR>(devices.at(key_of(commands)), "vkCmdTraceRaysKHR")(commands, generate, miss, hit,
+                                                                                   callable, width, height, depth);
+}
+
 PFN_vkVoidFunction intercepted(const char *name, bool of_instance) {
     const struct {
         const char *name;
@@ -227,6 +240,7 @@ PFN_vkVoidFunction intercepted(const char *name, bool of_instance) {
         {"vkDestroyDevice", reinterpret_cast<PFN_vkVoidFunction>(destroy_device), false},
         {"vkQueueSubmit", reinterpret_cast<PFN_vkVoidFunction>(queue_submit), false},
         {"vkWaitForFences", reinterpret_cast<PFN_vkVoidFunction>(wait_for_fences), false},
+        {"vkCmdTraceRaysKHR", reinterpret_cast<PFN_vkVoidFunction>(trace_rays), false},
         {"vkAllocateMemory", reinterpret_cast<PFN_vkVoidFunction>(allocate_memory), false},
     };
     for (const auto &one : all)

@@ -114,6 +114,26 @@ TEST_P(FailingDevice, FallsBackIfAnAnnouncedPathFails) {
                 HasSubstr("that this is unsupported"));
 }
 
+TEST_P(FailingDevice, FallsBackIfAPathDrawsWrongPictures) {
+    if (GetParam() != "pipeline")
+        GTEST_SKIP() << "the injected failure affects the path 'pipeline' only";
+    ::setenv("ARHOST_TEST_VULKAN_IS_A_GPU", "pipeline", 1);
+    for (const char *failure : {"no-picture", ""}) {
+        inject_failure(failure);
+        Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {}, "rt_vulkan");
+        ASSERT_EQ(tracer.start(small_), ARHOST_STATUS_OK) << tracer.plugin().log();
+        if (*failure)
+            EXPECT_THAT(
+                tracer.plugin().log(),
+                testing::AllOf(testing::ContainsRegex("path 'pipeline' failed, trying 'query': [0-9]+ of [0-9]+ "
+                                                      "drawn pixels of a small picture differ from those of "
+                                                      "the path 'plain'"),
+                               HasSubstr("path query, ")));
+        else
+            EXPECT_THAT(tracer.plugin().log(), HasSubstr("path pipeline, "));
+    }
+}
+
 TEST_P(FailingDevice, ReportsAMissingFunction) {
     const std::string function = GetParam() == "plain"   ? "vkGetMemoryHostPointerPropertiesEXT"
                                  : GetParam() == "query" ? "vkCmdBuildAccelerationStructuresKHR"
