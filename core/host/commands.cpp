@@ -8,6 +8,7 @@
 #include "host/pipeline.hpp"
 #include "host/probe.hpp"
 #include "run_config/schema.hpp"
+#include "scene/capabilities.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -324,12 +325,15 @@ int check(const Arguments &arguments, supervise::Starter &launcher) {
     ipc::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
 
+    ipc::PluginDescription raytracer;
     const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
         for (std::size_t i = 0; i < component.plugins.size(); ++i) {
             const ProbeResult result = probe(context, component.plugins[i], component.policy);
             if (const auto *reason = std::get_if<std::string>(&result))
                 component.node.require(i == 0 ? "plugin" : "fallback").fail(*reason);
             run_config::options_for(std::get<ipc::PluginDescription>(result), kind, component, i);
+            if (kind == ARHOST_KIND_RAYTRACER && i == 0)
+                raytracer = std::get<ipc::PluginDescription>(result);
         }
     };
     if (configuration.source)
@@ -343,14 +347,22 @@ int check(const Arguments &arguments, supervise::Starter &launcher) {
 
     if (configuration.raytracer) {
         std::optional<std::string> outcome;
-        const SceneLoading loading(
-            context, configuration.raytracer->scene, configuration.sandbox, configuration.raytracer->limits.start,
-            configuration.files,
-            {[&](const ipc::SharedMemory &) { outcome = ""; }, [&](const std::string &reason) { outcome = reason; }});
+        std::uint32_t needed = 0;
+        const SceneLoading loading(context, configuration.raytracer->scene, configuration.sandbox,
+                                   configuration.raytracer->limits.start, configuration.files,
+                                   {[&](const ipc::SharedMemory &arena) {
+                                        outcome = "";
+                                        needed = scene::needed_capabilities(
+                                            arena.map(ipc::Access::read_only).as<const arhost_scene>());
+                                    },
+                                    [&](const std::string &reason) { outcome = reason; }});
         while (!outcome)
             reactor.run_once();
         if (!outcome->empty())
             throw yaml::Error(*outcome);
+        const std::string missing = scene::missing_capabilities_text(raytracer.id, needed & ~raytracer.capabilities);
+        if (!missing.empty())
+            console.log(ARHOST_SEVERITY_WARNING, "raytracer", missing);
     }
     std::printf("%s: OK\n", base::printable(arguments.file).c_str());
     return success;

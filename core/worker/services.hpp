@@ -39,6 +39,7 @@ public:
     virtual arhost_status stop() = 0;
 };
 
-std::unique_ptr<Service> make_service(const arhost_plugin &plugin, arhost_instance *instance);
+std::unique_ptr<Service> make_service(const arhost_host &host, const arhost_plugin &plugin,
+                                      arhost_instance *instance);
 
 } // namespace arhost::worker

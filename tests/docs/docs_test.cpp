@@ -39,12 +39,9 @@ TEST(Documentation, ContainsOnlyValidConfigurations) {
     int checked = 0;
     for (const fs::path &document : {root / "README.md", root / "docs/config.md"})
         for (const std::string &block : yaml_blocks(read_file(document))) {
-            ArhostRun run;
-            fs::create_directory_symlink(root / "config", run.path("config"));
-            // The configuration is saved in the document's folder, because its paths are relative to its own folder.
-            const std::string file = (fs::relative(document, root).parent_path() / "snippet.yaml").string();
-            run.write(file, block);
-            EXPECT_EQ(run.run({"check", file}), 0) << document << ":\n" << block << run.output();
+            ArhostRun run; // in an empty folder: a snippet works from any folder
+            run.write("snippet.yaml", block);
+            EXPECT_EQ(run.run({"check", "snippet.yaml"}), 0) << document << ":\n" << block << run.output();
             ++checked;
         }
     EXPECT_EQ(checked, 2);
