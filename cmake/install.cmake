@@ -20,20 +20,78 @@ write_basic_package_version_file(arhostConfigVersion.cmake COMPATIBILITY SameMin
 configure_file(cmake/arhost.pc.in arhost.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/arhostConfig.cmake ${PROJECT_BINARY_DIR}/arhostConfigVersion.cmake
               cmake/arhost_add_plugin.cmake cmake/plugin.map DESTINATION lib/cmake/arhost)
-install(FILES ${PROJECT_BINARY_DIR}/arhost.pc DESTINATION lib/pkgconfig)
+install(FILES ${PROJECT_BINARY_DIR}/arhost.pc DESTINATION share/pkgconfig) # no architecture: only headers
 install(DIRECTORY sdk/ DESTINATION share/arhost PATTERN target EXCLUDE PATTERN Cargo.lock EXCLUDE)
 
 # Examples and documentation
-install(DIRECTORY config DESTINATION share/arhost)
+install(DIRECTORY config DESTINATION share/arhost PATTERN README.md EXCLUDE)
 install(FILES docs/arhost.schema.json DESTINATION share/arhost)
-file(GLOB documents CONFIGURE_DEPENDS docs/*.md)
-install(FILES README.md CHANGELOG.md ${documents} DESTINATION share/doc/arhost)
-install(DIRECTORY docs/images DESTINATION share/doc/arhost)
-install(FILES LICENSE DESTINATION share/doc/arhost RENAME copyright)
+set(documentation share/doc/arhost)
+install(FILES LICENSE DESTINATION ${documentation} COMPONENT licence) # Debian has the text elsewhere
+# The documentation has the folders of the repository, so that its relative links work: all documents, copies of the files
+# that they link to, and symbolic links to the headers.
+file(GLOB documents RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS *.md bench/peers/*.md config/*.md docs/*.md docs/adr/*.md
+     plugins/*/*.md)
+set(linked docs/images)
+foreach(document ${documents})
+  get_filename_component(folder ${document} DIRECTORY)
+  install(FILES ${document} DESTINATION ${documentation}/${folder})
+  file(READ ${document} text)
+  string(REPLACE "](" "\n<" text "${text}") # CMake's lists treat brackets specially
+  string(REGEX MATCHALL "\n<[^<>)#: \n]+" targets "${text}")
+  foreach(target ${targets})
+    string(SUBSTRING ${target} 2 -1 target)
+    file(REAL_PATH "./${folder}/${target}" target BASE_DIRECTORY ${PROJECT_SOURCE_DIR})
+    file(RELATIVE_PATH target ${PROJECT_SOURCE_DIR} ${target})
+    if(NOT target MATCHES "/include/|^\\.\\./" AND NOT target IN_LIST documents)
+      list(APPEND linked ${target})
+    endif()
+  endforeach()
+endforeach()
+list(REMOVE_DUPLICATES linked)
+foreach(target ${linked})
+  get_filename_component(folder ${target} DIRECTORY)
+  if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/${target})
+    install(DIRECTORY ${target} DESTINATION ${documentation}/${folder})
+  else()
+    install(FILES ${target} DESTINATION ${documentation}/${folder})
+  endif()
+endforeach()
+foreach(module abi shading)
+  file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/documentation/core/${module})
+  file(CREATE_LINK ../../../../../include ${PROJECT_BINARY_DIR}/documentation/core/${module}/include SYMBOLIC)
+endforeach()
+install(DIRECTORY ${PROJECT_BINARY_DIR}/documentation/ DESTINATION ${documentation})
 
+# The Debian package. `lintian` accepts it (tests/sdk).
+set(ARHOST_PACKAGE_CONTACT "arhost maintainers <arhost@example.org>" CACHE STRING "Maintainer of the Debian package: Name <mail>")
+set(debian ${PROJECT_BINARY_DIR}/debian)
+string(TIMESTAMP date "%a, %d %b %Y %H:%M:%S +0000" UTC) # of SOURCE_DATE_EPOCH if it is set
+file(CONFIGURE OUTPUT ${debian}/changelog CONTENT "arhost (${PROJECT_VERSION}) unstable; urgency=medium
+
+  * /usr/share/doc/arhost/CHANGELOG.md lists the changes.
+
+ -- ${ARHOST_PACKAGE_CONTACT}  ${date}
+" @ONLY)
+find_program(GZIP gzip REQUIRED)
+execute_process(COMMAND ${GZIP} -9nf ${debian}/changelog COMMAND_ERROR_IS_FATAL ANY)
+install(FILES ${debian}/changelog.gz DESTINATION ${documentation} COMPONENT debian EXCLUDE_FROM_ALL)
+install(FILES cmake/debian/copyright DESTINATION ${documentation} COMPONENT debian EXCLUDE_FROM_ALL)
+install(FILES cmake/debian/lintian-overrides DESTINATION share/lintian/overrides RENAME arhost COMPONENT debian EXCLUDE_FROM_ALL)
+set(CPACK_INSTALL_CMAKE_PROJECTS "${PROJECT_BINARY_DIR};arhost;Unspecified;/" "${PROJECT_BINARY_DIR};arhost;debian;/")
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ
+                                                WORLD_EXECUTE)
 set(CPACK_GENERATOR DEB)
-set(CPACK_PACKAGE_CONTACT "arhost <arhost@localhost>")
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Ray-traced objects over live video, and the SDK for its plugins")
+set(CPACK_PACKAGE_CONTACT ${ARHOST_PACKAGE_CONTACT})
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "ray-traced objects over live video, and the SDK for its plugins")
+set(CPACK_PACKAGE_DESCRIPTION "arhost runs trackers and ray tracers as plugins, each in its own
+sandboxed process, converts the pose of a marker to the camera of the
+ray tracer, and composites the ray-traced image over every frame.
+.
+This package contains the programs, plugins for files, cameras, ArUco
+and AprilTag markers, Embree, Vulkan and Python, example scenes, and
+what authors of plugins need: headers, a CMake package, templates and
+documentation.")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)

@@ -3,6 +3,7 @@
 #include "conformance/process_usage.hpp"
 #include "conformance/test.hpp"
 #include "ipc/json_abi.hpp"
+#include "worker/devices.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -157,9 +158,9 @@ void descriptor(Context &context) {
     for (const auto &[field, text] : texts)
         if (!text || !*text)
             throw Failure(fmt::format("the descriptor's {} is empty", field));
-    constexpr std::uint32_t capabilities_of_kind[] = {0, ARHOST_CAPABILITY_SEEK | ARHOST_CAPABILITY_LIVE, 0,
-                                                      ARHOST_CAPABILITY_LENS_DISTORTION,
-                                                      ARHOST_CAPABILITY_REALTIME_SINK};
+    constexpr std::uint32_t capabilities_of_kind[] = {
+        0, ARHOST_CAPABILITY_SEEK | ARHOST_CAPABILITY_LIVE, 0,
+        ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE, ARHOST_CAPABILITY_REALTIME_SINK};
     if (const std::uint32_t invalid = d.capabilities & ~capabilities_of_kind[d.kind])
         throw Failure(fmt::format("the capability bits {:#x} are not defined for this kind of plugin", invalid));
     const ipc::Json described = ipc::to_json(d);
@@ -290,6 +291,50 @@ void cancelled(Context &context) {
                                   instance.get() ? " not" : ""));
 }
 
+// A plugin may offer the extension only while an instance exists, as those for Python do.
+void devices(Context &context) {
+    Instance instance(context.library);
+    instance.create_or_fail();
+    const arhost_plugin &plugin = context.library.plugin();
+    if (!plugin.get_extension(ARHOST_DEVICES_EXTENSION))
+        throw Skip("it does not have the extension " ARHOST_DEVICES_EXTENSION);
+    const Host host;
+    const auto list = [&] {
+        std::optional<ipc::DeviceList> listed;
+        arhost_status status;
+        try {
+            status = in_call(context.library.calls(), Call::devices,
+                             [&] { return worker::list_devices(plugin, *host.get(), listed); });
+        } catch (const std::runtime_error &error) {
+            throw Failure(error.what());
+        }
+        if (status != ARHOST_STATUS_OK)
+            throw Failure(call_result("list", status, host));
+        return listed ? listed->devices : std::vector<ipc::DeviceDescription>();
+    };
+    const std::vector<ipc::DeviceDescription> first = list();
+    const ProcessUsage before = ProcessUsage::now();
+    const std::vector<ipc::DeviceDescription> again = list();
+    constexpr long allowed_kib = 4096;
+    if (const std::string grown = growth(before, ProcessUsage::now(), allowed_kib); !grown.empty())
+        throw Failure("listing the devices again, the process grew " + grown);
+    if (again != first)
+        throw Failure("listing the devices again gives another list");
+    std::size_t defaults = 0;
+    for (std::size_t i = 0; i < first.size(); ++i) {
+        if (first[i].index != i)
+            throw Failure(fmt::format("device {} of the list has the index {}", i, first[i].index));
+        if (first[i].name.empty())
+            throw Failure(fmt::format("device {} has an empty name", i));
+        defaults += first[i].is_default ? 1 : 0;
+        context.note += (i > 0 ? ", " : "") + first[i].name;
+    }
+    if (defaults > 1)
+        throw Failure(fmt::format("{} devices are the default; at most one may be", defaults));
+    if (first.empty())
+        context.note = "no devices";
+}
+
 constexpr Test tests[] = {
     {"abi.load", "arhost-worker can load it, it supports the ABI version, and its id matches its file name.", 0, "",
      10s, load},
@@ -311,6 +356,8 @@ constexpr Test tests[] = {
      20s, two_instances},
     {"abi.create-1000-times", "1,000 create/destroy cycles, or 20 s of them, leak no descriptors, threads or memory.",
      0, "abi.create", 240s, create_repeatedly},
+    {"abi.devices", "It lists its devices repeatedly: in order of their index, at most one of them the default.", 0,
+     "abi.create", 60s, devices},
     {"abi.cancelled-create", "After cancellation, create promptly returns OK or CANCELLED.", 0, "abi.create", 10s,
      cancelled},
 };

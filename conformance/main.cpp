@@ -6,6 +6,7 @@
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
 #include "conformance/report.hpp"
+#include "run_config/plugin_path.hpp"
 
 #include <fmt/format.h>
 
@@ -77,6 +78,16 @@ PrintFiles parse_prints(const std::vector<std::string> &texts) {
         prints[id] = fs::absolute(text.substr(equals + 1));
     }
     return prints;
+}
+
+// Returns the file of a plugin given as a path or as a name, which is searched for as in a configuration.
+fs::path find_plugin(const std::string &text) {
+    std::error_code ignored;
+    if (fs::is_regular_file(text, ignored))
+        return fs::absolute(text);
+    if (text.find('/') != std::string::npos || text.ends_with(".so") || text.ends_with(".py"))
+        throw std::runtime_error("there is no plugin '" + text + "'");
+    return arhost::run_config::PluginPath({}, default_reference().parent_path()).find(text);
 }
 
 // Options with the names and meanings of the configuration's keys.
@@ -183,6 +194,33 @@ std::string reference_problem(std::span<const Test> tests, const RunSettings &se
                                    file.string(), arhost::ipc::to_text(kind));
         }
     return {};
+}
+
+// Returns the plugin that runs the class of the Python script in the option `script`: the only one that finds a class
+// of its kind in it.
+fs::path adapter_of(const RunSettings &settings) {
+    const std::vector<Test> tests = all_tests();
+    const auto create = std::ranges::find(tests, std::string_view("abi.create"), &Test::name);
+    const std::string script = settings.subject.settings.at("script");
+    std::vector<std::string> found;
+    std::set<std::string> reasons;
+    RunSettings candidate = settings;
+    for (const char *name : {"source_python", "tracker_python", "rt_python", "sink_python"}) {
+        candidate.subject.plugin = find_plugin(name);
+        const Result result = run_alone(*create, candidate);
+        if (result.verdict == Verdict::pass)
+            found.emplace_back(name);
+        else
+            reasons.insert(result.message);
+    }
+    if (found.empty())
+        throw std::runtime_error(
+            fmt::format("'{}' cannot be used as a plugin: {}", script, fmt::join(reasons, "; ")));
+    if (found.size() > 1)
+        throw std::runtime_error(fmt::format("'{0}' contains several plugins; name one: arhost conform {1} --set "
+                                             "script={0}",
+                                             script, fmt::join(found, "|")));
+    return find_plugin(found.front());
 }
 
 // Writes to stdout without buffering. A write error ends the run.
@@ -331,7 +369,8 @@ int main(int argc, char **argv) {
     std::string reference = default_reference();
     bool only_list = false, quiet = false;
     settings.jobs = std::max(1u, std::thread::hardware_concurrency() / 2);
-    app.option("PLUGIN", plugin, "The plugin's shared object");
+    app.option("PLUGIN", plugin,
+               "The plugin: a shared object, a Python script, or a name that 'arhost plugins' lists");
     app.flag("--list", only_list, "Print the tests' names and requirements");
     app.option("--only", patterns, "Run only tests whose name matches, such as 'raytracer.*' (repeatable)")
         .type_name("PATTERN")
@@ -368,11 +407,13 @@ int main(int argc, char **argv) {
             print(list(patterns));
             return 0;
         }
-        if (!fs::is_regular_file(plugin))
-            throw std::runtime_error(plugin.empty() ? "the plugin is missing: arhost conform PLUGIN.so"
-                                                    : "there is no plugin '" + plugin + "'");
-        settings.subject.plugin = fs::absolute(plugin);
+        if (plugin.empty())
+            throw std::runtime_error("the plugin is missing: arhost conform PLUGIN");
+        settings.subject.plugin = find_plugin(plugin);
         settings.subject.reference = fs::absolute(reference);
+        const bool is_script = settings.subject.plugin.extension() == ".py";
+        if (is_script)
+            option_texts.push_back("script=" + settings.subject.plugin.string());
         settings.subject.settings = parse_settings(option_texts);
         settings.subject.prints = parse_prints(print_texts);
         settings.subject.policy = policy_options.policy(settings.subject);
@@ -384,6 +425,8 @@ int main(int argc, char **argv) {
         check_report_files({json, junit, html}, settings.subject);
         signals = take_signals(); // not in a test's process: signals terminate it
         settings.signals = signals.get();
+        if (is_script)
+            settings.subject.plugin = adapter_of(settings);
         base::AtomicFile json_file(json, settings.signals), junit_file(junit, settings.signals),
             html_file(html, settings.signals);
         const Report report = run(settings, patterns, quiet);

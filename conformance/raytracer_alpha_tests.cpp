@@ -125,6 +125,7 @@ void opaque_shadow(Context &context) {
 }
 
 void translucent_shadow(Context &context) {
+    need_capability(context, ARHOST_CAPABILITY_GLASS, "GLASS");
     const Picture picture = Tracer(context, ball_over_catcher(glass())).render(from_front());
     expect_shadow(picture, translucent, "a glass ball");
 }
@@ -141,6 +142,7 @@ void catcher_in_light(Context &context) {
 }
 
 void stronger_shadow_wins(Context &context) {
+    need_capability(context, ARHOST_CAPABILITY_GLASS, "GLASS");
     scene::ArenaBuilder builder = ball_over_catcher(diffuse(glm::vec3(0.5f)));
     // A glass sphere between lamp and ball. Its shadow covers half of the ball's shadow and extends beyond it.
     builder.add_object("glass", builder.add_spheres({{90, 7, 120, 8}}), builder.add_material(glass()));
@@ -156,6 +158,8 @@ void stronger_shadow_wins(Context &context) {
 
 void shadow_alpha_of_the_scene(Context &context) {
     for (const bool is_glass : {false, true}) {
+        if (is_glass && !has_capability(context, ARHOST_CAPABILITY_GLASS))
+            break;
         scene::ArenaBuilder builder = ball_over_catcher(is_glass ? glass() : diffuse(glm::vec3(0.5f)));
         builder.settings.shadow_alpha_opaque = 0.8f;
         builder.settings.shadow_alpha_translucent = 0.2f;

@@ -172,6 +172,7 @@ void moved_with_camera(Context &context) {
 }
 
 void moving_object(Context &context) {
+    need_capability(context, ARHOST_CAPABILITY_MOTION, "MOTION");
     constexpr double radius = 15;
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);

@@ -134,8 +134,10 @@ void reference(Context &context) {
                                  "' does not exist; give --reference FILE");
     PluginLibrary library(context.reference, {}, context.library.calls());
     Context of_reference{library, context.reference, context.random};
-    const Picture expected = Tracer(of_reference, still_life()).render(still_life_camera());
-    const Picture actual = Tracer(context, still_life()).render(still_life_camera());
+    const bool is_matte = !has_capability(context, ARHOST_CAPABILITY_REFLECTION);
+    const auto scene = [&] { return still_life(glm::mat4(1), is_matte); };
+    const Picture expected = Tracer(of_reference, scene()).render(still_life_camera());
+    const Picture actual = Tracer(context, scene()).render(still_life_camera());
     // Edges and their reflections may be off by a pixel.
     double squares = 0;
     int compared = 0, alphas = 0;

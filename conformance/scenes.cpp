@@ -130,7 +130,7 @@ scene::ArenaBuilder ball_over_catcher(const arhost_material &ball) {
     return builder;
 }
 
-scene::ArenaBuilder still_life(const glm::mat4 &moved) {
+scene::ArenaBuilder still_life(const glm::mat4 &moved, bool is_matte) {
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(0.2f);
     builder.settings.background = {0.5f, 0.6f, 0.7f};
@@ -138,13 +138,14 @@ scene::ArenaBuilder still_life(const glm::mat4 &moved) {
     const std::uint32_t grey = builder.add_material(diffuse(glm::vec3(0.7f)));
     const std::uint32_t red = builder.add_material(diffuse({0.8f, 0.2f, 0.1f}));
     arhost_material shiny = diffuse({0.2f, 0.4f, 0.6f});
-    shiny.model = ARHOST_MATERIAL_SPECULAR;
+    if (!is_matte)
+        shiny.model = ARHOST_MATERIAL_SPECULAR;
     copy(glm::vec3(0.4f), shiny.specular);
     shiny.exponent = 20;
     builder.add_object("floor", builder.add_triangles(square(120, 0)), grey, ARHOST_ROLE_CATCHER, at(0, 0, 0));
     builder.add_object("box", builder.add_triangles(box({12, 14, 20})), red, ARHOST_ROLE_VIRTUAL, at(-34, 6, 20));
-    builder.add_object("mirror", builder.add_spheres({{0, 0, 0, 20}}), builder.add_material(mirror(0.9f)),
-                       ARHOST_ROLE_VIRTUAL, at(20, 10, 20));
+    builder.add_object("mirror", builder.add_spheres({{0, 0, 0, 20}}),
+                       is_matte ? grey : builder.add_material(mirror(0.9f)), ARHOST_ROLE_VIRTUAL, at(20, 10, 20));
     builder.add_object("ball", builder.add_spheres({{0, 0, 0, 12}}), builder.add_material(shiny), ARHOST_ROLE_VIRTUAL,
                        at(-4, -35, 12));
     builder.add_object("post", builder.add_triangles(box({4, 4, 30})), grey, ARHOST_ROLE_OCCLUDER, at(52, -25, 30));

@@ -39,8 +39,9 @@ scene::ArenaBuilder one_sphere(const glm::vec4 &sphere, const arhost_material &m
 // next to the ball in from_front's image.
 scene::ArenaBuilder ball_over_catcher(const arhost_material &ball);
 
-// Shadows, a mirror, lamps and an occluder. `moved`: a rigid transform of the whole scene.
-scene::ArenaBuilder still_life(const glm::mat4 &moved = glm::mat4(1));
+// Shadows, a mirror, lamps and an occluder. `moved`: a rigid transform of the whole scene. `is_matte`: all materials
+// are diffuse, for ray tracers without ARHOST_CAPABILITY_REFLECTION.
+scene::ArenaBuilder still_life(const glm::mat4 &moved = glm::mat4(1), bool is_matte = false);
 arhost_camera still_life_camera(const arhost_intrinsics &intrinsics = pinhole(),
                                 const glm::dmat4 &moved = glm::dmat4(1));
 

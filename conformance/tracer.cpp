@@ -2,6 +2,9 @@
 #include "conformance/tracer.hpp"
 
 #include "base/unique_fd.hpp"
+#include "scene/capabilities.hpp"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <sys/mman.h>
@@ -35,6 +38,19 @@ SealedScene::SealedScene(scene::ArenaBuilder builder) : memory_(nullptr), size_(
 SealedScene::~SealedScene() {
     if (memory_)
         ::munmap(memory_, size_);
+}
+
+bool has_capability(Context &context, std::uint32_t capability) {
+    Instance instance(context.library);
+    instance.create_or_fail();
+    const arhost_plugin &plugin = context.library.plugin();
+    const auto &functions = *static_cast<const arhost_raytracer *>(plugin.functions);
+    return (scene::capabilities_of(*plugin.descriptor, functions, instance.get()) & capability) != 0;
+}
+
+void need_capability(Context &context, std::uint32_t capability, const char *name) {
+    if (!has_capability(context, capability))
+        throw Skip(fmt::format("ARHOST_CAPABILITY_{} is not declared", name));
 }
 
 Tracer::Tracer(Context &context, scene::ArenaBuilder builder, Settings overrides)

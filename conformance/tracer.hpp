@@ -28,6 +28,11 @@ private:
     std::size_t size_;
 };
 
+// Whether the ray tracer declares the capability.
+bool has_capability(Context &context, std::uint32_t capability);
+// Throws Skip unless the ray tracer declares the capability. `name`: without ARHOST_CAPABILITY_.
+void need_capability(Context &context, std::uint32_t capability, const char *name);
+
 class Tracer {
 public:
     Tracer(Context &context, scene::ArenaBuilder builder, Settings overrides = {});

@@ -10,6 +10,7 @@ import importlib.metadata
 import json
 import os
 import platform
+import re
 import shutil
 import statistics
 import subprocess
@@ -26,7 +27,7 @@ venv_python = os.path.join(venv, "bin", "python")
 threads = 2
 # For Python 3.11 (Debian 12); bpy determines the numpy version.
 packages = {"mitsuba": "3.9.1", "bpy": "5.0.1", "pillow": "11.3.0"}
-llvm_package = "libllvm19"
+llvm_package, oldest_llvm = "libllvm19", 16  # LLVM 14 and 15 abort on Sapphire Rapids
 cases = ["diffuse", "mirror", "glass-path"]
 ours_alone = "glass-tree"
 # Required speed relative to the peer.
@@ -35,13 +36,29 @@ targets = {"mitsuba": {"diffuse": 3, "mirror": 3, "glass-path": 2, "glass-tree":
 largest_mask_difference = 0.005
 
 
+def newest_llvm(libraries):
+    """(major version, path) of the newest LLVM library; (0, None) if there is none."""
+    newest = (0, None)
+    for path in libraries:
+        named = re.fullmatch(r"libLLVM(?:-(\d+)[\d.]*)?\.so(?:\.(\d+)[\d.]*)?", os.path.basename(path))
+        in_folder = re.search(r"/llvm-(\d+)/", path)
+        if named:
+            major = named[1] or (in_folder and in_folder[1]) or named[2] or "0"
+            newest = max(newest, (int(major), path), key=lambda each: each[0])
+    return newest
+
+
+def find_llvm():
+    return newest_llvm(glob.glob("/usr/lib/*/libLLVM*.so*") + glob.glob("/usr/lib/llvm-*/lib/libLLVM*.so*"))
+
+
 def install_llvm():
-    """Installs LLVM if Mitsuba finds none."""
-    if not glob.glob("/usr/lib/*/libLLVM*.so*") + glob.glob("/usr/lib/llvm-*/lib/libLLVM*.so*"):
+    """Installs LLVM if there is none that can compile Mitsuba's kernels."""
+    if find_llvm()[0] < oldest_llvm:
         print(f"Installing for Mitsuba with apt-get: {llvm_package}", flush=True)
         as_root = [] if os.geteuid() == 0 else ["sudo"] if shutil.which("sudo") else None
         if as_root is None:
-            print(f"Neither root nor sudo available: Mitsuba is skipped, as it needs {llvm_package}.")
+            print(f"Neither root nor sudo available to install {llvm_package}: Mitsuba may fail.")
         else:
             subprocess.run([*as_root, "apt-get", "update", "-q"], check=False)
             subprocess.run([*as_root, "env", "DEBIAN_FRONTEND=noninteractive", "apt-get", "install", "-q", "-y",
@@ -120,6 +137,8 @@ def main():
     os.makedirs(folder, exist_ok=True)
     install_llvm()
     install(packages)
+    if find_llvm()[1]:
+        os.environ["DRJIT_LIBLLVM_PATH"] = find_llvm()[1]  # Dr.Jit's own search may find an older one
 
     available = sorted(os.sched_getaffinity(0))
     if len(available) > threads:

@@ -124,8 +124,8 @@ def draw(file, title, curves, marks):
     def place(x, y):
         return left + x * width, top + height * (1 - (math.log2(y) - low) / (high - low))
 
-    svg = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 900 440" font-family="sans-serif" font-size="13">',
-           '<rect width="900" height="440" fill="white"/>', f'<text x="{left}" y="28" font-size="16">{title}</text>',
+    svg = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 980 440" font-family="sans-serif" font-size="13">',
+           '<rect width="980" height="440" fill="white"/>', f'<text x="{left}" y="28" font-size="16">{title}</text>',
            f'<text x="{left + width / 2}" y="425" text-anchor="middle">along the trajectory: from far to close</text>',
            f'<text transform="translate(18 {top + height / 2}) rotate(-90)" text-anchor="middle">frames per second</text>']
     for power in range(low, high + 1):

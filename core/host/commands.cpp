@@ -11,6 +11,7 @@
 #include "host/probe.hpp"
 #include "run_config/access.hpp"
 #include "run_config/schema.hpp"
+#include "scene/capabilities.hpp"
 
 #include <nlohmann/json.hpp>
 #include <spdlog/fmt/fmt.h>

@@ -59,6 +59,7 @@ struct DeviceDescription {
     arhost_device_kind kind = 0;
     bool is_default = false;
     std::string name, uuid, abilities; // may be empty
+    bool operator==(const DeviceDescription &) const = default;
 };
 struct DeviceList {
     std::vector<DeviceDescription> devices;

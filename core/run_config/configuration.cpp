@@ -153,6 +153,20 @@ FilesInUse files_read_by(const Configuration &configuration) {
     return files;
 }
 
+// Returns the file of a scene, which is given as a path or, for the scenes installed with arhost, by name.
+std::filesystem::path find_scene(const yaml::Node &scene, const std::filesystem::path &built_in_plugins) {
+    std::filesystem::path file = scene.input_path();
+    if (std::filesystem::is_regular_file(file))
+        return file;
+    if (const std::string name = scene.text(); name.find_first_of("./") == std::string::npos) {
+        const std::filesystem::path prefix = built_in_plugins.parent_path().parent_path().parent_path();
+        std::filesystem::path own = prefix / "share/arhost/config/scenes" / (name + ".yaml");
+        if (std::filesystem::is_regular_file(own))
+            return own;
+    }
+    scene.fail("there is no scene file '" + file.string() + "'");
+}
+
 } // namespace
 
 std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
@@ -245,12 +259,10 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     }
     if (const auto node = root.find("raytracer")) {
         const yaml::Node scene = node->require("scene");
-        configuration.raytracer =
-            RaytracerConfiguration{parse_component(*node, "raytracer", shared), scene.input_path(), scene};
+        configuration.raytracer = RaytracerConfiguration{parse_component(*node, "raytracer", shared), {}, scene};
         if (!configuration.tracker && !configuration.trajectory)
             node->fail("a ray tracer needs camera poses from a 'tracker' or a 'trajectory'");
-        if (!std::filesystem::is_regular_file(configuration.raytracer->scene))
-            scene.fail("there is no scene file '" + configuration.raytracer->scene.string() + "'");
+        configuration.raytracer->scene = find_scene(scene, built_in_plugins);
     }
     if (const auto node = root.find("coordinates")) {
         node->allow_keys(keys_of("coordinates"));

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <map>
 #include <sstream>
+#include <stdexcept>
 
 namespace arhost::run_config {
 
@@ -29,6 +30,15 @@ fs::path PluginPath::resolve(const yaml::Node &node) const {
             node.fail("there is no plugin '" + file.string() + "'");
         return file;
     }
+    try {
+        return find(name);
+    } catch (const std::runtime_error &error) {
+        node.fail(error.what());
+    }
+}
+
+fs::path PluginPath::find(const std::string &name) const {
+    std::error_code ignored;
     for (const fs::path &folder : folders_)
         if (fs::path file = folder / (name + ".so"); fs::is_regular_file(file, ignored))
             return file;
@@ -41,8 +51,9 @@ fs::path PluginPath::resolve(const yaml::Node &node) const {
     std::string folders;
     for (const fs::path &folder : folders_)
         folders += (folders.empty() ? "" : ", ") + folder.string();
-    node.fail("there is no plugin '" + name + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?") +
-              " (searched " + folders + "; 'arhost plugins' lists all)");
+    throw std::runtime_error("there is no plugin '" + name + "'" +
+                             (near.empty() ? "" : "; did you mean '" + near + "'?") + " (searched " + folders +
+                             "; 'arhost plugins' lists all)");
 }
 
 std::vector<fs::path> PluginPath::all() const {

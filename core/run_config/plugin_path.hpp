@@ -20,6 +20,9 @@ public:
     // that is relative to the configuration file. Throws yaml::Error if the file does not exist.
     std::filesystem::path resolve(const yaml::Node &node) const;
 
+    // Returns the shared object of the plugin with this name. Throws std::runtime_error if there is none.
+    std::filesystem::path find(const std::string &name) const;
+
     // Returns all plugin files. Of files with the same name, only the first in search order is included.
     std::vector<std::filesystem::path> all() const;
 

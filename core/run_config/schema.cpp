@@ -104,7 +104,10 @@ std::vector<Key> make_table() {
          fallback,
          conform});
     add_component(keys, {"raytracer", map, false, "no overlay", "Renders the virtual objects."}, "rt_embree",
-                  {{"scene", input_path, true, "", "Scene file (docs/scenes.md)."}, fallback, conform});
+                  {{"scene", input_path, true, "",
+                    "Scene file (docs/scenes.md), or the name of a scene in config/scenes, such as demo."},
+                   fallback,
+                   conform});
     add(keys, "",
         {{"coordinates", map, false, "from the scene's axes",
           "Transform from the marker's axes to the scene's (docs/camera.md)."},

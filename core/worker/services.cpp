@@ -2,6 +2,7 @@
 #include "worker/services.hpp"
 
 #include "pixels/grey.hpp"
+#include "scene/capabilities.hpp"
 #include "scene/motion.hpp"
 #include "worker/lens_warp.hpp"
 
@@ -138,9 +139,10 @@ private:
 
 class RaytracerService final : public Service {
 public:
-    RaytracerService(const Link &link, const arhost_raytracer &raytracer, arhost_instance *instance,
-                     bool supports_lenses)
-        : link_(link), raytracer_(raytracer), instance_(instance), supports_lenses_(supports_lenses) {}
+    RaytracerService(const Link &link, const arhost_host &host, const arhost_plugin &plugin, arhost_instance *instance)
+        : link_(link), host_(host), descriptor_(*plugin.descriptor),
+          raytracer_(*static_cast<const arhost_raytracer *>(plugin.functions)), instance_(instance),
+          supports_lenses_((plugin.descriptor->capabilities & ARHOST_CAPABILITY_LENS_DISTORTION) != 0) {}
 
     arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &fds,
                         messages::Ready &) override {
@@ -161,6 +163,10 @@ public:
         }
         if (setup.scene->duration_s > 0)
             motion_.emplace(*setup.scene);
+        const std::uint32_t missing =
+            scene::needed_capabilities(*setup.scene) & ~scene::capabilities_of(descriptor_, raytracer_, instance_);
+        if (const std::string warning = scene::missing_capabilities_text(descriptor_.id, missing); !warning.empty())
+            host_.log(&host_, ARHOST_SEVERITY_WARNING, warning.c_str());
         return raytracer_.start(instance_, &setup);
     }
 
@@ -201,6 +207,8 @@ public:
 
 private:
     const Link &link_;
+    const arhost_host &host_;
+    const arhost_descriptor &descriptor_;
     const arhost_raytracer &raytracer_;
     arhost_instance *instance_;
     bool supports_lenses_;
@@ -263,16 +271,15 @@ const Memory::Region &Memory::input(std::uint32_t generation) const {
     return found->second;
 }
 
-std::unique_ptr<Service> make_service(const Link &link, const arhost_plugin &plugin, arhost_instance *instance) {
+std::unique_ptr<Service> make_service(const Link &link, const arhost_host &host, const arhost_plugin &plugin,
+                                      arhost_instance *instance) {
     switch (plugin.descriptor->kind) {
     case ARHOST_KIND_SOURCE:
         return std::make_unique<SourceService>(*static_cast<const arhost_source *>(plugin.functions), instance);
     case ARHOST_KIND_TRACKER:
         return std::make_unique<TrackerService>(*static_cast<const arhost_tracker *>(plugin.functions), instance);
     case ARHOST_KIND_RAYTRACER:
-        return std::make_unique<RaytracerService>(
-            link, *static_cast<const arhost_raytracer *>(plugin.functions), instance,
-            (plugin.descriptor->capabilities & ARHOST_CAPABILITY_LENS_DISTORTION) != 0);
+        return std::make_unique<RaytracerService>(link, host, plugin, instance);
     default:
         return std::make_unique<SinkService>(*static_cast<const arhost_sink *>(plugin.functions), instance);
     }

@@ -39,7 +39,8 @@ public:
     virtual arhost_status stop() = 0;
 };
 
-// The link must outlive the Service.
-std::unique_ptr<Service> make_service(const Link &link, const arhost_plugin &plugin, arhost_instance *instance);
+// The link and the host must outlive the Service.
+std::unique_ptr<Service> make_service(const Link &link, const arhost_host &host, const arhost_plugin &plugin,
+                                      arhost_instance *instance);
 
 } // namespace arhost::worker

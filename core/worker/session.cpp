@@ -103,7 +103,7 @@ private:
             throw std::runtime_error("the plugin's create returned ARHOST_STATUS_OK, but no instance");
         messages::Ready ready;
         if (status == ARHOST_STATUS_OK) {
-            service_ = make_service(link_, plugin_, instance_);
+            service_ = make_service(link_, *host_.get(), plugin_, instance_);
             Link::InCall call(link_, Call::start);
             status = service_->start(create.setup, fds, ready);
         }

@@ -117,7 +117,7 @@ class _Adapter:
             sys.modules[name] = module
             specification.loader.exec_module(module)
             self.plugin = self._class_in(module, script, class_name)(self.host, **keywords)
-            return STATUS_OK
+            return STATUS_OK, callable(getattr(self.plugin, "devices", None))
 
         # Report a configuration error: if the script fails to load now, it would also fail on every retry.
         return self._guarded(load, STATUS_ERROR_CONFIGURATION)
@@ -165,6 +165,15 @@ class _Adapter:
                            "keep a copy (array.copy())")
             self.warned = True
         return result
+
+    def devices(self):
+        def devices():
+            return STATUS_OK, [
+                (index, int(device.get("kind", DEVICE_OTHER)), bool(device.get("is_default", False)), str(device["name"]),
+                 str(device.get("uuid", "")), str(device.get("abilities", "")))
+                for index, device in enumerate(self.plugin.devices())]
+
+        return self._guarded(devices)
 
     def stop(self):
         def stop():
@@ -225,6 +234,11 @@ class _Adapter:
         return self._with_memory([*planes, grey, markers], track)
 
     # ---- ray tracers ----
+
+    def capabilities(self):
+        return self._guarded(
+            lambda: (STATUS_OK, int(getattr(self.plugin, "capabilities", CAPABILITY_EVERY_SCENE))),
+            STATUS_ERROR_CONFIGURATION)
 
     def start_raytracer(self, width, height, scene, intrinsics):
         def start():

@@ -25,9 +25,13 @@
 #elif defined(KIND_RAYTRACER)
 #define KIND ARHOST_KIND_RAYTRACER
 #define METHOD "render"
+#define CAPABILITIES ARHOST_CAPABILITY_EVERY_SCENE // a script may implement less: the attribute `capabilities`
 #else
 #define KIND ARHOST_KIND_SINK
 #define METHOD "write"
+#endif
+#ifndef CAPABILITIES
+#define CAPABILITIES 0
 #endif
 
 namespace {
@@ -216,14 +220,22 @@ public:
         adapter_ = checked(PyObject_CallMethod(module.get(), "_Adapter", "sOOO", METHOD, functions[0].get(),
                                                functions[1].get(), functions[2].get()));
         try {
-            call("load", "sss", options.text("script").c_str(), options.text("class").c_str(),
-                 options.text("arguments").c_str());
+            if (call("load", "sss", options.text("script").c_str(), options.text("class").c_str(),
+                     options.text("arguments").c_str())
+                    .value.get() == Py_True)
+                lister_ = this;
+#if defined(KIND_RAYTRACER)
+            capabilities_ =
+                static_cast<std::uint32_t>(PyLong_AsUnsignedLongMask(call("capabilities", "").value.get()));
+#endif
         } catch (...) {
             adapter_ = Object(); // needs the GIL
             throw;
         }
     }
     ~PythonAdapter() {
+        if (lister_ == this)
+            lister_ = nullptr;
         const GilLock lock;
         adapter_ = Object();
     }
@@ -233,6 +245,12 @@ public:
     void stop() {
         const GilLock lock;
         call("stop", "");
+    }
+
+    // The extension of arhost/devices.h exists while there is an instance whose class has a method `devices`.
+    static const void *get_extension(const char *id) {
+        static constexpr arhost_devices functions = {sizeof functions, list_devices};
+        return lister_ && std::string_view(id) == ARHOST_DEVICES_EXTENSION ? &functions : nullptr;
     }
 
     // sources
@@ -286,6 +304,11 @@ public:
     }
 
     // ray tracers
+#if defined(KIND_RAYTRACER)
+    std::uint32_t capabilities() const {
+        return capabilities_;
+    }
+#endif
     void start(const arhost_raytracer_setup &setup) {
         const GilLock lock;
         call("start_raytracer", "IINN", setup.width, setup.height,
@@ -341,6 +364,23 @@ private:
         Object value;
     };
 
+    static arhost_status list_devices(const arhost_host *host, arhost_take_device take, void *context) {
+        return detail::guarded(Host(host), [&] {
+            const GilLock lock;
+            const Answer answer = lister_->call("devices", "");
+            for (Py_ssize_t i = 0; i < PyList_Size(answer.value.get()); ++i) {
+                arhost_device device{};
+                device.struct_size = sizeof device;
+                require(PyArg_ParseTuple(PyList_GetItem(answer.value.get(), i), "Iipsss", &device.index, &device.kind,
+                                         &device.is_default, &device.name, &device.uuid, &device.abilities));
+                device.uuid = *device.uuid ? device.uuid : nullptr;
+                device.abilities = *device.abilities ? device.abilities : nullptr;
+                take(context, &device);
+            }
+            return answer.status;
+        });
+    }
+
     // Calls a method of _Adapter; throws if it reports an error.
     template <class... Arguments> Answer call(const char *method, const char *format, Arguments... arguments) {
         const Object pair = checked(PyObject_CallMethod(adapter_.get(), method, format, arguments...));
@@ -357,9 +397,16 @@ private:
             throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "Python: " + take_error());
     }
 
+    // The newest instance whose class has a method `devices`. Static, because the extension has no instance argument.
+    // Only the worker's main thread uses it.
+    static inline PythonAdapter *lister_ = nullptr;
+
     Host host_;
     std::string path_;
     Object adapter_;
+#if defined(KIND_RAYTRACER)
+    std::uint32_t capabilities_ = 0;
+#endif
 };
 
 constexpr arhost_option_descriptor options[] = {
@@ -383,7 +430,7 @@ constexpr arhost_descriptor descriptor = {
     "arhost",
     "Apache-2.0",
     "Runs a class of a Python script.",
-    0,
+    CAPABILITIES,
     std::size(options),
     options,
     nullptr,

@@ -168,7 +168,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "arhost",
                                           "Apache-2.0",
                                           "Ray tracer for any Vulkan 1.1 GPU; renders the same images as rt_embree.",
-                                          ARHOST_CAPABILITY_LENS_DISTORTION,
+                                          ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE,
                                           std::size(options),
                                           options,
                                           needs};

@@ -104,7 +104,6 @@ AVPacket &Encoder::encode(const std::uint8_t *bgr, std::size_t stride, std::int6
         code = avcodec_receive_packet(context_.get(), packet_.get());
     if (code < 0)
         throw libav_failure(ARHOST_STATUS_ERROR_INTERNAL, "cannot encode frame " + std::to_string(number), code);
-    packet_->duration = 1;
     return *packet_;
 }
 

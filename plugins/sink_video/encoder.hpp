@@ -26,7 +26,7 @@ public:
 
     const AVCodecContext &context() const { return *context_; }
 
-    // The time stamps of the packet are frame numbers, in units of 1/fps. It is valid until the next call.
+    // The time stamps of the packet are `number`. It is valid until the next call.
     AVPacket &encode(const std::uint8_t *bgr, std::size_t stride, std::int64_t number);
 
 private:

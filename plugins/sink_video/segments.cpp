@@ -3,9 +3,15 @@
 
 #include "sink_common/files.hpp"
 
+extern "C" {
+#include <libavutil/intreadwrite.h>
+}
+
 #include <algorithm>
 #include <charconv>
+#include <cstdlib>
 #include <limits>
+#include <optional>
 
 namespace arhost::video {
 namespace {
@@ -44,6 +50,29 @@ AVStream &add_stream(AVFormatContext &output, AVRational fps) {
     return *stream;
 }
 
+constexpr AVRational ms = {1, 1000}, ns = {1, 1'000'000'000};
+constexpr std::uint64_t block_additional_id = 1; // the only one that libavformat writes
+
+// Attaches the frame's number to its packet.
+void set_number(AVPacket &packet, std::int64_t number) {
+    constexpr std::size_t size =
+        2 * sizeof(std::uint64_t); // the id of the BlockAdditional and the number, big-endian
+    std::uint8_t *data = av_packet_new_side_data(&packet, AV_PKT_DATA_MATROSKA_BLOCKADDITIONAL, size);
+    if (!data)
+        throw std::bad_alloc();
+    AV_WB64(data, block_additional_id);
+    AV_WB64(data + sizeof(std::uint64_t), static_cast<std::uint64_t>(number));
+}
+
+// Returns the number of the packet's frame, or nothing if the packet has none.
+std::optional<std::int64_t> number_of(const AVPacket &packet) {
+    std::size_t size = 0;
+    const std::uint8_t *data = av_packet_get_side_data(&packet, AV_PKT_DATA_MATROSKA_BLOCKADDITIONAL, &size);
+    if (!data || size != 2 * sizeof(std::uint64_t))
+        return std::nullopt;
+    return static_cast<std::int64_t>(AV_RB64(data + sizeof(std::uint64_t)));
+}
+
 bool same_codec(const AVCodecParameters &a, const AVCodecParameters &b) {
     return a.codec_id == b.codec_id && a.width == b.width && a.height == b.height &&
            std::ranges::equal(std::span(a.extradata, static_cast<std::size_t>(a.extradata_size)),
@@ -64,12 +93,14 @@ public:
         const AVStream &in = *segment.streams[0];
         const PacketPointer packet = allocated<PacketPointer>(av_packet_alloc());
         for (; av_read_frame(&segment, packet.get()) >= 0; av_packet_unref(packet.get())) {
-            const std::int64_t number = av_rescale_q(packet->pts, in.time_base, av_inv_q(fps_));
-            if (packet->flags & AV_PKT_FLAG_CORRUPT || number >= end)
+            const std::optional<std::int64_t> number = number_of(*packet);
+            if (packet->flags & AV_PKT_FLAG_CORRUPT || !number || *number >= end)
                 return; // the segment was truncated by a kill, or the next segment repeats the frame
+            const std::int64_t capture_ms = av_rescale_q(packet->pts, in.time_base, ms);
             if (frames_ == 0)
-                begin(*in.codecpar, number);
-            packet->pts = packet->dts = av_rescale_q(number - first_, av_inv_q(fps_), out_->time_base);
+                begin(*in.codecpar, capture_ms);
+            packet->pts = packet->dts = time_of(capture_ms);
+            av_packet_free_side_data(packet.get());
             packet->duration = av_rescale_q(1, av_inv_q(fps_), out_->time_base);
             packet->pos = -1;
             packet->stream_index = 0;
@@ -96,8 +127,18 @@ private:
                               "' was encoded with different options than the previous segment");
     }
 
-    void begin(const AVCodecParameters &codec, std::int64_t first) {
-        first_ = first;
+    // Returns the time of the next frame in the film, in the time base of the stream.
+    std::int64_t time_of(std::int64_t capture_ms) {
+        const std::int64_t since_first_ms = capture_ms - first_ms_;
+        const std::int64_t periods = av_rescale_q(since_first_ms, ms, av_inv_q(fps_)); // rounded to the nearest
+        const bool is_nominal = std::abs(av_rescale_q(periods, av_inv_q(fps_), ms) - since_first_ms) <= 1;
+        const std::int64_t time = is_nominal ? av_rescale_q(periods, av_inv_q(fps_), out_->time_base)
+                                             : av_rescale_q(since_first_ms, ms, out_->time_base);
+        return last_time_ = std::max(time, last_time_ + 1);
+    }
+
+    void begin(const AVCodecParameters &codec, std::int64_t first_ms) {
+        first_ms_ = first_ms;
         output_ = open_output(path_, format_);
         out_ = &add_stream(*output_, fps_);
         if (avcodec_parameters_copy(out_->codecpar, &codec) < 0)
@@ -114,8 +155,9 @@ private:
     const char *format_;
     AVRational fps_;
     OutputPointer output_;
-    AVStream *out_ = nullptr; // owned by output_
-    std::int64_t first_ = 0, frames_ = 0;
+    AVStream *out_ = nullptr;   // owned by output_
+    std::int64_t first_ms_ = 0; // capture time of the first frame
+    std::int64_t last_time_ = -1, frames_ = 0;
 };
 
 } // namespace
@@ -143,7 +185,7 @@ std::vector<Segment> find_segments(const fs::path &video) {
 }
 
 SegmentWriter::SegmentWriter(const fs::path &path, const AVCodecContext &encoder)
-    : path_(path), time_base_(encoder.time_base), output_(open_output(path, "matroska")) {
+    : path_(path), output_(open_output(path, "matroska")), last_time_(std::numeric_limits<std::int64_t>::min()) {
     AVStream &stream = add_stream(*output_, encoder.framerate);
     if (avcodec_parameters_from_context(stream.codecpar, &encoder) < 0)
         throw std::bad_alloc();
@@ -151,8 +193,12 @@ SegmentWriter::SegmentWriter(const fs::path &path, const AVCodecContext &encoder
     flush(avformat_write_header(output_.get(), nullptr));
 }
 
-void SegmentWriter::append(AVPacket &packet) {
-    av_packet_rescale_ts(&packet, time_base_, output_->streams[0]->time_base);
+void SegmentWriter::append(AVPacket &packet, std::int64_t number, std::int64_t capture_ns) {
+    const AVStream &stream = *output_->streams[0];
+    const std::int64_t time = av_rescale_q(capture_ns, ns, stream.time_base);
+    packet.pts = packet.dts = last_time_ = std::max(time, last_time_ + 1); // libavformat requires ascending times
+    packet.duration = av_rescale_q(1, av_inv_q(stream.avg_frame_rate), stream.time_base);
+    set_number(packet, number);
     packet.stream_index = 0;
     const int code = av_write_frame(output_.get(), &packet);
     flush(code < 0 ? code : av_write_frame(output_.get(), nullptr)); // ends the Matroska cluster

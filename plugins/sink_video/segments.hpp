@@ -2,7 +2,8 @@
 //
 // A video is written in segments, which are joined at the end. Each start of the sink begins a new segment. A segment
 // is a Matroska file with one cluster per frame, because all complete clusters of a truncated file can be read. (The
-// same is true for fragmented MP4, but there libav loses the gaps between frames.)
+// same is true for fragmented MP4, but there libav loses the gaps between frames.) The time stamps of a segment are
+// capture times in ms; each frame's number accompanies it as a BlockAdditional.
 #pragma once
 
 #include "libav.hpp"
@@ -25,19 +26,22 @@ std::vector<Segment> find_segments(const std::filesystem::path &video); // sorte
 class SegmentWriter {
 public:
     SegmentWriter(const std::filesystem::path &path, const AVCodecContext &encoder);
-    void append(AVPacket &packet); // packet times must be in the time base of the encoder; they are modified
+    // Modifies the packet's times. Capture times must not decrease.
+    void append(AVPacket &packet, std::int64_t number, std::int64_t capture_ns);
 
 private:
     void flush(int code);
 
     std::filesystem::path path_;
-    AVRational time_base_;
     OutputPointer output_;
+    std::int64_t last_time_; // in the time base of the stream
 };
 
 // Copies the packets of all segments to `video`. `format` is libav's name of the file format ("mp4"). If two segments
-// have the same frame, takes it from the later segment. Returns the number of frames; if it is 0, `video` is
-// unusable. Calls `progress` regularly with a fraction from 0 to 1, and `warn` with messages for the user.
+// have the same frame, takes it from the later segment. The video begins at time 0. Capture times within 1 ms of a
+// multiple of 1/fps become this multiple, so that a constant frame rate remains constant. Returns the number of
+// frames; if it is 0, `video` is unusable. Calls `progress` regularly with a fraction from 0 to 1, and `warn` with
+// messages for the user.
 std::int64_t join(const std::vector<Segment> &segments, const std::filesystem::path &video, const char *format,
                   AVRational fps, const std::function<void(double)> &progress,
                   const std::function<void(const std::string &)> &warn);

@@ -35,8 +35,7 @@ const char *format_of(const fs::path &path) {
 AVRational rational(double fps) {
     if (!(fps > 0))
         return {30, 1}; // the rate is unknown
-    // Frame numbers are recovered from the time stamps of the segments, which have a resolution of 1 ms. This limits
-    // the frame rate.
+    // The time stamps of segments have a resolution of 1 ms. This limits the frame rate.
     if (fps < 0.001 || fps > 500)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "the source has " + std::to_string(fps) +
@@ -86,7 +85,7 @@ public:
             failed_ = false;
         }
         const auto number = static_cast<std::int64_t>(output.record->sequence);
-        writer_->append(encoder_->encode(output.bgr, output.stride, number));
+        writer_->append(encoder_->encode(output.bgr, output.stride, number), number, output.record->capture_ns);
         finished_ = false;
         return ARHOST_STATUS_OK;
     }

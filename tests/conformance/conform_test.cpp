@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <csignal>
+#include <cstdlib>
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <thread>
@@ -385,6 +386,76 @@ TEST(Conform, FailsIfThePluginDoesNotExist) {
     ConformRun run;
     EXPECT_EQ(run.run({"nothing.so"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("there is no plugin 'nothing.so'"));
+}
+
+TEST(Conform, FindsPluginsByName) {
+    ConformRun run;
+    EXPECT_EQ(run.run({"sink_null", "--only", "abi.load"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("pass     abi.load"));
+    EXPECT_EQ(run.run({"sink_nul", "--only", "abi.load"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("there is no plugin 'sink_nul'; did you mean 'sink_null'?"));
+    run.link_wrong("miss_alpha_1");
+    EXPECT_EQ(run.run({"rt_miss_alpha_1", "--only", "abi.load"}), 2) << "the current folder is not searched";
+}
+
+class ConformPython : public testing::Test {
+protected:
+    void SetUp() override {
+        if (std::system("/usr/bin/python3 -c 'import numpy' 2>/dev/null") != 0)
+            GTEST_SKIP() << "python3-numpy is not installed";
+    }
+};
+
+const std::string idle_tracker = "class T:\n"
+                                 "    def __init__(self, host): pass\n"
+                                 "    def start(self, setup): pass\n"
+                                 "    def track(self, frame, markers): return 0\n";
+const std::string idle_sink = "class S:\n"
+                              "    def __init__(self, host): pass\n"
+                              "    def start(self, setup): pass\n"
+                              "    def write(self, output): pass\n";
+
+TEST_F(ConformPython, RunsAScript) {
+    ConformRun run;
+    run.write("my.py", idle_tracker + "    def devices(self): return [{'name': 'first', 'is_default': True}, "
+                                      "{'name': 'second'}]\n");
+    EXPECT_EQ(run.run({"my.py", "--only", "abi.create,abi.devices,tracker.start"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("tracker_python"));
+    EXPECT_THAT(run.output(), HasSubstr("pass     tracker.start"));
+    EXPECT_THAT(run.output(), testing::ContainsRegex("pass     abi.devices\\s+first, second"));
+}
+
+TEST_F(ConformPython, SkipsDevicesOfAScriptThatListsNone) {
+    ConformRun run;
+    run.write("my.py", idle_tracker);
+    EXPECT_EQ(run.run({"my.py", "--only", "abi.create,abi.devices"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("skip     abi.devices\n         it does not have the extension"));
+}
+
+TEST_F(ConformPython, RejectsAScriptWithoutOrWithSeveralPlugins) {
+    ConformRun run;
+    run.write("my.py", "def f(:\n");
+    EXPECT_EQ(run.run({"my.py"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("my.py' cannot be used as a plugin:"));
+    EXPECT_THAT(run.output(), HasSubstr("my.py:1: SyntaxError"));
+    run.write("my.py", idle_tracker + idle_sink);
+    EXPECT_EQ(run.run({"my.py"}), 2);
+    EXPECT_THAT(run.output(),
+                HasSubstr("contains several plugins; name one: arhost conform tracker_python|sink_python"));
+    EXPECT_EQ(run.run({"sink_python", "--set", "script=my.py", "--only", "abi.create"}), 0) << run.output();
+}
+
+TEST(Conform, SkipsTestsOfCapabilitiesThatTheRayTracerLacks) {
+    ConformRun run;
+    EXPECT_EQ(run.run({run.link_wrong("lambert_only").string(), "--only",
+                       "raytracer.translucent-shadow,raytracer.moving-object,raytracer.reference"}),
+              0)
+        << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("skip     raytracer.translucent-shadow\n"
+                                        "         ARHOST_CAPABILITY_GLASS is not declared"));
+    EXPECT_THAT(run.output(), HasSubstr("skip     raytracer.moving-object\n"
+                                        "         ARHOST_CAPABILITY_MOTION is not declared"));
+    EXPECT_THAT(run.output(), HasSubstr("pass     raytracer.reference"));
 }
 
 TEST(Conform, FailsOnAnUnknownOption) {

@@ -207,6 +207,16 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
     {"region_too_narrow", "reports a region 4 px too narrow", "fail", {"raytracer.region"}},
     {"region_beyond_image", "reports a region beyond the image", "fail", {"raytracer.region"}},
     {"device_time_since_boot", "reports the time since boot as device time", "fail", {"raytracer.device-time"}},
+    {"lambert_only",
+     "shades every material as diffuse and ignores motion, and declares neither capability",
+     "pass",
+     {}},
+    {"devices_differ", "lists other devices the second time", "fail", {"abi.devices"}},
+    {"devices_fail", "cannot list its devices", "fail", {"abi.devices"}},
+    {"devices_leak", "leaks a descriptor when it lists its devices", "fail", {"abi.devices"}},
+    {"devices_without_index", "gives every device the index 0", "fail", {"abi.devices"}},
+    {"two_default_devices", "lists two default devices", "fail", {"abi.devices"}},
+    {"unnamed_device", "lists a device whose name is NULL", "fail", {"abi.devices"}},
 };
 
 } // namespace arhost::test

@@ -53,6 +53,32 @@ TEST(Demo, WritesItsFourFiles) {
     EXPECT_EQ(stats["frames"]["augmented"], 42);
 }
 
+// The source cannot keep up with 200 frames per second, so it skips some.
+TEST(Film, ShowsTheFramesOfALiveRunAtTheirCaptureTimes) {
+    ArhostRun run("version: 1\nmode: live\n"
+                  "source: {plugin: source_synthetic, fps: 200, options: {frames: 100, width: 640, height: 360}}\n"
+                  "outputs:\n- {plugin: sink_video, path: film.mp4, options: {preset: ultrafast}}\n"
+                  "- {plugin: sink_poses, path: poses.jsonl}\nstats: stats.json\n");
+    ASSERT_EQ(run.run(), 0) << run.output();
+    std::vector<double> captured_ms;
+    std::istringstream poses(run.read("poses.jsonl"));
+    for (std::string line; std::getline(poses, line);)
+        captured_ms.push_back(1e-6 * nlohmann::json::parse(line)["capture_ns"].get<double>());
+    ASSERT_FALSE(captured_ms.empty());
+    ASSERT_LT(captured_ms.size(), 100u) << "no frame was skipped";
+    cv::VideoCapture film(run.path("film.mp4").string());
+    std::vector<double> shown_ms;
+    for (cv::Mat picture; film.read(picture);)
+        shown_ms.push_back(film.get(cv::CAP_PROP_POS_MSEC));
+    ASSERT_GT(shown_ms.size(), 1u);
+    for (const double ms : shown_ms) { // a busy film may have dropped frames, but not the first one
+        double nearest = 1e9;
+        for (const double captured : captured_ms)
+            nearest = std::min(nearest, std::abs(captured - captured_ms.front() - ms));
+        EXPECT_LE(nearest, 2.1) << ms;
+    }
+}
+
 // Tests all components together: moving objects must be rendered at the capture time of the frame.
 TEST(Motion, IsRenderedAtTheFramesTime) {
     const std::string yaml =

@@ -573,6 +573,26 @@ TEST(Run, TakesAPercentSignLiterallyIfThePluginWritesOneFile) {
     }
 }
 
+// rt_counter declares no capability.
+const std::string rich_scene = "version: 1\naxes: z-up\nmaterials: {m: {model: glass}}\nlights: [{type: sphere, "
+                               "position: [0, 0, 90], radius: 5, intensity: 1}]\n"
+                               "objects: [{sphere: {centre: [0, 0, 10], radius: 10}, material: m}]\n";
+const std::string lacks =
+    "rt_counter does not support parts of the scene: glass, area lights. The image will lack them";
+
+TEST(Run, WarnsOfPartsOfTheSceneThatTheRayTracerLacks) {
+    ArhostRun run(counting("lockstep", "frames: 5", "", ""));
+    run.write("scene.yaml", rich_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("warning: raytracer: " + lacks));
+    expect_every_frame_augmented(run, 5);
+    EXPECT_EQ(run.run({"check", "run.yaml"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("warning: raytracer: " + lacks));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0);
+    EXPECT_THAT(run.output(), Not(HasSubstr("does not support")));
+}
+
 TEST(Run, DistortsImagesOfARayTracerWithoutLensSupport) {
     // rt_counter receives a camera without lens distortion and fills the entire image.
     ArhostRun run(

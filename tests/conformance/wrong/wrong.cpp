@@ -320,6 +320,9 @@ template <class T> std::span<T> view(arhost_scene &scene, const arhost_buffer &b
 void modify(arhost_scene &scene) {
     const auto geometries = view<arhost_geometry>(scene, scene.geometries);
     const auto objects = view<arhost_object>(scene, scene.objects);
+    if (has("lambert_only"))
+        for (arhost_material &material : view<arhost_material>(scene, scene.materials))
+            material.model = ARHOST_MATERIAL_DIFFUSE;
     if (has("max_8_objects"))
         scene.objects.count = std::min(scene.objects.count, 8u);
     if (has("max_256_objects"))
@@ -412,7 +415,7 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         modified.camera.eye[2] -= 1; // the camera looks along −z
     const arhost_moved_object nowhere{0, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
     const arhost_motion still{sizeof still, 1, &nowhere, nullptr, 0, 0};
-    if (has("no_motion") && request->motion)
+    if ((has("no_motion") || has("lambert_only")) && request->motion)
         modified.motion = &still;
     const Pixels pixels{*image};
     std::vector<std::array<std::uint8_t, 4>> before;
@@ -483,12 +486,43 @@ void stop(arhost_instance *instance) {
         embree_functions().stop(wrong(instance).glass_only);
 }
 
-const void *get_extension(const char *) {
+arhost_status list_devices(const arhost_host *, arhost_take_device take, void *context) {
+    static std::uint32_t lists = 0;
+    const std::uint32_t list = lists++;
+    if (has("devices_fail"))
+        return ARHOST_STATUS_ERROR_INTERNAL;
+    if (has("devices_leak"))
+        (void)::dup(0);
+    for (std::uint32_t i = 0; i < 2; ++i) {
+        arhost_device device{sizeof device, i,      ARHOST_DEVICE_CPU, i == 0, i == 0 ? "first" : "second",
+                             nullptr,       nullptr};
+        if (has("devices_without_index"))
+            device.index = 0;
+        if (has("two_default_devices"))
+            device.is_default = 1;
+        if (has("unnamed_device"))
+            device.name = nullptr;
+        if (has("devices_differ") && list % 2 == 1 && i == 1)
+            device.name = "another";
+        take(context, &device);
+    }
+    return ARHOST_STATUS_OK;
+}
+
+const void *get_extension(const char *id) {
+    static const arhost_devices devices = {sizeof devices, list_devices};
+    if (!std::strcmp(id, ARHOST_DEVICES_EXTENSION))
+        return library_name().find("device") != std::string::npos ? &devices : nullptr;
     return has("returns_any_extension") ? &library_name() : nullptr;
 }
 
+std::uint32_t capabilities(arhost_instance *) {
+    return ARHOST_CAPABILITY_LENS_DISTORTION;
+}
+
 const arhost_plugin &wrong_plugin() {
-    static const arhost_raytracer functions = {sizeof functions, start, has("no_render") ? nullptr : render, stop};
+    static const arhost_raytracer functions = {sizeof functions, start, has("no_render") ? nullptr : render, stop,
+                                               has("lambert_only") ? capabilities : nullptr};
     static std::vector<arhost_option_descriptor> options(
         embree().descriptor->options, embree().descriptor->options + embree().descriptor->option_count);
     static arhost_descriptor descriptor = *embree().descriptor;

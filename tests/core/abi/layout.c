@@ -73,6 +73,14 @@ VALUE(ARHOST_CAPABILITY_SEEK, 1);
 VALUE(ARHOST_CAPABILITY_LIVE, 2);
 VALUE(ARHOST_CAPABILITY_LENS_DISTORTION, 4);
 VALUE(ARHOST_CAPABILITY_REALTIME_SINK, 16);
+VALUE(ARHOST_CAPABILITY_REFLECTION, 32);
+VALUE(ARHOST_CAPABILITY_GLASS, 64);
+VALUE(ARHOST_CAPABILITY_ROUGHNESS, 128);
+VALUE(ARHOST_CAPABILITY_TEXTURES, 256);
+VALUE(ARHOST_CAPABILITY_AREA_LIGHTS, 512);
+VALUE(ARHOST_CAPABILITY_ENVIRONMENT, 1024);
+VALUE(ARHOST_CAPABILITY_MOTION, 2048);
+VALUE(ARHOST_CAPABILITY_EVERY_SCENE, 4064);
 
 STRUCT(arhost_descriptor, 80);
 FIELD(arhost_descriptor, struct_size, 0, 4);
@@ -502,11 +510,12 @@ FIELD(arhost_render_info, region_width, 16, 4);
 FIELD(arhost_render_info, region_height, 20, 4);
 FIELD(arhost_render_info, device_time_ns, 24, 8);
 
-STRUCT(arhost_raytracer, 32);
+STRUCT(arhost_raytracer, 40);
 FIELD(arhost_raytracer, struct_size, 0, 4);
 FIELD(arhost_raytracer, start, 8, 8);
 FIELD(arhost_raytracer, render, 16, 8);
 FIELD(arhost_raytracer, stop, 24, 8);
+FIELD(arhost_raytracer, capabilities, 32, 8);
 
 /* arhost/sink.h */
 

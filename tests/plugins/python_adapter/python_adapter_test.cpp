@@ -158,6 +158,25 @@ class Sink:
     EXPECT_LT(run.stats()["frames"]["in"], 1000);
 }
 
+// The recipe of the README.
+TEST_F(PythonAdapter, UsesThePackagesOfAVirtualEnvironment) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 3}}\n"
+                  "outputs: [{plugin: sink_python, reads: [.venv], options: {script: script.py, "
+                  "interpreter: .venv/bin/python}}]\nstats: stats.json\n");
+    const std::string venv = run.path(".venv").string();
+    ASSERT_EQ(std::system(("/usr/bin/python3 -m venv --without-pip --system-site-packages " + venv).c_str()), 0);
+    for (const auto &entry : std::filesystem::directory_iterator(run.path(".venv/lib"))) // python3.11
+        run.write(entry.path() / "site-packages/only_in_venv.py", "answer = 42\n");
+    EXPECT_EQ(run_script(run, "import only_in_venv\n"
+                              "class Sink:\n"
+                              "    def __init__(self, host): host.info(f'answer {only_in_venv.answer}')\n"
+                              "    def start(self, setup): pass\n"
+                              "    def write(self, output): pass\n"),
+              0)
+        << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("answer 42"));
+}
+
 TEST_F(PythonAdapter, ThreadsOfAScriptRunBetweenItsCalls) {
     ArhostRun run(chain("tracker:", "tracker: {plugin: tracker_python, options: {script: script.py}, "
                                     "markers: [{id: 3, side_mm: 80}]}") +
@@ -234,4 +253,81 @@ TEST_F(PythonAdapter, UnusableScriptsAreConfigurationErrors) {
         EXPECT_EQ(run_script(run, idle_tracker), 2) << run.output();
         EXPECT_THAT(run.output(), HasSubstr(message));
     }
+}
+
+TEST_F(PythonAdapter, TheRayTracersScriptDeclaresItsCapabilities) {
+    for (const auto &[declaration, warns] :
+         {std::pair{"pass", false},
+          {"capabilities = arhost.CAPABILITY_MOTION", true},
+          {"capabilities = arhost.CAPABILITY_GLASS | arhost.CAPABILITY_MOTION", false}}) {
+        ArhostRun run(raytracer);
+        run.write("script.py", std::string("import arhost\n"
+                                           "class T:\n"
+                                           "    ") +
+                                   declaration +
+                                   "\n"
+                                   "    def __init__(self, host): pass\n"
+                                   "    def start(self, setup): pass\n"
+                                   "    def render(self, request, image): image[...] = 0\n");
+        run.write("scene.yaml", "version: 1\naxes: z-up\nmaterials: {m: {model: glass}}\n"
+                                "objects: [{sphere: {centre: [0, 0, 10], radius: 10}, material: m}]\n");
+        EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
+        run.run({"--config", "run.yaml", "--frames", "1"});
+        const auto warning = HasSubstr("rt_python does not support parts of the scene: glass.");
+        if (warns) {
+            EXPECT_THAT(run.output(), warning) << declaration;
+        } else {
+            EXPECT_THAT(run.output(), Not(warning)) << declaration;
+        }
+    }
+}
+
+// Compares the classes of arhost.pyi with the objects that the methods of a script receive.
+TEST_F(PythonAdapter, TheTypeStubDescribesTheObjectsOfTheMethods) {
+    const std::string check = R"(
+import ast, arhost
+stub = ast.parse(open(")" ARHOST_SOURCE_DIRECTORY R"(/sdk/templates/python/arhost.pyi").read())
+declared = {c.name: {f.target.id for f in c.body if isinstance(f, ast.AnnAssign)}
+            for c in stub.body if isinstance(c, ast.ClassDef)}
+missing = [f.target.id for f in stub.body if isinstance(f, ast.AnnAssign) and not hasattr(arhost, f.target.id)]
+assert not missing, missing
+undeclared = {n for n in dir(arhost) if n.isupper()} - {f.target.id for f in stub.body if isinstance(f, ast.AnnAssign)}
+assert not undeclared, undeclared
+def check(name, value):
+    names = set(value.dtype.names) if hasattr(value, "dtype") else {n for n in vars(value) if n[0] != "_"}
+    assert names == declared[name], (name, names ^ declared[name])
+class Source:
+    def __init__(self, host): pass
+    def start(self, setup):
+        check("SourceSetup", setup)
+        return {"width": 64, "height": 48, "fps": 25}
+    def read(self, buffer):
+        check("FrameBuffer", buffer), check("FrameFormat", buffer.format)
+        return None if buffer.sequence > 1 else 40_000_000 * buffer.sequence
+class Tracker:
+    def __init__(self, host): pass
+    def start(self, setup):
+        check("TrackerSetup", setup), check("Intrinsics", setup.intrinsics), check("MarkerConfig", setup.markers[0])
+    def track(self, frame, markers):
+        check("Frame", frame), check("Marker", markers)
+        m = markers[0]
+        m["id"], m["family"], m["state"] = 3, b"python", arhost.MARKER_DETECTED
+        m["mt"] = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -500, 1]
+        return 1
+class Tracer:
+    def __init__(self, host): pass
+    def start(self, setup): check("RaytracerSetup", setup), check("Scene", setup.scene)
+    def render(self, request, image): check("RenderRequest", request), check("Camera", request.camera)
+class Sink:
+    def __init__(self, host): pass
+    def start(self, setup): check("SinkSetup", setup)
+    def write(self, output): check("Output", output), check("Record", output.record)
+)";
+    ArhostRun run("version: 1\nsandbox: none\ncamera: {width: 64, height: 48, fx: 60}\n"
+                  "source: {plugin: source_python, options: {script: script.py}}\n"
+                  "tracker: {plugin: tracker_python, options: {script: script.py}, markers: [{id: 3, side_mm: 80}]}\n"
+                  "raytracer: {plugin: rt_python, options: {script: script.py}, scene: scene.yaml}\n"
+                  "outputs: [{plugin: sink_python, options: {script: script.py}}]\nstats: stats.json\n");
+    EXPECT_EQ(run_script(run, check), 0) << run.output();
+    EXPECT_EQ(run.stats()["frames"]["augmented"], 2) << run.output();
 }

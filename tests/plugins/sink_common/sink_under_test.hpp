@@ -82,14 +82,17 @@ private:
     std::uint8_t *map_, *bgr_;
 };
 
-inline arhost_record make_record(std::uint64_t sequence) {
+inline arhost_record make_record(std::uint64_t sequence, double fps) {
     arhost_record record{};
     record.struct_size = sizeof record;
     record.clock = ARHOST_CLOCK_MEDIA;
     record.sequence = sequence;
-    record.capture_ns = static_cast<std::int64_t>(sequence) * 33'333'333;
+    record.capture_ns = static_cast<std::int64_t>(sequence) * static_cast<std::int64_t>(1e9 / fps);
     record.overlay = ARHOST_OVERLAY_NONE;
     return record;
+}
+inline arhost_record make_record(std::uint64_t sequence) {
+    return make_record(sequence, 30);
 }
 
 // Returns a camera for pictures of this size. Its numbers need many decimal digits, to test that sinks do not round
@@ -125,6 +128,7 @@ public:
             return created_;
         width_ = width;
         height_ = height;
+        fps_ = fps > 0 ? fps : 30;
         arhost_sink_setup setup{};
         setup.struct_size = sizeof setup;
         setup.width = static_cast<std::uint32_t>(width);
@@ -146,7 +150,7 @@ public:
         return functions().write(plugin_.instance(), &output);
     }
     arhost_status write(std::uint64_t sequence) {
-        return write(Picture(width_, height_, sequence), make_record(sequence));
+        return write(Picture(width_, height_, sequence), make_record(sequence, fps_));
     }
     arhost_status write(std::uint64_t first, std::uint64_t end) { // [first, end)
         for (; first < end; ++first)
@@ -166,6 +170,7 @@ private:
     PluginUnderTest plugin_;
     arhost_status created_;
     int width_ = 0, height_ = 0;
+    double fps_ = 30;
 };
 
 // Runs a sink in a child process, beginning at frame `first_sequence`, and kills the process after the sink has

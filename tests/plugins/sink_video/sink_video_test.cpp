@@ -185,6 +185,80 @@ TEST_F(SinkVideo, DroppedFramesKeepTheirDuration) {
     EXPECT_NEAR(video.duration_s, 18 / 30.0, 1e-3); // the video starts with the first frame
 }
 
+// A camera's frames, numbered without gaps: some were skipped, and each is up to 4 ms off the nominal time. The clock
+// shows ten days.
+std::vector<std::int64_t> live_times_ns(std::size_t count) {
+    std::vector<std::int64_t> times;
+    std::int64_t slot = 0;
+    for (std::size_t i = 0; i < count; ++i, slot += i % 7 == 0 ? 4 : 1)
+        times.push_back(864'000'000'000'000 + slot * 33'333'333 + static_cast<std::int64_t>(i * 37 % 9) * 500'000);
+    return times;
+}
+
+TEST_F(SinkVideo, FramesAreShownAtTheirCaptureTimes) {
+    const std::vector<std::int64_t> captured_ns = live_times_ns(40);
+    for (const std::string name : {"a.mp4", "a.mkv", "a.mov"})
+        for (const std::string codec : {"h264", "mpeg4"})
+            for (const std::uint64_t restart : {40, 15}) { // 40: none
+                const std::map<std::string, std::string> options{{"path", path(name).string()}, {"codec", codec}};
+                const auto write = [&](std::uint64_t first, std::uint64_t end, bool stops) {
+                    SinkUnderTest s = sink(options);
+                    ASSERT_EQ(s.start(width, height, first), ARHOST_STATUS_OK) << s.log();
+                    for (std::uint64_t i = first; i < end; ++i) {
+                        arhost_record record = make_record(i);
+                        record.clock = ARHOST_CLOCK_MONOTONIC;
+                        record.capture_ns = captured_ns[i];
+                        ASSERT_EQ(s.write(Picture(width, height, i), record), ARHOST_STATUS_OK) << s.log();
+                    }
+                    if (stops) {
+                        ASSERT_EQ(s.stop(), ARHOST_STATUS_OK) << s.log();
+                    }
+                };
+                write(0, restart, restart == 40);
+                if (restart < 40)
+                    write(restart - 2, 40, true); // the host repeats two frames
+                const Video video = read_video(path(name));
+                ASSERT_EQ(video.numbers(), numbers(0, 40)) << name << " " << codec << " " << restart;
+                for (std::size_t i = 0; i < 40; ++i)
+                    ASSERT_NEAR(video.times_s()[i], 1e-9 * static_cast<double>(captured_ns[i] - captured_ns[0]),
+                                2.1e-3)
+                        << name << " " << codec << ", frame " << i;
+                EXPECT_NEAR(video.duration_s, video.times_s().back() + 1 / 30.0, 2e-3) << name << " " << codec;
+            }
+}
+
+TEST_F(SinkVideo, AConstantRateRemainsConstant) {
+    const AVRational rate{30000, 1001};
+    SinkUnderTest s = sink();
+    ASSERT_EQ(s.start(width, height, 0, av_q2d(rate)), ARHOST_STATUS_OK);
+    for (std::uint64_t i = 0; i < 100; ++i) {
+        arhost_record record = make_record(i);
+        record.capture_ns = 1'234'567 + std::llround(static_cast<double>(i) * 1e9 / av_q2d(rate));
+        ASSERT_EQ(s.write(Picture(width, height, i), record), ARHOST_STATUS_OK);
+    }
+    ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
+    const Video video = read_video(path());
+    EXPECT_EQ(av_cmp_q(video.fps, rate), 0);
+    for (std::size_t i = 0; i < video.frames.size(); ++i)
+        ASSERT_NEAR(video.times_s()[i], static_cast<double>(i) / av_q2d(rate), 1e-6);
+}
+
+TEST_F(SinkVideo, FramesWithEqualCaptureTimesAreKept) {
+    for (const std::uint64_t first : {0, 3}) { // the second is a restart
+        SinkUnderTest s = sink();
+        ASSERT_EQ(s.start(width, height, first), ARHOST_STATUS_OK);
+        for (std::uint64_t i = first; i < first + 5; ++i) {
+            arhost_record record = make_record(i);
+            record.capture_ns = 0;
+            ASSERT_EQ(s.write(Picture(width, height, i), record), ARHOST_STATUS_OK);
+        }
+        if (first > 0) {
+            ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
+        }
+    }
+    EXPECT_EQ(read_video(path()).numbers(), numbers(0, 8));
+}
+
 TEST_F(SinkVideo, TheSameFramesGiveTheSameBytes) {
     run(sink(), 0, 10);
     run(sink({{"path", path("again.mp4").string()}}), 0, 10);
@@ -233,9 +307,8 @@ TEST_F(SinkVideo, ManyRestartsGiveOneVideo) {
     run(sink(), 6, 12);
     const Video video = read_video(path());
     EXPECT_EQ(video.numbers(), numbers(0, 12));
-    std::vector<std::int64_t> times(12);
-    std::iota(times.begin(), times.end(), 0);
-    EXPECT_EQ(video.times(), times);
+    for (std::size_t i = 0; i < video.frames.size(); ++i)
+        EXPECT_NEAR(video.times_s()[i], static_cast<double>(i) / 30, 1e-6);
     EXPECT_THAT(names(), ElementsAre("demo.mp4"));
 }
 

@@ -24,7 +24,7 @@ namespace arhost::test {
 
 struct VideoFrame {
     int width, height;
-    std::int64_t time; // presentation time in units of 1/fps
+    double time_s; // presentation time
     std::vector<std::uint8_t> bgr;
 
     const std::uint8_t *pixel(int x, int y) const { return &bgr[3 * (static_cast<std::size_t>(y) * width + x)]; }
@@ -54,10 +54,10 @@ struct Video {
             all.push_back(frame.number());
         return all;
     }
-    std::vector<std::int64_t> times() const {
-        std::vector<std::int64_t> all;
+    std::vector<double> times_s() const {
+        std::vector<double> all;
         for (const VideoFrame &frame : frames)
-            all.push_back(frame.time);
+            all.push_back(frame.time_s);
         return all;
     }
 };
@@ -116,8 +116,7 @@ inline Video read_video(const std::filesystem::path &path) {
     const auto take = [&] {
         while (avcodec_receive_frame(codec.get(), frame.get()) == 0) {
             video.frames.push_back(to_bgr(*frame));
-            video.frames.back().time =
-                av_rescale_q(frame->best_effort_timestamp, stream.time_base, av_inv_q(stream.r_frame_rate));
+            video.frames.back().time_s = static_cast<double>(frame->best_effort_timestamp) * av_q2d(stream.time_base);
         }
     };
     while (av_read_frame(format, packet.get()) >= 0) {

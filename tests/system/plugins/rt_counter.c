@@ -151,7 +151,7 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              sizeof options / sizeof *options,
                                              options,
                                              NULL};
-static const arhost_raytracer functions = {sizeof(arhost_raytracer), start, render, stop};
+static const arhost_raytracer functions = {sizeof(arhost_raytracer), start, render, stop, NULL};
 static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {

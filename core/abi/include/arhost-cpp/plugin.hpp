@@ -233,17 +233,25 @@ inline constexpr arhost_tracker tracker_functions = {
     },
     stop_instance<T>};
 
-template <class T>
-inline constexpr arhost_raytracer raytracer_functions = {
-    sizeof(arhost_raytracer),
-    [](arhost_instance *i, const arhost_raytracer_setup *setup) {
+// `capabilities` is an optional member of the plugin class.
+template <class T> constexpr arhost_raytracer make_raytracer_functions() {
+    arhost_raytracer raytracer{};
+    raytracer.struct_size = sizeof(arhost_raytracer);
+    raytracer.start = [](arhost_instance *i, const arhost_raytracer_setup *setup) {
         return with<T>(i, [&](T &p) { return p.start(*setup), ARHOST_STATUS_OK; });
-    },
-    [](arhost_instance *i, const arhost_render_request *request, const arhost_image *image,
-       arhost_render_info *info) {
+    };
+    raytracer.render = [](arhost_instance *i, const arhost_render_request *request, const arhost_image *image,
+                          arhost_render_info *info) {
         return with<T>(i, [&](T &p) { return p.render(*request, *image, *info), ARHOST_STATUS_OK; });
-    },
-    stop_instance<T>};
+    };
+    raytracer.stop = stop_instance<T>;
+    if constexpr (requires(const T &p) { p.capabilities(); })
+        raytracer.capabilities = [](arhost_instance *i) -> std::uint32_t {
+            return instance_of<T>(i).plugin.capabilities();
+        };
+    return raytracer;
+}
+template <class T> inline constexpr arhost_raytracer raytracer_functions = make_raytracer_functions<T>();
 
 template <class T> constexpr arhost_sink make_sink_functions() {
     arhost_sink sink{};

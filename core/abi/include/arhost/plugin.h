@@ -166,7 +166,19 @@ enum {
     ARHOST_CAPABILITY_SEEK = 1 << 0, /* source: can start at any frame; frame N is the same wherever it starts */
     ARHOST_CAPABILITY_LIVE = 1 << 1, /* source: a camera; frames not read in time are lost */
     ARHOST_CAPABILITY_LENS_DISTORTION = 1 << 2, /* raytracer: applies the lens distortion of arhost_intrinsics */
-    ARHOST_CAPABILITY_REALTIME_SINK = 1 << 4    /* sink: needs only the latest frame */
+    ARHOST_CAPABILITY_REALTIME_SINK = 1 << 4,   /* sink: needs only the latest frame */
+    /* raytracer: the parts of a scene that it renders, besides diffuse materials and point, directional and spot
+     * lights. It must accept scenes with other parts too: it shades other materials as diffuse, ignores textures and
+     * the environment, may ignore area lights or treat them as point lights, and leaves moving objects where they are
+     * at time 0. The worker then warns the user. */
+    ARHOST_CAPABILITY_REFLECTION = 1 << 5,   /* the materials SPECULAR, MIRROR and METAL */
+    ARHOST_CAPABILITY_GLASS = 1 << 6,        /* the material GLASS */
+    ARHOST_CAPABILITY_ROUGHNESS = 1 << 7,    /* the material METALLIC_ROUGHNESS */
+    ARHOST_CAPABILITY_TEXTURES = 1 << 8,     /* textures of materials */
+    ARHOST_CAPABILITY_AREA_LIGHTS = 1 << 9,  /* rectangles and spheres */
+    ARHOST_CAPABILITY_ENVIRONMENT = 1 << 10, /* the environment map */
+    ARHOST_CAPABILITY_MOTION = 1 << 11,      /* arhost_motion */
+    ARHOST_CAPABILITY_EVERY_SCENE = 0xfe0    /* all of these: REFLECTION to MOTION */
 };
 
 /* Describes the plugin. Static storage: valid as long as the library is loaded. Each string may have up to 4,096

@@ -66,6 +66,10 @@ typedef struct arhost_raytracer {
 
     /* [worker, started] Called once after each successful `start`. */
     void (*stop)(arhost_instance *instance);
+
+    /* [worker, created] Returns the capabilities of this instance, if they depend on its options: those of the
+     * descriptor without some of ARHOST_CAPABILITY_EVERY_SCENE. Optional: may be NULL. */
+    uint32_t (*capabilities)(arhost_instance *instance);
 } arhost_raytracer;
 
 #ifdef __cplusplus

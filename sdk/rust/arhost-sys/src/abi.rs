@@ -87,6 +87,14 @@ pub const ARHOST_CAPABILITY_SEEK: u32 = 1;
 pub const ARHOST_CAPABILITY_LIVE: u32 = 2;
 pub const ARHOST_CAPABILITY_LENS_DISTORTION: u32 = 4;
 pub const ARHOST_CAPABILITY_REALTIME_SINK: u32 = 16;
+pub const ARHOST_CAPABILITY_REFLECTION: u32 = 32;
+pub const ARHOST_CAPABILITY_GLASS: u32 = 64;
+pub const ARHOST_CAPABILITY_ROUGHNESS: u32 = 128;
+pub const ARHOST_CAPABILITY_TEXTURES: u32 = 256;
+pub const ARHOST_CAPABILITY_AREA_LIGHTS: u32 = 512;
+pub const ARHOST_CAPABILITY_ENVIRONMENT: u32 = 1024;
+pub const ARHOST_CAPABILITY_MOTION: u32 = 2048;
+pub const ARHOST_CAPABILITY_EVERY_SCENE: u32 = 4064;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_descriptor {
@@ -683,8 +691,9 @@ pub struct arhost_raytracer {
     pub start: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_raytracer_setup) -> arhost_status>,
     pub render: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_render_request, *const arhost_image, *mut arhost_render_info) -> arhost_status>,
     pub stop: Option<unsafe extern "C" fn(*mut arhost_instance)>,
+    pub capabilities: Option<unsafe extern "C" fn(*mut arhost_instance) -> u32>,
 }
-const _: () = assert!(size_of::<arhost_raytracer>() == 32);
+const _: () = assert!(size_of::<arhost_raytracer>() == 40);
 unsafe impl Sync for arhost_raytracer {} // a plugin's statics are immutable
 
 // ---- arhost/sink.h ----

@@ -86,8 +86,24 @@ impl Options<'_> {
     }
 }
 
+/// A device that the plugin can run on: the fields of `arhost_device`, with "" for NULL.
+#[derive(Clone, Debug, Default)]
+pub struct Device {
+    pub index: u32,
+    pub kind: arhost_device_kind,
+    pub is_default: bool,
+    pub name: String,
+    pub uuid: String,
+    pub abilities: String,
+}
+
+/// Lists the devices that a plugin can run on, before an instance exists (arhost/devices.h).
+pub type ListDevices = fn(Host) -> Result<Vec<Device>, Failure>;
+
 /// Common to all kinds of plugin.
 pub trait Plugin: Sized {
+    /// The extension "arhost.devices/1": `Some(list)` if the user can choose among devices.
+    const DEVICES: Option<ListDevices> = None;
     fn new(host: Host, options: &Options) -> Result<Self, Failure>;
     fn stop(&mut self) -> Result<(), Failure> {
         Ok(())
@@ -303,8 +319,45 @@ unsafe extern "C" fn stop<T: Plugin>(instance: *mut arhost_instance) {
 unsafe extern "C" fn stop_sink<T: Plugin>(instance: *mut arhost_instance) -> arhost_status {
     with(instance, |plugin: &mut T| plugin.stop().map(|()| ARHOST_STATUS_OK))
 }
-unsafe extern "C" fn no_extension(_id: *const c_char) -> *const c_void {
-    std::ptr::null()
+struct Devices<T>(std::marker::PhantomData<T>);
+impl<T: Plugin> Devices<T> {
+    const TABLE: &'static arhost_devices =
+        &arhost_devices { struct_size: std::mem::size_of::<arhost_devices>() as u32, list: Some(list_devices::<T>) };
+}
+unsafe extern "C" fn get_extension<T: Plugin>(id: *const c_char) -> *const c_void {
+    if T::DEVICES.is_some() && CStr::from_ptr(id).to_bytes_with_nul() == ARHOST_DEVICES_EXTENSION {
+        Devices::<T>::TABLE as *const arhost_devices as *const c_void
+    } else {
+        std::ptr::null()
+    }
+}
+unsafe extern "C" fn list_devices<T: Plugin>(
+    host: *const arhost_host,
+    take: arhost_take_device,
+    context: *mut c_void,
+) -> arhost_status {
+    let c_text = |text: &str| CString::new(text.replace('\0', " ")).unwrap_or_default();
+    let or_null = |text: &CString| if text.as_bytes().is_empty() { std::ptr::null() } else { text.as_ptr() };
+    guarded(Host(host), || {
+        let list = T::DEVICES.map_or(Ok(Vec::new()), |list| list(Host(host)))?;
+        for device in list {
+            let (name, uuid) = (c_text(&device.name), c_text(&device.uuid));
+            let abilities = c_text(&device.abilities);
+            let device = arhost_device {
+                struct_size: std::mem::size_of::<arhost_device>() as u32,
+                index: device.index,
+                kind: device.kind,
+                is_default: device.is_default.into(),
+                name: name.as_ptr(),
+                uuid: or_null(&uuid),
+                abilities: or_null(&abilities),
+            };
+            if let Some(take) = take {
+                take(context, &device);
+            }
+        }
+        Ok(ARHOST_STATUS_OK)
+    })
 }
 
 #[doc(hidden)]
@@ -315,7 +368,7 @@ pub const fn plugin_of<T: Plugin>(descriptor: &'static arhost_descriptor, functi
         functions,
         create: Some(create::<T>),
         destroy: Some(destroy::<T>),
-        get_extension: Some(no_extension),
+        get_extension: Some(get_extension::<T>),
     }
 }
 
@@ -405,6 +458,7 @@ pub const fn raytracer<T: Raytracer>() -> arhost_raytracer {
         start: Some(start_raytracer::<T>),
         render: Some(render::<T>),
         stop: Some(stop::<T>),
+        capabilities: None,
     }
 }
 

@@ -138,7 +138,7 @@ static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "samples", "1", 1, 64, NULL,
      "Rays per pixel, rounded down to a square number."},
 };
-static const arhost_raytracer functions = {sizeof functions, start, render, stop};
+static const arhost_raytracer functions = {.struct_size = sizeof functions, .start = start, .render = render, .stop = stop};
 static const arhost_descriptor descriptor = {
     .struct_size = sizeof descriptor,
     .kind = ARHOST_KIND_RAYTRACER,
@@ -148,6 +148,9 @@ static const arhost_descriptor descriptor = {
     .vendor = "unknown", /* FILL IN: your name */
     .licence = "NONE",   /* FILL IN: SPDX identifier, e.g. "Apache-2.0" */
     .description = "Brute-force ray tracer.",
+    /* FILL IN: what you implement, such as ARHOST_CAPABILITY_TEXTURES or ARHOST_CAPABILITY_LENS_DISTORTION. arhost warns
+     * if a scene needs more. */
+    .capabilities = ARHOST_CAPABILITY_REFLECTION | ARHOST_CAPABILITY_MOTION,
     .option_count = sizeof options / sizeof *options,
     .options = options,
 };

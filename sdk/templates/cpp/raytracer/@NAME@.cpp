@@ -97,7 +97,9 @@ constexpr arhost_descriptor descriptor = {
     "unknown", // FILL IN: your name
     "NONE",    // FILL IN: SPDX identifier, e.g. "Apache-2.0"
     "Brute-force ray tracer.",
-    0, // FILL IN: ARHOST_CAPABILITY_LENS_DISTORTION if you implement lens distortion
+    // FILL IN: what you implement, such as ARHOST_CAPABILITY_TEXTURES or ARHOST_CAPABILITY_LENS_DISTORTION. arhost warns if
+    // a scene needs more.
+    ARHOST_CAPABILITY_REFLECTION | ARHOST_CAPABILITY_MOTION,
     std::size(options),
     options,
     nullptr, // permissions from the sandbox: arhost/plugin.h

@@ -309,6 +309,9 @@ def srgb_bytes(linear):
 
 
 class @CLASS@:
+    # FILL IN: what you implement, such as arhost.CAPABILITY_TEXTURES. arhost warns if a scene needs more.
+    capabilities = arhost.CAPABILITY_REFLECTION | arhost.CAPABILITY_MOTION
+
     # Further arguments come from the YAML: options: {arguments: '{"colour": [0, 0.5, 1]}'}
     def __init__(self, host):
         self.host = host  # host.info("…") logs; poll host.cancelled() in long loops

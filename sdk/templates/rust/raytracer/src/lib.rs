@@ -119,7 +119,9 @@ impl Raytracer for @CLASS@ {
 
 plugin! {
     raytracer @CLASS@, "@NAME@", "Brute-force ray tracer.",
-    capabilities: 0, // FILL IN: ARHOST_CAPABILITY_LENS_DISTORTION if you implement lens distortion
+    // FILL IN: what you implement, such as ARHOST_CAPABILITY_TEXTURES or ARHOST_CAPABILITY_LENS_DISTORTION. arhost warns if
+    // a scene needs more.
+    capabilities: ARHOST_CAPABILITY_REFLECTION | ARHOST_CAPABILITY_MOTION,
     // arhost validates the configuration against these before it calls `new`.
     options: [
         option!(ARHOST_OPTION_INTEGER, "samples", "1", "Rays per pixel, rounded down to a square number.", 1.0, 64.0),

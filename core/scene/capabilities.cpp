@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "scene/capabilities.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+#include <utility>
+
+namespace arhost::scene {
+namespace {
+
+template <class T> std::span<const T> view(const arhost_scene &scene, const arhost_buffer &buffer) {
+    return {reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&scene) + buffer.offset), buffer.count};
+}
+
+std::uint32_t needed_for(const arhost_material &material) {
+    std::uint32_t needed = 0;
+    switch (material.model) {
+    case ARHOST_MATERIAL_SPECULAR:
+    case ARHOST_MATERIAL_MIRROR:
+    case ARHOST_MATERIAL_METAL:
+        needed = ARHOST_CAPABILITY_REFLECTION;
+        break;
+    case ARHOST_MATERIAL_GLASS:
+        needed = ARHOST_CAPABILITY_GLASS;
+        break;
+    case ARHOST_MATERIAL_METALLIC_ROUGHNESS:
+        needed = ARHOST_CAPABILITY_ROUGHNESS;
+        break;
+    default:
+        break;
+    }
+    const std::array textures = {material.colour_texture, material.metallic_roughness_texture,
+                                 material.normal_texture, material.emission_texture};
+    if (std::ranges::any_of(textures, [](std::uint32_t texture) { return texture != ARHOST_NONE; }))
+        needed |= ARHOST_CAPABILITY_TEXTURES;
+    return needed;
+}
+
+// The order of the bits.
+constexpr std::pair<std::uint32_t, const char *> parts[] = {
+    {ARHOST_CAPABILITY_REFLECTION, "reflecting materials"},
+    {ARHOST_CAPABILITY_GLASS, "glass"},
+    {ARHOST_CAPABILITY_ROUGHNESS, "metallic-roughness materials"},
+    {ARHOST_CAPABILITY_TEXTURES, "textures"},
+    {ARHOST_CAPABILITY_AREA_LIGHTS, "area lights"},
+    {ARHOST_CAPABILITY_ENVIRONMENT, "the environment map"},
+    {ARHOST_CAPABILITY_MOTION, "motion"},
+};
+
+} // namespace
+
+std::uint32_t needed_capabilities(const arhost_scene &scene) {
+    std::uint32_t needed = 0;
+    const auto materials = view<arhost_material>(scene, scene.materials);
+    for (const arhost_object &object : view<arhost_object>(scene, scene.objects)) {
+        if (object.role != ARHOST_ROLE_OCCLUDER)
+            needed |= needed_for(materials[object.material]);
+        if (scene.duration_s > 0 && (object.moves || object.deforms))
+            needed |= ARHOST_CAPABILITY_MOTION;
+    }
+    for (const arhost_light &light : view<arhost_light>(scene, scene.lights))
+        if (light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE)
+            needed |= ARHOST_CAPABILITY_AREA_LIGHTS;
+    if (scene.environment.texture != ARHOST_NONE)
+        needed |= ARHOST_CAPABILITY_ENVIRONMENT;
+    return needed;
+}
+
+std::uint32_t capabilities_of(const arhost_descriptor &descriptor, const arhost_raytracer &functions,
+                              arhost_instance *instance) {
+    constexpr std::size_t size =
+        offsetof(arhost_raytracer, capabilities) + sizeof(arhost_raytracer::capabilities);
+    return functions.struct_size < size || !functions.capabilities ? descriptor.capabilities
+                                                                   : functions.capabilities(instance);
+}
+
+std::string missing_capabilities_text(const std::string &id, std::uint32_t missing) {
+    std::string names;
+    for (const auto &[bit, name] : parts)
+        if (missing & bit)
+            names.append(names.empty() ? "" : ", ").append(name);
+    return names.empty() ? names
+                         : id + " does not support parts of the scene: " + names +
+                               ". The image will lack them; use another ray tracer or a simpler scene";
+}
+
+} // namespace arhost::scene
