@@ -419,7 +419,7 @@ void order(Context &context) {
         }
     }
     for (const auto &[name, of_file] : changes)
-        if (!reported && of_file.size() == frames) // the file contains all frames
+        if (!reported && of_file.size() > 1) // the file contains several frames
             reported = check_video(context, context.library.scratch() / std::to_string(frames) / name, frames);
     if (!reported)
         throw Skip("the position of a frame in its files is unknown, and they are not videos");

@@ -11,7 +11,6 @@
 #include "host/probe.hpp"
 #include "run_config/access.hpp"
 #include "run_config/schema.hpp"
-#include "scene/capabilities.hpp"
 
 #include <nlohmann/json.hpp>
 #include <spdlog/fmt/fmt.h>
@@ -324,7 +323,7 @@ void check_plugins(const run_config::Configuration &configuration, supervise::Co
     for (const run_config::ComponentConfiguration &output : configuration.outputs) {
         const ipc::PluginDescription plugin = check_component(output, ARHOST_KIND_SINK);
         if (const auto path = run_config::path_of(output.node))
-            files.push_back({*path, (plugin.capabilities & (1u << 3)) != 0});
+            files.push_back({*path, (plugin.capabilities & ARHOST_CAPABILITY_NUMBERED_FILES) != 0});
     }
     run_config::expect_distinct(files);
 }

@@ -251,7 +251,8 @@ void Pipeline::make_sink(std::size_t index, const std::string &name) {
 // Compares the output's file with those of the plugins that are already known.
 void Pipeline::expect_distinct_files(std::size_t index, const PluginDescription &plugin) {
     if (const auto path = run_config::path_of(configuration_.outputs[index].node))
-        output_files_.insert_or_assign(index, run_config::OutputFile{*path, (plugin.capabilities & (1u << 3)) != 0});
+        output_files_.insert_or_assign(
+            index, run_config::OutputFile{*path, (plugin.capabilities & ARHOST_CAPABILITY_NUMBERED_FILES) != 0});
     std::vector<run_config::OutputFile> files = configuration_.report_files();
     for (const auto &[other, file] : output_files_)
         files.push_back(file);

@@ -10,8 +10,8 @@
 
 namespace arhost::scene {
 
-// Returns the bits of ARHOST_CAPABILITY_EVERY_SCENE that `scene` needs. The scene must be valid (`validate`). Only the
-// materials of virtual objects and catchers count: occluders are invisible.
+// Returns the bits of ARHOST_CAPABILITY_EVERY_SCENE that `scene` needs. The scene must be valid (`validate`). Only
+// the materials of virtual objects and catchers count: occluders are invisible.
 std::uint32_t needed_capabilities(const arhost_scene &scene);
 
 // Returns the capabilities of a ray tracer's instance.

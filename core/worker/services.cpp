@@ -139,7 +139,8 @@ private:
 
 class RaytracerService final : public Service {
 public:
-    RaytracerService(const Link &link, const arhost_host &host, const arhost_plugin &plugin, arhost_instance *instance)
+    RaytracerService(const Link &link, const arhost_host &host, const arhost_plugin &plugin,
+                     arhost_instance *instance)
         : link_(link), host_(host), descriptor_(*plugin.descriptor),
           raytracer_(*static_cast<const arhost_raytracer *>(plugin.functions)), instance_(instance),
           supports_lenses_((plugin.descriptor->capabilities & ARHOST_CAPABILITY_LENS_DISTORTION) != 0) {}

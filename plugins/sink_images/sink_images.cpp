@@ -158,7 +158,7 @@ constexpr arhost_descriptor descriptor = {
     "arhost",
     "Apache-2.0",
     "Writes frames as numbered PNG or JPEG files, or one frame as a single file.",
-    1 << 3,
+    ARHOST_CAPABILITY_NUMBERED_FILES,
     std::size(options),
     options,
     nullptr,

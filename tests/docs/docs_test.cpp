@@ -41,8 +41,10 @@ TEST(Documentation, ContainsOnlyValidConfigurations) {
         for (const std::string &block : yaml_blocks(read_file(document))) {
             ArhostRun run; // in an empty folder: a snippet works from any folder
             run.write("snippet.yaml", block);
+            run.write("frames/color_image_0000.png", "x"); // the input that docs/config.md names
             // A block may need a camera or files that are not here.
-            EXPECT_EQ(run.run({"check", "--no-open", "snippet.yaml"}), 0) << document << ":\n" << block << run.output();
+            EXPECT_EQ(run.run({"check", "--no-open", "snippet.yaml"}), 0) << document << ":\n"
+                                                                          << block << run.output();
             ++checked;
         }
     EXPECT_EQ(checked, 2);

@@ -519,7 +519,8 @@ TEST(CommandLine, CheckFindsWhatWouldStopTheRun) {
     const std::string film = "- {plugin: sink_video, path: film.mp4}\n";
     EXPECT_THAT(finds("plugin: source_file, path: flim.mp4", film),
                 HasSubstr("error: run.yaml:2:37: source.path: there is no file '"));
-    EXPECT_THAT(finds("plugin: source_file, path: film.mp4", film), HasSubstr("film.mp4' cannot be read: "));
+    EXPECT_THAT(finds("plugin: source_file, path: film.mp4", "- {plugin: sink_video, path: other.mp4}\n"),
+                HasSubstr("film.mp4' cannot be read: "));
     EXPECT_THAT(
         finds(counter, film + "- {plugin: sink_video, path: out/film.avi}\n"),
         testing::ContainsRegex("error: run.yaml:5:3: sink_video#1: path: '.*/out/film.avi' must end in .mp4"));

@@ -61,12 +61,11 @@ TEST(Capabilities, IncludeTextures) {
 }
 
 TEST(Capabilities, IncludeLightsWithAnExtent) {
-    for (const auto &[type, expected] :
-         {std::pair{ARHOST_LIGHT_POINT, 0u},
-          {ARHOST_LIGHT_DIRECTIONAL, 0u},
-          {ARHOST_LIGHT_SPOT, 0u},
-          {ARHOST_LIGHT_RECTANGLE, std::uint32_t{ARHOST_CAPABILITY_AREA_LIGHTS}},
-          {ARHOST_LIGHT_SPHERE, std::uint32_t{ARHOST_CAPABILITY_AREA_LIGHTS}}}) {
+    for (const auto &[type, expected] : {std::pair{ARHOST_LIGHT_POINT, 0u},
+                                         {ARHOST_LIGHT_DIRECTIONAL, 0u},
+                                         {ARHOST_LIGHT_SPOT, 0u},
+                                         {ARHOST_LIGHT_RECTANGLE, std::uint32_t{ARHOST_CAPABILITY_AREA_LIGHTS}},
+                                         {ARHOST_LIGHT_SPHERE, std::uint32_t{ARHOST_CAPABILITY_AREA_LIGHTS}}}) {
         ArenaBuilder builder;
         builder.add_light(make_light(type));
         EXPECT_EQ(needed(std::move(builder)), expected) << type;
@@ -107,9 +106,10 @@ TEST(Capabilities, EverySceneHasABitForEachPart) {
 }
 
 TEST(Capabilities, TheWarningNamesThePluginAndTheParts) {
-    EXPECT_EQ(missing_capabilities_text("rt_small", ARHOST_CAPABILITY_GLASS | ARHOST_CAPABILITY_MOTION),
-              "rt_small does not support parts of the scene: glass, motion. The image will lack them; use another ray "
-              "tracer or a simpler scene");
+    EXPECT_EQ(
+        missing_capabilities_text("rt_small", ARHOST_CAPABILITY_GLASS | ARHOST_CAPABILITY_MOTION),
+        "rt_small does not support parts of the scene: glass, motion. The image will lack them; use another ray "
+        "tracer or a simpler scene");
     EXPECT_EQ(missing_capabilities_text("rt_small", ARHOST_CAPABILITY_LENS_DISTORTION), "");
 }
 

@@ -166,7 +166,10 @@ enum {
     ARHOST_CAPABILITY_SEEK = 1 << 0, /* source: can start at any frame; frame N is the same wherever it starts */
     ARHOST_CAPABILITY_LIVE = 1 << 1, /* source: a camera; frames not read in time are lost */
     ARHOST_CAPABILITY_LENS_DISTORTION = 1 << 2, /* raytracer: applies the lens distortion of arhost_intrinsics */
-    ARHOST_CAPABILITY_REALTIME_SINK = 1 << 4,   /* sink: needs only the latest frame */
+    /* sink: if the option `path` contains %d or %0Nd, it writes one numbered file per frame; without this capability,
+     * the host treats the path as the name of a single file */
+    ARHOST_CAPABILITY_NUMBERED_FILES = 1 << 3,
+    ARHOST_CAPABILITY_REALTIME_SINK = 1 << 4, /* sink: needs only the latest frame */
     /* raytracer: the parts of a scene that it renders, besides diffuse materials and point, directional and spot
      * lights. It must accept scenes with other parts too: it shades other materials as diffuse, ignores textures and
      * the environment, may ignore area lights or treat them as point lights, and leaves moving objects where they are

@@ -86,6 +86,7 @@ unsafe impl Sync for arhost_option {} // a plugin's statics are immutable
 pub const ARHOST_CAPABILITY_SEEK: u32 = 1;
 pub const ARHOST_CAPABILITY_LIVE: u32 = 2;
 pub const ARHOST_CAPABILITY_LENS_DISTORTION: u32 = 4;
+pub const ARHOST_CAPABILITY_NUMBERED_FILES: u32 = 8;
 pub const ARHOST_CAPABILITY_REALTIME_SINK: u32 = 16;
 pub const ARHOST_CAPABILITY_REFLECTION: u32 = 32;
 pub const ARHOST_CAPABILITY_GLASS: u32 = 64;
