@@ -38,8 +38,9 @@ ReceiveState Channel::receive(Message &message, int timeout_ms) const {
             return ReceiveState::none;
     }
     const ssize_t waiting = ::recv(fd_.get(), nullptr, 0, MSG_PEEK | MSG_TRUNC | MSG_DONTWAIT);
-    std::vector<char> text(
-        std::clamp<std::size_t>(waiting < 0 ? 0 : static_cast<std::size_t>(waiting), 1, max_message_size));
+    if (waiting < 0)
+        return errno == EAGAIN ? ReceiveState::none : ReceiveState::closed;
+    std::vector<char> text(std::clamp<std::size_t>(static_cast<std::size_t>(waiting), 1, max_message_size));
     const auto [size, truncated] =
         receive_with_fds(fd_.get(), std::as_writable_bytes(std::span(text)), message.fds, MSG_DONTWAIT);
     if (size <= 0)
