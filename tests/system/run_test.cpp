@@ -560,7 +560,7 @@ TEST(Run, FailsIfTheTrackerFailsInEveryFrame) {
                   "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
                   "outputs: [{plugin: sink_counter, path: counted.txt}]\n");
     EXPECT_EQ(run.run({"run.yaml", "--allow-no-target"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("error: tracker: it delivered no result: it failed in every frame"));
+    EXPECT_THAT(run.output(), HasSubstr("error: arhost: 5 frames have no overlay because the tracker failed"));
     EXPECT_EQ(counted(run).size(), 5u);
 }
 
