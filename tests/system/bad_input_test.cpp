@@ -359,10 +359,10 @@ TEST(BadInput, OfAnUnwritableFolderIsReportedOnce) {
 }
 
 TEST(BadInput, OfAPluginIsReportedOnce) {
-    ArhostRun run(replaced(good, "scene.yaml, options: {", "scene.yaml, options: {refuse: true"));
+    ArhostRun run(replaced(good, "scene.yaml, options: {", "scene.yaml, options: {reject: true"));
     run.write("scene.yaml", small_scene);
     EXPECT_EQ(run.run(), 2);
-    const std::string reason = "rejected, as the option 'refuse' requests\n", output = run.output();
+    const std::string reason = "rejected, as the option 'reject' requests\n", output = run.output();
     EXPECT_THAT(output, HasSubstr("error: arhost: run.yaml:5:12: raytracer: " + reason));
     EXPECT_EQ(output.find(reason), output.rfind(reason)) << output;
 }
