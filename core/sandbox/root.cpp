@@ -11,6 +11,7 @@
 #include <linux/mount.h>
 #include <map>
 #include <sys/mount.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <unistd.h>
@@ -155,6 +156,12 @@ bool enter_staging() {
 } // namespace
 
 bool enter_root(const Policy &policy) {
+    if (!set_attributes(AT_FDCWD, "/", 0, 0)) // changes nothing; fails before Linux 5.12
+        return false;
+    rlimit files{}; // the mounts need one descriptor each; set_limits lowers the limit later
+    ::getrlimit(RLIMIT_NOFILE, &files);
+    files.rlim_cur = files.rlim_max;
+    ::setrlimit(RLIMIT_NOFILE, &files);
     if (::mount("", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) // no propagation of mounts
         return false;
     const Contents contents = contents_of(policy);
@@ -174,6 +181,7 @@ bool enter_root(const Policy &policy) {
     if (!is_complete || !enter_staging()) {
         const int error = errno;
         ::umount2(staging, MNT_DETACH);
+        (void)!::chdir(working_directory.c_str());
         errno = error;
         return false;
     }

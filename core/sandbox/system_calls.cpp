@@ -41,6 +41,7 @@ constexpr const char *denied[] = {
     "chmod", "fchmod", "fchmodat", "fchmodat2", "chown", "fchown", "lchown", "fchownat", "setxattr", "fsetxattr",
     "lsetxattr", "setxattrat", "removexattr", "fremovexattr", "lremovexattr", "removexattrat", "file_setattr",
     "utime", "utimes", "futimesat", "truncate", // ftruncate needs a writable descriptor
+    "symlink", "symlinkat", // a link in a writable folder could redirect a grant at the next start
     // machine-wide settings and IPC
     "reboot", "settimeofday", "clock_settime", "clock_settime64", "clock_adjtime", "clock_adjtime64", "adjtimex",
     "stime", "sethostname", "setdomainname", "vhangup", "mq_open",
@@ -219,6 +220,11 @@ void deny_sockets(Filter &filter, const Policy &policy) {
         if (!families.contains(family))
             filter.deny("socket", {equals(0, family)});
     filter.deny("socket", {from(0, end)});
+    filter.deny("socketpair", {differs(0, AF_UNIX)});
+    // The inherited sockets belong to the host's network namespace, whose addresses these requests return.
+    if (!policy.allows("network"))
+        for (const std::uint64_t requests : {0x8900ul /* SIOC… */, 0x8b00ul /* wireless */})
+            filter.deny("ioctl", {has_bits(1, 0xffffff00u, requests)});
     if (!families.contains(AF_UNIX))
         for (const int type : {SOCK_DGRAM, SOCK_RAW}) // sockets of these types can send to any socket
             filter.deny("socketpair", {has_bits(1, 0xf, static_cast<unsigned>(type))});

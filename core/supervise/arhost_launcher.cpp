@@ -43,9 +43,11 @@ using Workers = std::map<pid_t, std::optional<Init>>;
 
 [[noreturn]] void run_init(int pipe) {
     ::prctl(PR_SET_NAME, "arhost-init");
-    ::signal(SIGCHLD, SIG_IGN); // the kernel reaps orphans
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL); // a stopped process does not see the end of the pipe
+    ::signal(SIGCHLD, SIG_IGN);         // the kernel reaps orphans
     ::dup2(pipe, 0);
-    ::syscall(SYS_close_range, 1u, ~0u, 0u);
+    if (::syscall(SYS_close_range, 1u, ~0u, 0u) != 0)
+        ::_exit(1); // another open end of the pipe would keep the namespace
     char byte;
     while (::read(0, &byte, 1) < 0 && errno == EINTR) {
     }

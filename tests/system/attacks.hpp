@@ -60,6 +60,8 @@ inline constexpr Attack attacks[] = {
     {"system_v", "read a message", by_other_layers},
     {"system_v", "a semaphore", by_other_layers},
     {"system_v", "new memory", by_other_layers},
+    {"sockets", "network interfaces", by_other_layers},
+    {"sockets", "a pair of another family", by_other_layers},
     {"sockets", "internet", by_other_layers},
     {"sockets", "datagrams", by_other_layers},
     {"sockets", "netlink", by_other_layers},

@@ -10,6 +10,7 @@
 
 #include <errno.h>
 #include <fcntl.h>
+#include <net/if.h>
 #include <pthread.h>
 #include <sched.h>
 #include <signal.h>
@@ -175,6 +176,10 @@ static int connects(const tracker *self, int is_abstract) {
 
 static void open_sockets(const tracker *self) {
     int ends[2];
+    struct ifreq interfaces[16];
+    struct ifconf list = {sizeof interfaces, {(void *)interfaces}};
+    report(self, "network interfaces", ioctl(control, SIOCGIFCONF, &list) == 0 && list.ifc_len > 0);
+    report(self, "a pair of another family", socketpair(AF_INET, SOCK_STREAM, 0, ends) == 0 || errno == EOPNOTSUPP);
     report(self, "internet", socket(AF_INET, SOCK_STREAM, 0) >= 0);
     report(self, "datagrams", socket(AF_INET6, SOCK_DGRAM, 0) >= 0);
     report(self, "netlink", socket(AF_NETLINK, SOCK_RAW, 0) >= 0);
