@@ -13,8 +13,8 @@ Layer enter_namespaces(const Policy &policy) {
     Layer layer{"namespaces", "", ""};
     const auto active = [&](const char *what) { add_to(layer.active, what); };
     const auto missing = [&](const char *what) { add_to(layer.missing, error_text(what)); };
-    // Root needs no user namespace, and in one it would lose access to the files of other users. A worker inherits
-    // the user namespace of arhost-launcher, with the capability to create other namespaces in it.
+    // Root needs no user namespace, and in one it would lose access to the files of other users. arhost-launcher has
+    // started a worker in a user namespace, with the capability to create other namespaces in it.
     if (::unshare(CLONE_NEWNS) != 0) {
         if (const std::string why_not = enter_user_namespace(); !why_not.empty()) {
             layer.missing = "user: " + why_not;

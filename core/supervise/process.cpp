@@ -129,7 +129,7 @@ void Process::receive_messages(int max_messages) {
             } else {
                 ready_ = ready_ || is<messages::Ready>(message);
                 if (is<messages::Failed>(message) &&
-                    held_error_ == parse<messages::Failed>(message).text.substr(0, 4000))
+                    held_error_ == parse<messages::Failed>(message).text.substr(0, WorkerBudget::max_text))
                     held_error_.reset();
                 else if (ready_)
                     print_held_error();
