@@ -56,6 +56,7 @@ inline bool has_pid_namespace() {
 
 void drop_environment(const Policy &policy); // cannot fail
 Layer raise_oom_score();                     // the OOM killer kills workers first; must run while /proc is writable
+Layer report_control_group();                // arhost-launcher has created it
 Layer enter_namespaces(const Policy &policy);
 bool enter_root(const Policy &policy); // part of enter_namespaces; on failure returns false and sets errno
 Layer set_limits(const Policy &policy);

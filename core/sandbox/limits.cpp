@@ -29,6 +29,12 @@ std::uint64_t three_quarters_of_memory() {
 
 } // namespace
 
+std::uint64_t memory_limit(const Policy &policy) {
+    if (under_sanitizer)
+        return 0;
+    return policy.memory_bytes ? policy.memory_bytes : three_quarters_of_memory();
+}
+
 Layer raise_oom_score() {
     std::ofstream file("/proc/self/oom_score_adj");
     file << 1000 << std::flush;
@@ -42,7 +48,7 @@ Layer set_limits(const Policy &policy) {
     // RLIMIT_DATA counts private writable memory, including thread stacks. RLIMIT_AS would also count reserved
     // address space.
     if (has_memory_limit(policy))
-        lower(layer, "memory", RLIMIT_DATA, policy.memory_bytes ? policy.memory_bytes : three_quarters_of_memory());
+        lower(layer, "memory", RLIMIT_DATA, memory_limit(policy));
     if (policy.writable.empty() && !may_share_memory(policy))
         lower(layer, "files", RLIMIT_FSIZE, 0); // prevents writes to /tmp even if other layers are missing
     // Half of the usual 1024, because all descriptors in unread messages of a user's processes count towards one

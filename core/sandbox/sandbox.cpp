@@ -72,6 +72,7 @@ Level enter(const Policy &policy) {
     }
     drop_environment(policy);
     level.push_back(raise_oom_score());
+    level.push_back(report_control_group());
     level.push_back(enter_namespaces(policy));
     level.push_back(set_limits(policy));
     level.push_back(drop_capabilities());

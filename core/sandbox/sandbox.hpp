@@ -40,6 +40,14 @@ struct Policy {
     bool allows(std::string_view what) const { return allow.contains(what); }
 };
 
+// The number of bytes that a process with this policy may use; 0 (only in a build with sanitizers): unlimited.
+std::uint64_t memory_limit(const Policy &policy);
+
+// The folder of the calling process's control group (version 2), or an empty path if there is none.
+std::filesystem::path control_group();
+// How the names of workers' control groups begin.
+constexpr std::string_view worker_group = "arhost-worker-";
+
 // Whether `path` is `folder` or a path below it. Compares only names, so both must be canonical.
 bool contains(const std::filesystem::path &folder, const std::filesystem::path &path);
 

@@ -8,11 +8,13 @@
 #include "base/exec.hpp"
 #include "base/orphans.hpp"
 #include "sandbox/sandbox.hpp"
+#include "supervise/control_group.hpp"
 #include "supervise/launcher_protocol.hpp"
 
 #include <array>
 #include <csignal>
 #include <cstdio>
+#include <cstring>
 #include <fcntl.h>
 #include <linux/capability.h>
 #include <map>
@@ -38,8 +40,11 @@ struct Init {
     UniqueFd lifeline; // PID 1 exits when this end of the pipe is closed, also if the launcher is killed
 };
 
-// The workers that have not exited. A worker without a PID namespace has no Init.
-using Workers = std::map<pid_t, std::optional<Init>>;
+struct Worker {
+    std::optional<Init> init; // nullopt: the worker has no PID namespace
+    ControlGroup group;
+};
+using Workers = std::map<pid_t, Worker>; // those that have not exited
 
 [[noreturn]] void run_init(int pipe) {
     ::prctl(PR_SET_NAME, "arhost-init");
@@ -80,8 +85,8 @@ void keep_capability() {
     char *const argv[] = {const_cast<char *>(program), nullptr};
     const int output = fds[2].get();
     arhost::base::exec_child(program, argv, std::array{null, output, output, fds[0].get(), fds[1].get()}, parent);
-    const char message[] = "arhost-worker cannot be executed; is it installed in the same folder as arhost?\n";
-    (void)!::write(STDERR_FILENO, message, sizeof message - 1);
+    ::dprintf(STDERR_FILENO, "arhost-worker cannot be executed: %s; is it installed in the same folder as arhost?\n",
+              std::strerror(errno));
     ::_exit(127);
 }
 
@@ -93,7 +98,7 @@ pid_t fork_sibling() {
 // Starts a worker as PID 2 of a new PID namespace, as a child of this process. A helper process creates the
 // namespace, because a process without privileges cannot leave the user namespace that it needs to do so. Returns -1
 // if the namespaces are unavailable.
-pid_t fork_isolated(const Request &request, const std::vector<UniqueFd> &fds, std::optional<Init> &init) {
+pid_t fork_isolated(const Request &request, const std::vector<UniqueFd> &fds, Worker &worker) {
     int life[2], result[2];
     if (::pipe2(life, O_CLOEXEC) != 0)
         return -1;
@@ -105,8 +110,10 @@ pid_t fork_isolated(const Request &request, const std::vector<UniqueFd> &fds, st
     UniqueFd helper_end(result[1]);
     const pid_t helper = ::fork();
     if (helper == 0) {
+        worker.group.join();
         pid_t pids[2] = {-1, -1}; // of PID 1 and the worker
-        if ((::geteuid() == 0 || arhost::sandbox::enter_user_namespace().empty()) && ::unshare(CLONE_NEWPID) == 0) {
+        if (::unshare(CLONE_NEWPID) == 0 ||
+            (arhost::sandbox::enter_user_namespace().empty() && ::unshare(CLONE_NEWPID) == 0)) {
             if ((pids[0] = fork_sibling()) == 0)
                 run_init(init_end.get());
             if (pids[0] > 0 && (pids[1] = fork_sibling()) == 0) {
@@ -123,22 +130,28 @@ pid_t fork_isolated(const Request &request, const std::vector<UniqueFd> &fds, st
     if (helper > 0)
         ::waitpid(helper, nullptr, 0);
     if (pids[1] > 0)
-        init = Init{pids[0], std::move(lifeline)};
+        worker.init = Init{pids[0], std::move(lifeline)};
     return pids[1];
 }
 
-void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds, Workers &workers) {
+void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds, Workers &workers,
+           ControlGroups &groups) {
     const pid_t launcher = ::getpid();
-    std::optional<Init> init;
-    pid_t pid = request.isolated ? fork_isolated(request, fds, init) : -1;
+    Worker worker;
+    if (request.isolation.enabled)
+        worker.group = groups.create(request.isolation.memory_bytes);
+    pid_t pid = request.isolation.enabled ? fork_isolated(request, fds, worker) : -1;
     if (pid < 0)
         pid = ::fork();
-    if (pid == 0)
+    if (pid == 0) {
+        worker.group.join();
         exec_worker(request.program, fds, launcher);
+    }
     Reply reply{};
     if (pid < 0) {
         reply.kind = Reply::failed;
         reply.error = errno;
+        groups.end(worker.group);
         send_struct(socket, reply);
         return;
     }
@@ -149,20 +162,23 @@ void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds,
         reply.kind = Reply::failed;
         reply.error = errno;
         ::kill(pid, SIGKILL);
+        groups.end(worker.group);
         send_struct(socket, reply);
         return;
     }
     reply.kind = Reply::spawned;
-    workers.emplace(pid, std::move(init));
+    workers.emplace(pid, std::move(worker));
     send_struct(socket, reply, {pidfd.get()});
 }
 
 // Called after the host has exited. Kills the workers and their children, and exits. Uses _exit, because the leak
 // check of a sanitizer would stop this process at a normal exit, which conflicts with the SIGCONT that a waiting host
 // sends.
-[[noreturn]] void end_all(const Workers &workers) {
-    for (const auto &[worker, init] : workers)
-        ::kill(-worker, SIGKILL);
+[[noreturn]] void end_all(const Workers &workers, ControlGroups &groups) {
+    for (const auto &[pid, worker] : workers) {
+        ::kill(-pid, SIGKILL);
+        groups.end(worker.group);
+    }
     for (int i = 0; i < 500; ++i) { // gives up after half a second, because a process may hang in the kernel
         kill_orphans({});
         pid_t reaped;
@@ -172,31 +188,41 @@ void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds,
             break;
         ::usleep(1000);
     }
+    groups.remove_ended();
+    groups.restore();
     ::_exit(0);
 }
 
 // Kills children that are neither workers nor the first process of a worker's namespace.
 void kill_other_children(const Workers &workers) {
     std::set<pid_t> kept;
-    for (const auto &[worker, init] : workers) {
-        kept.insert(worker);
-        if (init)
-            kept.insert(init->pid);
+    for (const auto &[pid, worker] : workers) {
+        kept.insert(pid);
+        if (worker.init)
+            kept.insert(worker.init->pid);
     }
     kill_orphans(kept);
 }
 
-void reap(int socket, Workers &workers) {
+void reap(int socket, Workers &workers, ControlGroups &groups) {
+    groups.remove_ended();
     for (;;) {
+        siginfo_t info{};
+        if (::waitid(P_ALL, 0, &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid == 0)
+            return kill_other_children(workers);
+        const auto ended = workers.extract(info.si_pid);
+        // The id of a worker's process group cannot be reused before the worker is reaped. kill_other_children kills
+        // children that have left the group.
+        if (ended)
+            ::kill(-info.si_pid, SIGKILL);
         Reply reply{};
         rusage usage{};
         reply.kind = Reply::exited;
-        reply.exit.pid = ::wait4(-1, &reply.exit.wait_status, WNOHANG, &usage);
-        if (reply.exit.pid <= 0)
-            return kill_other_children(workers);
-        if (workers.erase(reply.exit.pid) == 0)
-            continue;                     // an orphan of a worker, or the first process of a namespace
-        ::kill(-reply.exit.pid, SIGKILL); // kill_other_children kills children that have left the group
+        reply.exit.pid = ::wait4(info.si_pid, &reply.exit.wait_status, 0, &usage);
+        if (!ended)
+            continue; // an orphan of a worker, or the first process of a namespace
+        reply.exit.exceeded_memory = ended.mapped().group.exceeded_memory();
+        groups.end(ended.mapped().group);
         reply.exit.cpu_seconds = cpu_seconds(usage);
         send_struct(socket, reply);
     }
@@ -225,8 +251,9 @@ int main() {
     ::sigemptyset(&child);
     ::sigaddset(&child, SIGCHLD);
     ::sigprocmask(SIG_BLOCK, &child, nullptr);
-    const UniqueFd signals(::signalfd(-1, &child, SFD_CLOEXEC | SFD_NONBLOCK));
+    const UniqueFd signals = arhost::base::checked(::signalfd(-1, &child, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
     Workers workers;
+    ControlGroups groups;
     for (;;) {
         pollfd ready[2] = {{launcher_fd, POLLIN, 0}, {signals.get(), POLLIN, 0}};
         if (::poll(ready, 2, -1) < 0)
@@ -235,14 +262,14 @@ int main() {
             signalfd_siginfo info;
             while (::read(signals.get(), &info, sizeof info) > 0) {
             }
-            reap(launcher_fd, workers);
+            reap(launcher_fd, workers, groups);
         }
         if (ready[0].revents) {
             Request request;
             std::vector<UniqueFd> fds;
             if (!receive_struct(launcher_fd, request, fds) || fds.size() != 3)
-                end_all(workers);
-            spawn(launcher_fd, request, fds, workers);
+                end_all(workers, groups);
+            spawn(launcher_fd, request, fds, workers, groups);
         }
     }
 }

@@ -12,6 +12,7 @@ struct Exit {
     pid_t pid;
     int wait_status; // as returned by wait(2)
     double cpu_seconds;
+    bool exceeded_memory = false; // the kernel killed it because of its control group's memory limit
 };
 
 // Returns user plus system time.

@@ -122,7 +122,7 @@ Launcher::~Launcher() {
 
 Spawned Launcher::spawn(const std::filesystem::path &program, Isolation isolation, const LogFunction &log) {
     Request request{};
-    request.isolated = isolation == Isolation::pid_namespace;
+    request.isolation = isolation;
     if (program.native().size() >= sizeof request.program)
         throw std::runtime_error("the path of arhost-worker is too long");
     std::strcpy(request.program, program.c_str());

@@ -9,6 +9,7 @@
 #include "base/unique_fd.hpp"
 #include "ipc/channel.hpp"
 #include "supervise/exit.hpp"
+#include "supervise/isolation.hpp"
 
 #include <arhost/plugin.h>
 
@@ -36,11 +37,6 @@ struct Spawned {
 };
 
 struct Reply;
-
-enum class Isolation {
-    none,
-    pid_namespace // where the machine supports it; the worker then keeps CAP_SYS_ADMIN until it enters its sandbox
-};
 
 // Starts workers. Implemented by Launcher, and by replacements in core/inprocess and tests.
 class Starter {

@@ -5,6 +5,7 @@
 
 #include "ipc/fd_passing.hpp"
 #include "supervise/exit.hpp"
+#include "supervise/isolation.hpp"
 
 #include <climits>
 
@@ -12,7 +13,7 @@ namespace arhost::supervise {
 
 struct Request {
     char program[PATH_MAX]; // accompanied by the descriptors of control channel, doorbell and output
-    bool isolated;          // Isolation::pid_namespace
+    Isolation isolation;
 };
 
 struct Reply {

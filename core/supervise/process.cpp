@@ -250,6 +250,8 @@ void Process::on_death() {
                     ::strsignal(WTERMSIG(exit.wait_status)) + ") " + to_text(call);
     else
         death.how = "exited with status " + std::to_string(WEXITSTATUS(exit.wait_status)) + " " + to_text(call);
+    if (exit.exceeded_memory)
+        death.how += ": it used more memory than 'memory_mb' allows";
     if (!end_reason_.empty())
         death.how = end_reason_ + "; " + death.how;
     for (const std::string &line : tail_)

@@ -49,7 +49,7 @@ public:
     template <class T>
     Process(Context &context, WorkerBudget &budget, Callbacks callbacks, const T &first)
         : Process(context, budget, std::move(callbacks), ipc::encode(first),
-                  first.sandbox.mode == sandbox::Mode::none ? Isolation::none : Isolation::pid_namespace) {}
+                  Isolation{first.sandbox.mode != sandbox::Mode::none, sandbox::memory_limit(first.sandbox)}) {}
     ~Process(); // kills the process if it is still running
     Process(const Process &) = delete;
     Process &operator=(const Process &) = delete;

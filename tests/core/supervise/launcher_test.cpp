@@ -46,7 +46,7 @@ pid_t parent_of(pid_t pid) {
 
 TEST(Launcher, ReportsTheExitOfAProcess) {
     Launcher launcher(program);
-    const Spawned spawned = launcher.spawn("/bin/true", Isolation::pid_namespace, no_log);
+    const Spawned spawned = launcher.spawn("/bin/true", Isolation{}, no_log);
     wait_dead(spawned);
     const Exit exit = launcher.wait_exit(spawned.pid);
     EXPECT_TRUE(WIFEXITED(exit.wait_status));
@@ -56,8 +56,8 @@ TEST(Launcher, ReportsTheExitOfAProcess) {
 
 TEST(Launcher, DistinguishesTheExitsOfSeveralProcesses) {
     Launcher launcher(program);
-    const Spawned good = launcher.spawn("/bin/true", Isolation::pid_namespace, no_log),
-                  bad = launcher.spawn("/bin/false", Isolation::pid_namespace, no_log);
+    const Spawned good = launcher.spawn("/bin/true", Isolation{}, no_log),
+                  bad = launcher.spawn("/bin/false", Isolation{}, no_log);
     wait_dead(good);
     wait_dead(bad);
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(bad.pid).wait_status), 1);
@@ -66,7 +66,7 @@ TEST(Launcher, DistinguishesTheExitsOfSeveralProcesses) {
 
 TEST(Launcher, ReportsAMissingProgram) {
     Launcher launcher(program);
-    const Spawned spawned = launcher.spawn("/no/such/program", Isolation::pid_namespace, no_log);
+    const Spawned spawned = launcher.spawn("/no/such/program", Isolation{}, no_log);
     wait_dead(spawned);
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(spawned.pid).wait_status), 127);
     EXPECT_NE(all_output(spawned).find("cannot be executed"), std::string::npos);
@@ -78,18 +78,18 @@ TEST(Launcher, IsReplacedEachTimeItIsKilled) {
     const LogFunction note = [&](arhost_severity, const std::string &, const std::string &text) {
         log += text + '\n';
     };
-    Spawned first = launcher.spawn("/usr/bin/yes", Isolation::pid_namespace, note);
+    Spawned first = launcher.spawn("/usr/bin/yes", Isolation{}, note);
     for (int i = 0; i < 3; ++i) {
         EXPECT_EQ(log, "");
         ::kill(parent_of(first.pid), SIGKILL);
         wait_dead(first);
         const pid_t pid = first.pid;
-        first = launcher.spawn("/usr/bin/yes", Isolation::pid_namespace, note);
+        first = launcher.spawn("/usr/bin/yes", Isolation{}, note);
         EXPECT_EQ(WTERMSIG(launcher.wait_exit(pid).wait_status), SIGKILL);
         EXPECT_EQ(log, "the launcher has died, and all workers with it; starting a new one\n");
         log.clear();
     }
-    const Spawned last = launcher.spawn("/bin/true", Isolation::pid_namespace, note);
+    const Spawned last = launcher.spawn("/bin/true", Isolation{}, note);
     wait_dead(last);
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(last.pid).wait_status), 0);
 }
@@ -100,10 +100,10 @@ TEST(Launcher, DoesNotKillUnrelatedChildrenWhenItIsReplaced) {
         for (;;)
             ::pause();
     Launcher launcher(program);
-    const Spawned first = launcher.spawn("/usr/bin/yes", Isolation::pid_namespace, no_log);
+    const Spawned first = launcher.spawn("/usr/bin/yes", Isolation{}, no_log);
     ::kill(parent_of(first.pid), SIGKILL);
     wait_dead(first);
-    launcher.spawn("/usr/bin/yes", Isolation::pid_namespace, no_log);
+    launcher.spawn("/usr/bin/yes", Isolation{}, no_log);
     EXPECT_EQ(::waitpid(other, nullptr, WNOHANG), 0) << "the unrelated child was killed";
     ::kill(other, SIGKILL);
     ::waitpid(other, nullptr, 0);
@@ -113,7 +113,7 @@ TEST(Launcher, ReportsThatItCanNotBeStarted) {
     const auto reason = [](const char *wrong) -> std::string {
         try {
             Launcher launcher(wrong);
-            launcher.spawn("/bin/true", Isolation::pid_namespace, no_log);
+            launcher.spawn("/bin/true", Isolation{}, no_log);
         } catch (const std::runtime_error &error) {
             return error.what();
         }
@@ -128,7 +128,7 @@ TEST(Launcher, ReportsThatItCanNotBeStarted) {
 // A launcher under a debugger does not respond, and the debugger collects its exit status before this process can.
 TEST(Launcher, IsReplacedIfADebuggerHoldsIt) {
     Launcher launcher(program, std::chrono::milliseconds(500));
-    const Spawned first = launcher.spawn("/usr/bin/yes", Isolation::pid_namespace, no_log);
+    const Spawned first = launcher.spawn("/usr/bin/yes", Isolation{}, no_log);
     const pid_t held = parent_of(first.pid);
     int ends[2];
     ASSERT_EQ(::pipe(ends), 0);
@@ -143,7 +143,7 @@ TEST(Launcher, IsReplacedIfADebuggerHoldsIt) {
     char holds = 0;
     ASSERT_EQ(::read(ends[0], &holds, 1), 1);
     if (holds) {
-        const Spawned second = launcher.spawn("/bin/true", Isolation::pid_namespace, no_log);
+        const Spawned second = launcher.spawn("/bin/true", Isolation{}, no_log);
         wait_dead(second);
         EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(second.pid).wait_status), 0);
         EXPECT_FALSE(is_alive(first.pid));
@@ -163,7 +163,7 @@ TEST(Launcher, IsReplacedIfItDoesNotRespond) {
                           << ".pid; wait; fi\nexec " << program << "\n";
     std::filesystem::permissions(silent, std::filesystem::perms::owner_all);
     Launcher launcher(silent, std::chrono::seconds(2));
-    const Spawned spawned = launcher.spawn("/bin/true", Isolation::pid_namespace, no_log);
+    const Spawned spawned = launcher.spawn("/bin/true", Isolation{}, no_log);
     wait_dead(spawned);
     EXPECT_EQ(WEXITSTATUS(launcher.wait_exit(spawned.pid).wait_status), 0);
     pid_t child = 0;
@@ -179,7 +179,7 @@ TEST(Launcher, DoesNotBlockTheDestructorIfItDoesNotExit) {
     std::filesystem::permissions(silent, std::filesystem::perms::owner_all);
     {
         Launcher launcher(silent, std::chrono::milliseconds(500));
-        wait_dead(launcher.spawn("/bin/true", Isolation::pid_namespace, no_log));
+        wait_dead(launcher.spawn("/bin/true", Isolation{}, no_log));
     }
     pid_t pid = 0;
     std::ifstream(silent + ".pid") >> pid;
@@ -194,7 +194,7 @@ TEST(Launcher, ExitsWithItsHostEvenIfStopped) {
     const pid_t host = ::fork();
     if (host == 0) {
         Launcher launcher(program);
-        const Spawned worker = launcher.spawn("/usr/bin/yes", Isolation::pid_namespace, no_log);
+        const Spawned worker = launcher.spawn("/usr/bin/yes", Isolation{}, no_log);
         const pid_t pids[] = {worker.pid, parent_of(worker.pid)};
         ::kill(pids[1], SIGSTOP);
         ::kill(worker.pid, SIGSTOP);
@@ -218,8 +218,8 @@ TEST(Launcher, KillsItsChildrenWhenItExits) {
     Spawned spawned;
     {
         Launcher launcher(program);
-        spawned = launcher.spawn("/bin/cat", Isolation::pid_namespace, no_log);
-        spawned = launcher.spawn("/usr/bin/yes", Isolation::pid_namespace, no_log);
+        spawned = launcher.spawn("/bin/cat", Isolation{}, no_log);
+        spawned = launcher.spawn("/usr/bin/yes", Isolation{}, no_log);
     }
     wait_dead(spawned);
 }

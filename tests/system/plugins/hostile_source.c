@@ -1,12 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A source of black frames that attempts one attack on the host during `start`.
+ * A source of black frames that attempts one attack on the host during `start`, or takes resources of the machine at
+ * frame 5.
  */
+#ifndef _GNU_SOURCE
+#define _GNU_SOURCE
+#endif
 #include <arhost/arhost.h>
 
+#include <pthread.h>
+#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+enum { frame_of_attack = 5 };
 
 struct arhost_instance {
     const arhost_host *host;
@@ -59,9 +69,73 @@ static arhost_status start(arhost_instance *self, const arhost_source_setup *set
         self->host->progress(self->host, 0.5, "still busy");
     return arhost_frame_layout(&properties->format) ? ARHOST_STATUS_OK : ARHOST_STATUS_ERROR_INTERNAL;
 }
+static void report(const arhost_instance *self, const char *what, long count) {
+    char text[64];
+    snprintf(text, sizeof text, "%s: %ld", what, count);
+    self->host->log(self->host, ARHOST_SEVERITY_INFO, text);
+}
+
+/* Each page table of 4 KiB covers 2 MiB. Reading maps the shared page of zeros, so only the page tables need memory.
+ */
+static void take_page_tables(const arhost_instance *self) {
+    const size_t covered = 2 << 20, count = 100000;
+    volatile const char *bytes = mmap(NULL, covered * count, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    size_t i;
+    if (bytes == MAP_FAILED) {
+        report(self, "page tables", 0);
+        return;
+    }
+    madvise((void *)bytes, covered * count, MADV_NOHUGEPAGE);
+    for (i = 0; i < count; ++i)
+        (void)bytes[i * covered];
+    report(self, "page tables", (long)count);
+    munmap((void *)bytes, covered * count);
+}
+
+static void *wait_forever(void *nothing) {
+    for (;;)
+        pause();
+    return nothing;
+}
+
+static void take_threads(const arhost_instance *self) {
+    pthread_attr_t small;
+    pthread_t thread;
+    long count = 0;
+    pthread_attr_init(&small);
+    pthread_attr_setstacksize(&small, 16384);
+    while (count < 2000 && pthread_create(&thread, &small, wait_forever, NULL) == 0)
+        ++count;
+    report(self, "threads", count);
+}
+
+/* Starts processes that leave the session of the worker and ignore all signals but SIGKILL. */
+static void leave_processes(const arhost_instance *self) {
+    long count;
+    int signal_number;
+    for (count = 0; count < 3; ++count) {
+        const pid_t child = fork();
+        if (child < 0)
+            break;
+        if (child > 0)
+            continue;
+        setsid();
+        for (signal_number = 1; signal_number < NSIG; ++signal_number)
+            signal(signal_number, SIG_IGN);
+        wait_forever(NULL);
+    }
+    report(self, "processes", count);
+}
+
 static arhost_status read_frame(arhost_instance *self, const arhost_frame_buffer *buffer, arhost_frame_info *info) {
     if (buffer->sequence >= (uint64_t)self->frames)
         return ARHOST_STATUS_END;
+    if (buffer->sequence == frame_of_attack && !strcmp(self->attack, "page_tables"))
+        take_page_tables(self);
+    if (buffer->sequence == frame_of_attack && !strcmp(self->attack, "threads"))
+        take_threads(self);
+    if (buffer->sequence == frame_of_attack && !strcmp(self->attack, "processes"))
+        leave_processes(self);
     memset(buffer->plane[0], 0, (size_t)buffer->format->stride[0] * buffer->format->height);
     info->clock = ARHOST_CLOCK_MEDIA;
     info->capture_ns = (int64_t)buffer->sequence * 33333333;
