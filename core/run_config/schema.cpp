@@ -43,7 +43,9 @@ void add_component(std::vector<Key> &keys, const Key &component, const std::stri
 std::vector<Key> make_table() {
     const Key conform = {"conform", boolean, false, "false",
                          "Check the plugin's results and report contract violations (docs/conformance.md)."};
-    const Key fallback = {"fallback", text, false, "", "Plugin to use after this one has failed too often."};
+    const Key fallback = {
+        "fallback", text, false, "",
+        "Plugin to use after this one has failed too often or has lost its device three times within a minute."};
     std::vector<Key> keys = {
         {"version", integer, true, "", "Version of this format: 1."},
         {"mode",
@@ -130,7 +132,8 @@ std::vector<Key> make_table() {
 
             {"restart", map, false, "", "Restart policy for failed components."},
             {"restart.proven_after_frames", integer, false, "10",
-             "A component that has delivered this many frames is restarted without delay or limit."},
+             "A component that has delivered this many frames is restarted without delay or limit if it delivers "
+             "frames between its failures; a `fallback` still replaces it after three lost devices within a minute."},
             {"restart.quarantine_after", integer, false, "5",
              "Consecutive failures after which a component is disabled."},
             {"restart.first_delay_ms", integer, false, "250",

@@ -21,10 +21,11 @@ public:
     // be disabled.
     //
     // A component is proven when it has completed proven_after_frames in total. If it is proven and the dead process
-    // completed at least one frame, it restarts at once, however often it dies. Any other death counts as a failure:
-    // the delay starts at first_delay and doubles with each failure up to longest_delay; after quarantine_after
-    // failures in a row, the component is disabled. `jitter` (0 to 1) adds up to a quarter of the delay, so that
-    // components that share a failed device do not restart at the same time.
+    // completed at least one frame, it restarts at once, however often it dies; but Component replaces one that has
+    // lost its device three times within a minute, if it has a fallback. Any other death counts as a failure: the
+    // delay starts at first_delay and doubles with each failure up to longest_delay; after quarantine_after failures
+    // in a row, the component is disabled. `jitter` (0 to 1) adds up to a quarter of the delay, so that components
+    // that share a failed device do not restart at the same time.
     std::optional<std::chrono::milliseconds> delay_after_death(double jitter);
 
     std::uint32_t failures() const { return failures_; }
