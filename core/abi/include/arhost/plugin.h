@@ -171,9 +171,10 @@ enum {
     ARHOST_CAPABILITY_NUMBERED_FILES = 1 << 3,
     ARHOST_CAPABILITY_REALTIME_SINK = 1 << 4, /* sink: needs only the latest frame */
     /* raytracer: the parts of a scene that it renders, besides diffuse materials and point, directional and spot
-     * lights. It must accept scenes with other parts too: it shades other materials as diffuse, ignores textures and
-     * the environment, may ignore area lights or treat them as point lights, and leaves moving objects where they are
-     * at time 0. The worker then warns the user. */
+     * lights. It should accept scenes with other parts too: it shades other materials as diffuse, ignores textures
+     * and the environment, may ignore area lights or treat them as point lights, and leaves moving objects where they
+     * are at time 0. The worker then warns the user. If an incomplete image is useless, `start` may refuse the scene
+     * with ARHOST_STATUS_ERROR_UNSUPPORTED. */
     ARHOST_CAPABILITY_REFLECTION = 1 << 5,   /* the materials SPECULAR, MIRROR and METAL */
     ARHOST_CAPABILITY_GLASS = 1 << 6,        /* the material GLASS */
     ARHOST_CAPABILITY_ROUGHNESS = 1 << 7,    /* the material METALLIC_ROUGHNESS */
