@@ -60,7 +60,8 @@ typedef struct arhost_raytracer {
      * called again after `stop`, with another scene and image size. */
     arhost_status (*start)(arhost_instance *instance, const arhost_raytracer_setup *setup);
 
-    /* [worker, started] Renders one image. Equal requests must give identical bytes, with any number of threads. */
+    /* [worker, started] Renders one image. Equal requests must give identical bytes, with any number of threads,
+     * unless an option of the plugin, off by default, says otherwise. */
     arhost_status (*render)(arhost_instance *instance, const arhost_render_request *request,
                             const arhost_image *image, arhost_render_info *info);
 
