@@ -145,7 +145,7 @@ run_config::Configuration replay_configuration(const Arguments &arguments, const
             ? yaml::Node::load(arguments.file)
             : yaml::Node::parse(replay.with_pipeline ? default_pipeline : default_raytracer, "arhost replay");
     if (arguments.file.empty() && replay.scene.empty())
-        throw yaml::Error("--scene is missing: the scene to render, as in --scene config/scenes/optix-cs.yaml");
+        throw yaml::Error("--scene is missing: the scene to render, as in --scene optix-cs");
     root.override_text("trajectory", replay.trajectory, "--trajectory");
     root.override_value("outputs", "[]", "arhost replay");
     if (!replay.scene.empty())
