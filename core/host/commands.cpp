@@ -84,12 +84,12 @@ void lift_deadlines(run_config::Configuration &configuration) {
 void protect_programs(const run_config::FilesInUse &files) {
     for (const char *program :
          {"arhost", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-worker", "render-scene"})
-        files.check_read(base::identity_of(own_folder() / program));
+        files.protect(base::identity_of(own_folder() / program));
     std::error_code ignored;
     for (fs::recursive_directory_iterator entry(own_prefix() / "lib/arhost", ignored), end; !ignored && entry != end;
          entry.increment(ignored))
         if (entry->is_regular_file(ignored))
-            files.check_read(base::identity_of(entry->path()));
+            files.protect(base::identity_of(entry->path()));
 }
 
 run_config::Configuration parse_configuration(yaml::Node &root, const Arguments &arguments) {

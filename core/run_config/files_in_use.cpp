@@ -80,10 +80,10 @@ bool can_collide(const OutputFile &a, const OutputFile &b) {
     });
 }
 
-[[noreturn]] void refuse(const yaml::Node &output, const std::string &file_read) {
-    const bool same_name = base::real_path(output.output_path()) == file_read;
-    output.fail("'" + output.text() + "' is a file that this run reads" + (same_name ? "" : " (" + file_read + ")") +
-                "; choose another path");
+[[noreturn]] void refuse(const yaml::Node &output, const std::string &file,
+                         const std::string &reason = "is a file that this run reads") {
+    const bool same_name = base::real_path(output.output_path()) == file;
+    output.fail("'" + output.text() + "' " + reason + (same_name ? "" : " (" + file + ")") + "; choose another path");
 }
 
 } // namespace
@@ -120,6 +120,11 @@ void FilesInUse::write(const yaml::Node &output) {
 void FilesInUse::check_read(const FileIdentity &file) const {
     if (const Use *use = find(file); use && use->output)
         refuse(*use->output, file.path);
+}
+
+void FilesInUse::protect(const FileIdentity &file) const {
+    if (const Use *use = find(file); use && use->output)
+        refuse(*use->output, file.path, "belongs to arhost");
 }
 
 const FilesInUse::Use *FilesInUse::find(const FileIdentity &file) const {

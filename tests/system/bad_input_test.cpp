@@ -374,7 +374,7 @@ TEST(BadInput, DoesNotOverwriteArhostItself) {
                       std::string(file) + "}]\n");
         EXPECT_EQ(run.run(), 2);
         EXPECT_THAT(run.output(), HasSubstr("run.yaml:3:38: outputs[0].path: '"));
-        EXPECT_THAT(run.output(), HasSubstr("' is a file that this run reads; choose another path"));
+        EXPECT_THAT(run.output(), HasSubstr("' belongs to arhost; choose another path"));
     }
 }
 
