@@ -25,10 +25,10 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
     if (poses_from_tracker && statistics.tracker_results > 0 && statistics.tracked == 0)
         return Problem{
             "tracker",
-            fmt::format("no marker was seen in any of {} frames, so no frame has an overlay; it looked for "
-                        "{}; compare the numbers and the dictionary with the print (--allow-no-target "
-                        "accepts this)",
-                        statistics.tracker_results, looked_for),
+            fmt::format("no marker was seen in any of {} frames{}; it looked for {}; compare the numbers and the "
+                        "dictionary with the print (--allow-no-target accepts this)",
+                        statistics.tracker_results, configuration.raytracer ? ", so no frame has an overlay" : "",
+                        looked_for),
             true};
     if (configuration.mode != run_config::Mode::live || !configuration.raytracer || statistics.composited == 0 ||
         statistics.augmented > 0)

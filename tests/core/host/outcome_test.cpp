@@ -46,6 +46,9 @@ TEST_F(Outcome, ReportsATargetThatWasNeverSeen) {
         EXPECT_THAT(problem()->text, HasSubstr("no marker was seen in any of 30 frames"));
         EXPECT_THAT(problem()->text, HasSubstr("it looked for marker 23 (dictionary D);"));
     }
+    EXPECT_THAT(problem()->text, HasSubstr("30 frames, so no frame has an overlay; it looked"));
+    configuration->raytracer.reset();
+    EXPECT_THAT(problem()->text, HasSubstr("30 frames; it looked"));
     statistics.frames_in = 0;
     EXPECT_FALSE(problem()) << "there was no frame in which to see it";
     statistics.frames_in = 30;
