@@ -162,6 +162,8 @@ std::optional<int> CommandLine::parse(int argc, char **argv) {
         for (const CLI::App *sub : named_subcommands(*app_))
             commands.push_back(page_command(*sub));
         const std::string page = generate_page(argv[2], page_command(*app_), commands);
+        if (page.empty())
+            std::fprintf(stderr, "--generate: '%s' is not one of man, bash, zsh, fish\n", printable(argv[2]).c_str());
         std::fputs(page.c_str(), stdout);
         return page.empty() ? 2 : 0;
     }

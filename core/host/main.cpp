@@ -142,9 +142,8 @@ int main(int argc, char **argv) {
     CommandLine conform_command =
         app.raw_subcommand("conform", "Test whether a plugin conforms to the ABI (docs/conformance.md)");
     std::string helped;
-    const std::vector<std::string> commands = app.subcommands();
     CommandLine help_command = app.subcommand("help", "Print help about arhost or a command");
-    help_command.option("COMMAND", helped, "The command").one_of(commands);
+    help_command.option("COMMAND", helped, "The command").one_of(app.subcommands());
 
     if (const auto status = app.parse(argc, argv))
         return checked_output(*status);

@@ -405,6 +405,8 @@ TEST(CommandLine, HelpDescribesCommands) {
     EXPECT_THAT(run.output(), HasSubstr("Usage: arhost check [OPTIONS] FILE"));
     EXPECT_EQ(run.run({"help", "conform"}), 0);
     EXPECT_THAT(run.output(), HasSubstr("Usage: arhost conform [OPTIONS] [PLUGIN]"));
+    EXPECT_EQ(run.run({"help", "help"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("Usage: arhost help [OPTIONS] [COMMAND]"));
     EXPECT_EQ(run.run({"help", "nonsense"}), 2);
 }
 
@@ -448,6 +450,12 @@ TEST(CommandLine, HasAManPageForEachProgram) {
     for (const char *part : {"\n.SH SYNOPSIS\n\\fBarhost\\fR [\\fIOPTIONS\\fR] [\\fIFILE\\fR]\n",
                              "\n.SS arhost check\n", "\\fB\\-\\-no\\-open\\fR\n", "one of: c, cpp, rust, python"})
         EXPECT_THAT(run.output(), HasSubstr(part));
+}
+
+TEST(CommandLine, RejectsAnUnknownKindOfPage) {
+    ArhostRun run;
+    EXPECT_EQ(run.run({"--generate", "nonsense"}), 2);
+    EXPECT_EQ(run.output(), "--generate: 'nonsense' is not one of man, bash, zsh, fish\n");
 }
 
 TEST(CommandLine, ListsDevicesOfPluginsThatSupportIt) {
