@@ -1,17 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Command line of arhost.
-#include "base/command_line.hpp"
-#include "base/text.hpp"
 #include "base/write_all.hpp"
-#include "host/commands.hpp"
 #include "host/new_plugin.hpp"
-#include "yaml/yaml.hpp"
+#include "host/program.hpp"
 
 #include <csignal>
 #include <cstdio>
 #include <fcntl.h>
-#include <filesystem>
 #include <unistd.h>
 
 namespace {
@@ -29,15 +25,9 @@ void prepare_process() {
     std::signal(SIGCHLD, SIG_DFL); // waitpid() fails if SIGCHLD is ignored
 }
 
-// Prints the error as a single line, even if a file name in it contains a line break. Returns `exit_status`.
-int print_error(const std::string &why, int exit_status) {
-    std::fprintf(stderr, "error: %s\n", arhost::base::printable(why).c_str());
-    return exit_status;
-}
-
 int checked_output(int status) {
-    return arhost::base::flush_stdout() ? status
-                                        : print_error("cannot write to standard output", arhost::host::run_failed);
+    using namespace arhost::host;
+    return arhost::base::flush_stdout() ? status : print_error("cannot write to standard output", run_failed);
 }
 
 } // namespace
@@ -56,17 +46,7 @@ int main(int argc, char **argv) {
     app.version("arhost " ARHOST_VERSION);
 
     Arguments arguments;
-    const auto add_configuration_options = [&](CommandLine &command) {
-        command.option("--set", arguments.settings, "Override a value: key.path=value (repeatable)")
-            .type_name("KEY=VALUE")
-            .one_value_each();
-        command.flag("-v,--verbose", arguments.verbose, "Log debug messages of components");
-    };
-    app.option("--config,FILE", arguments.file, "The configuration to run (docs/config.md)").type_name("FILE");
-    add_configuration_options(app);
-    app.option("--frames", arguments.frames, "Stop after N frames").type_name("N").range(0.0, 1e15);
-    app.flag("--allow-no-target", arguments.allow_no_target,
-             "Exit with status 0 even if the tracker has seen no marker in any frame");
+    add_run_options(app, arguments);
     CommandLine axes =
         app.group("Coordinates",
                   "The dissertation's options (docs/camera.md); they override 'coordinates:' in the configuration");
@@ -106,14 +86,14 @@ int main(int argc, char **argv) {
     replay_command.option("--stats", replay_arguments.stats, "File for the statistics (JSON)").type_name("FILE");
     replay_command.option("--timeline", replay_arguments.timeline, "File for the times of each frame (CSV)")
         .type_name("FILE");
-    add_configuration_options(replay_command);
+    add_configuration_options(replay_command, arguments);
 
     bool no_open = false;
     CommandLine check_command = app.subcommand("check", "Check a configuration: open everything that a run opens");
     check_command.option("FILE", arguments.file, "The configuration").required();
     check_command.flag("--no-open", no_open,
                        "Check only the file, the plugins' options and the scene, for example without the camera");
-    add_configuration_options(check_command);
+    add_configuration_options(check_command, arguments);
 
     PluginsArguments plugins_arguments;
     CommandLine plugins_command = app.subcommand("plugins", "List the plugins; for unusable ones, print the reason");
@@ -173,14 +153,5 @@ int main(int argc, char **argv) {
         }
         return run(arguments, launcher);
     };
-    try {
-        return checked_output(command());
-    } catch (const arhost::yaml::Error &error) {
-        return print_error(error.what(), bad_configuration);
-    } catch (const std::filesystem::filesystem_error
-                 &error) { // for example: a file name is too long, or a folder is unreadable
-        return print_error(error.path1().string() + ": " + error.code().message(), bad_configuration);
-    } catch (const std::exception &error) {
-        return print_error(error.what(), run_failed);
-    }
+    return exit_status_of([&] { return checked_output(command()); });
 }

@@ -5,6 +5,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cstdlib>
 
 using namespace arhost::test;
@@ -12,14 +13,18 @@ using testing::HasSubstr;
 
 namespace {
 
-// Runs arhost-inprocess in the folder of `run`. Returns its exit status; its output is in output.txt.
-int run_in_process(const ArhostRun &run) {
-    const std::string command = "cd " + run.path("").string() +
-                                " && ARHOST_PLUGIN_PATH=" ARHOST_TEST_PLUGIN_DIRECTORY
-                                " timeout 60 " ARHOST_BINARY_DIRECTORY
-                                "/bin/arhost-inprocess --config run.yaml >output.txt 2>&1";
+// Runs `program` in the folder of `run`, after the shell commands `before`. Returns its exit status; its output is in
+// output.txt.
+int run_program(const ArhostRun &run, const std::string &program, const std::string &before = "FILE=run.yaml") {
+    const std::string command = "cd " + run.path("").string() + " && (" + before +
+                                "; ARHOST_PLUGIN_PATH=" ARHOST_TEST_PLUGIN_DIRECTORY
+                                " timeout 60 " ARHOST_BINARY_DIRECTORY "/bin/" +
+                                program + " --config \"$FILE\") >output.txt 2>&1";
     const int status = std::system(command.c_str());
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+int run_in_process(const ArhostRun &run) {
+    return run_program(run, "arhost-inprocess");
 }
 
 } // namespace
@@ -48,6 +53,18 @@ TEST(InProcess, ReportsAPluginThatRejectsItsOptions) {
     EXPECT_EQ(run_in_process(run), 2);
     EXPECT_THAT(run.read("output.txt"), HasSubstr("run.yaml:5:"));
     EXPECT_THAT(run.read("output.txt"), HasSubstr("rejected, as the option 'reject' requests"));
+}
+
+TEST(InProcess, ReportsErrorsLikeArhost) {
+    ArhostRun run(
+        "version: 1\nsource: {plugin: source_counter}\noutputs: [{plugin: sink_poses, path: poses.jsonl}]\n");
+    for (const char *situation : {"FILE='two\nlines'", "FILE=$PWD/run.yaml; mkdir gone; cd gone; rmdir \"$PWD\""}) {
+        EXPECT_EQ(run_program(run, "arhost", situation), 2);
+        const std::string expected = run.output();
+        EXPECT_EQ(std::ranges::count(expected, '\n'), 1) << expected;
+        EXPECT_EQ(run_program(run, "arhost-inprocess", situation), 2);
+        EXPECT_EQ(run.output(), expected);
+    }
 }
 
 // A worker thread cannot be killed, but it ends by itself if the host closes the channel while it waits for a

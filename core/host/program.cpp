@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/program.hpp"
+
+#include "base/text.hpp"
+#include "yaml/yaml.hpp"
+
+#include <cstdio>
+#include <filesystem>
+
+namespace arhost::host {
+
+void add_configuration_options(base::CommandLine &command, Arguments &arguments) {
+    command.option("--set", arguments.settings, "Override a value: key.path=value (repeatable)")
+        .type_name("KEY=VALUE")
+        .one_value_each();
+    command.flag("-v,--verbose", arguments.verbose, "Log debug messages of components");
+}
+
+base::Option add_run_options(base::CommandLine &command, Arguments &arguments) {
+    const base::Option config =
+        command.option("--config,FILE", arguments.file, "The configuration to run (docs/config.md)")
+            .type_name("FILE");
+    add_configuration_options(command, arguments);
+    command.option("--frames", arguments.frames, "Stop after N frames").type_name("N").range(0.0, 1e15);
+    command.flag("--allow-no-target", arguments.allow_no_target,
+                 "Exit with status 0 even if the tracker has seen no marker in any frame");
+    return config;
+}
+
+int print_error(const std::string &why, int exit_status) {
+    std::fprintf(stderr, "error: %s\n", base::printable(why).c_str());
+    return exit_status;
+}
+
+int exit_status_of(const std::function<int()> &command) {
+    try {
+        return command();
+    } catch (const yaml::Error &error) {
+        return print_error(error.what(), bad_configuration);
+    } catch (const std::filesystem::filesystem_error
+                 &error) { // for example: a file name is too long, or a folder is unreadable
+        return print_error(error.path1().string() + ": " + error.code().message(), bad_configuration);
+    } catch (const std::exception &error) {
+        return print_error(error.what(), run_failed);
+    }
+}
+
+} // namespace arhost::host
