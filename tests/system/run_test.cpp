@@ -410,19 +410,27 @@ TEST(CommandLine, HelpDescribesCommands) {
     EXPECT_EQ(run.run({"help", "nonsense"}), 2);
 }
 
+// Runs a shell with the arguments in a scratch folder, where `script` is the variable SCRIPT. Returns its exit
+// status, 127 if it is not installed; its output is in output.txt.
+int run_shell(const ArhostRun &run, const std::string &shell, const std::string &script = "") {
+    ::setenv("SCRIPT", script.c_str(), 1);
+    const std::string command = "cd '" + run.path("").string() +
+                                "' && HOME=$PWD XDG_CONFIG_HOME=$PWD XDG_DATA_HOME=$PWD " + shell +
+                                " >output.txt 2>&1";
+    return WEXITSTATUS(std::system(command.c_str()));
+}
+
 TEST(CommandLine, CompletesInBash) {
     ArhostRun run;
     run.write("lab.yaml", "");
     run.write("plugins/x.so", "");
     const auto completed = [&](const std::string &words) {
-        const std::string script =
-            "cd '" + run.path("").string() +
-            "'; source '" ARHOST_BINARY_DIRECTORY "/pages/arhost.bash'; COMP_WORDS=(" + words +
-            "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _arhost; printf '%s ' \"${COMPREPLY[@]}\" >completed";
-        const std::string command = "bash -c \"$SCRIPT\"";
-        ::setenv("SCRIPT", script.c_str(), 1);
-        EXPECT_EQ(std::system(command.c_str()), 0);
-        return run.read("completed");
+        EXPECT_EQ(
+            run_shell(run, "bash -c \"$SCRIPT\"",
+                      "source '" ARHOST_BINARY_DIRECTORY "/pages/arhost.bash'; COMP_WORDS=(" + words +
+                          "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _arhost; printf '%s ' \"${COMPREPLY[@]}\""),
+            0);
+        return run.output();
     };
     EXPECT_EQ(completed("arhost ch"), "check ");
     EXPECT_EQ(completed("arhost la"), "lab.yaml ");
@@ -438,6 +446,43 @@ TEST(CommandLine, CompletesInBash) {
     EXPECT_EQ(completed("arhost conform --timeo"), "--timeout-factor ");
     EXPECT_EQ(completed("arhost conform plugins/"), "plugins/x.so ");
     EXPECT_EQ(completed("arhost conform --reads pl"), "plugins ");
+}
+
+TEST(CommandLine, CompletesInFish) {
+    ArhostRun run;
+    if (run_shell(run, "fish --version") != 0)
+        GTEST_SKIP() << "fish is not installed";
+    run.write("lab.yaml", "");
+    const auto completed = [&](const std::string &words) {
+        EXPECT_EQ(run_shell(run, "fish -c \"$SCRIPT\"",
+                            "source '" ARHOST_BINARY_DIRECTORY "/pages/arhost.fish'; complete -C '" + words + "'"),
+                  0);
+        return run.output();
+    };
+    EXPECT_EQ(completed("arhost ch"), "check\tCheck a configuration: open everything that a run opens\n");
+    EXPECT_EQ(completed("arhost la"), "lab.yaml\n");
+    EXPECT_EQ(completed("arhost --config la"), "lab.yaml\n");
+    EXPECT_THAT(completed("arhost --allow"), testing::StartsWith("--allow-no-target\tExit with status 0 even if"));
+    EXPECT_EQ(completed("arhost check la"), "lab.yaml\n");
+    EXPECT_EQ(completed("arhost new-plugin ra"), "raytracer\n");
+    EXPECT_EQ(completed("arhost new-plugin raytracer x --language py"), "python\tProgramming language\n");
+    EXPECT_EQ(completed("arhost help rep"), "replay\n");
+    EXPECT_EQ(completed("arhost conform --timeo"),
+              "--timeout-factor\tMultiply each deadline, for slow machines (1)\n");
+}
+
+TEST(CommandLine, GeneratesCompletionsForZsh) {
+    ArhostRun run;
+    EXPECT_EQ(run.run({"--generate", "zsh"}), 0);
+    for (const char *part :
+         {"#compdef arhost\n_arhost() {\n", "'(-V --version)--version[Display program version information and exit]'",
+          "'*--set[Override a value\\: key.path=value (repeatable)]:KEY=VALUE: '",
+          "'check:Check a configuration\\: open everything that a run opens'",
+          "        conform)\n    _arhost_conform\n        ;;\n", "'1:KIND:(raytracer tracker source sink)'"})
+        EXPECT_THAT(run.output(), HasSubstr(part));
+    if (run_shell(run, "zsh --version") != 0)
+        GTEST_SKIP() << "zsh is not installed";
+    EXPECT_EQ(run_shell(run, "zsh -n " ARHOST_BINARY_DIRECTORY "/pages/arhost.zsh"), 0) << run.output();
 }
 
 TEST(CommandLine, HasAManPageForEachProgram) {
