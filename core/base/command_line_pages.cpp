@@ -220,7 +220,7 @@ std::string zsh_completion(const PageCommand &program, const std::vector<PageCom
         " \\\n        '1: :->first' \\\n        '*::: :->rest'\n    case $state in\n    first)\n        commands=(" +
         names +
         ")\n        _describe -t commands command commands\n        _files\n        ;;\n    rest)\n"
-        "        words=($line[1] $words)\n        (( CURRENT += 1 ))\n        case $line[1] in\n" +
+        "        words=($line[1] \"${words[@]}\")\n        (( CURRENT += 1 ))\n        case $line[1] in\n" +
         cases + "        esac\n        ;;\n    esac\n}\n";
     return text;
 }
