@@ -56,6 +56,20 @@ PageCommand page_command(const CLI::App &app) {
     return command;
 }
 
+// Prints placeholders and choices instead of the types of values.
+struct Formatter : CLI::Formatter {
+    std::string make_option_name(const CLI::Option *option, bool is_positional) const override {
+        const std::string name = CLI::Formatter::make_option_name(option, is_positional);
+        const PageOption page = page_option(*option);
+        return is_positional || page.value.empty() || !page.choices.empty() ? name : name + " " + page.value;
+    }
+    std::string make_option_opts(const CLI::Option *option) const override {
+        const std::string choices = CLI::detail::join(choices_of(*option), "|"), value = option->get_default_str();
+        return (choices.empty() ? "" : " " + choices) + (value.empty() ? "" : "=" + value) +
+               (option->get_expected_max() > 1 ? " ..." : "") + (option->get_required() ? " (required)" : "");
+    }
+};
+
 std::vector<const CLI::App *> named_subcommands(const CLI::App &app) {
     return app.get_subcommands([](const CLI::App *sub) { return !sub->get_name().empty(); });
 }
@@ -101,6 +115,7 @@ Option Option::check(const std::function<std::string(const std::string &value)> 
 
 CommandLine::CommandLine(const std::string &description, const std::string &name)
     : app_(std::make_shared<CLI::App>(description, name)) {
+    app_->formatter(std::make_shared<Formatter>());
     app_->get_formatter()->column_width(34);
     // The message quotes arguments, which might contain control characters for the terminal.
     app_->failure_message([](const CLI::App *, const CLI::Error &error) {

@@ -401,6 +401,12 @@ TEST(CommandLine, HelpDescribesCommands) {
     const std::string help = run.output();
     EXPECT_EQ(run.run({"--help"}), 0);
     EXPECT_EQ(run.output(), help);
+    for (const char *line : {"\n  FILE  ", "\n  --frames N  ", "\n  --set KEY=VALUE ...  "})
+        EXPECT_THAT(help, HasSubstr(line));
+    EXPECT_EQ(run.run({"help", "new-plugin"}), 0);
+    for (const char *line : {"\n  KIND raytracer|tracker|source|sink (required)\n", "\n  NAME (required)  ",
+                             "\n  --language c|cpp|rust|python (required)\n"})
+        EXPECT_THAT(run.output(), HasSubstr(line));
     EXPECT_EQ(run.run({"help", "check"}), 0);
     EXPECT_THAT(run.output(), HasSubstr("Usage: arhost check [OPTIONS] FILE"));
     EXPECT_EQ(run.run({"help", "conform"}), 0);
