@@ -371,7 +371,7 @@ TEST_F(Sandbox, ReportsEachLayer) {
     EXPECT_EQ(in_child([&] {
                   const Level level = enter(policy);
                   Checks check;
-                  check.that(level.size() == 7);
+                  check.that(level.size() == 8);
                   for (const Layer &layer : level)
                       check.that(!layer.active.empty() || !layer.missing.empty());
                   return check.result();
