@@ -14,15 +14,20 @@
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <system_error>
 #include <unistd.h>
 
 namespace arhost::sandbox {
 namespace {
 
-// System calls that Debian 12's libseccomp does not know by name. Their numbers are the same on all architectures.
+static_assert(sizeof(void *) == 8, "the lists omit the calls that only 32-bit systems have");
+
+// System calls that libseccomp 2.5.0 does not know by name. Their numbers are the same on all architectures.
 constexpr std::pair<const char *, int> newer_calls[] = {
-    {"fchmodat2", 452},     {"setxattrat", 463},     {"getxattrat", 464},  {"listxattrat", 465},
-    {"removexattrat", 466}, {"open_tree_attr", 467}, {"file_setattr", 469}};
+    {"process_madvise", 440}, {"epoll_pwait2", 441},     {"mount_setattr", 442}, {"quotactl_fd", 443},
+    {"memfd_secret", 447},    {"process_mrelease", 448}, {"futex_waitv", 449},   {"fchmodat2", 452},
+    {"setxattrat", 463},      {"getxattrat", 464},       {"listxattrat", 465},   {"removexattrat", 466},
+    {"open_tree_attr", 467},  {"file_setattr", 469}};
 
 constexpr const char *denied[] = {
     // access to other processes
@@ -34,67 +39,61 @@ constexpr const char *denied[] = {
     // keyrings, which namespaces do not isolate
     "keyctl", "add_key", "request_key",
     // changes to the view of the file system
-    "mount", "umount", "umount2", "pivot_root", "chroot", "mount_setattr", "move_mount", "open_tree",
-    "open_tree_attr", "fsopen", "fsconfig", "fsmount", "fspick", "unshare", "setns", "open_by_handle_at",
-    "name_to_handle_at", "fanotify_init", "quotactl", "quotactl_fd", "swapon", "swapoff", "acct", "mknod", "mknodat",
+    "mount", "umount2", "pivot_root", "chroot", "mount_setattr", "move_mount", "open_tree", "open_tree_attr",
+    "fsopen", "fsconfig", "fsmount", "fspick", "unshare", "setns", "open_by_handle_at", "name_to_handle_at",
+    "fanotify_init", "quotactl", "quotactl_fd", "swapon", "swapoff", "acct", "mknod", "mknodat",
     // not handled by Landlock: owners, modes, attributes
     "chmod", "fchmod", "fchmodat", "fchmodat2", "chown", "fchown", "lchown", "fchownat", "setxattr", "fsetxattr",
     "lsetxattr", "setxattrat", "removexattr", "fremovexattr", "lremovexattr", "removexattrat", "file_setattr",
     "utime", "utimes", "futimesat", "truncate", // ftruncate needs a writable descriptor
     "symlink", "symlinkat", // a link in a writable folder could redirect a grant at the next start
     // machine-wide settings and IPC
-    "reboot", "settimeofday", "clock_settime", "clock_settime64", "clock_adjtime", "clock_adjtime64", "adjtimex",
-    "stime", "sethostname", "setdomainname", "vhangup", "mq_open",
+    "reboot", "settimeofday", "clock_settime", "clock_adjtime", "adjtimex", "sethostname", "setdomainname", "vhangup",
+    "mq_open",
     // System V objects and other objects that are counted per user, or that name paths outside of the sandbox
-    "msgget", "msgsnd", "msgrcv", "msgctl", "semget", "semop", "semtimedop", "semtimedop_time64", "semctl", "shmget",
-    "shmat", "shmctl", "shmdt", "inotify_init", "inotify_init1", "inotify_add_watch", "io_setup", "io_submit",
-    "getxattr", "lgetxattr", "fgetxattr", "listxattr", "llistxattr", "flistxattr", "getxattrat", "listxattrat"};
+    "msgget", "msgsnd", "msgrcv", "msgctl", "semget", "semop", "semtimedop", "semctl", "shmget", "shmat", "shmctl",
+    "shmdt", "inotify_init", "inotify_init1", "inotify_add_watch", "io_setup", "io_submit", "getxattr", "lgetxattr",
+    "fgetxattr", "listxattr", "llistxattr", "flistxattr", "getxattrat", "listxattrat"};
 
 // Calls that any plugin may need.
 constexpr const char *allowed[] = {
     // files and folders, for reading, and open descriptors
-    "access", "close", "close_range", "dup", "dup2", "dup3", "faccessat", "faccessat2", "fadvise64", "fadvise64_64",
-    "fchdir", "chdir", "fcntl", "fcntl64", "flock", "fstat", "fstat64", "fstatat64", "fstatfs", "fstatfs64", "getcwd",
-    "getdents", "getdents64", "ioctl", "lseek", "_llseek", "lstat", "lstat64", "newfstatat", "open", "openat",
-    "openat2", "pread64", "preadv", "preadv2", "read", "readahead", "readlink", "readlinkat", "readv", "stat",
-    "stat64", "statfs", "statfs64", "statx", "umask", "write", "writev", "pwrite64", "pwritev", "pwritev2",
+    "access", "close", "close_range", "dup", "dup2", "dup3", "faccessat", "faccessat2", "fadvise64", "fchdir",
+    "chdir", "fcntl", "fstat", "fstatfs", "getcwd", "getdents", "getdents64", "ioctl", "lseek", "lstat", "newfstatat",
+    "open", "openat", "openat2", "pread64", "preadv", "preadv2", "read", "readahead", "readlink", "readlinkat",
+    "readv", "stat", "statfs", "statx", "umask", "write", "writev", "pwrite64", "pwritev", "pwritev2",
     // pipes, events and waiting
     "epoll_create", "epoll_create1", "epoll_ctl", "epoll_pwait", "epoll_pwait2", "epoll_wait", "eventfd", "eventfd2",
-    "pipe", "pipe2", "poll", "ppoll", "ppoll_time64", "pselect6", "pselect6_time64", "select", "_newselect",
-    "signalfd", "signalfd4", "timerfd_create", "timerfd_gettime", "timerfd_gettime64", "timerfd_settime",
-    "timerfd_settime64",
+    "pipe", "pipe2", "poll", "ppoll", "pselect6", "select", "signalfd", "signalfd4", "timerfd_create",
+    "timerfd_gettime", "timerfd_settime",
     // connected sockets
-    "getpeername", "getsockname", "getsockopt", "recv", "recvfrom", "recvmmsg", "recvmmsg_time64", "recvmsg", "send",
-    "sendmmsg", "sendmsg", "sendto", "setsockopt", "shutdown", "socket", "socketpair",
+    "getpeername", "getsockname", "getsockopt", "recvfrom", "recvmmsg", "recvmsg", "sendmmsg", "sendmsg", "sendto",
+    "setsockopt", "shutdown", "socket", "socketpair",
     // memory
-    "brk", "get_mempolicy", "madvise", "membarrier", "memfd_create", "mincore", "mlock", "mlock2", "mmap", "mmap2",
-    "mprotect", "mremap", "msync", "munlock", "munmap", "pkey_alloc", "pkey_free", "pkey_mprotect",
+    "brk", "get_mempolicy", "madvise", "membarrier", "memfd_create", "mincore", "mlock", "mlock2", "mmap", "mprotect",
+    "mremap", "msync", "munlock", "munmap", "pkey_alloc", "pkey_free", "pkey_mprotect",
     // threads and processors
-    "clone", "exit", "exit_group", "futex", "futex_time64", "futex_waitv", "get_robust_list", "getcpu", "getpriority",
-    "gettid", "rseq", "sched_get_priority_max", "sched_get_priority_min", "sched_getaffinity", "sched_getattr",
+    "clone", "exit", "exit_group", "futex", "futex_waitv", "get_robust_list", "getcpu", "getpriority", "gettid",
+    "rseq", "sched_get_priority_max", "sched_get_priority_min", "sched_getaffinity", "sched_getattr",
     "sched_getparam", "sched_getscheduler", "sched_setaffinity", "sched_setparam", "sched_setscheduler",
     "set_mempolicy", "sched_yield", "set_robust_list", "set_tid_address", "setpriority",
     // signals
     "kill", "pause", "restart_syscall", "rt_sigaction", "rt_sigpending", "rt_sigprocmask", "rt_sigqueueinfo",
-    "rt_sigreturn", "rt_sigsuspend", "rt_sigtimedwait", "rt_sigtimedwait_time64", "rt_tgsigqueueinfo", "sigaltstack",
-    "sigreturn", "tgkill",
+    "rt_sigreturn", "rt_sigsuspend", "rt_sigtimedwait", "rt_tgsigqueueinfo", "sigaltstack", "tgkill",
     // clocks and timers
-    "alarm", "clock_getres", "clock_getres_time64", "clock_gettime", "clock_gettime64", "clock_nanosleep",
-    "clock_nanosleep_time64", "getitimer", "gettimeofday", "nanosleep", "setitimer", "time", "timer_create",
-    "timer_delete", "timer_getoverrun", "timer_gettime", "timer_gettime64", "timer_settime", "timer_settime64",
+    "alarm", "clock_getres", "clock_gettime", "clock_nanosleep", "getitimer", "gettimeofday", "nanosleep",
+    "setitimer", "time", "timer_create", "timer_delete", "timer_getoverrun", "timer_gettime", "timer_settime",
     "times",
     // this process
-    "arch_prctl", "capget", "getegid", "getegid32", "geteuid", "geteuid32", "getgid", "getgid32", "getgroups",
-    "getgroups32", "getpgid", "getpgrp", "getpid", "getppid", "getrandom", "getresgid", "getresgid32", "getresuid",
-    "getresuid32", "getrlimit", "getrusage", "getsid", "getuid", "getuid32", "prctl", "prlimit64", "riscv_hwprobe",
-    "seccomp", "set_tls", "setrlimit", "sysinfo", "ugetrlimit", "uname"};
+    "arch_prctl", "capget", "getegid", "geteuid", "getgid", "getgroups", "getpgid", "getpgrp", "getpid", "getppid",
+    "getrandom", "getresgid", "getresuid", "getrlimit", "getrusage", "getsid", "getuid", "prctl", "prlimit64",
+    "seccomp", "setrlimit", "sysinfo", "uname"};
 
 // Calls that only plugins with a writable folder need.
 constexpr const char *allowed_to_writers[] = {
-    "copy_file_range", "fallocate",  "fdatasync",       "fsync",           "ftruncate",        "ftruncate64",
-    "mkdir",           "mkdirat",    "rename",          "renameat",        "renameat2",        "rmdir",
-    "sendfile",        "sendfile64", "splice",          "sync_file_range", "sync_file_range2", "unlink",
-    "unlinkat",        "utimensat",  "utimensat_time64"};
+    "copy_file_range", "fallocate",       "fdatasync",        "fsync",     "ftruncate", "mkdir",
+    "mkdirat",         "rename",          "renameat",         "renameat2", "rmdir",     "sendfile",
+    "splice",          "sync_file_range", "sync_file_range2", "unlink",    "unlinkat",  "utimensat"};
 
 // Calls that an entry of `allow` adds.
 struct CallsOf {
@@ -102,10 +101,9 @@ struct CallsOf {
     std::initializer_list<const char *> calls;
 };
 constexpr CallsOf allowed_by[] = {
-    {"usb", {"bind"}}, // netlink, for hot-plug events
-    {"display", {"connect"}},
+    {"usb", {"bind"}}, // netlink
     {"network", {"accept", "accept4", "bind", "connect", "listen"}},
-    {"processes", {"execve", "execveat", "fork", "setpgid", "setsid", "vfork", "wait4", "waitid", "waitpid"}},
+    {"processes", {"execve", "execveat", "fork", "setpgid", "setsid", "vfork", "wait4", "waitid"}},
 };
 
 class Filter {
@@ -113,7 +111,7 @@ public:
     // The filter applies `default_action` to calls without a rule.
     explicit Filter(std::uint32_t default_action) : context_(seccomp_init(default_action)) {
         if (!context_)
-            return;
+            throw std::runtime_error("seccomp_init");
         (void)seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_OPTIMIZE, 2); // binary search
         (void)seccomp_attr_set(context_.get(), SCMP_FLTATR_CTL_TSYNC, 1);    // all threads
     }
@@ -121,28 +119,30 @@ public:
         add(SCMP_ACT_ERRNO(static_cast<unsigned>(error)), name, when);
     }
     void allow(const char *name) { add(SCMP_ACT_ALLOW, name, {}); }
-    bool load() const { return context_ && !failed_ && seccomp_load(context_.get()) == 0; }
+    void load() const { check(seccomp_load(context_.get()), "load"); }
 
 private:
+    // `result`: 0 or a negative errno, as libseccomp returns it.
+    static void check(int result, const char *what) {
+        if (result != 0)
+            throw std::system_error(-result, std::generic_category(), what);
+    }
     void add(std::uint32_t action, const char *name, std::initializer_list<scmp_arg_cmp> when) {
-        if (!context_)
-            return;
         int call = seccomp_syscall_resolve_name(name);
         if (call == __NR_SCMP_ERROR)
             for (const auto &[newer, number] : newer_calls)
                 if (!std::strcmp(newer, name))
                     call = number;
         if (call == __NR_SCMP_ERROR)
-            return;
-        failed_ |= seccomp_rule_add_array(context_.get(), action, call, static_cast<unsigned>(when.size()),
-                                          when.begin()) != 0;
+            throw std::runtime_error(std::string(name) + ": unknown to libseccomp");
+        check(seccomp_rule_add_array(context_.get(), action, call, static_cast<unsigned>(when.size()), when.begin()),
+              name);
     }
 
     struct Release {
         void operator()(void *context) const { seccomp_release(context); }
     };
     std::unique_ptr<void, Release> context_;
-    bool failed_ = false;
 };
 
 // Compares only the lower 32 bits: the kernel ignores the upper bits of these arguments.
@@ -214,7 +214,7 @@ void deny_sockets(Filter &filter, const Policy &policy) {
     if (policy.allows("network"))
         families.insert({AF_INET, AF_INET6, AF_NETLINK}); // getaddrinfo uses netlink
     if (policy.allows("usb"))
-        families.insert(AF_NETLINK); // hot-plug events
+        families.insert(AF_NETLINK); // libusb does not start without it
     constexpr unsigned end = 64;     // higher than all address families
     for (unsigned family = 0; family < end; ++family)
         if (!families.contains(family))
@@ -230,11 +230,18 @@ void deny_sockets(Filter &filter, const Policy &policy) {
             filter.deny("socketpair", {has_bits(1, 0xf, static_cast<unsigned>(type))});
 }
 
-// Denies larger buffers in the kernel than the default; RLIMIT_DATA does not count them.
-void deny_uncounted_buffers(Filter &filter) {
-    for (const int option : {SO_SNDBUF, SO_RCVBUF, SO_SNDBUFFORCE, SO_RCVBUFFORCE})
+// Denies larger buffers in the kernel than the default, which RLIMIT_DATA does not count, programs for the kernel
+// (BPF), and descriptors of the process at the other end.
+void deny_socket_options(Filter &filter, const Policy &policy) {
+    constexpr int pass_pidfd = 76, peer_pidfd = 77; // not in Debian 12's headers
+    std::set<int> options = {SO_SNDBUF,        SO_RCVBUF,     SO_SNDBUFFORCE,           SO_RCVBUFFORCE,
+                             SO_ATTACH_FILTER, SO_ATTACH_BPF, SO_ATTACH_REUSEPORT_CBPF, SO_ATTACH_REUSEPORT_EBPF,
+                             pass_pidfd};
+    if (policy.allows("usb"))
+        options.erase(SO_ATTACH_FILTER); // libudev filters its events
+    for (const int option : options)
         filter.deny("setsockopt", {equals(1, SOL_SOCKET), equals(2, static_cast<unsigned>(option))});
-    filter.deny("fcntl", {equals(1, F_SETPIPE_SZ)});
+    filter.deny("getsockopt", {equals(1, SOL_SOCKET), equals(2, peer_pidfd)});
 }
 
 // Denies calls that allocate memory that RLIMIT_DATA does not count.
@@ -245,7 +252,7 @@ void deny_uncounted_memory(Filter &filter) {
     filter.deny("mmap", {has_bits(3, MAP_GROWSDOWN, MAP_GROWSDOWN)}); // such a mapping would count as stack
 }
 
-bool deny_harmful_calls(const Policy &policy) {
+void deny_harmful_calls(const Policy &policy) {
     Filter filter(SCMP_ACT_ALLOW);
     for (const char *call : denied)
         if (!(under_sanitizer && !std::strcmp(call, "ptrace")))
@@ -254,14 +261,15 @@ bool deny_harmful_calls(const Policy &policy) {
     deny_reaching_others(filter, may_start_processes(policy));
     deny_new_processes(filter, may_start_processes(policy));
     deny_sockets(filter, policy);
-    deny_uncounted_buffers(filter);
+    deny_socket_options(filter, policy);
+    filter.deny("fcntl", {equals(1, F_SETPIPE_SZ)}); // RLIMIT_DATA does not count pipe buffers
     if (has_memory_limit(policy) && !may_share_memory(policy))
         deny_uncounted_memory(filter);
-    return filter.load();
+    filter.load();
 }
 
 // Does not apply to GPU drivers, whose needs vary, nor to sanitizers.
-bool allow_needed_calls(const Policy &policy) {
+void allow_needed_calls(const Policy &policy) {
     Filter filter(SCMP_ACT_ERRNO(ENOSYS));
     for (const char *call : allowed)
         filter.allow(call);
@@ -272,22 +280,21 @@ bool allow_needed_calls(const Policy &policy) {
         if (policy.allows(added.allowance))
             for (const char *call : added.calls)
                 filter.allow(call);
-    return filter.load();
+    filter.load();
 }
 
 } // namespace
 
 Layer filter_system_calls(const Policy &policy) {
-    Layer layer{"seccomp", "", ""};
-    if (!deny_harmful_calls(policy))
-        layer.missing = error_text("cannot load the filter");
-    else if (policy.allows("gpu") || policy.allows("display") || under_sanitizer)
-        layer.active = "deny list";
-    else if (!allow_needed_calls(policy))
-        layer.missing = error_text("cannot load the allow list");
-    else
-        layer.active = "allow list";
-    return layer;
+    const bool has_allow_list = !policy.allows("gpu") && !policy.allows("display") && !under_sanitizer;
+    try {
+        deny_harmful_calls(policy);
+        if (has_allow_list)
+            allow_needed_calls(policy);
+    } catch (const std::exception &error) {
+        return {"seccomp", "", std::string("cannot load the filters: ") + error.what()};
+    }
+    return {"seccomp", has_allow_list ? "allow list" : "deny list", ""};
 }
 
 } // namespace arhost::sandbox

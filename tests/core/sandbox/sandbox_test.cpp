@@ -9,6 +9,9 @@
 #include <fcntl.h>
 #include <fstream>
 #include <functional>
+#include <linux/capability.h>
+#include <linux/filter.h>
+#include <sched.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -238,6 +241,51 @@ TEST_F(Sandbox, SystemCallsCannotAffectOtherProcesses) {
         }
         return check.result();
     }));
+}
+
+TEST_F(Sandbox, SystemCallListsContainOnlyKnownNames) {
+    std::vector<std::set<std::string, std::less<>>> all = {{}};
+    for (const std::string_view allowance : allowances)
+        all.push_back({std::string(allowance)});
+    for (const auto &allow : all) {
+        policy.allow = allow;
+        EXPECT_EQ(in_child([&] {
+                      ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+                      const std::string missing = filter_system_calls(policy).missing;
+                      return missing.find("unknown to libseccomp") == std::string::npos ? 0 : 1;
+                  }),
+                  0);
+    }
+}
+
+TEST_F(Sandbox, SystemCallsBlockFiltersAndProcessDescriptorsOfSockets) {
+    for (const char *allow : {"video", "network", "usb"}) {
+        policy.allow = {allow};
+        EXPECT_CHECKS(in_child([&] {
+            int ends[2];
+            ::socketpair(AF_UNIX, SOCK_STREAM, 0, ends);
+            ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+            if (filter_system_calls(policy).active.empty())
+                return layer_is_missing;
+            Checks check;
+            const bool has_usb = policy.allows("usb");
+            sock_filter all{BPF_RET | BPF_K, 0, 0, 0xffffffff};
+            const sock_fprog program{1, &all};
+            check.that((::setsockopt(ends[0], SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program) == 0) ==
+                       has_usb); // libudev
+            const int bpf = -1, on = 1;
+            for (const int option : {50, 51, 52}) // BPF
+                check.that(::setsockopt(ends[0], SOL_SOCKET, option, &bpf, sizeof bpf) != 0 && errno == EPERM);
+            check.that(::setsockopt(ends[0], SOL_SOCKET, 76 /* SO_PASSPIDFD */, &on, sizeof on) != 0 &&
+                       errno == EPERM);
+            int pidfd;
+            socklen_t size = sizeof pidfd;
+            check.that(::getsockopt(ends[0], SOL_SOCKET, 77 /* SO_PEERPIDFD */, &pidfd, &size) != 0 &&
+                       errno == EPERM);
+            check.that(under_sanitizer || (::syscall(SYS_flock, 0, 0) != 0 && errno == ENOSYS));
+            return check.result();
+        }));
+    }
 }
 
 TEST_F(Sandbox, SystemCallsAllowThreadsButNotProcesses) {
