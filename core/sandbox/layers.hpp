@@ -54,6 +54,14 @@ inline bool has_pid_namespace() {
     return ::getppid() == 0;
 }
 
+// Why a user namespace could not be entered.
+struct UserNamespaceFailure {
+    enum class Step { none, trial, creation, mapping } step = Step::none; // trial: in a child process
+    int error = 0;                                                        // errno; 0: the child was killed
+};
+// Returns the reason and what an administrator can change; "" without a failure. `settings`: /proc/sys.
+std::string to_text(const UserNamespaceFailure &failure, const std::filesystem::path &settings);
+
 void drop_environment(const Policy &policy); // cannot fail
 Layer raise_oom_score();                     // the OOM killer kills workers first; must run while /proc is writable
 Layer report_control_group();                // arhost-launcher has created it

@@ -119,6 +119,33 @@ TEST_F(Sandbox, NamespacesHideAllPathsThatAreNotGranted) {
     }));
 }
 
+TEST_F(Sandbox, ExplainsWhyUserNamespacesAreMissing) {
+    using Step = UserNamespaceFailure::Step;
+    const auto reason = [&](Step step, int error) { return to_text({step, error}, scratch.path()); };
+    const auto set = [&](const char *name, const char *value) {
+        fs::create_directories((scratch.path() / name).parent_path());
+        std::ofstream(scratch.path() / name) << value;
+    };
+    EXPECT_EQ(reason(Step::none, 0), "");
+    EXPECT_EQ(reason(Step::trial, EAGAIN), "no process could try it (Resource temporarily unavailable)");
+    EXPECT_EQ(reason(Step::trial, 0), "no process could try it (it was killed)");
+    EXPECT_EQ(reason(Step::mapping, EPERM), "the user cannot be mapped (Operation not permitted)");
+    EXPECT_EQ(reason(Step::creation, EPERM), "forbidden, for example by the container that arhost runs in");
+    EXPECT_EQ(reason(Step::creation, ENOSPC),
+              "the limit of user namespaces is reached; raise the sysctl user.max_user_namespaces");
+    EXPECT_EQ(reason(Step::creation, EINVAL), "not in this kernel (Invalid argument)");
+    set("kernel/unprivileged_userns_clone", "0\n");
+    EXPECT_EQ(reason(Step::creation, EPERM), "disabled; set the sysctl kernel.unprivileged_userns_clone to 1");
+    set("user/max_user_namespaces", "0\n");
+    EXPECT_EQ(reason(Step::creation, EPERM), reason(Step::creation, ENOSPC));
+    set("kernel/apparmor_restrict_unprivileged_userns", "1\n");
+    for (const Step step : {Step::creation, Step::mapping})
+        for (const int error : {EPERM, EACCES})
+            EXPECT_TRUE(reason(step, error)
+                            .starts_with("forbidden by AppArmor; set the sysctl "
+                                         "kernel.apparmor_restrict_unprivileged_userns to 0"));
+}
+
 TEST_F(Sandbox, NamespacesBlockUnlistedDevices) {
     EXPECT_CHECKS(in_child([&] {
         if (!opens("/dev/ptmx", O_RDWR | O_NOCTTY) ||
