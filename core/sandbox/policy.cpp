@@ -69,7 +69,7 @@ constexpr Allowance granted[] = {
     {"display", gpu_readable, gpu_devices},
     {"network",
      {"/etc/resolv.conf", "/etc/hosts", "/etc/host.conf", "/etc/nsswitch.conf", "/etc/gai.conf", "/etc/services",
-      "/etc/protocols", "/etc/ssl", "/etc/ca-certificates", "/run/systemd/resolve"},
+      "/etc/protocols", "/etc/ssl/certs", "/etc/ssl/openssl.cnf", "/etc/ca-certificates", "/run/systemd/resolve"},
      {}},
     {"processes", {"/etc/passwd", "/etc/group", "/etc/nsswitch.conf"}, {}},
 };
@@ -83,6 +83,11 @@ void append(std::vector<fs::path> &paths, PathList patterns) {
     }
 }
 
+// libx.so or libx.so.1
+bool is_library(const std::string &name) {
+    return name.ends_with(".so") || name.find(".so.") != std::string::npos;
+}
+
 // Appends the shared libraries in the folders of LD_LIBRARY_PATH. The folders may contain other files, too.
 void append_library_path(std::vector<fs::path> &paths) {
     const char *value = std::getenv("LD_LIBRARY_PATH");
@@ -90,10 +95,9 @@ void append_library_path(std::vector<fs::path> &paths) {
     std::error_code ignored;
     for (std::string folder; std::getline(list, folder, ':');)
         if (fs::path(folder).is_absolute())
-            for (const auto &entry : fs::directory_iterator(folder, ignored))
-                if (entry.path().filename().string().find(".so") != std::string::npos &&
-                    entry.is_regular_file(ignored))
-                    paths.push_back(entry.path());
+            for (fs::directory_iterator entry(folder, ignored), end; entry != end; entry.increment(ignored))
+                if (is_library(entry->path().filename().string()) && entry->is_regular_file(ignored))
+                    paths.push_back(entry->path());
 }
 
 // Appends the sockets of the X and Wayland servers, and the file with the X server's cookie.

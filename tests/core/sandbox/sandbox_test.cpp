@@ -146,6 +146,24 @@ TEST_F(Sandbox, ExplainsWhyUserNamespacesAreMissing) {
                                          "kernel.apparmor_restrict_unprivileged_userns to 0"));
 }
 
+TEST_F(Sandbox, LibraryPathsGrantOnlyLibraries) {
+    for (const char *name : {"liba.so", "liba.so.1", "notes.social", "a.so_and_secrets"})
+        std::ofstream(outside / name) << "";
+    ::setenv("LD_LIBRARY_PATH", outside.c_str(), 1);
+    std::set<std::string> found;
+    for (const fs::path &path : paths_of(policy).readable)
+        if (contains(outside, path))
+            found.insert(path.filename());
+    ::unsetenv("LD_LIBRARY_PATH");
+    EXPECT_EQ(found, (std::set<std::string>{"liba.so", "liba.so.1"}));
+}
+
+TEST_F(Sandbox, NetworkDoesNotGrantPrivateKeys) {
+    policy.allow = {"network"};
+    for (const fs::path &path : paths_of(policy).readable)
+        EXPECT_FALSE(contains(path, "/etc/ssl/private")) << path;
+}
+
 TEST_F(Sandbox, NamespacesBlockUnlistedDevices) {
     EXPECT_CHECKS(in_child([&] {
         if (!opens("/dev/ptmx", O_RDWR | O_NOCTTY) ||
