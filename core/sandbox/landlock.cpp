@@ -4,6 +4,8 @@
 // defines the constants here, because Debian 12's headers contain only versions 1 and 2 of Landlock.
 #include "sandbox/layers.hpp"
 
+#include "base/unique_fd.hpp"
+
 #include <algorithm>
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -48,30 +50,23 @@ public:
     Ruleset(const RulesetAttributes &attributes, std::size_t size)
         : handled_(attributes.handled_files),
           fd_(static_cast<int>(::syscall(SYS_landlock_create_ruleset, &attributes, size, 0))) {}
-    ~Ruleset() {
-        if (fd_ >= 0)
-            ::close(fd_);
-    }
-    Ruleset(const Ruleset &) = delete;
-    Ruleset &operator=(const Ruleset &) = delete;
 
-    explicit operator bool() const { return fd_ >= 0; }
+    explicit operator bool() const { return static_cast<bool>(fd_); }
     // Allows `access` to `path` and everything below it. Ignores paths that do not exist.
     void allow(const fs::path &path, std::uint64_t access) {
-        const int fd = ::open(path.c_str(), O_PATH | O_CLOEXEC);
+        const base::UniqueFd fd(::open(path.c_str(), O_PATH | O_CLOEXEC));
         struct stat status {};
-        if (fd < 0 || ::fstat(fd, &status) != 0)
+        if (!fd || ::fstat(fd.get(), &status) != 0)
             return;
         const PathBeneath rule{access & handled_ & (S_ISDIR(status.st_mode) ? ~std::uint64_t(0) : access::of_files),
-                               fd};
-        (void)::syscall(SYS_landlock_add_rule, fd_, rule_path_beneath, &rule, 0);
-        ::close(fd);
+                               fd.get()};
+        (void)::syscall(SYS_landlock_add_rule, fd_.get(), rule_path_beneath, &rule, 0);
     }
-    bool enforce() const { return ::syscall(SYS_landlock_restrict_self, fd_, 0) == 0; }
+    bool enforce() const { return ::syscall(SYS_landlock_restrict_self, fd_.get(), 0) == 0; }
 
 private:
     std::uint64_t handled_;
-    int fd_;
+    base::UniqueFd fd_;
 };
 
 } // namespace
@@ -114,6 +109,7 @@ Layer enter_landlock(const Policy &policy) {
         return layer;
     }
     layer.active = "version " + std::to_string(version) + ", files";
+    layer.confines_files = true;
     if (attributes.handled_network)
         layer.active += ", TCP";
     if (attributes.scoped)

@@ -27,8 +27,8 @@ constexpr bool under_sanitizer = true;
 constexpr bool under_sanitizer = false;
 #endif
 
-inline std::string error_text(const char *what) {
-    return std::string(what) + ": " + std::strerror(errno);
+inline std::string error_text(const std::string &what) {
+    return what + ": " + std::strerror(errno);
 }
 
 inline void add_to(std::string &list, const std::string &what) {
@@ -66,7 +66,7 @@ void drop_environment(const Policy &policy); // cannot fail
 Layer raise_oom_score();                     // the OOM killer kills workers first; must run while /proc is writable
 Layer report_control_group();                // arhost-launcher has created it
 Layer enter_namespaces(const Policy &policy);
-bool enter_root(const Policy &policy); // part of enter_namespaces; on failure returns false and sets errno
+void enter_root(const Policy &policy, Layer &layer, bool has_control_group_namespace); // part of enter_namespaces
 Layer set_limits(const Policy &policy);
 Layer drop_capabilities();
 Layer enter_landlock(const Policy &policy); // this layer and the next one require no_new_privs

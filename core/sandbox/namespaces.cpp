@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Namespaces: no other processes, no network, no System V IPC objects, and a root folder with only what the policy
-// grants.
+// Namespaces: no other processes, no network, no System V IPC objects, no names of other control groups, and a root
+// folder with only what the policy grants.
 #include "sandbox/layers.hpp"
 
 #include <sched.h>
@@ -13,6 +13,12 @@ Layer enter_namespaces(const Policy &policy) {
     Layer layer{"namespaces", "", ""};
     const auto active = [&](const char *what) { add_to(layer.active, what); };
     const auto missing = [&](const char *what) { add_to(layer.missing, error_text(what)); };
+    const auto leave = [&](int flag, const char *what) {
+        const bool has_left = ::unshare(flag) == 0;
+        has_left ? active(what) : missing(what);
+        return has_left;
+    };
+    bool has_user_namespace = ::geteuid() != 0; // entered by arhost-launcher or below
     // Root needs no user namespace, and in one it would lose access to the files of other users. arhost-launcher has
     // started a worker in a user namespace, with the capability to create other namespaces in it.
     if (::unshare(CLONE_NEWNS) != 0) {
@@ -20,18 +26,19 @@ Layer enter_namespaces(const Policy &policy) {
             layer.missing = "user: " + why_not;
             return layer;
         }
+        has_user_namespace = true;
         if (::unshare(CLONE_NEWNS) != 0) {
             missing("mount");
             return layer;
         }
     }
-    if (::geteuid() != 0)
+    if (has_user_namespace)
         active("user");
-    has_pid_namespace() ? active("pid") : add_to(layer.missing, "pid");
-    enter_root(policy) ? active("mount") : missing("mount");
+    has_pid_namespace() ? active("pid") : add_to(layer.missing, "pid: the parent process has not created one");
+    enter_root(policy, layer, leave(CLONE_NEWCGROUP, "cgroup"));
     if (!policy.allows("network"))
-        ::unshare(CLONE_NEWNET) == 0 ? active("net") : missing("net");
-    ::unshare(CLONE_NEWIPC) == 0 ? active("ipc") : missing("ipc");
+        leave(CLONE_NEWNET, "net");
+    leave(CLONE_NEWIPC, "ipc");
     return layer;
 }
 

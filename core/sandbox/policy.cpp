@@ -37,7 +37,6 @@ constexpr PathList system_readable = {"/usr",
                                       "/etc/drirc",
                                       "/etc/python3",
                                       "/etc/mime.types",
-                                      "/dev/zero", // read-only: a writable mapping would be uncounted memory
                                       "/proc/self",
                                       "/proc/cpuinfo",
                                       "/proc/meminfo",
@@ -121,6 +120,8 @@ Paths paths_of(const Policy &policy) {
     Paths paths;
     append(paths.readable, system_readable);
     append(paths.devices, system_devices);
+    if (may_share_memory(policy)) // RLIMIT_DATA does not count shared mappings of this device
+        append(paths.devices, {"/dev/zero"});
     append_library_path(paths.readable);
     for (const Allowance &allowance : granted)
         if (policy.allows(allowance.name)) {

@@ -8,6 +8,7 @@
 
 #include <deque>
 #include <fcntl.h>
+#include <functional>
 #include <linux/mount.h>
 #include <map>
 #include <sys/mount.h>
@@ -27,6 +28,7 @@ constexpr std::uint64_t of_devices = MOUNT_ATTR_RDONLY | MOUNT_ATTR_NOSUID, // d
 // The new root is mounted on this folder before it becomes the root. Every system has it, and it is not /proc, which
 // must remain visible so that a user namespace may mount another one.
 constexpr const char *staging = "/dev";
+constexpr const char *control_groups = "/sys/fs/cgroup";
 
 struct Mount {
     fs::path path; // without symbolic links
@@ -34,26 +36,32 @@ struct Mount {
     base::UniqueFd tree;
 };
 
-base::UniqueFd clone_tree(const fs::path &path) {
-    return base::UniqueFd(static_cast<int>(
-        ::syscall(SYS_open_tree, AT_FDCWD, path.c_str(), OPEN_TREE_CLONE | OPEN_TREE_CLOEXEC | AT_RECURSIVE)));
-}
-
 bool set_attributes(int tree, const char *path, unsigned flags, std::uint64_t attributes) {
     mount_attr change{};
     change.attr_set = attributes;
     return ::syscall(SYS_mount_setattr, tree, path, flags, &change, sizeof change) == 0;
 }
 
+// Clones the mounts at and below `path`. On failure returns an empty descriptor and sets errno.
+base::UniqueFd clone_tree(const fs::path &path, std::uint64_t attributes) {
+    base::UniqueFd tree(static_cast<int>(
+        ::syscall(SYS_open_tree, AT_FDCWD, path.c_str(), OPEN_TREE_CLONE | OPEN_TREE_CLOEXEC | AT_RECURSIVE)));
+    if (tree && !set_attributes(tree.get(), "", AT_EMPTY_PATH | AT_RECURSIVE, attributes))
+        tree.reset(); // close(2) succeeds and leaves errno as it is
+    return tree;
+}
+
+using Report = std::function<void(const fs::path &path)>; // reports a path that errno prevents
+
 // The paths of the new root.
 class Contents {
 public:
     void grant(const fs::path &path, std::uint64_t attributes) {
-        if (contains("/proc", path))
-            return;
         std::error_code ignored;
         const fs::path real = resolve(path);
-        if (real.has_relative_path() && !contains("/proc", real) && fs::exists(real, ignored))
+        if (contains(real, "/proc") || contains("/proc/self", real) || real == control_groups)
+            return; // the new root has its own
+        if (fs::exists(real, ignored))
             if (const auto [entry, is_new] = attributes_.emplace(real, attributes); !is_new)
                 entry->second &= attributes;
     }
@@ -61,8 +69,8 @@ public:
     const std::map<fs::path, fs::path> &links() const { return links_; }
 
     // Clones the mounts. Omits a path that a folder already contains with the same attributes, and one that cannot be
-    // cloned.
-    std::vector<Mount> clone() const {
+    // cloned, which it reports.
+    std::vector<Mount> clone(const Report &missing) const {
         std::vector<Mount> mounts;
         for (const auto &[path, attributes] : attributes_) { // each folder comes before its contents
             const Mount *parent = nullptr;
@@ -71,9 +79,10 @@ public:
                     parent = &mount;
             if (parent && (parent->attributes & ~attributes) == 0)
                 continue;
-            base::UniqueFd tree = clone_tree(path);
-            if (tree && set_attributes(tree.get(), "", AT_EMPTY_PATH | AT_RECURSIVE, attributes))
+            if (base::UniqueFd tree = clone_tree(path, attributes))
                 mounts.push_back({path, attributes, std::move(tree)});
+            else
+                missing(path);
         }
         return mounts;
     }
@@ -90,7 +99,7 @@ private:
             std::error_code ignored;
             if (part == "..")
                 real = real.parent_path();
-            else if (part != "." && !fs::is_symlink(real / part, ignored))
+            else if (part != "." && (contains("/proc", real) || !fs::is_symlink(real / part, ignored)))
                 real /= part; // an absolute part replaces the path
             else if (part != ".") {
                 const fs::path target = fs::read_symlink(real / part, ignored);
@@ -114,8 +123,6 @@ Contents contents_of(const Policy &policy) {
         contents.grant(path, of_readable);
     for (const fs::path &path : paths.devices)
         contents.grant(path, of_devices);
-    if (may_share_memory(policy)) // RLIMIT_DATA does not count shared mappings of this device
-        contents.grant("/dev/zero", of_devices);
     for (const fs::path &path : paths.sockets)
         contents.grant(path, of_writable);
     for (const fs::path &path : policy.writable)
@@ -134,15 +141,35 @@ bool attach(const base::UniqueFd &tree, const fs::path &path) {
     return ::syscall(SYS_move_mount, tree.get(), "", AT_FDCWD, path.c_str(), MOVE_MOUNT_F_EMPTY_PATH) == 0;
 }
 
-// Mounts the /proc of this PID namespace, or the existing one: in a container, /proc may be covered in part, and then
-// the kernel refuses another one.
-bool mount_proc(const fs::path &path) {
-    const base::UniqueFd existing = clone_tree("/proc");
+// Makes the plugin's own folder in /proc visible, but not PID 1. `proc`: the path of /proc.
+bool mount_own_processes(const fs::path &proc) {
+    const fs::path processes = proc / "pids";
+    std::error_code ignored;
+    fs::create_directories(processes, ignored);
+    if (!has_pid_namespace() ||
+        ::mount("proc", processes.c_str(), "proc", MS_RDONLY | MS_NOSUID | MS_NODEV | MS_NOEXEC,
+                "subset=pid,hidepid=ptraceable") != 0) {
+        // In a container, /proc may be covered in part, and then the kernel refuses another one.
+        const fs::path self = fs::read_symlink("/proc/self", ignored);
+        const base::UniqueFd tree = self.empty() ? base::UniqueFd() : clone_tree("/proc" / self, of_readable);
+        if (!tree || !attach(tree, processes / self))
+            return false;
+        fs::create_symlink(self, processes / "self", ignored);
+    }
+    fs::create_symlink("pids/self", proc / "self", ignored);
+    fs::create_symlink("pids/thread-self", proc / "thread-self", ignored);
+    const std::string pid = std::to_string(::getpid());
+    fs::create_symlink("pids" / fs::read_symlink(processes / "self", ignored), proc / pid, ignored);
+    return true;
+}
+
+// Shows only the control group of this process and those below it. Libraries read the limits of the group there.
+void mount_own_control_groups(const fs::path &path) {
     std::error_code ignored;
     fs::create_directories(path, ignored);
-    return ::mount("proc", path.c_str(), "proc", MS_RDONLY | MS_NOSUID | MS_NODEV | MS_NOEXEC, nullptr) == 0 ||
-           (existing && set_attributes(existing.get(), "", AT_EMPTY_PATH | AT_RECURSIVE, of_readable) &&
-            attach(existing, path));
+    if (::mount("cgroup2", path.c_str(), "cgroup2", MS_NOSUID | MS_NODEV | MS_NOEXEC, nullptr) == 0 &&
+        !set_attributes(AT_FDCWD, path.c_str(), 0, of_readable))
+        ::umount2(path.c_str(), MNT_DETACH);
 }
 
 // Makes the folder `staging` the root and detaches the old root.
@@ -155,38 +182,44 @@ bool enter_staging() {
 
 } // namespace
 
-bool enter_root(const Policy &policy) {
+void enter_root(const Policy &policy, Layer &layer, bool has_control_group_namespace) {
+    const auto missing = [&](const fs::path &what) { add_to(layer.missing, error_text("mount: " + what.string())); };
     if (!set_attributes(AT_FDCWD, "/", 0, 0)) // changes nothing; fails before Linux 5.12
-        return false;
+        return missing("mount_setattr");
     rlimit files{}; // the mounts need one descriptor each; set_limits lowers the limit later
     ::getrlimit(RLIMIT_NOFILE, &files);
     files.rlim_cur = files.rlim_max;
     ::setrlimit(RLIMIT_NOFILE, &files);
     if (::mount("", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0) // no propagation of mounts
-        return false;
+        return missing("/");
     const Contents contents = contents_of(policy);
     std::error_code ignored;
     const fs::path working_directory = fs::current_path(ignored);
-    const std::vector<Mount> mounts = contents.clone();
+    const std::vector<Mount> mounts = contents.clone(missing);
     if (::mount("tmpfs", staging, "tmpfs", MS_NOSUID | MS_NODEV, "mode=755,size=1m") != 0)
-        return false;
+        return missing("tmpfs");
     const auto in_staging = [](const fs::path &path) { return staging / path.relative_path(); };
-    bool is_complete = mount_proc(in_staging("/proc"));
     for (const Mount &mount : mounts)
-        is_complete &= attach(mount.tree, in_staging(mount.path));
+        if (!attach(mount.tree, in_staging(mount.path)))
+            missing(mount.path);
+    if (!mount_own_processes(in_staging("/proc")))
+        missing("/proc/self");
+    if (has_control_group_namespace) // otherwise this would change options of the existing mount
+        mount_own_control_groups(in_staging(control_groups));
     for (const auto &[path, target] : contents.links()) {
         fs::create_directories(in_staging(path).parent_path(), ignored);
         fs::create_symlink(target, in_staging(path), ignored); // fails if a bind mount contains the link
     }
-    if (!is_complete || !enter_staging()) {
-        const int error = errno;
+    if (enter_staging()) {
+        add_to(layer.active, "mount");
+        layer.confines_files = true;
+    } else {
+        missing("pivot_root");
         ::umount2(staging, MNT_DETACH);
-        (void)!::chdir(working_directory.c_str());
-        errno = error;
-        return false;
     }
     (void)!::chdir(working_directory.c_str()); // "/" if the new root does not contain it
-    return set_attributes(AT_FDCWD, "/", 0, MOUNT_ATTR_RDONLY);
+    if (layer.confines_files && !set_attributes(AT_FDCWD, "/", 0, MOUNT_ATTR_RDONLY))
+        missing("/");
 }
 
 } // namespace arhost::sandbox

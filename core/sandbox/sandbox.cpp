@@ -35,14 +35,6 @@ std::filesystem::path own_plugin_folder() {
            "lib/arhost/plugins";
 }
 
-// Whether a layer limits which files can be read.
-bool confines_files(const Level &level) {
-    return std::any_of(level.begin(), level.end(), [](const Layer &layer) {
-        return (layer.name == "namespaces" && layer.active.find("mount") != std::string::npos) ||
-               (layer.name == "landlock" && !layer.active.empty());
-    });
-}
-
 } // namespace
 
 bool complete(const Level &level) {
@@ -93,7 +85,7 @@ Level enter_for(const std::filesystem::path &plugin, Policy policy) {
     policy.readable.push_back(own_folder);
     add_shader_cache(policy, plugin);
     Level level = enter(policy);
-    if (policy.mode == Mode::standard && !is_own && !confines_files(level))
+    if (policy.mode == Mode::standard && !is_own && std::ranges::none_of(level, &Layer::confines_files))
         throw std::runtime_error("sandbox: " + to_text(level) +
                                  "; this machine can confine no files, so only the plugins in " +
                                  own_folder.string() + " may run: fix this or set 'sandbox: permissive'");

@@ -69,8 +69,9 @@ bool is_variable_name(std::string_view name);
 // Result of applying one layer on this machine.
 struct Layer {
     std::string name;
-    std::string active;  // the restrictions that are enforced; "": none
-    std::string missing; // the restrictions that are not enforced, and why; "": none
+    std::string active;          // the restrictions that are enforced; "": none
+    std::string missing;         // the restrictions that are not enforced, and why; "": none
+    bool confines_files = false; // limits which files can be read
 };
 using Level = std::vector<Layer>;
 

@@ -38,6 +38,21 @@ int in_child(const std::function<int()> &checks) {
     return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }
 
+// Like in_child, in process 2 of a PID namespace, as arhost-launcher starts workers.
+int in_pid_namespace(const std::function<int()> &checks) {
+    return in_child([&] {
+        if (::unshare(CLONE_NEWPID) != 0 && (!enter_user_namespace().empty() || ::unshare(CLONE_NEWPID) != 0))
+            return layer_is_missing;
+        const pid_t first = ::fork();
+        if (first == 0)
+            for (;;)
+                ::pause();
+        const int result = in_child(checks);
+        ::kill(first, SIGKILL);
+        return result;
+    });
+}
+
 // Identifies a failed check by its number, because a child process cannot use GoogleTest's expectations.
 class Checks {
 public:
@@ -115,6 +130,95 @@ TEST_F(Sandbox, NamespacesHideAllPathsThatAreNotGranted) {
         check.that(opens("/proc/self/status", O_RDONLY));
         check.that(opens("/dev/fd/0", O_RDONLY) || errno != ENOENT);
         check.that(opens("/dev/null", O_WRONLY));
+        return check.result();
+    }));
+}
+
+TEST_F(Sandbox, NamespacesShowOnlyTheOwnProcessInProc) {
+    const auto checks = [&] {
+        const bool is_second = ::getppid() == 0;
+        if (enter_namespaces(policy).active.find("mount") == std::string::npos)
+            return layer_is_missing;
+        drop_capabilities(); // with those of PID 1, this process could trace it
+        Checks check;
+        for (const char *file : {"/proc/1/status", "/proc/keys", "/proc/cmdline", "/proc/sys/kernel/hostname"})
+            check.that(!opens(file, O_RDONLY) && errno == ENOENT);
+        for (const char *file : {"/proc/cpuinfo", "/proc/meminfo", "/proc/stat", "/proc/sys/vm/max_map_count"})
+            check.that(opens(file, O_RDONLY));
+        const std::string self = "/proc/" + std::to_string(::getpid());
+        check.that(fs::equivalent("/proc/self/maps", self + "/maps"));
+        if (is_second) {
+            check.that(!fs::exists("/proc/pids/1"));
+            check.that(opens("/proc/thread-self/comm", O_RDONLY));
+            check.that(in_child([&] { return fs::equivalent("/proc/self/maps", self + "/maps"); }) == 0);
+        }
+        return check.result();
+    };
+    EXPECT_CHECKS(in_child(checks));
+    EXPECT_CHECKS(in_pid_namespace(checks));
+    // The kernel refuses another /proc to a user who does not own the PID namespace.
+    EXPECT_CHECKS(in_pid_namespace([&] {
+        if (::geteuid() != 0 || ::setuid(65534) != 0 || ::prctl(PR_SET_DUMPABLE, 1, 0, 0, 0) != 0)
+            return layer_is_missing;
+        if (enter_namespaces(policy).active.find("mount") == std::string::npos)
+            return layer_is_missing;
+        Checks check;
+        check.that(!opens("/proc/1/status", O_RDONLY) && errno == ENOENT);
+        check.that(opens("/proc/self/status", O_RDONLY));
+        check.that(opens("/proc/2/status", O_RDONLY));
+        return check.result();
+    }));
+}
+
+TEST_F(Sandbox, NamespacesHideOtherControlGroups) {
+    EXPECT_CHECKS(in_child([&] {
+        std::vector<fs::path> others;
+        std::error_code ignored;
+        std::string line;
+        std::ifstream groups("/proc/self/cgroup");
+        const bool is_root = std::getline(groups, line) && line == "0::/";
+        for (fs::directory_iterator entry("/sys/fs/cgroup", ignored), end; !is_root && entry != end; ++entry)
+            if (entry->is_directory())
+                others.push_back(entry->path());
+        if (others.empty() || enter_namespaces(policy).active.find("cgroup, mount") == std::string::npos)
+            return layer_is_missing;
+        Checks check;
+        for (const fs::path &other : others)
+            check.that(!fs::exists(other));
+        groups = std::ifstream("/proc/self/cgroup");
+        while (std::getline(groups, line))
+            check.that(line.ends_with(":/"));
+        return check.result();
+    }));
+}
+
+TEST_F(Sandbox, NamespacesReportPathsThatCannotBeShown) {
+    EXPECT_CHECKS(in_child([&] {
+        const rlimit few{16, 16}; // each path needs a descriptor
+        if (::setrlimit(RLIMIT_NOFILE, &few) != 0)
+            return layer_is_missing;
+        const Layer layer = enter_namespaces(policy);
+        if (layer.active.find("mount") == std::string::npos)
+            return layer_is_missing;
+        return layer.missing.find("mount: " + inside.string() + ": Too many open files") != std::string::npos ? 0 : 1;
+    }));
+}
+
+TEST_F(Sandbox, NamespacesReportAUserNamespaceOfRoot) {
+    EXPECT_CHECKS(in_child([&] {
+        __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
+        __user_cap_data_struct data[2] = {};
+        ::syscall(SYS_capget, &header, data);
+        for (std::uint32_t *set : {&data[0].effective, &data[0].permitted})
+            *set &= ~(1u << CAP_SYS_ADMIN);
+        if (::geteuid() != 0 || ::syscall(SYS_capset, &header, data) != 0)
+            return layer_is_missing;
+        const Layer layer = enter_namespaces(policy);
+        if (layer.active.find("mount") == std::string::npos)
+            return layer_is_missing;
+        Checks check;
+        check.that(layer.active.starts_with("user, "));
+        check.that(layer.missing.starts_with("pid: "));
         return check.result();
     }));
 }
