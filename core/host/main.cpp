@@ -4,6 +4,7 @@
 #include "base/write_all.hpp"
 #include "host/new_plugin.hpp"
 #include "host/program.hpp"
+#include "sandbox/sandbox.hpp"
 
 #include <csignal>
 #include <cstdio>
@@ -103,6 +104,7 @@ int main(int argc, char **argv) {
     plugins_command
         .option("--reads", plugins_arguments.reads, "A folder with libraries that the plugins need (repeatable)")
         .existing_path()
+        .check(arhost::sandbox::obstacle_to_grant)
         .type_name("FOLDER")
         .one_value_each();
 

@@ -11,10 +11,17 @@ namespace {
 namespace fs = std::filesystem;
 using base::real_path;
 
+void expect_grantable(const yaml::Node &node, const fs::path &path) {
+    if (const std::string obstacle = sandbox::obstacle_to_grant(path); !obstacle.empty())
+        node.fail(obstacle);
+}
+
 // Grants write access to the folder of the output file, because an output is written to a temporary file in that
 // folder and then renamed. If the output file is a symbolic link, also grants access to the folder of the link's
 // target.
-void allow_write(sandbox::Policy &policy, const fs::path &file) {
+void allow_write(sandbox::Policy &policy, const yaml::Node &path) {
+    const fs::path file = path.output_path();
+    expect_grantable(path, file.parent_path());
     policy.writable.push_back(file.parent_path());
     if (const fs::path folder = real_path(file).parent_path(); folder != policy.writable.back())
         policy.writable.push_back(folder);
@@ -27,6 +34,7 @@ void add_reads(sandbox::Policy &policy, const yaml::Node &paths) {
         if (!fs::exists(policy.readable.back(), ignored))
             path.fail("there is no file or folder '" + policy.readable.back().string() +
                       "', or it cannot be accessed; correct the path or remove it");
+        expect_grantable(path, policy.readable.back());
     }
 }
 
@@ -37,6 +45,7 @@ void add_writes(sandbox::Policy &policy, const yaml::Node &folders) {
         if (!fs::is_directory(policy.writable.back(), ignored))
             folder.fail("there is no folder '" + policy.writable.back().string() +
                         "', or it cannot be accessed; name an existing folder (mkdir -p creates one)");
+        expect_grantable(folder, policy.writable.back());
     }
 }
 
@@ -69,7 +78,7 @@ sandbox::Policy access_of(const yaml::Node &node, bool is_output) {
     if (const auto environment = node.find("environment"))
         add_environment(policy, *environment);
     if (const auto path = path_of(node); path && is_output)
-        allow_write(policy, path->output_path());
+        allow_write(policy, *path);
     else if (path)
         sandbox::allow_read_files(policy, path->input_path());
     if (const auto options = node.find("options"); options && options->is_map())

@@ -138,6 +138,16 @@ bool contains(const fs::path &folder, const fs::path &path) {
     return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first == folder.end();
 }
 
+std::string obstacle_to_grant(const fs::path &path) {
+    std::error_code ignored;
+    const fs::path real = fs::weakly_canonical(path, ignored);
+    if (real.has_relative_path() && !contains("/proc", real) &&
+        (!contains("/dev", real) || contains("/dev/shm", real)))
+        return "";
+    return "the sandbox cannot grant '" + path.string() +
+           "'; name the files or folders that the plugin needs outside of /proc and /dev, and devices with 'allow'";
+}
+
 bool allow_read(Policy &policy, const fs::path &file) {
     std::error_code ignored;
     const auto type = fs::status(file, ignored).type();
@@ -147,9 +157,8 @@ bool allow_read(Policy &policy, const fs::path &file) {
     const fs::path real = fs::weakly_canonical(file, ignored);
     if (home && contains(real, fs::weakly_canonical(home, ignored)))
         return false;
-    for (const char *system : {"/dev", "/proc", "/sys"})
-        if (contains(real, system) || (contains(system, real) && !contains("/dev/shm", real)))
-            return false;
+    if (!obstacle_to_grant(real).empty() || contains("/sys", real))
+        return false;
     policy.readable.push_back(file);
     return true;
 }
@@ -160,8 +169,7 @@ void allow_read_files(Policy &policy, const fs::path &file_or_pattern) {
 }
 
 Mode mode_of(std::string_view text) {
-    const auto found = std::ranges::find(modes, text);
-    return static_cast<Mode>(found == modes.end() ? 1 : found - modes.begin() + 1);
+    return static_cast<Mode>(std::ranges::find(modes, text) - modes.begin() + 1);
 }
 
 nlohmann::json to_json(const Policy &policy) {

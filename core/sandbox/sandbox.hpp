@@ -51,6 +51,10 @@ constexpr std::string_view worker_group = "arhost-worker-";
 // Whether `path` is `folder` or a path below it. Compares only names, so both must be canonical.
 bool contains(const std::filesystem::path &folder, const std::filesystem::path &path);
 
+// Returns why access to `path` cannot be granted by name, and what to do instead; "" if it can. The sandbox has its
+// own root folder, /proc and /dev, so such a grant would take effect only in some of its layers.
+std::string obstacle_to_grant(const std::filesystem::path &path);
+
 // Grants read access to an absolute path that an option names. Returns false if the path does not exist or is too
 // broad: a folder that contains the home folder, or a path in /dev, /proc or /sys.
 bool allow_read(Policy &policy, const std::filesystem::path &file);
@@ -58,7 +62,7 @@ bool allow_read(Policy &policy, const std::filesystem::path &file);
 void allow_read_files(Policy &policy, const std::filesystem::path &file_or_pattern);
 
 constexpr std::array<std::string_view, 4> modes = {"standard", "permissive", "strict", "none"};
-Mode mode_of(std::string_view text);
+Mode mode_of(std::string_view text); // an element of `modes`
 
 nlohmann::json to_json(const Policy &policy);
 Policy policy_from_json(const nlohmann::json &json); // throws nlohmann::json::exception

@@ -108,13 +108,15 @@ TEST(Conform, PrintsTheCommandWithAllOptions) {
 }
 
 TEST(Conform, RejectsInvalidOptions) {
-    const std::array<std::array<std::string, 3>, 13> cases = {
+    const std::array<std::array<std::string, 3>, 15> cases = {
         {{"--timeout-factor", "nan", "'nan' must be a number from 0.001 to 1000"},
          {"--timeout-factor", "1e300", "'1e300' must be a number from 0.001 to 1000"},
          {"--seed", "99999999999999999999", "must be a whole number from 0 to 18446744073709551615"},
          {"--seed", "-1", "must be a whole number from 0 to"},
          {"--reads", "", "does not exist"},
          {"--reads", "nowhere", "does not exist: nowhere"},
+         {"--reads", "/", "the sandbox cannot grant '/'"},
+         {"--sandbox", "strict", "strict not in {standard,permissive,none}"},
          {"--reference", "", "the name is empty"},
          {"--json", "", "the name is empty"},
          {"--print", "1=", "must be ID=FILE"},

@@ -111,6 +111,21 @@ TEST_F(Access, MissingPathsAreErrors) {
     EXPECT_FALSE(fs::exists(folder / "dta"));
 }
 
+TEST_F(Access, RootProcAndDevicesAreErrors) {
+    fs::create_symlink("/", folder / "root");
+    for (const char *path : {"/", "root", "/proc", "/proc/self", "/dev", "/dev/null"})
+        EXPECT_THAT(error_of("{plugin: p, reads: [" + std::string(path) + "]}"),
+                    AllOf(HasSubstr("run.yaml:1:21: reads[0]: the sandbox cannot grant '"),
+                          HasSubstr("name the files or folders that the plugin needs")))
+            << path;
+    EXPECT_THAT(error_of("{plugin: p, writes: [/]}"),
+                HasSubstr("run.yaml:1:22: writes[0]: the sandbox cannot grant"));
+    EXPECT_THAT(of("{plugin: p, reads: [/dev/shm, /sys/kernel]}", false).readable,
+                ElementsAre("/dev/shm", "/sys/kernel"));
+    for (const char *path : {"/video.mp4", "/dev/video.mp4"})
+        EXPECT_THROW(of("{plugin: sink_video, path: " + std::string(path) + "}", true), Error) << path;
+}
+
 TEST_F(Access, DotDotAfterALinkStartsAtItsTarget) {
     file("there/inner/x");
     file("there/tags.txt");
