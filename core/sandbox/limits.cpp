@@ -60,7 +60,9 @@ Layer set_limits(const Policy &policy) {
     lower(layer, "queues", RLIMIT_MSGQUEUE, 0);
     lower(layer, "priorities", RLIMIT_RTPRIO, 0); // a real-time thread could starve all others
     lower(layer, "nice", RLIMIT_NICE, 0);
-    lower(layer, "threads", RLIMIT_NPROC, 8192); // per user namespace; not enforced for root
+    // Counted per user namespace, without one for all processes of the user; not enforced for root. Pools of threads
+    // have one thread for each processor.
+    lower(layer, "threads", RLIMIT_NPROC, has_pid_namespace() ? 1024 + 4 * ::get_nprocs() : 8192);
     return layer;
 }
 

@@ -12,6 +12,7 @@
 #include <linux/capability.h>
 #include <linux/filter.h>
 #include <sched.h>
+#include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
@@ -383,6 +384,7 @@ TEST_F(Sandbox, SystemCallsCannotAffectOtherProcesses) {
         check.that(::fchmod(old, 04777) != 0);
         check.that(::fchown(old, ::getuid(), ::getgid()) != 0);
         check.that(::ftruncate(old, 1) == 0);
+        check.that(::ioctl(old, TIOCSTI, "x") != 0 && errno == EPERM); // not ENOTTY
         if (!under_sanitizer) {
             check.that(::kill(::getppid(), 0) != 0);
             check.that(::kill(0, 0) != 0);

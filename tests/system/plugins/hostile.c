@@ -8,8 +8,11 @@
 #endif
 #include <arhost/arhost.h>
 
+#include <ctype.h>
+#include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
+#include <linux/filter.h>
 #include <net/if.h>
 #include <pthread.h>
 #include <sched.h>
@@ -17,6 +20,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/file.h>
 #include <sys/inotify.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
@@ -60,6 +64,36 @@ static pid_t host_pid(void) {
     return text ? (pid_t)atoi(text) : getppid();
 }
 
+/* Returns the launcher's pid, or that of the process in its PID namespace that has a copy of the launcher's memory.
+ */
+static pid_t launcher_pid(void) {
+    return getppid() ? getppid() : 1;
+}
+
+/* Whether the folder of another process is visible in /proc. */
+static int sees_processes(void) {
+    DIR *folder = opendir("/proc");
+    struct dirent *entry;
+    int found = 0;
+    while (folder && (entry = readdir(folder)))
+        found |= isdigit(entry->d_name[0]) && atoi(entry->d_name) != getpid();
+    if (folder)
+        closedir(folder);
+    return found;
+}
+
+/* Whether the name of the control group is visible: in a namespace, all are "/". */
+static int sees_control_group(void) {
+    FILE *groups = fopen("/proc/self/cgroup", "r");
+    char line[4096];
+    int found = 0;
+    while (groups && fgets(line, sizeof line, groups))
+        found |= !strstr(line, ":/\n");
+    if (groups)
+        fclose(groups);
+    return found;
+}
+
 static int opens(const char *file, int flags) {
     const int fd = open(file, flags | O_CLOEXEC, 0600);
     if (fd >= 0)
@@ -75,6 +109,13 @@ static void read_files(const tracker *self) {
     report(self, "the host's environment", opens(file, O_RDONLY));
     snprintf(file, sizeof file, "/proc/%d/maps", (int)host_pid());
     report(self, "the host's addresses", opens(file, O_RDONLY));
+    snprintf(file, sizeof file, "/proc/%d/mountinfo", (int)launcher_pid());
+    report(self, "the launcher's mounts", opens(file, O_RDONLY));
+    report(self, "the processes", sees_processes());
+    report(self, "the keys", opens("/proc/keys", O_RDONLY));
+    report(self, "the kernel's command line", opens("/proc/cmdline", O_RDONLY));
+    report(self, "the kernel's settings", opens("/proc/sys/kernel/hostname", O_RDONLY));
+    report(self, "the control group", sees_control_group());
 }
 
 /* Names, sizes and attributes of files that the plugin may not read. */
@@ -157,7 +198,7 @@ static void read_environment(const tracker *self) {
     report(self, "a secret that begins like a driver's variable", getenv("VK_TOKEN") != NULL);
     report(self, "a secret that begins like a linker's variable", getenv("LD_ACCESS_TOKEN") != NULL);
     report(self, "the initial environment", file_has("/proc/self/environ", "HOSTILE_SECRET="));
-    snprintf(file, sizeof file, "/proc/%d/environ", (int)getppid());
+    snprintf(file, sizeof file, "/proc/%d/environ", (int)launcher_pid());
     report(self, "the launcher's environment", file_has(file, "HOSTILE_SECRET="));
 }
 
@@ -178,6 +219,10 @@ static void open_sockets(const tracker *self) {
     int ends[2];
     struct ifreq interfaces[16];
     struct ifconf list = {sizeof interfaces, {(void *)interfaces}};
+    struct sock_filter all = {BPF_RET | BPF_K, 0, 0, 0xffffffff};
+    const struct sock_fprog program = {1, &all};
+    int pidfd;
+    socklen_t size = sizeof pidfd;
     report(self, "network interfaces", ioctl(control, SIOCGIFCONF, &list) == 0 && list.ifc_len > 0);
     report(self, "a pair of another family", socketpair(AF_INET, SOCK_STREAM, 0, ends) == 0 || errno == EOPNOTSUPP);
     report(self, "internet", socket(AF_INET, SOCK_STREAM, 0) >= 0);
@@ -189,13 +234,16 @@ static void open_sockets(const tracker *self) {
     report(self, "a path", connects(self, 0));
     report(self, "an abstract name", connects(self, 1));
     report(self, "a pair that can send anywhere", socketpair(AF_UNIX, SOCK_DGRAM, 0, ends) == 0);
+    report(self, "a filter", setsockopt(doorbell, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program) == 0);
+    report(self, "the host's process", getsockopt(control, SOL_SOCKET, 77 /* SO_PEERPIDFD */, &pidfd, &size) == 0);
 }
 
 /* The terminal that arhost was started in. */
 static void use_terminal(const tracker *self) {
-    const int terminal = open("/dev/tty", O_RDWR | O_NOCTTY | O_CLOEXEC);
+    const int terminal = open(getenv("HOSTILE_TERMINAL"), O_RDWR | O_NOCTTY | O_CLOEXEC);
     int fd, inherited = 0;
     report(self, "open the terminal", terminal >= 0);
+    report(self, "open its own terminal", opens("/dev/tty", O_RDWR | O_NOCTTY));
     for (fd = 0; fd < 16; ++fd)
         inherited |= isatty(fd);
     report(self, "an inherited terminal", inherited);
@@ -225,7 +273,7 @@ static void enter_kernel(const tracker *self) {
         {"a fanotify group", SYS_fanotify_init, {0, 0, 0}},
         {"a mount", SYS_mount, {(long)"none", (long)"/tmp", (long)"tmpfs"}},
         {"a module", SYS_finit_module, {-1, (long)"", 0}},
-        {"an undefined call", 1000, {0, 0, 0}},
+        {"a file lock", SYS_flock, {control, LOCK_EX | LOCK_NB, 0}},
     };
     size_t i;
     for (i = 0; i < sizeof calls / sizeof *calls; ++i) {
@@ -258,11 +306,13 @@ static void trace_host(const tracker *self) {
     struct iovec mine = {&byte, 1}, theirs = {&byte, 1};
     char file[64];
     report(self, "attach", ptrace(PTRACE_SEIZE, host_pid(), NULL, NULL) == 0);
-    report(self, "attach to the launcher", ptrace(PTRACE_SEIZE, getppid(), NULL, NULL) == 0);
+    report(self, "attach to the launcher", ptrace(PTRACE_SEIZE, launcher_pid(), NULL, NULL) == 0);
     report(self, "read memory", process_vm_readv(host_pid(), &mine, 1, &theirs, 1, 0) > 0 || errno == EFAULT);
     report(self, "write memory", process_vm_writev(host_pid(), &mine, 1, &theirs, 1, 0) > 0 || errno == EFAULT);
     snprintf(file, sizeof file, "/proc/%d/mem", (int)host_pid());
     report(self, "open memory", opens(file, O_RDWR));
+    snprintf(file, sizeof file, "/proc/%d/mem", (int)launcher_pid());
+    report(self, "open the launcher's memory", opens(file, O_RDWR));
     report(self, "take a descriptor", syscall(SYS_pidfd_getfd, syscall(SYS_pidfd_open, host_pid(), 0), 1, 0) >= 0);
 }
 
@@ -276,7 +326,7 @@ static void signal_host(const tracker *self) {
     CPU_ZERO(&processor);
     CPU_SET(0, &processor);
     report(self, "kill", kill(host_pid(), SIGKILL) == 0);
-    report(self, "reach the launcher", kill(getppid(), 0) == 0); /* killing it would kill this worker too */
+    report(self, "reach the launcher", kill(launcher_pid(), 0) == 0); /* killing it would kill this worker too */
     report(self, "reach all", kill(-1, 0) == 0);
     report(self, "join the host's group", setpgid(0, getpgid(host_pid())) == 0);
     report(self, "tkill", syscall(SYS_tkill, host_pid(), SIGKILL) == 0);
@@ -320,8 +370,7 @@ static void *wait_forever(void *nothing) {
 static void fill_memory(const tracker *self) {
     enum { step = 16 << 20, max_mib = 512 };
     size_t taken = 0;
-    pthread_t thread;
-    int fd, threads = 0;
+    int fd;
     while (taken < max_mib) {
         char *bytes = malloc(step);
         if (!bytes)
@@ -338,9 +387,19 @@ static void fill_memory(const tracker *self) {
     report(self, "shared zeros", fd >= 0 && mmap(NULL, step, PROT_WRITE, MAP_SHARED, fd, 0) != MAP_FAILED);
     fd = memfd_create("hostile", 0);
     report(self, "a memfd", fd >= 0);
-    while (threads < 1000 && pthread_create(&thread, NULL, wait_forever, NULL) == 0)
+}
+
+/* Small stacks, so that the limit of memory does not stop this. */
+static void start_threads(const tracker *self) {
+    const long many = 1200 + 4 * sysconf(_SC_NPROCESSORS_ONLN);
+    long threads = 0;
+    pthread_t thread;
+    pthread_attr_t small;
+    pthread_attr_init(&small);
+    pthread_attr_setstacksize(&small, 16 << 10);
+    while (threads < many && pthread_create(&thread, &small, wait_forever, NULL) == 0)
         ++threads;
-    report(self, "a thousand threads", threads == 1000);
+    report(self, "a thousand threads", threads == many);
 }
 
 /* Resources that the kernel counts per user, and memory in the kernel. */
@@ -380,13 +439,19 @@ static void exhaust_user(const tracker *self) {
 }
 
 static void fill_disk(const tracker *self) {
-    const char *const folders[] = {".", "/tmp", "/var/tmp", "/dev/shm", "/run", "/", getenv("HOME")};
+    const char *const folders[][2] = {{"the working folder", "."},
+                                      {"the home folder", getenv("HOME") ? getenv("HOME") : "."},
+                                      {"/tmp", "/tmp"},
+                                      {"/var/tmp", "/var/tmp"},
+                                      {"/dev/shm", "/dev/shm"},
+                                      {"/run", "/run"},
+                                      {"/", "/"}};
     size_t i;
     for (i = 0; i < sizeof folders / sizeof *folders; ++i) {
         char file[1100];
-        snprintf(file, sizeof file, "%s/hostile-%d", folders[i] ? folders[i] : ".", (int)getpid());
+        snprintf(file, sizeof file, "%s/hostile-%d", folders[i][1], (int)getpid());
         const int fd = open(file, O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
-        report(self, folders[i] ? folders[i] : "no home", fd >= 0 && write(fd, file, sizeof file) > 0);
+        report(self, folders[i][0], fd >= 0 && write(fd, file, sizeof file) > 0);
         if (fd >= 0) {
             close(fd);
             unlink(file);
@@ -476,7 +541,8 @@ static void *race(void *unused) {
 static void race_the_host(const tracker *self) {
     pthread_t thread;
     each_shared(self, note_memory);
-    report(self, "start no race", pthread_create(&thread, NULL, race, NULL) != 0);
+    if (pthread_create(&thread, NULL, race, NULL) == 0)
+        self->host->log(self->host, ARHOST_SEVERITY_INFO, "the race has started");
 }
 
 static void truncate_one(const tracker *self, void *bytes, size_t size, int writable) {
@@ -605,6 +671,8 @@ static void attack(const tracker *self) {
         signal_own_child(self);
     } else if (!strcmp(name, "memory"))
         fill_memory(self);
+    else if (!strcmp(name, "threads"))
+        start_threads(self);
     else if (!strcmp(name, "disk"))
         fill_disk(self);
     else if (!strcmp(name, "descriptors"))
