@@ -178,6 +178,78 @@ TEST_F(Vivid, ColourBarsHaveTheCorrectColours) {
     }
 }
 
+// Returns the colour of a pixel of a frame without row padding.
+std::array<double, 3> colour_at(const arhost_frame_format &format, const std::vector<std::uint8_t> &bytes,
+                                std::size_t x, std::size_t y) {
+    const std::size_t width = format.width, size = width * format.height;
+    const auto yuv = [&](double luma, double u, double v) {
+        return rgb_of(luma, u, v, 0.299, 0.114, format.yuv_range == ARHOST_YUV_RANGE_FULL);
+    };
+    switch (format.pixel_format) {
+    case ARHOST_PIXEL_FORMAT_YUYV: {
+        const std::uint8_t *pair = &bytes[2 * (y * width + x / 2 * 2)];
+        return yuv(pair[0], pair[1], pair[3]);
+    }
+    case ARHOST_PIXEL_FORMAT_NV12: {
+        const std::uint8_t *chroma = &bytes[size + y / 2 * width + x / 2 * 2];
+        return yuv(bytes[y * width + x], chroma[0], chroma[1]);
+    }
+    case ARHOST_PIXEL_FORMAT_I420: {
+        const std::size_t chroma = size + y / 2 * (width / 2) + x / 2;
+        return yuv(bytes[y * width + x], bytes[chroma], bytes[chroma + size / 4]);
+    }
+    case ARHOST_PIXEL_FORMAT_RGB8: {
+        const std::uint8_t *rgb = &bytes[3 * (y * width + x)];
+        return {double(rgb[0]), double(rgb[1]), double(rgb[2])};
+    }
+    case ARHOST_PIXEL_FORMAT_BGR8: {
+        const std::uint8_t *bgr = &bytes[3 * (y * width + x)];
+        return {double(bgr[2]), double(bgr[1]), double(bgr[0])};
+    }
+    default: // GREY8
+        return {double(bytes[y * width + x]), double(bytes[y * width + x]), double(bytes[y * width + x])};
+    }
+}
+
+TEST_F(Vivid, DeliversEveryUncompressedFormat) {
+    const std::array<std::array<int, 3>, 8> bars = {{{255, 255, 255},
+                                                     {255, 255, 0},
+                                                     {0, 255, 255},
+                                                     {0, 255, 0},
+                                                     {255, 0, 255},
+                                                     {255, 0, 0},
+                                                     {0, 0, 255},
+                                                     {0, 0, 0}}};
+    const std::vector<std::pair<std::string, arhost_pixel_format>> formats = {
+        {"yuyv", ARHOST_PIXEL_FORMAT_YUYV},  {"uyvy", ARHOST_PIXEL_FORMAT_YUYV},
+        {"nv12", ARHOST_PIXEL_FORMAT_NV12},  {"yuv420", ARHOST_PIXEL_FORMAT_I420},
+        {"rgb24", ARHOST_PIXEL_FORMAT_RGB8}, {"bgr24", ARHOST_PIXEL_FORMAT_BGR8},
+        {"grey", ARHOST_PIXEL_FORMAT_GREY8}, {"y10", ARHOST_PIXEL_FORMAT_GREY8},
+        {"y12", ARHOST_PIXEL_FORMAT_GREY8},  {"y16", ARHOST_PIXEL_FORMAT_GREY8}};
+    for (const auto &[name, delivered] : formats) {
+        SCOPED_TRACE(name);
+        ASSERT_EQ(start(60, {{"format", name}}), ARHOST_STATUS_OK) << source_.log();
+        EXPECT_EQ(source_.format().pixel_format, delivered);
+        const SourceFrame frame = source_.read(0);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+        const auto colour = [&](std::size_t bar, std::size_t y) {
+            return colour_at(source_.format(), frame.bytes, bar * 40 + 20, y);
+        };
+        for (const std::size_t y : {5u, 90u, 174u})
+            for (std::size_t bar = 0; bar < 8; ++bar) {
+                if (delivered != ARHOST_PIXEL_FORMAT_GREY8) {
+                    for (std::size_t i = 0; i < 3; ++i)
+                        EXPECT_NEAR(colour(bar, y)[i], bars[bar][i], 4) << "bar " << bar << ", row " << y;
+                    continue;
+                }
+                const double luma = 0.2126 * bars[bar][0] + 0.7152 * bars[bar][1] + 0.0722 * bars[bar][2];
+                EXPECT_NEAR(colour(bar, y)[0], luma, 3) << "bar " << bar << ", row " << y;
+            }
+        EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
+        source_.stop();
+    }
+}
+
 TEST_F(Vivid, StampsFramesWithTheMonotonicClock) {
     ASSERT_EQ(start(30), ARHOST_STATUS_OK) << source_.log();
     std::int64_t last = 0;
