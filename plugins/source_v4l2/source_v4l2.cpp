@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // source_v4l2: captures frames from Video4Linux devices (USB and built-in cameras, capture cards).
+#include "controls.hpp"
 #include "device.hpp"
 #include "jpeg.hpp"
 #include "pixels.hpp"
@@ -47,6 +48,24 @@ bool offers(const CaptureFormat &format, const Size &size) {
            });
 }
 
+// An option that sets a frequent control, which has an automatic mode.
+struct ControlOption {
+    const char *name;
+    std::uint32_t value_id;
+    std::uint32_t mode_id;                       // of the control that switches the automatic mode on or off
+    std::vector<std::int64_t> automatic, manual; // values of the mode, in the order of preference
+};
+const ControlOption control_options[] = {
+    {"exposure",
+     V4L2_CID_EXPOSURE_ABSOLUTE,
+     V4L2_CID_EXPOSURE_AUTO,
+     {V4L2_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
+     {V4L2_EXPOSURE_MANUAL, V4L2_EXPOSURE_SHUTTER_PRIORITY}},
+    {"gain", V4L2_CID_GAIN, V4L2_CID_AUTOGAIN, {1}, {0}},
+    {"focus", V4L2_CID_FOCUS_ABSOLUTE, V4L2_CID_FOCUS_AUTO, {1}, {0}},
+    {"white_balance", V4L2_CID_WHITE_BALANCE_TEMPERATURE, V4L2_CID_AUTO_WHITE_BALANCE, {1}, {0}},
+};
+
 std::int64_t clock_ns(clockid_t clock) {
     timespec time{};
     clock_gettime(clock, &time);
@@ -59,16 +78,21 @@ public:
         : host_(host),
           path_(options.text("device")), configured_size_{static_cast<std::uint32_t>(options.integer("width")),
                                                           static_cast<std::uint32_t>(options.integer("height"))},
-          format_option_(options.text("format")),
+          format_option_(options.text("format")), controls_option_(options.text("controls")),
+          power_line_option_(options.text("power_line_frequency")),
           buffer_count_(static_cast<std::uint32_t>(options.integer("buffers"))) {
         if ((configured_size_.width == 0) != (configured_size_.height == 0))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: set both or neither");
+        for (const ControlOption &option : control_options)
+            if (const std::string text = options.text(option.name); !text.empty())
+                control_values_.emplace_back(&option, text);
     }
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
         newest_only_ = setup.paced != 0;
         device_.emplace(path_);
         camera_ = set_format(setup);
+        set_controls();
         const double fps = device_->set_fps(setup.fps);
         const Size size{camera_.width, camera_.height};
         const std::string mode = arhost::fourcc_text(camera_.fourcc) + " " + size.text();
@@ -154,6 +178,39 @@ private:
             !defect.empty())
             throw Failure(ARHOST_STATUS_ERROR_IO, camera + " has a defective driver: " + defect);
         return set;
+    }
+
+    // Sets the controls before the stream starts, so that the first frame has them.
+    void set_controls() const {
+        const arhost::Controls controls(*device_);
+        const auto warn = [&](const std::string &warning) {
+            if (!warning.empty())
+                host_.warn(warning);
+        };
+        const auto set = [&](std::uint32_t id, const std::string &text, const std::string &key) {
+            const arhost::Control *control = controls.find(id);
+            if (!control)
+                controls.fail_missing(key, key);
+            warn(controls.set(*control, text, key));
+        };
+        for (const auto &[option, text] : control_values_) {
+            const bool is_automatic = text == "auto";
+            if (const arhost::Control *mode = controls.find(option->mode_id)) {
+                for (const std::int64_t value : is_automatic ? option->automatic : option->manual)
+                    if (mode->items.empty() || mode->items.contains(value)) {
+                        warn(controls.set(*mode, std::to_string(value), option->name));
+                        break;
+                    }
+            } else if (is_automatic) {
+                controls.fail_missing(std::string("auto ") + option->name, option->name);
+            }
+            if (!is_automatic)
+                set(option->value_id, text, option->name);
+        }
+        if (!power_line_option_.empty())
+            set(V4L2_CID_POWER_LINE_FREQUENCY, power_line_option_, "power_line_frequency");
+        for (const std::string &warning : controls.set_list(controls_option_, "controls"))
+            warn(warning);
     }
 
     // Returns the formats that the camera offers and the option `format` permits, in the order of preference.
@@ -289,8 +346,9 @@ private:
     arhost::Host host_;
     std::string path_;
     Size configured_size_; // 0×0: use the size of the calibration or the driver
-    std::string format_option_;
+    std::string format_option_, controls_option_, power_line_option_;
     std::uint32_t buffer_count_;
+    std::vector<std::pair<const ControlOption *, std::string>> control_values_; // of the options that are set
 
     std::optional<CaptureDevice> device_;
     std::optional<CaptureStream> stream_; // declared after device_, because it must be destroyed first
@@ -318,6 +376,14 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "format", "auto",
            "Pixel format of the camera; auto: uncompressed if that is fast enough, otherwise mjpeg.", 0, 0, formats),
     option(ARHOST_OPTION_INTEGER, "buffers", "4", "Number of driver buffers.", 2, 32),
+    option(ARHOST_OPTION_TEXT, "exposure", "", "Exposure time in units of 100 µs, or auto; empty: unchanged."),
+    option(ARHOST_OPTION_TEXT, "gain", "", "Gain in units of the camera, or auto; empty: unchanged."),
+    option(ARHOST_OPTION_TEXT, "focus", "", "Focus in units of the camera, or auto; empty: unchanged."),
+    option(ARHOST_OPTION_TEXT, "white_balance", "", "Colour temperature in K, or auto; empty: unchanged."),
+    option(ARHOST_OPTION_TEXT, "power_line_frequency", "",
+           "Frequency of the lamps, to avoid flicker: disabled, 50_hz, 60_hz or auto; empty: unchanged."),
+    option(ARHOST_OPTION_TEXT, "controls", "",
+           "Further controls by the names that v4l2-ctl -l lists: 'sharpness=3, backlight_compensation=1'."),
 };
 constexpr const char *needs[] = {"video", nullptr};
 

@@ -74,6 +74,11 @@ protected:
         controls.controls = &control;
         ASSERT_EQ(ioctl(fd_, VIDIOC_S_EXT_CTRLS, &controls), 0) << "control " << std::hex << id;
     }
+    int get(std::uint32_t id) const {
+        v4l2_control control{id, 0};
+        EXPECT_EQ(ioctl(fd_, VIDIOC_G_CTRL, &control), 0) << "control " << std::hex << id;
+        return control.value;
+    }
     // Captures small pictures by default, because the virtual machine is emulated and slow.
     arhost_status start(double fps = 60, std::map<std::string, std::string> options = {}, bool live = true) {
         options.try_emplace("device", device);
@@ -384,6 +389,45 @@ TEST_F(Vivid, WarnsAboutAnUnreachableRate) {
     ASSERT_EQ(start(120), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(source_.format().fps, 60.0);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_WARNING), HasSubstr("not the configured"));
+}
+
+TEST_F(Vivid, SetsControlsByName) {
+    ASSERT_EQ(
+        start(30, {{"gain", "77"},
+                   {"controls", "brightness=200, contrast = 90,boolean=true, menu=menu_item_3, test_pattern=1"}}),
+        ARHOST_STATUS_OK)
+        << source_.log();
+    EXPECT_EQ(get(V4L2_CID_AUTOGAIN), 0);
+    EXPECT_EQ(get(V4L2_CID_GAIN), 77);
+    EXPECT_EQ(get(V4L2_CID_BRIGHTNESS), 200);
+    EXPECT_EQ(get(V4L2_CID_CONTRAST), 90);
+    EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
+    ASSERT_EQ(start(30, {{"gain", "auto"}, {"controls", "brightness=128, contrast=128"}}), ARHOST_STATUS_OK)
+        << source_.log();
+    EXPECT_EQ(get(V4L2_CID_AUTOGAIN), 1);
+}
+
+TEST_F(Vivid, RejectsControlsThatItDoesNotHave) {
+    EXPECT_EQ(start(30, {{"controls", "brightnes=3"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(
+        source_.log(ARHOST_SEVERITY_ERROR),
+        HasSubstr("controls: the camera '/dev/video0' (vivid) has no control 'brightnes'; it has: brightness, "
+                  "contrast, "));
+    EXPECT_EQ(start(30, {{"focus", "auto"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("focus: the camera"));
+}
+
+TEST_F(Vivid, RejectsValuesOutsideTheRangeOfAControl) {
+    EXPECT_EQ(start(30, {{"gain", "300"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("does not accept '300' for 'gain'; valid: 0 to 255"));
+    EXPECT_EQ(start(30, {{"controls", "menu=9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR),
+                HasSubstr("does not accept '9' for 'menu'; valid: 1 (menu_item_1), "));
+    EXPECT_EQ(start(30, {{"controls", "boolean=maybe"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("valid: true or false"));
+    EXPECT_EQ(start(30, {{"controls", "brightness"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("'brightness' is not of the form NAME=VALUE"));
+    EXPECT_EQ(start(30, {{"controls", "bitmask=4, brightness=7x"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
 }
 
 TEST_F(Vivid, ReportsACameraInUse) {
