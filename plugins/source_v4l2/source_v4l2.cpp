@@ -72,6 +72,27 @@ std::int64_t clock_ns(clockid_t clock) {
     return time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec;
 }
 
+// Frames that were not delivered, by cause.
+struct Losses {
+    std::uint64_t driver = 0;     // missing in the driver's sequence numbers
+    std::uint64_t marked = 0;     // marked as damaged by the driver
+    std::uint64_t damaged = 0;    // truncated, or impossible to decode
+    std::uint64_t superseded = 0; // replaced by a newer frame in live mode
+
+    std::string text() const {
+        std::string list;
+        const auto add = [&](std::uint64_t count, const char *cause) {
+            if (count > 0)
+                list += (list.empty() ? "" : ", ") + std::to_string(count) + " " + cause;
+        };
+        add(driver, "lost by the driver");
+        add(marked, "marked as damaged by the driver");
+        add(damaged, "truncated or undecodable");
+        add(superseded, "replaced by newer ones");
+        return list;
+    }
+};
+
 class V4l2Source {
 public:
     V4l2Source(const arhost::Host &host, const arhost::Options &options)
@@ -128,6 +149,7 @@ public:
             stream_->queue(captured->index);
             if (!good) {
                 ++dropped_;
+                ++losses_.damaged;
                 continue;
             }
             info.clock = ARHOST_CLOCK_MONOTONIC;
@@ -138,6 +160,9 @@ public:
     }
 
     void stop() {
+        if (const std::string text = losses_.text(); !text.empty())
+            host_.info("frames of the camera that were not delivered: " + text);
+        losses_ = {};
         stream_.reset();
         device_.reset();
     }
@@ -284,11 +309,13 @@ private:
                 if (captured->flags & V4L2_BUF_FLAG_ERROR) {
                     stream_->queue(captured->index);
                     ++dropped_;
+                    ++losses_.marked;
                     continue;
                 }
                 if (found) {
                     stream_->queue(found->index);
                     ++dropped_;
+                    ++losses_.superseded;
                 }
                 found = std::move(captured);
                 if (!newest_only_)
@@ -333,8 +360,10 @@ private:
         std::uint32_t skipped = dropped_;
         if (last_sequence_) {
             const std::uint32_t gap = sequence - *last_sequence_ - 1;
-            if (gap < 1'000'000) // a larger gap means that the counter was reset
-                skipped = std::max(skipped, gap);
+            if (gap < 1'000'000 && gap > skipped) { // a larger gap means that the counter was reset
+                losses_.driver += gap - skipped;
+                skipped = gap;
+            }
         } else {
             skipped = 0; // frames before the first delivered one do not count
         }
@@ -357,6 +386,7 @@ private:
     PictureFormat camera_;
     std::optional<std::uint32_t> last_sequence_;
     std::uint32_t dropped_ = 0; // frames dropped since the last delivered frame
+    Losses losses_;
     std::int64_t last_ns_ = 0;
     bool clock_reported_ = false;
     std::string fault_; // what was wrong with the last damaged picture

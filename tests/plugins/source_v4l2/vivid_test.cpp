@@ -310,6 +310,8 @@ TEST_F(Vivid, CountsFramesDroppedByTheDriver) {
     EXPECT_GT(skipped, 5u);
     // At 50 fps, a frame takes 20 ms. The delivered and the skipped frames together must match the elapsed time.
     EXPECT_NEAR(static_cast<double>(last - first) / 20e6, static_cast<double>(29 + skipped), 3);
+    source_.stop();
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_INFO), HasSubstr(" lost by the driver"));
 }
 
 TEST_F(Vivid, DropsFramesMarkedAsDamaged) {
@@ -323,6 +325,9 @@ TEST_F(Vivid, DropsFramesMarkedAsDamaged) {
         skipped += frame.info.skipped;
     }
     EXPECT_GE(skipped, 1u);
+    source_.stop();
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_INFO), HasSubstr("not delivered: "));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_INFO), HasSubstr("1 marked as damaged by the driver"));
 }
 
 TEST_F(Vivid, DeliversThreeHundredFramesWithoutLeaks) {
