@@ -2,6 +2,7 @@
 //
 // Captures from vivid, the kernel's virtual camera, and makes vivid inject faults. To be run in a virtual machine:
 //   tools/vm/run-in-vm -m "vivid n_devs=1 node_types=0x1" …/source_v4l2-vivid-test
+#include "../../system/arhost_run.hpp"
 #include "../source_file/source_under_test.hpp"
 
 #include <gmock/gmock.h>
@@ -447,6 +448,55 @@ TEST_F(Vivid, ReportsACameraInUse) {
 TEST_F(Vivid, ListsCamerasIfTheConfiguredOneIsMissing) {
     EXPECT_EQ(start(30, {{"device", "/dev/video9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("/dev/video0 (vivid-000-vid-cap)"));
+}
+
+// As udev creates them; they name the camera even if its node gets another number.
+TEST_F(Vivid, IsFoundByALinkInTheSandbox) {
+    fs::create_directories("/dev/v4l/by-id");
+    fs::create_symlink("../../video0", "/dev/v4l/by-id/usb-vivid-index0");
+    arhost::test::ArhostRun run("version: 1\nsource: {plugin: source_v4l2, allow: [video], options: {device: "
+                                "/dev/v4l/by-id/usb-vivid-index0, width: 320, height: 180}}\n"
+                                "outputs: [{plugin: sink_null}]\n");
+    EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("320×180"));
+    fs::remove_all("/dev/v4l");
+}
+
+// A camera that is unplugged comes back as another node.
+TEST_F(Vivid, ComesBackUnderAnotherNumber) {
+    const char *const other = "/dev/video1";
+    if (!fs::exists(other))
+        GTEST_SKIP() << "needs two cameras: -m \"vivid n_devs=2 node_types=0x1,0x1\"";
+    const fs::path link = "/dev/v4l/by-id/usb-vivid-index0";
+    fs::create_directories(link.parent_path());
+    fs::create_symlink("../../video0", link);
+    arhost::test::ArhostRun run("version: 1\nmode: live\n"
+                                "source: {plugin: source_v4l2, allow: [video], fps: 30, options: {device: " +
+                                link.string() +
+                                ", width: 320, height: 180}}\ncamera: {width: 320, height: 180, fx: 300}\n"
+                                "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+                                "outputs: [{plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n");
+    run.start({"run.yaml", "--allow-no-target"});
+    const auto frames = [&] {
+        const std::string text = run.exists("out/poses.jsonl") ? run.read("out/poses.jsonl") : "";
+        return std::count(text.begin(), text.end(), '\n');
+    };
+    const auto wait_for = [&](std::ptrdiff_t count) {
+        for (int i = 0; run.running() && frames() < count && i < 3000; ++i)
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        return frames() >= count;
+    };
+    ASSERT_TRUE(wait_for(20)) << run.output();
+    fs::remove(link);
+    fs::create_symlink("../../video1", link);
+    set(disconnect, 1);
+    const std::ptrdiff_t before = frames();
+    EXPECT_TRUE(wait_for(before + 60)) << run.output();
+    arhost::test::send_signal(run.pid(), SIGINT);
+    run.wait();
+    EXPECT_THAT(run.output(), HasSubstr("was it unplugged?"));
+    EXPECT_GE(run.stats()["restarts"]["source"], 1);
+    fs::remove_all("/dev/v4l");
 }
 
 TEST_F(Vivid, StopsWaitingWhenCancelled) {
