@@ -61,7 +61,7 @@ struct Allowance {
 };
 constexpr Allowance granted[] = {
     {"video",
-     {"/sys/class/video4linux", "/sys/devices", "/sys/dev/char"},
+     {"/sys/class/video4linux", "/sys/devices", "/sys/dev/char", "/dev/v4l"}, // links to the nodes, by serial number
      {"/dev/video*", "/dev/media*", "/dev/v4l-subdev*"}},
     {"usb", {"/sys/bus/usb", "/sys/devices", "/sys/class", "/run/udev/data"}, {"/dev/bus/usb"}},
     {"gpu", gpu_readable, gpu_devices},

@@ -84,10 +84,10 @@ double fastest(int fd, std::uint32_t fourcc, std::uint32_t width, std::uint32_t 
     return fps;
 }
 
-std::vector<CaptureFormat> list_formats(int fd) {
+std::vector<CaptureFormat> list_formats(int fd, v4l2_buf_type buffer_type) {
     std::vector<CaptureFormat> formats;
     v4l2_fmtdesc description{};
-    description.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    description.type = buffer_type;
     for (; retried_ioctl(fd, VIDIOC_ENUM_FMT, &description) == 0; ++description.index) {
         CaptureFormat format;
         format.fourcc = description.pixelformat;
@@ -110,6 +110,45 @@ std::vector<CaptureFormat> list_formats(int fd) {
     }
     return formats;
 }
+
+PictureFormat picture_format(const v4l2_format &format) {
+    const auto copy = [](const auto &pixels) {
+        return PictureFormat{pixels.pixelformat,
+                             pixels.width,
+                             pixels.height,
+                             pixels.colorspace,
+                             pixels.ycbcr_enc,
+                             pixels.quantization,
+                             {}};
+    };
+    if (format.type == V4L2_BUF_TYPE_VIDEO_CAPTURE) {
+        PictureFormat picture = copy(format.fmt.pix);
+        picture.strides = {format.fmt.pix.bytesperline};
+        return picture;
+    }
+    PictureFormat picture = copy(format.fmt.pix_mp);
+    for (std::size_t p = 0; p < std::min<std::size_t>(format.fmt.pix_mp.num_planes, VIDEO_MAX_PLANES); ++p)
+        picture.strides.push_back(format.fmt.pix_mp.plane_fmt[p].bytesperline);
+    return picture;
+}
+
+// A v4l2_buffer and, for the multi-planar API, the planes that it refers to.
+struct Buffer {
+    Buffer(const CaptureDevice &device, std::uint32_t index) {
+        info.type = device.buffer_type();
+        info.memory = V4L2_MEMORY_MMAP;
+        info.index = index;
+        if (device.is_multiplanar()) {
+            info.m.planes = planes;
+            info.length = VIDEO_MAX_PLANES;
+        }
+    }
+    Buffer(const Buffer &) = delete;
+    Buffer &operator=(const Buffer &) = delete;
+
+    v4l2_buffer info{};
+    v4l2_plane planes[VIDEO_MAX_PLANES] = {};
+};
 
 } // namespace
 
@@ -149,16 +188,16 @@ CaptureDevice::CaptureDevice(const std::string &path)
     card_ = reinterpret_cast<const char *>(capability.card);
     const std::uint32_t able =
         capability.capabilities & V4L2_CAP_DEVICE_CAPS ? capability.device_caps : capability.capabilities;
-    if (!(able & V4L2_CAP_VIDEO_CAPTURE) || !(able & V4L2_CAP_STREAMING))
+    if (!(able & V4L2_CAP_VIDEO_CAPTURE))
+        buffer_type_ = V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE;
+    if (!(able & (V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_VIDEO_CAPTURE_MPLANE)) || !(able & V4L2_CAP_STREAMING))
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "device: '" + path + "' (" + card_ + ") does not capture pictures" +
                           (able & V4L2_CAP_META_CAPTURE ? " (it delivers metadata; the camera itself is "
                                                           "usually the node with the next lower number)"
-                           : able & V4L2_CAP_VIDEO_CAPTURE_MPLANE
-                               ? " in single-plane formats; multi-planar ones are unsupported"
-                               : "") +
+                                                        : "") +
                           "; " + other_devices());
-    formats_ = list_formats(fd_.get());
+    formats_ = list_formats(fd_.get(), buffer_type_);
 }
 
 int CaptureDevice::control(unsigned long request, void *argument) const {
@@ -219,30 +258,42 @@ std::string CaptureDevice::describe_sizes_near(const CaptureFormat &format, std:
     return text;
 }
 
-v4l2_format CaptureDevice::current_format() const {
+v4l2_format CaptureDevice::query_format() const {
     v4l2_format format{};
-    format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    format.type = buffer_type_;
     if (const int error = control(VIDIOC_G_FMT, &format))
         fail("querying its format", error);
     return format;
 }
 
-v4l2_format CaptureDevice::set_format(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height) {
-    v4l2_format format = current_format();
-    format.fmt.pix.width = width;
-    format.fmt.pix.height = height;
-    format.fmt.pix.pixelformat = fourcc;
-    format.fmt.pix.field = V4L2_FIELD_NONE;
-    format.fmt.pix.bytesperline = 0; // the driver chooses it
-    format.fmt.pix.sizeimage = 0;
+PictureFormat CaptureDevice::current_format() const {
+    return picture_format(query_format());
+}
+
+PictureFormat CaptureDevice::set_format(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height) {
+    v4l2_format format = query_format();
+    const auto set = [&](auto &pixels) {
+        pixels.width = width;
+        pixels.height = height;
+        pixels.pixelformat = fourcc;
+        pixels.field = V4L2_FIELD_NONE;
+    };
+    if (is_multiplanar()) {
+        set(format.fmt.pix_mp);
+        std::fill(std::begin(format.fmt.pix_mp.plane_fmt), std::end(format.fmt.pix_mp.plane_fmt),
+                  v4l2_plane_pix_format{}); // the driver chooses strides and sizes
+    } else {
+        set(format.fmt.pix);
+        format.fmt.pix.bytesperline = format.fmt.pix.sizeimage = 0;
+    }
     if (const int error = control(VIDIOC_S_FMT, &format))
         fail("setting the format " + fourcc_text(fourcc) + " " + size_text(width, height), error);
-    return format;
+    return picture_format(format);
 }
 
 double CaptureDevice::set_fps(double fps) {
     v4l2_streamparm parameters{};
-    parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    parameters.type = buffer_type_;
     if (control(VIDIOC_G_PARM, &parameters) != 0)
         return 0;
     v4l2_fract &interval = parameters.parm.capture.timeperframe;
@@ -256,38 +307,42 @@ double CaptureDevice::set_fps(double fps) {
 
 CaptureStream::CaptureStream(const CaptureDevice &device, std::uint32_t buffer_count) : device_(device) {
     v4l2_requestbuffers request{};
-    request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    request.type = device_.buffer_type();
     request.memory = V4L2_MEMORY_MMAP;
     request.count = buffer_count;
     if (const int error = device_.control(VIDIOC_REQBUFS, &request))
         device_.fail("reserving " + std::to_string(buffer_count) + " buffers", error);
     for (std::uint32_t i = 0; i < request.count; ++i) {
-        v4l2_buffer buffer{};
-        buffer.type = request.type;
-        buffer.memory = request.memory;
-        buffer.index = i;
-        if (const int error = device_.control(VIDIOC_QUERYBUF, &buffer))
+        Buffer buffer(device_, i);
+        if (const int error = device_.control(VIDIOC_QUERYBUF, &buffer.info))
             device_.fail("querying a buffer", error);
-        void *address =
-            mmap(nullptr, buffer.length, PROT_READ | PROT_WRITE, MAP_SHARED, device_.fd(), buffer.m.offset);
-        if (address == MAP_FAILED)
-            device_.fail("mapping a buffer", errno);
-        mappings_.emplace_back(address, buffer.length);
+        std::vector<Mapping> &planes = mappings_.emplace_back();
+        const auto map = [&](std::size_t size, std::uint32_t offset) {
+            void *address = mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED, device_.fd(), offset);
+            if (address == MAP_FAILED)
+                device_.fail("mapping a buffer", errno);
+            planes.emplace_back(address, size);
+        };
+        if (!device_.is_multiplanar())
+            map(buffer.info.length, buffer.info.m.offset);
+        else
+            for (std::uint32_t p = 0; p < std::min<std::uint32_t>(buffer.info.length, VIDEO_MAX_PLANES); ++p)
+                map(buffer.planes[p].length, buffer.planes[p].m.mem_offset);
     }
     for (std::uint32_t i = 0; i < mappings_.size(); ++i)
         queue(i);
-    int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    int type = device_.buffer_type();
     if (const int error = device_.control(VIDIOC_STREAMON, &type))
         device_.fail("starting the stream", error);
 }
 
 CaptureStream::~CaptureStream() {
     // Both calls may fail after the camera was unplugged. In that case, closing the device frees the buffers.
-    int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    int type = device_.buffer_type();
     device_.control(VIDIOC_STREAMOFF, &type);
     mappings_.clear(); // must happen before freeing the buffers
     v4l2_requestbuffers none{};
-    none.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    none.type = device_.buffer_type();
     none.memory = V4L2_MEMORY_MMAP;
     device_.control(VIDIOC_REQBUFS, &none);
 }
@@ -298,34 +353,36 @@ CaptureStream::Mapping::~Mapping() {
 }
 
 void CaptureStream::queue(std::uint32_t index) const {
-    v4l2_buffer buffer{};
-    buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    buffer.memory = V4L2_MEMORY_MMAP;
-    buffer.index = index;
-    if (const int error = device_.control(VIDIOC_QBUF, &buffer))
+    Buffer buffer(device_, index);
+    if (device_.is_multiplanar())
+        buffer.info.length = static_cast<std::uint32_t>(mappings_[index].size());
+    if (const int error = device_.control(VIDIOC_QBUF, &buffer.info))
         device_.fail("queueing a buffer", error);
 }
 
-std::span<const std::uint8_t> CaptureStream::bytes(const v4l2_buffer &buffer) const {
-    const Mapping &mapping = mappings_[buffer.index];
-    return {static_cast<const std::uint8_t *>(mapping.address),
-            std::min<std::size_t>(buffer.bytesused, mapping.size)};
-}
-
-std::optional<v4l2_buffer> CaptureStream::dequeue() const {
-    v4l2_buffer buffer{};
-    buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-    buffer.memory = V4L2_MEMORY_MMAP;
-    const int error = device_.control(VIDIOC_DQBUF, &buffer);
+std::optional<Capture> CaptureStream::dequeue() const {
+    Buffer buffer(device_, 0);
+    const int error = device_.control(VIDIOC_DQBUF, &buffer.info);
     if (error == EAGAIN)
         return std::nullopt;
     if (error == EIO)
         fail_stopped();
     if (error != 0)
         device_.fail("capturing", error);
-    if (buffer.index >= mappings_.size())
+    const v4l2_buffer &info = buffer.info;
+    if (info.index >= mappings_.size())
         device_.fail("capturing (the driver returned an invalid buffer index)", EPROTO);
-    return buffer;
+    Capture capture{info.index, info.flags, info.sequence, info.timestamp, {}};
+    const std::vector<Mapping> &planes = mappings_[info.index];
+    for (std::size_t p = 0; p < planes.size(); ++p) {
+        // In the multi-planar API, the number of used bytes includes the data before the offset.
+        const std::size_t end = std::min<std::size_t>(
+            device_.is_multiplanar() ? buffer.planes[p].bytesused : info.bytesused, planes[p].size);
+        const std::size_t begin =
+            std::min<std::size_t>(device_.is_multiplanar() ? buffer.planes[p].data_offset : 0, end);
+        capture.planes.emplace_back(static_cast<const std::uint8_t *>(planes[p].address) + begin, end - begin);
+    }
+    return capture;
 }
 
 void CaptureStream::fail_stopped() const {

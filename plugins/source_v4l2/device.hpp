@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A V4L2 capture device: its formats and its stream of memory-mapped buffers. Functions that fail throw Failure with
-// a message for the user.
+// A V4L2 capture device: its formats and its stream of memory-mapped buffers, through the single- or the multi-planar
+// API. Functions that fail throw Failure with a message for the user.
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
@@ -44,6 +44,20 @@ struct CaptureFormat {
     bool any_size = false; // any size in the range is available
 };
 
+// The format that a camera is set to.
+struct PictureFormat {
+    std::uint32_t fourcc = 0, width = 0, height = 0;
+    std::uint32_t colour_space = 0, ycbcr_encoding = 0, quantization = 0; // V4L2's constants
+    std::vector<std::uint32_t> strides; // bytes per row in each plane of memory; the single-planar API has one
+};
+
+// A filled buffer.
+struct Capture {
+    std::uint32_t index = 0, flags = 0, sequence = 0;
+    timeval time{};
+    std::vector<std::span<const std::uint8_t>> planes; // of memory; as many bytes as the driver reported
+};
+
 std::string fourcc_text(std::uint32_t fourcc); // such as "YUYV"
 
 class CaptureDevice {
@@ -59,8 +73,8 @@ public:
     std::string describe_formats() const; // such as "YUYV (640×480 30 fps, …), MJPG (…)"
     std::string describe_sizes_near(const CaptureFormat &format, std::uint32_t width, std::uint32_t height) const;
 
-    v4l2_format current_format() const;
-    v4l2_format set_format(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height);
+    PictureFormat current_format() const;
+    PictureFormat set_format(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height);
     double set_fps(double fps); // 0 keeps the current rate. Returns the resulting rate; 0: unknown
 
     // Calls ioctl and repeats it on EINTR. Returns 0 or an errno value.
@@ -68,9 +82,14 @@ public:
     // Throws Failure for the errno value `error`, which occurred while `what` ("querying its format").
     [[noreturn]] void fail(const std::string &what, int error) const;
     int fd() const { return fd_.get(); }
+    v4l2_buf_type buffer_type() const { return buffer_type_; }
+    bool is_multiplanar() const { return buffer_type_ == V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE; }
 
 private:
+    v4l2_format query_format() const;
+
     std::string path_, card_;
+    v4l2_buf_type buffer_type_ = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     FileDescriptor fd_;
     std::vector<CaptureFormat> formats_;
 };
@@ -83,9 +102,8 @@ public:
     CaptureStream &operator=(const CaptureStream &) = delete;
 
     // Returns the oldest filled buffer, or std::nullopt if there is none. The caller must queue the buffer again.
-    std::optional<v4l2_buffer> dequeue() const;
+    std::optional<Capture> dequeue() const;
     void queue(std::uint32_t index) const;
-    std::span<const std::uint8_t> bytes(const v4l2_buffer &buffer) const; // as many bytes as the driver reported
     // Waits for a frame. Returns false on timeout.
     bool wait(int timeout_ms) const;
 
@@ -100,7 +118,7 @@ private:
     [[noreturn]] void fail_stopped() const;
 
     const CaptureDevice &device_;
-    std::vector<Mapping> mappings_;
+    std::vector<std::vector<Mapping>> mappings_; // of each buffer, of each plane
 };
 
 } // namespace arhost

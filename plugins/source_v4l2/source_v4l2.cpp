@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // source_v4l2: captures frames from Video4Linux devices (USB and built-in cameras, capture cards).
+#include "controls.hpp"
 #include "device.hpp"
 #include "jpeg.hpp"
+#include "pixels.hpp"
 
 #include <algorithm>
 #include <array>
@@ -14,13 +16,16 @@
 #include <iterator>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace {
 
+using arhost::Capture;
 using arhost::CaptureDevice;
 using arhost::CaptureFormat;
 using arhost::CaptureStream;
 using arhost::Failure;
+using arhost::PictureFormat;
 using Clock = std::chrono::steady_clock;
 
 // A camera that delivers no intact frame for this long is reported as lost.
@@ -43,11 +48,50 @@ bool offers(const CaptureFormat &format, const Size &size) {
            });
 }
 
+// An option that sets a frequent control, which has an automatic mode.
+struct ControlOption {
+    const char *name;
+    std::uint32_t value_id;
+    std::uint32_t mode_id;                       // of the control that switches the automatic mode on or off
+    std::vector<std::int64_t> automatic, manual; // values of the mode, in the order of preference
+};
+const ControlOption control_options[] = {
+    {"exposure",
+     V4L2_CID_EXPOSURE_ABSOLUTE,
+     V4L2_CID_EXPOSURE_AUTO,
+     {V4L2_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
+     {V4L2_EXPOSURE_MANUAL, V4L2_EXPOSURE_SHUTTER_PRIORITY}},
+    {"gain", V4L2_CID_GAIN, V4L2_CID_AUTOGAIN, {1}, {0}},
+    {"focus", V4L2_CID_FOCUS_ABSOLUTE, V4L2_CID_FOCUS_AUTO, {1}, {0}},
+    {"white_balance", V4L2_CID_WHITE_BALANCE_TEMPERATURE, V4L2_CID_AUTO_WHITE_BALANCE, {1}, {0}},
+};
+
 std::int64_t clock_ns(clockid_t clock) {
     timespec time{};
     clock_gettime(clock, &time);
     return time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec;
 }
+
+// Frames that were not delivered, by cause.
+struct Losses {
+    std::uint64_t driver = 0;     // missing in the driver's sequence numbers
+    std::uint64_t marked = 0;     // marked as damaged by the driver
+    std::uint64_t damaged = 0;    // truncated, or impossible to decode
+    std::uint64_t superseded = 0; // replaced by a newer frame in live mode
+
+    std::string text() const {
+        std::string list;
+        const auto add = [&](std::uint64_t count, const char *cause) {
+            if (count > 0)
+                list += (list.empty() ? "" : ", ") + std::to_string(count) + " " + cause;
+        };
+        add(driver, "lost by the driver");
+        add(marked, "marked as damaged by the driver");
+        add(damaged, "truncated or undecodable");
+        add(superseded, "replaced by newer ones");
+        return list;
+    }
+};
 
 class V4l2Source {
 public:
@@ -55,19 +99,24 @@ public:
         : host_(host),
           path_(options.text("device")), configured_size_{static_cast<std::uint32_t>(options.integer("width")),
                                                           static_cast<std::uint32_t>(options.integer("height"))},
-          format_option_(options.text("format")),
+          format_option_(options.text("format")), controls_option_(options.text("controls")),
+          power_line_option_(options.text("power_line_frequency")),
           buffer_count_(static_cast<std::uint32_t>(options.integer("buffers"))) {
         if ((configured_size_.width == 0) != (configured_size_.height == 0))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: set both or neither");
+        for (const ControlOption &option : control_options)
+            if (const std::string text = options.text(option.name); !text.empty())
+                control_values_.emplace_back(&option, text);
     }
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
         newest_only_ = setup.paced != 0;
         device_.emplace(path_);
-        const v4l2_pix_format pixels = set_format(setup);
+        camera_ = set_format(setup);
+        set_controls();
         const double fps = device_->set_fps(setup.fps);
-        const std::string mode =
-            arhost::fourcc_text(pixels.pixelformat) + " " + Size{pixels.width, pixels.height}.text();
+        const Size size{camera_.width, camera_.height};
+        const std::string mode = arhost::fourcc_text(camera_.fourcc) + " " + size.text();
         if (setup.fps > 0 && fps > 0 && std::abs(fps - setup.fps) > 0.05 * setup.fps)
             host_.warn("the camera delivers " + std::to_string(fps) + " fps at " + mode + ", not the configured " +
                        std::to_string(setup.fps) + " fps; it offers " + device_->describe_formats());
@@ -75,15 +124,9 @@ public:
         arhost_frame_format format{};
         format.struct_size = properties.format.struct_size;
         stream_.emplace(*device_, buffer_count_);
-        if (pixels.pixelformat == V4L2_PIX_FMT_YUYV) {
-            yuyv_stride_ = pixels.bytesperline;
-            format.pixel_format = ARHOST_PIXEL_FORMAT_YUYV;
-            format.width = pixels.width;
-            format.height = pixels.height;
-            set_colours(pixels, format);
-        } else {
+        if (!arhost::describe(camera_, format)) {
             describe_first_picture(format);
-            if (Size{format.width, format.height} != Size{pixels.width, pixels.height})
+            if (Size{format.width, format.height} != size)
                 throw Failure(ARHOST_STATUS_ERROR_IO, "the camera '" + path_ + "' was set to " + mode +
                                                           ", but sends pictures of " +
                                                           Size{format.width, format.height}.text());
@@ -102,10 +145,11 @@ public:
             const auto captured = next(give_up);
             if (!captured)
                 return ARHOST_STATUS_ERROR_CANCELLED;
-            const bool good = copy(stream_->bytes(*captured), buffer);
+            const bool good = copy(captured->planes, buffer);
             stream_->queue(captured->index);
             if (!good) {
                 ++dropped_;
+                ++losses_.damaged;
                 continue;
             }
             info.clock = ARHOST_CLOCK_MONOTONIC;
@@ -116,12 +160,15 @@ public:
     }
 
     void stop() {
+        if (const std::string text = losses_.text(); !text.empty())
+            host_.info("frames of the camera that were not delivered: " + text);
+        losses_ = {};
         stream_.reset();
         device_.reset();
     }
 
 private:
-    v4l2_pix_format set_format(const arhost_source_setup &setup) {
+    PictureFormat set_format(const arhost_source_setup &setup) {
         Size size = configured_size_;
         std::string wanted_by = "set 'width' and 'height'";
         if (setup.intrinsics) {
@@ -137,13 +184,13 @@ private:
         }
         const bool demanded = size != Size{};
         if (!demanded) {
-            const v4l2_pix_format current = device_->current_format().fmt.pix;
+            const PictureFormat current = device_->current_format();
             size = {current.width, current.height};
         }
         const CaptureFormat &chosen = choose_format(size, setup.fps);
-        const v4l2_pix_format set = device_->set_format(chosen.fourcc, size.width, size.height).fmt.pix;
+        PictureFormat set = device_->set_format(chosen.fourcc, size.width, size.height);
         const std::string camera = "the camera '" + path_ + "' (" + device_->card() + ")";
-        if (set.pixelformat != chosen.fourcc)
+        if (set.fourcc != chosen.fourcc)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           camera + " rejects " + arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
                               ", although it lists " + device_->describe_formats());
@@ -152,25 +199,72 @@ private:
                           camera + " has no size " + size.text() + " in " + arhost::fourcc_text(chosen.fourcc) +
                               " (it would deliver " + Size{set.width, set.height}.text() + "); the nearest are " +
                               device_->describe_sizes_near(chosen, size.width, size.height) + "; " + wanted_by);
-        if (set.pixelformat == V4L2_PIX_FMT_YUYV && set.bytesperline < 2 * set.width)
-            throw Failure(ARHOST_STATUS_ERROR_IO, camera + " has a defective driver: rows of " +
-                                                      std::to_string(set.bytesperline) + " bytes for " +
-                                                      std::to_string(set.width) + " px");
+        if (const std::string defect = arhost::find_raw_format(set.fourcc) ? arhost::defect_of(set) : "";
+            !defect.empty())
+            throw Failure(ARHOST_STATUS_ERROR_IO, camera + " has a defective driver: " + defect);
         return set;
     }
 
-    // Chooses YUYV, which needs no decoding, if the camera delivers it at the configured size and rate; otherwise
-    // Motion-JPEG.
+    // Sets the controls before the stream starts, so that the first frame has them.
+    void set_controls() const {
+        const arhost::Controls controls(*device_);
+        const auto warn = [&](const std::string &warning) {
+            if (!warning.empty())
+                host_.warn(warning);
+        };
+        const auto set = [&](std::uint32_t id, const std::string &text, const std::string &key) {
+            const arhost::Control *control = controls.find(id);
+            if (!control)
+                controls.fail_missing(key, key);
+            warn(controls.set(*control, text, key));
+        };
+        for (const auto &[option, text] : control_values_) {
+            const bool is_automatic = text == "auto";
+            if (const arhost::Control *mode = controls.find(option->mode_id)) {
+                for (const std::int64_t value : is_automatic ? option->automatic : option->manual)
+                    if (mode->items.empty() || mode->items.contains(value)) {
+                        warn(controls.set(*mode, std::to_string(value), option->name));
+                        break;
+                    }
+            } else if (is_automatic) {
+                controls.fail_missing(std::string("auto ") + option->name, option->name);
+            }
+            if (!is_automatic)
+                set(option->value_id, text, option->name);
+        }
+        if (!power_line_option_.empty())
+            set(V4L2_CID_POWER_LINE_FREQUENCY, power_line_option_, "power_line_frequency");
+        for (const std::string &warning : controls.set_list(controls_option_, "controls"))
+            warn(warning);
+    }
+
+    // Returns the formats that the camera offers and the option `format` permits, in the order of preference.
+    std::vector<const CaptureFormat *> permitted_formats() const {
+        std::vector<const CaptureFormat *> permitted;
+        const auto add = [&](std::uint32_t fourcc, std::string_view name) {
+            const CaptureFormat *format = device_->find(fourcc);
+            if (format && (format_option_ == "auto" || format_option_ == name))
+                permitted.push_back(format);
+        };
+        const auto add_raw = [&](bool is_grey) {
+            for (const arhost::RawFormat &raw : arhost::raw_formats)
+                if (raw.is_grey == is_grey)
+                    add(raw.fourcc, raw.name);
+        };
+        add_raw(false);
+        add(V4L2_PIX_FMT_MJPEG, "mjpeg");
+        add(V4L2_PIX_FMT_JPEG, "mjpeg");
+        add_raw(true);
+        return permitted;
+    }
+
+    // Chooses the first permitted format in which the camera reaches the configured rate, else the fastest.
     const CaptureFormat &choose_format(const Size &size, double fps) const {
-        std::vector<const CaptureFormat *> known;
-        for (const std::uint32_t fourcc : {V4L2_PIX_FMT_YUYV, V4L2_PIX_FMT_MJPEG, V4L2_PIX_FMT_JPEG})
-            if (const CaptureFormat *format = device_->find(fourcc);
-                format && (format_option_ == "auto" || (format_option_ == "yuyv") == (fourcc == V4L2_PIX_FMT_YUYV)))
-                known.push_back(format);
+        const std::vector<const CaptureFormat *> known = permitted_formats();
         if (known.empty())
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "format: the camera '" + path_ + "' (" + device_->card() + ") offers no " +
-                              (format_option_ == "auto" ? "YUYV and no MJPG" : format_option_) + ", only " +
+                              (format_option_ == "auto" ? "supported format" : format_option_) + ", only " +
                               device_->describe_formats());
         const double wanted_fps = 0.95 * (fps > 0 ? fps : 25);
         const CaptureFormat *best = known.front();
@@ -189,20 +283,6 @@ private:
         return *best;
     }
 
-    static void set_colours(const v4l2_pix_format &pixels, arhost_frame_format &format) {
-        const std::uint32_t encoding = pixels.ycbcr_enc == V4L2_YCBCR_ENC_DEFAULT
-                                           ? std::uint32_t{V4L2_MAP_YCBCR_ENC_DEFAULT(pixels.colorspace)}
-                                           : pixels.ycbcr_enc;
-        format.yuv_matrix = encoding == V4L2_YCBCR_ENC_709 || encoding == V4L2_YCBCR_ENC_XV709
-                                ? ARHOST_YUV_MATRIX_BT709
-                                : ARHOST_YUV_MATRIX_BT601;
-        const std::uint32_t range =
-            pixels.quantization == V4L2_QUANTIZATION_DEFAULT
-                ? std::uint32_t{V4L2_MAP_QUANTIZATION_DEFAULT(false, pixels.colorspace, encoding)}
-                : pixels.quantization;
-        format.yuv_range = range == V4L2_QUANTIZATION_FULL_RANGE ? ARHOST_YUV_RANGE_FULL : ARHOST_YUV_RANGE_LIMITED;
-    }
-
     // Waits for a picture and describes its format. The chroma subsampling is known only from a picture.
     void describe_first_picture(arhost_frame_format &format) {
         for (const auto give_up = Clock::now() + silence_limit;;) {
@@ -210,7 +290,7 @@ private:
             const auto captured = next(give_up);
             if (!captured)
                 throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "starting the camera '" + path_ + "' was cancelled");
-            const bool good = jpeg_.describe(stream_->bytes(*captured), format);
+            const bool good = jpeg_.describe(captured->planes.front(), format);
             stream_->queue(captured->index);
             if (good)
                 return;
@@ -220,22 +300,24 @@ private:
 
     // Returns a frame from the driver's queue that the driver does not mark as damaged: in live mode the newest one,
     // otherwise the oldest one. Waits until `give_up`, then throws Failure. Returns std::nullopt if cancelled.
-    std::optional<v4l2_buffer> next(Clock::time_point give_up) {
+    std::optional<Capture> next(Clock::time_point give_up) {
         for (;;) {
             if (host_.cancelled())
                 return std::nullopt;
-            std::optional<v4l2_buffer> found;
-            while (const auto captured = stream_->dequeue()) {
+            std::optional<Capture> found;
+            while (auto captured = stream_->dequeue()) {
                 if (captured->flags & V4L2_BUF_FLAG_ERROR) {
                     stream_->queue(captured->index);
                     ++dropped_;
+                    ++losses_.marked;
                     continue;
                 }
                 if (found) {
                     stream_->queue(found->index);
                     ++dropped_;
+                    ++losses_.superseded;
                 }
-                found = captured;
+                found = std::move(captured);
                 if (!newest_only_)
                     break;
             }
@@ -250,26 +332,15 @@ private:
         }
     }
 
-    bool copy(std::span<const std::uint8_t> bytes, const arhost_frame_buffer &buffer) {
-        const arhost_frame_format &format = *buffer.format;
-        if (format.pixel_format != ARHOST_PIXEL_FORMAT_YUYV)
-            return jpeg_.decode(bytes, format, buffer.plane, fault_);
-        const std::size_t row_bytes = std::size_t{2} * format.width;
-        if (bytes.size() < std::size_t{yuyv_stride_} * (format.height - 1) + row_bytes) {
-            fault_ = "it has only " + std::to_string(bytes.size()) + " bytes";
-            return false;
-        }
-        if (yuyv_stride_ == format.stride[0])
-            std::memcpy(buffer.plane[0], bytes.data(), std::size_t{yuyv_stride_} * (format.height - 1) + row_bytes);
-        else
-            for (std::size_t y = 0; y < format.height; ++y)
-                std::memcpy(buffer.plane[0] + y * format.stride[0], bytes.data() + y * yuyv_stride_, row_bytes);
-        return true;
+    bool copy(const std::vector<std::span<const std::uint8_t>> &planes, const arhost_frame_buffer &buffer) {
+        return arhost::find_raw_format(camera_.fourcc)
+                   ? arhost::copy_picture(camera_, planes, buffer, fault_)
+                   : jpeg_.decode(planes.front(), *buffer.format, buffer.plane, fault_);
     }
 
-    std::int64_t capture_ns(const v4l2_buffer &captured) {
-        const std::int64_t stamp_ns = captured.timestamp.tv_sec * std::int64_t{1'000'000'000} +
-                                      captured.timestamp.tv_usec * std::int64_t{1'000};
+    std::int64_t capture_ns(const Capture &captured) {
+        const std::int64_t stamp_ns =
+            captured.time.tv_sec * std::int64_t{1'000'000'000} + captured.time.tv_usec * std::int64_t{1'000};
         if ((captured.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC)
             return stamp_ns;
         // Old drivers use the wall clock or do not say which clock they use.
@@ -289,8 +360,10 @@ private:
         std::uint32_t skipped = dropped_;
         if (last_sequence_) {
             const std::uint32_t gap = sequence - *last_sequence_ - 1;
-            if (gap < 1'000'000) // a larger gap means that the counter was reset
-                skipped = std::max(skipped, gap);
+            if (gap < 1'000'000 && gap > skipped) { // a larger gap means that the counter was reset
+                losses_.driver += gap - skipped;
+                skipped = gap;
+            }
         } else {
             skipped = 0; // frames before the first delivered one do not count
         }
@@ -302,23 +375,26 @@ private:
     arhost::Host host_;
     std::string path_;
     Size configured_size_; // 0×0: use the size of the calibration or the driver
-    std::string format_option_;
+    std::string format_option_, controls_option_, power_line_option_;
     std::uint32_t buffer_count_;
+    std::vector<std::pair<const ControlOption *, std::string>> control_values_; // of the options that are set
 
     std::optional<CaptureDevice> device_;
     std::optional<CaptureStream> stream_; // declared after device_, because it must be destroyed first
     arhost::JpegDecoder jpeg_;
     bool newest_only_ = false;
-    std::uint32_t yuyv_stride_ = 0;
+    PictureFormat camera_;
     std::optional<std::uint32_t> last_sequence_;
     std::uint32_t dropped_ = 0; // frames dropped since the last delivered frame
+    Losses losses_;
     std::int64_t last_ns_ = 0;
     bool clock_reported_ = false;
     std::string fault_; // what was wrong with the last damaged picture
 };
 
 using arhost::option;
-constexpr const char *formats[] = {"auto", "yuyv", "mjpeg", nullptr};
+constexpr const char *formats[] = {"auto", "yuyv", "nv12", "yuv420", "uyvy",  "rgb24", "bgr24",
+                                   "grey", "y16",  "y12",  "y10",    "mjpeg", nullptr};
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "device", "/dev/video0", "Device node of the camera."),
     option(ARHOST_OPTION_INTEGER, "width", "0",
@@ -328,8 +404,16 @@ constexpr arhost_option_descriptor options[] = {
            "Frame size in px; 0: the size of the calibration if set, otherwise the driver's default.", 0,
            ARHOST_MAX_IMAGE_SIDE),
     option(ARHOST_OPTION_TEXT, "format", "auto",
-           "Pixel format of the camera; auto: yuyv if it is fast enough, otherwise mjpeg.", 0, 0, formats),
+           "Pixel format of the camera; auto: uncompressed if that is fast enough, otherwise mjpeg.", 0, 0, formats),
     option(ARHOST_OPTION_INTEGER, "buffers", "4", "Number of driver buffers.", 2, 32),
+    option(ARHOST_OPTION_TEXT, "exposure", "", "Exposure time in units of 100 µs, or auto; empty: unchanged."),
+    option(ARHOST_OPTION_TEXT, "gain", "", "Gain in units of the camera, or auto; empty: unchanged."),
+    option(ARHOST_OPTION_TEXT, "focus", "", "Focus in units of the camera, or auto; empty: unchanged."),
+    option(ARHOST_OPTION_TEXT, "white_balance", "", "Colour temperature in K, or auto; empty: unchanged."),
+    option(ARHOST_OPTION_TEXT, "power_line_frequency", "",
+           "Frequency of the lamps, to avoid flicker: disabled, 50_hz, 60_hz or auto; empty: unchanged."),
+    option(ARHOST_OPTION_TEXT, "controls", "",
+           "Further controls by the names that v4l2-ctl -l lists: 'sharpness=3, backlight_compensation=1'."),
 };
 constexpr const char *needs[] = {"video", nullptr};
 

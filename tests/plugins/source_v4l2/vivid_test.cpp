@@ -2,6 +2,7 @@
 //
 // Captures from vivid, the kernel's virtual camera, and makes vivid inject faults. To be run in a virtual machine:
 //   tools/vm/run-in-vm -m "vivid n_devs=1 node_types=0x1" …/source_v4l2-vivid-test
+#include "../../system/arhost_run.hpp"
 #include "../source_file/source_under_test.hpp"
 
 #include <gmock/gmock.h>
@@ -73,6 +74,11 @@ protected:
         controls.count = 1;
         controls.controls = &control;
         ASSERT_EQ(ioctl(fd_, VIDIOC_S_EXT_CTRLS, &controls), 0) << "control " << std::hex << id;
+    }
+    int get(std::uint32_t id) const {
+        v4l2_control control{id, 0};
+        EXPECT_EQ(ioctl(fd_, VIDIOC_G_CTRL, &control), 0) << "control " << std::hex << id;
+        return control.value;
     }
     // Captures small pictures by default, because the virtual machine is emulated and slow.
     arhost_status start(double fps = 60, std::map<std::string, std::string> options = {}, bool live = true) {
@@ -178,6 +184,78 @@ TEST_F(Vivid, ColourBarsHaveTheCorrectColours) {
     }
 }
 
+// Returns the colour of a pixel of a frame without row padding.
+std::array<double, 3> colour_at(const arhost_frame_format &format, const std::vector<std::uint8_t> &bytes,
+                                std::size_t x, std::size_t y) {
+    const std::size_t width = format.width, size = width * format.height;
+    const auto yuv = [&](double luma, double u, double v) {
+        return rgb_of(luma, u, v, 0.299, 0.114, format.yuv_range == ARHOST_YUV_RANGE_FULL);
+    };
+    switch (format.pixel_format) {
+    case ARHOST_PIXEL_FORMAT_YUYV: {
+        const std::uint8_t *pair = &bytes[2 * (y * width + x / 2 * 2)];
+        return yuv(pair[0], pair[1], pair[3]);
+    }
+    case ARHOST_PIXEL_FORMAT_NV12: {
+        const std::uint8_t *chroma = &bytes[size + y / 2 * width + x / 2 * 2];
+        return yuv(bytes[y * width + x], chroma[0], chroma[1]);
+    }
+    case ARHOST_PIXEL_FORMAT_I420: {
+        const std::size_t chroma = size + y / 2 * (width / 2) + x / 2;
+        return yuv(bytes[y * width + x], bytes[chroma], bytes[chroma + size / 4]);
+    }
+    case ARHOST_PIXEL_FORMAT_RGB8: {
+        const std::uint8_t *rgb = &bytes[3 * (y * width + x)];
+        return {double(rgb[0]), double(rgb[1]), double(rgb[2])};
+    }
+    case ARHOST_PIXEL_FORMAT_BGR8: {
+        const std::uint8_t *bgr = &bytes[3 * (y * width + x)];
+        return {double(bgr[2]), double(bgr[1]), double(bgr[0])};
+    }
+    default: // GREY8
+        return {double(bytes[y * width + x]), double(bytes[y * width + x]), double(bytes[y * width + x])};
+    }
+}
+
+TEST_F(Vivid, DeliversEveryUncompressedFormat) {
+    const std::array<std::array<int, 3>, 8> bars = {{{255, 255, 255},
+                                                     {255, 255, 0},
+                                                     {0, 255, 255},
+                                                     {0, 255, 0},
+                                                     {255, 0, 255},
+                                                     {255, 0, 0},
+                                                     {0, 0, 255},
+                                                     {0, 0, 0}}};
+    const std::vector<std::pair<std::string, arhost_pixel_format>> formats = {
+        {"yuyv", ARHOST_PIXEL_FORMAT_YUYV},  {"uyvy", ARHOST_PIXEL_FORMAT_YUYV},
+        {"nv12", ARHOST_PIXEL_FORMAT_NV12},  {"yuv420", ARHOST_PIXEL_FORMAT_I420},
+        {"rgb24", ARHOST_PIXEL_FORMAT_RGB8}, {"bgr24", ARHOST_PIXEL_FORMAT_BGR8},
+        {"grey", ARHOST_PIXEL_FORMAT_GREY8}, {"y10", ARHOST_PIXEL_FORMAT_GREY8},
+        {"y12", ARHOST_PIXEL_FORMAT_GREY8},  {"y16", ARHOST_PIXEL_FORMAT_GREY8}};
+    for (const auto &[name, delivered] : formats) {
+        SCOPED_TRACE(name);
+        ASSERT_EQ(start(60, {{"format", name}}), ARHOST_STATUS_OK) << source_.log();
+        EXPECT_EQ(source_.format().pixel_format, delivered);
+        const SourceFrame frame = source_.read(0);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+        const auto colour = [&](std::size_t bar, std::size_t y) {
+            return colour_at(source_.format(), frame.bytes, bar * 40 + 20, y);
+        };
+        for (const std::size_t y : {5u, 90u, 174u})
+            for (std::size_t bar = 0; bar < 8; ++bar) {
+                if (delivered != ARHOST_PIXEL_FORMAT_GREY8) {
+                    for (std::size_t i = 0; i < 3; ++i)
+                        EXPECT_NEAR(colour(bar, y)[i], bars[bar][i], 4) << "bar " << bar << ", row " << y;
+                    continue;
+                }
+                const double luma = 0.2126 * bars[bar][0] + 0.7152 * bars[bar][1] + 0.0722 * bars[bar][2];
+                EXPECT_NEAR(colour(bar, y)[0], luma, 3) << "bar " << bar << ", row " << y;
+            }
+        EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
+        source_.stop();
+    }
+}
+
 TEST_F(Vivid, StampsFramesWithTheMonotonicClock) {
     ASSERT_EQ(start(30), ARHOST_STATUS_OK) << source_.log();
     std::int64_t last = 0;
@@ -233,6 +311,8 @@ TEST_F(Vivid, CountsFramesDroppedByTheDriver) {
     EXPECT_GT(skipped, 5u);
     // At 50 fps, a frame takes 20 ms. The delivered and the skipped frames together must match the elapsed time.
     EXPECT_NEAR(static_cast<double>(last - first) / 20e6, static_cast<double>(29 + skipped), 3);
+    source_.stop();
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_INFO), HasSubstr(" lost by the driver"));
 }
 
 TEST_F(Vivid, DropsFramesMarkedAsDamaged) {
@@ -246,6 +326,9 @@ TEST_F(Vivid, DropsFramesMarkedAsDamaged) {
         skipped += frame.info.skipped;
     }
     EXPECT_GE(skipped, 1u);
+    source_.stop();
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_INFO), HasSubstr("not delivered: "));
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_INFO), HasSubstr("1 marked as damaged by the driver"));
 }
 
 TEST_F(Vivid, DeliversThreeHundredFramesWithoutLeaks) {
@@ -314,6 +397,45 @@ TEST_F(Vivid, WarnsAboutAnUnreachableRate) {
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_WARNING), HasSubstr("not the configured"));
 }
 
+TEST_F(Vivid, SetsControlsByName) {
+    ASSERT_EQ(
+        start(30, {{"gain", "77"},
+                   {"controls", "brightness=200, contrast = 90,boolean=true, menu=menu_item_3, test_pattern=1"}}),
+        ARHOST_STATUS_OK)
+        << source_.log();
+    EXPECT_EQ(get(V4L2_CID_AUTOGAIN), 0);
+    EXPECT_EQ(get(V4L2_CID_GAIN), 77);
+    EXPECT_EQ(get(V4L2_CID_BRIGHTNESS), 200);
+    EXPECT_EQ(get(V4L2_CID_CONTRAST), 90);
+    EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
+    ASSERT_EQ(start(30, {{"gain", "auto"}, {"controls", "brightness=128, contrast=128"}}), ARHOST_STATUS_OK)
+        << source_.log();
+    EXPECT_EQ(get(V4L2_CID_AUTOGAIN), 1);
+}
+
+TEST_F(Vivid, RejectsControlsThatItDoesNotHave) {
+    EXPECT_EQ(start(30, {{"controls", "brightnes=3"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(
+        source_.log(ARHOST_SEVERITY_ERROR),
+        HasSubstr("controls: the camera '/dev/video0' (vivid) has no control 'brightnes'; it has: brightness, "
+                  "contrast, "));
+    EXPECT_EQ(start(30, {{"focus", "auto"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("focus: the camera"));
+}
+
+TEST_F(Vivid, RejectsValuesOutsideTheRangeOfAControl) {
+    EXPECT_EQ(start(30, {{"gain", "300"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("does not accept '300' for 'gain'; valid: 0 to 255"));
+    EXPECT_EQ(start(30, {{"controls", "menu=9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR),
+                HasSubstr("does not accept '9' for 'menu'; valid: 1 (menu_item_1), "));
+    EXPECT_EQ(start(30, {{"controls", "boolean=maybe"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("valid: true or false"));
+    EXPECT_EQ(start(30, {{"controls", "brightness"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("'brightness' is not of the form NAME=VALUE"));
+    EXPECT_EQ(start(30, {{"controls", "bitmask=4, brightness=7x"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+}
+
 TEST_F(Vivid, ReportsACameraInUse) {
     SourceUnderTest first("source_v4l2");
     ASSERT_EQ(first.start({{"device", device}}), ARHOST_STATUS_OK) << first.log();
@@ -326,6 +448,55 @@ TEST_F(Vivid, ReportsACameraInUse) {
 TEST_F(Vivid, ListsCamerasIfTheConfiguredOneIsMissing) {
     EXPECT_EQ(start(30, {{"device", "/dev/video9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("/dev/video0 (vivid-000-vid-cap)"));
+}
+
+// As udev creates them; they name the camera even if its node gets another number.
+TEST_F(Vivid, IsFoundByALinkInTheSandbox) {
+    fs::create_directories("/dev/v4l/by-id");
+    fs::create_symlink("../../video0", "/dev/v4l/by-id/usb-vivid-index0");
+    arhost::test::ArhostRun run("version: 1\nsource: {plugin: source_v4l2, allow: [video], options: {device: "
+                                "/dev/v4l/by-id/usb-vivid-index0, width: 320, height: 180}}\n"
+                                "outputs: [{plugin: sink_null}]\n");
+    EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("320×180"));
+    fs::remove_all("/dev/v4l");
+}
+
+// A camera that is unplugged comes back as another node.
+TEST_F(Vivid, ComesBackUnderAnotherNumber) {
+    const char *const other = "/dev/video1";
+    if (!fs::exists(other))
+        GTEST_SKIP() << "needs two cameras: -m \"vivid n_devs=2 node_types=0x1,0x1\"";
+    const fs::path link = "/dev/v4l/by-id/usb-vivid-index0";
+    fs::create_directories(link.parent_path());
+    fs::create_symlink("../../video0", link);
+    arhost::test::ArhostRun run("version: 1\nmode: live\n"
+                                "source: {plugin: source_v4l2, allow: [video], fps: 30, options: {device: " +
+                                link.string() +
+                                ", width: 320, height: 180}}\ncamera: {width: 320, height: 180, fx: 300}\n"
+                                "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+                                "outputs: [{plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n");
+    run.start({"run.yaml", "--allow-no-target"});
+    const auto frames = [&] {
+        const std::string text = run.exists("out/poses.jsonl") ? run.read("out/poses.jsonl") : "";
+        return std::count(text.begin(), text.end(), '\n');
+    };
+    const auto wait_for = [&](std::ptrdiff_t count) {
+        for (int i = 0; run.running() && frames() < count && i < 3000; ++i)
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        return frames() >= count;
+    };
+    ASSERT_TRUE(wait_for(20)) << run.output();
+    fs::remove(link);
+    fs::create_symlink("../../video1", link);
+    set(disconnect, 1);
+    const std::ptrdiff_t before = frames();
+    EXPECT_TRUE(wait_for(before + 60)) << run.output();
+    arhost::test::send_signal(run.pid(), SIGINT);
+    run.wait();
+    EXPECT_THAT(run.output(), HasSubstr("was it unplugged?"));
+    EXPECT_GE(run.stats()["restarts"]["source"], 1);
+    fs::remove_all("/dev/v4l");
 }
 
 TEST_F(Vivid, StopsWaitingWhenCancelled) {

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The controls of a V4L2 camera: gain, exposure and so on. Functions that fail throw Failure with a message for the
+// user.
+#pragma once
+
+#include "device.hpp"
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace arhost {
+
+struct Control {
+    std::uint32_t id = 0, type = 0, flags = 0;
+    std::string name; // as v4l2-ctl prints it: "white_balance_temperature"
+    std::int64_t minimum = 0, maximum = 0, default_value = 0;
+    std::uint64_t step = 1;
+    std::map<std::int64_t, std::string> items; // of a menu
+};
+
+// "White Balance, Automatic" becomes "white_balance_automatic".
+std::string control_name(std::string_view label);
+
+class Controls {
+public:
+    explicit Controls(const CaptureDevice &device);
+
+    const std::vector<Control> &all() const { return controls_; }
+    const Control *find(std::uint32_t id) const;
+    const Control *find(std::string_view name) const;
+
+    // Sets a control to a value in text form: a number, "true" or "false", or the number or name of a menu item.
+    // `key` names the option for messages. Returns a warning if the camera sets another value, else an empty string.
+    std::string set(const Control &control, std::string_view text, const std::string &key) const;
+
+    // Sets controls as listed by a user: "gain=20, auto_exposure=manual_mode", in this order. Returns the warnings.
+    std::vector<std::string> set_list(std::string_view list, const std::string &key) const;
+
+    // The camera has no such control.
+    [[noreturn]] void fail_missing(std::string_view name, const std::string &key) const;
+
+private:
+    std::int64_t parse(const Control &control, std::string_view text, const std::string &key) const;
+    std::optional<std::int64_t> value_of(const Control &control) const;
+    [[noreturn]] void fail(const std::string &key, const std::string &what) const;
+
+    const CaptureDevice &device_;
+    std::vector<Control> controls_;
+};
+
+} // namespace arhost
