@@ -383,7 +383,7 @@ std::map<std::string, std::string> outcomes(const std::string &group, const Sett
     HostileRun run(group, settings_for(group));
     if (setting.is_ordinary_user && ::geteuid() == 0)
         run.give_to(nobody);
-    run.start_it(0, [&] { apply(setting); });
+    run.start_it(0, [&] { apply(setting); }, {"--set", "tracker.deadline_ms=30000"}); // virtual machines are slow
     EXPECT_EQ(run.wait(), 0) << run.output();
     EXPECT_EQ(run.target_text(), "secret");
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 0) << run.output();
