@@ -132,58 +132,6 @@ std::array<double, 3> rgb_of(double y, double u, double v, double kr, double kb,
     return {r, (luma - kr * r - kb * b) / (1 - kr - kb), b};
 }
 
-} // namespace
-
-TEST_F(Vivid, DeliversYuyvAtTheConfiguredSizeAndRate) {
-    ASSERT_EQ(start(30), ARHOST_STATUS_OK) << source_.log();
-    EXPECT_EQ(source_.format().pixel_format, ARHOST_PIXEL_FORMAT_YUYV);
-    EXPECT_EQ(source_.format().width, 320u);
-    EXPECT_EQ(source_.format().height, 180u);
-    EXPECT_EQ(source_.format().fps, 30.0);
-    EXPECT_EQ(source_.properties().frame_count, 0u);
-    EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
-    EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
-}
-
-TEST_F(Vivid, ColourBarsHaveTheCorrectColours) {
-    struct Case {
-        int colorspace, quantization;
-        arhost_yuv_matrix matrix;
-        arhost_yuv_range range;
-        double kr, kb;
-    };
-    for (const Case &c : {Case{2, 0, ARHOST_YUV_MATRIX_BT601, ARHOST_YUV_RANGE_LIMITED, 0.299, 0.114},
-                          Case{1, 0, ARHOST_YUV_MATRIX_BT709, ARHOST_YUV_RANGE_LIMITED, 0.2126, 0.0722},
-                          Case{2, 1, ARHOST_YUV_MATRIX_BT601, ARHOST_YUV_RANGE_FULL, 0.299, 0.114}}) {
-        SCOPED_TRACE("colorspace " + std::to_string(c.colorspace) + ", quantization " +
-                     std::to_string(c.quantization));
-        set(colorspace, c.colorspace);
-        set(quantization, c.quantization);
-        ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
-        EXPECT_EQ(source_.format().yuv_matrix, c.matrix);
-        EXPECT_EQ(source_.format().yuv_range, c.range);
-        const SourceFrame frame = source_.read(0);
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
-        // The eight colour bars over 320 px: white, yellow, cyan, green, magenta, red, blue and black.
-        const std::array<std::array<int, 3>, 8> bars = {{{255, 255, 255},
-                                                         {255, 255, 0},
-                                                         {0, 255, 255},
-                                                         {0, 255, 0},
-                                                         {255, 0, 255},
-                                                         {255, 0, 0},
-                                                         {0, 0, 255},
-                                                         {0, 0, 0}}};
-        for (const std::size_t y : {5u, 90u, 174u})
-            for (std::size_t bar = 0; bar < 8; ++bar) {
-                const std::uint8_t *pair = &frame.bytes[y * 640 + 2 * (bar * 40 + 20)];
-                const auto rgb = rgb_of(pair[0], pair[1], pair[3], c.kr, c.kb, c.range == ARHOST_YUV_RANGE_FULL);
-                for (std::size_t i = 0; i < 3; ++i)
-                    EXPECT_NEAR(rgb[i], bars[bar][i], 4) << "bar " << bar << ", row " << y << ", channel " << i;
-            }
-        source_.stop();
-    }
-}
-
 // Returns the colour of a pixel of a frame without row padding.
 std::array<double, 3> colour_at(const arhost_frame_format &format, const std::vector<std::uint8_t> &bytes,
                                 std::size_t x, std::size_t y) {
@@ -217,15 +165,54 @@ std::array<double, 3> colour_at(const arhost_frame_format &format, const std::ve
     }
 }
 
+// vivid's eight colour bars over 320 px: white, yellow, cyan, green, magenta, red, blue and black.
+constexpr std::array<std::array<int, 3>, 8> bars = {
+    {{255, 255, 255}, {255, 255, 0}, {0, 255, 255}, {0, 255, 0}, {255, 0, 255}, {255, 0, 0}, {0, 0, 255}, {0, 0, 0}}};
+
+} // namespace
+
+TEST_F(Vivid, DeliversYuyvAtTheConfiguredSizeAndRate) {
+    ASSERT_EQ(start(30), ARHOST_STATUS_OK) << source_.log();
+    EXPECT_EQ(source_.format().pixel_format, ARHOST_PIXEL_FORMAT_YUYV);
+    EXPECT_EQ(source_.format().width, 320u);
+    EXPECT_EQ(source_.format().height, 180u);
+    EXPECT_EQ(source_.format().fps, 30.0);
+    EXPECT_EQ(source_.properties().frame_count, 0u);
+    EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
+}
+
+TEST_F(Vivid, ColourBarsHaveTheCorrectColours) {
+    struct Case {
+        int colorspace, quantization;
+        arhost_yuv_matrix matrix;
+        arhost_yuv_range range;
+        double kr, kb;
+    };
+    for (const Case &c : {Case{2, 0, ARHOST_YUV_MATRIX_BT601, ARHOST_YUV_RANGE_LIMITED, 0.299, 0.114},
+                          Case{1, 0, ARHOST_YUV_MATRIX_BT709, ARHOST_YUV_RANGE_LIMITED, 0.2126, 0.0722},
+                          Case{2, 1, ARHOST_YUV_MATRIX_BT601, ARHOST_YUV_RANGE_FULL, 0.299, 0.114}}) {
+        SCOPED_TRACE("colorspace " + std::to_string(c.colorspace) + ", quantization " +
+                     std::to_string(c.quantization));
+        set(colorspace, c.colorspace);
+        set(quantization, c.quantization);
+        ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+        EXPECT_EQ(source_.format().yuv_matrix, c.matrix);
+        EXPECT_EQ(source_.format().yuv_range, c.range);
+        const SourceFrame frame = source_.read(0);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+        for (const std::size_t y : {5u, 90u, 174u})
+            for (std::size_t bar = 0; bar < 8; ++bar) {
+                const std::uint8_t *pair = &frame.bytes[y * 640 + 2 * (bar * 40 + 20)];
+                const auto rgb = rgb_of(pair[0], pair[1], pair[3], c.kr, c.kb, c.range == ARHOST_YUV_RANGE_FULL);
+                for (std::size_t i = 0; i < 3; ++i)
+                    EXPECT_NEAR(rgb[i], bars[bar][i], 4) << "bar " << bar << ", row " << y << ", channel " << i;
+            }
+        source_.stop();
+    }
+}
+
 TEST_F(Vivid, DeliversEveryUncompressedFormat) {
-    const std::array<std::array<int, 3>, 8> bars = {{{255, 255, 255},
-                                                     {255, 255, 0},
-                                                     {0, 255, 255},
-                                                     {0, 255, 0},
-                                                     {255, 0, 255},
-                                                     {255, 0, 0},
-                                                     {0, 0, 255},
-                                                     {0, 0, 0}}};
     const std::vector<std::pair<std::string, arhost_pixel_format>> formats = {
         {"yuyv", ARHOST_PIXEL_FORMAT_YUYV},  {"uyvy", ARHOST_PIXEL_FORMAT_YUYV},
         {"nv12", ARHOST_PIXEL_FORMAT_NV12},  {"yuv420", ARHOST_PIXEL_FORMAT_I420},
