@@ -3,6 +3,8 @@
 #include "conformance/expect.hpp"
 #include "conformance/tracer.hpp"
 
+#include <arhost/shading/scalar.hpp>
+
 namespace arhost::conformance {
 namespace {
 
@@ -174,12 +176,36 @@ void shadow_alpha_of_the_scene(Context &context) {
     }
 }
 
+// One of two lamps is hidden. Its light is two thirds of the light of both.
+void partial_shadow(Context &context) {
+    for (const bool is_glass : {false, true}) {
+        if (is_glass && !has_capability(context, ARHOST_CAPABILITY_GLASS))
+            break;
+        scene::ArenaBuilder builder = ball_over_catcher(is_glass ? glass() : diffuse(glm::vec3(0.5f)));
+        const double alpha_opaque = double{builder.settings.shadow_alpha_opaque},
+                     alpha_translucent = double{builder.settings.shadow_alpha_translucent};
+        builder.add_light(lamp({-150, 0, 200}, 0.5f));
+        const Picture picture = Tracer(context, std::move(builder)).render(from_front());
+        const double hidden = 2.0 / 3;
+        const double alpha =
+            shading::shadow_alpha(is_glass ? 0 : hidden, is_glass ? hidden : 0, alpha_opaque, alpha_translucent);
+        const int expected = static_cast<int>(shading::code_8bit(alpha)), actual = picture.alpha(79, 59);
+        if (std::abs(actual - expected) > 1)
+            throw Failure(
+                fmt::format("pixel (79, 59): {} hides two thirds of the light, alpha is {}; expected {}, so "
+                            "that the linear light over mid-grey video is right",
+                            is_glass ? "a glass ball" : "an opaque ball", actual, expected))
+                .with("rendered", picture)
+                .at(79, 59);
+    }
+}
+
+// ---- Edges -----------------------------------------------------------------------------------------
+
 void straight_alpha(Context &context) {
-    const arhost_option_descriptor *samples = context.library.option("samples");
-    const bool settable = samples && samples->type == ARHOST_OPTION_INTEGER;
-    const Settings settings = settable ? Settings{{"samples", "16"}} : Settings{};
     const Picture picture =
-        Tracer(context, one_sphere({0, 0, 0, 30}, glowing({0.8f, 0.8f, 0.8f})), settings).render(from_front());
+        Tracer(context, one_sphere({0, 0, 0, 30}, glowing({0.8f, 0.8f, 0.8f})), many_samples(context))
+            .render(from_front());
     const int inside = picture.at(79, 59)[1];
     int edges = 0;
     expect_pixels(picture, [&](auto x, auto y) {
@@ -195,6 +221,32 @@ void straight_alpha(Context &context) {
         throw Skip("no pixel is partially covered");
 }
 
+void edge_over_shadow(Context &context) {
+    scene::ArenaBuilder builder = one_sphere({0, 0, 0, 30}, glowing({0.8f, 0.8f, 0.8f}));
+    const std::uint32_t material = builder.add_material(diffuse(glm::vec3(0.8f)));
+    builder.add_object("floor", builder.add_triangles(square(400, -50)), material, ARHOST_ROLE_CATCHER);
+    builder.add_object("roof", builder.add_triangles(square(400, 300)), material); // above the camera
+    builder.add_light(lamp({0, 0, 1000}, 1));
+    const Picture picture = Tracer(context, std::move(builder), many_samples(context)).render(from_front());
+    const int inside = picture.at(79, 59)[1];
+    int edges = 0;
+    expect_pixels(picture, [&](auto x, auto y) {
+        const Pixel p = picture.at(x, y);
+        if (p[3] <= opaque || p[3] == 255)
+            return std::string();
+        ++edges;
+        const double coverage = (p[3] - opaque) / (255.0 - opaque);
+        const int expected = static_cast<int>(std::lround(inside * coverage * 255 / p[3]));
+        return std::abs(p[1] - expected) <= 4
+                   ? ""
+                   : fmt::format("the sphere covers {:.0f} % of a pixel in shadow, green is {}; expected {}: the "
+                                 "sphere's code {} and black, blended by their shares of the alpha",
+                                 100 * coverage, p[1], expected, inside);
+    });
+    if (edges == 0)
+        throw Skip("no pixel is partially covered");
+}
+
 constexpr const char *gate = "raytracer.render";
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
@@ -204,6 +256,9 @@ constexpr Test tests[] = {
      hit_alpha},
     {"raytracer.straight-alpha", "The colour of a partially covered pixel is not premultiplied by alpha.", kind, gate,
      20s, straight_alpha},
+    {"raytracer.edge-over-shadow",
+     "Where an edge is in front of a shadow, object and shadow are blended in sRGB by their shares of the alpha.",
+     kind, gate, 20s, edge_over_shadow},
     {"raytracer.inside-sphere", "A camera inside an object sees the object in every pixel.", kind, gate, 20s,
      inside_sphere},
     {"raytracer.near-the-eye", "Objects 0.05 mm in front of the eye are visible.", kind, gate, 20s, near_the_eye},
@@ -219,6 +274,9 @@ constexpr Test tests[] = {
      stronger_shadow_wins},
     {"raytracer.shadow-alpha-of-scene", "Shadow alphas are those of the scene's settings.", kind, gate, 20s,
      shadow_alpha_of_the_scene},
+    {"raytracer.partial-shadow",
+     "Where light is partly hidden, alpha gives the right linear light over mid-grey video (sRGB 0.5).", kind, gate,
+     20s, partial_shadow},
 };
 
 } // namespace

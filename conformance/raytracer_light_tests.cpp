@@ -8,10 +8,16 @@
 
 #include <glm/geometric.hpp>
 
+#include <numbers>
+
 namespace arhost::conformance {
 namespace {
 
 using shading::srgb8_exact;
+
+double linear_light(int code) {
+    return shading::srgb_decode(code / 255.0);
+}
 
 Pixel centre_of(const Picture &picture) {
     return picture.at(picture.width() / 2, picture.height() / 2);
@@ -118,6 +124,143 @@ void shadow_on_object(Context &context) {
             .at(79, 59);
 }
 
+// The light of a glass ball's shadow on an object, relative to the light without a ball.
+void glass_shadow(Context &context) {
+    need_capability(context, ARHOST_CAPABILITY_GLASS, "GLASS");
+    const glm::vec3 attenuation(0.9f, 0.6f, 0.3f);
+    arhost_material material = glass();
+    std::copy_n(&attenuation.x, 3, material.shadow_attenuation);
+    scene::ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0);
+    builder.add_object("plane", builder.add_triangles(square(150, 0)), builder.add_material(diffuse(glm::vec3(1))));
+    builder.add_object("ball", builder.add_spheres({{30, 0, 40, 12}}), builder.add_material(material));
+    builder.add_light(lamp({150, 0, 200}, 1));
+    const Picture picture = Tracer(context, std::move(builder)).render(from_front());
+    const Pixel p = picture.at(79, 59);
+    for (int channel = 0; channel < 3; ++channel) {
+        const double cosine = 0.8, transmittance = double{attenuation[channel]} * double{attenuation[channel]};
+        const int expected = srgb8_exact(cosine * transmittance);
+        if (std::abs(p[channel] - expected) > 2)
+            throw Failure(fmt::format("pixel (79, 59): the lamp shines through the centre of a glass ball, whose two "
+                                      "surfaces transmit {:.2f} of its {} light; the code is {}, expected {}",
+                                      transmittance, std::array{"red", "green", "blue"}[channel], p[channel],
+                                      expected))
+                .with("rendered", picture)
+                .at(79, 59);
+    }
+}
+
+// Lamps of radiance 0.5 that are seen in a mirror or through a pane of glass without refraction and reflection.
+void visible_lamps(Context &context) {
+    need_capability(context, ARHOST_CAPABILITY_AREA_LIGHTS, "AREA_LIGHTS");
+    arhost_material pane = glass();
+    pane.index = 1;
+    pane.fresnel_minimum = pane.fresnel_maximum = 0;
+    struct Way {
+        const char *name;
+        std::uint32_t capability;
+        arhost_material material;
+        float lamp_z; // between camera and mirror, or behind the pane; its lower or upper side is visible
+    };
+    bool is_checked = false;
+    for (const Way &way : {Way{"in a mirror", ARHOST_CAPABILITY_REFLECTION, mirror(1), 100},
+                           Way{"through a pane of glass", ARHOST_CAPABILITY_GLASS, pane, -100}})
+        for (const arhost_light_type type : {ARHOST_LIGHT_SPHERE, ARHOST_LIGHT_RECTANGLE}) {
+            if (!has_capability(context, way.capability))
+                continue;
+            is_checked = true;
+            arhost_light light = scene::make_light(type);
+            light.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
+            light.position[2] = way.lamp_z;
+            light.direction[2] = way.lamp_z > 0 ? -1.0f : 1.0f;
+            light.radius = light.axis_u[0] = light.axis_v[1] = 20;
+            const double area = type == ARHOST_LIGHT_SPHERE ? 400 * std::numbers::pi : 1600;
+            std::fill_n(light.intensity, 3, static_cast<float>(0.5 * area / std::numbers::pi));
+            scene::ArenaBuilder builder;
+            builder.settings.background = glm::vec3(0);
+            // No pixel centre is on a diagonal: a fast ray tracer may leave a gap between triangles that share an
+            // edge.
+            builder.add_object("surface", builder.add_triangles(box({60, 61, 0.5f})),
+                               builder.add_material(way.material));
+            builder.add_light(light);
+            const Picture picture = Tracer(context, std::move(builder)).render(from_front());
+            expect_pixels(picture, [&](auto x, auto y) {
+                // Seen from 300 mm, a lamp's half side of 20 mm is 13.3 px long, the half diagonal 18.9 px.
+                const double r = distance_from_centre(picture, x, y);
+                const int code = picture.at(x, y)[1], expected = r < 12 ? srgb8_exact(0.5) : 0;
+                return (r >= 12 && r < 20) || r > 50 || std::abs(code - expected) <= 2
+                           ? ""
+                           : fmt::format("a {} lamp of radiance 0.5 is {}visible {}: the code is {}, expected {}",
+                                         type == ARHOST_LIGHT_SPHERE ? "spherical" : "rectangular",
+                                         r < 12 ? "" : "not ", way.name, code, expected);
+            });
+        }
+    if (!is_checked)
+        throw Skip("neither ARHOST_CAPABILITY_REFLECTION nor ARHOST_CAPABILITY_GLASS is declared");
+}
+
+// A coarse ball whose normals are those of a sphere.
+void shadow_terminator(Context &context) {
+    constexpr double radius = 45;
+    scene::TriangleMesh mesh = ball(8, 12);
+    for (glm::vec3 &position : mesh.positions)
+        position *= radius;
+    scene::ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(0);
+    builder.add_object("ball", builder.add_triangles(mesh), builder.add_material(diffuse(glm::vec3(1))));
+    arhost_light sun = scene::make_light(ARHOST_LIGHT_DIRECTIONAL);
+    const glm::vec3 to_sun(0.8f, 0.36f, 0.48f);
+    for (int axis = 0; axis < 3; ++axis)
+        sun.direction[axis] = -to_sun[axis];
+    builder.add_light(sun);
+    const Picture picture = Tracer(context, std::move(builder)).render(from_front());
+    expect_pixels(picture, [&](auto x, auto y) {
+        const glm::dvec3 eye(0, 0, 200), ray = glm::normalize(glm::dvec3(x - 79.5, 59.5 - y, -200));
+        const double middle = -glm::dot(eye, ray), aside = 200.0 * 200 - middle * middle;
+        if (aside > 0.9 * radius * radius) // beside the ball, or close to its silhouette
+            return std::string();
+        const glm::dvec3 normal = (eye + (middle - std::sqrt(radius * radius - aside)) * ray) / radius;
+        const double expected = std::max(glm::dot(normal, glm::dvec3(to_sun)), 0.0);
+        const double light = linear_light(picture.at(x, y)[1]);
+        return std::abs(light - expected) < 0.1
+                   ? ""
+                   : fmt::format(
+                         "a smooth mesh approximates a ball that has the light {:.2f} here, but it has {:.2f}",
+                         expected, light);
+    });
+}
+
+// Renders a slanted edge between a black surface and one of radiance `brightness`. Returns by how many pixels it
+// seems to be displaced towards the black one, from the mean linear light of 100 rows.
+double edge_displacement(Context &context, float brightness) {
+    scene::ArenaBuilder builder;
+    builder.settings.ambient = glm::vec3(brightness);
+    const scene::TriangleMesh left{{{-30, -300, 0}, {30, 300, 0}, {-600, 0, 0}}, {}, {}, {{0, 1, 2}}};
+    builder.add_object("bright", builder.add_triangles(left), builder.add_material(glowing(glm::vec3(1))));
+    builder.add_object("black", builder.add_triangles(square(300, -0.1f)),
+                       builder.add_material(glowing(glm::vec3(0))));
+    const Picture picture = Tracer(context, std::move(builder), many_samples(context)).render(from_front());
+    double light = 0; // of 100 rows of 20 px around the edge, which is at 74.5 to 84.5 px
+    for (std::uint32_t y = 10; y < 110; ++y)
+        for (std::uint32_t x = 70; x < 90; ++x)
+            light += linear_light(picture.at(x, y)[1]);
+    if (count_pixels(picture, [&](auto x, auto y) { return picture.at(x, y)[1] % 255 != 0; }) == 0)
+        throw Skip("no pixel is a mean of several samples");
+    return light / 100 - 10;
+}
+
+void linear_samples(Context &context) {
+    if (const double white = edge_displacement(context, 1); std::abs(white) > 0.1)
+        throw Failure(fmt::format("an edge between white and black seems to be displaced by {:.2f} px; expected 0: "
+                                  "samples are averaged in linear light",
+                                  white));
+    constexpr double expected = 0.375; // a pixel is white if a quarter of it is covered
+    if (const double bright = edge_displacement(context, 4); std::abs(bright - expected) > 0.15)
+        throw Failure(fmt::format("an edge between 4 times white and black seems to be displaced by {:.2f} px; "
+                                  "expected {}: samples brighter than white count in full",
+                                  bright, expected));
+}
+
 constexpr const char *gate = "raytracer.render";
 constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
@@ -128,6 +271,15 @@ constexpr Test tests[] = {
      20s, inverse_square},
     {"raytracer.directional-light", "A directional light comes from its direction.", kind, gate, 20s, directional},
     {"raytracer.shadow-on-object", "Objects cast shadows on other objects.", kind, gate, 20s, shadow_on_object},
+    {"raytracer.shadow-terminator", "A smooth mesh is lit up to the terminator of its normals, without facets.", kind,
+     gate, 20s, shadow_terminator},
+    {"raytracer.glass-shadow", "Glass tints the light that it lets through to objects by shadow_attenuation.", kind,
+     gate, 20s, glass_shadow},
+    {"raytracer.visible-lamps", "Area lights are visible in mirrors and through glass, with their radiance.", kind,
+     gate, 20s, visible_lamps},
+    {"raytracer.linear-samples",
+     "Samples are averaged in linear light, in which samples brighter than white count in full.", kind, gate, 20s,
+     linear_samples},
 };
 
 } // namespace

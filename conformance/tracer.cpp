@@ -53,6 +53,11 @@ void need_capability(Context &context, std::uint32_t capability, const char *nam
         throw Skip(fmt::format("ARHOST_CAPABILITY_{} is not declared", name));
 }
 
+Settings many_samples(Context &context) {
+    const arhost_option_descriptor *samples = context.library.option("samples");
+    return samples && samples->type == ARHOST_OPTION_INTEGER ? Settings{{"samples", "16"}} : Settings{};
+}
+
 Tracer::Tracer(Context &context, scene::ArenaBuilder builder, Settings overrides)
     : instance_(context.library, std::move(overrides)), scene_(std::move(builder)),
       functions_(*static_cast<const arhost_raytracer *>(context.library.plugin().functions)) {

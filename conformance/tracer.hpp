@@ -33,6 +33,9 @@ bool has_capability(Context &context, std::uint32_t capability);
 // Throws Skip unless the ray tracer declares the capability. `name`: without ARHOST_CAPABILITY_.
 void need_capability(Context &context, std::uint32_t capability, const char *name);
 
+// Sets the option `samples`, if the ray tracer has it, to 16 samples per pixel.
+Settings many_samples(Context &context);
+
 class Tracer {
 public:
     Tracer(Context &context, scene::ArenaBuilder builder, Settings overrides = {});

@@ -4,6 +4,7 @@
 #include "defect.hpp"
 
 #include <arhost/arhost.h>
+#include <arhost/shading/srgb8.hpp>
 
 #include <algorithm>
 #include <array>
@@ -21,6 +22,7 @@
 
 namespace {
 
+namespace shading = arhost::shading;
 using namespace arhost::test;
 
 // ---- The modified ray tracer ------------------------------------------------------------------------
@@ -51,11 +53,14 @@ struct Wrong {
     const arhost_host *host = nullptr;
     bool was_started = false, is_tiny = false;
     unsigned users = 0;
-    std::int64_t threads = 0;              // the option
-    std::vector<std::uint8_t> last;        // image
-    SceneCopy scene{nullptr, &std::free};  // modified
-    arhost_instance *glass_only = nullptr; // shadows_add: another instance, and its scene
-    SceneCopy glass_scene{nullptr, &std::free};
+    std::int64_t threads = 0;             // the option
+    std::vector<std::uint8_t> last;       // image
+    SceneCopy scene{nullptr, &std::free}; // modified
+    // Defects that combine two images: renders the other one, of another scene and with `fineness` times as many
+    // pixels along each axis.
+    arhost_instance *other = nullptr;
+    SceneCopy other_scene{nullptr, &std::free};
+    std::uint32_t fineness = 1;
 };
 Wrong &wrong(arhost_instance *instance) {
     return *reinterpret_cast<Wrong *>(instance);
@@ -250,8 +255,13 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
     }
     auto *created = new Wrong;
     const arhost_status status = embree().create(host, options, count, &created->real);
-    if (has("adds_shadows"))
-        embree().create(host, options, count, &created->glass_only);
+    std::vector<arhost_option> of_other(options, options + count);
+    if (has("averages_codes") || has("clamps_samples"))
+        for (arhost_option &option : of_other)
+            if (option.key == std::string_view("samples") && option.integer > 1)
+                option.integer = 1, created->fineness = 4;
+    if (has("adds_shadows") || has("blends_linearly") || has("facets_in_shadow") || created->fineness > 1)
+        embree().create(host, of_other.data(), count, &created->other);
     created->host = host;
     created->users = 1;
     created->threads = arhost_find_option(options, count, "threads")->integer;
@@ -271,8 +281,8 @@ void destroy(arhost_instance *instance) {
     if (--self.users > 0)
         return;
     embree().destroy(self.real);
-    if (self.glass_only)
-        embree().destroy(self.glass_only);
+    if (self.other)
+        embree().destroy(self.other);
     existing = nullptr;
     delete &self;
 }
@@ -323,6 +333,13 @@ void modify(arhost_scene &scene) {
     if (has("lambert_only"))
         for (arhost_material &material : view<arhost_material>(scene, scene.materials))
             material.model = ARHOST_MATERIAL_DIFFUSE;
+    if (has("untinted_shadows"))
+        for (arhost_material &material : view<arhost_material>(scene, scene.materials))
+            std::fill_n(material.shadow_attenuation, 3, 1.0f);
+    if (has("invisible_lamps"))
+        for (arhost_light &light : view<arhost_light>(scene, scene.lights))
+            if (light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE)
+                light.type = ARHOST_LIGHT_POINT;
     if (has("max_8_objects"))
         scene.objects.count = std::min(scene.objects.count, 8u);
     if (has("max_256_objects"))
@@ -349,16 +366,62 @@ void modify(arhost_scene &scene) {
         }
 }
 
-// Starts glass_only on the scene with all other virtual objects moved far away.
-void start_glass_only(Wrong &self, arhost_raytracer_setup setup) {
-    self.glass_scene = make_copy(*setup.scene);
-    arhost_scene *scene = &scene_in(self.glass_scene);
-    const auto materials = view<arhost_material>(*scene, scene->materials);
-    for (arhost_object &object : view<arhost_object>(*scene, scene->objects))
-        if (object.role == ARHOST_ROLE_VIRTUAL && materials[object.material].model != ARHOST_MATERIAL_GLASS)
-            object.world_from_object[11] -= 1e6f;
-    setup.scene = scene;
-    embree_functions().start(self.glass_only, &setup);
+arhost_intrinsics finer(arhost_intrinsics in, std::uint32_t times) {
+    in.width *= times;
+    in.height *= times;
+    for (double *focal : {&in.fx, &in.fy})
+        *focal *= times;
+    for (double *centre : {&in.cx, &in.cy})
+        *centre = (*centre + 0.5) * times - 0.5;
+    return in;
+}
+
+void start_other(Wrong &self, arhost_raytracer_setup setup) {
+    self.other_scene = make_copy(*setup.scene);
+    arhost_scene &scene = scene_in(self.other_scene);
+    const auto materials = view<arhost_material>(scene, scene.materials);
+    for (arhost_object &object : view<arhost_object>(scene, scene.objects))
+        if (has("blends_linearly") ? object.role == ARHOST_ROLE_CATCHER
+                                   : has("adds_shadows") && object.role == ARHOST_ROLE_VIRTUAL &&
+                                         materials[object.material].model != ARHOST_MATERIAL_GLASS)
+            object.world_from_object[11] -= 1e6f; // invisible
+    if (has("facets_in_shadow"))
+        for (arhost_geometry &geometry : view<arhost_geometry>(scene, scene.geometries))
+            geometry.normals.count = 0;
+    const arhost_intrinsics intrinsics = finer(*setup.intrinsics, self.fineness);
+    setup.scene = &scene;
+    setup.intrinsics = &intrinsics;
+    setup.width = intrinsics.width;
+    setup.height = intrinsics.height;
+    embree_functions().start(self.other, &setup);
+}
+
+double decoded(std::uint8_t code) {
+    return shading::srgb_decode(code / 255.0);
+}
+
+// Combines a pixel with the pixels of the other image, from column `x` and row `y` on.
+void combine(std::uint8_t *pixel, const Pixels &other, std::uint32_t x, std::uint32_t y, std::uint32_t fineness) {
+    const std::uint8_t *same = other.at(x, y);
+    if (has("adds_shadows") && pixel[3] == 153 && same[3] == 77)
+        pixel[3] = 153 + 77;
+    if (has("facets_in_shadow") && same[0] + same[1] + same[2] == 0)
+        std::fill_n(pixel, 3, std::uint8_t{0});
+    for (int channel = 0; channel < 3; ++channel) {
+        if (has("blends_linearly") && pixel[3] > same[3] && same[3] > 0)
+            pixel[channel] = shading::srgb8_exact(decoded(same[channel]) * same[3] / pixel[3]);
+        if (fineness == 1 || pixel[3] < 255)
+            continue;
+        double codes = 0, light = 0;
+        for (std::uint32_t i = 0; i < fineness * fineness; ++i) {
+            const std::uint8_t code = other.at(x + i % fineness, y + i / fineness)[channel];
+            codes += code;
+            light += decoded(code);
+        }
+        const double count = fineness * fineness;
+        pixel[channel] = static_cast<std::uint8_t>(has("averages_codes") ? std::lround(codes / count)
+                                                                         : shading::srgb8_exact(light / count));
+    }
 }
 
 arhost_status start(arhost_instance *instance, const arhost_raytracer_setup *setup) {
@@ -380,8 +443,8 @@ arhost_status start(arhost_instance *instance, const arhost_raytracer_setup *set
     modify(scene_in(copy));
     modified.scene = &scene_in(copy);
     self.is_tiny = modified.scene->bounds_max[0] - modified.scene->bounds_min[0] < 1;
-    if (self.glass_only)
-        start_glass_only(self, modified);
+    if (self.other)
+        start_other(self, modified);
     const arhost_status status = embree_functions().start(self.real, &modified);
     self.scene = std::move(copy); // frees the previous one
     return status;
@@ -457,16 +520,28 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
                             pixels.at(0, y));
         self.last = std::move(now);
     }
-    if (self.glass_only) {
-        std::vector<std::uint8_t> bytes(std::size_t{image->stride} * image->height);
-        arhost_image other = *image;
-        other.rgba = bytes.data();
-        embree_functions().render(self.glass_only, &modified, &other, info);
+    if (self.other) {
+        modified.camera.intrinsics = finer(modified.camera.intrinsics, self.fineness);
+        const std::uint32_t width = image->width * self.fineness, height = image->height * self.fineness;
+        const std::uint32_t stride = (4 * width + 63) / 64 * 64;
+        std::vector<std::uint8_t> bytes(std::size_t{stride} * height);
+        const arhost_image other{sizeof other, stride, width, height, bytes.data()};
+        embree_functions().render(self.other, &modified, &other, info);
         for (std::uint32_t y = 0; y < image->height; ++y)
             for (std::uint32_t x = 0; x < image->width; ++x)
-                if (std::uint8_t *pixel = pixels.at(x, y); pixel[3] == 153 && Pixels{other}.at(x, y)[3] == 77)
-                    pixel[3] = 153 + 77;
+                combine(pixels.at(x, y), {other}, x * self.fineness, y * self.fineness, self.fineness);
         info->has_region = 0;
+    }
+    if (has("linear_shadow_alpha")) { // partial shadows only
+        const arhost_scene &scene = scene_in(self.scene);
+        const double opaque = double{scene.shadow_alpha_opaque}, translucent = double{scene.shadow_alpha_translucent};
+        pixels.each([&](std::uint8_t *p) {
+            const double alpha = p[3] / 255.0;
+            const auto is = [&](double other) { return std::abs(alpha - other) < 0.5 / 255; };
+            if (alpha < opaque && !is(translucent))
+                p[3] = static_cast<std::uint8_t>(std::lround(255 * opaque * (1 - shading::light_under_alpha(alpha)) /
+                                                             (1 - shading::light_under_alpha(opaque))));
+        });
     }
     if (has("region_too_narrow") && info->region_width > 4)
         info->region_width -= 4;
@@ -482,8 +557,8 @@ void stop(arhost_instance *instance) {
     if (has("crash_in_stop"))
         crash();
     embree_functions().stop(wrong(instance).real);
-    if (wrong(instance).glass_only)
-        embree_functions().stop(wrong(instance).glass_only);
+    if (wrong(instance).other)
+        embree_functions().stop(wrong(instance).other);
 }
 
 arhost_status list_devices(const arhost_host *, arhost_take_device take, void *context) {
