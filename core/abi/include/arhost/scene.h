@@ -47,7 +47,8 @@ typedef struct arhost_geometry {
     uint32_t reserved;
     arhost_buffer positions; /* triangles: 3 floats per vertex; spheres: 4 floats each, centre and radius. In object
                                 space, mm; a skinned mesh is in its bind pose */
-    arhost_buffer normals;   /* 3 floats per vertex, unit length, for smooth shading; absent: flat shading */
+    arhost_buffer normals;   /* 3 floats per vertex, unit length, for smooth shading; absent: flat shading. Smooth
+                                facets do not shadow themselves where the interpolated normal faces the light */
     arhost_buffer texcoords; /* 2 floats per vertex; (0, 0): top left corner of the texture, (1, 1): bottom right */
     arhost_buffer indices;   /* 3 uint32 per triangle, each < positions.count */
     /* Present only in deforming triangle meshes. The worker evaluates these buffers (arhost/motion.h). */

@@ -8,6 +8,7 @@
 struct arhost_instance {
     const arhost_host *host;
     int side; /* rays per pixel: side × side */
+    double shadow_alpha_opaque, shadow_alpha_translucent;
     tracer *tracer;
 };
 
@@ -48,27 +49,46 @@ static uint8_t to_byte(double value) {
     return (uint8_t)(255 * fmin(fmax(value, 0), 1) + 0.5);
 }
 static double srgb(double linear) {
-    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * pow(linear, 1 / 2.4) - 0.055;
+    const double bounded = fmin(fmax(linear, 0), 1);
+    return bounded <= 0.0031308 ? 12.92 * bounded : 1.055 * pow(bounded, 1 / 2.4) - 0.055;
+}
+static double linear_light(double srgb) {
+    return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
 
-/* Averages a grid of rays. Alpha is straight: the colour is not multiplied by the pixel's coverage. */
+/* Alpha of a shadow. The host composites in sRGB, but a shadow hides a share of the linear light: alpha is exact for
+ * mid-grey video, the sRGB value 0.5. `opaque`, `translucent`: the shares of the light that such objects hide. */
+static double shadow_alpha(const arhost_instance *self, double opaque, double translucent) {
+    const double grey = linear_light(0.5);
+    const double hidden = opaque * (grey - linear_light(0.5 * (1 - self->shadow_alpha_opaque))) +
+                          translucent * (grey - linear_light(0.5 * (1 - self->shadow_alpha_translucent)));
+    return 1 - 2 * srgb(grey - hidden);
+}
+
+/* Averages a grid of rays in linear light. Objects and shadows are averaged apart and then blended by their shares of
+ * the alpha. Alpha is straight: the colour is not multiplied by it. */
 static void write_pixel(uint8_t *pixel, const arhost_instance *self, const view *v, double column, double row) {
     const int side = self->side;
-    vec sum = {0, 0, 0}; /* of colour · alpha */
-    double alpha_sum = 0;
-    int i;
+    vec colour = {0, 0, 0};
+    double opaque = 0, translucent = 0, others, coverage, alpha, share;
+    int i, hits = 0;
     for (i = 0; i < side * side; ++i) {
         const double right = (i % side + 0.5) / side - 0.5, down = (i / side + 0.5) / side - 0.5;
         const sample s = tracer_trace(self->tracer, ray_through(v, column + right, row + down));
-        sum = add(sum, scale(s.alpha, s.colour));
-        alpha_sum += s.alpha;
+        hits += s.is_virtual;
+        colour = add(colour, s.colour);
+        opaque += s.opaque;
+        translucent += s.translucent;
     }
-    if (alpha_sum > 0)
-        sum = scale(1 / alpha_sum, sum);
-    pixel[0] = to_byte(srgb(sum.x));
-    pixel[1] = to_byte(srgb(sum.y));
-    pixel[2] = to_byte(srgb(sum.z));
-    pixel[3] = to_byte(alpha_sum / (side * side));
+    others = fmax(side * side - hits, 1);
+    coverage = (double)hits / (side * side);
+    alpha = coverage + (1 - coverage) * shadow_alpha(self, opaque / others, translucent / others);
+    share = alpha > 0 ? coverage / alpha : 0; /* shadows are black */
+    colour = scale(1 / fmax(hits, 1), colour);
+    pixel[0] = to_byte(share * srgb(colour.x));
+    pixel[1] = to_byte(share * srgb(colour.y));
+    pixel[2] = to_byte(share * srgb(colour.z));
+    pixel[3] = to_byte(alpha);
 }
 
 static arhost_status render(arhost_instance *self, const arhost_render_request *request, const arhost_image *image,
@@ -95,6 +115,8 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
 /* ---- start and end ---- */
 
 static arhost_status start(arhost_instance *self, const arhost_raytracer_setup *setup) {
+    self->shadow_alpha_opaque = setup->scene->shadow_alpha_opaque;
+    self->shadow_alpha_translucent = setup->scene->shadow_alpha_translucent;
     self->tracer = tracer_new(setup->scene);
     if (!self->tracer) {
         self->host->log(self->host, ARHOST_SEVERITY_ERROR, "out of memory");

@@ -191,6 +191,7 @@ typedef struct hit {
     double distance;
     const object *object;    /* NULL: no hit */
     vec face_normal, normal; /* geometric and shading normal, unit length */
+    vec lift;                /* to the origin of shadow rays */
 } hit;
 
 /* Distances at which the ray's line enters and leaves a sphere; returns 0 if it misses. */
@@ -214,8 +215,23 @@ static void intersect_sphere(const object *o, const sphere *s, ray r, int front_
     if (distance > 0 && distance < nearest->distance) {
         const vec at = add(r.origin, scale(distance, r.direction));
         const vec normal = scale(1 / s->radius, subtract(at, s->centre));
-        *nearest = (hit){distance, o, normal, normal};
+        *nearest = (hit){distance, o, normal, normal, {0, 0, 0}};
     }
+}
+
+/* From a point of a triangle to the curved surface that its normals describe. Shadow rays start there, so that the
+ * facets of a smooth mesh do not shadow themselves (J. Hanika, Hacking the Shadow Terminator, Ray Tracing Gems II, 2021).
+ */
+static vec lift_at(const triangle *t, double u, double v) {
+    const vec from_corner = add(scale(u, t->edge_1), scale(v, t->edge_2));
+    const vec to_corners[3] = {scale(-1, from_corner), subtract(t->edge_1, from_corner),
+                               subtract(t->edge_2, from_corner)};
+    const double weights[3] = {1 - u - v, u, v};
+    vec lift = {0, 0, 0};
+    int c;
+    for (c = 0; c < 3; ++c)
+        lift = add(lift, scale(weights[c] * fmax(dot(to_corners[c], t->normals[c]), 0), t->normals[c]));
+    return lift;
 }
 
 /* Möller and Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, Journal of Graphics Tools 2(1), 1997. */
@@ -232,12 +248,13 @@ static void intersect_triangle(const object *o, const triangle *t, ray r, int fr
     if (!(u >= -epsilon && v >= -epsilon && u + v <= 1 + epsilon && distance > 0 && distance < nearest->distance))
         return;
     normal = add(add(scale(1 - u - v, t->normals[0]), scale(u, t->normals[1])), scale(v, t->normals[2]));
-    *nearest = (hit){distance, o, t->face_normal, length(normal) > 0 ? normalised(normal) : t->face_normal};
+    *nearest = (hit){distance, o, t->face_normal, length(normal) > 0 ? normalised(normal) : t->face_normal,
+                     lift_at(t, u, v)};
 }
 
 /* FILL IN: use a BVH, or a library such as Embree, to make this fast. */
 static hit nearest_hit(const tracer *self, ray r, unsigned kinds, int front_faces_only) {
-    hit nearest = {r.end, NULL, {0, 0, 0}, {0, 0, 0}};
+    hit nearest = {r.end, NULL, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
     uint32_t i, k;
     for (i = 0; i < self->scene->objects.count; ++i) {
         const object *o = &self->objects[i];
@@ -257,19 +274,20 @@ static hit nearest_hit(const tracer *self, ray r, unsigned kinds, int front_face
 
 /* A point hit by a ray. */
 typedef struct surface {
-    vec position;            /* offset along the geometric normal, so that secondary rays do not hit it again */
-    vec below;               /* offset to the other side */
-    vec face_normal, normal; /* facing the ray's origin; unit length */
-    int is_real;             /* a catcher or occluder */
+    vec position; /* offset along the geometric normal, so that secondary rays do not hit it again */
+    vec below;    /* offset to the other side */
+    vec lifted;   /* origin of shadow rays */
+    vec normal;   /* shading normal, facing the ray's origin; unit length */
+    int is_real;  /* a catcher or occluder */
 } surface;
 
 static surface surface_at(ray r, const hit *h) {
     const vec at = add(r.origin, scale(h->distance, r.direction));
     const vec face_normal = dot(h->face_normal, r.direction) > 0 ? scale(-1, h->face_normal) : h->face_normal;
     const vec normal = dot(h->normal, face_normal) < 0 ? scale(-1, h->normal) : h->normal;
-    const vec gap = scale(1e-9 * (length(at) + h->distance), face_normal);
-    return (surface){add(at, gap), subtract(at, gap), face_normal, normal,
-                     (h->object->kind & (CATCHER | OCCLUDER)) != 0};
+    const vec gap = scale(1e-9 * (length(at) + h->distance), face_normal), above = add(at, gap);
+    const vec lifted = dot(h->normal, face_normal) < 0 ? above : add(above, h->lift); /* not from inside */
+    return (surface){above, subtract(at, gap), lifted, normal, (h->object->kind & (CATCHER | OCCLUDER)) != 0};
 }
 
 /* The light that arrives at a surface from one light source. */
@@ -300,15 +318,14 @@ static incident_light incident_from(const arhost_light *light, const surface *s)
         const double t = fmin(fmax((along_beam - outer) / fmax(inner - outer, 1e-6), 0), 1);
         in.irradiance *= t * t * (3 - 2 * t);
     }
-    if (dot(s->face_normal, in.direction) > 0)
-        in.cosine = fmax(dot(s->normal, in.direction), 0);
+    in.cosine = fmax(dot(s->normal, in.direction), 0);
     return in;
 }
 
 /* Returns SOLID if an opaque object blocks the light, GLASS if only glass does, otherwise 0. Proxies for real objects
  * cast no shadows on each other: the video already contains those. */
 static unsigned blocked_by(const tracer *self, const incident_light *light, const surface *s) {
-    const ray shadow_ray = {s->position, light->direction, light->distance};
+    const ray shadow_ray = {s->lifted, light->direction, light->distance};
     if (nearest_hit(self, shadow_ray, s->is_real ? SOLID : SOLID | CATCHER | OCCLUDER, 0).object)
         return SOLID;
     return nearest_hit(self, shadow_ray, GLASS, 0).object ? GLASS : 0;
@@ -375,8 +392,8 @@ static vec radiance(const tracer *self, ray r, const hit *h, uint32_t bounces) {
 
 /* ---- overlay ---- */
 
-/* Shadow on a catcher: proportional to the fraction of its light that virtual objects block. */
-static double shadow_alpha(const tracer *self, const surface *s) {
+/* The shares of a catcher's light that virtual objects hide. */
+static sample shadow_at(const tracer *self, const surface *s) {
     double total = 0, blocked = 0, through_glass = 0;
     uint32_t i;
     for (i = 0; i < self->scene->lights.count; ++i) {
@@ -392,24 +409,21 @@ static double shadow_alpha(const tracer *self, const surface *s) {
         through_glass += by == GLASS ? light : 0;
     }
     if (!(total > 0))
-        return 0;
-    return blocked / total * self->scene->shadow_alpha_opaque +
-           through_glass / total * self->scene->shadow_alpha_translucent;
+        return (sample){0};
+    return (sample){.opaque = blocked / total, .translucent = through_glass / total};
 }
 
 sample tracer_trace(const tracer *self, ray r) {
     const hit nearest = nearest_hit(self, r, SOLID | GLASS | OCCLUDER, 0);
-    sample result = {{0, 0, 0}, 0};
     hit catcher;
     surface s;
     if (nearest.object && nearest.object->kind != OCCLUDER)
-        return (sample){radiance(self, r, &nearest, 0), 1};
+        return (sample){.is_virtual = 1, .colour = radiance(self, r, &nearest, 0)};
     /* The video shows the real surface; the overlay adds only the shadow. */
     r.end = nearest.distance;
     catcher = nearest_hit(self, r, CATCHER, 1);
-    if (catcher.object) {
-        s = surface_at(r, &catcher);
-        result.alpha = shadow_alpha(self, &s);
-    }
-    return result;
+    if (!catcher.object)
+        return (sample){0};
+    s = surface_at(r, &catcher);
+    return shadow_at(self, &s);
 }

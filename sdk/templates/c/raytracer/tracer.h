@@ -43,10 +43,11 @@ typedef struct ray {
     double end;            /* maximum distance of a hit, mm */
 } ray;
 
-/* The overlay along a ray. Alpha is exactly 0 where only the video is visible, exactly 1 on virtual objects. */
+/* What a ray shows: a virtual object, or a shadow catcher. All 0 where only the video is visible. */
 typedef struct sample {
-    vec colour; /* linear light */
-    double alpha;
+    int is_virtual;
+    vec colour;                 /* of the virtual object, linear light */
+    double opaque, translucent; /* shares of the catcher's light that such objects hide */
 } sample;
 
 typedef struct tracer tracer;

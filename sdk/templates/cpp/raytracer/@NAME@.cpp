@@ -3,19 +3,13 @@
 #include "tracer.hpp"
 
 #include <arhost-cpp/plugin.hpp>
+#include <arhost/shading/scalar.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 namespace {
-
-std::uint8_t to_byte(double value) {
-    return static_cast<std::uint8_t>(255 * std::clamp(value, 0.0, 1.0) + 0.5);
-}
-double srgb(double linear) {
-    return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
-}
 
 // Pixel centres are at integer coordinates, rows go downwards, the camera looks along -back.
 class Camera {
@@ -44,7 +38,10 @@ public:
     @CLASS@(const arhost::Host &host, const arhost::Options &options)
         : host_(host), side_(std::sqrt(options.integer("samples"))) {}
 
-    void start(const arhost_raytracer_setup &setup) { tracer_.emplace(*setup.scene); }
+    void start(const arhost_raytracer_setup &setup) {
+        scene_ = setup.scene;
+        tracer_.emplace(*scene_);
+    }
     void stop() { tracer_.reset(); }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &) {
@@ -61,25 +58,39 @@ public:
     }
 
 private:
-    // Averages a grid of rays. Alpha is straight: the colour is not multiplied by the pixel's coverage.
+    // Averages a grid of rays in linear light. Objects and shadows are averaged apart and then blended by their shares
+    // of the alpha. Alpha is straight: the colour is not multiplied by it.
     void write(std::uint8_t *pixel, const Camera &camera, double column, double row) const {
-        Vec sum; // of colour · alpha
-        double alpha_sum = 0;
-        for (int i = 0; i < side_ * side_; ++i) {
+        Vec colour;
+        double hits = 0, opaque = 0, translucent = 0;
+        const int count = side_ * side_;
+        for (int i = 0; i < count; ++i) {
             const double right = (i % side_ + 0.5) / side_ - 0.5, down = (i / side_ + 0.5) / side_ - 0.5;
             const Sample sample = tracer_->trace(camera.ray(column + right, row + down));
-            sum = sum + sample.alpha * sample.colour;
-            alpha_sum += sample.alpha;
+            hits += sample.is_virtual;
+            colour = colour + sample.colour;
+            opaque += sample.opaque;
+            translucent += sample.translucent;
         }
-        const Vec colour = alpha_sum > 0 ? 1 / alpha_sum * sum : Vec{};
-        pixel[0] = to_byte(srgb(colour.x));
-        pixel[1] = to_byte(srgb(colour.y));
-        pixel[2] = to_byte(srgb(colour.z));
-        pixel[3] = to_byte(alpha_sum / (side_ * side_));
+        const double coverage = hits / count, others = std::max(count - hits, 1.0);
+        const double shadow =
+            arhost::shading::shadow_alpha(opaque / others, translucent / others, scene_->shadow_alpha_opaque,
+                                          scene_->shadow_alpha_translucent);
+        const double alpha = coverage + (1 - coverage) * shadow;
+        const double share = alpha > 0 ? coverage / alpha : 0; // shadows are black
+        const auto to_byte = [](double value) { return static_cast<std::uint8_t>(arhost::shading::code_8bit(value)); };
+        const auto encode = [&](double sum) {
+            return to_byte(share * arhost::shading::srgb_encode(sum / std::max(hits, 1.0)));
+        };
+        pixel[0] = encode(colour.x);
+        pixel[1] = encode(colour.y);
+        pixel[2] = encode(colour.z);
+        pixel[3] = to_byte(alpha);
     }
 
     arhost::Host host_;
     int side_; // rays per pixel: side × side
+    const arhost_scene *scene_ = nullptr;
     std::optional<Tracer> tracer_;
 };
 

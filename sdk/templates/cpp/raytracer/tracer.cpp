@@ -131,7 +131,18 @@ void Tracer::intersect_sphere(const Object &object, const Sphere &sphere, const 
     if (!(distance > 0 && distance < nearest.distance))
         return;
     const Vec normal = 1 / sphere.radius * (ray.origin + distance * ray.direction - sphere.centre);
-    nearest = {distance, &object, normal, normal};
+    nearest = {distance, &object, normal, normal, {}};
+}
+
+// From a point of a triangle to the curved surface that its normals describe. Shadow rays start there, so that the
+// facets of a smooth mesh do not shadow themselves (J. Hanika, Hacking the Shadow Terminator, Ray Tracing Gems II, 2021).
+Vec Tracer::lift(const Triangle &t, double u, double v) {
+    const Vec from_corner = u * t.edge_1 + v * t.edge_2;
+    const auto to_corner = [&](Vec corner, Vec normal, double weight) {
+        return weight * std::max(dot(corner - from_corner, normal), 0.0) * normal;
+    };
+    return to_corner({}, t.normals[0], 1 - u - v) + to_corner(t.edge_1, t.normals[1], u) +
+           to_corner(t.edge_2, t.normals[2], v);
 }
 
 // Möller and Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, Journal of Graphics Tools 2(1), 1997.
@@ -151,7 +162,8 @@ void Tracer::intersect_triangle(const Object &object, const Triangle &t, const R
     if (!(v >= -epsilon && u + v <= 1 + epsilon && distance > 0 && distance < nearest.distance))
         return;
     const Vec normal = (1 - u - v) * t.normals[0] + u * t.normals[1] + v * t.normals[2];
-    nearest = {distance, &object, t.face_normal, length(normal) > 0 ? normalised(normal) : t.face_normal};
+    nearest = {distance, &object, t.face_normal, length(normal) > 0 ? normalised(normal) : t.face_normal,
+               lift(t, u, v)};
 }
 
 // FILL IN: use a BVH, or a library such as Embree, to make this fast.
@@ -176,10 +188,11 @@ Tracer::Hit Tracer::nearest(const Ray &ray, unsigned kinds, Faces faces) const {
 
 // A point hit by a ray.
 struct Tracer::Surface {
-    Vec position;            // offset along the geometric normal, so that secondary rays do not hit it again
-    Vec below;               // offset to the other side
-    Vec face_normal, normal; // facing the ray's origin; unit length
-    bool is_real;            // a catcher or occluder
+    Vec position; // offset along the geometric normal, so that secondary rays do not hit it again
+    Vec below;    // offset to the other side
+    Vec lifted;   // origin of shadow rays
+    Vec normal;   // shading normal, facing the ray's origin; unit length
+    bool is_real; // a catcher or occluder
 };
 
 Tracer::Surface Tracer::surface_at(const Ray &ray, const Hit &hit) {
@@ -187,7 +200,8 @@ Tracer::Surface Tracer::surface_at(const Ray &ray, const Hit &hit) {
     const Vec face_normal = dot(hit.face_normal, ray.direction) > 0 ? -1 * hit.face_normal : hit.face_normal;
     const Vec normal = dot(hit.normal, face_normal) < 0 ? -1 * hit.normal : hit.normal;
     const Vec gap = 1e-9 * (length(at) + hit.distance) * face_normal;
-    return {at + gap, at - gap, face_normal, normal, bool(hit.object->kind & (catcher | occluder))};
+    const Vec lift = dot(hit.normal, face_normal) < 0 ? Vec{} : hit.lift; // not from inside
+    return {at + gap, at - gap, at + gap + lift, normal, bool(hit.object->kind & (catcher | occluder))};
 }
 
 // The light that arrives at a surface from one light source.
@@ -217,14 +231,13 @@ Tracer::IncidentLight Tracer::incident(const arhost_light &light, const Surface 
         const double t = std::clamp((along_beam - outer) / std::max(inner - outer, 1e-6), 0.0, 1.0);
         in.irradiance *= t * t * (3 - 2 * t);
     }
-    if (dot(surface.face_normal, in.direction) > 0)
-        in.cosine = std::max(dot(surface.normal, in.direction), 0.0);
+    in.cosine = std::max(dot(surface.normal, in.direction), 0.0);
     return in;
 }
 
 // Proxies for real objects cast no shadows on each other: the video already contains those.
 Tracer::Visibility Tracer::visibility(const IncidentLight &light, const Surface &surface) const {
-    const Ray ray = {surface.position, light.direction, light.distance};
+    const Ray ray = {surface.lifted, light.direction, light.distance};
     if (nearest(ray, surface.is_real ? solid : solid | catcher | occluder).object)
         return Visibility::blocked;
     return nearest(ray, glass).object ? Visibility::through_glass : Visibility::clear;
@@ -283,8 +296,8 @@ Vec Tracer::radiance(const Ray &ray, const Hit &hit, unsigned bounces) const {
 
 // ---- Overlay ----
 
-// Shadow on a catcher: proportional to the fraction of its light that virtual objects block.
-double Tracer::shadow_alpha(const Surface &surface) const {
+// The shares of a catcher's light that virtual objects hide.
+Sample Tracer::shadow(const Surface &surface) const {
     const auto *lights = elements<arhost_light>(scene_.lights);
     double total = 0, blocked = 0, through_glass = 0;
     for (std::uint32_t i = 0; i < scene_.lights.count; ++i) {
@@ -299,17 +312,15 @@ double Tracer::shadow_alpha(const Surface &surface) const {
         through_glass += path == Visibility::through_glass ? light : 0;
     }
     if (!(total > 0))
-        return 0;
-    return blocked / total * scene_.shadow_alpha_opaque + through_glass / total * scene_.shadow_alpha_translucent;
+        return {};
+    return {false, {}, blocked / total, through_glass / total};
 }
 
 Sample Tracer::trace(const Ray &ray) const {
     const Hit hit = nearest(ray, solid | glass | occluder);
     if (hit.object && hit.object->kind != occluder)
-        return {radiance(ray, hit, 0), 1};
+        return {true, radiance(ray, hit, 0)};
     // The video shows the real surface; the overlay adds only the shadow.
     const Hit shadowed = nearest({ray.origin, ray.direction, hit.distance}, catcher, Faces::front);
-    if (shadowed.object)
-        return {Vec{}, shadow_alpha(surface_at(ray, shadowed))};
-    return {};
+    return shadowed.object ? shadow(surface_at(ray, shadowed)) : Sample{};
 }

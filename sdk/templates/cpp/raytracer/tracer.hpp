@@ -46,10 +46,11 @@ struct Ray {
     double end = infinity; // maximum distance of a hit, mm
 };
 
-// The overlay along a ray. Alpha is exactly 0 where only the video is visible, exactly 1 on virtual objects.
+// What a ray shows: a virtual object, or a shadow catcher. All 0 where only the video is visible.
 struct Sample {
-    Vec colour; // linear light
-    double alpha = 0;
+    bool is_virtual = false;
+    Vec colour;                         // of the virtual object, linear light
+    double opaque = 0, translucent = 0; // shares of the catcher's light that such objects hide
 };
 
 // Brute force: tests each ray against every object whose bounding sphere it hits, and there against every sphere or
@@ -86,6 +87,7 @@ private:
         double distance = infinity;
         const Object *object = nullptr; // null: no hit
         Vec face_normal, normal;        // geometric and shading normal, unit length
+        Vec lift;                       // to the origin of shadow rays
     };
     struct Surface;
     struct IncidentLight;
@@ -93,6 +95,7 @@ private:
     template <class T> const T *elements(const arhost_buffer &buffer) const;
     void update_geometry(std::uint32_t number, const float *world_from_object, const float *positions,
                          const float *normals);
+    static Vec lift(const Triangle &t, double u, double v);
     static void intersect_sphere(const Object &object, const Sphere &sphere, const Ray &ray, Faces faces,
                                  Hit &nearest);
     static void intersect_triangle(const Object &object, const Triangle &triangle, const Ray &ray, Faces faces,
@@ -103,7 +106,7 @@ private:
     Visibility visibility(const IncidentLight &light, const Surface &surface) const;
     Vec radiance(const Ray &ray, const Hit &hit, unsigned bounces) const;
     Vec direct_light(const Surface &surface, const arhost_material &material, Vec to_eye) const;
-    double shadow_alpha(const Surface &surface) const;
+    Sample shadow(const Surface &surface) const;
 
     const arhost_scene &scene_;
     std::vector<Object> objects_;

@@ -88,12 +88,14 @@ class Hits:
         self.object = np.full(count, -1)  # index; -1: no hit
         self.face_normal = np.zeros((count, 3))  # geometric normal, unit length
         self.normal = np.zeros((count, 3))  # shading normal, unit length
+        self.lift = np.zeros((count, 3))  # to the origin of shadow rays
 
-    def take(self, rays, number, distance, face_normal, normal):
+    def take(self, rays, number, distance, face_normal, normal, lift):
         nearer = (distance > 0) & (distance < self.distance[rays])  # false for NaN
         rays = rays[nearer]
         self.distance[rays], self.object[rays] = distance[nearer], number
         self.face_normal[rays], self.normal[rays] = face_normal[nearer], normal[nearer]
+        self.lift[rays] = lift[nearer]
 
 
 def intersect_spheres(hits, number, o, rays, origins, directions, front_faces_only):
@@ -101,7 +103,7 @@ def intersect_spheres(hits, number, o, rays, origins, directions, front_faces_on
         enters, leaves = sphere_interval(centre, radius, origins, directions)
         distance = enters if front_faces_only else np.where(enters > 0, enters, leaves)
         normal = (origins + distance[:, None] * directions - centre) / radius
-        hits.take(rays, number, distance, normal, normal)
+        hits.take(rays, number, distance, normal, normal, np.zeros(normal.shape))
 
 
 def intersect_triangles(hits, number, o, part, rays, origins, directions, front_faces_only):
@@ -127,9 +129,15 @@ def intersect_triangles(hits, number, o, part, rays, origins, directions, front_
         return
     which, every = which[found], every[found]
     u, v = u[every, which, None], v[every, which, None]
-    corners = o.normals[part][which]
-    normal = (1 - u - v) * corners[:, 0] + u * corners[:, 1] + v * corners[:, 2]
-    hits.take(rays[found], number, nearest[found], o.face_normals[part][which], normalised(normal))
+    normals, weights = o.normals[part][which], np.stack((1 - u - v, u, v), axis=1)
+    normal = (weights * normals).sum(axis=1)
+    # Vectors to the corners, then from the hit to the curved surface that the normals describe. Shadow rays start there,
+    # so that the facets of a smooth mesh do not shadow themselves (J. Hanika, Hacking the Shadow Terminator, Ray Tracing
+    # Gems II, 2021).
+    along_1, along_2 = edge_1[which], edge_2[which]
+    to_corners = np.stack((np.zeros(along_1.shape), along_1, along_2), axis=1) - (u * along_1 + v * along_2)[:, None]
+    lift = (weights * np.maximum(dot(to_corners, normals), 0)[..., None] * normals).sum(axis=1)
+    hits.take(rays[found], number, nearest[found], o.face_normals[part][which], normalised(normal), lift)
 
 
 class Tracer:
@@ -197,7 +205,7 @@ class Tracer:
             inner, outer = float(light["cosine_inner"]), float(light["cosine_outer"])
             t = np.clip((along_beam - outer) / max(inner - outer, 1e-6), 0, 1)
             irradiance = irradiance * t * t * (3 - 2 * t)
-        cosine = np.where(dot(surface.face_normal, direction) > 0, np.maximum(dot(surface.normal, direction), 0), 0)
+        cosine = np.maximum(dot(surface.normal, direction), 0)
         return direction, distance, cosine, irradiance
 
     def visibility(self, direction, distance, surface, facing):
@@ -206,7 +214,7 @@ class Tracer:
         blocked, through_glass = np.zeros((2, len(facing)), bool)
         for real, opaque in ((False, SOLID | CATCHER | OCCLUDER), (True, SOLID)):
             some = np.flatnonzero(facing & (surface.is_real == real))
-            rays = surface.position[some], direction[some]
+            rays = surface.lifted[some], direction[some]
             blocked[some] = self.nearest(*rays, opaque, distance[some]).object >= 0
             through_glass[some] = self.nearest(*rays, GLASS, distance[some]).object >= 0
         return blocked, through_glass & ~blocked
@@ -257,16 +265,19 @@ class Tracer:
     # ---- Overlay ----
 
     def shadow_alphas(self, surface):
-        """Shadow on a catcher: proportional to the fraction of its light that virtual objects block."""
-        total, alphas = np.zeros((2, len(surface.position)))
+        """Shadow on a catcher. The host composites in sRGB, but a shadow hides a share of the linear light: alpha is exact
+        for mid-grey video, the sRGB value 0.5."""
+        grey = linear_light(0.5)
+        hidden_by_opaque = grey - linear_light(0.5 * (1 - self.scene.shadow_alpha_opaque))
+        hidden_by_glass = grey - linear_light(0.5 * (1 - self.scene.shadow_alpha_translucent))
+        total, hidden = np.zeros((2, len(surface.position)))
         for light in self.scene.lights:
             direction, distance, cosine, irradiance = self.incoming(light, surface)
             power = cosine * irradiance * light["intensity"].astype(float).sum()
             blocked, through_glass = self.visibility(direction, distance, surface, power > 0)
             total += power
-            alphas += power * np.where(blocked, self.scene.shadow_alpha_opaque, 0)
-            alphas += power * np.where(through_glass, self.scene.shadow_alpha_translucent, 0)
-        return np.divide(alphas, total, out=np.zeros(len(total)), where=total > 0)
+            hidden += power * (blocked * hidden_by_opaque + through_glass * hidden_by_glass)
+        return 1 - 2 * srgb(grey - hidden / np.maximum(total, 1e-300))
 
     def trace(self, origins, directions):
         """Overlay colours, in linear light, and alphas: exactly 0 where only the video is visible, exactly 1 on virtual
@@ -294,18 +305,28 @@ class Surface:
         at = origins + distance * directions
         face_normal, normal = hits.face_normal[here], hits.normal[here]
         # Both normals face the rays' origins.
-        self.face_normal = np.where(dot(face_normal, directions)[:, None] > 0, -face_normal, face_normal)
-        self.normal = np.where(dot(normal, self.face_normal)[:, None] < 0, -normal, normal)
-        gap = 1e-9 * (length(at)[:, None] + distance) * self.face_normal
+        face_normal = np.where(dot(face_normal, directions)[:, None] > 0, -face_normal, face_normal)
+        inside = dot(normal, face_normal)[:, None] < 0
+        self.normal = np.where(inside, -normal, normal)
+        gap = 1e-9 * (length(at)[:, None] + distance) * face_normal
         self.position, self.below = at + gap, at - gap  # offsets, so that secondary rays do not hit it again
+        self.lifted = np.where(inside, self.position, self.position + hits.lift[here])  # origin of shadow rays
         self.is_real = np.full(len(at), bool(kind & (CATCHER | OCCLUDER)))
 
 
 # ---- Plugin ----
 
-def srgb_bytes(linear):
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.maximum(linear, 0) ** (1 / 2.4) - 0.055)
-    return (255 * np.clip(encoded, 0, 1) + 0.5).astype(np.uint8)
+def srgb(linear):
+    linear = np.clip(linear, 0, 1)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def linear_light(encoded):
+    return encoded / 12.92 if encoded <= 0.04045 else ((encoded + 0.055) / 1.055) ** 2.4
+
+
+def to_bytes(values):
+    return (255 * np.clip(values, 0, 1) + 0.5).astype(np.uint8)
 
 
 class @CLASS@:
@@ -344,5 +365,5 @@ class @CLASS@:
             directions = normalised(x[:, None] * right - y[:, None] * up - back)
             colours, alphas = self.tracer.trace(np.broadcast_to(camera.eye, directions.shape), directions)
             # Straight alpha: colours are not multiplied by it.
-            band[..., :3] = srgb_bytes(colours).reshape(band.shape[:2] + (3,))
-            band[..., 3] = (255 * alphas + 0.5).astype(np.uint8).reshape(band.shape[:2])
+            band[..., :3] = to_bytes(srgb(colours)).reshape(band.shape[:2] + (3,))
+            band[..., 3] = to_bytes(alphas).reshape(band.shape[:2])

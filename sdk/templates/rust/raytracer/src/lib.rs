@@ -5,17 +5,39 @@ mod tracer;
 mod vec3;
 
 use arhost_sys::*;
-use tracer::{Ray, Tracer};
+use tracer::{Ray, Sample, Tracer};
 use vec3::*;
 
 fn to_byte(value: f64) -> u8 {
     (255.0 * value.clamp(0.0, 1.0)).round() as u8
 }
 fn srgb(linear: f64) -> f64 {
-    if linear <= 0.0031308 {
-        12.92 * linear
+    match linear.clamp(0.0, 1.0) {
+        dark if dark <= 0.0031308 => 12.92 * dark,
+        bright => 1.055 * bright.powf(1.0 / 2.4) - 0.055,
+    }
+}
+fn linear_light(srgb: f64) -> f64 {
+    if srgb <= 0.04045 {
+        srgb / 12.92
     } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
+        ((srgb + 0.055) / 1.055).powf(2.4)
+    }
+}
+
+/// Alphas of fully hidden light.
+struct ShadowAlpha {
+    opaque: f64,
+    translucent: f64,
+}
+
+impl ShadowAlpha {
+    /// Alpha of a shadow. The host composites in sRGB, but a shadow hides a share of the linear light: alpha is exact for
+    /// mid-grey video, the sRGB value 0.5. `opaque`, `translucent`: the shares of the light that such objects hide.
+    fn of(&self, opaque: f64, translucent: f64) -> f64 {
+        let hidden = |alpha: f64| linear_light(0.5) - linear_light(0.5 * (1.0 - alpha));
+        let light = linear_light(0.5) - opaque * hidden(self.opaque) - translucent * hidden(self.translucent);
+        1.0 - 2.0 * srgb(light)
     }
 }
 
@@ -52,35 +74,43 @@ impl View<'_> {
     }
 }
 
-/// Averages a grid of `side` × `side` rays. Alpha is straight: the colour is not multiplied by the pixel's coverage.
-fn pixel(tracer: &Tracer, view: &View, side: u32, column: f64, row: f64) -> [u8; 4] {
-    let mut sum = Vec3([0.0; 3]); // of colour · alpha
-    let mut alpha_sum = 0.0;
+/// Averages a grid of `side` × `side` rays in linear light. Objects and shadows are averaged apart and then blended by
+/// their shares of the alpha. Alpha is straight: the colour is not multiplied by it.
+fn pixel(tracer: &Tracer, shadow: &ShadowAlpha, view: &View, side: u32, column: f64, row: f64) -> [u8; 4] {
+    let count = f64::from(side * side);
+    let (mut hits, mut colour, mut opaque, mut translucent) = (0.0, Vec3([0.0; 3]), 0.0, 0.0);
     let offset = |i: u32| (f64::from(i) + 0.5) / f64::from(side) - 0.5;
     for i in 0..side * side {
-        let sample = tracer.trace(&view.ray(column + offset(i % side), row + offset(i / side)));
-        sum = sum + sample.alpha * sample.colour;
-        alpha_sum += sample.alpha;
+        match tracer.trace(&view.ray(column + offset(i % side), row + offset(i / side))) {
+            Sample::Virtual(more) => {
+                hits += 1.0;
+                colour = colour + more;
+            }
+            Sample::Video { opaque: o, translucent: t } => {
+                opaque += o;
+                translucent += t;
+            }
+        }
     }
-    let colour = if alpha_sum > 0.0 { 1.0 / alpha_sum * sum } else { sum };
-    [
-        to_byte(srgb(colour[0])),
-        to_byte(srgb(colour[1])),
-        to_byte(srgb(colour[2])),
-        to_byte(alpha_sum / f64::from(side * side)),
-    ]
+    let (coverage, others) = (hits / count, (count - hits).max(1.0));
+    let alpha = coverage + (1.0 - coverage) * shadow.of(opaque / others, translucent / others);
+    let share = if alpha > 0.0 { coverage / alpha } else { 0.0 }; // shadows are black
+    let code = |sum: f64| to_byte(share * srgb(sum / hits.max(1.0)));
+    [code(colour[0]), code(colour[1]), code(colour[2]), to_byte(alpha)]
 }
 
 struct @CLASS@ {
     host: Host,
     side: u32, // rays per pixel: side × side
+    shadow: ShadowAlpha,
     tracer: Option<Tracer>,
 }
 
 impl Plugin for @CLASS@ {
     fn new(host: Host, options: &Options) -> Result<Self, Failure> {
         let side = (options.integer("samples") as f64).sqrt() as u32;
-        Ok(@CLASS@ { host, side, tracer: None })
+        let shadow = ShadowAlpha { opaque: 0.0, translucent: 0.0 };
+        Ok(@CLASS@ { host, side, shadow, tracer: None })
     }
     fn stop(&mut self) -> Result<(), Failure> {
         self.tracer = None; // the scene becomes invalid
@@ -90,7 +120,12 @@ impl Plugin for @CLASS@ {
 
 impl Raytracer for @CLASS@ {
     fn start(&mut self, setup: &arhost_raytracer_setup) -> Result<(), Failure> {
-        self.tracer = Some(Tracer::new(setup.scene()));
+        let scene = setup.scene();
+        self.shadow = ShadowAlpha {
+            opaque: scene.shadow_alpha_opaque.into(),
+            translucent: scene.shadow_alpha_translucent.into(),
+        };
+        self.tracer = Some(Tracer::new(scene));
         Ok(())
     }
 
@@ -110,7 +145,7 @@ impl Raytracer for @CLASS@ {
                 return Err(Failure::new(ARHOST_STATUS_ERROR_CANCELLED, "")); // arhost wants this call to return soon
             }
             for (column, rgba) in image.row_mut(row).iter_mut().enumerate() {
-                *rgba = pixel(tracer, &view, self.side, column as f64, f64::from(row));
+                *rgba = pixel(tracer, &self.shadow, &view, self.side, column as f64, f64::from(row));
             }
         }
         Ok(())

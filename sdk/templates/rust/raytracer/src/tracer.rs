@@ -13,10 +13,12 @@ pub struct Ray {
     pub end: f64,        // maximum distance of a hit, mm
 }
 
-/// The overlay along a ray. Alpha is exactly 0 where only the video is visible, exactly 1 on virtual objects.
-pub struct Sample {
-    pub colour: Vec3, // linear light
-    pub alpha: f64,
+/// What a ray shows.
+pub enum Sample {
+    /// A virtual object; its colour, linear light.
+    Virtual(Vec3),
+    /// The video; the shares of the light that opaque and translucent objects hide from a shadow catcher.
+    Video { opaque: f64, translucent: f64 },
 }
 
 // Kinds of objects, as bits of a ray mask. Glass and solid objects cast different shadows.
@@ -182,6 +184,7 @@ struct Hit<'a> {
     object: Option<&'a Object>, // None: no hit
     face_normal: Vec3,          // geometric normal, unit length
     normal: Vec3,               // shading normal, unit length
+    lift: Vec3,                 // to the origin of shadow rays
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -199,15 +202,27 @@ fn sphere_interval(sphere: &Sphere, ray: &Ray) -> Option<(f64, f64)> {
     (squared > 0.0).then(|| (middle - squared.sqrt(), middle + squared.sqrt()))
 }
 
-fn intersect_sphere(sphere: &Sphere, ray: &Ray, faces: Faces) -> Option<(f64, Vec3, Vec3)> {
+/// Distance, geometric and shading normal, lift.
+type Intersection = (f64, Vec3, Vec3, Vec3);
+
+fn intersect_sphere(sphere: &Sphere, ray: &Ray, faces: Faces) -> Option<Intersection> {
     let (enters, leaves) = sphere_interval(sphere, ray)?;
     let distance = if enters > 0.0 || faces == Faces::Front { enters } else { leaves };
     let normal = 1.0 / sphere.radius * (ray.origin + distance * ray.direction - sphere.centre);
-    Some((distance, normal, normal))
+    Some((distance, normal, normal, Vec3([0.0; 3])))
+}
+
+/// From a point of a triangle to the curved surface that its normals describe. Shadow rays start there, so that the
+/// facets of a smooth mesh do not shadow themselves (J. Hanika, Hacking the Shadow Terminator, Ray Tracing Gems II, 2021).
+fn lift(t: &Triangle, u: f64, v: f64) -> Vec3 {
+    let from_corner = u * t.edge_1 + v * t.edge_2;
+    let part = |corner: Vec3, n: Vec3, weight: f64| weight * dot(corner - from_corner, n).max(0.0) * n;
+    let [a, b, c] = t.normals;
+    part(Vec3([0.0; 3]), a, 1.0 - u - v) + part(t.edge_1, b, u) + part(t.edge_2, c, v)
 }
 
 /// Möller and Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, Journal of Graphics Tools 2(1), 1997.
-fn intersect_triangle(t: &Triangle, ray: &Ray, faces: Faces) -> Option<(f64, Vec3, Vec3)> {
+fn intersect_triangle(t: &Triangle, ray: &Ray, faces: Faces) -> Option<Intersection> {
     const EPSILON: f64 = 1e-9; // prevents gaps between triangles with a common edge
     if faces == Faces::Front && dot(t.face_normal, ray.direction) > 0.0 {
         return None;
@@ -229,13 +244,15 @@ fn intersect_triangle(t: &Triangle, ray: &Ray, faces: Faces) -> Option<(f64, Vec
         inverse * dot(t.edge_2, q),
         t.face_normal,
         if length(normal) > 0.0 { normalised(normal) } else { t.face_normal },
+        lift(t, u, v),
     ))
 }
 
 impl Tracer {
     /// FILL IN: use a BVH, or a library such as Embree, to make this fast.
     fn nearest(&self, ray: &Ray, kinds: Kinds, faces: Faces) -> Hit<'_> {
-        let mut nearest = Hit { distance: ray.end, object: None, face_normal: ray.direction, normal: ray.direction };
+        let nothing = Vec3([0.0; 3]);
+        let mut nearest = Hit { distance: ray.end, object: None, face_normal: nothing, normal: nothing, lift: nothing };
         for object in self.objects.iter().filter(|object| object.kind & kinds != 0) {
             match sphere_interval(&object.shape.bounds, ray) {
                 Some((enters, leaves)) if enters < nearest.distance && leaves > 0.0 => {}
@@ -244,9 +261,9 @@ impl Tracer {
             let spheres = object.shape.spheres.iter().filter_map(|sphere| intersect_sphere(sphere, ray, faces));
             let triangles =
                 object.shape.triangles.iter().filter_map(|triangle| intersect_triangle(triangle, ray, faces));
-            for (distance, face_normal, normal) in spheres.chain(triangles) {
+            for (distance, face_normal, normal, lift) in spheres.chain(triangles) {
                 if distance > 0.0 && distance < nearest.distance {
-                    nearest = Hit { distance, object: Some(object), face_normal, normal };
+                    nearest = Hit { distance, object: Some(object), face_normal, normal, lift };
                 }
             }
         }
@@ -258,22 +275,23 @@ impl Tracer {
 
 /// A point hit by a ray.
 struct Surface {
-    position: Vec3,    // offset along the geometric normal, so that secondary rays do not hit it again
-    below: Vec3,       // offset to the other side
-    face_normal: Vec3, // geometric normal, facing the ray's origin; unit length
-    normal: Vec3,      // shading normal, likewise
-    is_real: bool,     // a catcher or occluder
+    position: Vec3, // offset along the geometric normal, so that secondary rays do not hit it again
+    below: Vec3,    // offset to the other side
+    lifted: Vec3,   // origin of shadow rays
+    normal: Vec3,   // shading normal, facing the ray's origin; unit length
+    is_real: bool,  // a catcher or occluder
 }
 
 fn surface_at(ray: &Ray, hit: &Hit, object: &Object) -> Surface {
     let at = ray.origin + hit.distance * ray.direction;
     let face_normal = if dot(hit.face_normal, ray.direction) > 0.0 { -1.0 * hit.face_normal } else { hit.face_normal };
-    let normal = if dot(hit.normal, face_normal) < 0.0 { -1.0 * hit.normal } else { hit.normal };
+    let inside = dot(hit.normal, face_normal) < 0.0;
+    let normal = if inside { -1.0 * hit.normal } else { hit.normal };
     let gap = 1e-9 * (length(at) + hit.distance) * face_normal;
     Surface {
         position: at + gap,
         below: at - gap,
-        face_normal,
+        lifted: if inside { at + gap } else { at + gap + hit.lift },
         normal,
         is_real: object.kind & (CATCHER | OCCLUDER) != 0,
     }
@@ -308,9 +326,7 @@ fn incident(light: &arhost_light, surface: &Surface) -> IncidentLight {
         let t = ((along_beam - outer) / (inner - outer).max(1e-6)).clamp(0.0, 1.0);
         incident.irradiance *= t * t * (3.0 - 2.0 * t);
     }
-    if dot(surface.face_normal, incident.direction) > 0.0 {
-        incident.cosine = dot(surface.normal, incident.direction).max(0.0);
-    }
+    incident.cosine = dot(surface.normal, incident.direction).max(0.0);
     incident
 }
 
@@ -324,7 +340,7 @@ enum Visibility {
 impl Tracer {
     /// Proxies for real objects cast no shadows on each other: the video already contains those.
     fn visibility(&self, light: &IncidentLight, surface: &Surface) -> Visibility {
-        let ray = Ray { origin: surface.position, direction: light.direction, end: light.distance };
+        let ray = Ray { origin: surface.lifted, direction: light.direction, end: light.distance };
         let opaque = if surface.is_real { SOLID } else { SOLID | CATCHER | OCCLUDER };
         if self.nearest(&ray, opaque, Faces::All).object.is_some() {
             return Visibility::Blocked;
@@ -393,8 +409,8 @@ impl Tracer {
 
     // ---- Overlay ----
 
-    /// Shadow on a catcher: proportional to the fraction of its light that virtual objects block.
-    fn shadow_alpha(&self, surface: &Surface) -> f64 {
+    /// The shares of a catcher's light that virtual objects hide.
+    fn shadow(&self, surface: &Surface) -> Sample {
         let (mut total, mut blocked, mut through_glass) = (0.0, 0.0, 0.0);
         for light in &self.lights {
             let incident = incident(light, surface);
@@ -410,26 +426,24 @@ impl Tracer {
                 Visibility::Clear => {}
             }
         }
-        if total == 0.0 {
-            return 0.0;
-        }
-        let (opaque, translucent) = (self.scene.shadow_alpha_opaque, self.scene.shadow_alpha_translucent);
-        blocked / total * f64::from(opaque) + through_glass / total * f64::from(translucent)
+        total = total.max(f64::MIN_POSITIVE);
+        Sample::Video { opaque: blocked / total, translucent: through_glass / total }
     }
 
     pub fn trace(&self, ray: &Ray) -> Sample {
         let hit = self.nearest(ray, SOLID | GLASS | OCCLUDER, Faces::All);
         match hit.object {
             Some(object) if object.kind != OCCLUDER => {
-                return Sample { colour: self.radiance(ray, &hit, object, 0), alpha: 1.0 };
+                return Sample::Virtual(self.radiance(ray, &hit, object, 0));
             }
             _ => {}
         }
         // The video shows the real surface; the overlay adds only the shadow.
         let catcher_ray = Ray { end: hit.distance, ..*ray };
         let shadowed = self.nearest(&catcher_ray, CATCHER, Faces::Front);
-        let alpha =
-            shadowed.object.map_or(0.0, |object| self.shadow_alpha(&surface_at(&catcher_ray, &shadowed, object)));
-        Sample { colour: Vec3([0.0; 3]), alpha }
+        match shadowed.object {
+            Some(object) => self.shadow(&surface_at(&catcher_ray, &shadowed, object)),
+            None => Sample::Video { opaque: 0.0, translucent: 0.0 },
+        }
     }
 }
