@@ -135,8 +135,9 @@ inline constexpr std::int32_t tile_side = 32, tile_pixels = tile_side * tile_sid
 // Secondary rays that wait to be traced, all of the same depth. `values` consists of `rows` arrays, each with room
 // for `capacity` rays.
 struct RayQueue {
-    // Origin, direction, throughput (three floats each), reciprocal of the direction's density per steradian (0 for
-    // mirrors and glass, whose direction is not random), pixel index (an int's bits).
+    // Origin, direction, throughput (three floats each), inverse density, pixel index (an int's bits). Inverse
+    // density: reciprocal of the density per steradian of the path's last random direction; 0 if there is none,
+    // negative if the path has since been reflected or refracted by mirrors or glass.
     static constexpr int rows = 11;
     float *values;
     std::int32_t count, capacity;

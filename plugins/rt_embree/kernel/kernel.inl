@@ -23,7 +23,7 @@ ARHOST_INLINE void add_to_sum(Scratch &scratch, int row, int first_pixel, Float 
 ARHOST_INLINE bool primary(Work &work, int first_pixel, Vec3 direction, Bool active) {
     const Scene &scene = work.frame.scene;
     const Vec3 eye = splat(work.frame.camera.eye);
-    const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0};
+    const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0, Float(0.0f)};
     RTCRayHit16 rays;
     set_ray(rays.ray, eye, direction, Float(far_away), Int(virtual_masks | occluder_mask));
     const Bool hit = trace(scene, scene.root, make_query(Coherence::coherent), rays, active);

@@ -85,7 +85,9 @@ ARHOST_INLINE LightSample sample_light(const arhost_light &light, const Surface 
 }
 
 // Returns the light of lamps with an area that arrives along secondary rays before `t_far`, where the rays hit a
-// surface. Lamps do not hide each other or anything else. `inverse_density`: see RayQueue.
+// surface. Lamps do not hide each other or anything else. `inverse_density`: see RayQueue. After a rough surface,
+// mirrors and glass on the way count as if the lamp were seen directly: a few random rays that find a small lamp by
+// such a path would be bright spots.
 ARHOST_INLINE Vec3 arriving_from_lamps(const Frame &frame, Vec3 origin, Vec3 direction, Float t_far,
                                        Float inverse_density) {
     Vec3 sum = black();
@@ -104,7 +106,7 @@ ARHOST_INLINE Vec3 arriving_from_lamps(const Frame &frame, Vec3 origin, Vec3 dir
         const Arriving arriving = arriving_from_point(light, to_centre, direction * t);
         const Float sampled = arriving.density * Float(static_cast<float>(frame.light_samples));
         const Float radiance = arriving.irradiance * arriving.density * Float(3.14159265f) /
-                               (Float(1.0f) + sampled * inverse_density); // the divisor: balance_weight
+                               (Float(1.0f) + sampled * abs(inverse_density)); // the divisor: balance_weight
         sum = sum + splat(light.intensity) * select(arrives, radiance, Float(0.0f));
     }
     return sum;
@@ -199,6 +201,7 @@ constexpr float background_density = 0.159154943f;
 // Returns the light that arrives along secondary rays that hit no surface, from the environment or the background.
 // `inverse_density`: see RayQueue.
 ARHOST_INLINE Vec3 arriving_from_environment(const Frame &frame, Vec3 direction, Float inverse_density) {
+    inverse_density = max(inverse_density, Float(0.0f)); // samples of the environment do not follow mirrors
     const Environment &environment = frame.scene.environment;
     const bool is_random = any(inverse_density > Float(0.0f));
     Vec3 light = splat(frame.scene.background);
@@ -288,8 +291,8 @@ ARHOST_INLINE void for_each_light(const Frame &frame, const Surface &s, const Ra
 }
 
 // Returns the share of the light of a sample that a rough surface reflects to the eye, without the Fresnel term. A
-// ray that is reflected at random can also arrive at the light source, except through glass; balance_weight() divides
-// the light between them.
+// ray that is reflected at random can also arrive at the light source; balance_weight() divides the light between
+// them. Such rays bring all light of the environment that glass lets through.
 ARHOST_INLINE Float rough_lobe(const Surface &s, Vec3 to_eye, Vec3 half_vector, const LightSample &sample,
                                const Visibility &visibility, bool rays_follow) {
     const Float cosine_eye = dot(s.normal, to_eye), cosine_half = dot(s.normal, half_vector);
@@ -298,7 +301,8 @@ ARHOST_INLINE Float rough_lobe(const Surface &s, Vec3 to_eye, Vec3 half_vector, 
         return lobe;
     const Bool reflects = dot(s.geometric_normal, sample.direction) > Float(0.0f);
     const Float density = select(reflects, ggx_reflection_density(cosine_eye, cosine_half, s.alpha), Float(0.0f));
-    const Bool through_glass = visibility.is_tinted & (sample.density > Float(0.0f));
+    const Bool through_glass =
+        visibility.is_tinted & bool_of(sample.t_far == far_away) & (sample.density > Float(0.0f));
     return select(through_glass, Float(0.0f), lobe * balance_weight(sample.density, density));
 }
 

@@ -10,7 +10,8 @@ struct Paths {
     Int pixel;                // index of the pixel in the tile
     std::int32_t first_pixel; // pixel of lane 0; valid for primary rays only, whose pixels are consecutive
     Vec3 throughput;
-    std::uint32_t depth; // number of bounces so far
+    std::uint32_t depth;   // number of bounces so far
+    Float inverse_density; // see RayQueue; 0 for primary rays
 };
 
 // State of the tile being rendered.
@@ -55,7 +56,7 @@ ARHOST_INLINE void add_radiance(Work &work, const Paths &paths, Vec3 radiance, B
 
 // Adds a secondary ray for each active lane to the queue of the depth of `from`. `inverse_density`: see RayQueue.
 ARHOST_INLINE void enqueue(Work &work, const Paths &from, Vec3 origin, Vec3 direction, Vec3 throughput, Bool active,
-                           Float inverse_density = 0.0f) {
+                           Float inverse_density) {
     alignas(64) float by_lane[RayQueue::rows][lanes];
     const Float values[] = {
         origin.x,     origin.y,     origin.z,     direction.x,     direction.y,         direction.z,
@@ -71,6 +72,11 @@ ARHOST_INLINE void enqueue(Work &work, const Paths &from, Vec3 origin, Vec3 dire
             to[row * queue.capacity] = by_lane[row][i];
     }
     queue.count += __builtin_popcount(mask_of(active.lane));
+}
+
+// Adds rays off mirrors and glass.
+ARHOST_INLINE void enqueue(Work &work, const Paths &from, Vec3 origin, Vec3 direction, Vec3 throughput, Bool active) {
+    enqueue(work, from, origin, direction, throughput, active, -abs(from.inverse_density));
 }
 
 // Reflected rays below this throughput are invisible.
@@ -205,9 +211,10 @@ ARHOST_INLINE void trace_queued_packet(Work &work, std::uint32_t depth) {
     const auto row = [&](int i) __attribute__((always_inline)) {
         return load(queue.values + i * queue.capacity + first);
     };
-    const Paths paths{select(active, bits_of(row(10)), Int(0)), 0, {row(6), row(7), row(8)}, depth + 1};
-    const Vec3 origin{row(0), row(1), row(2)}, direction{row(3), row(4), row(5)};
     const Float inverse_density = select(active, row(9), Float(0.0f));
+    const Paths paths{
+        select(active, bits_of(row(10)), Int(0)), 0, {row(6), row(7), row(8)}, depth + 1, inverse_density};
+    const Vec3 origin{row(0), row(1), row(2)}, direction{row(3), row(4), row(5)};
     RTCRayHit16 rays;
     set_ray(rays.ray, origin, direction, Float(far_away), Int(all_masks));
     queue.count = first;

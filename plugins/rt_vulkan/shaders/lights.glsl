@@ -67,7 +67,9 @@ Incidence incidence(uint lamp, Surface s, vec2 sample_uv, uint count) {
 }
 
 // Returns the light of lamps with an area that arrives along a secondary ray before `t_max`, where the ray hits a
-// surface. Lamps do not hide each other or anything else. `inverse_density`: see Path.
+// surface. Lamps do not hide each other or anything else. `inverse_density`: see Path. After a rough surface, mirrors and
+// glass on the way count as if the lamp were seen directly: a few random rays that find a small lamp by such a path would
+// be bright spots.
 vec3 arriving_from_lamps(vec3 origin, vec3 direction, float t_max, float inverse_density) {
     vec3 sum = vec3(0.0);
     for (uint lamp = 0u; lamp < frame.light_count; ++lamp) {
@@ -83,7 +85,7 @@ vec3 arriving_from_lamps(vec3 origin, vec3 direction, float t_max, float inverse
         vec2 arriving = arriving_from_point(lamp, to_centre, direction * t);
         float sampled = arriving.y * float(frame.light_samples);
         sum += lights[lamp].intensity * (arriving.x * arriving.y * 3.14159265 /
-                                         (1.0 + sampled * inverse_density)); // the divisor: balance_weight
+                                         (1.0 + sampled * abs(inverse_density))); // the divisor: balance_weight
     }
     return sum;
 }
@@ -165,6 +167,7 @@ const float background_density = 0.159154943;
 // Returns the light that arrives along a secondary ray that hits no surface, from the environment or the background.
 // `inverse_density`: see Path.
 vec3 arriving_from_environment(vec3 direction, float inverse_density) {
+    inverse_density = max(inverse_density, 0.0); // samples of the environment do not follow mirrors
     vec3 light = frame.background;
     float density = background_density;
     if (frame.environment_texture != NONE) {
@@ -233,14 +236,14 @@ void add_shadow(inout DirectLight sum, Incidence arriving, Visibility visible, f
 }
 
 // Returns the share of the arriving light that a rough surface reflects to the eye, without the Fresnel term. A ray that
-// is reflected at random can also arrive at the light source, except through glass; balance_weight() divides the light
-// between them.
+// is reflected at random can also arrive at the light source; balance_weight() divides the light between them. Such rays
+// bring all light of the environment that glass lets through.
 float rough_lobe(Surface s, vec3 to_eye, vec3 half_vector, Incidence arriving, Visibility visible, bool rays_follow) {
     float cosine_eye = dot(s.normal, to_eye), cosine_half = dot(s.normal, half_vector);
     float lobe = ggx_lobe(arriving.cosine, cosine_eye, cosine_half, s.alpha);
     if (!rays_follow)
         return lobe;
-    if (visible.is_tinted && arriving.density > 0.0)
+    if (visible.is_tinted && arriving.t_max > 1.0 && arriving.density > 0.0)
         return 0.0;
     bool reflects = dot(s.geometric_normal, arriving.direction) > 0.0;
     float density = reflects ? ggx_reflection_density(cosine_eye, cosine_half, s.alpha) : 0.0;

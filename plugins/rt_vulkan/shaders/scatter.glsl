@@ -5,7 +5,8 @@
 // A ray, and the throughput of the path from the pixel to this ray.
 struct Path {
     vec3 origin, direction, throughput;
-    // Reciprocal of the density of the direction per steradian; 0 for mirrors and glass, whose direction is not random.
+    // Reciprocal of the density per steradian of the last random direction; 0 if there is none, negative if the path has
+    // since been reflected or refracted by mirrors or glass.
     float inverse_density;
     uint depth; // number of bounces so far
 };
@@ -28,7 +29,8 @@ vec3 above(Surface s) {
 void push_reflected(Path path, Surface s, vec3 direction, vec3 reflectance) {
     vec3 throughput = path.throughput * reflectance;
     if (largest(throughput) > min_throughput)
-        push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), throughput, 0.0);
+        push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), throughput,
+             -abs(path.inverse_density));
 }
 
 // Pushes the reflected and the refracted ray, or only one of them, chosen at random, if frame.one_path is set. A ray
@@ -70,14 +72,15 @@ vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Rando
     float cutoff = materials[material].importance_cutoff;
     if (refracts) {
         if (path.depth < materials[material].refraction_depth && luminance(refracted_share) > cutoff)
-            push(path, s.position - s.geometric_normal * s.offset, refracted, refracted_share, 0.0);
+            push(path, s.position - s.geometric_normal * s.offset, refracted, refracted_share,
+                 -abs(path.inverse_density));
         else
             cut_off += refracted_share * cutoff_colour;
     }
     if (reflects) {
         if (path.depth < materials[material].reflection_depth && luminance(reflected_share) > cutoff)
-            push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal),
-                    reflected_share, 0.0);
+            push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), reflected_share,
+                 -abs(path.inverse_density));
         else
             cut_off += reflected_share * cutoff_colour;
     }

@@ -418,6 +418,40 @@ TEST(Rough, ReflectionsOfLightsAreRightAndSmoothForEveryRoughness) {
     }
 }
 
+// Linear light of a metal plane beside a ball, which reflects a small, bright lamp to the plane or lets its light
+// through.
+Picture beside_a_ball(const arhost_material &ball, float roughness) {
+    ArenaBuilder builder = in_a_room_of_light(0);
+    builder.settings.max_depth = 4;
+    builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(white_metal(roughness)));
+    builder.add_object("ball", builder.add_spheres({{0, 0, 30, 30}}), builder.add_material(ball));
+    arhost_light bulb = scene::make_light(ARHOST_LIGHT_SPHERE);
+    bulb.falloff = ARHOST_FALLOFF_NONE;
+    set3(bulb.position, 100, 0, 250);
+    set3(bulb.intensity, 0.1f, 0.1f, 0.1f);
+    bulb.radius = 10;
+    builder.add_light(bulb);
+    return Tracer(std::move(builder), {{"samples", "16"}}).render(from_above());
+}
+
+// A rough surface cannot sample a lamp that it sees in a mirror or refracted by glass: the few reflected rays that
+// arrive there would be bright spots.
+TEST(Rough, ReflectionsOfLampsInMirrorsAndGlassHaveNoBrightSpots) {
+    for (const arhost_material &ball : {mirror(1), clear_glass()})
+        for (const float roughness : {0.5f, 0.0f}) {
+            const Picture picture = beside_a_ball(ball, roughness);
+            int bright = 0;
+            for (int y = 0; y < 150; ++y)
+                for (int x = 0; x < 200; ++x)
+                    if (glm::length(on_the_floor(x, y)) > 45) // not the ball
+                        bright += picture.at(x, y)[0] > 200;
+            if (roughness > 0)
+                EXPECT_EQ(bright, 0) << (ball.model == ARHOST_MATERIAL_MIRROR ? "mirror" : "glass");
+            else
+                EXPECT_GT(bright, 0) << "a smooth surface shows the lamp";
+        }
+}
+
 TEST(Rough, PlasticPlaneMatchesTheGltfFormulas) {
     arhost_material plastic = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
     set3(plastic.diffuse, 0.6f, 0.3f, 0.1f);
