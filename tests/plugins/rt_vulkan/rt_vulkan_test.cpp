@@ -20,6 +20,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <list>
 #include <memory>
 #include <optional>
 
@@ -341,7 +342,11 @@ TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
     auto *memory =
         static_cast<std::uint8_t *>(mmap(nullptr, pages, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
     std::memset(memory, 0xa5, pages);
-    Picture copied(small);
+    std::list<Picture> pictures; // the last one does not begin at a page
+    do
+        pictures.emplace_back(small);
+    while (reinterpret_cast<std::uintptr_t>(pictures.back().image().rgba) % 4096 == 0);
+    Picture &copied = pictures.back();
     const arhost_image in_place{sizeof in_place, stride, small.width, small.height, memory};
     const rt_vulkan::Rectangle drawn = renderer.render(view, in_place);
     if (!renderer.wrote_in_place() && parts.device.properties.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU)
