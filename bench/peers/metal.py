@@ -39,7 +39,7 @@ def main():
     if not os.path.exists(render_scene):
         raise SystemExit("metal: build/release/bin/render-scene is missing: build it with tools/test")
     os.makedirs(peers.folder, exist_ok=True)
-    peers.install({name: version for name, version in peers.packages.items() if name != "bpy"})
+    peers.install({name: peers.packages.get(name) for name in ("mitsuba", "pillow", "numpy")})
     images = [os.path.abspath(path) for path in arguments]
     if not images:
         images = [path for name in ("studio_small_03_1k.hdr", "st_fagans_interior_1k.hdr")

@@ -66,7 +66,7 @@ def install_llvm():
 
 
 def install(wanted):
-    """Installs packages (name: version) into build/peers-venv."""
+    """Installs packages (name: version, or None for any version) into build/peers-venv."""
     if not os.path.exists(venv_python):
         suitable = [path for path in (sys.executable, "/usr/bin/python3", shutil.which("python3.11"))
                     if path and subprocess.run([path, "-c", "import sys, ensurepip; sys.exit(sys.version_info[:2] != (3, 11))"],
@@ -77,11 +77,12 @@ def install(wanted):
     for name, version in wanted.items():
         installed = subprocess.run([venv_python, "-c", f"import importlib.metadata as m; print(m.version('{name}'))"],
                                capture_output=True, text=True, check=False).stdout.strip()
-        if installed == version:
+        if installed == version or installed and version is None:
             continue
-        print(f"Installing with pip into {os.path.relpath(venv, root)}: {name} {version}", flush=True)
+        package = f"{name}=={version}" if version else name
+        print(f"Installing with pip into {os.path.relpath(venv, root)}: {package}", flush=True)
         if subprocess.run([venv_python, "-m", "pip", "install", "-q", "--disable-pip-version-check",
-                           f"{name}=={version}"], check=False).returncode:
+                           package], check=False).returncode:
             print(f"  pip failed: {name} is skipped.")
 
 
