@@ -52,14 +52,17 @@ constexpr std::pair<std::uint32_t, const char *> parts[] = {
 } // namespace
 
 std::uint32_t needed_capabilities(const arhost_scene &scene) {
-    std::uint32_t needed = 0;
+    std::uint32_t needed = 0, needed_for_occluders = 0;
     const auto materials = view<arhost_material>(scene, scene.materials);
     for (const arhost_object &object : view<arhost_object>(scene, scene.objects)) {
-        if (object.role != ARHOST_ROLE_OCCLUDER)
-            needed |= needed_for(materials[object.material]);
+        (object.role == ARHOST_ROLE_OCCLUDER ? needed_for_occluders : needed) |=
+            needed_for(materials[object.material]);
         if (scene.duration_s > 0 && (object.moves || object.deforms))
             needed |= ARHOST_CAPABILITY_MOTION;
     }
+    // Only mirrors, glass and rough surfaces show occluders.
+    if (needed & (ARHOST_CAPABILITY_REFLECTION | ARHOST_CAPABILITY_GLASS | ARHOST_CAPABILITY_ROUGHNESS))
+        needed |= needed_for_occluders;
     for (const arhost_light &light : view<arhost_light>(scene, scene.lights))
         if (light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE)
             needed |= ARHOST_CAPABILITY_AREA_LIGHTS;

@@ -39,6 +39,13 @@ TEST(Capabilities, DependOnTheModelsOfMaterials) {
     }
 }
 
+TEST(Capabilities, IncludeOccludersThatMirrorsShow) {
+    ArenaBuilder builder = ball(make_material(ARHOST_MATERIAL_MIRROR));
+    builder.add_object("post", builder.add_spheres({{30, 0, 0, 10}}),
+                       builder.add_material(make_material(ARHOST_MATERIAL_GLASS)), ARHOST_ROLE_OCCLUDER);
+    EXPECT_EQ(needed(std::move(builder)), ARHOST_CAPABILITY_REFLECTION | ARHOST_CAPABILITY_GLASS);
+}
+
 TEST(Capabilities, IgnoreMaterialsThatNoObjectUses) {
     ArenaBuilder builder = ball(make_material(ARHOST_MATERIAL_DIFFUSE));
     builder.add_material(make_material(ARHOST_MATERIAL_GLASS));
@@ -60,7 +67,7 @@ TEST(Capabilities, IncludeTextures) {
     EXPECT_EQ(needed(std::move(builder)), ARHOST_CAPABILITY_TEXTURES);
 }
 
-TEST(Capabilities, IncludeLightsWithAnExtent) {
+TEST(Capabilities, IncludeAreaLights) {
     for (const auto &[type, expected] : {std::pair{ARHOST_LIGHT_POINT, 0u},
                                          {ARHOST_LIGHT_DIRECTIONAL, 0u},
                                          {ARHOST_LIGHT_SPOT, 0u},

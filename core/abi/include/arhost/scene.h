@@ -137,7 +137,8 @@ enum {
     ARHOST_ROLE_VIRTUAL = 1, /* virtual object: alpha 255 */
     ARHOST_ROLE_CATCHER = 2, /* shadow catcher, a proxy for real geometry: alpha is above 0 only where it is
                                 shadowed. Visible to secondary rays; primary rays pass through its back faces */
-    ARHOST_ROLE_OCCLUDER = 3 /* proxy for real geometry that hides virtual objects behind it: alpha 0 */
+    ARHOST_ROLE_OCCLUDER = 3 /* proxy for real geometry that hides virtual objects behind it: alpha 0. Visible to
+                                secondary rays */
 };
 
 typedef struct arhost_object {
