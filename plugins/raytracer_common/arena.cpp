@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "raytracer_common/arena.hpp"
 
+#include <arhost/shading/scalar.hpp>
+
 #include <algorithm>
 #include <cmath>
 
@@ -9,6 +11,10 @@ namespace arhost::raytracer_common {
 bool is_identity(const float *world_from_object) {
     constexpr float identity[12] = {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0};
     return std::equal(identity, identity + 12, world_from_object);
+}
+
+float quantized_alpha(float alpha) {
+    return static_cast<float>(shading::code_8bit(double{alpha}) / 255);
 }
 
 Cofactors::Cofactors(const float *m) {

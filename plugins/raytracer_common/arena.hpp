@@ -38,6 +38,23 @@ void object_extent(const Number (&low)[3], const Number (&high)[3], const float 
     }
 }
 
+// Writes the bounding box of a transformed box (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990).
+template <class Number>
+void transform_box(const Number (&low)[3], const Number (&high)[3], const float *world_from_object,
+                   double (&to_low)[3], double (&to_high)[3]) {
+    for (int row = 0; row < 3; ++row) {
+        to_low[row] = to_high[row] = world_from_object[9 + row];
+        for (int axis = 0; axis < 3; ++axis) {
+            const double factor = world_from_object[3 * axis + row], a = factor * low[axis], b = factor * high[axis];
+            to_low[row] += std::min(a, b);
+            to_high[row] += std::max(a, b);
+        }
+    }
+}
+
+// Rounds `alpha` to a multiple of 1/255, so that rounding errors of the shading do not change the 8-bit code.
+float quantized_alpha(float alpha);
+
 // The cofactors of the 3×3 part of a transform. The inverse of the 3×3 part is the transpose of the matrix
 // cofactor[row][column] / determinant.
 struct Cofactors {

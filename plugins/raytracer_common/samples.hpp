@@ -22,4 +22,8 @@ std::vector<Sample> sample_positions(std::uint32_t count);
 // is at the centre (R2 sequence: M. Roberts, The Unreasonable Effectiveness of Quasirandom Sequences, 2018).
 std::vector<Sample> sample_positions(std::uint32_t first, std::uint32_t count);
 
+// Accumulation stops at this number of samples. The remaining noise and the rounding errors of the float sums are
+// then below half an 8-bit code, so more samples would not change the image.
+inline constexpr std::uint32_t max_accumulated_samples = 1u << 16;
+
 } // namespace arhost::raytracer_common

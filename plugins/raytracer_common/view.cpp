@@ -19,6 +19,14 @@ bool all_finite(std::span<const double> values) {
     return std::all_of(values.begin(), values.end(), [](double value) { return std::isfinite(value); });
 }
 
+bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
+    return a.width == b.width && a.height == b.height && a.distortion == b.distortion && a.fx == b.fx &&
+           a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.coefficient_count == b.coefficient_count &&
+           std::equal(a.coefficients,
+                      a.coefficients + std::min<std::uint32_t>(a.coefficient_count, ARHOST_MAX_DISTORTION),
+                      b.coefficients);
+}
+
 } // namespace
 
 void check_setup(const arhost_raytracer_setup &setup) {
@@ -52,17 +60,17 @@ void check_setup(const arhost_raytracer_setup &setup) {
                std::to_string(ARHOST_SCENE_VERSION) + " is required");
 }
 
+void check_render(const arhost_camera &camera, const arhost_image &image, const arhost_intrinsics &intrinsics) {
+    if (!same(camera.intrinsics, intrinsics))
+        reject("the camera's intrinsics differ from the intrinsics passed to start");
+    if (image.width != intrinsics.width || image.height != intrinsics.height || !image.rgba ||
+        image.stride < 4 * image.width)
+        reject("the image buffer must have the size passed to start and a stride of at least 4 bytes per pixel");
+}
+
 bool same_view(const arhost_camera &a, const arhost_camera &b) {
     return std::equal(a.eye, a.eye + 3, b.eye) && std::equal(a.look_at, a.look_at + 3, b.look_at) &&
            std::equal(a.up, a.up + 3, b.up);
-}
-
-bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
-    return a.width == b.width && a.height == b.height && a.distortion == b.distortion && a.fx == b.fx &&
-           a.fy == b.fy && a.cx == b.cx && a.cy == b.cy && a.coefficient_count == b.coefficient_count &&
-           std::equal(a.coefficients,
-                      a.coefficients + std::min<std::uint32_t>(a.coefficient_count, ARHOST_MAX_DISTORTION),
-                      b.coefficients);
 }
 
 Pose::Pose(const arhost_camera &camera) {

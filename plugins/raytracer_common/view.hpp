@@ -10,8 +10,9 @@
 namespace arhost::raytracer_common {
 
 void check_setup(const arhost_raytracer_setup &setup);
+// `intrinsics`: those passed to start.
+void check_render(const arhost_camera &camera, const arhost_image &image, const arhost_intrinsics &intrinsics);
 
-bool same(const arhost_intrinsics &a, const arhost_intrinsics &b);
 bool same_view(const arhost_camera &a, const arhost_camera &b); // compares eye, look_at and up only
 
 // The camera's eye in mm, and its axes as unit vectors: x right, y down, z forward. All are in world space.

@@ -20,6 +20,8 @@ using arhost::raytracer_common::bytes;
 using arhost::raytracer_common::elements;
 using arhost::raytracer_common::is_identity;
 using arhost::raytracer_common::object_extent;
+using arhost::raytracer_common::quantized_alpha;
+using arhost::raytracer_common::transform_box;
 
 unsigned mask_of(const Object &object) {
     return object.role == ARHOST_ROLE_CATCHER                ? catcher_mask
@@ -81,19 +83,11 @@ Box local_box(const arhost_scene &arena, const arhost_object &object) {
                   geometry.type == ARHOST_GEOMETRY_SPHERES);
 }
 
-// Returns the bounding box of a transformed box (Arvo, Transforming Axis-Aligned Bounding Boxes, Graphics Gems 1990).
-Box transformed(const Box &local, const float *m) {
+Box transformed(const Box &local, const float *world_from_object) {
     if (local.min[0] > local.max[0])
         return local;
     Box world;
-    for (int row = 0; row < 3; ++row) {
-        world.min[row] = world.max[row] = m[9 + row];
-        for (int axis = 0; axis < 3; ++axis) {
-            const double a = m[3 * axis + row] * local.min[axis], b = m[3 * axis + row] * local.max[axis];
-            world.min[row] += std::min(a, b);
-            world.max[row] += std::max(a, b);
-        }
-    }
+    transform_box(local.min, local.max, world_from_object, world.min, world.max);
     return world;
 }
 
@@ -118,11 +112,6 @@ bool needs_catcher_bvh(const arhost_scene &arena) {
         catcher_triangles += count;
     }
     return any_catcher && 8 * catcher_triangles <= all_triangles;
-}
-
-// Rounds `alpha` to a multiple of 1/255, so that rounding errors of the shader do not change the 8-bit code.
-float quantized_alpha(float alpha) {
-    return static_cast<float>(arhost::shading::code_8bit(double{alpha}) / 255);
 }
 
 bool report_build(void *host, double fraction) {
@@ -208,7 +197,7 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     const auto lights = elements<arhost_light>(arena, arena.lights);
     view_.lights = lights.data();
     view_.light_count = arena.lights.count;
-    view_.has_extended_lights = std::any_of(lights.begin(), lights.end(), [](const arhost_light &light) {
+    view_.has_area_lights = std::any_of(lights.begin(), lights.end(), [](const arhost_light &light) {
         return light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE;
     });
     view_.max_depth = arena.max_depth;
@@ -288,7 +277,7 @@ void EmbreeScene::place_object(std::uint32_t object, const float *world_from_obj
 
 void EmbreeScene::update_bounds(std::uint32_t object) {
     const auto &[local, world_from_object] = placements_[object];
-    object_extent(local.min, local.max, world_from_object.data(), objects_[object].reach);
+    object_extent(local.min, local.max, world_from_object.data(), objects_[object].extent);
     if (objects_[object].role != ARHOST_ROLE_OCCLUDER)
         visible_boxes_[object] = transformed(local, world_from_object.data());
 }

@@ -33,7 +33,7 @@ struct Object {
     // 3×3 matrices from object to world space, column-major. `transform` is for directions; `normal_transform`, its
     // inverse transpose, is for normals.
     float transform[9], normal_transform[9];
-    float reach[3];         // result of object_extent() (raytracer_common/arena.hpp)
+    float extent[3];        // result of object_extent() (raytracer_common/arena.hpp)
     const int *indices;     // three vertex indices per triangle
     const float *positions; // vertex positions
     const float *normals;   // NULL if flat-shaded or a sphere
@@ -83,8 +83,8 @@ struct Scene {
     float shadow_alpha_opaque, shadow_alpha_translucent;
     bool coloured_shadows;
     bool has_catchers, has_occluders, has_glass;
-    bool has_extended_lights; // lamps with an area
-    bool has_background;      // a background that is not black, and no environment
+    bool has_area_lights;
+    bool has_background; // a background that is not black, and no environment
     bool has_instances;
     int sum_row_count() const { return has_catchers ? sum_rows : caught_row; }
     const arhost::shading::Srgb8Table *srgb8;
@@ -115,7 +115,7 @@ struct Frame {
     std::int32_t sample_count;
     std::uint32_t first_sample; // number of samples accumulated before this frame; offset into the random sequences
     float *history[sum_rows];   // sums of accumulated samples, as Scratch::sum but for all tiles; NULL: off
-    std::int32_t light_samples; // shadow rays per shaded point to each area light
+    std::int32_t light_samples; // samples per shaded point of each area light, the environment and the background
     bool single_path;           // glass spawns one random ray instead of two
     std::uint8_t *rgba;
     std::uint32_t stride;

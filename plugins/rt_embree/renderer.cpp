@@ -16,12 +16,8 @@ namespace rt_embree {
 namespace {
 
 using arhost::Failure;
-using arhost::raytracer_common::Pose, arhost::raytracer_common::same, arhost::raytracer_common::same_view;
+using arhost::raytracer_common::Pose, arhost::raytracer_common::same_view;
 using Vec3d = arhost::shading::Vec3T<double>;
-
-[[noreturn]] void refuse(const std::string &message) {
-    throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, message);
-}
 
 // Returns the bounding rectangle of a box projected onto the plane z = 1; empty if the whole box is behind the
 // camera.
@@ -49,10 +45,6 @@ Window window_of(const Box &box, const Pose &pose) {
     window.unbounded = behind > 0 && behind < 8;
     return window;
 }
-
-// Accumulation stops at this number of samples. The remaining noise and the rounding errors of the float sums are
-// then below half an 8-bit code, so more samples would not change the image.
-constexpr std::uint32_t max_accumulated_samples = 1u << 16;
 
 Camera camera_of(const Pose &pose) {
     Camera camera;
@@ -128,11 +120,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
 }
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
-    if (!same(camera.intrinsics, intrinsics_))
-        refuse("the camera's intrinsics differ from the intrinsics passed to start");
-    if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
-        image.stride < 4 * image.width)
-        refuse("the image buffer must have the size passed to start and a stride of at least 4 bytes per pixel");
+    arhost::raytracer_common::check_render(camera, image, intrinsics_);
     const Pose pose(camera);
     if (motion)
         scene_.move(*motion);
@@ -147,7 +135,8 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
             history_samples_ = 0;
         history_camera_ = camera;
         samples_ = arhost::raytracer_common::sample_positions(
-            history_samples_, history_samples_ < max_accumulated_samples ? samples_per_frame_ : 0);
+            history_samples_,
+            history_samples_ < arhost::raytracer_common::max_accumulated_samples ? samples_per_frame_ : 0);
     }
     Frame frame{scene_.view(),
                 ray_table_.rays(),

@@ -19,7 +19,7 @@ struct Settings {
     std::uint32_t samples = 1; // per pixel
     unsigned threads = 0;      // 0: one per processor
     bool robust = false;
-    std::int32_t light_samples = 4; // shadow rays per shaded point to each area light
+    std::int32_t light_samples = 4; // per shaded point and area light, environment or background
     bool accumulate = false;        // average over frames while the camera and scene are static
     bool single_path = false;       // glass spawns one random ray instead of two
     std::string instruction_set = "auto";

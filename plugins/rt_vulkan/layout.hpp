@@ -90,7 +90,7 @@ struct Frame {
     std::uint32_t object_count;
     float world_from_camera[3][4]; // columns
     std::uint32_t width, height, sample_count, first_sample;
-    std::uint32_t light_samples, light_count, max_depth, one_path;
+    std::uint32_t light_samples, light_count, max_depth, single_path;
     float ambient[3];
     std::uint32_t coloured_shadows;
     float background[3];
@@ -132,7 +132,7 @@ enum Binding : std::uint32_t {
 struct Specialization {
     std::int32_t stack_capacity;
     std::uint32_t has_glass, has_catchers, has_holes; // 0 or 1
-    std::uint32_t ray_dimensions, has_slopes, has_textures;
+    std::uint32_t ray_dimensions, has_slopes, has_textures, has_area_lights;
 };
 
 } // namespace rt_vulkan

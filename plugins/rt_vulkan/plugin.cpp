@@ -66,7 +66,7 @@ public:
         settings_.samples = static_cast<std::uint32_t>(options.integer("samples"));
         settings_.light_samples = static_cast<std::uint32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
-        settings_.one_path = options.text("glass") == "path";
+        settings_.single_path = options.text("glass") == "path";
     }
 
     void start(const arhost_raytracer_setup &setup) {

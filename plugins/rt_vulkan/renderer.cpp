@@ -21,9 +21,6 @@ using arhost::Failure;
 static_assert(Bands::unit % group_side == 0); // a work group never covers two bands
 
 constexpr Binding moving_bindings[] = {objects_binding, nodes_binding, primitives_binding, attributes_binding};
-// Accumulation stops at this number of samples. The remaining noise and the rounding errors of the float sums are
-// then below half an 8-bit code, so more samples would not change the image.
-constexpr std::uint32_t max_accumulated_samples = 1u << 16;
 constexpr std::size_t drawn_size = 4 * sizeof(std::int32_t); // bytes of the buffer Drawn in shaders/scene.glsl
 constexpr std::size_t max_targets = 8; // kept, as the host reuses image memory (arhost/raytracer.h)
 enum Timestamp : std::uint32_t { begun, traced, copied, timestamp_count }; // per image
@@ -125,7 +122,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     frame_.width = intrinsics_.width;
     frame_.height = intrinsics_.height;
     frame_.light_samples = settings.light_samples;
-    frame_.one_path = settings.one_path;
+    frame_.single_path = settings.single_path;
     frame_.accumulates = settings.accumulate;
     scene_.release_static_parts();
 }
@@ -238,14 +235,15 @@ void Renderer::make_descriptor_set(const Shaders &shaders) {
 
 void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
     // If glass spawns two rays, up to one ray per depth waits on the stack.
-    const bool branches = scene_.has_glass() && !settings_.one_path;
+    const bool branches = scene_.has_glass() && !settings_.single_path;
     const Specialization constants{branches ? static_cast<std::int32_t>(max_depth) + 1 : 1,
                                    scene_.has_glass(),
                                    scene_.has_catchers(),
                                    scene_.has_holes(),
                                    ray_dimensions_,
                                    settings_.samples > 1 || settings_.accumulate,
-                                   scene_.has_textures()};
+                                   scene_.has_textures(),
+                                   scene_.has_area_lights()};
     const Heartbeat heartbeat(host_, "compiling the shader");
     pipeline_.emplace(device_, shaders, layout_.get(), constants);
     // Lavapipe compiles a shader when it is first dispatched. Therefore this runs the shader once for a frame of
@@ -363,14 +361,7 @@ void Renderer::write_moving_parts() {
 }
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
-    if (!arhost::raytracer_common::same(camera.intrinsics, intrinsics_))
-        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
-                      "the camera's intrinsics differ from the intrinsics passed to start");
-    if (image.width != intrinsics_.width || image.height != intrinsics_.height || !image.rgba ||
-        image.stride < 4 * image.width)
-        throw Failure(
-            ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
-            "the image buffer must have the size passed to start and a stride of at least 4 bytes per pixel");
+    arhost::raytracer_common::check_render(camera, image, intrinsics_);
     if (image.stride % 4)
         throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
                       "the image buffer's stride must be a multiple of 4 bytes");
@@ -394,7 +385,8 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
             history_samples_ = 0;
         history_camera_.reset(); // stays empty if this image fails, as the sums are then invalid
         samples_ = arhost::raytracer_common::sample_positions(
-            history_samples_, history_samples_ < max_accumulated_samples ? settings_.samples : 0);
+            history_samples_,
+            history_samples_ < arhost::raytracer_common::max_accumulated_samples ? settings_.samples : 0);
     }
     frame_.first_sample = history_samples_;
     frame_.sample_count = static_cast<std::uint32_t>(samples_.size());

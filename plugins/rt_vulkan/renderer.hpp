@@ -18,9 +18,9 @@ namespace rt_vulkan {
 
 struct Settings {
     std::uint32_t samples = 1;                        // per pixel
-    std::uint32_t light_samples = 4;                  // shadow rays per shaded point to each area light
+    std::uint32_t light_samples = 4;                  // per shaded point and area light, environment or background
     bool accumulate = false;                          // average over frames while the camera and scene are static
-    bool one_path = false;                            // glass spawns one random ray instead of two
+    bool single_path = false;                         // glass spawns one random ray instead of two
     std::optional<Bands::Milliseconds> max_band_time; // set by tests only; the default depends on the device
 };
 

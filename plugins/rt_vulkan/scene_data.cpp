@@ -20,6 +20,8 @@ using arhost::raytracer_common::bytes;
 using arhost::raytracer_common::elements;
 using arhost::raytracer_common::is_identity;
 using arhost::raytracer_common::object_extent;
+using arhost::raytracer_common::quantized_alpha;
+using arhost::raytracer_common::transform_box;
 
 // A BVH is rebuilt if its SAH cost exceeds this times the cost after the last build: above that, a rebuild saves more
 // tracing time than it costs.
@@ -75,28 +77,18 @@ Light light_of(const arhost_light &from) {
     return to;
 }
 
-// Rounds `alpha` to a multiple of 1/255, so that the mean over several samples yields the same 8-bit code.
-float alpha_of_code(float alpha) {
-    return static_cast<float>(arhost::shading::code_8bit(double{alpha}) / 255);
-}
-
-// Returns the bounding box, in world space, of a box in object space (Arvo, Transforming Axis-Aligned Bounding Boxes,
-// Graphics Gems 1990). Adds a margin for the rounding errors of rays that are transformed to object space.
+// Returns the bounding box, in world space, of a box in object space. Adds a margin for the rounding errors of rays
+// that are transformed to object space.
 Box in_world(const Box &local, const float *m) {
     Box world;
     float extent[3];
     object_extent(local.low, local.high, m, extent);
+    double low[3], high[3];
+    transform_box(local.low, local.high, m, low, high);
     for (int row = 0; row < 3; ++row) {
-        double low = m[9 + row], high = low;
-        const double margin = 2e-6 * (std::abs(low) + extent[row]);
-        for (int axis = 0; axis < 3; ++axis) {
-            const double a = double{m[3 * axis + row]} * local.low[axis],
-                         b = double{m[3 * axis + row]} * local.high[axis];
-            low += std::min(a, b);
-            high += std::max(a, b);
-        }
-        world.low[row] = static_cast<float>(low - margin);
-        world.high[row] = static_cast<float>(high + margin);
+        const double margin = 2e-6 * (std::abs(double{m[9 + row]}) + extent[row]);
+        world.low[row] = static_cast<float>(low[row] - margin);
+        world.high[row] = static_cast<float>(high[row] + margin);
     }
     return world;
 }
@@ -119,8 +111,10 @@ SceneData::SceneData(const arhost_scene &arena, bool has_bvhs, const arhost::Hos
     : arena_(arena), has_bvhs_(has_bvhs), host_(host) {
     for (const arhost_material &material : elements<arhost_material>(arena, arena.materials))
         materials_.push_back(material_of(material));
-    for (const arhost_light &light : elements<arhost_light>(arena, arena.lights))
+    for (const arhost_light &light : elements<arhost_light>(arena, arena.lights)) {
         lights_.push_back(light_of(light));
+        has_area_lights_ |= light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE;
+    }
     add_textures();
     add_tables();
 
@@ -500,8 +494,8 @@ Frame SceneData::frame() const {
     copy(arena_.ambient, frame.ambient);
     copy(arena_.background, frame.background);
     frame.coloured_shadows = arena_.coloured_shadows != 0;
-    frame.shadow_alpha_opaque = alpha_of_code(arena_.shadow_alpha_opaque);
-    frame.shadow_alpha_translucent = alpha_of_code(arena_.shadow_alpha_translucent);
+    frame.shadow_alpha_opaque = quantized_alpha(arena_.shadow_alpha_opaque);
+    frame.shadow_alpha_translucent = quantized_alpha(arena_.shadow_alpha_translucent);
     const arhost_environment &environment = arena_.environment;
     frame.environment_texture = environment.texture;
     if (environment.texture != ARHOST_NONE) {

@@ -13,6 +13,7 @@ namespace {
 
 using arhost::raytracer_common::bytes;
 using arhost::raytracer_common::elements;
+using arhost::raytracer_common::transform_box;
 
 constexpr std::uint32_t width = 64, height = 48;
 constexpr int max_code_difference = 16; // rounding differs between the paths, but by less
@@ -31,16 +32,14 @@ Box box_of_virtual_objects(const arhost_scene &scene) {
         for (const Box &box :
              boxes_of(scene, geometry, {bytes(scene) + geometry.positions.offset, geometry.positions.stride}))
             include(local, box);
-        const float *m = object.world_from_object;
-        for (int corner = 0; corner < 8 && local.low[0] <= local.high[0]; ++corner) {
-            float world[3];
-            for (int row = 0; row < 3; ++row) {
-                world[row] = m[9 + row];
-                for (int axis = 0; axis < 3; ++axis)
-                    world[row] += m[3 * axis + row] * (corner >> axis & 1 ? local.high[axis] : local.low[axis]);
-            }
-            include(all, world);
-        }
+        if (local.low[0] > local.high[0])
+            continue;
+        double low[3], high[3];
+        transform_box(local.low, local.high, object.world_from_object, low, high);
+        Box world;
+        std::copy_n(low, 3, world.low);
+        std::copy_n(high, 3, world.high);
+        include(all, world);
     }
     return all;
 }

@@ -15,8 +15,8 @@ struct LightSample {
     Float cosine;     // cosine of the angle of incidence; 0 if the light is behind the surface
     Vec3 intensity;   // linear colour
     Float irradiance; // at perpendicular incidence, per unit of intensity
-    Float density;    // number of samples of the light source times their density per steradian; 0 if reflected rays
-                      // cannot hit the light source
+    // Number of samples of the light source times their density per steradian; 0 if reflected rays cannot hit it.
+    Float sampling_density;
     bool is_background; // seen in reflections only
 };
 
@@ -28,12 +28,12 @@ ARHOST_INLINE LightSample make_light_sample(const Surface &s, Vec3 to_light, flo
     sample.cosine = lambert(s.normal, sample.direction);
     sample.intensity = intensity;
     sample.irradiance = Float(1.0f);
-    sample.density = Float(0.0f);
+    sample.sampling_density = Float(0.0f);
     sample.is_background = false;
     return sample;
 }
 
-ARHOST_INLINE bool is_extended(const arhost_light &light) {
+ARHOST_INLINE bool is_area_light(const arhost_light &light) {
     return light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE;
 }
 
@@ -41,7 +41,7 @@ ARHOST_INLINE Float falloff_of(const arhost_light &light, Vec3 to_light) {
     return point_light_falloff(bool_of(light.falloff == ARHOST_FALLOFF_INVERSE_SQUARE), dot(to_light, to_light));
 }
 
-// The irradiance and the density of a LightSample, but the density of one sample.
+// The irradiance of a LightSample, and the density of one sample per steradian.
 struct Arriving {
     Float irradiance, density;
 };
@@ -64,7 +64,7 @@ ARHOST_INLINE LightSample sample_light(const arhost_light &light, const Surface 
     if (light.type == ARHOST_LIGHT_DIRECTIONAL)
         return make_light_sample(s, -splat(light.direction), far_away, splat(light.intensity));
     const Vec3 to_centre = splat(light.position) - s.position;
-    if (is_extended(light)) {
+    if (is_area_light(light)) {
         const Vec3 to_point =
             light.type == ARHOST_LIGHT_SPHERE
                 ? vector_to_disc(to_centre, Float(light.radius), uv.u, uv.v)
@@ -72,7 +72,7 @@ ARHOST_INLINE LightSample sample_light(const arhost_light &light, const Surface 
         const Arriving arriving = arriving_from_point(light, to_centre, to_point);
         LightSample sample = make_light_sample(s, to_point, 1, splat(light.intensity));
         sample.irradiance = arriving.irradiance;
-        sample.density = arriving.density * Float(static_cast<float>(count));
+        sample.sampling_density = arriving.density * Float(static_cast<float>(count));
         return sample;
     }
     LightSample sample = make_light_sample(s, to_centre, 1, splat(light.intensity));
@@ -84,16 +84,16 @@ ARHOST_INLINE LightSample sample_light(const arhost_light &light, const Surface 
     return sample;
 }
 
-// Returns the light of lamps with an area that arrives along secondary rays before `t_far`, where the rays hit a
+// Returns the light of area lights that arrives along secondary rays before `t_far`, where the rays hit a
 // surface. Lamps do not hide each other or anything else. `inverse_density`: see RayQueue. After a rough surface,
 // mirrors and glass on the way count as if the lamp were seen directly: a few random rays that find a small lamp by
 // such a path would be bright spots.
-ARHOST_INLINE Vec3 arriving_from_lamps(const Frame &frame, Vec3 origin, Vec3 direction, Float t_far,
-                                       Float inverse_density) {
+ARHOST_INLINE Vec3 arriving_from_area_lights(const Frame &frame, Vec3 origin, Vec3 direction, Float t_far,
+                                             Float inverse_density) {
     Vec3 sum = black();
     for (std::uint32_t i = 0; i < frame.scene.light_count; ++i) {
         const arhost_light &light = frame.scene.lights[i];
-        if (!is_extended(light))
+        if (!is_area_light(light))
             continue;
         const Vec3 to_centre = splat(light.position) - origin;
         const Float t = light.type == ARHOST_LIGHT_SPHERE
@@ -105,8 +105,8 @@ ARHOST_INLINE Vec3 arriving_from_lamps(const Frame &frame, Vec3 origin, Vec3 dir
             continue;
         const Arriving arriving = arriving_from_point(light, to_centre, direction * t);
         const Float sampled = arriving.density * Float(static_cast<float>(frame.light_samples));
-        const Float radiance = arriving.irradiance * arriving.density * Float(3.14159265f) /
-                               (Float(1.0f) + sampled * abs(inverse_density)); // the divisor: balance_weight
+        const Float radiance = arriving.irradiance * arriving.density * Float(3.14159265f) *
+                               balance_weight_of_ray(sampled, abs(inverse_density));
         sum = sum + splat(light.intensity) * select(arrives, radiance, Float(0.0f));
     }
     return sum;
@@ -195,9 +195,6 @@ ARHOST_INLINE Float environment_density(const Texture &image, Float row_step, Fl
     return equirectangular_density(row_step * column_step * texels, v);
 }
 
-// Uniform density of sample_background() per steradian: 1/2π.
-constexpr float background_density = 0.159154943f;
-
 // Returns the light that arrives along secondary rays that hit no surface, from the environment or the background.
 // `inverse_density`: see RayQueue.
 ARHOST_INLINE Vec3 arriving_from_environment(const Frame &frame, Vec3 direction, Float inverse_density) {
@@ -205,7 +202,7 @@ ARHOST_INLINE Vec3 arriving_from_environment(const Frame &frame, Vec3 direction,
     const Environment &environment = frame.scene.environment;
     const bool is_random = any(inverse_density > Float(0.0f));
     Vec3 light = splat(frame.scene.background);
-    Float density = background_density;
+    Float density = hemisphere_density();
     if (environment.image) {
         const Texture &image = *environment.image;
         const Vec3 d = transform(environment.environment_from_world, direction);
@@ -222,15 +219,15 @@ ARHOST_INLINE Vec3 arriving_from_environment(const Frame &frame, Vec3 direction,
         }
     }
     const Float sampled = density * Float(static_cast<float>(frame.light_samples));
-    return is_random ? light * (Float(1.0f) / (Float(1.0f) + sampled * inverse_density)) : light; // balance_weight
+    return is_random ? light * balance_weight_of_ray(sampled, inverse_density) : light;
 }
 
 // Samples a direction of the hemisphere uniformly.
 ARHOST_INLINE LightSample sample_background(const Scene &scene, const Surface &s, Pair uv, int count) {
     LightSample sample =
         make_light_sample(s, hemisphere_direction(s.normal, uv.u, uv.v), far_away, splat(scene.background));
-    sample.irradiance = irradiance_of_density(Float(background_density));
-    sample.density = Float(background_density * static_cast<float>(count));
+    sample.irradiance = irradiance_of_density(hemisphere_density());
+    sample.sampling_density = hemisphere_density() * Float(static_cast<float>(count));
     sample.is_background = true;
     return sample;
 }
@@ -258,7 +255,7 @@ ARHOST_INLINE LightSample sample_environment(const Scene &scene, const Surface &
     const Vec3 light = texel_at(scene, image, column, row).colour * Float(environment.intensity);
     LightSample sample = make_light_sample(s, to_light, far_away, light);
     sample.irradiance = irradiance_of_density(density);
-    sample.density = density * Float(static_cast<float>(count));
+    sample.sampling_density = density * Float(static_cast<float>(count));
     return sample;
 }
 
@@ -271,7 +268,7 @@ ARHOST_INLINE void for_each_light(const Frame &frame, const Surface &s, const Ra
     const bool has_environment = scene.environment.image != nullptr;
     const std::uint32_t count = scene.light_count + (has_environment || background ? 1 : 0);
     for (std::uint32_t i = 0; i < count; ++i) {
-        const bool is_lamp = i < scene.light_count, has_points = !is_lamp || is_extended(scene.lights[i]);
+        const bool is_lamp = i < scene.light_count, has_points = !is_lamp || is_area_light(scene.lights[i]);
         const int purpose = is_lamp ? first_lamp_purpose + static_cast<int>(i) : environment_purpose;
         const int points = has_points ? frame.light_samples : 1;
         for (int point = 0; point < points; ++point) {
@@ -302,8 +299,8 @@ ARHOST_INLINE Float rough_lobe(const Surface &s, Vec3 to_eye, Vec3 half_vector, 
     const Bool reflects = dot(s.geometric_normal, sample.direction) > Float(0.0f);
     const Float density = select(reflects, ggx_reflection_density(cosine_eye, cosine_half, s.alpha), Float(0.0f));
     const Bool through_glass =
-        visibility.is_tinted & bool_of(sample.t_far == far_away) & (sample.density > Float(0.0f));
-    return select(through_glass, Float(0.0f), lobe * balance_weight(sample.density, density));
+        visibility.is_tinted & bool_of(sample.t_far == far_away) & (sample.sampling_density > Float(0.0f));
+    return select(through_glass, Float(0.0f), lobe * balance_weight(sample.sampling_density, density));
 }
 
 // Returns the radiance that surfaces other than mirrors and glass send towards the ray's origin: ambient light,

@@ -94,6 +94,17 @@ ARHOST_INLINE void reflect(Work &work, const Paths &paths, const Surface &s, Vec
         enqueue(work, paths, s.position + s.geometric_normal * s.offset, reflected(s, direction), throughput, active);
 }
 
+// Refraction of rays at a surface with this normal. `cosine`: of the angle of incidence.
+struct Refraction {
+    Float cosine, cosine_squared; // the latter of the angle of refraction; negative for total internal reflection
+    Vec3 direction;
+};
+ARHOST_INLINE Refraction refraction_at(Vec3 direction, Vec3 normal, Float ratio) {
+    const Float cosine = max(-dot(direction, normal), Float(0.0f));
+    const Float squared = refracted_cosine_squared(cosine, ratio);
+    return {cosine, squared, refracted_direction(direction, normal, ratio, cosine, sqrt(max(squared, Float(0.0f))))};
+}
+
 // Queues the reflected and the refracted ray, or only one of them, chosen at random, if `single_path` is set. A ray
 // that exceeds the depth limit or falls below the importance cutoff is not traced: it contributes the material's
 // cutoff colour.
@@ -103,24 +114,17 @@ ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surfac
     const Vec3 throughput = paths.throughput * transmittance;
 
     const Float ratio = select(s.back_face, Float(glass.index), Float(1 / glass.index));
-    Vec3 normal = s.normal;
-    Float cosine = max(-dot(direction, normal), Float(0.0f));
-    Float squared = refracted_cosine_squared(cosine, ratio);
-    Float refracted_cosine = sqrt(max(squared, Float(0.0f)));
-    Vec3 refracted = refracted_direction(direction, normal, ratio, cosine, refracted_cosine);
+    Refraction refraction = refraction_at(direction, s.normal, ratio);
     // If refraction at the interpolated normal leaves the ray outside the glass, the geometric normal is used
     // instead; reflected() does the same for reflection.
-    const Bool wrong_side = (dot(refracted, s.geometric_normal) > Float(0.0f)) & (squared > Float(0.0f));
-    if (any(active & wrong_side)) {
-        normal = select(wrong_side, s.geometric_normal, normal);
-        cosine = max(-dot(direction, normal), Float(0.0f));
-        squared = refracted_cosine_squared(cosine, ratio);
-        refracted_cosine = sqrt(max(squared, Float(0.0f)));
-        refracted = refracted_direction(direction, normal, ratio, cosine, refracted_cosine);
-    }
-    const Bool total = squared < Float(0.0f);
-    const Float reflectance = glass_reflected_fraction(s.back_face, cosine, squared, Float(glass.fresnel_exponent),
-                                                       Float(glass.fresnel_minimum), Float(glass.fresnel_maximum));
+    const Bool wrong_side =
+        (dot(refraction.direction, s.geometric_normal) > Float(0.0f)) & (refraction.cosine_squared > Float(0.0f));
+    if (any(active & wrong_side))
+        refraction = refraction_at(direction, select(wrong_side, s.geometric_normal, s.normal), ratio);
+    const Bool total = refraction.cosine_squared < Float(0.0f);
+    const Float reflectance = glass_reflected_fraction(s.back_face, refraction.cosine, refraction.cosine_squared,
+                                                       Float(glass.fresnel_exponent), Float(glass.fresnel_minimum),
+                                                       Float(glass.fresnel_maximum));
 
     const Vec3 inside = s.position - s.geometric_normal * s.offset;
     Vec3 refracted_throughput = throughput * splat(glass.refraction) * (Float(1.0f) - reflectance);
@@ -145,7 +149,7 @@ ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surfac
     };
     refracts = follow(refracted_throughput, refracts, paths.depth >= glass.refraction_depth);
     if (any(refracts))
-        enqueue(work, paths, inside, refracted, refracted_throughput, refracts);
+        enqueue(work, paths, inside, refraction.direction, refracted_throughput, refracts);
     reflects = follow(reflected_throughput, reflects, paths.depth >= glass.reflection_depth);
     if (any(reflects))
         enqueue(work, paths, s.position + s.geometric_normal * s.offset, reflected(s, direction),
@@ -222,8 +226,9 @@ ARHOST_INLINE void trace_queued_packet(Work &work, std::uint32_t depth) {
     const Bool missed = active & ~hit;
     if (any(missed))
         add_radiance(work, paths, arriving_from_environment(work.frame, direction, inverse_density), missed);
-    if (work.frame.scene.has_extended_lights) {
-        const Vec3 light = arriving_from_lamps(work.frame, origin, direction, load(rays.ray.tfar), inverse_density);
+    if (work.frame.scene.has_area_lights) {
+        const Vec3 light =
+            arriving_from_area_lights(work.frame, origin, direction, load(rays.ray.tfar), inverse_density);
         const Bool lit = active & (largest(light) > Float(0.0f));
         if (any(lit))
             add_radiance(work, paths, light, lit);

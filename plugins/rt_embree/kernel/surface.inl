@@ -62,17 +62,14 @@ ARHOST_INLINE Texel sample_object_texture(const Scene &scene, const Object &obje
 // over each triangle.
 ARHOST_INLINE Vec3 mapped_normal(const Scene &scene, const Object &object, Vec3 facet, Vec3 normal,
                                  const RTCHit16 &hit, Bool here) {
-    const Int corner = select(here, load(hit.primID), Int(0)) * Int(static_cast<int>(object.index_stride / 4));
+    const Corners corners = corners_of(object, hit, here);
     Vec3 position[3];
     Float u[3], v[3];
-    for (int number = 0; number < 3; ++number) {
-        const Int vertex = gather(object.indices + number, corner);
-        const Int at = vertex * Int(static_cast<int>(object.position_stride / 4));
-        position[number] = {gather(object.positions, at), gather(object.positions + 1, at),
-                            gather(object.positions + 2, at)};
-        const Int texel = vertex * Int(static_cast<int>(object.texcoord_stride / 4));
-        u[number] = gather(object.texcoords, texel);
-        v[number] = gather(object.texcoords + 1, texel);
+    for (int i = 0; i < 3; ++i) {
+        position[i] = gather_vector(object.positions, object.position_stride, corners.vertex[i]);
+        const Int texel = corners.vertex[i] * Int(static_cast<int>(object.texcoord_stride / 4));
+        u[i] = gather(object.texcoords, texel);
+        v[i] = gather(object.texcoords + 1, texel);
     }
     const Vec3 edge_1 = position[1] - position[0], edge_2 = position[2] - position[0];
     const Float u1 = u[1] - u[0], u2 = u[2] - u[0], v1 = v[1] - v[0], v2 = v[2] - v[0];
@@ -114,7 +111,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     s.distance = length(step);
     s.geometric_normal = facet;
     s.normal = facet;
-    Vec3 reach = black();
+    Vec3 extent = black();
     for_each_object(scene, hit, active, [&](const Object &object, Bool here) {
         Vec3 geometric = facet, normal = facet;
         Corners corners;
@@ -135,7 +132,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
         if (object.material->model == ARHOST_MATERIAL_METALLIC_ROUGHNESS &&
             object.material->normal_texture != ARHOST_NONE && object.texcoords)
             normal = mapped_normal(scene, object, geometric, normal, hit, here);
-        reach = select(here, splat(object.reach), reach);
+        extent = select(here, splat(object.extent), extent);
         s.geometric_normal = select(here, geometric, s.geometric_normal);
         s.normal = select(here, normal, s.normal);
         if (object.role != ARHOST_ROLE_VIRTUAL)
@@ -189,7 +186,7 @@ ARHOST_INLINE Surface surface_at(const Scene &scene, const RTCRayHit16 &rays, Bo
     });
 
     s.geometric_normal = normalize_or(s.geometric_normal, -normalize(direction));
-    s.offset = offset_from_surface(s.position, step, s.geometric_normal, reach);
+    s.offset = offset_from_surface(s.position, step, s.geometric_normal, extent);
     s.back_face = dot(s.geometric_normal, direction) > Float(0.0f);
     s.geometric_normal = facing(s.geometric_normal, -direction);
     s.normal = shading_normal(s.normal, s.geometric_normal);

@@ -28,7 +28,9 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
                 continue;
             }
         } else if (stage == PATH_STAGE) {
-            light += path.throughput * arriving_from_lamps(ray.origin, ray.direction, hit.t, path.inverse_density);
+            if (has_area_lights)
+                light +=
+                    path.throughput * arriving_from_area_lights(ray.origin, ray.direction, hit.t, path.inverse_density);
             if (!is_hit)
                 light += path.throughput * arriving_from_environment(ray.direction, path.inverse_density);
         }

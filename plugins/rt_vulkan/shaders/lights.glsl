@@ -3,24 +3,24 @@
 // Direct light from lamps and the environment, and its occlusion. Equivalent to rt_embree's kernel/lights.inl.
 
 // The light that arrives at a surface point from one sampled point of a light source.
-struct Incidence {
+struct LightSample {
     vec3 to_light;    // vector from the surface to the sampled point; of unit length if the light is infinitely far
     float t_max;      // end of the shadow ray in lengths of `to_light`: 1, or infinity
     vec3 direction;   // of `to_light`, unit length
     float cosine;     // cosine of the angle of incidence; 0 if the light is behind the surface
     float irradiance; // at perpendicular incidence, per unit of intensity
     vec3 intensity;
-    float density;      // number of samples of the light source times their density per steradian; 0 if reflected rays
-                        // cannot hit the light source
+    // Number of samples of the light source times their density per steradian; 0 if reflected rays cannot hit it.
+    float sampling_density;
     bool is_background; // seen in reflections only
 };
 
-Incidence incidence_along(Surface s, vec3 to_light, float t_max, float irradiance, vec3 intensity) {
+LightSample make_light_sample(Surface s, vec3 to_light, float t_max, float irradiance, vec3 intensity) {
     vec3 direction = normalize(to_light);
-    return Incidence(to_light, t_max, direction, lambert(s.normal, direction), irradiance, intensity, 0.0, false);
+    return LightSample(to_light, t_max, direction, lambert(s.normal, direction), irradiance, intensity, 0.0, false);
 }
 
-bool is_extended(uint lamp) {
+bool is_area_light(uint lamp) {
     return lights[lamp].type == RECTANGLE_LIGHT || lights[lamp].type == SPHERE_LIGHT;
 }
 
@@ -41,39 +41,39 @@ vec2 arriving_from_point(uint lamp, vec3 to_centre, vec3 to_point) {
 }
 
 // `sample_uv` selects the sampled point of an area light, of which `count` are sampled.
-Incidence incidence(uint lamp, Surface s, vec2 sample_uv, uint count) {
+LightSample sample_light(uint lamp, Surface s, vec2 sample_uv, uint count) {
     uint type = lights[lamp].type;
     vec3 intensity = lights[lamp].intensity, axis = lights[lamp].direction;
     if (type == DIRECTIONAL_LIGHT)
-        return incidence_along(s, -axis, INFINITY, 1.0, intensity);
+        return make_light_sample(s, -axis, INFINITY, 1.0, intensity);
     vec3 to_centre = lights[lamp].position - s.position;
-    if (is_extended(lamp)) {
+    if (is_area_light(lamp)) {
         vec3 to_point = type == SPHERE_LIGHT
                             ? vector_to_disc(to_centre, lights[lamp].radius, sample_uv.x, sample_uv.y)
                             : vector_to_rectangle(to_centre, lights[lamp].axis_u, lights[lamp].axis_v, sample_uv.x,
                                                   sample_uv.y);
         vec2 arriving = arriving_from_point(lamp, to_centre, to_point);
-        Incidence result = incidence_along(s, to_point, 1.0, arriving.x, intensity);
-        result.density = arriving.y * float(count);
+        LightSample result = make_light_sample(s, to_point, 1.0, arriving.x, intensity);
+        result.sampling_density = arriving.y * float(count);
         return result;
     }
     bool falls_off = lights[lamp].falloff == FALLOFF_INVERSE_SQUARE;
-    Incidence arriving =
-        incidence_along(s, to_centre, 1.0, point_light_falloff(falls_off, dot(to_centre, to_centre)), intensity);
+    LightSample arriving =
+        make_light_sample(s, to_centre, 1.0, point_light_falloff(falls_off, dot(to_centre, to_centre)), intensity);
     if (type == SPOT_LIGHT)
         arriving.irradiance *= spot_attenuation(dot(axis, -arriving.direction), lights[lamp].cosine_inner,
                                           lights[lamp].cosine_outer);
     return arriving;
 }
 
-// Returns the light of lamps with an area that arrives along a secondary ray before `t_max`, where the ray hits a
+// Returns the light of area lights that arrives along a secondary ray before `t_max`, where the ray hits a
 // surface. Lamps do not hide each other or anything else. `inverse_density`: see Path. After a rough surface, mirrors and
 // glass on the way count as if the lamp were seen directly: a few random rays that find a small lamp by such a path would
 // be bright spots.
-vec3 arriving_from_lamps(vec3 origin, vec3 direction, float t_max, float inverse_density) {
+vec3 arriving_from_area_lights(vec3 origin, vec3 direction, float t_max, float inverse_density) {
     vec3 sum = vec3(0.0);
     for (uint lamp = 0u; lamp < frame.light_count; ++lamp) {
-        if (!is_extended(lamp))
+        if (!is_area_light(lamp))
             continue;
         vec3 to_centre = lights[lamp].position - origin;
         float t = lights[lamp].type == SPHERE_LIGHT
@@ -84,15 +84,15 @@ vec3 arriving_from_lamps(vec3 origin, vec3 direction, float t_max, float inverse
             continue;
         vec2 arriving = arriving_from_point(lamp, to_centre, direction * t);
         float sampled = arriving.y * float(frame.light_samples);
-        sum += lights[lamp].intensity * (arriving.x * arriving.y * 3.14159265 /
-                                         (1.0 + sampled * abs(inverse_density))); // the divisor: balance_weight
+        sum += lights[lamp].intensity * (arriving.x * arriving.y * 3.14159265 *
+                                         balance_weight_of_ray(sampled, abs(inverse_density)));
     }
     return sum;
 }
 
 // The visibility of a light source from a surface point.
 struct Visibility {
-    bool is_unoccluded; // no opaque object is in between
+    bool unoccluded; // no opaque object is in between
     bool is_tinted;     // glass is in between
     vec3 tint;          // transmittance of the glass in between
 };
@@ -100,7 +100,7 @@ struct Visibility {
 // Traces shadow rays. Real surfaces (catchers and occluders) cast no virtual shadow on each other: the video already
 // shows their shadows. The first ray searches for opaque objects; each further ray leads from one glass surface to
 // the next. A single loop traces all of them, because trace() is inlined and its code is long.
-Visibility visibility(Incidence arriving, Surface s) {
+Visibility visibility(LightSample arriving, Surface s) {
     const int max_surfaces = 64; // ignores further surfaces: rays may alternate endlessly between coincident faces
     vec3 lift = s.lift + s.geometric_normal * s.offset, start = s.position + lift, to_light = arriving.to_light;
     if (arriving.t_max < INFINITY)
@@ -113,7 +113,7 @@ Visibility visibility(Incidence arriving, Surface s) {
         Hit hit = trace(ray, i == 0, false);
         bool is_hit = hit.object != NONE;
         if (i == 0)
-            result.is_unoccluded = !is_hit;
+            result.unoccluded = !is_hit;
         if (!has_glass || is_hit == (i == 0))
             break;
         if (i > 0) {
@@ -122,7 +122,7 @@ Visibility visibility(Incidence arriving, Surface s) {
             uint material = objects[hit.object].material;
             result.tint *= glass_shadow(materials[material].shadow_attenuation,
                                         abs(dot(glass.normal, arriving.direction))) *
-                           bouguer(materials[material].extinction, glass.is_back_face ? glass.distance : 0.0);
+                           bouguer(materials[material].extinction, glass.back_face ? glass.distance : 0.0);
             if (!(largest(result.tint) > 1e-3))
                 break;
             // The next ray starts behind the glass surface.
@@ -161,15 +161,12 @@ float environment_density(float row_step, float column_step, float v) {
     return equirectangular_density(row_step * column_step * texels, v);
 }
 
-// Uniform density of sample_background() per steradian: 1/2π.
-const float background_density = 0.159154943;
-
 // Returns the light that arrives along a secondary ray that hits no surface, from the environment or the background.
 // `inverse_density`: see Path.
 vec3 arriving_from_environment(vec3 direction, float inverse_density) {
     inverse_density = max(inverse_density, 0.0); // samples of the environment do not follow mirrors
     vec3 light = frame.background;
-    float density = background_density;
+    float density = hemisphere_density();
     if (frame.environment_texture != NONE) {
         vec3 d = frame.environment_from_world * direction;
         vec2 at = vec2(equirectangular_u(d), equirectangular_v(d));
@@ -182,22 +179,21 @@ vec3 arriving_from_environment(vec3 direction, float inverse_density) {
                 step_of_sums(frame.environment_columns + uint(texel.y * size.x), texel.x).y, at.y);
         }
     }
-    float sampled = density * float(frame.light_samples);
-    return light / (1.0 + sampled * inverse_density); // the divisor: balance_weight
+    return light * balance_weight_of_ray(density * float(frame.light_samples), inverse_density);
 }
 
 // Samples a direction of the hemisphere uniformly, for rough reflections of a scene without environment.
-Incidence sample_background(Surface s, vec2 sample_uv) {
+LightSample sample_background(Surface s, vec2 sample_uv) {
     vec3 direction = hemisphere_direction(s.normal, sample_uv.x, sample_uv.y);
-    Incidence arriving =
-        incidence_along(s, direction, INFINITY, irradiance_of_density(background_density), frame.background);
-    arriving.density = background_density * float(frame.light_samples);
+    LightSample arriving =
+        make_light_sample(s, direction, INFINITY, irradiance_of_density(hemisphere_density()), frame.background);
+    arriving.sampling_density = hemisphere_density() * float(frame.light_samples);
     arriving.is_background = true;
     return arriving;
 }
 
 // Samples a direction in proportion to the environment's luminance. `sample_uv`: random numbers from 0 to 1.
-Incidence sample_environment(Surface s, vec2 sample_uv) {
+LightSample sample_environment(Surface s, vec2 sample_uv) {
     int width = textures[frame.environment_texture].width, height = textures[frame.environment_texture].height;
     int row = search_sums(frame.environment_rows, height, sample_uv.y);
     vec2 row_step = step_of_sums(frame.environment_rows, row);
@@ -212,8 +208,8 @@ Incidence sample_environment(Surface s, vec2 sample_uv) {
     // The colour is not interpolated, because the density is not: the light of a bright neighbouring texel would be
     // divided by the low density of this texel, which causes bright noise.
     vec3 light = texel_at(frame.environment_texture, column, row).rgb * frame.environment_intensity;
-    Incidence arriving = incidence_along(s, direction, INFINITY, irradiance_of_density(density), light);
-    arriving.density = density * float(frame.light_samples);
+    LightSample arriving = make_light_sample(s, direction, INFINITY, irradiance_of_density(density), light);
+    arriving.sampling_density = density * float(frame.light_samples);
     return arriving;
 }
 
@@ -224,10 +220,10 @@ struct DirectLight {
     float irradiance;
 };
 
-void add_shadow(inout DirectLight sum, Incidence arriving, Visibility visible, float share) {
+void add_shadow(inout DirectLight sum, LightSample arriving, Visibility visible, float share) {
     float power = arriving.intensity.x + arriving.intensity.y + arriving.intensity.z;
     float weight = arriving.cosine * arriving.irradiance * power * share;
-    float hidden = visible.is_unoccluded ? 0.0 : weight, tinted = visible.is_tinted ? weight : 0.0;
+    float hidden = visible.unoccluded ? 0.0 : weight, tinted = visible.is_tinted ? weight : 0.0;
     sum.irradiance += weight;
     if (frame.coloured_shadows != 0u)
         sum.hidden += hidden + (vec3(1.0) - visible.tint) * tinted;
@@ -238,19 +234,19 @@ void add_shadow(inout DirectLight sum, Incidence arriving, Visibility visible, f
 // Returns the share of the arriving light that a rough surface reflects to the eye, without the Fresnel term. A ray that
 // is reflected at random can also arrive at the light source; balance_weight() divides the light between them. Such rays
 // bring all light of the environment that glass lets through.
-float rough_lobe(Surface s, vec3 to_eye, vec3 half_vector, Incidence arriving, Visibility visible, bool rays_follow) {
+float rough_lobe(Surface s, vec3 to_eye, vec3 half_vector, LightSample arriving, Visibility visible, bool rays_follow) {
     float cosine_eye = dot(s.normal, to_eye), cosine_half = dot(s.normal, half_vector);
     float lobe = ggx_lobe(arriving.cosine, cosine_eye, cosine_half, s.alpha);
     if (!rays_follow)
         return lobe;
-    if (visible.is_tinted && arriving.t_max > 1.0 && arriving.density > 0.0)
+    if (visible.is_tinted && arriving.t_max > 1.0 && arriving.sampling_density > 0.0)
         return 0.0;
     bool reflects = dot(s.geometric_normal, arriving.direction) > 0.0;
     float density = reflects ? ggx_reflection_density(cosine_eye, cosine_half, s.alpha) : 0.0;
-    return lobe * balance_weight(arriving.density, density);
+    return lobe * balance_weight(arriving.sampling_density, density);
 }
 
-void add_reflected(inout DirectLight sum, Surface s, vec3 to_eye, Incidence arriving, Visibility visible,
+void add_reflected(inout DirectLight sum, Surface s, vec3 to_eye, LightSample arriving, Visibility visible,
                    bool rays_follow, float share) {
     vec3 reflected = s.diffuse * arriving.cosine;
     if (s.is_rough) {
@@ -271,15 +267,15 @@ DirectLight direct_light(Surface s, vec3 to_eye, bool catches, bool rays_follow,
     bool background = !catches && s.is_rough && largest(frame.background) > 0.0;
     uint count = frame.light_count + (has_environment || background ? 1u : 0u);
     for (uint lamp = 0u; lamp < count; ++lamp) {
-        bool is_lamp = lamp < frame.light_count, has_points = !is_lamp || is_extended(lamp);
+        bool is_lamp = lamp < frame.light_count, has_points = !is_lamp || is_area_light(lamp);
         uint point_count = has_points ? frame.light_samples : 1u;
         float share = 1.0 / float(point_count);
         for (uint point = 0u; point < point_count; ++point) {
             uint purpose = is_lamp ? FIRST_LAMP_PURPOSE + lamp : ENVIRONMENT_PURPOSE;
             vec2 sample_uv = has_points ? pair(random, purpose, point, point_count) : vec2(0.5);
-            Incidence arriving;
+            LightSample arriving;
             if (is_lamp)
-                arriving = incidence(lamp, s, sample_uv, point_count);
+                arriving = sample_light(lamp, s, sample_uv, point_count);
             else if (has_environment)
                 arriving = sample_environment(s, sample_uv);
             else
@@ -289,7 +285,7 @@ DirectLight direct_light(Surface s, vec3 to_eye, bool catches, bool rays_follow,
             Visibility visible = visibility(arriving, s);
             if (catches)
                 add_shadow(sum, arriving, visible, share);
-            else if (visible.is_unoccluded)
+            else if (visible.unoccluded)
                 add_reflected(sum, s, to_eye, arriving, visible, rays_follow, share);
         }
     }

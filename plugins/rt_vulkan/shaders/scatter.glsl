@@ -33,35 +33,38 @@ void push_reflected(Path path, Surface s, vec3 direction, vec3 reflectance) {
              -abs(path.inverse_density));
 }
 
-// Pushes the reflected and the refracted ray, or only one of them, chosen at random, if frame.one_path is set. A ray
+// Refraction of a ray at a surface with this normal. `cosine`: of the angle of incidence.
+struct Refraction {
+    float cosine, cosine_squared; // the latter of the angle of refraction; negative for total internal reflection
+    vec3 direction;
+};
+Refraction refraction_at(vec3 direction, vec3 normal, float ratio) {
+    float cosine = max(-dot(direction, normal), 0.0), squared = refracted_cosine_squared(cosine, ratio);
+    return Refraction(cosine, squared,
+                      refracted_direction(direction, normal, ratio, cosine, sqrt(max(squared, 0.0))));
+}
+
+// Pushes the reflected and the refracted ray, or only one of them, chosen at random, if frame.single_path is set. A ray
 // that exceeds the depth limit or falls below the importance cutoff is not traced: the function returns the cutoff
 // colour that it contributes instead.
 vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Random random) {
     vec3 throughput = path.throughput;
-    if (s.is_back_face)
+    if (s.back_face)
         throughput *= bouguer(materials[material].extinction, s.distance);
-    float index = materials[material].index, ratio = s.is_back_face ? index : 1.0 / index;
-    vec3 normal = s.normal;
-    float cosine = max(-dot(direction, normal), 0.0), squared = refracted_cosine_squared(cosine, ratio);
-    float refracted_cosine = sqrt(max(squared, 0.0));
-    vec3 refracted = refracted_direction(direction, normal, ratio, cosine, refracted_cosine);
+    float index = materials[material].index, ratio = s.back_face ? index : 1.0 / index;
+    Refraction refraction = refraction_at(direction, s.normal, ratio);
     // If refraction at the interpolated normal leaves the ray outside the glass, the geometric normal is used instead;
     // mirror_direction_off_facet() does the same for reflection.
-    if (dot(refracted, s.geometric_normal) > 0.0 && squared > 0.0) {
-        normal = s.geometric_normal;
-        cosine = max(-dot(direction, normal), 0.0);
-        squared = refracted_cosine_squared(cosine, ratio);
-        refracted_cosine = sqrt(max(squared, 0.0));
-        refracted = refracted_direction(direction, normal, ratio, cosine, refracted_cosine);
-    }
-    float reflectance =
-        glass_reflected_fraction(s.is_back_face, cosine, squared, materials[material].fresnel_exponent,
-                              materials[material].fresnel_minimum, materials[material].fresnel_maximum);
+    if (dot(refraction.direction, s.geometric_normal) > 0.0 && refraction.cosine_squared > 0.0)
+        refraction = refraction_at(direction, s.geometric_normal, ratio);
+    float reflectance = glass_reflected_fraction(
+        s.back_face, refraction.cosine, refraction.cosine_squared, materials[material].fresnel_exponent,
+        materials[material].fresnel_minimum, materials[material].fresnel_maximum);
 
     vec3 refracted_share = throughput * materials[material].refraction * (1.0 - reflectance);
     vec3 reflected_share = throughput * materials[material].reflectivity * reflectance;
-    bool refracts = !(squared < 0.0), reflects = true;
-    if (frame.one_path != 0u) {
+    bool refracts = !(refraction.cosine_squared < 0.0), reflects = true;
+    if (frame.single_path != 0u) {
         bool chooses_reflection = pair(random, GLASS_PURPOSE, 0u, 1u).x < reflectance;
         refracts = refracts && !chooses_reflection;
         reflects = chooses_reflection;
@@ -72,7 +75,7 @@ vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Rando
     float cutoff = materials[material].importance_cutoff;
     if (refracts) {
         if (path.depth < materials[material].refraction_depth && luminance(refracted_share) > cutoff)
-            push(path, s.position - s.geometric_normal * s.offset, refracted, refracted_share,
+            push(path, s.position - s.geometric_normal * s.offset, refraction.direction, refracted_share,
                  -abs(path.inverse_density));
         else
             cut_off += refracted_share * cutoff_colour;
@@ -88,7 +91,7 @@ vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Rando
 }
 
 // Pushes a ray that is reflected off a randomly sampled microfacet.
-void scatter_off_roughness(Path path, Surface s, vec3 to_eye, Random random) {
+void scatter_rough(Path path, Surface s, vec3 to_eye, Random random) {
     vec2 sample_uv = pair(random, ROUGH_PURPOSE, 0u, 1u);
     vec3 half_vector = ggx_half_vector(s.normal, to_eye, s.alpha, sample_uv.x, sample_uv.y);
     vec3 direction = mirror_direction(-to_eye, half_vector);
@@ -113,6 +116,6 @@ vec3 scatter(Path path, Surface s, vec3 direction, uint material, Random random)
     else if (has_glass && model == GLASS)
         return scatter_in_glass(path, s, direction, material, random);
     else if (model == METALLIC_ROUGHNESS)
-        scatter_off_roughness(path, s, -direction, random);
+        scatter_rough(path, s, -direction, random);
     return vec3(0.0);
 }

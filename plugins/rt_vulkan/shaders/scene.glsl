@@ -26,6 +26,7 @@ layout(constant_id = 3) const bool has_holes = true; // whether any object has h
 layout(constant_id = 4) const uint ray_dimensions = 2u;
 layout(constant_id = 5) const bool has_slopes = false;
 layout(constant_id = 6) const bool has_textures = true; // whether the scene has textures
+layout(constant_id = 7) const bool has_area_lights = true;
 
 struct Object {
     mat4x3 object_from_world;
@@ -103,7 +104,7 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     uint object_count;
     mat3 world_from_camera;
     uint width, height, sample_count, first_sample;
-    uint light_samples, light_count, max_depth, one_path;
+    uint light_samples, light_count, max_depth, single_path;
     vec3 ambient;
     uint coloured_shadows;
     vec3 background;

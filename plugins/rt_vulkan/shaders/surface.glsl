@@ -7,7 +7,7 @@ struct Surface {
     // The triangle's normal and the shading normal (interpolated from the vertices, and perturbed by the normal map).
     // Both have unit length and face the ray origin.
     vec3 geometric_normal, normal;
-    bool is_back_face; // the ray hit the back face; `geometric_normal` has been flipped
+    bool back_face; // the ray hit the back face; `geometric_normal` has been flipped
     float offset;      // mm: distance of a secondary ray's origin from the surface
     float distance;    // mm, from the ray origin
     vec3 lift;         // mm: from the hit to the curved surface where shadow rays start (lift_to_corner)
@@ -94,7 +94,7 @@ Surface surface_at(Ray ray, Hit hit, bool normal_maps) {
     s.is_real = objects[object].role != VIRTUAL;
     s.geometric_normal = normalize_or(geometric, -normalize(ray.direction));
     s.offset = offset_from_surface(s.position, path, s.geometric_normal, objects[object].extent);
-    s.is_back_face = dot(s.geometric_normal, ray.direction) > 0.0;
+    s.back_face = dot(s.geometric_normal, ray.direction) > 0.0;
     s.geometric_normal = facing(s.geometric_normal, -ray.direction);
     s.normal = shading_normal(normal, s.geometric_normal);
     s.lift = vec3(0.0);

@@ -127,6 +127,8 @@ TEST(Light, WeightsOfTwoSamplingTechniquesAddUpToOne) {
     EXPECT_DOUBLE_EQ(balance_weight(3, 1) + balance_weight(1, 3), 1);
     EXPECT_EQ(balance_weight(3, 0), 1);
     EXPECT_EQ(balance_weight(0, 5), 1) << "only this technique can sample the light";
+    EXPECT_DOUBLE_EQ(balance_weight_of_ray(3, 1 / 5.0), balance_weight(5, 3));
+    EXPECT_EQ(balance_weight_of_ray(3, 0), 1) << "mirrors and glass";
 }
 
 TEST(Light, SpotIsFullInsideTheInnerConeAndDarkOutsideTheOuterCone) {

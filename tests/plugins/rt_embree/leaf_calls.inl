@@ -36,7 +36,7 @@ void call(Result (*f)(Parameters...), const Float *arguments, Float *results) {
 // Returns a bit mask of the argument array: bit i is set if a Vec3 begins at index i.
 template <class Result, class... Parameters> constexpr unsigned vectors_of(Result (*)(Parameters...)) {
     unsigned vectors = 0;
-    int at = 0;
+    [[maybe_unused]] int at = 0;
     ((vectors |= (numbers_of<Parameters> == 3 ? 1u : 0u) << at, at += numbers_of<Parameters>), ...);
     return vectors;
 }
@@ -98,10 +98,12 @@ const LeafFunction leaf_functions[] = {
     LEAF(distance_to_rectangle),
     LEAF(distance_to_disc),
     LEAF(balance_weight),
+    LEAF(balance_weight_of_ray),
     LEAF(glass_shadow),
     LEAF(irradiance_of_density),
     LEAF(tangent_axis),
     LEAF(bitangent_axis),
+    LEAF(hemisphere_density),
     LEAF(hemisphere_direction),
     LEAF(ggx_visible_normal),
     LEAF(ggx_half_vector),

@@ -187,7 +187,7 @@ TEST(SphereLight, IsVisibleInMirrorsAndThroughGlass) {
                 500.0 / (30 * 30), 0.02);
 }
 
-TEST(ExtendedLights, BehindAnObjectAreNotVisibleInMirrors) {
+TEST(AreaLights, BehindAnObjectAreNotVisibleInMirrors) {
     arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, 0, 80}, 1);
     bulb.radius = 10;
     for (const bool screen : {false, true}) {
@@ -206,7 +206,7 @@ TEST(ExtendedLights, BehindAnObjectAreNotVisibleInMirrors) {
     }
 }
 
-TEST(ExtendedLights, AreIdenticalOnEachRunAndThreadCount) {
+TEST(AreaLights, AreIdenticalOnEachRunAndThreadCount) {
     arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, -20, 200}, 1);
     bulb.radius = 30;
     const auto pixels = [&](const char *threads) { return over_a_plane(bulb, {{"threads", threads}}).pixels(); };

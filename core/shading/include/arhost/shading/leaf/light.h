@@ -49,6 +49,12 @@ ARHOST_LEAF Float balance_weight(Float density, Float other_density) {
     return select(density > Float(0.0), density / max(density + other_density, Float(1e-30)), Float(1.0));
 }
 
+// balance_weight of a randomly reflected ray that arrives at a light. `light_density`: number of samples of the light
+// times their density per steradian; `inverse_density`: reciprocal of the ray's density, 0 if the ray is not random.
+ARHOST_LEAF Float balance_weight_of_ray(Float light_density, Float inverse_density) {
+    return Float(1.0) / (Float(1.0) + light_density * inverse_density);
+}
+
 // Transmittance of a glass surface for shadow rays: 1 − Schlick's term with f0 = 1 − attenuation (coloured shadows,
 // as in the dissertation).
 ARHOST_LEAF Vec3 glass_shadow(Vec3 attenuation, Float cosine) {

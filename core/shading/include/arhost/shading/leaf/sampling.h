@@ -13,7 +13,12 @@ ARHOST_LEAF Vec3 bitangent_axis(Vec3 n) {
     return vec3(n.x * n.y * a, sign + n.y * n.y * a, -n.y);
 }
 
-// Samples a direction of the hemisphere around `normal` uniformly: its density is 1/2π per steradian.
+// Density of hemisphere_direction() per steradian: 1/2π.
+ARHOST_LEAF Float hemisphere_density() {
+    return Float(0.159154943091895);
+}
+
+// Samples a direction of the hemisphere around `normal` uniformly.
 ARHOST_LEAF Vec3 hemisphere_direction(Vec3 normal, Float u, Float v) {
     Float cosine = Float(1.0) - u;
     Float sine = sqrt(max(Float(1.0) - cosine * cosine, Float(0.0)));
