@@ -173,14 +173,23 @@ void add_cumulative_sums(Environment &environment, const Texture &texture, const
     const std::span<const float> texels = floats_of(texture.texels);
     environment.rows.resize(texture.height);
     environment.columns.resize(std::size_t(texture.width) * texture.height);
-    std::vector<double> luminance(texture.width), row_sums(texture.height);
-    for (std::size_t row = 0; row < texture.height; ++row) {
+    const std::size_t width = texture.width, height = texture.height;
+    // The mean of the bilinear interpolation over a texel has the weights 1, 6 and 1 along each axis.
+    const auto mean = [](double before, double here, double after) { return (before + 6 * here + after) / 8; };
+    std::vector<double> by_column(width), luminance(width), row_sums(height);
+    for (std::size_t row = 0; row < height; ++row) {
         reporter.report(static_cast<double>(row) / texture.height);
-        double sum = 0;
-        for (std::size_t column = 0; column < texture.width; ++column) {
-            const float *t = &texels[4 * (row * texture.width + column)];
-            sum += luminance[column] = 0.2126 * t[0] + 0.7152 * t[1] + 0.0722 * t[2]; // Rec. 709
+        for (std::size_t column = 0; column < width; ++column) {
+            const auto at = [&](std::size_t y) {
+                const float *t = &texels[4 * (y * width + column)];
+                return 0.2126 * t[0] + 0.7152 * t[1] + 0.0722 * t[2]; // Rec. 709
+            };
+            by_column[column] = mean(at(row - (row > 0)), at(row), at(std::min(row + 1, height - 1)));
         }
+        double sum = 0;
+        for (std::size_t column = 0; column < width; ++column)
+            sum += luminance[column] =
+                mean(by_column[(column + width - 1) % width], by_column[column], by_column[(column + 1) % width]);
         accumulate(luminance, std::span(environment.columns).subspan(row * texture.width, texture.width));
         row_sums[row] = sum * std::sin(std::numbers::pi * (static_cast<double>(row) + 0.5) / texture.height);
     }

@@ -32,8 +32,8 @@ Image read_image(const std::filesystem::path &file, std::span<const unsigned cha
 // Converts to RGBA floats in linear light; decodes sRGB-encoded bytes.
 Image linearized(Image image, const Reporter &reporter);
 
-// Sets `rows` and `columns` to cumulative sums of luminance · sin(πv), for importance sampling. `texture` must be
-// RGBA32F.
+// Sets `rows` and `columns` to cumulative sums of luminance · sin(πv), for importance sampling. The luminance is the
+// mean over a texel, interpolated as by ray tracers. `texture` must be RGBA32F, repeated horizontally only.
 void add_cumulative_sums(Environment &environment, const Texture &texture, const Reporter &reporter);
 
 } // namespace arhost::scene

@@ -250,9 +250,7 @@ ARHOST_INLINE LightSample sample_environment(const Scene &scene, const Surface &
     const float *m = environment.environment_from_world;
     const Vec3 to_light{dot(splat(m), d), dot(splat(m + 3), d), dot(splat(m + 6), d)};
     const Float density = environment_density(image, row_step.v, column_step.v, v);
-    // The colour is not interpolated, because the density is not: the light of a bright neighbouring texel would be
-    // divided by the low density of this texel, which causes bright noise.
-    const Vec3 light = texel_at(scene, image, column, row).colour * Float(environment.intensity);
+    const Vec3 light = sample_texture(scene, image, u, v).colour * Float(environment.intensity);
     LightSample sample = make_light_sample(s, to_light, far_away, light);
     sample.irradiance = irradiance_of_density(density);
     sample.sampling_density = density * Float(static_cast<float>(count));

@@ -205,9 +205,7 @@ LightSample sample_environment(Surface s, vec2 sample_uv) {
     // The inverse of a rotation matrix is its transpose.
     vec3 direction = equirectangular_direction(u, v) * frame.environment_from_world;
     float density = environment_density(row_step.y, column_step.y, v);
-    // The colour is not interpolated, because the density is not: the light of a bright neighbouring texel would be
-    // divided by the low density of this texel, which causes bright noise.
-    vec3 light = texel_at(frame.environment_texture, column, row).rgb * frame.environment_intensity;
+    vec3 light = sample_texture(frame.environment_texture, vec2(u, v)).rgb * frame.environment_intensity;
     LightSample arriving = make_light_sample(s, direction, INFINITY, irradiance_of_density(density), light);
     arriving.sampling_density = density * float(frame.light_samples);
     return arriving;

@@ -216,10 +216,17 @@ TEST(Environments, HaveCumulativeSums) {
     EXPECT_EQ(texture(arena).format, ARHOST_TEXEL_RGBA32F);
     EXPECT_THAT(floats(arena), ElementsAre(1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1));
     const auto *rows = at<float>(arena, environment.rows), *columns = at<float>(arena, environment.columns);
-    EXPECT_THAT(std::vector<float>(rows, rows + 2), ElementsAre(1, 1));
-    EXPECT_THAT(std::vector<float>(columns, columns + 4), ElementsAre(1, 1, 0.5f, 1))
-        << "uniform if all texels are black";
+    // Interpolation extends the light by half a texel, horizontally across the image's edge.
+    EXPECT_THAT(std::vector<float>(rows, rows + 2), ElementsAre(0.875f, 1));
+    EXPECT_THAT(std::vector<float>(columns, columns + 4), ElementsAre(0.75f, 1, 0.75f, 1));
     EXPECT_THAT(arena.scene().ambient, testing::Each(0.0f)) << "the environment replaces ambient light";
+}
+
+TEST(Environments, AreSampledUniformlyIfBlack) {
+    const Arena arena =
+        Scene("a.png", png(2, 1, 1, {0, 0})).load("environment: {image: a.png}\nmaterials: {}\nobjects: []\n");
+    const auto *columns = at<float>(arena, arena.scene().environment.columns);
+    EXPECT_THAT(std::vector<float>(columns, columns + 2), ElementsAre(0.5f, 1));
 }
 
 TEST(Environments, WeightRowsBySolidAngle) {

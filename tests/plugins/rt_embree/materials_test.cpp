@@ -380,10 +380,17 @@ TEST(Rough, BackgroundIsReflectedAtTheDepthLimit) {
     EXPECT_NEAR(light_in_the_middle(picture) / (0.5 * albedo_at_normal_incidence(0.6)), 1, 0.03);
 }
 
-// A lamp with an area and an environment can be sampled in two ways: reflected rays rarely hit a small light, and
-// samples of the light rarely lie in a narrow lobe. The combination must have the right brightness and little noise
-// in both cases.
-TEST(Rough, ReflectionsOfLightsAreRightAndSmoothForEveryRoughness) {
+// Root mean square of the relative deviation of the 25 central pixels from this light.
+double noise_in_the_middle(const Picture &picture, double light) {
+    double squares = 0;
+    for (std::uint32_t i = 0; i < 25; ++i)
+        squares += std::pow(shading::srgb_decode(picture.at(98 + i % 5, 72 + i / 5)[0] / 255.0) / light - 1, 2) / 25;
+    return std::sqrt(squares);
+}
+
+// Area lights and environments are sampled in two ways: reflected rays rarely hit a small light, and samples of the
+// light rarely lie in a narrow lobe. The combination must have the right brightness and little noise in both cases.
+TEST(Rough, ReflectionsOfAreaLightsAreRightAndSmoothForEveryRoughness) {
     for (const float roughness : {0.0f, 0.15f, 0.5f, 1.0f}) {
         // A panel of 60 mm × 60 mm is 100 mm above a metal plane.
         ArenaBuilder builder = in_a_room_of_light(0);
@@ -409,12 +416,22 @@ TEST(Rough, ReflectionsOfLightsAreRightAndSmoothForEveryRoughness) {
             if (l.z > 0 && std::abs(l.x / l.z) < 0.3 && std::abs(l.y / l.z) < 0.3)
                 sum += radiance * shading::ggx_masking(l.z, alpha) / (n * n);
         }
-        double squares = 0;
-        for (std::uint32_t i = 0; i < 25; ++i)
-            squares +=
-                std::pow(shading::srgb_decode(picture.at(98 + i % 5, 72 + i / 5)[0] / 255.0) / sum - 1, 2) / 25;
         EXPECT_NEAR(light_in_the_middle(picture) / sum, 1, 0.02) << roughness;
-        EXPECT_LT(std::sqrt(squares), 0.05) << "noise, " << roughness;
+        EXPECT_LT(noise_in_the_middle(picture, sum), 0.05) << "noise, " << roughness;
+    }
+}
+
+TEST(Rough, ReflectionsOfEnvironmentsWithFewBrightTexelsAreRightAndSmooth) {
+    for (const float roughness : {0.5f, 0.75f, 1.0f}) {
+        ArenaBuilder builder = in_a_room_of_light(0);
+        add_environment(builder, [](std::uint32_t column) { return glm::vec3(column == 2 ? 4.0f : 0.0f); });
+        builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(white_metal(roughness)));
+        const Picture picture = Tracer(std::move(builder), {{"samples", "64"}}).render(from_above());
+        // The lobe is rotationally symmetric, and one of eight columns is bright.
+        const double expected = 4 / 8.0 * albedo_at_normal_incidence(roughness);
+        EXPECT_NEAR(light_in_the_middle(picture) / expected, 1, 0.02) << roughness;
+        EXPECT_LT(noise_in_the_middle(picture, expected), 0.08) // half of the light is below the plane
+            << "noise, " << roughness;
     }
 }
 

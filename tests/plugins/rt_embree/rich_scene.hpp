@@ -3,10 +3,8 @@
 // Builds textures, environments, materials with an alpha cutoff, and a scene that combines all features.
 #pragma once
 
+#include "scene/image.hpp"
 #include "tracer.hpp"
-
-#include <cmath>
-#include <numbers>
 
 namespace arhost::test {
 
@@ -26,32 +24,21 @@ inline scene::Texture texture_of(std::uint32_t width, std::uint32_t height, cons
 
 // Adds an environment map of 8×4 texels. `colour(column)` returns the colour of a column's texels.
 template <class Colour> void add_environment(ArenaBuilder &builder, Colour colour) {
-    constexpr std::uint32_t width = 8, height = 4;
     scene::Texture texture;
     texture.format = ARHOST_TEXEL_RGBA32F;
-    texture.width = width;
-    texture.height = height;
+    texture.width = 8;
+    texture.height = 4;
+    texture.wrap_v = ARHOST_WRAP_CLAMP;
     std::vector<float> texels;
-    scene::Environment environment;
-    double total = 0;
-    std::vector<double> row_sums;
-    for (std::uint32_t y = 0; y < height; ++y) {
-        double sum = 0;
-        std::vector<double> sums;
-        for (std::uint32_t x = 0; x < width; ++x) {
-            const glm::vec3 c = colour(x);
-            texels.insert(texels.end(), {c.x, c.y, c.z, 1});
-            sums.push_back(sum += 0.2126 * c.x + 0.7152 * c.y + 0.0722 * c.z);
-        }
-        for (const double s : sums)
-            environment.columns.push_back(static_cast<float>(s / sum));
-        row_sums.push_back(total += sum * std::sin(std::numbers::pi * (y + 0.5) / height));
+    for (std::uint32_t i = 0; i < texture.width * texture.height; ++i) {
+        const glm::vec3 c = colour(i % texture.width);
+        texels.insert(texels.end(), {c.x, c.y, c.z, 1});
     }
-    for (const double s : row_sums)
-        environment.rows.push_back(static_cast<float>(s / total));
     texture.texels.size = texels.size() * sizeof(float);
     texture.texels.bytes = std::make_unique<std::byte[]>(texture.texels.size);
     std::memcpy(texture.texels.bytes.get(), texels.data(), texture.texels.size);
+    scene::Environment environment;
+    scene::add_cumulative_sums(environment, texture, scene::Reporter({}, "sky"));
     environment.texture = builder.add_texture("sky", std::move(texture));
     environment.environment_from_world = glm::mat3(1, 0, 0, 0, 0, -1, 0, 1, 0); // the map's up direction is world +z
     builder.environment = std::move(environment);

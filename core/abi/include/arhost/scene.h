@@ -239,7 +239,7 @@ typedef struct arhost_environment {
     float intensity;                 /* multiplies the texels */
     float environment_from_world[9]; /* rotation, column-major 3×3 */
     /* CDFs (floats, the last of each CDF is 1) for importance sampling with a density proportional to
-     * luminance · sin(πv). */
+     * luminance · sin(πv), where the luminance is the mean of the interpolated texture over a texel. */
     arhost_buffer rows;    /* marginal CDF: one value per row of the texture */
     arhost_buffer columns; /* conditional CDFs: for each row, one value per column */
 } arhost_environment;
