@@ -43,7 +43,7 @@ typedef struct ray {
     double end;            /* maximum distance of a hit, mm */
 } ray;
 
-/* What a ray shows: a virtual object, or a shadow catcher. All 0 where only the video is visible. */
+/* The result of a ray: a virtual object, or a shadow catcher. All 0 where only the video is visible. */
 typedef struct sample {
     int is_virtual;
     vec colour;                 /* of the virtual object, linear light */

@@ -46,7 +46,7 @@ struct Ray {
     double end = infinity; // maximum distance of a hit, mm
 };
 
-// What a ray shows: a virtual object, or a shadow catcher. All 0 where only the video is visible.
+// The result of a ray: a virtual object, or a shadow catcher. All 0 where only the video is visible.
 struct Sample {
     bool is_virtual = false;
     Vec colour;                         // of the virtual object, linear light

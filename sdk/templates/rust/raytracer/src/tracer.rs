@@ -13,7 +13,7 @@ pub struct Ray {
     pub end: f64,        // maximum distance of a hit, mm
 }
 
-/// What a ray shows.
+/// The result of a ray.
 pub enum Sample {
     /// A virtual object; its colour, linear light.
     Virtual(Vec3),
