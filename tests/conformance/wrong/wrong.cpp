@@ -255,11 +255,15 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
     }
     auto *created = new Wrong;
     const arhost_status status = embree().create(host, options, count, &created->real);
-    std::vector<arhost_option> of_other(options, options + count);
-    if (has("averages_codes") || has("clamps_samples"))
-        for (arhost_option &option : of_other)
-            if (option.key == std::string_view("samples") && option.integer > 1)
-                option.integer = 1, created->fineness = 4;
+    std::vector<arhost_option> of_other;
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const auto *bytes = reinterpret_cast<const std::byte *>(options) + std::size_t{options->struct_size} * i;
+        arhost_option &option = of_other.emplace_back(*reinterpret_cast<const arhost_option *>(bytes));
+        option.struct_size = sizeof option;
+        if ((has("averages_codes") || has("clamps_samples")) && option.key == std::string_view("samples") &&
+            option.integer > 1)
+            option.integer = 1, created->fineness = 4;
+    }
     if (has("adds_shadows") || has("blends_linearly") || has("facets_in_shadow") || created->fineness > 1)
         embree().create(host, of_other.data(), count, &created->other);
     created->host = host;
