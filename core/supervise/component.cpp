@@ -39,10 +39,10 @@ RegionPointer make_host_region(const char *name, const SlotLayout &layout) {
 }
 
 Component::Component(Context &context, std::string name, std::vector<std::filesystem::path> plugins,
-                     const base::Limits &limits, sandbox::Policy policy, Callbacks callbacks)
+                     const base::Limits &limits, sandbox::Policy sandbox, Callbacks callbacks)
     : context_(context), name_(std::move(name)), plugins_(std::move(plugins)), limits_(limits),
-      sandbox_(std::move(policy)), callbacks_(std::move(callbacks)), budget_(context.log, name_),
-      policy_(limits.restart) {}
+      sandbox_(std::move(sandbox)), callbacks_(std::move(callbacks)), budget_(context.log, name_),
+      restart_policy_(limits.restart) {}
 
 void Component::start() {
     spawn();
@@ -228,7 +228,7 @@ void Component::on_result(const Result &result) {
     callbacks_.result(command, result);
     // Errors do not count as completed frames, nor do results because of which the host terminates the process.
     if (result.status > 0 && process_ && !process_->ending())
-        policy_.frame_done();
+        restart_policy_.frame_done();
     if (stop_requested_)
         stop_when_idle();
 }
@@ -299,10 +299,10 @@ void Component::record_crash(Crash crash) {
 }
 
 void Component::restart(const std::string &reason) {
-    const auto delay = policy_.delay_after_death(std::uniform_real_distribution<double>(0, 1)(jitter_));
+    const auto delay = restart_policy_.delay_after_death(std::uniform_real_distribution<double>(0, 1)(jitter_));
     if (!delay)
-        return fall_back_or_disable(reason + "; it failed " + std::to_string(policy_.failures()) + " times in a row",
-                                    false);
+        return fall_back_or_disable(
+            reason + "; it failed " + std::to_string(restart_policy_.failures()) + " times in a row", false);
     const std::string wait = delay->count() ? " in " + std::to_string(delay->count()) + " ms" : "";
     context_.log(ARHOST_SEVERITY_WARNING, name_, reason + "; restarting it" + wait);
     ++restarts_;
@@ -315,7 +315,7 @@ void Component::fall_back_or_disable(const std::string &reason, bool is_configur
                      reason + "; falling back to " + plugins_[candidate_ + 1].stem().string());
         ++candidate_;
         device_losses_.clear();
-        policy_ = RestartPolicy(limits_.restart);
+        restart_policy_ = RestartPolicy(limits_.restart);
         ++restarts_;
         restart_timer_ = context_.reactor.at(Reactor::Clock::now(), [this] { spawn(); });
         return;

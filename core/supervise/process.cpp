@@ -149,16 +149,12 @@ void Process::log(arhost_severity severity, const std::string &text) {
     if (severity == ARHOST_SEVERITY_ERROR && !ready_)
         held_error_ = text;
     else
-        print(severity, text);
+        budget_.log(severity, text);
 }
 
 void Process::print_held_error() {
     if (const auto text = std::exchange(held_error_, std::nullopt))
-        print(ARHOST_SEVERITY_ERROR, *text);
-}
-
-void Process::print(arhost_severity severity, const std::string &text) {
-    budget_.log(severity, text);
+        budget_.log(ARHOST_SEVERITY_ERROR, *text);
 }
 
 void Process::on_doorbell() {
