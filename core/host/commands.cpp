@@ -201,11 +201,18 @@ double cpu_seconds_of_host() {
     return supervise::cpu_seconds(usage);
 }
 
-bool write_file(const fs::path &file, const char *key, Console &console, const std::string &text) {
+// Opens the file of a report. Must be called before workers run, because they could create a link or a pipe with the
+// file's name.
+base::AtomicFile open_report(const std::optional<fs::path> &file) {
+    std::error_code ignored; // AtomicFile reports the error
+    if (file)
+        fs::create_directories(file->parent_path(), ignored);
+    return base::AtomicFile(file.value_or(""));
+}
+
+bool write_report(base::AtomicFile &file, const char *key, Console &console, const std::string &text) {
     try {
-        std::error_code ignored; // AtomicFile reports the error
-        fs::create_directories(file.parent_path(), ignored);
-        base::AtomicFile(file).write(text);
+        file.write(text);
         return true;
     } catch (const std::runtime_error &error) {
         console.log(ARHOST_SEVERITY_ERROR, key, error.what());
@@ -239,6 +246,7 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
         nullptr); // blocked before the console's thread starts, because that thread must not receive these signals
     const base::UniqueFd signal_fd = base::checked(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
 
+    base::AtomicFile stats = open_report(configuration.stats), timeline = open_report(configuration.timeline);
     Console console(arguments.verbose);
     show_warnings(configuration, console);
     ipc::Reactor reactor;
@@ -280,12 +288,12 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     log_contract_checks(statistics.contract_checks, console);
     bool written = true;
     if (configuration.stats && statistics.frames_in > 0)
-        written = write_file(*configuration.stats, "stats", console,
-                             report(statistics, pipeline.components(), cpu_seconds_of_host())
-                                     .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-                                 "\n");
+        written = write_report(stats, "stats", console,
+                               report(statistics, pipeline.components(), cpu_seconds_of_host())
+                                       .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                                   "\n");
     if (configuration.timeline && statistics.frames_in > 0)
-        written &= write_file(*configuration.timeline, "timeline", console, timeline_csv(statistics));
+        written &= write_report(timeline, "timeline", console, timeline_csv(statistics));
     // From here on, signals end the process immediately, because a stopped terminal may block the last log lines.
     signalfd_siginfo taken;
     while (::read(signal_fd.get(), &taken, sizeof taken) > 0) {

@@ -764,11 +764,14 @@ TEST(Sandbox, KillsAWorkerThatIgnoresSignals) {
 TEST(Sandbox, HostDoesNotOpenPlantedLinksOrPipes) {
     for (const char *attack : {"link", "pipe"}) {
         SCOPED_TRACE(attack);
-        HostileRun run(attack, "", "sandbox: none\n");
+        HostileRun run(attack, "", "timeline: times.csv\nsandbox: none\n");
         ASSERT_EQ(run.attack(), 0) << run.output();
         EXPECT_THAT(run.output(), HasSubstr("SUCCEEDED"));
         EXPECT_EQ(run.target_text(), "secret");
         EXPECT_EQ(run.stats()["frames"]["in"], frames);
+        EXPECT_THAT(run.read("times.csv"), testing::StartsWith("frame,"));
+        for (const char *report : {"stats.json", "times.csv"})
+            EXPECT_EQ(fs::symlink_status(run.path(report)).type(), fs::file_type::regular) << report;
         expect_complete_video(run);
         if (!has("landlock"))
             continue;

@@ -710,7 +710,7 @@ static void attack(const tracker *self) {
     } else if (!strcmp(name, "empty"))
         say_text("");
     else if (!strcmp(name, "link")) {
-        report(self, "a link", symlink(self->target, "stats.json.tmp") == 0);
+        report(self, "a link", symlink(self->target, "stats.json") == 0 && symlink(self->target, "times.csv") == 0);
     } else if (!strcmp(name, "failures")) {
         send_failures();
     } else if (!strcmp(name, "large_messages")) {
@@ -720,7 +720,7 @@ static void attack(const tracker *self) {
     } else if (!strcmp(name, "lines")) {
         print_lines();
     } else if (!strcmp(name, "pipe")) {
-        report(self, "a pipe", mkfifo("stats.json.tmp", 0600) == 0);
+        report(self, "a pipe", mkfifo("stats.json", 0600) == 0 && mkfifo("times.csv", 0600) == 0);
     }
 }
 
