@@ -132,8 +132,7 @@ void Component::on_message(Message &message) {
     } else if (is<messages::Attached>(message)) {
         on_attached(parse<messages::Attached>(message));
     } else if (is<messages::Failed>(message)) {
-        const auto [status, whole_text] = parse<messages::Failed>(message);
-        const std::string text = whole_text.substr(0, WorkerBudget::max_text);
+        const auto [status, text] = parse<messages::Failed>(message);
         if (state_ != State::starting)
             log(ARHOST_SEVERITY_WARNING, text);
         else if (status == ARHOST_STATUS_ERROR_CONFIGURATION || status == ARHOST_STATUS_ERROR_UNSUPPORTED)
@@ -260,7 +259,7 @@ void Component::on_died(const Death &death) {
 
     if (stop_response_) { // the plugin has finished its work, so a later crash does not matter
         if (crash)
-            context_.log(ARHOST_SEVERITY_WARNING, name_, reason + ", after it had finished");
+            budget_.log_death(reason + ", after it had finished");
         return stopped(stop_response_->status, stop_response_->text);
     }
     // Of the components that die during stop, only a sink is restarted, because it may have to complete files: once
@@ -268,7 +267,7 @@ void Component::on_died(const Death &death) {
     const bool is_sink = description_.kind == ARHOST_KIND_SINK;
     deaths_in_stop_ += !stop_sent_ ? 0 : death.by_host ? limits_.restart.quarantine_after - 1 : 1;
     if (stop_sent_ && (!is_sink || deaths_in_stop_ >= limits_.restart.quarantine_after)) {
-        context_.log(ARHOST_SEVERITY_WARNING, name_, reason);
+        budget_.log_death(reason);
         return stopped(is_sink ? ARHOST_STATUS_ERROR_INTERNAL : ARHOST_STATUS_OK, reason);
     }
     if (!configuration_error_.empty())
@@ -304,15 +303,14 @@ void Component::restart(const std::string &reason) {
         return fall_back_or_disable(
             reason + "; it failed " + std::to_string(restart_policy_.failures()) + " times in a row", false);
     const std::string wait = delay->count() ? " in " + std::to_string(delay->count()) + " ms" : "";
-    context_.log(ARHOST_SEVERITY_WARNING, name_, reason + "; restarting it" + wait);
+    budget_.log_death(reason + "; restarting it" + wait);
     ++restarts_;
     restart_timer_ = context_.reactor.at(Reactor::Clock::now() + *delay, [this] { spawn(); });
 }
 
 void Component::fall_back_or_disable(const std::string &reason, bool is_configuration_error) {
     if (candidate_ + 1 < plugins_.size()) {
-        context_.log(ARHOST_SEVERITY_WARNING, name_,
-                     reason + "; falling back to " + plugins_[candidate_ + 1].stem().string());
+        budget_.log_death(reason + "; falling back to " + plugins_[candidate_ + 1].stem().string());
         ++candidate_;
         device_losses_.clear();
         restart_policy_ = RestartPolicy(limits_.restart);

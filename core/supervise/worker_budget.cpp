@@ -1,25 +1,35 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "supervise/worker_budget.hpp"
 
+#include "ipc/messages.hpp"
+
 #include <algorithm>
 
 namespace arhost::supervise {
 
 void WorkerBudget::log(arhost_severity severity, const std::string &text, Clock::time_point now) {
+    log(severity >= ARHOST_SEVERITY_WARNING ? warnings_ : other_lines_, severity, text, now);
+}
+
+void WorkerBudget::log_death(const std::string &text, Clock::time_point now) {
+    log(deaths_, ARHOST_SEVERITY_WARNING, text, now);
+}
+
+void WorkerBudget::log(LineCount &lines, arhost_severity severity, const std::string &text, Clock::time_point now) {
     if (now >= second_ends_) {
         report_suppressed_lines();
         second_ends_ = now + std::chrono::seconds(1);
     }
-    LineCount &lines = severity >= ARHOST_SEVERITY_WARNING ? warnings_ : other_lines_;
     if (lines.logged++ < max_lines)
-        log_(severity, name_, text.size() > max_text ? text.substr(0, max_text) : text);
+        log_(severity, name_, text.substr(0, ipc::messages::max_text));
     else
         ++lines.suppressed;
 }
 
 void WorkerBudget::report_suppressed_lines() {
-    for (const auto &[lines, severity] :
-         {std::pair{&other_lines_, ARHOST_SEVERITY_DEBUG}, {&warnings_, ARHOST_SEVERITY_WARNING}}) {
+    for (const auto &[lines, severity] : {std::pair{&other_lines_, ARHOST_SEVERITY_DEBUG},
+                                          {&warnings_, ARHOST_SEVERITY_WARNING},
+                                          {&deaths_, ARHOST_SEVERITY_WARNING}}) {
         if (lines->suppressed > 0)
             log_(severity, name_,
                  "suppressed " + std::to_string(lines->suppressed) + " more log lines within one second");

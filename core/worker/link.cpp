@@ -43,8 +43,7 @@ void Link::send_json(const Json &body, std::initializer_list<int> fds) const {
 }
 
 void Link::log(arhost_severity severity, const std::string &text) const {
-    constexpr std::size_t max_text = 4000, max_cost = 100'000, cost_per_line = 500;
-    const std::string sent = text.substr(0, max_text);
+    constexpr std::size_t max_cost = 100'000, cost_per_line = 500;
     {
         const std::lock_guard lock(rates_->mutex);
         if (const auto now = Clock::now(); now >= rates_->log_second_ends) {
@@ -52,11 +51,11 @@ void Link::log(arhost_severity severity, const std::string &text) const {
             std::fill(std::begin(rates_->log_costs), std::end(rates_->log_costs), 0);
         }
         std::size_t &cost = rates_->log_costs[severity >= ARHOST_SEVERITY_WARNING];
-        cost += std::max(sent.size(), cost_per_line);
+        cost += std::clamp(text.size(), cost_per_line, messages::max_text);
         if (cost > max_cost)
             return;
     }
-    channel_.send(encode(messages::Log{severity, sent}), {}, false);
+    channel_.send(encode(messages::Log{severity, text}), {}, false);
 }
 
 void Link::progress(double fraction, const char *what) const {

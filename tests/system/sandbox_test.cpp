@@ -719,6 +719,15 @@ TEST(Sandbox, OneBudgetLimitsTheLinesOfAWorker) {
     }
 }
 
+// Each process of the plugin sends a message of an unknown type, whose name has 120 KB.
+TEST(Sandbox, DeathsDoNotLogLongTextsOfTheWorker) {
+    HostileRun run("huge_type");
+    expect_ended(run, "protocol violation: unexpected message \"xxx");
+    EXPECT_GE(run.stats()["restarts"]["tracker"], 20);
+    EXPECT_LT(run.output().size(), 500'000u);
+    EXPECT_LT(run.read("stats.json").size(), 500'000u);
+}
+
 TEST(Sandbox, RefusesAnImplausibleLens) {
     ArhostRun run("version: 1\nsource: {plugin: hostile_source, options: {attack: lens}}\n"
                   "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
