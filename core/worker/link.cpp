@@ -24,7 +24,7 @@ Message Link::receive() const {
         case ReceiveState::closed:
             throw HostLost("the host has closed the channel");
         case ReceiveState::malformed:
-            throw HostLost("the host sent a malformed message");
+            throw ProtocolViolation("the host sent a malformed message");
         }
     }
 }
@@ -74,11 +74,11 @@ void Link::progress(double fraction, const char *what) const {
 
 void Link::map_pages(Message &open) {
     if (open.fds.size() < 2)
-        throw HostLost("'open' was sent without the descriptors of the pages");
+        throw ProtocolViolation("'open' was sent without the descriptors of the pages");
     host_page_ = SharedMemory::adopt(std::move(open.fds[0])).map(Access::read_only);
     worker_page_ = SharedMemory::adopt(std::move(open.fds[1])).map(Access::read_write);
     if (host_page_.bytes().size() < sizeof(HostPage) || worker_page_.bytes().size() < sizeof(WorkerPage))
-        throw HostLost("a page is too small");
+        throw ProtocolViolation("a page is too small");
     commands_.emplace(host_page_.as<HostPage>().commands, worker_page_.as<WorkerPage>().commands);
     results_.emplace(worker_page_.as<WorkerPage>().results, host_page_.as<HostPage>().results);
 }
@@ -92,7 +92,7 @@ std::optional<Command> Link::next_command(std::chrono::milliseconds timeout) {
         case RingResult::done:
             return command;
         case RingResult::violation:
-            throw HostLost("the host's ring is inconsistent");
+            throw ProtocolViolation("the host's ring is inconsistent");
         case RingResult::wait:
             break;
         }
@@ -109,7 +109,7 @@ std::optional<Command> Link::next_command(std::chrono::milliseconds timeout) {
 void Link::send_result(const Result &result) {
     // The result ring is never full, because the host never has more commands in flight than the ring has entries.
     if (results_->push(result) != RingResult::done)
-        throw HostLost("the result ring is full or inconsistent");
+        throw ProtocolViolation("the result ring is full or inconsistent");
     ring_doorbell(doorbell_.get());
 }
 
