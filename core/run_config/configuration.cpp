@@ -186,7 +186,7 @@ std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, 
         const auto option = options ? options->find(declared.key) : std::nullopt;
         const auto node = declared.key == "path" && component.path ? component.path : option;
         if (node && declared.type == ARHOST_OPTION_INPUT_PATH)
-            expect_readable(*node);
+            expect_readable(*node, component.policy);
         else if (node && declared.type == ARHOST_OPTION_OUTPUT_PATH)
             expect_writable(*node);
     }
