@@ -11,6 +11,7 @@
 #include "host/probe.hpp"
 #include "run_config/access.hpp"
 #include "run_config/schema.hpp"
+#include "scene/capabilities.hpp"
 
 #include <nlohmann/json.hpp>
 #include <spdlog/fmt/fmt.h>
@@ -308,44 +309,58 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     return problem && !is_accepted ? run_failed : success;
 }
 
-// Checks the plugins, fallbacks included, and their options.
-void check_plugins(const run_config::Configuration &configuration, supervise::Context &context) {
+// Checks the plugins, fallbacks included, and their options. Returns the ray tracer and its fallback.
+std::vector<ipc::PluginDescription> check_plugins(const run_config::Configuration &configuration,
+                                                  supervise::Context &context) {
     const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
-        ipc::PluginDescription plugin;
+        std::vector<ipc::PluginDescription> plugins;
         for (std::size_t i = 0; i < component.plugins.size(); ++i) {
             const ProbeResult result = probe(context, component.plugins[i], component.policy);
             if (const auto *reason = std::get_if<std::string>(&result))
                 component.node.require(i == 0 ? "plugin" : "fallback").fail(*reason);
-            plugin = std::get<ipc::PluginDescription>(result);
-            run_config::options_for(plugin, kind, component, i);
+            plugins.push_back(std::get<ipc::PluginDescription>(result));
+            run_config::options_for(plugins.back(), kind, component, i);
         }
-        return plugin;
+        return plugins;
     };
     if (configuration.source)
         check_component(*configuration.source, ARHOST_KIND_SOURCE);
     if (configuration.tracker)
         check_component(*configuration.tracker, ARHOST_KIND_TRACKER);
+    std::vector<ipc::PluginDescription> raytracers;
     if (configuration.raytracer)
-        check_component(*configuration.raytracer, ARHOST_KIND_RAYTRACER);
+        raytracers = check_component(*configuration.raytracer, ARHOST_KIND_RAYTRACER);
     std::vector<run_config::OutputFile> files = configuration.report_files();
     for (const run_config::ComponentConfiguration &output : configuration.outputs) {
-        const ipc::PluginDescription plugin = check_component(output, ARHOST_KIND_SINK);
+        const ipc::PluginDescription plugin = check_component(output, ARHOST_KIND_SINK).back();
         if (const auto path = run_config::path_of(output.node))
             files.push_back({*path, (plugin.capabilities & ARHOST_CAPABILITY_NUMBERED_FILES) != 0});
     }
     run_config::expect_distinct(files);
+    return raytracers;
 }
 
-void check_scene(const run_config::Configuration &configuration, supervise::Context &context) {
+// Loads the scene. Warns of parts that one of the ray tracers lacks, according to its descriptor.
+void check_scene(const run_config::Configuration &configuration, supervise::Context &context,
+                 const std::vector<ipc::PluginDescription> &raytracers) {
     std::optional<std::string> outcome;
-    const SceneLoading loading(
-        context, configuration.raytracer->scene, configuration.sandbox, configuration.raytracer->limits,
-        configuration.files,
-        {[&](const ipc::SharedMemory &) { outcome = ""; }, [&](const std::string &reason) { outcome = reason; }});
+    std::uint32_t needed = 0;
+    const SceneLoading loading(context, configuration.raytracer->scene, configuration.sandbox,
+                               configuration.raytracer->limits, configuration.files,
+                               {[&](const ipc::SharedMemory &arena) {
+                                    needed = scene::needed_capabilities(
+                                        arena.map(ipc::Access::read_only).as<const arhost_scene>());
+                                    outcome = "";
+                                },
+                                [&](const std::string &reason) { outcome = reason; }});
     while (!outcome)
         context.reactor.run_once();
     if (!outcome->empty())
         throw yaml::Error(*outcome);
+    for (const ipc::PluginDescription &plugin : raytracers)
+        if (const std::string text = scene::missing_capabilities_text(plugin.id, needed & ~plugin.capabilities);
+            !text.empty())
+            context.log(ARHOST_SEVERITY_WARNING, "raytracer", text);
 }
 
 class TemporaryFolder {
@@ -465,11 +480,11 @@ int check(const Arguments &arguments, bool open, supervise::Starter &launcher) {
     show_warnings(configuration, console);
     ipc::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
-    check_plugins(configuration, context);
+    const std::vector<ipc::PluginDescription> raytracers = check_plugins(configuration, context);
     if (open)
         check_by_opening(configuration, context);
     else if (configuration.raytracer)
-        check_scene(configuration, context);
+        check_scene(configuration, context, raytracers);
     std::printf("%s: OK\n", base::printable(arguments.file).c_str());
     return success;
 }
