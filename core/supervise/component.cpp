@@ -326,6 +326,7 @@ void Component::fall_back_or_disable(const std::string &reason, bool is_configur
 
 void Component::stopped(arhost_status status, const std::string &text) {
     state_ = State::stopped;
+    budget_.report_repetitions();
     callbacks_.stopped(status, text);
 }
 

@@ -4,11 +4,29 @@
 #include "ipc/messages.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace arhost::supervise {
 
 void WorkerBudget::log(arhost_severity severity, const std::string &text, Clock::time_point now) {
+    constexpr std::size_t max_recent_lines = 32;
+    std::erase_if(recent_lines_, [&](const auto &line) { return now - line.second > std::chrono::seconds(10); });
+    const auto [line, is_new] = recent_lines_.insert_or_assign({severity, text}, now);
+    if (!is_new) {
+        ++repetitions_[severity >= ARHOST_SEVERITY_WARNING];
+        return;
+    }
+    if (recent_lines_.size() > max_recent_lines)
+        recent_lines_.clear();
     log(severity >= ARHOST_SEVERITY_WARNING ? warnings_ : other_lines_, severity, text, now);
+}
+
+void WorkerBudget::report_repetitions(Clock::time_point now) {
+    for (const bool are_warnings : {false, true})
+        if (const std::uint64_t count = std::exchange(repetitions_[are_warnings], 0))
+            log(are_warnings ? warnings_ : other_lines_,
+                are_warnings ? ARHOST_SEVERITY_WARNING : ARHOST_SEVERITY_DEBUG,
+                std::to_string(count) + " lines that repeat others were not printed", now);
 }
 
 void WorkerBudget::log_death(const std::string &text, Clock::time_point now) {

@@ -631,6 +631,9 @@ TEST(Run, FailsIfTheTrackerFailsInEveryFrame) {
                   "outputs: [{plugin: sink_counter, path: counted.txt}]\n");
     EXPECT_EQ(run.run({"run.yaml", "--allow-no-target"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("error: arhost: 5 frames have no overlay because the tracker failed"));
+    EXPECT_THAT(run.output(), HasSubstr("warning: tracker: frame 0: "));
+    EXPECT_THAT(run.output(), Not(HasSubstr("warning: tracker: frame 1: ")));
+    EXPECT_THAT(run.output(), testing::ContainsRegex("warning: tracker: .* in 5 frames\n"));
     EXPECT_EQ(counted(run).size(), 5u);
 }
 

@@ -26,8 +26,8 @@ const WorkerBudget::Clock::time_point start = WorkerBudget::Clock::time_point(1h
 TEST(WorkerBudget, LimitsTheLinesOfEachSecondAndReportsTheirNumber) {
     Lines lines;
     for (int i = 0; i < 1000; ++i) {
-        lines.budget.log(ARHOST_SEVERITY_WARNING, "w", start);
-        lines.budget.log(ARHOST_SEVERITY_DEBUG, "d", start + 500ms);
+        lines.budget.log(ARHOST_SEVERITY_WARNING, "w" + std::to_string(i), start);
+        lines.budget.log(ARHOST_SEVERITY_DEBUG, "d" + std::to_string(i), start + 500ms);
         lines.budget.log_death("killed", start + 500ms);
     }
     EXPECT_EQ(lines.all.size(), 3u * WorkerBudget::max_lines) << "no kind displaces another";
@@ -37,6 +37,18 @@ TEST(WorkerBudget, LimitsTheLinesOfEachSecondAndReportsTheirNumber) {
                                                 "warning tracker: suppressed 900 more log lines within one second",
                                                 "warning tracker: suppressed 900 more log lines within one second",
                                                 "tracker: later"));
+}
+
+TEST(WorkerBudget, OnlyCountsLinesThatRepeatOthers) {
+    Lines lines;
+    for (int i = 0; i < 60; ++i)
+        for (const char *text : {"no light", "no marker"})
+            lines.budget.log(ARHOST_SEVERITY_ERROR, text, start + i * 1s);
+    lines.budget.log(ARHOST_SEVERITY_ERROR, "no light", start + 59s + 11s);
+    lines.budget.report_repetitions(start + 80s);
+    EXPECT_THAT(lines.all, testing::ElementsAre("warning tracker: no light", "warning tracker: no marker",
+                                                "warning tracker: no light",
+                                                "warning tracker: 118 lines that repeat others were not printed"));
 }
 
 TEST(WorkerBudget, CutsLongLines) {
