@@ -164,7 +164,7 @@ std::filesystem::path find_scene(const yaml::Node &scene, const std::filesystem:
         if (std::filesystem::is_regular_file(own))
             return own;
     }
-    scene.fail("there is no scene file '" + file.string() + "'");
+    scene.fail("there is no scene file '" + file.string() + "'" + hint_at_similar_name(file));
 }
 
 } // namespace

@@ -15,14 +15,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::set<std::string> names_in(const fs::path &folder, const yaml::Node &node) {
-    std::error_code error;
+std::set<std::string> names_in(const fs::path &folder, std::error_code &error) {
     std::set<std::string> names;
     for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
         names.insert(entry->path().filename().string());
-    if (error)
-        node.fail("the folder '" + folder.string() + "' cannot be listed: " + error.message());
     return names;
+}
+
+std::string hint(const fs::path &file, const std::set<std::string> &names) {
+    const std::vector<std::string_view> candidates(names.begin(), names.end());
+    const std::string near = yaml::nearest(file.filename().string(), candidates);
+    return near.empty() ? "" : "; did you mean '" + near + "'?";
 }
 
 void expect_match(const fs::path &pattern_path, const std::set<std::string> &names, const yaml::Node &node,
@@ -64,12 +67,12 @@ void expect_readable(const yaml::Node &node, const sandbox::Policy &policy) {
     const fs::path folder = file.parent_path();
     if (!fs::is_directory(folder, error))
         node.fail("there is no file '" + file.string() + "', as there is no folder '" + folder.string() + "'");
-    const std::set<std::string> names = names_in(folder, node);
+    const std::set<std::string> names = names_in(folder, error);
+    if (error)
+        node.fail("the folder '" + folder.string() + "' cannot be listed: " + error.message());
     if (file.filename().string().find('%') != std::string::npos)
         return expect_match(file, names, node, policy);
-    const std::vector<std::string_view> candidates(names.begin(), names.end());
-    const std::string near = yaml::nearest(file.filename().string(), candidates);
-    node.fail("there is no file '" + file.string() + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+    node.fail("there is no file '" + file.string() + "'" + hint(file, names));
 }
 
 void expect_writable(const yaml::Node &node) {
@@ -88,6 +91,11 @@ void expect_writable(const yaml::Node &node) {
     if (::access(folder.c_str(), W_OK | X_OK) != 0)
         node.fail("no file can be created in the folder '" + folder.string() + "': " + std::strerror(errno) +
                   "; choose another path");
+}
+
+std::string hint_at_similar_name(const fs::path &file) {
+    std::error_code ignored;
+    return hint(file, names_in(file.parent_path(), ignored));
 }
 
 } // namespace arhost::run_config

@@ -17,4 +17,7 @@ void expect_readable(const yaml::Node &node, const sandbox::Policy &policy);
 // Creates and changes nothing. Paths in /dev and /proc are not checked.
 void expect_writable(const yaml::Node &node);
 
+// Returns "; did you mean 'NAME'?" if the folder of `file` contains a similar name, otherwise "".
+std::string hint_at_similar_name(const std::filesystem::path &file);
+
 } // namespace arhost::run_config
