@@ -11,6 +11,7 @@
 #include "host/probe.hpp"
 #include "run_config/access.hpp"
 #include "run_config/schema.hpp"
+#include "scene/capabilities.hpp"
 
 #include <nlohmann/json.hpp>
 #include <spdlog/fmt/fmt.h>
@@ -201,11 +202,18 @@ double cpu_seconds_of_host() {
     return supervise::cpu_seconds(usage);
 }
 
-bool write_file(const fs::path &file, const char *key, Console &console, const std::string &text) {
+// Opens the file of a report. Must be called before workers run, because they could create a link or a pipe with the
+// file's name.
+base::AtomicFile open_report(const std::optional<fs::path> &file) {
+    std::error_code ignored; // AtomicFile reports the error
+    if (file)
+        fs::create_directories(file->parent_path(), ignored);
+    return base::AtomicFile(file.value_or(""));
+}
+
+bool write_report(base::AtomicFile &file, const char *key, Console &console, const std::string &text) {
     try {
-        std::error_code ignored; // AtomicFile reports the error
-        fs::create_directories(file.parent_path(), ignored);
-        base::AtomicFile(file).write(text);
+        file.write(text);
         return true;
     } catch (const std::runtime_error &error) {
         console.log(ARHOST_SEVERITY_ERROR, key, error.what());
@@ -239,6 +247,7 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
         nullptr); // blocked before the console's thread starts, because that thread must not receive these signals
     const base::UniqueFd signal_fd = base::checked(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
 
+    base::AtomicFile stats = open_report(configuration.stats), timeline = open_report(configuration.timeline);
     Console console(arguments.verbose);
     show_warnings(configuration, console);
     ipc::Reactor reactor;
@@ -280,12 +289,12 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     log_contract_checks(statistics.contract_checks, console);
     bool written = true;
     if (configuration.stats && statistics.frames_in > 0)
-        written = write_file(*configuration.stats, "stats", console,
-                             report(statistics, pipeline.components(), cpu_seconds_of_host())
-                                     .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
-                                 "\n");
+        written = write_report(stats, "stats", console,
+                               report(statistics, pipeline.components(), cpu_seconds_of_host())
+                                       .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+                                   "\n");
     if (configuration.timeline && statistics.frames_in > 0)
-        written &= write_file(*configuration.timeline, "timeline", console, timeline_csv(statistics));
+        written &= write_report(timeline, "timeline", console, timeline_csv(statistics));
     // From here on, signals end the process immediately, because a stopped terminal may block the last log lines.
     signalfd_siginfo taken;
     while (::read(signal_fd.get(), &taken, sizeof taken) > 0) {
@@ -300,44 +309,58 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     return problem && !is_accepted ? run_failed : success;
 }
 
-// Checks the plugins, fallbacks included, and their options.
-void check_plugins(const run_config::Configuration &configuration, supervise::Context &context) {
+// Checks the plugins, fallbacks included, and their options. Returns the ray tracer and its fallback.
+std::vector<ipc::PluginDescription> check_plugins(const run_config::Configuration &configuration,
+                                                  supervise::Context &context) {
     const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
-        ipc::PluginDescription plugin;
+        std::vector<ipc::PluginDescription> plugins;
         for (std::size_t i = 0; i < component.plugins.size(); ++i) {
             const ProbeResult result = probe(context, component.plugins[i], component.policy);
             if (const auto *reason = std::get_if<std::string>(&result))
                 component.node.require(i == 0 ? "plugin" : "fallback").fail(*reason);
-            plugin = std::get<ipc::PluginDescription>(result);
-            run_config::options_for(plugin, kind, component, i);
+            plugins.push_back(std::get<ipc::PluginDescription>(result));
+            run_config::options_for(plugins.back(), kind, component, i);
         }
-        return plugin;
+        return plugins;
     };
     if (configuration.source)
         check_component(*configuration.source, ARHOST_KIND_SOURCE);
     if (configuration.tracker)
         check_component(*configuration.tracker, ARHOST_KIND_TRACKER);
+    std::vector<ipc::PluginDescription> raytracers;
     if (configuration.raytracer)
-        check_component(*configuration.raytracer, ARHOST_KIND_RAYTRACER);
+        raytracers = check_component(*configuration.raytracer, ARHOST_KIND_RAYTRACER);
     std::vector<run_config::OutputFile> files = configuration.report_files();
     for (const run_config::ComponentConfiguration &output : configuration.outputs) {
-        const ipc::PluginDescription plugin = check_component(output, ARHOST_KIND_SINK);
+        const ipc::PluginDescription plugin = check_component(output, ARHOST_KIND_SINK).back();
         if (const auto path = run_config::path_of(output.node))
             files.push_back({*path, (plugin.capabilities & ARHOST_CAPABILITY_NUMBERED_FILES) != 0});
     }
     run_config::expect_distinct(files);
+    return raytracers;
 }
 
-void check_scene(const run_config::Configuration &configuration, supervise::Context &context) {
+// Loads the scene. Warns of parts that one of the ray tracers lacks, according to its descriptor.
+void check_scene(const run_config::Configuration &configuration, supervise::Context &context,
+                 const std::vector<ipc::PluginDescription> &raytracers) {
     std::optional<std::string> outcome;
-    const SceneLoading loading(
-        context, configuration.raytracer->scene, configuration.sandbox, configuration.raytracer->limits,
-        configuration.files,
-        {[&](const ipc::SharedMemory &) { outcome = ""; }, [&](const std::string &reason) { outcome = reason; }});
+    std::uint32_t needed = 0;
+    const SceneLoading loading(context, configuration.raytracer->scene, configuration.sandbox,
+                               configuration.raytracer->limits, configuration.files,
+                               {[&](const ipc::SharedMemory &arena) {
+                                    needed = scene::needed_capabilities(
+                                        arena.map(ipc::Access::read_only).as<const arhost_scene>());
+                                    outcome = "";
+                                },
+                                [&](const std::string &reason) { outcome = reason; }});
     while (!outcome)
         context.reactor.run_once();
     if (!outcome->empty())
         throw yaml::Error(*outcome);
+    for (const ipc::PluginDescription &plugin : raytracers)
+        if (const std::string text = scene::missing_capabilities_text(plugin.id, needed & ~plugin.capabilities);
+            !text.empty())
+            context.log(ARHOST_SEVERITY_WARNING, "raytracer", text);
 }
 
 class TemporaryFolder {
@@ -457,11 +480,11 @@ int check(const Arguments &arguments, bool open, supervise::Starter &launcher) {
     show_warnings(configuration, console);
     ipc::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
-    check_plugins(configuration, context);
+    const std::vector<ipc::PluginDescription> raytracers = check_plugins(configuration, context);
     if (open)
         check_by_opening(configuration, context);
     else if (configuration.raytracer)
-        check_scene(configuration, context);
+        check_scene(configuration, context, raytracers);
     std::printf("%s: OK\n", base::printable(arguments.file).c_str());
     return success;
 }

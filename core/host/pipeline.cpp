@@ -37,6 +37,7 @@ bool Pipeline::run() {
         context_.reactor.run_once();
         pump();
     }
+    report_frame_errors();
     if (!live_)
         check_all_overlays();
     return failure_.empty();
@@ -75,6 +76,13 @@ std::vector<std::string> Pipeline::findings() const {
             path && std::filesystem::is_regular_file(file, ignored) ? " (a run replaces the existing file)" : ""));
     }
     return lines;
+}
+
+void Pipeline::report_frame_errors() const {
+    for (const auto &[error, frames] : frame_errors_)
+        if (frames > 1)
+            context_.log(ARHOST_SEVERITY_WARNING, error.first,
+                         fmt::format("{} in {} frames", status_text(error.second), frames));
 }
 
 // In mode lockstep, the output must be that of a run without failures.

@@ -101,6 +101,7 @@ private:
     bool may_skip(const supervise::Component *stage) const;
     bool is_behind() const;
     void skip(Frame &frame, const char *stage);
+    void report_frame_errors() const;
     void check_all_overlays();
     void enqueue(Frame &frame, Frame::Stage stage);
     Frame *next_waiting(Frame::Stage stage);
@@ -147,6 +148,8 @@ private:
     std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // with the number of its frame
 
     Statistics statistics_;
+    std::map<std::pair<std::string, arhost_status>, std::uint64_t>
+        frame_errors_;                          // number of frames by stage and error
     std::optional<SourceChecks> source_checks_; // for the current plugin; survives restarts
     std::optional<OverlayChecks> overlay_checks_;
     std::string failure_;

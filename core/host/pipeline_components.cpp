@@ -165,10 +165,10 @@ void Pipeline::make_raytracer() {
             run_config::options_for(plugin, ARHOST_KIND_RAYTRACER, raytracer, candidate);
         if (intrinsics_.distortion != ARHOST_DISTORTION_NONE &&
             !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION))
-            context_.log(ARHOST_SEVERITY_WARNING, "raytracer",
-                         plugin.id +
-                             " does not support lens distortion: its worker warps the rendered images, which costs "
-                             "sharpness and time");
+            raytracer_->log(
+                ARHOST_SEVERITY_WARNING,
+                plugin.id + " does not support lens distortion: its worker warps the rendered images, which costs "
+                            "sharpness and time");
         return Component::Create{
             {std::move(options), messages::RaytracerSetup{format_->width, format_->height, intrinsics_}},
             arena_.fd()};

@@ -158,8 +158,9 @@ Frame *Pipeline::accept_result(const Command &command, const Result &result, Com
         return nullptr;
     }
     if (result.status < 0) {
-        stage.log(ARHOST_SEVERITY_WARNING,
-                  "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
+        if (frame_errors_[{stage.name(), result.status}]++ == 0) // report_frame_errors reports the number
+            stage.log(ARHOST_SEVERITY_WARNING,
+                      "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
         skip(frame, stage.name().c_str());
         return nullptr;
     }

@@ -107,20 +107,32 @@ void from_json(const Json &json, Create &create) {
 
 } // namespace messages
 
+template <class T> void cut_text(T &message) {
+    if (message.text.size() > messages::max_text)
+        message.text.resize(messages::max_text);
+}
+
 template <class T> Json encode(const T &message) {
     Json json = Json::object();
-    if constexpr (!std::is_empty_v<T>)
+    if constexpr (requires { message.text; }) {
+        T cut = message;
+        cut_text(cut);
+        json = cut;
+    } else if constexpr (!std::is_empty_v<T>) {
         json = message;
+    }
     json["type"] = T::type;
     return json;
 }
 
 template <class T> T parse(const Message &message) {
     try {
-        if constexpr (std::is_empty_v<T>)
-            return {};
-        else
-            return message.body.get<T>();
+        T parsed;
+        if constexpr (!std::is_empty_v<T>)
+            parsed = message.body.get<T>();
+        if constexpr (requires { parsed.text; })
+            cut_text(parsed);
+        return parsed;
     } catch (const Json::exception &error) {
         throw ProtocolViolation(std::string("malformed message '") + T::type + "': " + error.what());
     }

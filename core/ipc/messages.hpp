@@ -23,6 +23,9 @@ class ProtocolViolation : public std::runtime_error {
 
 namespace messages {
 
+// Maximum size in bytes of the field `text` of a message. Sender and receiver cut longer texts.
+constexpr std::size_t max_text = 4000;
+
 // ---- host → worker ---------------------------------------------------------------------------------
 
 // The first message to a worker that runs a plugin. The descriptors of the host page and the worker page

@@ -4,9 +4,19 @@
 #include <algorithm>
 #include <array>
 #include <sys/epoll.h>
+#include <time.h>
 #include <utility>
 
 namespace arhost::ipc {
+namespace {
+
+std::chrono::nanoseconds cpu_time_of_thread() {
+    timespec time{};
+    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return std::chrono::seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+}
+
+} // namespace
 
 void Reactor::Registration::cancel() {
     if (reactor_)
@@ -14,7 +24,9 @@ void Reactor::Registration::cancel() {
     reactor_ = nullptr;
 }
 
-Reactor::Reactor() : epoll_(base::checked(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")) {}
+Reactor::Reactor()
+    : epoll_(base::checked(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")),
+      cpu_time_at_last_wait_end_(cpu_time_of_thread()) {}
 
 Reactor::Registration Reactor::watch(int fd, Callback callback) {
     const std::uint64_t id = next_id_++;
@@ -80,14 +92,16 @@ void Reactor::dispatch_events(std::optional<std::chrono::milliseconds> timeout) 
     }
 }
 
-// If this process was suspended during the last wait, extends all deadlines by the duration of the suspension,
-// because the workers may have been suspended, too.
+// If this process was suspended since the last call, extends all deadlines by the duration of the suspension, because
+// the workers may have been suspended, too. Time in which this thread used a processor is not suspension.
 void Reactor::postpone_by_suspension(std::optional<std::chrono::milliseconds> timeout) {
     constexpr std::chrono::milliseconds noticeable{50}; // above the scheduling delays of a busy machine
     const Clock::time_point now = Clock::now(), before = std::exchange(last_wait_end_, now);
+    const std::chrono::nanoseconds cpu_time = cpu_time_of_thread(),
+                                   cpu_time_before = std::exchange(cpu_time_at_last_wait_end_, cpu_time);
     if (!timeout) // no deadline was pending
         return;
-    const auto suspension = now - before - *timeout;
+    const auto suspension = now - before - *timeout - (cpu_time - cpu_time_before);
     if (suspension < noticeable)
         return;
     std::multimap<Clock::time_point, Deadline> postponed;

@@ -49,7 +49,7 @@ public:
     [[nodiscard]] Registration at(Clock::time_point when, Callback callback);
 
     // Waits for events or a deadline and calls the callbacks. Handles events before expired deadlines. Deadlines do
-    // not include time in which this process was suspended (Ctrl-Z, a frozen container).
+    // not include time in which this thread could not run (Ctrl-Z, a frozen container), but include its own work.
     void run_once();
 
 private:
@@ -70,6 +70,7 @@ private:
     std::map<std::uint64_t, Watch> watches_;
     std::multimap<Clock::time_point, Deadline> deadlines_;
     Clock::time_point last_wait_end_ = Clock::now();
+    std::chrono::nanoseconds cpu_time_at_last_wait_end_;
 };
 
 } // namespace arhost::ipc

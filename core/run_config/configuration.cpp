@@ -164,7 +164,7 @@ std::filesystem::path find_scene(const yaml::Node &scene, const std::filesystem:
         if (std::filesystem::is_regular_file(own))
             return own;
     }
-    scene.fail("there is no scene file '" + file.string() + "'");
+    scene.fail("there is no scene file '" + file.string() + "'" + hint_at_similar_name(file));
 }
 
 } // namespace
@@ -186,7 +186,7 @@ std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, 
         const auto option = options ? options->find(declared.key) : std::nullopt;
         const auto node = declared.key == "path" && component.path ? component.path : option;
         if (node && declared.type == ARHOST_OPTION_INPUT_PATH)
-            expect_readable(*node);
+            expect_readable(*node, component.policy);
         else if (node && declared.type == ARHOST_OPTION_OUTPUT_PATH)
             expect_writable(*node);
     }

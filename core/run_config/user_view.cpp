@@ -2,10 +2,9 @@
 #include "run_config/user_view.hpp"
 
 #include "base/file_identity.hpp"
-#include "sandbox/sandbox.hpp"
-
 #include <arhost-cpp/numbered_name.hpp>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <set>
@@ -16,25 +15,37 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::set<std::string> names_in(const fs::path &folder, const yaml::Node &node) {
-    std::error_code error;
+std::set<std::string> names_in(const fs::path &folder, std::error_code &error) {
     std::set<std::string> names;
     for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
         names.insert(entry->path().filename().string());
-    if (error)
-        node.fail("the folder '" + folder.string() + "' cannot be listed: " + error.message());
     return names;
 }
 
-void expect_match(const fs::path &pattern_path, const std::set<std::string> &names, const yaml::Node &node) {
+std::string hint(const fs::path &file, const std::set<std::string> &names) {
+    const std::vector<std::string_view> candidates(names.begin(), names.end());
+    const std::string near = yaml::nearest(file.filename().string(), candidates);
+    return near.empty() ? "" : "; did you mean '" + near + "'?";
+}
+
+void expect_match(const fs::path &pattern_path, const std::set<std::string> &names, const yaml::Node &node,
+                  const sandbox::Policy &policy) {
     std::optional<NumberedName> pattern;
     try {
         pattern.emplace(pattern_path.filename().string());
     } catch (const std::invalid_argument &error) {
         node.fail("there is no file '" + pattern_path.string() + "', and it is not a valid pattern: " + error.what());
     }
+    const bool is_hidden =
+        policy.mode != sandbox::Mode::none && std::ranges::none_of(policy.readable, [&](const fs::path &readable) {
+            return sandbox::contains(readable, pattern_path.parent_path());
+        });
     for (const std::string &name : names)
-        if (pattern->number(name))
+        if (pattern->number(name) && is_hidden)
+            node.fail("the sandbox hides the folder '" + pattern_path.parent_path().string() +
+                      "' from the plugin, because it contains your whole home; move the files to a folder of their "
+                      "own");
+        else if (pattern->number(name))
             return;
     node.fail("no file matches '" + pattern_path.string() + "'; its folder has " + std::to_string(names.size()) +
               " entries" + (names.empty() ? "" : ", such as '" + *names.begin() + "'"));
@@ -42,7 +53,7 @@ void expect_match(const fs::path &pattern_path, const std::set<std::string> &nam
 
 } // namespace
 
-void expect_readable(const yaml::Node &node) {
+void expect_readable(const yaml::Node &node, const sandbox::Policy &policy) {
     const fs::path file = node.input_path();
     std::error_code error;
     const fs::file_status status = fs::status(file, error);
@@ -56,12 +67,12 @@ void expect_readable(const yaml::Node &node) {
     const fs::path folder = file.parent_path();
     if (!fs::is_directory(folder, error))
         node.fail("there is no file '" + file.string() + "', as there is no folder '" + folder.string() + "'");
-    const std::set<std::string> names = names_in(folder, node);
+    const std::set<std::string> names = names_in(folder, error);
+    if (error)
+        node.fail("the folder '" + folder.string() + "' cannot be listed: " + error.message());
     if (file.filename().string().find('%') != std::string::npos)
-        return expect_match(file, names, node);
-    const std::vector<std::string_view> candidates(names.begin(), names.end());
-    const std::string near = yaml::nearest(file.filename().string(), candidates);
-    node.fail("there is no file '" + file.string() + "'" + (near.empty() ? "" : "; did you mean '" + near + "'?"));
+        return expect_match(file, names, node, policy);
+    node.fail("there is no file '" + file.string() + "'" + hint(file, names));
 }
 
 void expect_writable(const yaml::Node &node) {
@@ -80,6 +91,11 @@ void expect_writable(const yaml::Node &node) {
     if (::access(folder.c_str(), W_OK | X_OK) != 0)
         node.fail("no file can be created in the folder '" + folder.string() + "': " + std::strerror(errno) +
                   "; choose another path");
+}
+
+std::string hint_at_similar_name(const fs::path &file) {
+    std::error_code ignored;
+    return hint(file, names_in(file.parent_path(), ignored));
 }
 
 } // namespace arhost::run_config

@@ -4,16 +4,20 @@
 // shows, for example "permission denied" for a file that does not exist.
 #pragma once
 
+#include "sandbox/sandbox.hpp"
 #include "yaml/yaml.hpp"
 
 namespace arhost::run_config {
 
 // Throws yaml::Error if the input file at `node` does not exist or cannot be read. For a numbered file name whose
-// literal name does not exist, throws if no file matches it.
-void expect_readable(const yaml::Node &node);
+// literal name does not exist, throws if no file matches it, or if `policy` hides its folder (allow_read_files).
+void expect_readable(const yaml::Node &node, const sandbox::Policy &policy);
 
 // Throws yaml::Error if the output file at `node` is write-protected, or if no file can be created in its folder.
 // Creates and changes nothing. Paths in /dev and /proc are not checked.
 void expect_writable(const yaml::Node &node);
+
+// Returns "; did you mean 'NAME'?" if the folder of `file` contains a similar name, otherwise "".
+std::string hint_at_similar_name(const std::filesystem::path &file);
 
 } // namespace arhost::run_config

@@ -39,10 +39,10 @@ RegionPointer make_host_region(const char *name, const SlotLayout &layout) {
 }
 
 Component::Component(Context &context, std::string name, std::vector<std::filesystem::path> plugins,
-                     const base::Limits &limits, sandbox::Policy policy, Callbacks callbacks)
+                     const base::Limits &limits, sandbox::Policy sandbox, Callbacks callbacks)
     : context_(context), name_(std::move(name)), plugins_(std::move(plugins)), limits_(limits),
-      sandbox_(std::move(policy)), callbacks_(std::move(callbacks)), budget_(context.log, name_),
-      policy_(limits.restart) {}
+      sandbox_(std::move(sandbox)), callbacks_(std::move(callbacks)), budget_(context.log, name_),
+      restart_policy_(limits.restart) {}
 
 void Component::start() {
     spawn();
@@ -132,8 +132,7 @@ void Component::on_message(Message &message) {
     } else if (is<messages::Attached>(message)) {
         on_attached(parse<messages::Attached>(message));
     } else if (is<messages::Failed>(message)) {
-        const auto [status, whole_text] = parse<messages::Failed>(message);
-        const std::string text = whole_text.substr(0, WorkerBudget::max_text);
+        const auto [status, text] = parse<messages::Failed>(message);
         if (state_ != State::starting)
             log(ARHOST_SEVERITY_WARNING, text);
         else if (status == ARHOST_STATUS_ERROR_CONFIGURATION || status == ARHOST_STATUS_ERROR_UNSUPPORTED)
@@ -228,7 +227,7 @@ void Component::on_result(const Result &result) {
     callbacks_.result(command, result);
     // Errors do not count as completed frames, nor do results because of which the host terminates the process.
     if (result.status > 0 && process_ && !process_->ending())
-        policy_.frame_done();
+        restart_policy_.frame_done();
     if (stop_requested_)
         stop_when_idle();
 }
@@ -260,7 +259,7 @@ void Component::on_died(const Death &death) {
 
     if (stop_response_) { // the plugin has finished its work, so a later crash does not matter
         if (crash)
-            context_.log(ARHOST_SEVERITY_WARNING, name_, reason + ", after it had finished");
+            budget_.log_death(reason + ", after it had finished");
         return stopped(stop_response_->status, stop_response_->text);
     }
     // Of the components that die during stop, only a sink is restarted, because it may have to complete files: once
@@ -268,7 +267,7 @@ void Component::on_died(const Death &death) {
     const bool is_sink = description_.kind == ARHOST_KIND_SINK;
     deaths_in_stop_ += !stop_sent_ ? 0 : death.by_host ? limits_.restart.quarantine_after - 1 : 1;
     if (stop_sent_ && (!is_sink || deaths_in_stop_ >= limits_.restart.quarantine_after)) {
-        context_.log(ARHOST_SEVERITY_WARNING, name_, reason);
+        budget_.log_death(reason);
         return stopped(is_sink ? ARHOST_STATUS_ERROR_INTERNAL : ARHOST_STATUS_OK, reason);
     }
     if (!configuration_error_.empty())
@@ -299,23 +298,22 @@ void Component::record_crash(Crash crash) {
 }
 
 void Component::restart(const std::string &reason) {
-    const auto delay = policy_.delay_after_death(std::uniform_real_distribution<double>(0, 1)(jitter_));
+    const auto delay = restart_policy_.delay_after_death(std::uniform_real_distribution<double>(0, 1)(jitter_));
     if (!delay)
-        return fall_back_or_disable(reason + "; it failed " + std::to_string(policy_.failures()) + " times in a row",
-                                    false);
+        return fall_back_or_disable(
+            reason + "; it failed " + std::to_string(restart_policy_.failures()) + " times in a row", false);
     const std::string wait = delay->count() ? " in " + std::to_string(delay->count()) + " ms" : "";
-    context_.log(ARHOST_SEVERITY_WARNING, name_, reason + "; restarting it" + wait);
+    budget_.log_death(reason + "; restarting it" + wait);
     ++restarts_;
     restart_timer_ = context_.reactor.at(Reactor::Clock::now() + *delay, [this] { spawn(); });
 }
 
 void Component::fall_back_or_disable(const std::string &reason, bool is_configuration_error) {
     if (candidate_ + 1 < plugins_.size()) {
-        context_.log(ARHOST_SEVERITY_WARNING, name_,
-                     reason + "; falling back to " + plugins_[candidate_ + 1].stem().string());
+        budget_.log_death(reason + "; falling back to " + plugins_[candidate_ + 1].stem().string());
         ++candidate_;
         device_losses_.clear();
-        policy_ = RestartPolicy(limits_.restart);
+        restart_policy_ = RestartPolicy(limits_.restart);
         ++restarts_;
         restart_timer_ = context_.reactor.at(Reactor::Clock::now(), [this] { spawn(); });
         return;
@@ -328,6 +326,7 @@ void Component::fall_back_or_disable(const std::string &reason, bool is_configur
 
 void Component::stopped(arhost_status status, const std::string &text) {
     state_ = State::stopped;
+    budget_.report_repetitions();
     callbacks_.stopped(status, text);
 }
 

@@ -62,9 +62,9 @@ public:
         static constexpr std::uint64_t no_frame = ~std::uint64_t(0);
     };
 
-    // `plugins`: the shared object of the plugin, followed by its fallbacks. `policy` applies to all of them.
+    // `plugins`: the shared object of the plugin, followed by its fallbacks. `sandbox` applies to all of them.
     Component(Context &context, std::string name, std::vector<std::filesystem::path> plugins,
-              const base::Limits &limits, sandbox::Policy policy, Callbacks callbacks);
+              const base::Limits &limits, sandbox::Policy sandbox, Callbacks callbacks);
     Component(const Component &) = delete;
     Component &operator=(const Component &) = delete;
 
@@ -127,7 +127,7 @@ private:
     sandbox::Policy sandbox_;
     Callbacks callbacks_;
     WorkerBudget budget_;
-    RestartPolicy policy_;
+    RestartPolicy restart_policy_;
     std::deque<ipc::Reactor::Clock::time_point> device_losses_; // within the last minute
     State state_ = State::idle;
     enum class Handshake { opening, creating, done }; // waits for Hello; waits for Ready; has received both

@@ -76,7 +76,7 @@ void Process::request_cancel() {
 void Process::end(const std::string &reason) {
     if (!end_reason_.empty())
         return;
-    end_reason_ = reason;
+    end_reason_ = reason.substr(0, messages::max_text); // it may contain text that the worker chose
     if (!signal_process(spawned_.pidfd, SIGABRT)) { // the worker is a thread, which ends when its channel is closed
         ::shutdown(spawned_.channel.fd(), SHUT_RDWR);
         wake(host_page_.as<HostPage>().wake);
@@ -125,11 +125,10 @@ void Process::receive_messages(int max_messages) {
         try {
             if (is<messages::Log>(message)) {
                 const auto [severity, text] = parse<messages::Log>(message);
-                log(severity, text.substr(0, WorkerBudget::max_text));
+                log(severity, text);
             } else {
                 ready_ = ready_ || is<messages::Ready>(message);
-                if (is<messages::Failed>(message) &&
-                    held_error_ == parse<messages::Failed>(message).text.substr(0, WorkerBudget::max_text))
+                if (is<messages::Failed>(message) && held_error_ == parse<messages::Failed>(message).text)
                     held_error_.reset();
                 else if (ready_)
                     print_held_error();
@@ -149,16 +148,12 @@ void Process::log(arhost_severity severity, const std::string &text) {
     if (severity == ARHOST_SEVERITY_ERROR && !ready_)
         held_error_ = text;
     else
-        print(severity, text);
+        budget_.log(severity, text);
 }
 
 void Process::print_held_error() {
     if (const auto text = std::exchange(held_error_, std::nullopt))
-        print(ARHOST_SEVERITY_ERROR, *text);
-}
-
-void Process::print(arhost_severity severity, const std::string &text) {
-    budget_.log(severity, text);
+        budget_.log(ARHOST_SEVERITY_ERROR, *text);
 }
 
 void Process::on_doorbell() {

@@ -84,7 +84,6 @@ private:
     void on_death();
     void receive_results();
     void log(arhost_severity severity, const std::string &text);
-    void print(arhost_severity severity, const std::string &text);
     void print_held_error();
     void append_to_tail(const std::string &line);
 

@@ -7,41 +7,52 @@
 #include "ipc/reactor.hpp"
 #include "supervise/launcher.hpp"
 
+#include <map>
+
 namespace arhost::supervise {
 
 class WorkerBudget {
 public:
     using Clock = ipc::Reactor::Clock;
 
-    // Lines per second, for warnings (and errors) and other lines separately, so that neither displaces the other.
+    // Lines per second, separately for deaths, warnings (and errors) and other lines, so that none displaces another.
     static constexpr int max_lines = 100;
     // Cost of messages, in bytes. A worker that logs as much as arhost-worker lets its plugin stays far below.
     static constexpr std::size_t cost_per_message = 512, cost_per_second = 2 << 20, max_cost = 16 << 20;
-    static constexpr std::size_t max_text = 4000; // bytes of a line; the rest is cut off
 
     WorkerBudget(LogFunction log, std::string name) : log_(std::move(log)), name_(std::move(name)) {}
-    ~WorkerBudget() { report_suppressed_lines(); }
+    ~WorkerBudget() {
+        report_repetitions();
+        report_suppressed_lines();
+    }
     WorkerBudget(const WorkerBudget &) = delete;
     WorkerBudget &operator=(const WorkerBudget &) = delete;
 
     // Logs a line that a worker sent or caused. Counts lines beyond the limit; the next line of a later second is
-    // preceded by their number.
+    // preceded by their number. Only counts a line that repeats another of the last 10 s.
     void log(arhost_severity severity, const std::string &text, Clock::time_point now = Clock::now());
+    // Logs a warning about the death of a worker.
+    void log_death(const std::string &text, Clock::time_point now = Clock::now());
+    // Logs the number of repeated lines.
+    void report_repetitions(Clock::time_point now = Clock::now());
 
     // Deducts the cost of a message. Returns false if the budget is exhausted: it holds max_cost, and regains
     // cost_per_second.
     bool spend(std::size_t message_bytes, Clock::time_point now = Clock::now());
 
 private:
-    void report_suppressed_lines();
-
     struct LineCount { // lines within the current second
         int logged = 0, suppressed = 0;
     };
+    void log(LineCount &lines, arhost_severity severity, const std::string &text, Clock::time_point now);
+    void report_suppressed_lines();
+
     LogFunction log_;
     std::string name_;
     Clock::time_point second_ends_{}, last_spent_{};
-    LineCount other_lines_, warnings_;
+    LineCount other_lines_, warnings_, deaths_;
+    std::map<std::pair<arhost_severity, std::string>, Clock::time_point> recent_lines_; // with their last time
+    std::uint64_t repetitions_[2] = {};                                                 // [1]: of warnings and errors
     double left_ = max_cost;
 };
 

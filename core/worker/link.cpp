@@ -24,7 +24,7 @@ Message Link::receive() const {
         case ReceiveState::closed:
             throw HostLost("the host has closed the channel");
         case ReceiveState::malformed:
-            throw HostLost("the host sent a malformed message");
+            throw ProtocolViolation("the host sent a malformed message");
         }
     }
 }
@@ -43,8 +43,7 @@ void Link::send_json(const Json &body, std::initializer_list<int> fds) const {
 }
 
 void Link::log(arhost_severity severity, const std::string &text) const {
-    constexpr std::size_t max_text = 4000, max_cost = 100'000, cost_per_line = 500;
-    const std::string sent = text.substr(0, max_text);
+    constexpr std::size_t max_cost = 100'000, cost_per_line = 500;
     {
         const std::lock_guard lock(rates_->mutex);
         if (const auto now = Clock::now(); now >= rates_->log_second_ends) {
@@ -52,11 +51,11 @@ void Link::log(arhost_severity severity, const std::string &text) const {
             std::fill(std::begin(rates_->log_costs), std::end(rates_->log_costs), 0);
         }
         std::size_t &cost = rates_->log_costs[severity >= ARHOST_SEVERITY_WARNING];
-        cost += std::max(sent.size(), cost_per_line);
+        cost += std::clamp(text.size(), cost_per_line, messages::max_text);
         if (cost > max_cost)
             return;
     }
-    channel_.send(encode(messages::Log{severity, sent}), {}, false);
+    channel_.send(encode(messages::Log{severity, text}), {}, false);
 }
 
 void Link::progress(double fraction, const char *what) const {
@@ -75,11 +74,11 @@ void Link::progress(double fraction, const char *what) const {
 
 void Link::map_pages(Message &open) {
     if (open.fds.size() < 2)
-        throw HostLost("'open' was sent without the descriptors of the pages");
+        throw ProtocolViolation("'open' was sent without the descriptors of the pages");
     host_page_ = SharedMemory::adopt(std::move(open.fds[0])).map(Access::read_only);
     worker_page_ = SharedMemory::adopt(std::move(open.fds[1])).map(Access::read_write);
     if (host_page_.bytes().size() < sizeof(HostPage) || worker_page_.bytes().size() < sizeof(WorkerPage))
-        throw HostLost("a page is too small");
+        throw ProtocolViolation("a page is too small");
     commands_.emplace(host_page_.as<HostPage>().commands, worker_page_.as<WorkerPage>().commands);
     results_.emplace(worker_page_.as<WorkerPage>().results, host_page_.as<HostPage>().results);
 }
@@ -93,7 +92,7 @@ std::optional<Command> Link::next_command(std::chrono::milliseconds timeout) {
         case RingResult::done:
             return command;
         case RingResult::violation:
-            throw HostLost("the host's ring is inconsistent");
+            throw ProtocolViolation("the host's ring is inconsistent");
         case RingResult::wait:
             break;
         }
@@ -110,7 +109,7 @@ std::optional<Command> Link::next_command(std::chrono::milliseconds timeout) {
 void Link::send_result(const Result &result) {
     // The result ring is never full, because the host never has more commands in flight than the ring has entries.
     if (results_->push(result) != RingResult::done)
-        throw HostLost("the result ring is full or inconsistent");
+        throw ProtocolViolation("the result ring is full or inconsistent");
     ring_doorbell(doorbell_.get());
 }
 

@@ -15,7 +15,7 @@
 
 namespace arhost::worker {
 
-// Thrown if the host has exited or violates the protocol. The worker then exits.
+// Thrown if the host has exited. The worker then exits, too.
 class HostLost : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
@@ -25,7 +25,7 @@ public:
     Link(ipc::Channel channel, base::UniqueFd doorbell)
         : channel_(std::move(channel)), doorbell_(std::move(doorbell)) {}
 
-    // Waits for the next control message; throws HostLost.
+    // Waits for the next control message. Throws HostLost, or ProtocolViolation if it is malformed.
     ipc::Message receive() const;
     template <class T> void send(const T &message, std::initializer_list<int> fds = {}) const {
         send_json(ipc::encode(message), fds);
@@ -42,7 +42,8 @@ public:
         return host_page_ && host_page_.as<ipc::HostPage>().cancelled.load(std::memory_order_relaxed) != 0;
     }
 
-    // Returns the next command, or nullopt if none arrives within `timeout`. Throws HostLost.
+    // Returns the next command, or nullopt if none arrives within `timeout`. Throws HostLost or
+    // ProtocolViolation.
     std::optional<ipc::Command> next_command(std::chrono::milliseconds timeout);
     void send_result(const ipc::Result &result);
 

@@ -20,7 +20,7 @@ std::uint8_t *as_pixels(std::span<std::byte> bytes) {
 
 void require(bool condition, const char *what) {
     if (!condition)
-        throw HostLost(what);
+        throw ProtocolViolation(what);
 }
 
 template <class T> const T &setup_of_kind(const messages::Setup &setup) {

@@ -17,12 +17,12 @@ struct Memory {
     struct Region {
         ipc::SlotLayout layout;
         ipc::Mapping mapping;
-        std::span<std::byte> slot(std::uint32_t index) const; // throws HostLost if out of range
+        std::span<std::byte> slot(std::uint32_t index) const; // throws ipc::ProtocolViolation if out of range
     };
     std::map<std::uint32_t, Region> inputs; // key: generation
     Region output;
 
-    const Region &input(std::uint32_t generation) const; // throws HostLost
+    const Region &input(std::uint32_t generation) const; // throws ipc::ProtocolViolation
 };
 
 class Service {

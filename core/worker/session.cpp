@@ -148,17 +148,17 @@ private:
             link_.send(messages::Stopped{status, status == ARHOST_STATUS_OK ? std::string() : host_.last_error()});
             stopped_ = true;
         } else {
-            throw HostLost("the host sent a message of unknown type " + message.body["type"].dump());
+            throw ProtocolViolation("the host sent a message of unknown type " + message.body["type"].dump());
         }
     }
 
     void attach(const messages::Attach &attach, std::vector<base::UniqueFd> fds) {
         if (fds.size() != 1)
-            throw HostLost("'attach' was sent without exactly one memory descriptor");
+            throw ProtocolViolation("'attach' was sent without exactly one memory descriptor");
         const SharedMemory memory = SharedMemory::adopt(std::move(fds[0]));
         Memory::Region region{attach.layout, memory.map(attach.is_output ? Access::read_write : Access::read_only)};
         if (region.layout.byte_size() > memory.size())
-            throw HostLost("the slots do not fit into their memory");
+            throw ProtocolViolation("the slots do not fit into their memory");
         (attach.is_output ? memory_.output : memory_.inputs[attach.generation]) = std::move(region);
         link_.send(messages::Attached{attach.is_output, attach.generation});
     }
@@ -211,7 +211,7 @@ int serve_plugin(Link &link, const messages::Open &open) {
     for (; is<messages::ListDevices>(next); next = link.receive())
         send_devices(link, host, *plugin);
     if (!is<messages::Create>(next))
-        throw HostLost("the host's message after 'hello' is not 'create'");
+        throw ProtocolViolation("the host's message after 'hello' is not 'create'");
     return Session(link, host, *plugin).run(parse<messages::Create>(next), next.fds);
 }
 
@@ -223,7 +223,7 @@ int serve(Link &link) {
         return load_scene(link, load);
     }
     if (!is<messages::Open>(first))
-        throw HostLost("the host's first message is not 'open' or 'load'");
+        throw ProtocolViolation("the host's first message is not 'open' or 'load'");
     link.map_pages(first);
     return serve_plugin(link, parse<messages::Open>(first));
 }
@@ -239,19 +239,21 @@ void retain_freed_memory() {
 }
 
 int run(Link &link) {
+    messages::Failed failed;
     try {
         return serve(link);
     } catch (const HostLost &) {
         return EXIT_FAILURE;
+    } catch (const ProtocolViolation &error) {
+        failed = {ARHOST_STATUS_ERROR_INTERNAL, std::string("protocol violation: ") + error.what()};
     } catch (const std::exception &error) {
-        try {
-            const arhost_status status =
-                link.serving ? ARHOST_STATUS_ERROR_INTERNAL : ARHOST_STATUS_ERROR_CONFIGURATION;
-            link.send(messages::Failed{status, error.what()});
-        } catch (const HostLost &) {
-        }
-        return EXIT_FAILURE;
+        failed = {link.serving ? ARHOST_STATUS_ERROR_INTERNAL : ARHOST_STATUS_ERROR_CONFIGURATION, error.what()};
     }
+    try {
+        link.send(failed);
+    } catch (const HostLost &) {
+    }
+    return EXIT_FAILURE;
 }
 
 } // namespace arhost::worker

@@ -25,6 +25,7 @@ std::string size_text(const cv::Mat &image) {
 cv::Mat read_image(const fs::path &file, int flags) {
     cv::Mat image;
     std::string reason = "damaged or unknown image format";
+    arhost_status status = ARHOST_STATUS_ERROR_CONFIGURATION; // a restart does not help
     try {
         image = cv::imread(file.string(), flags);
     } catch (const cv::Exception &error) {
@@ -34,10 +35,10 @@ cv::Mat read_image(const fs::path &file, int flags) {
         std::error_code error;
         const auto size = fs::file_size(file, error);
         if (error)
-            reason = error.message();
+            reason = error.message(), status = ARHOST_STATUS_ERROR_IO;
         else if (size == 0)
             reason = "the file is empty";
-        throw Failure(ARHOST_STATUS_ERROR_IO, "the image " + quoted(file) + " cannot be read: " + reason);
+        throw Failure(status, "the image " + quoted(file) + " cannot be read: " + reason);
     }
     if (image.cols > ARHOST_MAX_IMAGE_SIDE || image.rows > ARHOST_MAX_IMAGE_SIDE)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "the image " + quoted(file) + " is " + size_text(image) +

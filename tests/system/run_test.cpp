@@ -631,6 +631,9 @@ TEST(Run, FailsIfTheTrackerFailsInEveryFrame) {
                   "outputs: [{plugin: sink_counter, path: counted.txt}]\n");
     EXPECT_EQ(run.run({"run.yaml", "--allow-no-target"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("error: arhost: 5 frames have no overlay because the tracker failed"));
+    EXPECT_THAT(run.output(), HasSubstr("warning: tracker: frame 0: "));
+    EXPECT_THAT(run.output(), Not(HasSubstr("warning: tracker: frame 1: ")));
+    EXPECT_THAT(run.output(), testing::ContainsRegex("warning: tracker: .* in 5 frames\n"));
     EXPECT_EQ(counted(run).size(), 5u);
 }
 
@@ -657,8 +660,11 @@ TEST(Run, WarnsOfPartsOfTheSceneThatTheRayTracerLacks) {
     ASSERT_EQ(run.run(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("warning: raytracer: " + lacks));
     expect_every_frame_augmented(run, 5);
-    EXPECT_EQ(run.run({"check", "run.yaml"}), 0);
-    EXPECT_THAT(run.output(), HasSubstr("warning: raytracer: " + lacks));
+    for (const std::vector<std::string> &check :
+         {std::vector<std::string>{"check", "run.yaml"}, {"check", "--no-open", "run.yaml"}}) {
+        EXPECT_EQ(run.run(check), 0);
+        EXPECT_THAT(run.output(), HasSubstr("warning: raytracer: " + lacks));
+    }
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 0);
     EXPECT_THAT(run.output(), Not(HasSubstr("does not support")));

@@ -719,6 +719,15 @@ TEST(Sandbox, OneBudgetLimitsTheLinesOfAWorker) {
     }
 }
 
+// Each process of the plugin sends a message of an unknown type, whose name has 120 KB.
+TEST(Sandbox, DeathsDoNotLogLongTextsOfTheWorker) {
+    HostileRun run("huge_type");
+    expect_ended(run, "protocol violation: unexpected message \"xxx");
+    EXPECT_GE(run.stats()["restarts"]["tracker"], 20);
+    EXPECT_LT(run.output().size(), 500'000u);
+    EXPECT_LT(run.read("stats.json").size(), 500'000u);
+}
+
 TEST(Sandbox, RefusesAnImplausibleLens) {
     ArhostRun run("version: 1\nsource: {plugin: hostile_source, options: {attack: lens}}\n"
                   "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
@@ -764,11 +773,14 @@ TEST(Sandbox, KillsAWorkerThatIgnoresSignals) {
 TEST(Sandbox, HostDoesNotOpenPlantedLinksOrPipes) {
     for (const char *attack : {"link", "pipe"}) {
         SCOPED_TRACE(attack);
-        HostileRun run(attack, "", "sandbox: none\n");
+        HostileRun run(attack, "", "timeline: times.csv\nsandbox: none\n");
         ASSERT_EQ(run.attack(), 0) << run.output();
         EXPECT_THAT(run.output(), HasSubstr("SUCCEEDED"));
         EXPECT_EQ(run.target_text(), "secret");
         EXPECT_EQ(run.stats()["frames"]["in"], frames);
+        EXPECT_THAT(run.read("times.csv"), testing::StartsWith("frame,"));
+        for (const char *report : {"stats.json", "times.csv"})
+            EXPECT_EQ(fs::symlink_status(run.path(report)).type(), fs::file_type::regular) << report;
         expect_complete_video(run);
         if (!has("landlock"))
             continue;

@@ -119,6 +119,15 @@ TEST(Messages, PreserveWhatAWorkerReports) {
     EXPECT_EQ(sent(messages::Reads{"/a", "1:2"}).node, "1:2");
 }
 
+TEST(Messages, CutLongTexts) {
+    const messages::Failed failed{ARHOST_STATUS_ERROR_IO, std::string(1 << 20, 'x')};
+    EXPECT_LT(encode(failed).dump().size(), Channel::max_message_size);
+    EXPECT_EQ(sent(failed).text.size(), messages::max_text);
+    Json foreign = encode(messages::Log{ARHOST_SEVERITY_ERROR, ""});
+    foreign["text"] = failed.text;
+    EXPECT_EQ(parse<messages::Log>(Message{foreign, {}}).text.size(), messages::max_text);
+}
+
 TEST(Messages, MissingOrMistypedFieldsViolateTheProtocol) {
     EXPECT_THAT(violation<messages::Log>({{"severity", 1}}), HasSubstr("malformed message 'log': "));
     EXPECT_THAT(violation<messages::Log>({{"severity", "high"}, {"text", ""}}), HasSubstr("malformed message 'log'"));

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <ctime>
 #include <optional>
 #include <thread>
 
@@ -96,6 +97,23 @@ TEST(Reactor, ExtendsDeadlinesByTimeInWhichTheProcessDidNotRun) {
     EXPECT_FALSE(missed);
     while (!missed)
         reactor.run_once();
+}
+
+TEST(Reactor, CallsDeadlinesAlthoughTheThreadIsBusy) {
+    Reactor reactor;
+    const Pipe pipe;
+    const auto begin = Reactor::Clock::now();
+    bool called = false;
+    auto deadline = reactor.at(begin + 500ms, [&] { called = true; });
+    auto watch = reactor.watch(pipe.read.get(), [] {});
+    pipe.put();
+    while (!called && Reactor::Clock::now() < begin + 10s) {
+        reactor.run_once();
+        const std::clock_t end = std::clock() + CLOCKS_PER_SEC / 5; // CPU time
+        while (std::clock() < end) {
+        }
+    }
+    EXPECT_TRUE(called);
 }
 
 TEST(Reactor, LetsADeadlineSetAnother) {

@@ -139,6 +139,28 @@ TEST(Component, EndsAStartThatReportsProgressForever) {
               std::string::npos);
 }
 
+TEST(Component, EndsAStopThatReportsProgressForever) {
+    Bench bench;
+    bench.make("hostile_source", {.stop_total = 300ms, .restart = {}}, {{"attack", "endless_stop"}});
+    ASSERT_TRUE(bench.until("running")) << bench.log;
+    bench.component->stop();
+    ASSERT_TRUE(bench.until("stopped")) << bench.log;
+    ASSERT_EQ(bench.component->crashes().size(), 1u);
+    EXPECT_NE(bench.component->crashes()[0].how.find("did not stop within 300 ms in total, although it reported "
+                                                     "progress"),
+              std::string::npos);
+}
+
+// The error must not be mistaken for one of the configuration, which is not retried.
+TEST(Component, RetriesAStartThatFailsWithALongError) {
+    Bench bench;
+    bench.make("hostile_source", {.restart = {.quarantine_after = 2, .first_delay = 1ms}},
+               {{"attack", "long_error"}});
+    ASSERT_TRUE(bench.until("disabled")) << bench.log.substr(0, 1000);
+    EXPECT_EQ(bench.component->restarts(), 1u);
+    EXPECT_LT(bench.log.size(), 10'000u);
+}
+
 TEST(Component, IsDisabledIfItsLibraryIsUnusable) {
     for (const char *plugin : {"broken_constructor", "none"}) {
         Bench bench;

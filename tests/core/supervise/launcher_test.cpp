@@ -4,12 +4,13 @@
 #include "plugin_under_test.hpp"
 #include "processes.hpp"
 
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include <csignal>
 #include <fstream>
 #include <poll.h>
 #include <sys/ptrace.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 
 using namespace arhost::supervise;
@@ -40,6 +41,44 @@ pid_t parent_of(pid_t pid) {
     pid_t parent = 0;
     status >> parent;
     return parent;
+}
+
+// Returns the process's pid in its own PID namespace.
+pid_t innermost_pid(pid_t pid) {
+    std::ifstream status("/proc/" + std::to_string(pid) + "/status");
+    for (std::string key; status >> key && key != "NSpid:";) {
+    }
+    pid_t innermost = 0;
+    for (pid_t next; status >> next;)
+        innermost = next;
+    return innermost;
+}
+
+// Returns the child of `parent` that is PID 1 of a namespace; 0 if there is none.
+pid_t init_started_by(pid_t parent) {
+    const std::string id = std::to_string(parent);
+    std::ifstream children("/proc/" + id + "/task/" + id + "/children");
+    for (pid_t child; children >> child;)
+        if (innermost_pid(child) == 1)
+            return child;
+    return 0;
+}
+
+// Waits until the process sleeps.
+void wait_idle(pid_t pid) {
+    for (char state = 0; state != 'S'; ::usleep(1000)) {
+        std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
+        stat.ignore(1000, ')') >> state;
+    }
+}
+
+std::string spawn_error(Launcher &launcher) {
+    try {
+        launcher.spawn("/bin/true", Isolation{false}, no_log);
+    } catch (const std::runtime_error &error) {
+        return error.what();
+    }
+    return "";
 }
 
 } // namespace
@@ -107,6 +146,60 @@ TEST(Launcher, DoesNotKillUnrelatedChildrenWhenItIsReplaced) {
     EXPECT_EQ(::waitpid(other, nullptr, WNOHANG), 0) << "the unrelated child was killed";
     ::kill(other, SIGKILL);
     ::waitpid(other, nullptr, 0);
+}
+
+TEST(Launcher, StartsAWorkerAsPid2WhosePid1EndsWithIt) {
+    Launcher launcher(program);
+    const Spawned worker = launcher.spawn("/usr/bin/yes", Isolation{}, no_log);
+    if (innermost_pid(worker.pid) == worker.pid)
+        GTEST_SKIP() << "this machine does not allow PID namespaces";
+    EXPECT_EQ(innermost_pid(worker.pid), 2);
+    const pid_t init = init_started_by(parent_of(worker.pid));
+    ASSERT_GT(init, 0);
+    ::kill(worker.pid, SIGKILL);
+    launcher.wait_exit(worker.pid);
+    for (int i = 0; i < 5000 && is_alive(init); ++i)
+        ::usleep(2000);
+    EXPECT_FALSE(is_alive(init));
+}
+
+TEST(Launcher, ReportsThatItCanNotStartAProcess) {
+    Launcher launcher(program);
+    const Spawned first = launcher.spawn("/usr/bin/yes", Isolation{false}, no_log);
+    const pid_t pid = parent_of(first.pid);
+    wait_idle(pid); // it has then closed the descriptors of the request
+    const std::filesystem::directory_iterator open_files("/proc/" + std::to_string(pid) + "/fd"), end;
+    rlimit usual{};
+    ASSERT_EQ(::prlimit(pid, RLIMIT_NOFILE, nullptr, &usual), 0);
+    // Enough for the three descriptors of the request, but not for the worker's pidfd.
+    const rlimit few{static_cast<rlim_t>(std::distance(open_files, end)) + 3, usual.rlim_max};
+    ASSERT_EQ(::prlimit(pid, RLIMIT_NOFILE, &few, nullptr), 0);
+    EXPECT_EQ(spawn_error(launcher), "no process can be started: Too many open files");
+    ASSERT_EQ(::prlimit(pid, RLIMIT_NOFILE, &usual, nullptr), 0);
+    EXPECT_EQ(spawn_error(launcher), "");
+    EXPECT_TRUE(is_alive(first.pid)) << "the launcher was replaced";
+}
+
+TEST(Launcher, ReportsThatItsHostHasNoFreeDescriptors) {
+    Launcher launcher(program);
+    ASSERT_EQ(spawn_error(launcher), "");
+    rlimit usual{};
+    ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &usual), 0);
+    const int unused = ::dup(STDIN_FILENO);
+    ::close(unused);
+    std::vector<std::string> errors;
+    for (int free = 0; free < 20; ++free) {
+        const rlimit few{static_cast<rlim_t>(unused + free), usual.rlim_max};
+        ::setrlimit(RLIMIT_NOFILE, &few);
+        const std::string error = spawn_error(launcher);
+        ::setrlimit(RLIMIT_NOFILE, &usual);
+        if (error.empty())
+            break;
+        errors.push_back(error);
+    }
+    EXPECT_THAT(errors, testing::Each(testing::HasSubstr("Too many open files")));
+    EXPECT_THAT(errors, testing::Contains("no process can be started: Too many open files"));
+    EXPECT_LT(errors.size(), 20u);
 }
 
 TEST(Launcher, ReportsThatItCanNotBeStarted) {

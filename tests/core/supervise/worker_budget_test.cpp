@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "supervise/worker_budget.hpp"
 
+#include "ipc/messages.hpp"
+
 #include <gmock/gmock.h>
 
 using namespace arhost::supervise;
@@ -24,21 +26,35 @@ const WorkerBudget::Clock::time_point start = WorkerBudget::Clock::time_point(1h
 TEST(WorkerBudget, LimitsTheLinesOfEachSecondAndReportsTheirNumber) {
     Lines lines;
     for (int i = 0; i < 1000; ++i) {
-        lines.budget.log(ARHOST_SEVERITY_WARNING, "w", start);
-        lines.budget.log(ARHOST_SEVERITY_DEBUG, "d", start + 500ms);
+        lines.budget.log(ARHOST_SEVERITY_WARNING, "w" + std::to_string(i), start);
+        lines.budget.log(ARHOST_SEVERITY_DEBUG, "d" + std::to_string(i), start + 500ms);
+        lines.budget.log_death("killed", start + 500ms);
     }
-    EXPECT_EQ(lines.all.size(), 2u * WorkerBudget::max_lines) << "neither kind displaces the other";
+    EXPECT_EQ(lines.all.size(), 3u * WorkerBudget::max_lines) << "no kind displaces another";
     lines.all.clear();
     lines.budget.log(ARHOST_SEVERITY_INFO, "later", start + 1s);
     EXPECT_THAT(lines.all, testing::ElementsAre("tracker: suppressed 900 more log lines within one second",
                                                 "warning tracker: suppressed 900 more log lines within one second",
+                                                "warning tracker: suppressed 900 more log lines within one second",
                                                 "tracker: later"));
+}
+
+TEST(WorkerBudget, OnlyCountsLinesThatRepeatOthers) {
+    Lines lines;
+    for (int i = 0; i < 60; ++i)
+        for (const char *text : {"no light", "no marker"})
+            lines.budget.log(ARHOST_SEVERITY_ERROR, text, start + i * 1s);
+    lines.budget.log(ARHOST_SEVERITY_ERROR, "no light", start + 59s + 11s);
+    lines.budget.report_repetitions(start + 80s);
+    EXPECT_THAT(lines.all, testing::ElementsAre("warning tracker: no light", "warning tracker: no marker",
+                                                "warning tracker: no light",
+                                                "warning tracker: 118 lines that repeat others were not printed"));
 }
 
 TEST(WorkerBudget, CutsLongLines) {
     Lines lines;
     lines.budget.log(ARHOST_SEVERITY_INFO, std::string(1 << 20, 'x'), start);
-    EXPECT_EQ(lines.all.at(0).size(), std::string("tracker: ").size() + WorkerBudget::max_text);
+    EXPECT_EQ(lines.all.at(0).size(), std::string("tracker: ").size() + arhost::ipc::messages::max_text);
 }
 
 TEST(WorkerBudget, LimitsTheNumberAndTheBytesOfMessages) {

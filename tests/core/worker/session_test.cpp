@@ -91,5 +91,18 @@ TEST(Worker, ExitsIfTheSetupIsForAnotherKind) {
     const auto hello = worker.next<messages::Hello>();
     ASSERT_TRUE(hello);
     worker.process.send(messages::Create{default_options(*hello), messages::SinkSetup{}});
+    const auto failed = worker.next<messages::Failed>();
+    ASSERT_TRUE(failed);
+    EXPECT_EQ(failed->status, ARHOST_STATUS_ERROR_INTERNAL);
+    EXPECT_EQ(failed->text, "protocol violation: the setup is for another kind of plugin");
     EXPECT_FALSE(worker.next<messages::Ready>());
+}
+
+TEST(Worker, ReportsViolationsOfTheProtocol) {
+    Conversation worker("source_counter");
+    ASSERT_TRUE(worker.next<messages::Hello>());
+    worker.process.send(messages::Stop{});
+    const auto failed = worker.next<messages::Failed>();
+    ASSERT_TRUE(failed);
+    EXPECT_EQ(failed->text, "protocol violation: the host's message after 'hello' is not 'create'");
 }

@@ -219,9 +219,9 @@ TEST(ImageSequence, NamesADamagedImage) {
     write_bytes(folder.path() / "image_0002.png", {});
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK);
-    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0001.png' cannot be read: damaged"));
-    EXPECT_EQ(source.read(2).status, ARHOST_STATUS_ERROR_IO);
+    EXPECT_EQ(source.read(2).status, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0002.png' cannot be read: the file is empty"));
 }
 
@@ -370,7 +370,7 @@ TEST(Rejection, ReportsEmptyAndInvalidFilesOnce) {
                          {name, "cannot be read"});
     }
     write_bytes(folder.path() / "image.png", garbage);
-    expect_rejection({{"path", (folder.path() / "image.png").string()}}, ARHOST_STATUS_ERROR_IO,
+    expect_rejection({{"path", (folder.path() / "image.png").string()}}, ARHOST_STATUS_ERROR_CONFIGURATION,
                      {"image.png' cannot be read"});
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A source of black frames that attempts one attack on the host during `start`, or takes resources of the machine at
- * frame 5.
+ * A source of black frames that attempts one attack on the host during `start` or `stop`, or takes resources of the
+ * machine at frame 5.
  */
 #ifndef _GNU_SOURCE
 #define _GNU_SOURCE
@@ -65,6 +65,12 @@ static arhost_status start(arhost_instance *self, const arhost_source_setup *set
     properties->format.fps = 30;
     if (!strcmp(self->attack, "lens"))
         report_lens(properties);
+    if (!strcmp(self->attack, "long_error")) {
+        static char reason[200 << 10];
+        memset(reason, 'x', sizeof reason - 1);
+        self->host->log(self->host, ARHOST_SEVERITY_ERROR, reason);
+        return ARHOST_STATUS_ERROR_IO;
+    }
     while (!strcmp(self->attack, "endless_start"))
         self->host->progress(self->host, 0.5, "still busy");
     return arhost_frame_layout(&properties->format) ? ARHOST_STATUS_OK : ARHOST_STATUS_ERROR_INTERNAL;
@@ -142,7 +148,8 @@ static arhost_status read_frame(arhost_instance *self, const arhost_frame_buffer
     return ARHOST_STATUS_OK;
 }
 static void stop(arhost_instance *self) {
-    (void)self;
+    while (!strcmp(self->attack, "endless_stop"))
+        self->host->progress(self->host, 0.5, "still busy");
 }
 
 static const arhost_option_descriptor options[] = {
