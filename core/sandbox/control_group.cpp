@@ -11,19 +11,31 @@ std::filesystem::path control_group() {
     std::ifstream file("/proc/self/cgroup");
     std::error_code ignored;
     for (std::string line; std::getline(file, line);)
-        if (line.starts_with(version_2) && std::filesystem::exists(mount_point / "cgroup.procs", ignored))
-            return mount_point / std::filesystem::path(line.substr(version_2.size())).relative_path();
+        if (line.starts_with(version_2) && std::filesystem::exists(mount_point / "cgroup.procs", ignored)) {
+            const auto group = std::filesystem::path(line.substr(version_2.size())).relative_path();
+            return group.empty() ? mount_point : mount_point / group; // without a slash at the end
+        }
     return {};
 }
 
 Layer report_control_group() {
     const std::filesystem::path group = control_group();
     if (!group.filename().string().starts_with(worker_group))
-        return {"control group", "not delegated", ""}; // most machines delegate none, so this is no fault
-    Layer layer{"control group", "kill", ""};
-    std::ifstream file(group / "cgroup.controllers");
-    for (std::string controller; file >> controller;)
-        add_to(layer.active, controller);
+        return {"control group", "none", ""}; // few machines delegate one, so this is not missing
+    Layer layer{"control group", "", ""};
+    const auto value = [&](const char *file) {
+        std::string text;
+        std::ifstream(group / file) >> text;
+        return text;
+    };
+    std::error_code ignored;
+    if (std::filesystem::exists(group / "cgroup.kill", ignored)) // since Linux 5.14
+        add_to(layer.active, "kill");
+    for (const char *limit : {"memory.max", "pids.max"})
+        if (const std::string text = value(limit); !text.empty() && text != "max")
+            add_to(layer.active, limit);
+    if (!value("cpu.weight").empty())
+        add_to(layer.active, "cpu.weight");
     return layer;
 }
 

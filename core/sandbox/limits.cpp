@@ -2,9 +2,11 @@
 #include "sandbox/layers.hpp"
 
 #include <algorithm>
+#include <cstdio>
 #include <fstream>
 #include <sys/resource.h>
 #include <sys/sysinfo.h>
+#include <sys/utsname.h>
 
 namespace arhost::sandbox {
 namespace {
@@ -25,6 +27,14 @@ std::uint64_t three_quarters_of_memory() {
     struct sysinfo info {};
     ::sysinfo(&info);
     return std::uint64_t(info.totalram) * info.mem_unit / 4 * 3;
+}
+
+bool kernel_is_at_least(int major, int minor) {
+    utsname name{};
+    int found_major = 0, found_minor = 0;
+    ::uname(&name);
+    return std::sscanf(name.release, "%d.%d", &found_major, &found_minor) == 2 &&
+           std::pair(found_major, found_minor) >= std::pair(major, minor);
 }
 
 } // namespace
@@ -60,9 +70,10 @@ Layer set_limits(const Policy &policy) {
     lower(layer, "queues", RLIMIT_MSGQUEUE, 0);
     lower(layer, "priorities", RLIMIT_RTPRIO, 0); // a real-time thread could starve all others
     lower(layer, "nice", RLIMIT_NICE, 0);
-    // Counted per user namespace, without one for all processes of the user; not enforced for root. Pools of threads
-    // have one thread for each processor.
-    lower(layer, "threads", RLIMIT_NPROC, has_pid_namespace() ? 1024 + 4 * ::get_nprocs() : 8192);
+    // Counted per user namespace since Linux 5.14, otherwise for all processes of the user; not enforced for root.
+    // Pools of threads have one thread for each processor.
+    const bool is_own_count = has_pid_namespace() && kernel_is_at_least(5, 14);
+    lower(layer, "threads", RLIMIT_NPROC, is_own_count ? 1024 + 4 * ::get_nprocs() : 8192);
     return layer;
 }
 

@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <fstream>
 #include <iterator>
+#include <map>
 #include <set>
 #include <string>
 #include <sys/sysinfo.h>
@@ -82,12 +83,15 @@ void ControlGroup::kill() const {
 }
 
 bool ControlGroup::exceeded_memory() const {
-    std::ifstream events(folder_ / "memory.events");
+    if (folder_.empty())
+        return false;
+    std::ifstream file(folder_ / "memory.events");
+    std::map<std::string, int> events;
     std::string name;
-    for (int count = 0; events >> name >> count;)
-        if (name == "oom_kill")
-            return count > 0;
-    return false;
+    for (int count = 0; file >> name >> count;)
+        events[name] = count;
+    // Kills by the machine's OOM killer count as oom_kill, too, but only the group's own limit counts as oom.
+    return events["oom"] > 0 && events["oom_kill"] > 0;
 }
 
 bool ControlGroup::remove() const {
@@ -122,9 +126,12 @@ ControlGroups::ControlGroups() {
 ControlGroup ControlGroups::create(std::uint64_t memory_bytes) {
     if (delegated_.empty())
         return {};
-    const fs::path folder = delegated_ / (std::string(sandbox::worker_group) + std::to_string(++count_));
+    fs::path folder;
     std::error_code error;
-    if (!fs::create_directory(folder, error))
+    do // a group of an earlier launcher may still exist
+        folder = delegated_ / (std::string(sandbox::worker_group) + std::to_string(++count_));
+    while (!fs::create_directory(folder, error) && !error);
+    if (error)
         return {};
     if (memory_bytes) {
         write(folder / "memory.max", std::to_string(memory_bytes + other_memory_bytes));

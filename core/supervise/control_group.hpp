@@ -24,7 +24,7 @@ public:
     ControlGroup() = default;
     explicit ControlGroup(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
-    void join() const;                 // moves the calling process, which must be single-threaded, to the group
+    void join() const;                 // moves the calling process to the group
     void kill() const;                 // kills all its processes
     bool exceeded_memory() const;      // whether the kernel has killed a process because of the group's memory limit
     [[nodiscard]] bool remove() const; // returns false if a process has not exited yet

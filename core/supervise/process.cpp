@@ -190,8 +190,13 @@ void Process::watch_output() {
         if (!output_watch_.active())
             return;
         output_watch_.cancel();
-        output_pause_ =
-            context_.reactor.at(Reactor::Clock::now() + std::chrono::milliseconds(10), [this] { watch_output(); });
+        output_pause_ = context_.reactor.at(Reactor::Clock::now() + std::chrono::milliseconds(10), [this] {
+            try {
+                watch_output();
+            } catch (const std::system_error &error) { // the user's limit of epoll watches is reached
+                end(std::string("its output cannot be read: ") + error.what());
+            }
+        });
     });
 }
 
@@ -217,7 +222,8 @@ void Process::read_output(std::size_t max_bytes) {
 }
 
 void Process::append_to_tail(const std::string &line) {
-    tail_.push_back(line);
+    constexpr std::size_t max_line = 400;
+    tail_.push_back(line.substr(0, max_line));
     if (tail_.size() > 20)
         tail_.pop_front();
 }
@@ -246,7 +252,7 @@ void Process::on_death() {
     else
         death.how = "exited with status " + std::to_string(WEXITSTATUS(exit.wait_status)) + " " + to_text(call);
     if (exit.exceeded_memory)
-        death.how += ": it used more memory than 'memory_mb' allows";
+        death.how += ": it used more memory than its control group allows (see 'memory_mb')";
     if (!end_reason_.empty())
         death.how = end_reason_ + "; " + death.how;
     for (const std::string &line : tail_)
