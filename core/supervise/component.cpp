@@ -292,8 +292,9 @@ bool Component::loses_its_device_often() {
 }
 
 void Component::record_crash(Crash crash) {
+    constexpr std::size_t max_crashes = 20; // limits the statistics and the memory of the host
     crashes_.push_back(std::move(crash));
-    if (crashes_.size() > 100)
+    if (crashes_.size() > max_crashes)
         crashes_.pop_front();
 }
 

@@ -98,7 +98,7 @@ public:
     // Logs a line for which the worker is responsible (WorkerBudget::log).
     void log(arhost_severity severity, const std::string &text) { budget_.log(severity, text); }
     double cpu_seconds() const { return cpu_seconds_of_dead_ + (process_ ? process_->cpu_seconds() : 0); }
-    const std::deque<Crash> &crashes() const { return crashes_; } // the last 100
+    const std::deque<Crash> &crashes() const { return crashes_; } // the last 20
 
 private:
     void spawn();

@@ -10,15 +10,15 @@ namespace arhost::supervise {
 
 void WorkerBudget::log(arhost_severity severity, const std::string &text, Clock::time_point now) {
     constexpr std::size_t max_recent_lines = 32;
-    std::erase_if(recent_lines_, [&](const auto &line) { return now - line.second > std::chrono::seconds(10); });
-    const auto [line, is_new] = recent_lines_.insert_or_assign({severity, text}, now);
-    if (!is_new) {
+    std::erase_if(recent_lines_, [&](const auto &line) { return now - line.second >= std::chrono::seconds(10); });
+    if (!recent_lines_.try_emplace({severity, text}, now).second) {
         ++repetitions_[severity >= ARHOST_SEVERITY_WARNING];
         return;
     }
     if (recent_lines_.size() > max_recent_lines)
         recent_lines_.clear();
-    log(severity >= ARHOST_SEVERITY_WARNING ? warnings_ : other_lines_, severity, text, now);
+    log(severity >= ARHOST_SEVERITY_WARNING ? warnings_ : other_lines_, severity,
+        text.substr(0, ipc::messages::max_text), now);
 }
 
 void WorkerBudget::report_repetitions(Clock::time_point now) {
@@ -26,7 +26,7 @@ void WorkerBudget::report_repetitions(Clock::time_point now) {
         if (const std::uint64_t count = std::exchange(repetitions_[are_warnings], 0))
             log(are_warnings ? warnings_ : other_lines_,
                 are_warnings ? ARHOST_SEVERITY_WARNING : ARHOST_SEVERITY_DEBUG,
-                std::to_string(count) + " lines that repeat others were not printed", now);
+                "lines that repeat others and were not printed: " + std::to_string(count), now);
 }
 
 void WorkerBudget::log_death(const std::string &text, Clock::time_point now) {
@@ -39,7 +39,7 @@ void WorkerBudget::log(LineCount &lines, arhost_severity severity, const std::st
         second_ends_ = now + std::chrono::seconds(1);
     }
     if (lines.logged++ < max_lines)
-        log_(severity, name_, text.substr(0, ipc::messages::max_text));
+        log_(severity, name_, text);
     else
         ++lines.suppressed;
 }

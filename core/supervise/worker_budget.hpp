@@ -29,9 +29,9 @@ public:
     WorkerBudget &operator=(const WorkerBudget &) = delete;
 
     // Logs a line that a worker sent or caused. Counts lines beyond the limit; the next line of a later second is
-    // preceded by their number. Only counts a line that repeats another of the last 10 s.
+    // preceded by their number. Only counts a line that was already printed in the last 10 s.
     void log(arhost_severity severity, const std::string &text, Clock::time_point now = Clock::now());
-    // Logs a warning about the death of a worker.
+    // Logs a warning about the death of a worker. The host has composed it from texts of limited size.
     void log_death(const std::string &text, Clock::time_point now = Clock::now());
     // Logs the number of repeated lines.
     void report_repetitions(Clock::time_point now = Clock::now());
@@ -51,8 +51,9 @@ private:
     std::string name_;
     Clock::time_point second_ends_{}, last_spent_{};
     LineCount other_lines_, warnings_, deaths_;
-    std::map<std::pair<arhost_severity, std::string>, Clock::time_point> recent_lines_; // with their last time
-    std::uint64_t repetitions_[2] = {};                                                 // [1]: of warnings and errors
+    std::map<std::pair<arhost_severity, std::string>, Clock::time_point>
+        recent_lines_;                  // with the time when they were printed
+    std::uint64_t repetitions_[2] = {}; // [1]: of warnings and errors
     double left_ = max_cost;
 };
 
