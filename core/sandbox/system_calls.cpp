@@ -63,9 +63,8 @@ constexpr const char *allowed[] = {
     "open", "openat", "openat2", "pread64", "preadv", "preadv2", "read", "readahead", "readlink", "readlinkat",
     "readv", "stat", "statfs", "statx", "umask", "write", "writev", "pwrite64", "pwritev", "pwritev2",
     // pipes, events and waiting
-    "epoll_create", "epoll_create1", "epoll_ctl", "epoll_pwait", "epoll_pwait2", "epoll_wait", "eventfd", "eventfd2",
-    "pipe", "pipe2", "poll", "ppoll", "pselect6", "select", "signalfd", "signalfd4", "timerfd_create",
-    "timerfd_gettime", "timerfd_settime",
+    "eventfd", "eventfd2", "pipe", "pipe2", "poll", "ppoll", "pselect6", "select", "signalfd", "signalfd4",
+    "timerfd_create", "timerfd_gettime", "timerfd_settime",
     // connected sockets
     "getpeername", "getsockname", "getsockopt", "recvfrom", "recvmmsg", "recvmsg", "sendmmsg", "sendmsg", "sendto",
     "setsockopt", "shutdown", "socket", "socketpair",
@@ -105,6 +104,11 @@ constexpr CallsOf allowed_by[] = {
     {"network", {"accept", "accept4", "bind", "connect", "listen"}},
     {"processes", {"execve", "execveat", "fork", "setpgid", "setsid", "vfork", "wait4", "waitid"}},
 };
+
+// Allowed with `network` and `processes`; without them, libraries fall back to poll. The watches of epoll are counted
+// per user, and they slow down the host's use and release of shared files: the kernel calls or frees each of them.
+constexpr const char *epoll_calls[] = {"epoll_create", "epoll_create1", "epoll_ctl",
+                                       "epoll_pwait",  "epoll_pwait2",  "epoll_wait"};
 
 class Filter {
 public:
@@ -236,6 +240,7 @@ void deny_socket_options(Filter &filter, const Policy &policy) {
     constexpr int pass_pidfd = 76, peer_pidfd = 77; // not in Debian 12's headers
     std::set<int> options = {SO_SNDBUF,        SO_RCVBUF,     SO_SNDBUFFORCE,           SO_RCVBUFFORCE,
                              SO_ATTACH_FILTER, SO_ATTACH_BPF, SO_ATTACH_REUSEPORT_CBPF, SO_ATTACH_REUSEPORT_EBPF,
+                             SO_LINGER, // the last close of a socket would wait, also if the host closes it
                              pass_pidfd};
     if (policy.allows("usb"))
         options.erase(SO_ATTACH_FILTER); // libudev filters its events
@@ -280,6 +285,9 @@ void allow_needed_calls(const Policy &policy) {
         if (policy.allows(added.allowance))
             for (const char *call : added.calls)
                 filter.allow(call);
+    if (policy.allows("network") || policy.allows("processes"))
+        for (const char *call : epoll_calls)
+            filter.allow(call);
     filter.load();
 }
 
@@ -287,14 +295,18 @@ void allow_needed_calls(const Policy &policy) {
 
 Layer filter_system_calls(const Policy &policy) {
     const bool has_allow_list = !policy.allows("gpu") && !policy.allows("display") && !under_sanitizer;
+    Layer layer{"seccomp", "", ""};
     try {
         deny_harmful_calls(policy);
-        if (has_allow_list)
+        layer.active = "deny list";
+        if (has_allow_list) {
             allow_needed_calls(policy);
+            layer.active = "allow list";
+        }
     } catch (const std::exception &error) {
-        return {"seccomp", "", std::string("cannot load the filters: ") + error.what()};
+        layer.missing = std::string("cannot load the filters: ") + error.what();
     }
-    return {"seccomp", has_allow_list ? "allow list" : "deny list", ""};
+    return layer;
 }
 
 } // namespace arhost::sandbox

@@ -122,6 +122,8 @@ inline constexpr Attack attacks[] = {
     {"descriptors", "more than 1024", by_other_layers},
     {"descriptors", "a thousand in flight", by_other_layers},
     {"exhaust", "inotify instances", by_other_layers},
+    {"exhaust", "epoll watches", by_other_layers},
+    {"exhaust", "a lingering close", by_other_layers},
     {"exhaust", "timers", by_other_layers},
     {"exhaust", "queued signals", by_other_layers},
     {"exhaust", "AIO events", by_other_layers},

@@ -20,6 +20,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/epoll.h>
 #include <sys/file.h>
 #include <sys/inotify.h>
 #include <sys/ioctl.h>
@@ -406,6 +407,7 @@ static void start_threads(const tracker *self) {
 static void exhaust_user(const tracker *self) {
     enum { many = 3000, big = 8 << 20 };
     const struct rlimit endless = {RLIM_INFINITY, RLIM_INFINITY}, more = {4096, 4096};
+    const struct linger long_wait = {1, 120};
     const int size = big;
     int ends[2], made, found;
     unsigned long io = 0;
@@ -425,6 +427,10 @@ static void exhaust_user(const tracker *self) {
     for (made = 0; made < many && sigqueue(getpid(), SIGRTMIN + 5, value) == 0;)
         ++made;
     report(self, "queued signals", made == many);
+    report(self, "epoll watches", epoll_create1(EPOLL_CLOEXEC) >= 0);
+    report(self, "a lingering close",
+           socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0 &&
+               setsockopt(ends[0], SOL_SOCKET, SO_LINGER, &long_wait, sizeof long_wait) == 0);
     report(self, "AIO events", syscall(SYS_io_setup, 10000, &io) == 0);
     report(self, "a larger pipe", pipe(ends) == 0 && fcntl(ends[1], F_SETPIPE_SZ, 1 << 20) >= 1 << 20);
     report(self, "a larger socket buffer",
