@@ -71,6 +71,17 @@ void copy_row(std::uint32_t fourcc, const std::uint8_t *from, std::size_t bytes,
     }
 }
 
+std::uint32_t encoding_of(const PictureFormat &camera) {
+    return camera.ycbcr_encoding == V4L2_YCBCR_ENC_DEFAULT
+               ? std::uint32_t{V4L2_MAP_YCBCR_ENC_DEFAULT(camera.colour_space)}
+               : camera.ycbcr_encoding;
+}
+
+bool is_chromatic(arhost_pixel_format format) {
+    return format == ARHOST_PIXEL_FORMAT_YUYV || format == ARHOST_PIXEL_FORMAT_NV12 ||
+           format == ARHOST_PIXEL_FORMAT_I420;
+}
+
 } // namespace
 
 const RawFormat *find_raw_format(std::uint32_t fourcc) {
@@ -85,9 +96,7 @@ bool describe(const PictureFormat &camera, arhost_frame_format &format) {
     format.pixel_format = raw->delivered;
     format.width = camera.width;
     format.height = camera.height;
-    const std::uint32_t encoding = camera.ycbcr_encoding == V4L2_YCBCR_ENC_DEFAULT
-                                       ? std::uint32_t{V4L2_MAP_YCBCR_ENC_DEFAULT(camera.colour_space)}
-                                       : camera.ycbcr_encoding;
+    const std::uint32_t encoding = encoding_of(camera);
     format.yuv_matrix = encoding == V4L2_YCBCR_ENC_709 || encoding == V4L2_YCBCR_ENC_XV709 ? ARHOST_YUV_MATRIX_BT709
                                                                                            : ARHOST_YUV_MATRIX_BT601;
     const std::uint32_t range =
@@ -96,6 +105,13 @@ bool describe(const PictureFormat &camera, arhost_frame_format &format) {
             : camera.quantization;
     format.yuv_range = range == V4L2_QUANTIZATION_FULL_RANGE ? ARHOST_YUV_RANGE_FULL : ARHOST_YUV_RANGE_LIMITED;
     return true;
+}
+
+bool has_known_matrix(const PictureFormat &camera) {
+    const RawFormat *raw = find_raw_format(camera.fourcc);
+    const std::uint32_t known[] = {V4L2_YCBCR_ENC_601, V4L2_YCBCR_ENC_XV601, V4L2_YCBCR_ENC_709,
+                                   V4L2_YCBCR_ENC_XV709};
+    return !raw || !is_chromatic(raw->delivered) || std::ranges::count(known, encoding_of(camera)) > 0;
 }
 
 std::string defect_of(const PictureFormat &camera) {

@@ -43,6 +43,9 @@ const RawFormat *find_raw_format(std::uint32_t fourcc);
 // Sets pixel format, size and, for Y'CbCr, matrix and range. Returns false for compressed and unknown formats.
 bool describe(const PictureFormat &camera, arhost_frame_format &format);
 
+// Whether describe() sets the driver's matrix; otherwise it sets that of BT.601.
+bool has_known_matrix(const PictureFormat &camera);
+
 // Returns what is wrong with the rows that the driver reports ("rows of 100 bytes for 640 px"), or an empty string.
 std::string defect_of(const PictureFormat &camera);
 

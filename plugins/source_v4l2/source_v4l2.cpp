@@ -124,7 +124,11 @@ public:
         arhost_frame_format format{};
         format.struct_size = properties.format.struct_size;
         stream_.emplace(*device_, buffer_count_);
-        if (!arhost::describe(camera_, format)) {
+        if (arhost::describe(camera_, format)) {
+            if (!arhost::has_known_matrix(camera_))
+                host_.warn(
+                    "the camera's Y'CbCr matrix is neither that of BT.601 nor of BT.709, so colours are inexact");
+        } else {
             describe_first_picture(format);
             if (Size{format.width, format.height} != size)
                 throw Failure(ARHOST_STATUS_ERROR_IO, "the camera '" + path_ + "' was set to " + mode +
@@ -221,11 +225,12 @@ private:
         for (const auto &[option, text] : control_values_) {
             const bool is_automatic = text == "auto";
             if (const arhost::Control *mode = controls.find(option->mode_id)) {
-                for (const std::int64_t value : is_automatic ? option->automatic : option->manual)
-                    if (mode->items.empty() || mode->items.contains(value)) {
-                        warn(controls.set(*mode, std::to_string(value), option->name));
-                        break;
-                    }
+                // The last value is an error of set() if the camera has none of them.
+                const std::vector<std::int64_t> &values = is_automatic ? option->automatic : option->manual;
+                const auto value = std::find_if(values.begin(), values.end() - 1, [&](std::int64_t candidate) {
+                    return mode->items.empty() || mode->items.contains(candidate);
+                });
+                warn(controls.set(*mode, std::to_string(*value), option->name));
             } else if (is_automatic) {
                 controls.fail_missing(std::string("auto ") + option->name, option->name);
             }
@@ -406,12 +411,12 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "format", "auto",
            "Pixel format of the camera; auto: uncompressed if that is fast enough, otherwise mjpeg.", 0, 0, formats),
     option(ARHOST_OPTION_INTEGER, "buffers", "4", "Number of driver buffers.", 2, 32),
-    option(ARHOST_OPTION_TEXT, "exposure", "", "Exposure time in units of 100 µs, or auto; empty: unchanged."),
-    option(ARHOST_OPTION_TEXT, "gain", "", "Gain in units of the camera, or auto; empty: unchanged."),
-    option(ARHOST_OPTION_TEXT, "focus", "", "Focus in units of the camera, or auto; empty: unchanged."),
-    option(ARHOST_OPTION_TEXT, "white_balance", "", "Colour temperature in K, or auto; empty: unchanged."),
+    option(ARHOST_OPTION_TEXT, "exposure", "", "Exposure time in units of 100 µs, or auto; not set: unchanged."),
+    option(ARHOST_OPTION_TEXT, "gain", "", "Gain in units of the camera, or auto; not set: unchanged."),
+    option(ARHOST_OPTION_TEXT, "focus", "", "Focus in units of the camera, or auto; not set: unchanged."),
+    option(ARHOST_OPTION_TEXT, "white_balance", "", "Colour temperature in K, or auto; not set: unchanged."),
     option(ARHOST_OPTION_TEXT, "power_line_frequency", "",
-           "Frequency of the lamps, to avoid flicker: disabled, 50_hz, 60_hz or auto; empty: unchanged."),
+           "Frequency of the lamps, to avoid flicker: disabled, 50_hz, 60_hz or auto; not set: unchanged."),
     option(ARHOST_OPTION_TEXT, "controls", "",
            "Further controls by the names that v4l2-ctl -l lists: 'sharpness=3, backlight_compensation=1'."),
 };

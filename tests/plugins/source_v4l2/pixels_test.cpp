@@ -179,5 +179,8 @@ TEST(V4l2Pixels, HaveTheMatrixAndRangeOfTheDriver) {
                          format));
     EXPECT_EQ(format.yuv_matrix, ARHOST_YUV_MATRIX_BT601);
     EXPECT_EQ(format.yuv_range, ARHOST_YUV_RANGE_FULL);
+    EXPECT_TRUE(has_known_matrix({V4L2_PIX_FMT_NV12, width, height, V4L2_COLORSPACE_REC709, 0, 0, {width}}));
+    EXPECT_FALSE(has_known_matrix({V4L2_PIX_FMT_NV12, width, height, V4L2_COLORSPACE_BT2020, 0, 0, {width}}));
+    EXPECT_TRUE(has_known_matrix({V4L2_PIX_FMT_RGB24, width, height, V4L2_COLORSPACE_BT2020, 0, 0, {width}}));
     EXPECT_FALSE(describe({V4L2_PIX_FMT_MJPEG, width, height, 0, 0, 0, {}}, format));
 }

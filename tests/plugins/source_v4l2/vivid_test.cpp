@@ -212,7 +212,7 @@ TEST_F(Vivid, ColourBarsHaveTheCorrectColours) {
     }
 }
 
-TEST_F(Vivid, DeliversEveryUncompressedFormat) {
+TEST_F(Vivid, DeliversEachFormatOfTheOption) {
     const std::vector<std::pair<std::string, arhost_pixel_format>> formats = {
         {"yuyv", ARHOST_PIXEL_FORMAT_YUYV},  {"uyvy", ARHOST_PIXEL_FORMAT_YUYV},
         {"nv12", ARHOST_PIXEL_FORMAT_NV12},  {"yuv420", ARHOST_PIXEL_FORMAT_I420},
