@@ -325,7 +325,13 @@ static incident_light incident_from(const arhost_light *light, const surface *s)
 /* Returns SOLID if an opaque object blocks the light, GLASS if only glass does, otherwise 0. Proxies for real objects
  * cast no shadows on each other: the video already contains those. */
 static unsigned blocked_by(const tracer *self, const incident_light *light, const surface *s) {
-    const ray shadow_ray = {s->lifted, light->direction, light->distance};
+    ray shadow_ray = {s->lifted, light->direction, light->distance};
+    if (isfinite(light->distance)) {
+        const vec light_position = add(s->position, scale(light->distance, light->direction));
+        const vec to_light = subtract(light_position, s->lifted);
+        shadow_ray.end = length(to_light);
+        shadow_ray.direction = normalised(to_light);
+    }
     if (nearest_hit(self, shadow_ray, s->is_real ? SOLID : SOLID | CATCHER | OCCLUDER, 0).object)
         return SOLID;
     return nearest_hit(self, shadow_ray, GLASS, 0).object ? GLASS : 0;

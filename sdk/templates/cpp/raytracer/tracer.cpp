@@ -237,7 +237,12 @@ Tracer::IncidentLight Tracer::incident(const arhost_light &light, const Surface 
 
 // Proxies for real objects cast no shadows on each other: the video already contains those.
 Tracer::Visibility Tracer::visibility(const IncidentLight &light, const Surface &surface) const {
-    const Ray ray = {surface.lifted, light.direction, light.distance};
+    Ray ray = {surface.lifted, light.direction, light.distance};
+    if (light.distance < infinity) {
+        const Vec to_light = surface.position + light.distance * light.direction - surface.lifted;
+        ray.end = length(to_light);
+        ray.direction = (1 / ray.end) * to_light;
+    }
     if (nearest(ray, surface.is_real ? solid : solid | catcher | occluder).object)
         return Visibility::blocked;
     return nearest(ray, glass).object ? Visibility::through_glass : Visibility::clear;

@@ -211,6 +211,10 @@ class Tracer:
     def visibility(self, direction, distance, surface, facing):
         """For the points that face a light: whether it is blocked, and whether it is visible through glass. Proxies for
         real objects cast no shadows on each other: the video already contains those."""
+        if np.isfinite(distance[:1]).all():  # not a directional light
+            to_light = surface.position + distance[:, None] * direction - surface.lifted
+            distance = length(to_light)
+            direction = to_light / distance[:, None]
         blocked, through_glass = np.zeros((2, len(facing)), bool)
         for real, opaque in ((False, SOLID | CATCHER | OCCLUDER), (True, SOLID)):
             some = np.flatnonzero(facing & (surface.is_real == real))

@@ -340,7 +340,12 @@ enum Visibility {
 impl Tracer {
     /// Proxies for real objects cast no shadows on each other: the video already contains those.
     fn visibility(&self, light: &IncidentLight, surface: &Surface) -> Visibility {
-        let ray = Ray { origin: surface.lifted, direction: light.direction, end: light.distance };
+        let mut ray = Ray { origin: surface.lifted, direction: light.direction, end: light.distance };
+        if light.distance.is_finite() {
+            let to_light = surface.position + light.distance * light.direction - surface.lifted;
+            ray.end = length(to_light);
+            ray.direction = (1.0 / ray.end) * to_light;
+        }
         let opaque = if surface.is_real { SOLID } else { SOLID | CATCHER | OCCLUDER };
         if self.nearest(&ray, opaque, Faces::All).object.is_some() {
             return Visibility::Blocked;
