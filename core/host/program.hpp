@@ -12,7 +12,8 @@
 namespace arhost::host {
 
 void add_configuration_options(base::CommandLine &command, Arguments &arguments); // --set, --verbose
-base::Option add_run_options(base::CommandLine &command, Arguments &arguments);   // also the others; returns --config
+// Adds all options of a run and returns the option --config.
+base::Option add_run_options(base::CommandLine &command, Arguments &arguments);
 
 // Prints the error as a single line, even if a file name in it contains a line break. Returns `exit_status`.
 int print_error(const std::string &why, int exit_status);

@@ -11,7 +11,9 @@ namespace {
 namespace fs = std::filesystem;
 using base::real_path;
 
-void expect_grantable(const yaml::Node &node, const fs::path &path) {
+void expect_grantable(const sandbox::Policy &policy, const yaml::Node &node, const fs::path &path) {
+    if (policy.mode == sandbox::Mode::none)
+        return;
     if (const std::string obstacle = sandbox::obstacle_to_grant(path); !obstacle.empty())
         node.fail(obstacle);
 }
@@ -21,7 +23,9 @@ void expect_grantable(const yaml::Node &node, const fs::path &path) {
 // target.
 void allow_write(sandbox::Policy &policy, const yaml::Node &path) {
     const fs::path file = path.output_path();
-    expect_grantable(path, file.parent_path());
+    if (policy.mode != sandbox::Mode::none && !sandbox::obstacle_to_grant(file.parent_path()).empty())
+        path.fail("the sandbox cannot let an output write to the folder '" + file.parent_path().string() +
+                  "'; choose another folder");
     policy.writable.push_back(file.parent_path());
     if (const fs::path folder = real_path(file).parent_path(); folder != policy.writable.back())
         policy.writable.push_back(folder);
@@ -34,7 +38,7 @@ void add_reads(sandbox::Policy &policy, const yaml::Node &paths) {
         if (!fs::exists(policy.readable.back(), ignored))
             path.fail("there is no file or folder '" + policy.readable.back().string() +
                       "', or it cannot be accessed; correct the path or remove it");
-        expect_grantable(path, policy.readable.back());
+        expect_grantable(policy, path, policy.readable.back());
     }
 }
 
@@ -45,7 +49,7 @@ void add_writes(sandbox::Policy &policy, const yaml::Node &folders) {
         if (!fs::is_directory(policy.writable.back(), ignored))
             folder.fail("there is no folder '" + policy.writable.back().string() +
                         "', or it cannot be accessed; name an existing folder (mkdir -p creates one)");
-        expect_grantable(folder, policy.writable.back());
+        expect_grantable(policy, folder, policy.writable.back());
     }
 }
 
@@ -66,8 +70,9 @@ std::optional<yaml::Node> path_of(const yaml::Node &component) {
     return path || !options || !options->is_map() ? path : options->find("path");
 }
 
-sandbox::Policy access_of(const yaml::Node &node, bool is_output) {
+sandbox::Policy access_of(const yaml::Node &node, bool is_output, sandbox::Mode mode) {
     sandbox::Policy policy;
+    policy.mode = mode;
     if (const auto allow = node.find("allow"))
         for (const yaml::Node &what : allow->items())
             policy.allow.insert(what.choice(sandbox::allowances));

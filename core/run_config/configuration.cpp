@@ -91,8 +91,7 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
     component.limits.start_total = base::Limits::total_factor * component.limits.start;
     component.limits.stop_total = base::Limits::total_factor * component.limits.stop;
     component.limits.restart = shared.restart;
-    component.policy = access_of(node, schema_path == "outputs[]");
-    component.policy.mode = shared.sandbox;
+    component.policy = access_of(node, schema_path == "outputs[]", shared.sandbox);
     component.policy.memory_bytes =
         static_cast<std::uint64_t>(integer_or_default(node, schema_path + ".memory_mb", 0, 1'000'000'000)) << 20;
     if (component.policy.memory_bytes && component.policy.allows("gpu"))

@@ -19,7 +19,7 @@ namespace {
 struct Access : testing::Test {
     arhost::sandbox::Policy of(const std::string &component, bool is_output) {
         std::ofstream(folder / "run.yaml") << component;
-        return access_of(Node::load(folder / "run.yaml"), is_output);
+        return access_of(Node::load(folder / "run.yaml"), is_output, arhost::sandbox::Mode::standard);
     }
     std::string error_of(const std::string &component) {
         try {

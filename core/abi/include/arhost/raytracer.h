@@ -33,11 +33,11 @@ typedef struct arhost_render_request {
 
 /* The image to write: R, G, B, A bytes, straight (not premultiplied) alpha, sRGB-encoded, top row first. Alpha is
  * exactly 0 where the primary ray hits nothing (the colour is then ignored) and 255 on virtual objects. Samples of a
- * pixel are averaged in linear light, in which samples brighter than white count in full, and then encoded. Virtual
- * objects and shadows are averaged apart and blended in sRGB by their shares of the alpha. Near clip: 1e-4 × scene
- * extent. Write every pixel and nothing else. `rgba` is aligned to a 4,096-byte page and its last page is fully
- * mapped, so a GPU can import the memory; leave the bytes after the last row unchanged. Between `start` and `stop`,
- * `rgba` takes at most 8 different values. */
+ * pixel are averaged in linear light and then encoded; samples brighter than white count in full, up to a bound of at
+ * least 100 times white. Virtual objects and shadows are averaged apart and blended in sRGB by their shares of the
+ * alpha. Near clip: 1e-4 × scene extent. Write every pixel and nothing else. `rgba` is aligned to a 4,096-byte page
+ * and its last page is fully mapped, so a GPU can import the memory; leave the bytes after the last row unchanged.
+ * Between `start` and `stop`, `rgba` takes at most 8 different values. */
 typedef struct arhost_image {
     uint32_t struct_size;
     uint32_t stride; /* bytes per row, a multiple of 64 */
