@@ -71,12 +71,14 @@ TEST(Film, ShowsTheFramesOfALiveRunAtTheirCaptureTimes) {
     for (cv::Mat picture; film.read(picture);)
         shown_ms.push_back(film.get(cv::CAP_PROP_POS_MSEC));
     ASSERT_GT(shown_ms.size(), 1u);
-    for (const double ms : shown_ms) { // a busy film may have dropped frames, but not the first one
-        double nearest = 1e9;
-        for (const double captured : captured_ms)
-            nearest = std::min(nearest, std::abs(captured - captured_ms.front() - ms));
-        EXPECT_LE(nearest, 2.1) << ms;
-    }
+    // Each output drops frames of its own if the machine is busy, but not the first one.
+    const auto is_capture_time = [&](double ms) {
+        return std::ranges::any_of(
+            captured_ms, [&](double captured) { return std::abs(captured - captured_ms.front() - ms) <= 2.1; });
+    };
+    const auto stats = nlohmann::json::parse(run.read("stats.json"));
+    const auto missing_poses = stats["frames"]["dropped"].value("sink_poses", std::ptrdiff_t(0));
+    EXPECT_LE(std::ranges::count_if(shown_ms, std::not_fn(is_capture_time)), missing_poses) << stats.dump(1);
 }
 
 // Tests all components together: moving objects must be rendered at the capture time of the frame.

@@ -92,7 +92,8 @@ TEST(Live, ShownFramesEqualThoseOfLockstep) {
         if (!live.exists(name))
             continue;
         ++shown;
-        EXPECT_TRUE(live.read(name) == lockstep.read(name)) << name << ": the overlay belongs to another frame";
+        EXPECT_TRUE(live.read(name) == lockstep.read(name)) << name << ": the overlay belongs to another frame\n"
+                                                            << stats.dump(1) << live.output();
     }
     EXPECT_EQ(shown + dropped(stats), 45u) << stats.dump(1);
     EXPECT_GT(shown, 2u);
