@@ -4,10 +4,13 @@
 #include "arhost_run.hpp"
 
 #include <gmock/gmock.h>
+
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
+#include <algorithm>
+#include <functional>
 #include <sched.h>
 #include <sys/mount.h>
 
