@@ -86,14 +86,23 @@ TEST(Live, ShownFramesEqualThoseOfLockstep) {
     std::uint64_t shown = 0;
     EXPECT_GT(stats["frames"]["dropped"]["raytracer"], 0) << stats.dump(1);
     ASSERT_EQ(lockstep.run({"--config", "run.yaml", "--set", "source.fps=0"}), 0) << lockstep.output();
-    for (int frame = 0; frame < 45; ++frame) {
+    const auto name_of = [](int frame) {
         char name[16];
         std::snprintf(name, sizeof name, "%04d.png", frame);
-        if (!live.exists(name))
+        return std::string(name);
+    };
+    // On a busy machine the source skips frames, and its later frames have lower numbers than in lockstep.
+    const int skipped = stats["frames"]["dropped"].value("source", 0);
+    for (int frame = 0; frame < 45; ++frame) {
+        if (!live.exists(name_of(frame)))
             continue;
         ++shown;
-        EXPECT_TRUE(live.read(name) == lockstep.read(name)) << name << ": the overlay belongs to another frame\n"
-                                                            << stats.dump(1) << live.output();
+        const std::string picture = live.read(name_of(frame));
+        bool is_frame_of_lockstep = false;
+        for (int i = frame; i <= std::min(frame + skipped, 44); ++i)
+            is_frame_of_lockstep |= picture == lockstep.read(name_of(i));
+        EXPECT_TRUE(is_frame_of_lockstep) << name_of(frame) << ": the overlay belongs to another frame\n"
+                                          << stats.dump(1) << live.output();
     }
     EXPECT_EQ(shown + dropped(stats), 45u) << stats.dump(1);
     EXPECT_GT(shown, 2u);
