@@ -70,7 +70,13 @@ void ring_doorbell(int worker_end) {
 
 int drain_doorbell(int host_end) {
     char bytes[4096];
-    const ssize_t count = ::recv(host_end, bytes, sizeof bytes, MSG_DONTWAIT);
+    iovec part{bytes, sizeof bytes};
+    msghdr header{};
+    header.msg_iov = &part;
+    header.msg_iovlen = 1;
+    const ssize_t count = ::recvmsg(host_end, &header, MSG_DONTWAIT);
+    if (count > 0 && (header.msg_flags & MSG_CTRUNC)) // there is no room for descriptors
+        return -2;
     if (count > 0)
         return static_cast<int>(count);
     if (count == 0)

@@ -41,7 +41,8 @@ struct DoorbellPair {
 DoorbellPair make_doorbell();
 void ring_doorbell(int worker_end);
 
-// Reads all rings of the doorbell and returns their number, or -1 if the other end is closed. Reads at most 4096 per
+// Reads all rings of the doorbell and returns their number; -1 if the other end is closed; -2 if the worker sent file
+// descriptors, which it must not do. Reads at most 4096 per
 // call, which bounds the time that the host spends.
 int drain_doorbell(int host_end);
 

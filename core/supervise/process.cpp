@@ -122,6 +122,11 @@ void Process::receive_messages(int max_messages) {
             channel_watch_.cancel();
             return end("protocol violation: it floods its control channel with messages");
         }
+        if (!message.fds.empty() && !is<messages::Loaded>(message)) {
+            // The kernel frees what they refer to in the time of the host.
+            channel_watch_.cancel();
+            return end("protocol violation: it sent file descriptors");
+        }
         try {
             if (is<messages::Log>(message)) {
                 const auto [severity, text] = parse<messages::Log>(message);
@@ -160,6 +165,8 @@ void Process::on_doorbell() {
     const int rings = drain_doorbell(spawned_.doorbell.get());
     if (rings < 0) {
         doorbell_watch_.cancel();
+        if (rings == -2)
+            end("protocol violation: it sent file descriptors");
         return;
     }
     rings_ += static_cast<std::uint64_t>(rings);

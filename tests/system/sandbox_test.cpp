@@ -696,6 +696,14 @@ TEST(Sandbox, AFloodedDoorbellEndsTheWorker) {
     expect_ended(run, "floods its doorbell");
 }
 
+TEST(Sandbox, DescriptorsForTheHostEndTheWorker) {
+    for (const char *attack : {"descriptor_in_message", "descriptor_in_doorbell"}) {
+        SCOPED_TRACE(attack);
+        HostileRun run(attack);
+        expect_ended(run, "protocol violation: it sent file descriptors");
+    }
+}
+
 TEST(Sandbox, AFloodOfMessagesEndsTheWorker) {
     for (const char *attack : {"large_messages", "small_messages"}) {
         SCOPED_TRACE(attack);

@@ -624,6 +624,26 @@ static void send_small_messages(void) {
         say_text("{\"type\": \"detached\"}");
 }
 
+/* Sends an open file to the host, which must release it. */
+static void send_descriptor(int socket) {
+    char text[] = "{\"type\": \"detached\"}";
+    const int fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
+    _Alignas(struct cmsghdr) char ancillary[CMSG_SPACE(sizeof(int))] = {0};
+    struct iovec part = {text, sizeof text - 1};
+    struct msghdr message = {0};
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    message.msg_control = ancillary;
+    message.msg_controllen = sizeof ancillary;
+    CMSG_FIRSTHDR(&message)->cmsg_level = SOL_SOCKET;
+    CMSG_FIRSTHDR(&message)->cmsg_type = SCM_RIGHTS;
+    CMSG_FIRSTHDR(&message)->cmsg_len = CMSG_LEN(sizeof(int));
+    memcpy(CMSG_DATA(CMSG_FIRSTHDR(&message)), &fd, sizeof fd);
+    (void)!sendmsg(socket, &message, MSG_NOSIGNAL);
+    for (;;)
+        pause();
+}
+
 static void print_lines(void) {
     int i;
     for (i = 0; i < 20000; ++i)
@@ -717,6 +737,10 @@ static void attack(const tracker *self) {
         say_text("{\"type\": ");
     else if (!strcmp(name, "wrong_types"))
         say_text("{\"type\": \"log\", \"severity\": [], \"text\": {}}");
+    else if (!strcmp(name, "descriptor_in_message"))
+        send_descriptor(control);
+    else if (!strcmp(name, "descriptor_in_doorbell"))
+        send_descriptor(doorbell);
     else if (!strcmp(name, "huge_type"))
         send_huge_type();
     else if (!strcmp(name, "out_of_turn"))
