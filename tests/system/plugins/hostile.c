@@ -465,6 +465,22 @@ static void fill_disk(const tracker *self) {
     }
 }
 
+/* Sends bytes together with a file descriptor. */
+static ssize_t send_with_descriptor(int socket, char *bytes, size_t size, int fd, int flags) {
+    _Alignas(struct cmsghdr) char ancillary[CMSG_SPACE(sizeof(int))] = {0};
+    struct iovec part = {bytes, size};
+    struct msghdr message = {0};
+    message.msg_iov = &part;
+    message.msg_iovlen = 1;
+    message.msg_control = ancillary;
+    message.msg_controllen = sizeof ancillary;
+    CMSG_FIRSTHDR(&message)->cmsg_level = SOL_SOCKET;
+    CMSG_FIRSTHDR(&message)->cmsg_type = SCM_RIGHTS;
+    CMSG_FIRSTHDR(&message)->cmsg_len = CMSG_LEN(sizeof(int));
+    memcpy(CMSG_DATA(CMSG_FIRSTHDR(&message)), &fd, sizeof fd);
+    return sendmsg(socket, &message, flags);
+}
+
 /* Keeps as many descriptors as possible: open ones, and ones in unread messages. */
 static void hold_descriptors(const tracker *self) {
     enum { pairs = 20 };
@@ -480,18 +496,7 @@ static void hold_descriptors(const tracker *self) {
     report(self, "more than 1024", held > 1024);
     for (i = 0; i < pairs;) {
         char byte = 0;
-        _Alignas(struct cmsghdr) char ancillary[CMSG_SPACE(sizeof(int))] = {0};
-        struct iovec part = {&byte, 1};
-        struct msghdr message = {0};
-        message.msg_iov = &part;
-        message.msg_iovlen = 1;
-        message.msg_control = ancillary;
-        message.msg_controllen = sizeof ancillary;
-        CMSG_FIRSTHDR(&message)->cmsg_level = SOL_SOCKET;
-        CMSG_FIRSTHDR(&message)->cmsg_type = SCM_RIGHTS;
-        CMSG_FIRSTHDR(&message)->cmsg_len = CMSG_LEN(sizeof(int));
-        memcpy(CMSG_DATA(CMSG_FIRSTHDR(&message)), &pair[i][0], sizeof(int));
-        if (sendmsg(pair[i][1], &message, MSG_DONTWAIT) < 0)
+        if (send_with_descriptor(pair[i][1], &byte, sizeof byte, pair[i][0], MSG_DONTWAIT) < 0)
             ++i;
         else
             ++in_flight;
@@ -627,19 +632,7 @@ static void send_small_messages(void) {
 /* Sends an open file to the host, which must release it. */
 static void send_descriptor(int socket) {
     char text[] = "{\"type\": \"detached\"}";
-    const int fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    _Alignas(struct cmsghdr) char ancillary[CMSG_SPACE(sizeof(int))] = {0};
-    struct iovec part = {text, sizeof text - 1};
-    struct msghdr message = {0};
-    message.msg_iov = &part;
-    message.msg_iovlen = 1;
-    message.msg_control = ancillary;
-    message.msg_controllen = sizeof ancillary;
-    CMSG_FIRSTHDR(&message)->cmsg_level = SOL_SOCKET;
-    CMSG_FIRSTHDR(&message)->cmsg_type = SCM_RIGHTS;
-    CMSG_FIRSTHDR(&message)->cmsg_len = CMSG_LEN(sizeof(int));
-    memcpy(CMSG_DATA(CMSG_FIRSTHDR(&message)), &fd, sizeof fd);
-    (void)!sendmsg(socket, &message, MSG_NOSIGNAL);
+    (void)!send_with_descriptor(socket, text, sizeof text - 1, open("/dev/null", O_RDONLY | O_CLOEXEC), MSG_NOSIGNAL);
     for (;;)
         pause();
 }
