@@ -20,13 +20,18 @@ constexpr const char *harmless[] = {"clone3(",                // libraries then 
                                     "prctl(PR_CAPBSET_DROP,", // the sandbox itself, without privileges
                                     "unshare("}; // the launcher and the sandbox, on machines without namespaces
 
-bool can_trace() {
+// Returns why calls cannot be traced; empty if they can be.
+std::string obstacle() {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    return "under a sanitizer there is no allow list";
+#else
     ArhostRun run;
     run.start({}, [] {
         ::execlp("strace", "strace", "-f", "-o", "/dev/null", "/bin/true", nullptr);
         ::_exit(127);
     });
-    return run.wait() == 0;
+    return run.wait() == 0 ? "" : "strace is missing or not permitted";
+#endif
 }
 
 // Returns the calls that failed with ENOSYS or EPERM in a run of run.yaml, with their arguments.
@@ -77,13 +82,9 @@ struct Case {
 
 class AllowList : public testing::TestWithParam<Case> {};
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define REQUIRE_TRACE() GTEST_SKIP() << "under a sanitizer there is no allow list"
-#else
 #define REQUIRE_TRACE()                                                                                              \
-    if (!can_trace())                                                                                                \
-    GTEST_SKIP() << "strace is missing or not permitted"
-#endif
+    if (const std::string reason = obstacle(); !reason.empty())                                                      \
+    GTEST_SKIP() << reason
 
 TEST_P(AllowList, ContainsTheCallsOf) {
     REQUIRE_TRACE();
