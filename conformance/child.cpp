@@ -40,6 +40,15 @@ sandbox::Level enter_sandbox(const Test &test, const Subject &subject) {
     return sandbox::enter_for(subject.plugin, policy);
 }
 
+// Discards what a sink with the option `path: "-"` writes, which would hide other output.
+void discard_standard_output(const Settings &settings) {
+    const auto path = settings.find("path");
+    if (path == settings.end() || path->second != standard_output)
+        return;
+    const base::UniqueFd null = base::checked(::open("/dev/null", O_WRONLY | O_CLOEXEC), "open /dev/null");
+    ::dup2(null.get(), STDOUT_FILENO);
+}
+
 constexpr off_t min_space_mib = 16;
 
 // Returns 0 if min_space_mib are free on the folder's file system, otherwise an errno.
@@ -148,6 +157,7 @@ int run_child(const std::string &name, const Subject &subject) {
         if (name != test.name)
             continue;
         PluginLibrary library(subject.plugin, subject.settings, calls, subject.scratch);
+        discard_standard_output(subject.settings);
         Context context{library, subject.reference, std::mt19937_64(subject.seed)};
         context.prints = subject.prints;
         context.timeout_factor = subject.timeout_factor;

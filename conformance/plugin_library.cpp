@@ -128,7 +128,7 @@ arhost_status Instance::create(Newer newer) {
         if (const std::filesystem::path path = texts.back(); !path.empty()) {
             if (option->type == ARHOST_OPTION_INPUT_PATH)
                 texts.back() = std::filesystem::absolute(path);
-            if (option->type == ARHOST_OPTION_OUTPUT_PATH)
+            if (option->type == ARHOST_OPTION_OUTPUT_PATH && path != standard_output)
                 texts.back() = library_.scratch() / folder_ / path.filename();
         }
         try {

@@ -43,6 +43,9 @@ template <class Function> auto in_call(const CallPage &calls, ipc::Call call, Fu
 
 using Settings = std::map<std::string, std::string>; // option values as text, as in the YAML
 
+// Value of an output path; see ARHOST_CAPABILITY_STANDARD_OUTPUT.
+constexpr const char *standard_output = "-";
+
 class PluginLibrary {
 public:
     // `settings`: the user's option values. `scratch`: the folder for outputs. Does not open the plugin yet.
@@ -100,7 +103,7 @@ private:
 class Instance {
 public:
     // `overrides` take precedence over the user's settings. An output path keeps its file name but is placed in
-    // `folder` of the scratch folder.
+    // `folder` of the scratch folder, unless it is `standard_output`.
     explicit Instance(PluginLibrary &library, Settings overrides = {}, std::filesystem::path folder = {});
     ~Instance() { destroy(); }
     Instance(const Instance &) = delete;

@@ -24,6 +24,7 @@
 #include <fstream>
 #include <sys/resource.h>
 #include <sys/signalfd.h>
+#include <sys/stat.h>
 
 namespace arhost::host {
 namespace {
@@ -394,11 +395,13 @@ void check_by_opening(run_config::Configuration configuration, supervise::Contex
         run_config::ComponentConfiguration &output = configuration.outputs[i];
         restart_never(output);
         const auto path = run_config::path_of(output.node);
-        if (!path)
+        if (!path || run_config::is_standard_output(*path))
             continue;
         const fs::path folder = Pipeline::check_folder(scratch.path(), i), own = path->output_path().parent_path();
         fs::create_directory(folder);
         folders.emplace_back(folder, own);
+        if (fs::is_fifo(path->output_path()))
+            ::mkfifo((folder / path->output_path().filename()).c_str(), 0600); // on failure, the output reports it
         std::erase_if(output.policy.writable, [&](const fs::path &writable) {
             return writable == own || writable == base::real_path(path->output_path()).parent_path();
         });

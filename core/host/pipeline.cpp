@@ -69,7 +69,8 @@ std::vector<std::string> Pipeline::findings() const {
             fmt::format("raytracer: {}: {}", raytracer_->description().id, configuration_.raytracer->scene.string()));
     for (std::size_t i = 0; i < sinks_.size(); ++i) {
         const auto path = run_config::path_of(configuration_.outputs[i].node);
-        const std::string file = path ? path->output_path().string() : "";
+        const bool is_stdout = path && run_config::is_standard_output(*path);
+        const std::string file = is_stdout ? "standard output" : path ? path->output_path().string() : "";
         std::error_code ignored;
         lines.push_back(fmt::format(
             "output: {}{}{}", sinks_[i]->component->description().id, path ? ": " + file : "",
@@ -213,6 +214,9 @@ void Pipeline::interrupt() {
             abandoned_ = true;
         });
     }
+    for (const auto &sink : sinks_)
+        if (sink->component->waits_for_receiver())
+            sink->component->cancel_call();
     end_run();
 }
 

@@ -218,7 +218,8 @@ void Pipeline::make_sink(std::size_t index, const std::string &name) {
         std::vector<OptionValue> options = run_config::options_for(plugin, ARHOST_KIND_SINK, output, candidate);
         expect_distinct_files(index, plugin);
         for (OptionValue &option : options)
-            if (check_scratch_ && option.type == ARHOST_OPTION_OUTPUT_PATH && !option.text.empty())
+            if (check_scratch_ && option.type == ARHOST_OPTION_OUTPUT_PATH && !option.text.empty() &&
+                option.text != "-")
                 option.text = check_folder(*check_scratch_, index) / std::filesystem::path(option.text).filename();
         return Component::Create{{std::move(options), setup}, {}};
     };
@@ -228,6 +229,10 @@ void Pipeline::make_sink(std::size_t index, const std::string &name) {
             end_sink(*sink, output.may_quit);
         if (result.status >= 0 || sink->closed)
             return;
+        if (interrupted_ && result.status == ARHOST_STATUS_ERROR_CANCELLED) { // its receiver did not take the frame
+            close_sink(*sink);
+            return sink->component->stop();
+        }
         // A restart would not help, for example if the disk is full. Keeps the files that are complete and continues
         // with the other outputs.
         const std::string reason = "cannot write frame " + std::to_string(command.sequence) + ": " +

@@ -22,6 +22,10 @@ void expect_grantable(const sandbox::Policy &policy, const yaml::Node &node, con
 // folder and then renamed. If the output file is a symbolic link, also grants access to the folder of the link's
 // target.
 void allow_write(sandbox::Policy &policy, const yaml::Node &path) {
+    if (is_standard_output(path)) {
+        policy.standard_output = true;
+        return;
+    }
     const fs::path file = path.output_path();
     if (policy.mode != sandbox::Mode::none && !sandbox::obstacle_to_grant(file.parent_path()).empty())
         path.fail("the sandbox cannot let an output write to the folder '" + file.parent_path().string() +
@@ -70,6 +74,10 @@ std::optional<yaml::Node> path_of(const yaml::Node &component) {
     return path || !options || !options->is_map() ? path : options->find("path");
 }
 
+bool is_standard_output(const yaml::Node &path) {
+    return path.text() == "-" || path.text() == "/dev/stdout";
+}
+
 sandbox::Policy access_of(const yaml::Node &node, bool is_output, sandbox::Mode mode) {
     sandbox::Policy policy;
     policy.mode = mode;
@@ -94,6 +102,8 @@ sandbox::Policy access_of(const yaml::Node &node, bool is_output, sandbox::Mode 
 }
 
 std::string warning_of_output(const yaml::Node &path, const std::string &plugin) {
+    if (is_standard_output(path))
+        return "";
     const fs::path file = path.output_path(), folder = real_path(file).parent_path();
     const char *home = std::getenv("HOME");
     for (const fs::path &wide : {real_path(home ? home : "/"), real_path(".")})

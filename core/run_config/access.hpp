@@ -17,6 +17,9 @@ sandbox::Policy access_of(const yaml::Node &node, bool is_output, sandbox::Mode 
 // Returns the component's `path`, which may be a key of the component or one of its options.
 std::optional<yaml::Node> path_of(const yaml::Node &component);
 
+// Whether an output's `path` names standard output.
+bool is_standard_output(const yaml::Node &path);
+
 // Returns a warning if an output's `path` makes the entire home directory or working directory writable, otherwise
 // "".
 std::string warning_of_output(const yaml::Node &path, const std::string &plugin);

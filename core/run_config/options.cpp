@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_config/options.hpp"
 
+#include "run_config/access.hpp"
+
 #include <algorithm>
 #include <limits>
 
@@ -26,7 +28,7 @@ ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::No
         value.text = node.input_path().string();
         break;
     case ARHOST_OPTION_OUTPUT_PATH:
-        value.text = node.output_path().string();
+        value.text = is_standard_output(node) ? "-" : node.output_path().string();
         break;
     default:
         if (declared.choices.empty()) {
@@ -69,6 +71,9 @@ std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plug
                 value->fail("the path is also given by the key 'path' next to 'plugin'; remove one of them");
             value = path;
         }
+        if (value && declared.type == ARHOST_OPTION_OUTPUT_PATH && is_standard_output(*value) &&
+            !(plugin.capabilities & ARHOST_CAPABILITY_STANDARD_OUTPUT && declared.key == "path"))
+            value->fail(plugin.id + " cannot write to standard output; name a file");
         if (value)
             values.push_back(value_of(declared, *value));
         else if (declared.default_value)

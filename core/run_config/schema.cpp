@@ -121,7 +121,9 @@ std::vector<Key> make_table() {
          {"coordinates.rotations[].axis", reals, true, "", "Three numbers, not all zero."}});
     add_component(
         keys, {"outputs", list, false, "", "Outputs for the augmented frames."}, "sink_video",
-        {{"path", output_path, false, "", "Output file, for plugins that write files; its folder becomes writable."},
+        {{"path", output_path, false, "",
+          "Output file, for plugins that write files; its folder becomes writable. `-`: standard output "
+          "(`sink_pipe`)."},
          {"control", list, false, "nothing",
           "Commands that the output may give: `quit` ends the run, for example when its window is closed."}});
     add(keys, "",

@@ -2,6 +2,8 @@
 #include "run_config/user_view.hpp"
 
 #include "base/file_identity.hpp"
+#include "run_config/access.hpp"
+
 #include <arhost-cpp/numbered_name.hpp>
 
 #include <algorithm>
@@ -77,7 +79,7 @@ void expect_readable(const yaml::Node &node, const sandbox::Policy &policy) {
 
 void expect_writable(const yaml::Node &node) {
     const fs::path path = node.output_path();
-    if (sandbox::contains("/dev", path) || sandbox::contains("/proc", path))
+    if (is_standard_output(node) || sandbox::contains("/dev", path) || sandbox::contains("/proc", path))
         return;
     const fs::path file = base::real_path(path);
     std::error_code error;

@@ -182,7 +182,8 @@ nlohmann::json to_json(const Policy &policy) {
             {"writable", texts(policy.writable)},
             {"environment", policy.environment},
             {"memory_bytes", policy.memory_bytes},
-            {"makes_shared_memory", policy.makes_shared_memory}};
+            {"makes_shared_memory", policy.makes_shared_memory},
+            {"standard_output", policy.standard_output}};
 }
 
 Policy policy_from_json(const nlohmann::json &json) {
@@ -200,6 +201,7 @@ Policy policy_from_json(const nlohmann::json &json) {
     policy.writable = paths("writable");
     policy.memory_bytes = json.at("memory_bytes").get<std::uint64_t>();
     policy.makes_shared_memory = json.at("makes_shared_memory").get<bool>();
+    policy.standard_output = json.at("standard_output").get<bool>();
     return policy;
 }
 

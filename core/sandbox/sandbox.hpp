@@ -36,6 +36,7 @@ struct Policy {
     std::set<std::string, std::less<>> environment{}; // variables to keep in addition to the standard ones
     std::uint64_t memory_bytes = 0;   // limit of private memory; 0: three quarters of the memory of the machine
     bool makes_shared_memory = false; // set for the scene loader; such memory does not count towards memory_bytes
+    bool standard_output = false;     // the worker writes to the standard output of the host
 
     bool allows(std::string_view what) const { return allow.contains(what); }
 };

@@ -73,7 +73,7 @@ void keep_capability() {
 
 // Runs in the child after fork. Executes arhost-worker, with the control channel as descriptor 3 and the doorbell as
 // descriptor 4. `parent`: the value of getppid(2).
-[[noreturn]] void exec_worker(const char *program, const std::vector<UniqueFd> &fds, pid_t parent) {
+[[noreturn]] void exec_worker(const Request &request, const std::vector<UniqueFd> &fds, pid_t parent) {
     // A separate session, so that the worker has no controlling terminal, a kill of the process group reaches the
     // processes that the worker forks, and Ctrl-C in the terminal reaches only the host.
     ::setsid();
@@ -82,9 +82,10 @@ void keep_capability() {
     ::signal(SIGHUP, SIG_IGN);
     ::signal(SIGPIPE, SIG_IGN); // writes to a closed pipe return EPIPE instead
     const int null = ::open("/dev/null", O_RDONLY | O_CLOEXEC);
-    char *const argv[] = {const_cast<char *>(program), nullptr};
-    const int output = fds[2].get();
-    arhost::base::exec_child(program, argv, std::array{null, output, output, fds[0].get(), fds[1].get()}, parent);
+    char *const argv[] = {const_cast<char *>(request.program), nullptr};
+    const int output = fds[2].get(), standard_output = request.isolation.standard_output ? STDOUT_FILENO : output;
+    arhost::base::exec_child(request.program, argv,
+                             std::array{null, standard_output, output, fds[0].get(), fds[1].get()}, parent);
     ::dprintf(STDERR_FILENO, "arhost-worker cannot be executed: %s; is it installed in the same folder as arhost?\n",
               std::strerror(errno));
     ::_exit(127);
@@ -118,7 +119,7 @@ pid_t fork_isolated(const Request &request, const std::vector<UniqueFd> &fds, Wo
                 run_init(init_end.get());
             if (pids[0] > 0 && (pids[1] = fork_sibling()) == 0) {
                 keep_capability();
-                exec_worker(request.program, fds, 0); // 0: the parent is outside of the namespace
+                exec_worker(request, fds, 0); // 0: the parent is outside of the namespace
             }
         }
         (void)!::write(helper_end.get(), pids, sizeof pids);
@@ -145,7 +146,7 @@ void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds,
         pid = ::fork();
     if (pid == 0) {
         worker.group.join();
-        exec_worker(request.program, fds, launcher);
+        exec_worker(request, fds, launcher);
     }
     Reply reply{};
     if (pid < 0) {

@@ -18,11 +18,12 @@ bool is_valid_status(arhost_kind kind, arhost_status status) {
     return status == ARHOST_STATUS_OK || (status < 0 && status >= ARHOST_STATUS_ERROR_INTERNAL);
 }
 
-// Whether a restart may fix the error `status` of a tracker or ray tracer: a new process reopens its device and
-// starts with free memory. Errors of the other kinds are handled by the host: it restarts a source and disables a
-// sink.
+// Whether a restart may fix the error `status`: a new process reopens its device and starts with free memory. Other
+// errors are handled by the host: it restarts a source and disables a sink.
 bool needs_new_process(arhost_kind kind, arhost_status status) {
-    return (kind == ARHOST_KIND_TRACKER || kind == ARHOST_KIND_RAYTRACER) &&
+    if (kind == ARHOST_KIND_SINK)
+        return status == ARHOST_STATUS_ERROR_DEVICE_LOST;
+    return kind != ARHOST_KIND_SOURCE &&
            (status == ARHOST_STATUS_ERROR_DEVICE_LOST || status == ARHOST_STATUS_ERROR_OUT_OF_MEMORY);
 }
 
@@ -125,6 +126,8 @@ void Component::on_message(Message &message) {
             set_progress_deadline(limits_.start, "did not start");
         else if (stop_sent_)
             set_progress_deadline(limits_.stop, "did not stop");
+        else if (description_.kind == ARHOST_KIND_SINK && !in_flight_.empty())
+            wait_for_receiver();
     } else if (is<messages::Hello>(message) && handshake_ == Handshake::opening) {
         on_hello(message);
     } else if (is<messages::Ready>(message) && handshake_ == Handshake::creating) {
@@ -223,6 +226,7 @@ void Component::on_result(const Result &result) {
         return process_->end(status_text(result.status)); // the command counts as unanswered, as after a crash
     const Command command = in_flight_.front();
     in_flight_.pop_front();
+    waits_for_receiver_ = false;
     set_frame_deadline();
     callbacks_.result(command, result);
     // Errors do not count as completed frames, nor do results because of which the host terminates the process.
@@ -242,6 +246,7 @@ void Component::on_died(const Death &death) {
     attached_inputs_.clear();
     const std::vector<Command> unanswered(in_flight_.begin(), in_flight_.end());
     in_flight_.clear();
+    waits_for_receiver_ = false;
 
     state_ = State::waiting;
     const bool finished = death.clean && stop_response_;
@@ -342,6 +347,11 @@ void Component::set_total_deadline(std::chrono::milliseconds limit, const char *
         process_->end(std::string(what) + " within " + std::to_string(limit.count()) +
                       " ms in total, although it reported progress");
     });
+}
+
+void Component::wait_for_receiver() {
+    waits_for_receiver_ = true;
+    set_frame_deadline();
 }
 
 void Component::set_frame_deadline() {

@@ -74,6 +74,8 @@ public:
     void stop();
     void kill(); // kills the process at once; it is not restarted
     void cancel_call();
+    // Whether a sink has reported progress in the current call of `write`: another program does not take the frame.
+    bool waits_for_receiver() const { return waits_for_receiver_; }
     // Terminates the process, which is then restarted.
     void end_process(const std::string &reason);
 
@@ -117,6 +119,7 @@ private:
     void stopped(arhost_status status, const std::string &text);
     void set_progress_deadline(std::chrono::milliseconds limit, const char *what);
     void set_total_deadline(std::chrono::milliseconds limit, const char *what);
+    void wait_for_receiver();
     void set_frame_deadline();
 
     Context &context_;
@@ -132,7 +135,7 @@ private:
     State state_ = State::idle;
     enum class Handshake { opening, creating, done }; // waits for Hello; waits for Ready; has received both
     Handshake handshake_ = Handshake::opening;
-    bool stop_requested_ = false, stop_sent_ = false;
+    bool stop_requested_ = false, stop_sent_ = false, waits_for_receiver_ = false;
     std::optional<ipc::messages::Stopped> stop_response_;
     std::string configuration_error_, failure_; // text of Failed, or of an exception of `hello` or `ready`
     ipc::PluginDescription description_;

@@ -12,6 +12,8 @@ struct Isolation {
     // CAP_SYS_ADMIN in its user namespace until it enters its sandbox.
     bool enabled = true;
     std::uint64_t memory_bytes = 0; // limit of the control group; 0: none
+    // The worker's standard output is that of the host, which the launcher has inherited.
+    bool standard_output = false;
 };
 
 } // namespace arhost::supervise

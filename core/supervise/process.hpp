@@ -49,7 +49,8 @@ public:
     template <class T>
     Process(Context &context, WorkerBudget &budget, Callbacks callbacks, const T &first)
         : Process(context, budget, std::move(callbacks), ipc::encode(first),
-                  Isolation{first.sandbox.mode != sandbox::Mode::none, sandbox::memory_limit(first.sandbox)}) {}
+                  Isolation{first.sandbox.mode != sandbox::Mode::none, sandbox::memory_limit(first.sandbox),
+                            first.sandbox.standard_output}) {}
     ~Process(); // kills the process if it is still running
     Process(const Process &) = delete;
     Process &operator=(const Process &) = delete;

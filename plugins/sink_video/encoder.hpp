@@ -2,6 +2,7 @@
 #pragma once
 
 #include "libav.hpp"
+#include "libav_common/bgr_converter.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -30,12 +31,8 @@ public:
     AVPacket &encode(const std::uint8_t *bgr, std::size_t stride, std::int64_t number);
 
 private:
-    void copy_padded(const std::uint8_t *bgr, std::size_t stride);
-
-    int width_, height_;
+    BgrConverter converter_;
     CodecPointer context_;
-    FramePointer bgr_, yuv_;
-    SwsPointer converter_;
     PacketPointer packet_;
 };
 

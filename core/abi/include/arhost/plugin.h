@@ -59,7 +59,7 @@ extern "C" {
 typedef int32_t arhost_status;
 enum {
     ARHOST_STATUS_OK = 1,
-    ARHOST_STATUS_END = 2, /* success; a source has no more frames, or the user closed the window of a sink */
+    ARHOST_STATUS_END = 2, /* success; a source has no more frames, or the user closed the receiver of a sink */
     ARHOST_STATUS_END_TRUNCATED = 3, /* the source's input is truncated; all readable frames were delivered */
 
     ARHOST_STATUS_ERROR_INVALID_ARGUMENT = -1, /* contract violation by the caller */
@@ -103,8 +103,9 @@ typedef struct arhost_host {
     void (*log)(const struct arhost_host *host, arhost_severity severity, const char *text);
 
     /* [any] Reports progress and restarts the deadline for start-up (`create` and `start`) or for `stop`: call it at
-     * least every few seconds in these functions. `fraction`: the completed fraction, 0 to 1, or negative if unknown.
-     * `what`: describes the current step to the user. */
+     * least every few seconds in these functions. In a sink, it also restarts the deadline of `write`: call it while
+     * `write` waits for a receiver that the user may pause, such as another program. `fraction`: the completed
+     * fraction, 0 to 1, or negative if unknown. `what`: describes the current step to the user. */
     void (*progress)(const struct arhost_host *host, double fraction, const char *what);
 
     /* [any] Returns non-zero if the running call must return soon, with ARHOST_STATUS_ERROR_CANCELLED. Costs one
@@ -124,7 +125,9 @@ enum {
     ARHOST_OPTION_REAL = 3,       /* arhost_option.real */
     ARHOST_OPTION_TEXT = 4,       /* arhost_option.text */
     ARHOST_OPTION_INPUT_PATH = 5, /* arhost_option.text; absolute, resolved against the configuration's folder */
-    ARHOST_OPTION_OUTPUT_PATH = 6 /* arhost_option.text; absolute, resolved against the working directory */
+    /* arhost_option.text; absolute, resolved against the working directory; or "-", see
+     * ARHOST_CAPABILITY_STANDARD_OUTPUT */
+    ARHOST_OPTION_OUTPUT_PATH = 6
 };
 
 /* Declares an option. Before `create` is called, the host checks the configuration against the declarations, and
@@ -182,7 +185,10 @@ enum {
     ARHOST_CAPABILITY_AREA_LIGHTS = 1 << 9,  /* rectangles and spheres */
     ARHOST_CAPABILITY_ENVIRONMENT = 1 << 10, /* the environment map */
     ARHOST_CAPABILITY_MOTION = 1 << 11,      /* arhost_motion */
-    ARHOST_CAPABILITY_EVERY_SCENE = 0xfe0    /* all of these: REFLECTION to MOTION */
+    ARHOST_CAPABILITY_EVERY_SCENE = 0xfe0,   /* all of these: REFLECTION to MOTION */
+    /* sink: accepts "-" as the option `path`, and then writes to standard output, descriptor 1. Without this
+     * capability, the host rejects "-" as the path of an output. */
+    ARHOST_CAPABILITY_STANDARD_OUTPUT = 1 << 12
 };
 
 /* Describes the plugin. Static storage: valid as long as the library is loaded. Each string may have up to 4,096

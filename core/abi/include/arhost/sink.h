@@ -70,8 +70,10 @@ typedef struct arhost_sink {
 
     /* [worker, started] Takes one frame; sequence numbers ascend. After ARHOST_STATUS_OK the host does not send the
      * frame again, so it must survive a kill of the process. The frames in a file are in ascending order; if each
-     * frame has its own numbered file, the numbers ascend. Returns ARHOST_STATUS_END if the user closed the window:
-     * the host then closes this output, and ends the run if the configuration allows it (`control: [quit]`). */
+     * frame has its own numbered file, the numbers ascend. Returns ARHOST_STATUS_END if the user closed the window,
+     * or the program that receives the frames: the host then closes this output, and ends the run if the
+     * configuration allows it (`control: [quit]`). After ARHOST_STATUS_ERROR_DEVICE_LOST the host restarts the sink
+     * and sends the frame again; after other errors it closes this output. */
     arhost_status (*write)(arhost_instance *instance, const arhost_output *output);
 
     /* [worker, started] Called about 30 times per second while no frame arrives, to process window events. Returns

@@ -96,6 +96,7 @@ pub const ARHOST_CAPABILITY_AREA_LIGHTS: u32 = 512;
 pub const ARHOST_CAPABILITY_ENVIRONMENT: u32 = 1024;
 pub const ARHOST_CAPABILITY_MOTION: u32 = 2048;
 pub const ARHOST_CAPABILITY_EVERY_SCENE: u32 = 4064;
+pub const ARHOST_CAPABILITY_STANDARD_OUTPUT: u32 = 4096;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_descriptor {

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// sink_pipe: writes uncompressed video to a FIFO or to standard output, for other programs.
+#include "libav_common/bgr_converter.hpp"
+#include "stream.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+extern "C" {
+#include <libavutil/pixdesc.h>
+}
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace {
+
+using namespace arhost;
+using namespace arhost::libav;
+using arhost::pipe::Stream;
+
+struct Format {
+    std::string_view name; // value of the option `format`
+    AVPixelFormat pixels;
+    const char *y4m; // name of the pixel format in a Y4M header; nullptr: pixels without headers
+};
+constexpr Format formats[] = {{"y4m", AV_PIX_FMT_YUV420P, "420mpeg2 XYSCSS=420MPEG2"},
+                              {"y4m444", AV_PIX_FMT_YUV444P, "444 XYSCSS=444"},
+                              {"rgba", AV_PIX_FMT_RGBA, nullptr},
+                              {"bgra", AV_PIX_FMT_BGRA, nullptr},
+                              {"rgb", AV_PIX_FMT_RGB24, nullptr},
+                              {"bgr", AV_PIX_FMT_BGR24, nullptr}};
+
+const Format &format_of(std::string_view name) {
+    return *std::ranges::find(formats, name, &Format::name);
+}
+
+class PipeSink {
+public:
+    PipeSink(const Host &host, const Options &options)
+        : host_(host), stream_(host, options.text("path")), format_(format_of(options.text("format"))),
+          matrix_(options.text("matrix")), reopen_(options.boolean("reopen")) {
+        if (reopen_ && stream_.is_standard_output())
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          "reopen: standard output cannot be opened again; name a FIFO as 'path'");
+    }
+
+    void start(const arhost_sink_setup &setup) {
+        width_ = static_cast<int>(setup.width);
+        height_ = static_cast<int>(setup.height);
+        // The matrix that programs assume, because Y4M does not state it: that of standard-definition television
+        // (BT.601) up to its size.
+        constexpr int standard_definition = 576;
+        const bool is_bt601 = matrix_ == "auto" ? height_ <= standard_definition : matrix_ == "bt601";
+        converter_.emplace(width_, height_, format_.pixels, is_bt601 ? Matrix::bt601 : Matrix::bt709);
+        const AVRational fps = setup.fps > 0 ? av_d2q(setup.fps, 1'000'000) : AVRational{30, 1};
+        header_ = format_.y4m ? "YUV4MPEG2 W" + std::to_string(width_) + " H" + std::to_string(height_) + " F" +
+                                    std::to_string(fps.num) + ":" + std::to_string(fps.den) + " Ip A1:1 C" +
+                                    format_.y4m + " XCOLORRANGE=LIMITED\n"
+                              : "";
+        stream_.check();
+        // The stream of the previous process may have ended in the middle of a frame.
+        was_interrupted_ = setup.first_sequence > 0;
+    }
+
+    arhost_status write(const arhost_output &output) {
+        if (static_cast<int>(output.width) != width_ || static_cast<int>(output.height) != height_)
+            throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the size of a frame differs from that in the setup");
+        if (was_interrupted_ && !reopen_)
+            throw Failure(
+                ARHOST_STATUS_ERROR_IO,
+                "the stream to " + stream_.name() +
+                    " was cut when this output was restarted, and cannot be continued; 'reopen: true' would "
+                    "begin another stream for the next reader of a FIFO");
+        pack(converter_->convert(output.bgr, output.stride));
+        for (;;) {
+            if (!stream_.is_open()) {
+                stream_.open(was_interrupted_);
+                was_interrupted_ = false;
+                frame_.insert(frame_.begin(), header_.begin(), header_.end());
+            }
+            if (stream_.write(frame_))
+                return ARHOST_STATUS_OK;
+            host_.info("the reader of " + stream_.name() + " has closed it");
+            if (!reopen_)
+                return ARHOST_STATUS_END;
+            stream_.close();
+            pack(converter_->convert(output.bgr, output.stride));
+        }
+    }
+
+    void stop() { stream_.close(); }
+
+private:
+    // Copies the frame to frame_, with its header if the format has one, and without padding.
+    void pack(const AVFrame &converted) {
+        static constexpr std::string_view frame_header = "FRAME\n";
+        frame_.clear();
+        if (format_.y4m)
+            frame_.insert(frame_.end(), frame_header.begin(), frame_header.end());
+        const AVPixFmtDescriptor &description = *av_pix_fmt_desc_get(format_.pixels);
+        const bool is_planar = description.flags & AV_PIX_FMT_FLAG_PLANAR;
+        for (int plane = 0; plane < (is_planar ? description.nb_components : 1); ++plane) {
+            const int shift_x = plane ? description.log2_chroma_w : 0,
+                      shift_y = plane ? description.log2_chroma_h : 0;
+            const int bytes = AV_CEIL_RSHIFT(width_, shift_x) * description.comp[plane].step;
+            for (int y = 0; y < AV_CEIL_RSHIFT(height_, shift_y); ++y) {
+                const std::uint8_t *row =
+                    converted.data[plane] + static_cast<std::ptrdiff_t>(y) * converted.linesize[plane];
+                frame_.insert(frame_.end(), row, row + bytes);
+            }
+        }
+    }
+
+    Host host_;
+    Stream stream_;
+    const Format &format_;
+    std::string matrix_;
+    bool reopen_;
+    int width_ = 0, height_ = 0;
+    std::string header_; // of the stream
+    std::optional<BgrConverter> converter_;
+    std::vector<std::uint8_t> frame_; // as it is written
+    bool was_interrupted_ = false;
+};
+
+constexpr const char *format_names[] = {"y4m", "y4m444", "rgba", "bgra", "rgb", "bgr", nullptr};
+constexpr const char *matrices[] = {"auto", "bt601", "bt709", nullptr};
+constexpr arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "Existing FIFO (mkfifo), or '-' for standard output."),
+    option(ARHOST_OPTION_TEXT, "format", "y4m",
+           "Y4M with YUV 4:2:0 (y4m) or 4:4:4 (y4m444), or pixels without headers: rgba, bgra, rgb or bgr.", 0, 0,
+           format_names),
+    option(ARHOST_OPTION_TEXT, "matrix", "auto",
+           "YUV matrix of Y4M: bt601, bt709, or auto (bt601 up to 576 rows, otherwise bt709).", 0, 0, matrices),
+    option(ARHOST_OPTION_BOOL, "reopen", "false",
+           "After the reader has closed the FIFO, wait for the next reader; false: end the output."),
+};
+
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),
+    ARHOST_KIND_SINK,
+    "sink_pipe",
+    "Pipe",
+    "0.1.0",
+    "arhost",
+    "Apache-2.0",
+    "Writes uncompressed video (Y4M or pixels) to a FIFO or standard output, for other programs.",
+    ARHOST_CAPABILITY_STANDARD_OUTPUT,
+    std::size(options),
+    options,
+    nullptr,
+};
+
+} // namespace
+
+ARHOST_SINK(PipeSink, descriptor)

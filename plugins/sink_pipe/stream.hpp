@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A FIFO or standard output. No call blocks in the kernel: while the program at the other end is missing or does not
+// read, the functions report progress to the host, and throw Failure (ARHOST_STATUS_ERROR_CANCELLED) once the host
+// cancels the call.
+#pragma once
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace arhost::pipe {
+
+class Stream {
+public:
+    // `path`: of an existing FIFO, or "-" for standard output.
+    Stream(const Host &host, std::string path) : host_(host), path_(std::move(path)) {}
+    ~Stream() { close(); }
+    Stream(const Stream &) = delete;
+    Stream &operator=(const Stream &) = delete;
+
+    bool is_standard_output() const { return path_ == "-"; }
+    std::string name() const { return is_standard_output() ? "standard output" : "'" + path_ + "'"; }
+
+    // Throws Failure if the path is not a FIFO or cannot be written. Does not open it, which its reader would notice.
+    void check() const;
+
+    bool is_open() const { return fd_ >= 0; }
+    // Waits for a reader. If an earlier stream may still be in the FIFO (`after_another`, or unread bytes), first
+    // waits until its reader has seen the end of it.
+    void open(bool after_another);
+    // Waits until everything is written. Returns false if the reader has closed the stream.
+    bool write(std::span<const std::uint8_t> bytes);
+    void close();
+
+private:
+    void open_standard_output();
+    void wait_for_end_of_earlier_stream();
+    void wait(const char *what) const;
+
+    Host host_;
+    std::string path_;
+    int fd_ = -1;
+};
+
+} // namespace arhost::pipe
