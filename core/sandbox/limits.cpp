@@ -59,7 +59,7 @@ Layer set_limits(const Policy &policy) {
     // address space.
     if (has_memory_limit(policy))
         lower(layer, "memory", RLIMIT_DATA, memory_limit(policy));
-    if (policy.writable.empty() && !may_share_memory(policy))
+    if (policy.writable.empty() && !policy.standard_output && !may_share_memory(policy))
         lower(layer, "files", RLIMIT_FSIZE, 0); // prevents writes to /tmp even if other layers are missing
     // Half of the usual 1024, because all descriptors in unread messages of a user's processes count towards one
     // limit, and a plugin must not exhaust it: the host and the scene loader need it, too.
