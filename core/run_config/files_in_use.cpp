@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_config/files_in_use.hpp"
 
+#include "run_config/access.hpp"
 #include <arhost-cpp/numbered_name.hpp>
 
 #include <algorithm>
@@ -103,8 +104,10 @@ void FilesInUse::read_numbered(const fs::path &file_or_pattern) {
 }
 
 void FilesInUse::write(const yaml::Node &output) {
-    const FileIdentity named = base::identity_of(output.output_path());
-    const std::vector<FileIdentity> matching = files_of(output.output_path());
+    const bool is_stdout = is_standard_output(output);
+    const FileIdentity named = is_stdout ? FileIdentity{"-", "-"} : base::identity_of(output.output_path());
+    const std::vector<FileIdentity> matching =
+        is_stdout ? std::vector<FileIdentity>() : files_of(output.output_path());
     if (const Use *use = find(named); use && use->output && !use->by_pattern)
         output.fail("another output already writes '" + output.text() + "'; choose another path");
     else if (use && !use->output)

@@ -23,15 +23,17 @@ using arhost::pipe::Stream;
 
 struct Format {
     std::string_view name; // value of the option `format`
-    AVPixelFormat pixels;
-    const char *y4m; // name of the pixel format in a Y4M header; nullptr: pixels without headers
+    // Name of the pixel format in a Y4M header. nullptr: pixels without headers, whose channels have the order of the
+    // letters in `name`.
+    const char *y4m;
+    AVPixelFormat pixels; // only for Y4M
 };
-constexpr Format formats[] = {{"y4m", AV_PIX_FMT_YUV420P, "420mpeg2 XYSCSS=420MPEG2"},
-                              {"y4m444", AV_PIX_FMT_YUV444P, "444 XYSCSS=444"},
-                              {"rgba", AV_PIX_FMT_RGBA, nullptr},
-                              {"bgra", AV_PIX_FMT_BGRA, nullptr},
-                              {"rgb", AV_PIX_FMT_RGB24, nullptr},
-                              {"bgr", AV_PIX_FMT_BGR24, nullptr}};
+constexpr Format formats[] = {{"y4m", "420mpeg2 XYSCSS=420MPEG2", AV_PIX_FMT_YUV420P},
+                              {"y4m444", "444 XYSCSS=444", AV_PIX_FMT_YUV444P},
+                              {"rgba", nullptr, AV_PIX_FMT_NONE},
+                              {"bgra", nullptr, AV_PIX_FMT_NONE},
+                              {"rgb", nullptr, AV_PIX_FMT_NONE},
+                              {"bgr", nullptr, AV_PIX_FMT_NONE}};
 
 const Format &format_of(std::string_view name) {
     return *std::ranges::find(formats, name, &Format::name);
@@ -54,7 +56,8 @@ public:
         // (BT.601) up to its size.
         constexpr int standard_definition = 576;
         const bool is_bt601 = matrix_ == "auto" ? height_ <= standard_definition : matrix_ == "bt601";
-        converter_.emplace(width_, height_, format_.pixels, is_bt601 ? Matrix::bt601 : Matrix::bt709);
+        if (format_.y4m)
+            converter_.emplace(width_, height_, format_.pixels, is_bt601 ? Matrix::bt601 : Matrix::bt709);
         const AVRational fps = setup.fps > 0 ? av_d2q(setup.fps, 1'000'000) : AVRational{30, 1};
         header_ = format_.y4m ? "YUV4MPEG2 W" + std::to_string(width_) + " H" + std::to_string(height_) + " F" +
                                     std::to_string(fps.num) + ":" + std::to_string(fps.den) + " Ip A1:1 C" +
@@ -74,7 +77,7 @@ public:
                 "the stream to " + stream_.name() +
                     " was cut when this output was restarted, and cannot be continued; 'reopen: true' would "
                     "begin another stream for the next reader of a FIFO");
-        pack(converter_->convert(output.bgr, output.stride));
+        pack(output);
         for (;;) {
             if (!stream_.is_open()) {
                 stream_.open(was_interrupted_);
@@ -87,29 +90,49 @@ public:
             if (!reopen_)
                 return ARHOST_STATUS_END;
             stream_.close();
-            pack(converter_->convert(output.bgr, output.stride));
+            pack(output);
         }
     }
 
     void stop() { stream_.close(); }
 
 private:
-    // Copies the frame to frame_, with its header if the format has one, and without padding.
-    void pack(const AVFrame &converted) {
-        static constexpr std::string_view frame_header = "FRAME\n";
+    // Sets frame_ to the bytes of a frame.
+    void pack(const arhost_output &output) {
         frame_.clear();
         if (format_.y4m)
-            frame_.insert(frame_.end(), frame_header.begin(), frame_header.end());
+            pack_y4m(converter_->convert(output.bgr, output.stride));
+        else
+            pack_pixels(output);
+    }
+
+    void pack_y4m(const AVFrame &converted) {
+        static constexpr std::string_view frame_header = "FRAME\n";
+        frame_.assign(frame_header.begin(), frame_header.end());
         const AVPixFmtDescriptor &description = *av_pix_fmt_desc_get(format_.pixels);
-        const bool is_planar = description.flags & AV_PIX_FMT_FLAG_PLANAR;
-        for (int plane = 0; plane < (is_planar ? description.nb_components : 1); ++plane) {
-            const int shift_x = plane ? description.log2_chroma_w : 0,
-                      shift_y = plane ? description.log2_chroma_h : 0;
-            const int bytes = AV_CEIL_RSHIFT(width_, shift_x) * description.comp[plane].step;
-            for (int y = 0; y < AV_CEIL_RSHIFT(height_, shift_y); ++y) {
+        for (int plane = 0; plane < description.nb_components; ++plane) {
+            const int width = AV_CEIL_RSHIFT(width_, plane ? description.log2_chroma_w : 0),
+                      height = AV_CEIL_RSHIFT(height_, plane ? description.log2_chroma_h : 0);
+            for (int y = 0; y < height; ++y) {
                 const std::uint8_t *row =
                     converted.data[plane] + static_cast<std::ptrdiff_t>(y) * converted.linesize[plane];
-                frame_.insert(frame_.end(), row, row + bytes);
+                frame_.insert(frame_.end(), row, row + width);
+            }
+        }
+    }
+
+    // Without swscale, which converts BGR to RGBA through YUV, with a loss.
+    void pack_pixels(const arhost_output &output) {
+        const std::size_t channels = format_.name.size();
+        frame_.resize(channels * output.width * output.height);
+        for (std::size_t channel = 0; channel < channels; ++channel) {
+            const char name = format_.name[channel];
+            const std::size_t source = name == 'b' ? 0 : name == 'g' ? 1 : 2;
+            std::uint8_t *to = frame_.data() + channel;
+            for (std::size_t y = 0; y < output.height; ++y) {
+                const std::uint8_t *row = output.bgr + y * output.stride + source;
+                for (std::size_t x = 0; x < output.width; ++x, to += channels)
+                    *to = name == 'a' ? 255 : row[3 * x];
             }
         }
     }
@@ -120,9 +143,9 @@ private:
     std::string matrix_;
     bool reopen_;
     int width_ = 0, height_ = 0;
-    std::string header_; // of the stream
-    std::optional<BgrConverter> converter_;
-    std::vector<std::uint8_t> frame_; // as it is written
+    std::string header_;                    // of the stream
+    std::optional<BgrConverter> converter_; // only for Y4M
+    std::vector<std::uint8_t> frame_;       // as it is written
     bool was_interrupted_ = false;
 };
 

@@ -122,8 +122,8 @@ DeviceFormat OutputDevice::set_format(const DeviceFormat &wanted) {
     if (const int error = control(VIDIOC_S_FMT, &format))
         fail("setting the format " + fourcc_text(wanted.fourcc), error);
     const auto chosen = [](const auto &pixels, std::uint32_t stride, std::uint32_t size) {
-        return DeviceFormat{pixels.pixelformat, pixels.width,      pixels.height,   stride,
-                            size,               pixels.colorspace, pixels.ycbcr_enc};
+        return DeviceFormat{pixels.pixelformat, pixels.width,    pixels.height, stride, size,
+                            pixels.colorspace,  pixels.ycbcr_enc};
     };
     const v4l2_pix_format &single = format.fmt.pix;
     const v4l2_plane_pix_format &plane = format.fmt.pix_mp.plane_fmt[0];
@@ -140,9 +140,10 @@ double OutputDevice::set_fps(double fps) {
         return 0;
     v4l2_fract &interval = parameters.parm.output.timeperframe;
     if (fps > 0 && parameters.parm.output.capability & V4L2_CAP_TIMEPERFRAME) {
+        const v4l2_fract before = interval;
         interval = {1000, static_cast<std::uint32_t>(std::lround(fps * 1000))};
-        if (const int error = control(VIDIOC_S_PARM, &parameters))
-            fail("setting the frame rate", error);
+        if (control(VIDIOC_S_PARM, &parameters) != 0) // some drivers have a fixed rate in spite of the capability
+            interval = before;
     }
     return interval.numerator > 0 ? static_cast<double>(interval.denominator) / interval.numerator : 0;
 }
@@ -198,18 +199,21 @@ bool OutputDevice::wait_until_writable(const Host &host) const {
             fail("waiting", error);
         host.wait_until(Clock::now() + std::chrono::milliseconds(timeout_ms)); // poll(2) returns immediately
     }
-    throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST,
-                  "the output device " + name() + " has taken no picture for " + std::to_string(limit.count()) + " s");
+    throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST, "the output device " + name() + " has taken no picture for " +
+                                                       std::to_string(limit.count()) + " s");
 }
 
-std::span<std::uint8_t> OutputDevice::begin_image(const Host &host, Transfer transfer) {
+void OutputDevice::reserve(Transfer transfer) {
     transfer_ = transfer;
-    if (transfer == Transfer::write) {
+    if (transfer == Transfer::write)
         image_.resize(image_size_);
-        return image_;
-    }
-    if (buffers_.empty())
+    else
         map_buffers();
+}
+
+std::span<std::uint8_t> OutputDevice::begin_image(const Host &host) {
+    if (transfer_ == Transfer::write)
+        return image_;
     if (queued_ < buffers_.size()) {
         current_ = queued_;
     } else {

@@ -42,11 +42,13 @@ public:
     DeviceFormat set_format(const DeviceFormat &wanted);
     double set_fps(double fps); // returns the resulting rate; 0: unknown
 
-    // Waits until the device takes another image, and returns the memory to write it to, of at least
-    // DeviceFormat::image_size bytes. Empty: the host has cancelled the call. The first call starts the stream, after
-    // which the format cannot change.
-    std::span<std::uint8_t> begin_image(const Host &host, Transfer transfer);
-    void end_image(const Host &host); // hands over the image
+    // Allocates memory for images. Afterwards the format cannot change, and with Transfer::mmap other programs cannot
+    // use the device.
+    void reserve(Transfer transfer);
+    // Waits until the device takes another image, and returns the memory to write it to, of DeviceFormat::image_size
+    // bytes. Empty: the host has cancelled the call.
+    std::span<std::uint8_t> begin_image(const Host &host);
+    void end_image(const Host &host); // hands over the image; the first one starts the stream
 
 private:
     struct Unmap {
@@ -72,7 +74,7 @@ private:
     std::uint32_t capabilities_ = 0;
     v4l2_buf_type type_ = V4L2_BUF_TYPE_VIDEO_OUTPUT;
     std::uint32_t image_size_ = 0;
-    Transfer transfer_ = Transfer::write;
+    Transfer transfer_ = Transfer::mmap;
     std::vector<std::uint8_t> image_; // only for Transfer::write
     std::vector<Mapping> buffers_;    // only for Transfer::mmap
     std::uint32_t queued_ = 0;        // number of buffers that were queued at least once

@@ -48,8 +48,8 @@ public:
         device_.emplace(path_);
         set_format();
         converter_.emplace(static_cast<int>(width_), static_cast<int>(height_), pixels_->pixels, matrix_of(format_));
-        choose_transfer();
         const double fps = device_->set_fps(setup.fps);
+        device_->reserve(choose_transfer());
         std::string rate;
         if (fps > 0)
             rate = ", " + std::to_string(fps) + " fps";
@@ -66,7 +66,7 @@ public:
         if (output.width != width_ || output.height != height_)
             throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the size of a frame differs from that in the setup");
         const AVFrame &frame = converter_->convert(output.bgr, output.stride);
-        const std::span<std::uint8_t> image = device_->begin_image(host_, transfer_);
+        const std::span<std::uint8_t> image = device_->begin_image(host_);
         if (image.empty())
             return ARHOST_STATUS_ERROR_CANCELLED;
         std::uint8_t *to = image.data();
@@ -104,7 +104,7 @@ private:
                 continue;
             // The matrix that programs assume if the device does not pass on the colour space.
             constexpr std::uint32_t standard_definition = 576;
-            const std::uint32_t colour_space = !candidate.is_yuv                 ? V4L2_COLORSPACE_SRGB
+            const std::uint32_t colour_space = !candidate.is_yuv                ? V4L2_COLORSPACE_SRGB
                                                : height_ <= standard_definition ? V4L2_COLORSPACE_SMPTE170M
                                                                                 : V4L2_COLORSPACE_REC709;
             format_ = device_->set_format({candidate.fourcc, width_, height_, 0, 0, colour_space, 0});
@@ -119,9 +119,9 @@ private:
                           "format: the output device " + device_->name() + " accepts no " +
                               (format_option_ == "auto" ? "supported format" : format_option_) + ", only " +
                               (offers.empty() ? "nothing" : offers));
-        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      "device: " + device_->name() + " does not take frames of " + size_text(width_, height_) +
-                          rejected + "; set the source or the device to another size");
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "device: " + device_->name() + " does not take frames of " +
+                                                             size_text(width_, height_) + rejected +
+                                                             "; set the source or the device to another size");
     }
 
     // Subsampled formats have even sizes.
@@ -143,14 +143,15 @@ private:
                                                       std::to_string(format_.image_size));
     }
 
-    void choose_transfer() {
-        transfer_ = io_option_ == "write" || (io_option_ == "auto" && device_->supports(Transfer::write))
-                        ? Transfer::write
-                        : Transfer::mmap;
-        if (!device_->supports(transfer_))
+    Transfer choose_transfer() const {
+        const Transfer transfer =
+            io_option_ == "write" || (io_option_ == "auto" && !device_->supports(Transfer::mmap)) ? Transfer::write
+                                                                                                  : Transfer::mmap;
+        if (!device_->supports(transfer))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "io: the output device " + device_->name() +
                                                                  " does not support '" + io_option_ +
                                                                  "'; set 'io: auto'");
+        return transfer;
     }
 
     Host host_;
@@ -159,7 +160,6 @@ private:
     std::optional<OutputDevice> device_;
     DeviceFormat format_;
     const PixelFormat *pixels_ = nullptr;
-    Transfer transfer_ = Transfer::write;
     std::optional<BgrConverter> converter_;
 };
 
@@ -171,7 +171,7 @@ constexpr arhost_option_descriptor options[] = {
            "Pixel format; auto: the first of yuyv, nv12, yuv420, bgr24, rgb24 that the device accepts.", 0, 0,
            format_names),
     option(ARHOST_OPTION_TEXT, "io", "auto",
-           "How frames are passed to the driver: write, mmap, or auto (write if the device supports it).", 0, 0,
+           "How frames are passed to the driver: mmap, write, or auto (mmap if the device supports it).", 0, 0,
            io_names),
 };
 constexpr const char *needs[] = {"video", nullptr};

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Runs of arhost with sink_pipe, in the sandbox.
+#include "../../system/arhost_run.hpp"
+#include "fifo.hpp"
+
+#include <gmock/gmock.h>
+
+#include <future>
+
+namespace fs = std::filesystem;
+using arhost::test::ArhostRun;
+using arhost::test::count_of;
+using arhost::test::FifoReader;
+using arhost::test::make_fifo;
+using arhost::test::read_file;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+namespace {
+
+constexpr std::size_t frame_bytes = 6 + 160 * 120 * 3 / 2; // of Y4M with the size below
+
+std::string yaml(const std::string &output, const std::string &source = "frames: 30", const std::string &more = "") {
+    return "version: 1\nsource: {plugin: source_synthetic, options: {width: 160, height: 120, " + source +
+           "}}\noutputs: [{plugin: sink_pipe, " + output + "}]\nstats: stats.json\n" + more;
+}
+
+void wait_for_output(const ArhostRun &run, const std::string &text) {
+    for (int i = 0; run.running() && run.output().find(text) == std::string::npos && i < 6000; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_THAT(run.output(), HasSubstr(text));
+}
+
+std::size_t frames_in(const std::string &stream) {
+    return (stream.size() - stream.find('\n') - 1) / frame_bytes;
+}
+
+} // namespace
+
+TEST(PipeRun, FfmpegDecodesEachFrameOfAFifo) {
+    if (std::system("ffmpeg -version >/dev/null 2>&1") != 0)
+        GTEST_SKIP() << "needs ffmpeg";
+    ArhostRun run(yaml("path: out/fifo"));
+    make_fifo(run.path("out/fifo"));
+    auto decoded = std::async(std::launch::async, [&] {
+        return std::system(("timeout 60 ffmpeg -loglevel error -i " + run.path("out/fifo").string() +
+                            " -f framemd5 " + run.path("md5").string())
+                               .c_str());
+    });
+    EXPECT_EQ(run.run(), 0) << run.output();
+    EXPECT_EQ(decoded.get(), 0);
+    EXPECT_EQ(count_of(run.read("md5"), "\n0,"), 30u) << run.read("md5");
+}
+
+TEST(PipeRun, StandardOutputHasOnlyTheVideo) {
+    for (const char *path : {"\"-\"", "/dev/stdout"}) {
+        ArhostRun run(yaml("path: " + std::string(path)));
+        run.start({"--config", "run.yaml"},
+                  [] { ::dup2(::open("video.y4m", O_CREAT | O_WRONLY | O_CLOEXEC, 0600), STDOUT_FILENO); });
+        EXPECT_EQ(run.wait(), 0) << run.output();
+        const std::string video = run.read("video.y4m");
+        EXPECT_THAT(video, StartsWith("YUV4MPEG2 W160 H120 "));
+        EXPECT_EQ(video.size(), video.find('\n') + 1 + 30 * frame_bytes);
+    }
+}
+
+TEST(PipeRun, AClosedReaderOfStandardOutputEndsTheRun) {
+    int ends[2];
+    ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);
+    ArhostRun run(yaml("path: \"-\"", "frames: 100000"));
+    run.start({"--config", "run.yaml"}, [&] { ::dup2(ends[1], STDOUT_FILENO); });
+    ::close(ends[1]);
+    char bytes[1000];
+    EXPECT_GT(::read(ends[0], bytes, sizeof bytes), 0);
+    ::close(ends[0]);
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("the reader of standard output has closed it"));
+}
+
+TEST(PipeRun, OnlyASinkThatSupportsItMayWriteToStandardOutput) {
+    ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 1}}\noutputs: [{plugin: "
+                  "sink_poses, path: \"-\"}]\n");
+    EXPECT_EQ(run.run(), 2) << run.output();
+    EXPECT_THAT(run.output(),
+                HasSubstr("run.yaml:3:38: outputs[0].path: sink_poses cannot write to standard output; name a file"));
+}
+
+TEST(PipeRun, OnlyOneOutputMayUseStandardOutput) {
+    ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 1}}\n"
+                  "outputs: [{plugin: sink_pipe, path: \"-\"}, {plugin: sink_pipe, path: /dev/stdout}]\n");
+    EXPECT_EQ(run.run(), 2) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("another output already writes"));
+}
+
+TEST(PipeRun, CheckOpensTheFifoWithoutAReader) {
+    ArhostRun run(yaml("path: out/fifo"));
+    make_fifo(run.path("out/fifo"));
+    EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("output: sink_pipe: " + fs::canonical(run.path("out/fifo")).string()));
+}
+
+// The reader pauses longer than the deadline of a frame.
+TEST(PipeRun, APausedReaderDoesNotEndALockstepRun) {
+    ArhostRun run(yaml("path: out/fifo, deadline_ms: 500"));
+    make_fifo(run.path("out/fifo"));
+    run.start();
+    const FifoReader reader(run.path("out/fifo"));
+    wait_for_output(run, "which has paused");
+    const std::string video = reader.read_all();
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    EXPECT_EQ(frames_in(video), 30u);
+    EXPECT_EQ(run.stats()["restarts"]["sink_pipe"], 0);
+}
+
+TEST(PipeRun, APausedReaderOnlyDropsItsOwnFramesOfALiveRun) {
+    ArhostRun run("version: 1\nmode: live\n"
+                  "source: {plugin: source_synthetic, fps: 100, options: {width: 160, height: 120, frames: 200}}\n"
+                  "outputs: [{plugin: sink_pipe, path: out/fifo}, {plugin: sink_poses, path: out/poses.jsonl}]\n"
+                  "stats: stats.json\n");
+    make_fifo(run.path("out/fifo"));
+    run.start();
+    const FifoReader reader(run.path("out/fifo"));
+    const auto lines = [&] {
+        return count_of(run.exists("out/poses.jsonl") ? run.read("out/poses.jsonl") : "", "\n");
+    };
+    for (int i = 0; run.running() && lines() < 150 && i < 6000; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_GE(lines(), 150u) << "the paused reader holds up the run";
+    const std::string video = reader.read_all();
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    EXPECT_EQ(count_of(video, "YUV4MPEG2"), 1u);
+    EXPECT_EQ((video.size() - video.find('\n') - 1) % frame_bytes, 0u);
+    EXPECT_GT(run.stats()["frames"]["dropped"]["sink_pipe"], 0) << run.stats();
+}
+
+TEST(PipeRun, AnInterruptEndsARunThatWaitsForAReader) {
+    ArhostRun run(yaml("path: out/fifo"));
+    make_fifo(run.path("out/fifo"));
+    run.start();
+    wait_for_output(run, "waiting for a program to read");
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    arhost::test::send_signal(run.pid(), SIGINT);
+    EXPECT_EQ(run.wait(), 130) << run.output();
+}
+
+TEST(PipeRun, AKilledWorkerCutsTheStreamAndEndsTheOutput) {
+    ArhostRun run(yaml("path: out/fifo"));
+    make_fifo(run.path("out/fifo"));
+    run.start();
+    const FifoReader reader(run.path("out/fifo"));
+    std::string video = reader.read(200 + 4 * frame_bytes);
+    arhost::test::send_signal(run.worker("sink_pipe"), SIGKILL);
+    video += reader.read_all();
+    EXPECT_EQ(run.wait(), 1) << run.output();
+    EXPECT_EQ(count_of(video, "YUV4MPEG2"), 1u);
+    EXPECT_THAT(run.output(), HasSubstr("was cut when this output was restarted"));
+}
+
+TEST(PipeRun, AKilledWorkerBeginsAnotherStreamForTheNextReader) {
+    ArhostRun run(yaml("path: out/fifo, options: {reopen: true}"));
+    make_fifo(run.path("out/fifo"));
+    run.start();
+    std::string first;
+    {
+        const FifoReader reader(run.path("out/fifo"));
+        first = reader.read(200 + 4 * frame_bytes);
+        arhost::test::send_signal(run.worker("sink_pipe"), SIGKILL);
+        first += reader.read_all();
+    }
+    EXPECT_EQ(count_of(first, "YUV4MPEG2"), 1u);
+    const std::string second = FifoReader(run.path("out/fifo")).read_all();
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    EXPECT_THAT(second, StartsWith("YUV4MPEG2 "));
+    EXPECT_GE(frames_in(first) + frames_in(second), 30u) << "a frame is missing";
+}
