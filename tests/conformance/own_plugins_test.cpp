@@ -15,18 +15,16 @@ TEST_P(OwnPlugins, PassTheSuite) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, OwnPlugins,
-    testing::Values(OwnPlugin{"Synthetic", "source_synthetic", {"width=160", "height=120", "frames=60"}},
-                    OwnPlugin{"FilePictures", "source_file", {"path=in/%02d.png"}},
-                    OwnPlugin{"FileVideo", "source_file", {"path=in/a.mp4"}},
-                    OwnPlugin{"Camera", "source_v4l2", {}, "video"},
-                    OwnPlugin{"Images", "sink_images", {"path=%03d.png"}},
-                    OwnPlugin{"Video", "sink_video", {"path=video.mp4"}},
-                    OwnPlugin{"Poses", "sink_poses", {"path=poses.jsonl"}},
-                    OwnPlugin{"Trajectory", "sink_trajectory", {"path=run.trajectory.jsonl"}},
-                    OwnPlugin{"Null", "sink_null", {}}, OwnPlugin{"Window", "sink_window", {}, "display"},
-                    OwnPlugin{"Pipe", "sink_pipe", {"path=-"}},
-                    OwnPlugin{"PipePixels", "sink_pipe", {"path=-", "format=rgba"}},
-                    OwnPlugin{"V4l2", "sink_v4l2", {"device=/dev/video10"}, "video"}),
+    testing::Values(
+        OwnPlugin{"Synthetic", "source_synthetic", {"width=160", "height=120", "frames=60"}},
+        OwnPlugin{"FilePictures", "source_file", {"path=in/%02d.png"}},
+        OwnPlugin{"FileVideo", "source_file", {"path=in/a.mp4"}}, OwnPlugin{"Camera", "source_v4l2", {}, "video"},
+        OwnPlugin{"Images", "sink_images", {"path=%03d.png"}}, OwnPlugin{"Video", "sink_video", {"path=video.mp4"}},
+        OwnPlugin{"Poses", "sink_poses", {"path=poses.jsonl"}},
+        OwnPlugin{"Trajectory", "sink_trajectory", {"path=run.trajectory.jsonl"}}, OwnPlugin{"Null", "sink_null", {}},
+        OwnPlugin{"Window", "sink_window", {}, "display"}, OwnPlugin{"Pipe", "sink_pipe", {"path=-"}},
+        OwnPlugin{"PipePixels", "sink_pipe", {"path=-", "format=rgba"}},
+        OwnPlugin{"V4l2", "sink_v4l2", {"device=/dev/video10"}, "video"}),
     [](const auto &info) { return info.param.name; });
 
 } // namespace

@@ -77,6 +77,15 @@ TEST_F(Access, AnOutputMayWriteToItsFolder) {
                 ElementsAre(folder / "out"));
 }
 
+TEST_F(Access, StandardOutputGrantsNoFolder) {
+    for (const char *path : {"\"-\"", "/dev/stdout"}) {
+        const auto policy = of("{plugin: sink_pipe, path: " + std::string(path) + "}", true);
+        EXPECT_TRUE(policy.standard_output) << path;
+        EXPECT_THAT(policy.writable, IsEmpty()) << path;
+    }
+    EXPECT_FALSE(of("{plugin: sink_pipe, path: ./-}", true).standard_output);
+}
+
 TEST_F(Access, ALinkedOutputMayAlsoWriteToTheTargetsFolder) {
     file("there/video.mp4");
     fs::create_symlink(folder / "there/video.mp4", folder / "link.mp4");
