@@ -13,7 +13,6 @@ using arhost::test::ArhostRun;
 using arhost::test::count_of;
 using arhost::test::FifoReader;
 using arhost::test::make_fifo;
-using arhost::test::read_file;
 using testing::HasSubstr;
 using testing::StartsWith;
 

@@ -11,7 +11,6 @@
 namespace fs = std::filesystem;
 using arhost::test::FifoReader;
 using arhost::test::make_fifo;
-using arhost::test::make_record;
 using arhost::test::Picture;
 using arhost::test::SinkUnderTest;
 using testing::HasSubstr;
@@ -54,7 +53,7 @@ double byte(const std::string &bytes, std::size_t at) {
 
 // Checks each pixel of a frame with YUV 4:4:4 planes that begin at `at`.
 void expect_yuv444(const std::string &stream, std::size_t at, const Picture &picture, double kr, double kb) {
-    const std::size_t size = static_cast<std::size_t>(picture.width() * picture.height());
+    const std::size_t size = static_cast<std::size_t>(picture.width()) * static_cast<std::size_t>(picture.height());
     double greatest = 0;
     for (int y = 0; y < picture.height(); ++y)
         for (int x = 0; x < picture.width(); ++x) {

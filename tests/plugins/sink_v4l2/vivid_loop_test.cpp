@@ -18,7 +18,6 @@
 #include <atomic>
 #include <thread>
 
-namespace fs = std::filesystem;
 using arhost::test::ArhostRun;
 using arhost::test::Picture;
 using arhost::test::SinkUnderTest;
