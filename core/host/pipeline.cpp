@@ -215,7 +215,7 @@ void Pipeline::interrupt() {
         });
     }
     for (const auto &sink : sinks_)
-        if (sink->component->waits_for_receiver())
+        if (sink->component->waits())
             sink->component->cancel_call();
     end_run();
 }

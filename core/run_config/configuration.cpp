@@ -9,6 +9,7 @@
 #include "run_config/user_view.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <limits>
 #include <set>
@@ -152,6 +153,14 @@ FilesInUse files_read_by(const Configuration &configuration) {
     return files;
 }
 
+// Whether a text begins with the scheme of a URL (RFC 3986, section 3.1), such as rtsp://.
+bool is_url(std::string_view text) {
+    const std::string_view scheme = text.substr(0, text.find("://"));
+    return scheme.size() < text.size() && !scheme.empty() && std::ranges::all_of(scheme, [](unsigned char c) {
+        return std::isalnum(c) || c == '+' || c == '-' || c == '.';
+    });
+}
+
 // Returns the file of a scene, which is given as a path or, for the scenes installed with arhost, by name.
 std::filesystem::path find_scene(const yaml::Node &scene, const std::filesystem::path &built_in_plugins) {
     std::filesystem::path file = scene.input_path();
@@ -184,7 +193,13 @@ std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, 
     for (const ipc::OptionDeclaration &declared : plugin.options) {
         const auto option = options ? options->find(declared.key) : std::nullopt;
         const auto node = declared.key == "path" && component.path ? component.path : option;
-        if (node && declared.type == ARHOST_OPTION_INPUT_PATH)
+        if (node && declared.type == ARHOST_OPTION_INPUT_PATH && is_url(node->text()))
+            node->fail("is a URL, but '" + plugin.id + "' reads only files" +
+                       (kind == ARHOST_KIND_SOURCE
+                            ? "; for network cameras write '" + component.node.path() +
+                                  ": {plugin: source_network, allow: [network], options: {url: …}}' with this URL"
+                            : ""));
+        else if (node && declared.type == ARHOST_OPTION_INPUT_PATH)
             expect_readable(*node, component.policy);
         else if (node && declared.type == ARHOST_OPTION_OUTPUT_PATH)
             expect_writable(*node);

@@ -93,6 +93,7 @@ void Component::kill() {
 }
 
 void Component::cancel_call() {
+    call_cancelled_ = true;
     if (process_)
         process_->request_cancel();
 }
@@ -126,8 +127,8 @@ void Component::on_message(Message &message) {
             set_progress_deadline(limits_.start, "did not start");
         else if (stop_sent_)
             set_progress_deadline(limits_.stop, "did not stop");
-        else if (description_.kind == ARHOST_KIND_SINK && !in_flight_.empty())
-            wait_for_receiver();
+        else if (may_wait() && !call_cancelled_ && !in_flight_.empty())
+            wait();
     } else if (is<messages::Hello>(message) && handshake_ == Handshake::opening) {
         on_hello(message);
     } else if (is<messages::Ready>(message) && handshake_ == Handshake::creating) {
@@ -226,7 +227,7 @@ void Component::on_result(const Result &result) {
         return process_->end(status_text(result.status)); // the command counts as unanswered, as after a crash
     const Command command = in_flight_.front();
     in_flight_.pop_front();
-    waits_for_receiver_ = false;
+    waits_ = false;
     set_frame_deadline();
     callbacks_.result(command, result);
     // Errors do not count as completed frames, nor do results because of which the host terminates the process.
@@ -246,7 +247,7 @@ void Component::on_died(const Death &death) {
     attached_inputs_.clear();
     const std::vector<Command> unanswered(in_flight_.begin(), in_flight_.end());
     in_flight_.clear();
-    waits_for_receiver_ = false;
+    waits_ = false;
 
     state_ = State::waiting;
     const bool finished = death.clean && stop_response_;
@@ -349,8 +350,13 @@ void Component::set_total_deadline(std::chrono::milliseconds limit, const char *
     });
 }
 
-void Component::wait_for_receiver() {
-    waits_for_receiver_ = true;
+bool Component::may_wait() const {
+    return description_.kind == ARHOST_KIND_SINK ||
+           (description_.kind == ARHOST_KIND_SOURCE && description_.capabilities & ARHOST_CAPABILITY_LIVE);
+}
+
+void Component::wait() {
+    waits_ = true;
     set_frame_deadline();
 }
 

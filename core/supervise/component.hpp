@@ -73,9 +73,11 @@ public:
     // the process has exited. If the process is dead, it is restarted first, because it may have to complete files.
     void stop();
     void kill(); // kills the process at once; it is not restarted
+    // Asks the plugin to return from the current call soon. It may then no longer wait.
     void cancel_call();
-    // Whether a sink has reported progress in the current call of `write`: another program does not take the frame.
-    bool waits_for_receiver() const { return waits_for_receiver_; }
+    // Whether a live source or a sink has reported progress in the current call: it waits for its camera, or for
+    // another program that does not take the frame.
+    bool waits() const { return waits_; }
     // Terminates the process, which is then restarted.
     void end_process(const std::string &reason);
 
@@ -119,7 +121,8 @@ private:
     void stopped(arhost_status status, const std::string &text);
     void set_progress_deadline(std::chrono::milliseconds limit, const char *what);
     void set_total_deadline(std::chrono::milliseconds limit, const char *what);
-    void wait_for_receiver();
+    bool may_wait() const;
+    void wait();
     void set_frame_deadline();
 
     Context &context_;
@@ -135,7 +138,7 @@ private:
     State state_ = State::idle;
     enum class Handshake { opening, creating, done }; // waits for Hello; waits for Ready; has received both
     Handshake handshake_ = Handshake::opening;
-    bool stop_requested_ = false, stop_sent_ = false, waits_for_receiver_ = false;
+    bool stop_requested_ = false, stop_sent_ = false, waits_ = false, call_cancelled_ = false;
     std::optional<ipc::messages::Stopped> stop_response_;
     std::string configuration_error_, failure_; // text of Failed, or of an exception of `hello` or `ready`
     ipc::PluginDescription description_;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "libav.hpp"
-#include "picture.hpp"
+#include "libav_common/log.hpp"
+#include "libav_common/picture.hpp"
 #include "reader.hpp"
 
 #include <filesystem>

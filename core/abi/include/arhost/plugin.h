@@ -103,9 +103,10 @@ typedef struct arhost_host {
     void (*log)(const struct arhost_host *host, arhost_severity severity, const char *text);
 
     /* [any] Reports progress and restarts the deadline for start-up (`create` and `start`) or for `stop`: call it at
-     * least every few seconds in these functions. In a sink, it also restarts the deadline of `write`: call it while
-     * `write` waits for a receiver that the user may pause, such as another program. `fraction`: the completed
-     * fraction, 0 to 1, or negative if unknown. `what`: describes the current step to the user. */
+     * least every few seconds in these functions. Also restarts the deadline of a call that waits: `read` of a source
+     * with ARHOST_CAPABILITY_LIVE whose camera is lost, and a sink's `write` whose receiver, such as another program,
+     * does not take the frame. `fraction`: the completed fraction, 0 to 1, or negative if unknown. `what`: describes
+     * the current step to the user. */
     void (*progress)(const struct arhost_host *host, double fraction, const char *what);
 
     /* [any] Returns non-zero if the running call must return soon, with ARHOST_STATUS_ERROR_CANCELLED. Costs one

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "libav.hpp"
+#include "libav_common/log.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 

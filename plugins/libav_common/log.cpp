@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "libav.hpp"
+#include "libav_common/log.hpp"
 
 #include <array>
 #include <utility>
@@ -16,7 +16,7 @@ struct {
 
 } // namespace
 
-LibavLog::LibavLog(const Host &host) : host_(host) {
+LibavLog::LibavLog(const Host &host, std::string (*hides)(const std::string &text)) : host_(host), hides_(hides) {
     std::lock_guard lock(active.mutex);
     active.log = this;
     av_log_set_callback(&on_message);
@@ -41,13 +41,15 @@ void LibavLog::on_message(void *context, int level, const char *format, va_list 
     if (!active.log)
         return;
     LibavLog &log = *active.log;
-    std::array<char, 512> line{};
+    std::array<char, 8192> line{}; // a cut URL would no longer show where its password ends
     av_log_format_line2(context, level, format, arguments, line.data(), line.size(), &log.print_prefix_);
     std::string text = line.data();
     while (!text.empty() && (text.back() == '\n' || text.back() == '\r'))
         text.pop_back();
     if (text.empty())
         return;
+    if (log.hides_)
+        text = log.hides_(text);
     log.host_.log(ARHOST_SEVERITY_DEBUG, "libav: " + text);
     if (level <= AV_LOG_ERROR) {
         // "[mov,mp4 @ 0x55…] moov atom not found": drop the prefix with the address.

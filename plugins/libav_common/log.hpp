@@ -22,7 +22,8 @@ namespace arhost {
 // instead of stderr.
 class LibavLog {
 public:
-    explicit LibavLog(const Host &host);
+    // `hides` replaces what must not be shown, such as passwords, in each message.
+    explicit LibavLog(const Host &host, std::string (*hides)(const std::string &text) = nullptr);
     ~LibavLog();
     LibavLog(const LibavLog &) = delete;
     LibavLog &operator=(const LibavLog &) = delete;
@@ -35,6 +36,7 @@ private:
     static void on_message(void *context, int level, const char *format, va_list arguments);
 
     Host host_;
+    std::string (*hides_)(const std::string &text);
     std::mutex mutex_;
     std::string last_error_;
     int print_prefix_ = 1; // state of av_log_format_line2: 1 if the next text begins a new line

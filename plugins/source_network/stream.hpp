@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "libav_common/log.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+namespace arhost {
+
+struct StreamSettings {
+    std::string url;                   // accepted by check_url
+    std::string transport;             // of RTSP: "tcp" or "udp"
+    std::chrono::milliseconds timeout; // without an intact picture
+    bool verifies_tls;
+};
+
+// CLOCK_MONOTONIC, in ns.
+std::int64_t monotonic_ns();
+
+// One connection to a network camera. Decodes the first video track.
+class Stream {
+public:
+    // Connects. Throws Failure, as next does, also if `stop` is requested.
+    Stream(const StreamSettings &settings, LibavLog &log, std::stop_token stop);
+    Stream(const Stream &) = delete; // libav stores its address
+    Stream &operator=(const Stream &) = delete;
+
+    // Decodes the next intact picture. Returns false at the end of a recording; throws Failure if the connection is
+    // lost or no intact picture arrives within the timeout.
+    bool next();
+
+    const AVFrame &picture() const { return *picture_; }
+    std::int64_t arrival_ns() const { return arrival_ns_; } // of the last data of the picture, CLOCK_MONOTONIC
+    // The picture's time stamp, with an arbitrary epoch; nullopt if it has none.
+    std::optional<std::int64_t> sender_ns() const;
+    // The picture's time by the sender's wall clock (UTC), from RTCP sender reports; nullopt if there were none.
+    std::optional<std::int64_t> sender_utc_ns() const;
+    // The number of damaged pictures before this picture since the previous one.
+    std::uint32_t damaged() const { return damaged_; }
+    // Whether data arrives faster than in real time (recordings, and HLS, whose segments contain seconds), so that
+    // pictures have to wait until they are due.
+    bool is_ahead_of_time() const { return ahead_of_time_; }
+    double fps() const; // 0: unknown
+
+private:
+    void open(const StreamSettings &settings);
+    void open_decoder();
+    bool feed(); // returns false at the end of the data
+    Failure failure(int code);
+
+    std::string name_; // without credentials
+    std::chrono::milliseconds timeout_;
+    bool verifies_tls_;
+    LibavLog &log_;
+    std::stop_token stop_;
+    std::chrono::steady_clock::time_point deadline_; // of the next picture
+    decltype(AVFormatContext::io_open) open_io_ = nullptr;
+
+    libav::InputPointer input_;
+    AVStream *track_ = nullptr; // owned by input_
+    libav::CodecPointer codec_;
+    libav::PacketPointer packet_;
+    libav::FramePointer picture_;
+    bool timed_ = false, ahead_of_time_ = false, ends_ = false;
+    std::int64_t arrival_ns_ = 0;
+    std::optional<std::int64_t> utc_offset_ns_; // UTC − time stamp
+    std::uint32_t damaged_ = 0;
+};
+
+} // namespace arhost
