@@ -157,8 +157,8 @@ FilesInUse files_read_by(const Configuration &configuration) {
 bool is_url(std::string_view text) {
     const std::string_view scheme = text.substr(0, text.find("://"));
     return scheme.size() < text.size() && !scheme.empty() && std::ranges::all_of(scheme, [](unsigned char c) {
-        return std::isalnum(c) || c == '+' || c == '-' || c == '.';
-    });
+               return std::isalnum(c) || c == '+' || c == '-' || c == '.';
+           });
 }
 
 // Returns the file of a scene, which is given as a path or, for the scenes installed with arhost, by name.

@@ -127,6 +127,24 @@ TEST(Component, IsRestartedIfItsProcessIsStoppedBeyondTheDeadline) {
     ASSERT_TRUE(bench.until("running", 2));
 }
 
+TEST(Component, ALiveSourceThatReportsProgressMayExceedTheDeadlineOfAFrame) {
+    Bench bench;
+    bench.make("source_waiting_live", {.frame = 300ms, .restart = {}});
+    ASSERT_TRUE(bench.until("running")) << bench.log;
+    bench.read(0);
+    ASSERT_TRUE(bench.until("result 0")) << bench.log;
+    EXPECT_EQ(bench.component->restarts(), 0u);
+}
+
+TEST(Component, OtherSourcesMustMeetTheDeadlineOfAFrameDespiteProgress) {
+    Bench bench;
+    bench.make("source_waiting", {.frame = 300ms, .restart = {.first_delay = 1ms}});
+    ASSERT_TRUE(bench.until("running")) << bench.log;
+    bench.read(0);
+    ASSERT_TRUE(bench.until("lost 1")) << bench.log;
+    EXPECT_NE(bench.component->crashes()[0].how.find("hung: no answer within 300 ms"), std::string::npos);
+}
+
 // The deadlines of start and stop restart with each progress report, which must not keep a worker alive forever.
 TEST(Component, EndsAStartThatReportsProgressForever) {
     Bench bench;

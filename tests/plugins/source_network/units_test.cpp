@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "capture_clock.hpp"
+#include "url.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <gmock/gmock.h>
+
+#include <random>
+
+namespace {
+
+using arhost::CaptureClock;
+using arhost::check_url;
+using arhost::without_credentials;
+
+constexpr std::int64_t ms = 1'000'000, second = 1000 * ms, frame = 40 * ms;
+
+std::string rejection_of(const std::string &url) {
+    try {
+        check_url(url);
+    } catch (const arhost::Failure &failure) {
+        EXPECT_EQ(failure.status(), ARHOST_STATUS_ERROR_CONFIGURATION);
+        return failure.what();
+    }
+    return "";
+}
+
+} // namespace
+
+TEST(CaptureClock, RemovesTheJitterOfTheNetwork) {
+    CaptureClock clock;
+    std::mt19937 random(1);
+    std::int64_t worst_ns = 0;
+    for (std::int64_t n = 0; n < 500; ++n) {
+        const std::int64_t sent_ns = n * frame, delay_ns = 10 * ms + std::int64_t(random() % (20 * ms));
+        const std::int64_t captured_ns = clock.capture_ns(7 * second + sent_ns, sent_ns + delay_ns);
+        if (n >= 100)
+            worst_ns = std::max(worst_ns, std::abs(captured_ns - sent_ns - 10 * ms));
+    }
+    EXPECT_LT(worst_ns, 2 * ms) << "the delays vary by 20 ms";
+}
+
+TEST(CaptureClock, FollowsClocksThatAreFastOrSlow) {
+    for (const double drift : {-200e-6, 200e-6}) {
+        CaptureClock clock;
+        for (std::int64_t n = 0; n < 25 * 3600; ++n) {
+            const std::int64_t arrival_ns = n * frame + 10 * ms;
+            const auto stamp_ns = static_cast<std::int64_t>(static_cast<double>(n * frame) * (1 + drift));
+            ASSERT_NEAR(static_cast<double>(clock.capture_ns(stamp_ns, arrival_ns) - arrival_ns), 0, 1e5)
+                << "frame " << n << ", drift " << drift;
+        }
+    }
+}
+
+TEST(CaptureClock, NeverDecreasesNorIsInTheFutureWhateverTheSenderSends) {
+    CaptureClock clock;
+    std::mt19937_64 random(2);
+    std::int64_t last_ns = 0, arrival_ns = second;
+    for (int n = 0; n < 10'000; ++n) {
+        arrival_ns += static_cast<std::int64_t>(random() % (2 * frame));
+        std::optional<std::int64_t> stamp_ns;
+        if (random() % 10 > 0)
+            stamp_ns = static_cast<std::int64_t>(random() % (100 * second)) - 50 * second;
+        if (random() % 100 == 0)
+            clock.restart();
+        const std::int64_t captured_ns = clock.capture_ns(stamp_ns, arrival_ns);
+        ASSERT_LE(captured_ns, arrival_ns) << n;
+        ASSERT_GE(captured_ns, last_ns) << n;
+        last_ns = captured_ns;
+    }
+}
+
+TEST(CaptureClock, RecoversFromTimeStampsThatJumpBack) {
+    CaptureClock clock;
+    clock.capture_ns(100 * second, second);
+    EXPECT_EQ(clock.capture_ns(0, second + frame), second + frame);
+    EXPECT_EQ(clock.capture_ns(frame, second + 2 * frame + 5 * ms), second + 2 * frame + frame / 2000 + 2500);
+}
+
+TEST(CaptureClock, UsesTheArrivalIfThereAreNoTimeStamps) {
+    CaptureClock clock;
+    EXPECT_EQ(clock.capture_ns(std::nullopt, 5), 5);
+    EXPECT_EQ(clock.capture_ns(std::nullopt, 9), 9);
+}
+
+TEST(Url, IsAcceptedWithCredentialsPortAndQuery) {
+    for (const char *url :
+         {"rtsp://camera/", "rtsp://u:p%40@10.0.0.7:8554/live?channel=1", "https://host", "http://[::1]:80/a.m3u8#x"})
+        EXPECT_EQ(rejection_of(url), "") << url;
+}
+
+TEST(Url, IsRejectedWithoutBeingShown) {
+    using testing::HasSubstr;
+    for (const char *url : {"", "file:///etc/passwd", "rtsps://u:secret@host", "concat:http://u:secret@host/",
+                            "RTSP://u:secret@host", " http://u:secret@host"})
+        EXPECT_EQ(rejection_of(url), "url: must begin with rtsp://, http:// or https:// (in lower case)") << url;
+    for (const char *url : {"http://u:secret@host/a b", "http://u:secret@host/\r\nX: y", "http://u:sec'ret@host/",
+                            "http://u:secret@host/ä"})
+        EXPECT_THAT(rejection_of(url), testing::AllOf(HasSubstr("write it as %20"), Not(HasSubstr("secret")))) << url;
+    EXPECT_EQ(rejection_of("http:///path"), "url: names no host");
+    EXPECT_EQ(rejection_of("http://"), "url: names no host");
+    EXPECT_EQ(rejection_of("http://h/" + std::string(3000, 'x')), "url: is longer than 2000 characters");
+}
+
+TEST(Url, IsShownWithoutCredentials) {
+    EXPECT_EQ(without_credentials("rtsp://u:p@host:1/a?user=u&pwd=p#x"), "rtsp://host:1/a?…");
+    EXPECT_EQ(without_credentials("Opening 'http://u:p@a/b.ts' and \"https://u@c/?t=1\" for reading"),
+              "Opening 'http://a/b.ts' and \"https://c/?…\" for reading");
+    EXPECT_EQ(without_credentials("rtsp://u:p/q@host/"), "rtsp://host/") << "an unescaped slash in the password";
+    EXPECT_EQ(without_credentials("rtsp://u:p?q@host/a"), "rtsp://host/a") << "an unescaped ? in the password";
+    EXPECT_EQ(without_credentials("rtsp://u:p@q@host/a"), "rtsp://host/a");
+    EXPECT_EQ(without_credentials("no URL, a@b"), "no URL, a@b");
+    EXPECT_EQ(without_credentials("http://"), "http://");
+}

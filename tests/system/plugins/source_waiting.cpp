@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A source whose camera is lost for a second before each frame. It reports progress meanwhile.
+#include <arhost-cpp/plugin.hpp>
+
+#include <cstring>
+
+namespace {
+
+using namespace arhost;
+
+class Waiting {
+public:
+    Waiting(const Host &host, const Options &) : host_(host) {}
+
+    void start(const arhost_source_setup &, arhost_source_properties &properties) {
+        properties.format.pixel_format = ARHOST_PIXEL_FORMAT_GREY8;
+        properties.format.width = properties.format.height = 8;
+        arhost_frame_layout(&properties.format);
+    }
+
+    arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
+        const auto now = std::chrono::steady_clock::now;
+        for (const auto end = now() + std::chrono::seconds(1); now() < end;) {
+            host_.progress(-1, "waiting for the camera");
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        }
+        std::memset(buffer.plane[0], 0, buffer.format->byte_size);
+        info.clock = ARHOST_CLOCK_MONOTONIC;
+        info.capture_ns = std::chrono::nanoseconds(now().time_since_epoch()).count();
+        return ARHOST_STATUS_OK;
+    }
+
+private:
+    Host host_;
+};
+
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),          ARHOST_KIND_SOURCE, ID, "Waiting", "0.1.0", "arhost", "Apache-2.0",
+    "Waits for its camera, for tests.", CAPABILITIES,       0,  nullptr,   nullptr};
+
+} // namespace
+
+ARHOST_SOURCE(Waiting, descriptor)
