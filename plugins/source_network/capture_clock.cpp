@@ -16,7 +16,7 @@ std::int64_t CaptureClock::capture_ns(std::optional<std::int64_t> sender_ns, std
         last_sender_ns_ = *sender_ns;
     }
     last_arrival_ns_ = arrival_ns;
-    return last_capture_ns_ = std::max(last_capture_ns_, capture_ns);
+    return last_capture_ns_ = std::max(capture_ns, std::min(last_capture_ns_ + 1, arrival_ns));
 }
 
 } // namespace arhost

@@ -6,7 +6,7 @@
 
 namespace arhost {
 
-// Maps a sender's time stamps to CLOCK_MONOTONIC. The results never decrease and are never after the arrival.
+// Maps a sender's time stamps to CLOCK_MONOTONIC. The results ascend and are never after the arrival.
 //
 // A picture arrives after a delay that varies. The picture with the shortest delay shows best how far the clocks are
 // apart, so the offset is the minimum of arrival − time stamp. It may rise by 500 ppm, more than the drift of quartz

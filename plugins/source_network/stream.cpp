@@ -214,6 +214,10 @@ Failure Stream::failure(int code) {
         why = "the server has closed the connection" + reason;
     else if (code == AVERROR_HTTP_UNAUTHORIZED)
         why += "; correct the user name and password: protocol://USER:PASSWORD@HOST…";
+    else if (reason.find("certificate") != std::string::npos)
+        why += "; if you trust this server, set 'tls_verify: false'";
+    else if (code == AVERROR_HTTP_OTHER_4XX)
+        why += "; it may have no video";
     else if (code == AVERROR_INVALIDDATA || code == AVERROR(EINVAL))
         why += "; it is no video that arhost plays (RTSP, Motion-JPEG, HLS, MPEG-TS, MP4, Matroska, FLV)";
     return {ARHOST_STATUS_ERROR_CONFIGURATION, name_ + " cannot be received: " + why};

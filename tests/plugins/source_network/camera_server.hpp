@@ -22,19 +22,23 @@ namespace arhost::test {
 constexpr const char *user_and_password = "camera:s3cr%3At%40%2F", *password = "s3cr%3At%40%2F";
 constexpr int picture_count = 16; // distinct ones, which the cameras show in a loop
 
-// Pictures of 160×120 px in uniform grey: picture n mod 16 has the luma 40 + 12 n.
-inline constexpr const char *numbered_pictures =
-    "-f lavfi -i \"nullsrc=s=160x120:r=25,geq=lum='40+12*mod(N,16)':cb=128:cr=128\"";
+// Pictures of 160×120 px in uniform grey: picture n mod 16 has the luma 40 + 12 n, given by `luma` as a function of
+// it.
+inline std::string numbered_pictures(std::string luma) {
+    luma.replace(luma.find('Y'), 1, "(40+12*mod(N,16))");
+    return "-f lavfi -i \"nullsrc=s=160x120:r=25,format=yuv420p,geq=lum='" + luma + "':cb=128:cr=128\"";
+}
 
 // The files that the servers serve.
 class Media {
 public:
     Media() {
-        shell(ARHOST_FFMPEG " -nostdin -v error " + std::string(numbered_pictures) +
+        shell(ARHOST_FFMPEG " -nostdin -v error " +
+              numbered_pictures("16+Y*219/255") + // ffmpeg then converts to full range
               " -frames:v 16 -q:v 2 -pix_fmt yuvj420p -start_number 0 %02d.jpg");
         shell(ARHOST_FFMPEG " -nostdin -v error -f lavfi -i color=gray:s=320x240 -frames:v 1 -f mjpeg large");
-        shell(ARHOST_FFMPEG " -nostdin -v error " + std::string(numbered_pictures) +
-              " -frames:v 1500 -c:v libx264 -preset ultrafast -qp 5 -g 25 -bf 0 -pix_fmt yuv420p -f hls -hls_time 1 "
+        shell(ARHOST_FFMPEG " -nostdin -v error " + numbered_pictures("Y") +
+              " -frames:v 500 -c:v libx264 -preset ultrafast -qp 5 -g 25 -bf 0 -f hls -hls_time 1 "
               "-hls_list_size 2 -hls_segment_filename hls%d.ts all.m3u8");
         shell("head -n 8 all.m3u8 > vod.m3u8 && echo '#EXT-X-ENDLIST' >> vod.m3u8");
         shell("openssl req -x509 -newkey rsa:2048 -nodes -days 1 -subj /CN=camera -keyout key.pem "

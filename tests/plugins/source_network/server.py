@@ -38,8 +38,8 @@ class Camera(http.server.BaseHTTPRequestHandler):
         if route:
             try:
                 route()
-            except (BrokenPipeError, ConnectionResetError):
-                pass
+            except OSError:
+                pass  # the client has closed the connection
         elif (self.server.folder / name).is_file():
             self.send_bytes((self.server.folder / name).read_bytes())
         else:
@@ -75,8 +75,8 @@ class Camera(http.server.BaseHTTPRequestHandler):
         self.stream(itertools.cycle(p[: len(p) // 2] for p in self.server.pictures))
 
     def send_stalls(self):
-        """Sends five pictures, then keeps the connection without sending."""
-        self.stream(self.server.pictures[:5])
+        """Sends ten pictures, then keeps the connection without sending."""
+        self.stream(self.server.pictures[:10])
         time.sleep(3600)
 
     def send_grows(self):

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include <chrono>
+#include <cmath>
 #include <numeric>
 #include <thread>
 
@@ -24,16 +25,11 @@ std::int64_t now_ns() {
 // The number of the picture, from its mean luma; −1 if it is none of the pictures.
 int number_of(const SourceFrame &frame, const SourceUnderTest &source) {
     const std::size_t count = std::size_t{source.format().width} * source.format().height;
-    double luma =
+    const double luma =
         std::accumulate(frame.bytes.begin(), frame.bytes.begin() + static_cast<std::ptrdiff_t>(count), 0.0) /
         static_cast<double>(count);
-    const bool is_full = source.format().yuv_range == ARHOST_YUV_RANGE_FULL;
-    for (int n = 0; n < picture_count; ++n) {
-        const double expected = 40 + 12 * n; // of full range in the JPEG pictures, limited range in HLS
-        if (std::abs(luma - expected) < 4 || (!is_full && std::abs(luma - (16 + expected * 219 / 255)) < 4))
-            return n;
-    }
-    return -1;
+    const int number = static_cast<int>(std::lround((luma - 40) / 12));
+    return std::abs(luma - 40 - 12 * number) < 3 && number < picture_count ? number : -1;
 }
 
 arhost_source_setup live() {
@@ -89,7 +85,8 @@ TEST_P(Rtsp, DeliversThePicturesOfTheCamera) {
     EXPECT_EQ(source.format().width, 160u);
     EXPECT_EQ(source.format().height, 120u);
     EXPECT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_I420);
-    EXPECT_NEAR(source.format().fps, 25, 0.1);
+    // RTP with JPEG does not tell the rate.
+    EXPECT_NEAR(source.format().fps, GetParam().at("url") == "jpeg" ? 0 : 25, 0.1);
     expect_pictures(source, 60);
     EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
     EXPECT_THAT(source.log(), AllOf(Not(HasSubstr("s3cr")), Not(HasSubstr("camera:"))));
@@ -119,7 +116,7 @@ TEST(RtspErrors, NameTheCause) {
     for (const std::string user : {"", "camera:wrong", "nobody:s3cr"})
         EXPECT_THAT(error_of({{"url", server.url("private", user)}}),
                     AllOf(HasSubstr("401 Unauthorized"), HasSubstr("correct the user name and password")));
-    EXPECT_THAT(error_of({{"url", server.url("only-sound")}}), HasSubstr("has no video"));
+    EXPECT_THAT(error_of({{"url", server.url("only-sound")}}), HasSubstr("it may have no video"));
     server.kill();
     EXPECT_THAT(error_of({{"url", server.url("h264")}}),
                 HasSubstr("the stream '" + server.url("h264") + "' cannot be received: Connection refused"));
@@ -264,10 +261,10 @@ TEST(Http, ACameraThatStopsSendingIsConnectedAgain) {
     const Media media;
     const CameraServer server("http", media);
     SourceUnderTest source(id);
-    ASSERT_EQ(source.start({{"url", server.url("stalls")}, {"timeout_ms", "500"}}), ARHOST_STATUS_OK) << source.log();
-    for (int n = 0; n < 12; ++n) // five in each connection
-        ASSERT_EQ(number_of(source.read(0), source), n % 5) << source.log();
-    EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("no intact picture has arrived for 500 ms"));
+    ASSERT_EQ(source.start({{"url", server.url("stalls")}, {"timeout_ms", "1000"}}), ARHOST_STATUS_OK) << source.log();
+    for (int n = 0; n < 24; ++n) // ten in each connection
+        ASSERT_EQ(number_of(source.read(0), source), n % 10) << source.log();
+    EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("no intact picture has arrived for 1000 ms"));
 }
 
 TEST(Http, AChangeOfTheFrameSizeIsAnError) {
