@@ -4,6 +4,7 @@
 // (core/sandbox/system_calls.cpp): a call that the allow list lacks fails with ENOSYS, one of the deny list with
 // EPERM.
 #include "arhost_run.hpp"
+#include "camera_server.hpp"
 
 #include <gmock/gmock.h>
 
@@ -154,6 +155,24 @@ class Tracker:
         return 0
 )");
     EXPECT_THAT(blocked_calls(run), testing::IsEmpty());
+}
+
+TEST(AllowListOfOthers, ContainsTheCallsOfANetworkStream) {
+    REQUIRE_TRACE();
+    ARHOST_REQUIRE_RTSP_SERVER();
+    const Media media;
+    const CameraServer rtsp("rtsp", media), https("https", media);
+    for (const std::string &stream :
+         {"url: \"" + rtsp.url("h264") + "\"", "transport: udp, url: \"" + rtsp.url("h264") + "\"",
+          "tls_verify: false, url: \"" + https.url("vod.m3u8") + "\""}) {
+        ArhostRun run("version: 1\nframes: 3\noutputs: [{plugin: sink_null}]\nsource: {plugin: source_network, "
+                      "allow: [network], options: {" +
+                      stream + "}}\n");
+        std::set<std::string> blocked = blocked_calls(run);
+        // libavformat then uses buffers of the default size.
+        std::erase_if(blocked, [](const std::string &call) { return call.find("SO_RCVBUF") != std::string::npos; });
+        EXPECT_THAT(blocked, testing::IsEmpty()) << stream;
+    }
 }
 
 // CMakeLists.txt runs this test in a virtual machine, which has a virtual camera.

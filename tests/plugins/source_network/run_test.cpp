@@ -30,7 +30,7 @@ TEST(NetworkRun, PlaysInTheSandboxWithoutShowingThePassword) {
                                         server.url("private", user_and_password) + "\"}",
                                     50));
         ASSERT_EQ(run.run(), 0) << run.output();
-        EXPECT_EQ(run.stats()["frames"]["composited"], 50);
+        EXPECT_EQ(run.stats()["frames"]["in"], 50);
         for (const auto &[name, check] : run.stats()["conformance"]["source"].items())
             EXPECT_EQ(check["violations"], 0) << name << ": " << check;
         for (const char *file : {"output.txt", "stats.json", "timeline.csv"})
@@ -93,6 +93,6 @@ TEST(NetworkRun, ContinuesWhenTheCameraComesBack) {
     server.start();
     EXPECT_EQ(run.wait(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("is back"));
-    EXPECT_EQ(run.stats()["frames"]["composited"], 100);
+    EXPECT_EQ(run.stats()["frames"]["in"], 100);
     EXPECT_EQ(run.stats()["restarts"]["source"], 0);
 }

@@ -261,7 +261,8 @@ TEST(Http, ACameraThatStopsSendingIsConnectedAgain) {
     const Media media;
     const CameraServer server("http", media);
     SourceUnderTest source(id);
-    ASSERT_EQ(source.start({{"url", server.url("stalls")}, {"timeout_ms", "1000"}}), ARHOST_STATUS_OK) << source.log();
+    ASSERT_EQ(source.start({{"url", server.url("stalls")}, {"timeout_ms", "1000"}}), ARHOST_STATUS_OK)
+        << source.log();
     for (int n = 0; n < 24; ++n) // ten in each connection
         ASSERT_EQ(number_of(source.read(0), source), n % 10) << source.log();
     EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("no intact picture has arrived for 1000 ms"));

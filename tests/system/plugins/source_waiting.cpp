@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A source whose camera is lost for a second before each frame. It reports progress meanwhile.
+// A source whose camera is lost for a while, or forever, before each frame. It reports progress meanwhile and ignores
+// the host's request to cancel.
 #include <arhost-cpp/plugin.hpp>
 
 #include <cstring>
@@ -11,7 +12,7 @@ using namespace arhost;
 
 class Waiting {
 public:
-    Waiting(const Host &host, const Options &) : host_(host) {}
+    Waiting(const Host &host, const Options &options) : host_(host), wait_(options.integer("wait_ms")) {}
 
     void start(const arhost_source_setup &, arhost_source_properties &properties) {
         properties.format.pixel_format = ARHOST_PIXEL_FORMAT_GREY8;
@@ -21,7 +22,7 @@ public:
 
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
         const auto now = std::chrono::steady_clock::now;
-        for (const auto end = now() + std::chrono::seconds(1); now() < end;) {
+        for (const auto end = now() + wait_; wait_.count() < 0 || now() < end;) {
             host_.progress(-1, "waiting for the camera");
             std::this_thread::sleep_for(std::chrono::milliseconds(10));
         }
@@ -33,8 +34,11 @@ public:
 
 private:
     Host host_;
+    std::chrono::milliseconds wait_;
 };
 
+constexpr arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_INTEGER, "wait_ms", "1000", "Duration of each outage, in ms; -1: forever")};
 constexpr arhost_descriptor descriptor = {
     sizeof(arhost_descriptor),          ARHOST_KIND_SOURCE, ID, "Waiting", "0.1.0", "arhost", "Apache-2.0",
     "Waits for its camera, for tests.", CAPABILITIES,       0,  nullptr,   nullptr};
