@@ -597,3 +597,17 @@ TEST(Supervision, TheRunEndsIfNoOutputIsLeft) {
                   "outputs: [{plugin: sink_counter, path: counted.txt, options: {error_at: 5}}]\n");
     EXPECT_EQ(run.run(), 1) << run.output();
 }
+
+// After the signal, the source may no longer extend deadline_ms, so the outputs are completed.
+TEST(Supervision, OneSignalEndsARunWhoseLiveSourceWaitsForever) {
+    ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_waiting_live, deadline_ms: 400, "
+                  "options: {wait_ms: -1}}\noutputs: [{plugin: sink_counter, path: out/counted.txt}]\n");
+    run.start();
+    while (run.running() && !run.worker("source_waiting_live"))
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    std::this_thread::sleep_for(std::chrono::seconds(2)); // several times deadline_ms
+    EXPECT_THAT(run.output(), Not(HasSubstr("hung")));
+    send_signal(run.pid(), SIGTERM);
+    EXPECT_EQ(run.wait(), 130) << run.output();
+    EXPECT_TRUE(run.exists("out/counted.txt.done"));
+}

@@ -19,7 +19,7 @@
 
 namespace arhost::test {
 
-constexpr const char *user_and_password = "camera:s3cr%3At%40%2F", *password = "s3cr%3At%40%2F";
+constexpr const char *user_and_password = "camera:s3cr%3At%40%2F";
 constexpr int picture_count = 16; // distinct ones, which the cameras show in a loop
 
 // Pictures of 160×120 px in uniform grey: picture n mod 16 has the luma 40 + 12 n, given by `luma` as a function of

@@ -39,9 +39,18 @@ private:
 
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_INTEGER, "wait_ms", "1000", "Duration of each outage, in ms; -1: forever")};
-constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),          ARHOST_KIND_SOURCE, ID, "Waiting", "0.1.0", "arhost", "Apache-2.0",
-    "Waits for its camera, for tests.", CAPABILITIES,       0,  nullptr,   nullptr};
+constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
+                                          ARHOST_KIND_SOURCE,
+                                          ID,
+                                          "Waiting",
+                                          "0.1.0",
+                                          "arhost",
+                                          "Apache-2.0",
+                                          "Waits for its camera, for tests.",
+                                          CAPABILITIES,
+                                          std::size(options),
+                                          options,
+                                          nullptr};
 
 } // namespace
 
