@@ -12,9 +12,6 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
-using std::chrono::seconds;
-
-constexpr milliseconds first_delay(250), longest_delay(5000); // between attempts to connect
 
 } // namespace
 
@@ -37,7 +34,7 @@ std::optional<Received> Receiver::take(milliseconds limit) {
 
 bool Receiver::ended() {
     const std::lock_guard lock(mutex_);
-    return ended_ && kept_.empty();
+    return ended_ && kept_.empty() && !error_; // take throws the error
 }
 
 double Receiver::fps() {
@@ -46,9 +43,7 @@ double Receiver::fps() {
 }
 
 void Receiver::run(const std::stop_token &stop) {
-    milliseconds delay = first_delay;
     while (!stop.stop_requested()) {
-        const Clock::time_point begin = Clock::now();
         try {
             receive(stop);
             return finish({});
@@ -60,23 +55,24 @@ void Receiver::run(const std::stop_token &stop) {
         } catch (...) {
             return finish(std::current_exception());
         }
-        if (Clock::now() - begin > 2 * longest_delay)
-            delay = first_delay; // the connection was stable
-        if (!wait(stop, Clock::now() + delay))
+        if (!wait(stop, Clock::now() + delay_))
             return;
-        delay = std::min(2 * delay, longest_delay);
+        delay_ = std::min(2 * delay_, longest_delay);
     }
 }
 
 // Receives one connection until the end of a recording. Throws Failure if it is lost.
 void Receiver::receive(const std::stop_token &stop) {
     Stream stream(settings_.stream, log_, stop);
+    const Clock::time_point begin = Clock::now();
     clock_.restart();
     epoch_ns_.reset();
     while (stream.next()) {
         if (std::exchange(is_lost_, false))
             host_.info("the stream '" + without_credentials(settings_.stream.url) + "' is back");
         has_received_ = true;
+        if (Clock::now() - begin > longest_delay)
+            delay_ = first_delay; // the connection is stable
         if (stream.is_ahead_of_time() && !wait_until_due(stream, stop))
             return;
         publish(stream);

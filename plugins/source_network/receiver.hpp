@@ -48,12 +48,15 @@ private:
     void publish(const Stream &stream);
     void finish(std::exception_ptr error);
 
+    static constexpr std::chrono::milliseconds first_delay{250}, longest_delay{5000}; // between attempts to connect
+
     Host host_;
     ReceiverSettings settings_;
     LibavLog log_;
     // Used only by the thread:
     CaptureClock clock_;
     bool has_received_ = false, is_lost_ = false, clock_reported_ = false;
+    std::chrono::milliseconds delay_ = first_delay; // before the next attempt
     std::optional<std::int64_t> epoch_ns_; // CLOCK_MONOTONIC at time stamp 0, for streams that are ahead of time
 
     std::mutex mutex_;
