@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/pipeline.hpp"
 
-#include "camera/coordinates.hpp"
 #include "run_config/access.hpp"
 
 #include <spdlog/fmt/fmt.h>
@@ -22,6 +21,9 @@ Pipeline::Pipeline(const run_config::Configuration &configuration, supervise::Co
         context_.log(ARHOST_SEVERITY_WARNING, name.substr(0, name.find('.')),
                      "violates the contract: " + name + ": " + violation);
     });
+    if (configuration.tracker)
+        for (const arhost_marker_config &marker : configuration.tracker->markers)
+            marker_ids_.insert(marker.id);
 }
 
 bool Pipeline::run() {
@@ -63,10 +65,10 @@ std::vector<std::string> Pipeline::findings() const {
         lines.push_back(fmt::format("camera: fx {:g} px, fy {:g} px, cx {:g} px, cy {:g} px", intrinsics_.fx,
                                     intrinsics_.fy, intrinsics_.cx, intrinsics_.cy));
     if (tracker_)
-        lines.push_back(fmt::format("tracker: {}: {}", tracker_->description().id, looked_for_));
+        lines.push_back(fmt::format("tracker: {}: {}", tracker_->component->description().id, looked_for()));
     if (raytracer_)
-        lines.push_back(
-            fmt::format("raytracer: {}: {}", raytracer_->description().id, configuration_.raytracer->scene.string()));
+        lines.push_back(fmt::format("raytracer: {}: {}", raytracer_->component->description().id,
+                                    configuration_.raytracer->scene.string()));
     for (std::size_t i = 0; i < sinks_.size(); ++i) {
         const auto path = run_config::path_of(configuration_.outputs[i].node);
         const bool is_stdout = path && run_config::is_standard_output(*path);
@@ -95,12 +97,20 @@ void Pipeline::check_all_overlays() {
 }
 
 std::vector<Component *> Pipeline::components() const {
-    std::vector<Component *> all;
-    for (const auto *component : {&source_, &tracker_, &raytracer_})
-        if (*component)
-            all.push_back(component->get());
+    std::vector<Component *> all = components_before_outputs();
     for (const auto &sink : sinks_)
         all.push_back(sink->component.get());
+    return all;
+}
+
+std::vector<Component *> Pipeline::components_before_outputs() const {
+    std::vector<Component *> all;
+    if (source_)
+        all.push_back(source_.get());
+    if (tracker_)
+        all.push_back(tracker_->component.get());
+    if (raytracer_)
+        all.push_back(raytracer_->component.get());
     return all;
 }
 
@@ -136,19 +146,15 @@ void Pipeline::pump() {
 }
 
 void Pipeline::advance_phase() {
-    const auto is_ready = [](const std::unique_ptr<Component> &component) {
-        return !component || component->running();
-    };
-    if (phase_ == Phase::source && is_ready(source_) && !scene_loading_ && (!configuration_.raytracer || arena_)) {
+    const auto is_ready = [](const auto &part) { return !part || part->running(); };
+    if (phase_ == Phase::source && is_ready(source_) && !scene_loading_ && (!configuration_.raytracer || scene_)) {
         if (configuration_.tracker) {
-            make_tracker();
-            tracker_->start();
+            tracker_ = make_tracker(*configuration_.tracker);
+            tracker_->component->start();
         }
         if (configuration_.raytracer) {
-            coordinates_ = configuration_.coordinates.value_or(
-                camera::default_for(arena_.map(Access::read_only).as<const arhost_scene>().axes));
-            make_raytracer();
-            raytracer_->start();
+            raytracer_ = make_raytracer(*configuration_.raytracer, scene_);
+            raytracer_->component->start();
         }
         phase_ = Phase::stages;
     }
@@ -178,9 +184,10 @@ void Pipeline::end_run() {
 
 // Cancels the tracker's and the ray tracer's calls for frames that will not be shown.
 void Pipeline::cancel_stages() {
-    for (Component *stage : {tracker_.get(), raytracer_.get()})
-        if (stage)
-            stage->cancel_call();
+    if (tracker_)
+        tracker_->component->cancel_call();
+    if (raytracer_)
+        raytracer_->component->cancel_call();
 }
 
 std::chrono::milliseconds Pipeline::longest_stop_deadline() const {
@@ -226,9 +233,8 @@ void Pipeline::stop_components() {
     phase_ = Phase::stopping;
     scene_loading_.reset();
     on_progress_({statistics_.composited, statistics_.composited, true});
-    for (Component *stage : {source_.get(), tracker_.get(), raytracer_.get()})
-        if (stage)
-            stage->running() ? stage->stop() : stage->kill();
+    for (Component *component : components_before_outputs())
+        component->running() ? component->stop() : component->kill();
     // A sink that is not running is restarted once more, so that it can finish its files.
     for (const auto &sink : sinks_)
         if (sink->component->state() != Component::State::stopped)

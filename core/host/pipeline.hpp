@@ -15,6 +15,7 @@
 #include "host/frames.hpp"
 #include "host/scene_loading.hpp"
 #include "host/sink_queue.hpp"
+#include "host/stage.hpp"
 #include "host/statistics.hpp"
 #include "run_config/configuration.hpp"
 
@@ -46,7 +47,7 @@ public:
 
     const std::string &failure() const { return failure_; }
     bool failure_was_logged() const { return failure_was_logged_; }
-    const std::string &looked_for() const { return looked_for_; }
+    std::string looked_for() const { return tracker_ ? tracker_->looked_for : ""; }
     bool failed_by_configuration() const { return failed_by_configuration_; }
 
     // Handles Ctrl-C. The first call lets the frames in progress finish and then ends the run, after the longest
@@ -58,16 +59,19 @@ public:
     std::vector<supervise::Component *> components() const; // source, tracker, ray tracer, outputs
 
 private:
+    std::vector<supervise::Component *> components_before_outputs() const;
     enum class Phase { source, stages, outputs, running, stopping, finished };
 
     void make_source();
     void make_black_frames();
-    void make_tracker();
-    void make_raytracer();
+    std::unique_ptr<TrackerStage> make_tracker(const run_config::TrackerConfiguration &configuration);
+    std::unique_ptr<RaytracerStage> make_raytracer(const run_config::RaytracerConfiguration &configuration,
+                                                   std::shared_ptr<LoadedScene> scene);
     void make_outputs();
     void make_sink(std::size_t index, const std::string &name);
     void expect_distinct_files(std::size_t index, const ipc::PluginDescription &plugin);
     void load_scene();
+    std::shared_ptr<LoadedScene> use_scene(ipc::SharedMemory arena) const;
     supervise::Component::Callbacks common_callbacks(const std::string &name, const yaml::Node &node);
 
     void pump();
@@ -81,6 +85,9 @@ private:
     bool compose();
     void compose(Frame &frame, std::span<std::byte> slot);
     ImageView overlay_of(const Frame &frame) const;
+    camera::Coordinates coordinates() const {
+        return raytracer_ ? raytracer_->scene->coordinates : camera::Coordinates();
+    }
     void check_buffers_unmodified(const Frame &frame);
     void cancel_stages();
     std::chrono::milliseconds longest_stop_deadline() const;
@@ -95,10 +102,10 @@ private:
     Frame *accept_result(const ipc::Command &command, const ipc::Result &result, supervise::Component &stage);
     void on_tracked(const ipc::Command &command, const ipc::Result &result);
     void on_rendered(const ipc::Command &command, const ipc::Result &result);
-    void on_stage_lost(const std::vector<ipc::Command> &unanswered, Frame::Stage waiting);
+    void on_stage_lost(Stage &stage, const std::vector<ipc::Command> &unanswered, Frame::Stage waiting);
 
     // Returns whether a frame may skip `stage` because the stage's worker is down.
-    bool may_skip(const supervise::Component *stage) const;
+    bool may_skip(const Stage &stage) const;
     bool is_behind() const;
     void skip(Frame &frame, const char *stage);
     void report_frame_errors() const;
@@ -122,19 +129,19 @@ private:
     Phase phase_ = Phase::source;
 
     std::unique_ptr<SceneLoading> scene_loading_;
-    ipc::SharedMemory arena_;
-    camera::Coordinates coordinates_;
+    std::shared_ptr<LoadedScene> scene_;
 
-    std::unique_ptr<supervise::Component> source_, tracker_, raytracer_;
+    std::unique_ptr<supervise::Component> source_;
+    std::unique_ptr<TrackerStage> tracker_;
+    std::unique_ptr<RaytracerStage> raytracer_;
     std::vector<std::unique_ptr<SinkQueue>> sinks_;
     std::map<std::size_t, run_config::OutputFile> output_files_; // by the output's index
-    std::shared_ptr<SlotPool> source_slots_, tracker_slots_, raytracer_slots_, output_slots_;
+    std::shared_ptr<SlotPool> source_slots_, output_slots_;
 
     std::optional<arhost_frame_format> format_;
     std::uint64_t frame_count_ = 0;
     arhost_intrinsics intrinsics_{};
     std::set<std::int32_t> marker_ids_;
-    std::string looked_for_; // the markers and dictionary of the current tracker, for messages
 
     std::deque<Lease> reads_; // slots of the pending read commands, oldest first
     std::uint64_t next_read_ = 0;
@@ -151,7 +158,6 @@ private:
     std::map<std::pair<std::string, arhost_status>, std::uint64_t>
         frame_errors_;                          // number of frames by stage and error
     std::optional<SourceChecks> source_checks_; // for the current plugin; survives restarts
-    std::optional<OverlayChecks> overlay_checks_;
     std::string failure_;
     bool failed_by_configuration_ = false, failure_was_logged_ = false;
     std::optional<std::filesystem::path> check_scratch_; // set by check()

@@ -4,6 +4,7 @@
 #include "host/pipeline.hpp"
 
 #include "camera/calibration.hpp"
+#include "camera/coordinates.hpp"
 #include "camera/lens.hpp"
 #include "host/outcome.hpp"
 #include "run_config/access.hpp"
@@ -121,9 +122,7 @@ void Pipeline::load_scene() {
     const run_config::RaytracerConfiguration &raytracer = *configuration_.raytracer;
     SceneLoading::Callbacks callbacks;
     callbacks.loaded = [this](SharedMemory arena) {
-        arena_ = std::move(arena);
-        if (configuration_.raytracer->conform)
-            overlay_checks_.emplace(arena_.map(Access::read_only).as<const arhost_scene>());
+        scene_ = use_scene(std::move(arena));
         scene_loading_.reset();
     };
     callbacks.failed = [this](const std::string &reason) {
@@ -134,55 +133,73 @@ void Pipeline::load_scene() {
                                                     raytracer.limits, configuration_.files, std::move(callbacks));
 }
 
-void Pipeline::make_tracker() {
-    const run_config::TrackerConfiguration &tracker = *configuration_.tracker;
-    for (const arhost_marker_config &marker : tracker.markers)
-        marker_ids_.insert(marker.id);
-    Component::Callbacks callbacks = common_callbacks("tracker", tracker.node);
-    callbacks.hello = [this, &tracker](const PluginDescription &plugin, std::size_t candidate) {
-        std::vector<OptionValue> options = run_config::options_for(plugin, ARHOST_KIND_TRACKER, tracker, candidate);
-        looked_for_ = describe_targets(tracker.markers, plugin, options);
-        return Component::Create{{std::move(options), messages::TrackerSetup{*format_, intrinsics_, tracker.markers}},
+std::shared_ptr<LoadedScene> Pipeline::use_scene(SharedMemory arena) const {
+    const Mapping mapping = arena.map(Access::read_only);
+    const auto &scene = mapping.as<const arhost_scene>();
+    auto loaded = std::make_shared<LoadedScene>();
+    loaded->coordinates = configuration_.coordinates.value_or(camera::default_for(scene.axes));
+    if (configuration_.raytracer->conform)
+        loaded->overlay_checks.emplace(scene);
+    loaded->arena = std::move(arena);
+    return loaded;
+}
+
+std::unique_ptr<TrackerStage> Pipeline::make_tracker(const run_config::TrackerConfiguration &configuration) {
+    auto tracker = std::make_unique<TrackerStage>();
+    TrackerStage *stage = tracker.get();
+    stage->configuration = &configuration;
+    Component::Callbacks callbacks = common_callbacks("tracker", configuration.node);
+    callbacks.hello = [this, stage](const PluginDescription &plugin, std::size_t candidate) {
+        const run_config::TrackerConfiguration &own = *stage->configuration;
+        std::vector<OptionValue> options = run_config::options_for(plugin, ARHOST_KIND_TRACKER, own, candidate);
+        stage->looked_for = describe_targets(own.markers, plugin, options);
+        return Component::Create{{std::move(options), messages::TrackerSetup{*format_, intrinsics_, own.markers}},
                                  {}};
     };
     callbacks.ready = [](const messages::Ready &) {
         return SlotLayout{sizeof(arhost_tracker_result), stage_slot_count};
     };
-    callbacks.running = [this] { tracker_slots_ = pool_of(*tracker_); };
+    callbacks.running = [stage] { stage->slots = pool_of(*stage->component); };
     callbacks.result = [this](const Command &command, const Result &result) { on_tracked(command, result); };
-    callbacks.lost = [this](const std::vector<Command> &unanswered) {
-        on_stage_lost(unanswered, Frame::Stage::to_track);
+    callbacks.lost = [this, stage](const std::vector<Command> &unanswered) {
+        on_stage_lost(*stage, unanswered, Frame::Stage::to_track);
     };
-    tracker_ = std::make_unique<Component>(context_, "tracker", tracker.plugins, tracker.limits, tracker.policy,
-                                           std::move(callbacks));
+    stage->component = std::make_unique<Component>(context_, "tracker", configuration.plugins, configuration.limits,
+                                                   configuration.policy, std::move(callbacks));
+    return tracker;
 }
 
-void Pipeline::make_raytracer() {
-    const run_config::RaytracerConfiguration &raytracer = *configuration_.raytracer;
-    Component::Callbacks callbacks = common_callbacks("raytracer", raytracer.node);
-    callbacks.hello = [this, &raytracer](const PluginDescription &plugin, std::size_t candidate) {
+std::unique_ptr<RaytracerStage> Pipeline::make_raytracer(const run_config::RaytracerConfiguration &configuration,
+                                                         std::shared_ptr<LoadedScene> scene) {
+    auto raytracer = std::make_unique<RaytracerStage>();
+    RaytracerStage *stage = raytracer.get();
+    stage->configuration = &configuration;
+    stage->scene = std::move(scene);
+    Component::Callbacks callbacks = common_callbacks("raytracer", configuration.node);
+    callbacks.hello = [this, stage](const PluginDescription &plugin, std::size_t candidate) {
         std::vector<OptionValue> options =
-            run_config::options_for(plugin, ARHOST_KIND_RAYTRACER, raytracer, candidate);
+            run_config::options_for(plugin, ARHOST_KIND_RAYTRACER, *stage->configuration, candidate);
         if (intrinsics_.distortion != ARHOST_DISTORTION_NONE &&
             !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION))
-            raytracer_->log(
+            stage->component->log(
                 ARHOST_SEVERITY_WARNING,
                 plugin.id + " does not support lens distortion: its worker warps the rendered images, which costs "
                             "sharpness and time");
         return Component::Create{
             {std::move(options), messages::RaytracerSetup{format_->width, format_->height, intrinsics_}},
-            arena_.fd()};
+            stage->scene->arena.fd()};
     };
     callbacks.ready = [this](const messages::Ready &) {
         return SlotLayout{std::uint64_t(overlay_stride(format_->width)) * format_->height, stage_slot_count};
     };
-    callbacks.running = [this] { raytracer_slots_ = pool_of(*raytracer_); };
+    callbacks.running = [stage] { stage->slots = pool_of(*stage->component); };
     callbacks.result = [this](const Command &command, const Result &result) { on_rendered(command, result); };
-    callbacks.lost = [this](const std::vector<Command> &unanswered) {
-        on_stage_lost(unanswered, Frame::Stage::to_render);
+    callbacks.lost = [this, stage](const std::vector<Command> &unanswered) {
+        on_stage_lost(*stage, unanswered, Frame::Stage::to_render);
     };
-    raytracer_ = std::make_unique<Component>(context_, "raytracer", raytracer.plugins, raytracer.limits,
-                                             raytracer.policy, std::move(callbacks));
+    stage->component = std::make_unique<Component>(context_, "raytracer", configuration.plugins, configuration.limits,
+                                                   configuration.policy, std::move(callbacks));
+    return raytracer;
 }
 
 void Pipeline::make_outputs() {

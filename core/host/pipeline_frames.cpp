@@ -123,13 +123,13 @@ bool Pipeline::track() {
     Frame *frame = next_waiting(Frame::Stage::to_track);
     if (!frame)
         return false;
-    if (may_skip(tracker_.get())) {
+    if (may_skip(*tracker_)) {
         skip(*frame, "tracker");
         return true;
     }
-    if (!tracker_->running() || tracker_->in_flight() >= (live_ ? 1u : 2u))
+    if (!tracker_->running() || tracker_->component->in_flight() >= (live_ ? 1u : 2u))
         return false;
-    std::optional<Lease> slot = tracker_slots_->acquire();
+    std::optional<Lease> slot = tracker_->slots->acquire();
     if (!slot)
         return false;
     frame->result = std::move(*slot);
@@ -141,7 +141,7 @@ bool Pipeline::track() {
     command.sequence = frame->record.sequence;
     command.capture_ns = frame->record.capture_ns;
     command.clock = frame->record.clock;
-    tracker_->submit(command, frame->pixels.region());
+    tracker_->component->submit(command, frame->pixels.region());
     return true;
 }
 
@@ -168,7 +168,7 @@ Frame *Pipeline::accept_result(const Command &command, const Result &result, Com
 }
 
 void Pipeline::on_tracked(const Command &command, const Result &result) {
-    Frame *accepted = accept_result(command, result, *tracker_);
+    Frame *accepted = accept_result(command, result, *tracker_->component);
     if (!accepted)
         return;
     Frame &frame = *accepted;
@@ -177,11 +177,11 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
     frame.result = Lease();
     if (problem) {
         skip(frame, "tracker");
-        return tracker_->end_process(std::string("contract violation: ") + problem);
+        return tracker_->component->end_process(std::string("contract violation: ") + problem);
     }
     ++statistics_.tracker_results;
-    if (configuration_.tracker->conform)
-        check_markers(statistics_.contract_checks, frame.record, intrinsics_, configuration_.tracker->markers);
+    if (tracker_->configuration->conform)
+        check_markers(statistics_.contract_checks, frame.record, intrinsics_, tracker_->configuration->markers);
     frame.times.tracker = std::chrono::nanoseconds(result.busy_ns);
     set_camera_from_markers(frame);
     on_camera_known(frame);
@@ -197,8 +197,8 @@ void Pipeline::set_camera_from_markers(Frame &frame) {
         return;
     const std::uint64_t sequence = frame.record.sequence;
     if (anchor != markers.end())
-        last_camera_ = {sequence, *camera::camera_from_marker(anchor->mt, coordinates_, intrinsics_)};
-    if (!last_camera_ || sequence - last_camera_->first > configuration_.tracker->hold_frames)
+        last_camera_ = {sequence, *camera::camera_from_marker(anchor->mt, coordinates(), intrinsics_)};
+    if (!last_camera_ || sequence - last_camera_->first > tracker_->configuration->hold_frames)
         return;
     frame.held = last_camera_->first != sequence;
     frame.record.camera = last_camera_->second;
@@ -233,13 +233,13 @@ bool Pipeline::render() {
     Frame *frame = next_waiting(Frame::Stage::to_render);
     if (!frame)
         return false;
-    if (may_skip(raytracer_.get())) {
+    if (may_skip(*raytracer_)) {
         skip(*frame, "raytracer");
         return true;
     }
-    if (!raytracer_->running() || raytracer_->in_flight() >= (live_ ? 1u : 2u))
+    if (!raytracer_->running() || raytracer_->component->in_flight() >= (live_ ? 1u : 2u))
         return false;
-    std::optional<Lease> slot = raytracer_slots_->acquire();
+    std::optional<Lease> slot = raytracer_->slots->acquire();
     if (!slot)
         return false;
     frame->overlay = std::move(*slot);
@@ -250,7 +250,7 @@ bool Pipeline::render() {
     command.sequence = frame->record.sequence;
     command.time_s = 1e-9 * static_cast<double>(frame->record.capture_ns);
     command.camera = frame->record.camera;
-    raytracer_->submit(command);
+    raytracer_->component->submit(command);
     return true;
 }
 
@@ -258,7 +258,7 @@ void Pipeline::on_rendered(const Command &command, const Result &result) {
     const std::chrono::nanoseconds busy(result.busy_ns), device = device_time(result.render, busy);
     if (device.count())
         statistics_.stages["device"].add(device);
-    Frame *accepted = accept_result(command, result, *raytracer_);
+    Frame *accepted = accept_result(command, result, *raytracer_->component);
     if (!accepted)
         return;
     Frame &frame = *accepted;
@@ -267,9 +267,9 @@ void Pipeline::on_rendered(const Command &command, const Result &result) {
     frame.times.device = device;
     frame.record.overlay = frame.held ? ARHOST_OVERLAY_HELD : ARHOST_OVERLAY_RENDERED;
     frame.stage = Frame::Stage::done;
-    if (overlay_checks_) {
-        overlay_checks_->check(statistics_.contract_checks, command.sequence, command.camera,
-                               region_of(frame.render, format_->width, format_->height), overlay_of(frame));
+    if (auto &checks = raytracer_->scene->overlay_checks) {
+        checks->check(statistics_.contract_checks, command.sequence, command.camera,
+                      region_of(frame.render, format_->width, format_->height), overlay_of(frame));
         frame.overlay_sample = sample_hash(frame.overlay.bytes(), command.sequence);
     }
 }
@@ -293,8 +293,8 @@ void Pipeline::check_buffers_unmodified(const Frame &frame) {
                                             : "the image changed after hand-over");
 }
 
-void Pipeline::on_stage_lost(const std::vector<Command> &unanswered, Frame::Stage waiting) {
-    (waiting == Frame::Stage::to_track ? tracker_slots_ : raytracer_slots_).reset();
+void Pipeline::on_stage_lost(Stage &stage, const std::vector<Command> &unanswered, Frame::Stage waiting) {
+    stage.slots.reset();
     for (const Command &command : unanswered) {
         const auto found = frames_.find(command.sequence);
         if (found == frames_.end())
@@ -313,8 +313,8 @@ void Pipeline::on_stage_lost(const std::vector<Command> &unanswered, Frame::Stag
     }
 }
 
-bool Pipeline::may_skip(const Component *stage) const {
-    return live_ ? !stage->running() : stage->state() == Component::State::disabled;
+bool Pipeline::may_skip(const Stage &stage) const {
+    return live_ ? !stage.running() : stage.component->state() == Component::State::disabled;
 }
 
 bool Pipeline::is_behind() const {

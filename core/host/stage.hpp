@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The tracker and the ray tracer of a pipeline. A swap creates a second stage of the same kind and then exchanges the
+// two.
+#pragma once
+
+#include "camera/coordinates.hpp"
+#include "host/contract_checks.hpp"
+#include "host/slots.hpp"
+#include "run_config/configuration.hpp"
+
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace arhost::host {
+
+struct Stage {
+    std::unique_ptr<supervise::Component> component;
+    std::shared_ptr<SlotPool> slots; // of the current worker; null unless it is running
+
+    bool running() const { return component->running(); }
+};
+
+struct TrackerStage : Stage {
+    const run_config::TrackerConfiguration *configuration = nullptr;
+    std::string looked_for; // the markers and dictionary, for messages
+};
+
+struct LoadedScene {
+    ipc::SharedMemory arena;
+    camera::Coordinates coordinates;             // from the configuration or from the scene's axes
+    std::optional<OverlayChecks> overlay_checks; // only for `conform: true`
+};
+
+struct RaytracerStage : Stage {
+    const run_config::RaytracerConfiguration *configuration = nullptr;
+    std::shared_ptr<LoadedScene> scene;
+};
+
+} // namespace arhost::host
