@@ -49,9 +49,22 @@ arhost_marker marker(double z_mm) {
 
 } // namespace
 
+arhost_frame_format video_format(const Size &size) {
+    arhost_frame_format format{};
+    format.struct_size = sizeof format;
+    format.pixel_format = ARHOST_PIXEL_FORMAT_BGR8;
+    format.width = size.width;
+    format.height = size.height;
+    format.fps = fps;
+    arhost_frame_layout(&format);
+    return format;
+}
+
 SealedOutput::SealedOutput(const Content &content)
-    : stride_(ipc::OutputSlot::stride(content.size.width) + content.padding), record_(sizeof(arhost_record)),
-      pixels_(std::size_t{stride_} * content.size.height) {
+    : stride_(ipc::OutputSlot::stride(content.size.width) + content.padding),
+      video_format_(video_format(content.size)), record_(sizeof(arhost_record)),
+      pixels_(std::size_t{stride_} * content.size.height), video_(video_format_.byte_size),
+      overlay_(std::size_t{ipc::overlay_stride(content.size.width)} * content.size.height) {
     const Size &size = content.size;
     auto *bgr = reinterpret_cast<std::uint8_t *>(pixels_.data());
     std::mt19937 noise(static_cast<std::uint32_t>(2 * content.sequence + content.other));
@@ -76,9 +89,17 @@ SealedOutput::SealedOutput(const Content &content)
     r.camera.intrinsics = lens(size);
     r.marker_count = 1;
     r.markers[0] = marker(-eye[2]);
-    output_ = {sizeof output_, stride_, size.width, size.height, bgr, &r};
-    record_.seal();
-    pixels_.seal();
+    const auto fill = [&](const GuardedMemory &memory, std::size_t size) {
+        std::generate_n(memory.data(), size, [&] { return static_cast<std::byte>(noise() >> 24); });
+    };
+    fill(video_, video_format_.byte_size);
+    fill(overlay_, std::size_t{ipc::overlay_stride(size.width)} * size.height);
+    output_ = {sizeof output_, stride_, size.width, size.height, bgr, &r, {}, nullptr, 0, 0};
+    output_.video[0] = reinterpret_cast<const std::uint8_t *>(video_.data());
+    output_.overlay_rgba = reinterpret_cast<const std::uint8_t *>(overlay_.data());
+    output_.overlay_stride = ipc::overlay_stride(size.width);
+    for (GuardedMemory *memory : {&record_, &pixels_, &video_, &overlay_})
+        memory->seal();
 }
 
 Files files_in(const fs::path &folder) {
@@ -114,7 +135,9 @@ arhost_status SinkRun::try_start(std::uint64_t first_sequence, const Size &size)
     if (!std::exchange(fresh_, false))
         create();
     const arhost_intrinsics intrinsics = lens(size);
-    const arhost_sink_setup setup{sizeof setup, size.width, size.height, 0, fps, first_sequence, &intrinsics};
+    const arhost_frame_format format = video_format(size);
+    const arhost_sink_setup setup{sizeof setup, size.width,     size.height, 0,
+                                  fps,          first_sequence, &intrinsics, &format};
     const arhost_status status =
         in_call(library_.calls(), Call::start, [&] { return functions_.start(instance_->get(), &setup); });
     started_ = status == ARHOST_STATUS_OK;
@@ -127,8 +150,15 @@ void SinkRun::start(std::uint64_t first_sequence, const Size &size) {
 }
 
 arhost_status SinkRun::try_write(const SealedOutput &frame) {
-    return in_call(library_.calls(), Call::per_frame,
-                   [&] { return functions_.write(instance_->get(), &frame.output()); });
+    arhost_output output = frame.output();
+    const std::uint32_t capabilities = library_.plugin().descriptor->capabilities;
+    if (!(capabilities & ARHOST_CAPABILITY_VIDEO_INPUT))
+        std::fill(std::begin(output.video), std::end(output.video), nullptr);
+    if (!(capabilities & ARHOST_CAPABILITY_OVERLAY_INPUT)) {
+        output.overlay_rgba = nullptr;
+        output.overlay_stride = 0;
+    }
+    return in_call(library_.calls(), Call::per_frame, [&] { return functions_.write(instance_->get(), &output); });
 }
 
 void SinkRun::write(const SealedOutput &frame) {

@@ -17,6 +17,9 @@ struct Size {
     std::uint32_t width = 64, height = 48;
 };
 
+// The format of the video frames under the overlays.
+arhost_frame_format video_format(const Size &size);
+
 // A frame in read-only memory, like the host's, with inaccessible memory after its last row. Its pixels are
 // incompressible noise that differs for each frame.
 class SealedOutput {
@@ -42,7 +45,8 @@ private:
     arhost_record &record() { return *reinterpret_cast<arhost_record *>(record_.data()); }
 
     std::uint32_t stride_;
-    GuardedMemory record_, pixels_;
+    arhost_frame_format video_format_;
+    GuardedMemory record_, pixels_, video_, overlay_;
     arhost_output output_{};
 };
 

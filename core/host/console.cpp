@@ -78,7 +78,7 @@ void Console::show(const Progress &progress, const Statistics &statistics) {
     else
         line += fmt::format("  {:.1f} fps", fps);
     for (const char *stage : {"source", "tracker", "raytracer", "composite"})
-        if (const auto timing = statistics.stages.find(stage); timing != statistics.stages.end())
+        if (const auto timing = statistics.stages.all().find(stage); timing != statistics.stages.all().end())
             line += fmt::format("  {} {:.1f} ms", stage, timing->second.percentile_ms(0.5));
     if (terminal_) {
         winsize size{};

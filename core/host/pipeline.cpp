@@ -111,6 +111,12 @@ std::vector<Component *> Pipeline::components_before_outputs() const {
         all.push_back(tracker_->component.get());
     if (raytracer_)
         all.push_back(raytracer_->component.get());
+    if (next_tracker_)
+        all.push_back(next_tracker_->component.get());
+    if (next_raytracer_)
+        all.push_back(next_raytracer_->component.get());
+    for (const auto &stage : retired_)
+        all.push_back(stage->component.get());
     return all;
 }
 
@@ -120,11 +126,14 @@ void Pipeline::pump() {
     if (phase_ < Phase::running)
         advance_phase();
     if (phase_ == Phase::running) {
-        while (read() || track() || render() || compose()) {
+        while (finish_swaps() || read() || track() || render() || compose()) {
         }
+        remove_ended();
         bool sinks_empty = true;
         for (const auto &sink : sinks_) {
             sink->pump();
+            if (sink->ending && sink->empty() && sink->component->running())
+                sink->component->stop();
             sinks_empty = sinks_empty && (sink->empty() || sink->closed);
         }
         if (no_more_frames() && reads_.empty()) {
@@ -232,6 +241,7 @@ void Pipeline::stop_components() {
         return;
     phase_ = Phase::stopping;
     scene_loading_.reset();
+    next_scene_loading_.reset();
     on_progress_({statistics_.composited, statistics_.composited, true});
     for (Component *component : components_before_outputs())
         component->running() ? component->stop() : component->kill();

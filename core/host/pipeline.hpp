@@ -59,7 +59,7 @@ public:
     std::vector<supervise::Component *> components() const; // source, tracker, ray tracer, outputs
 
 private:
-    std::vector<supervise::Component *> components_before_outputs() const;
+    static constexpr std::size_t max_started_outputs = 4; // by commands, at the same time
     enum class Phase { source, stages, outputs, running, stopping, finished };
 
     void make_source();
@@ -68,12 +68,46 @@ private:
     std::unique_ptr<RaytracerStage> make_raytracer(const run_config::RaytracerConfiguration &configuration,
                                                    std::shared_ptr<LoadedScene> scene);
     void make_outputs();
-    void make_sink(std::size_t index, const std::string &name);
-    void expect_distinct_files(std::size_t index, const ipc::PluginDescription &plugin);
+    SinkQueue &make_sink(const run_config::ComponentConfiguration &output, const std::string &name,
+                         const std::string &path = "");
+    void expect_distinct_files(const run_config::ComponentConfiguration &output,
+                               const ipc::PluginDescription &plugin);
     void load_scene();
-    std::shared_ptr<LoadedScene> use_scene(ipc::SharedMemory arena) const;
+    std::shared_ptr<LoadedScene> use_scene(ipc::SharedMemory arena, const run_config::Scene &scene) const;
     supervise::Component::Callbacks common_callbacks(const std::string &name, const yaml::Node &node);
 
+    void on_request(SinkQueue &sink, const run_config::ComponentConfiguration &output,
+                    const ipc::messages::Request &request);
+    void execute(const control::Quit &command, const control::Done &done);
+    void execute(const control::Freeze &command, const control::Done &done);
+    void execute(const control::Snapshot &command, const control::Done &done);
+    void execute(const control::Record &command, const control::Done &done);
+    void execute(const control::LoadScene &command, const control::Done &done);
+    void execute(const control::Swap &command, const control::Done &done);
+    void execute(const control::Set &command, const control::Done &done);
+    void execute(const control::Status &command, const control::Done &done);
+    static void expect_no_swap(bool in_progress, const char *component);
+    void start_next_raytracer(const run_config::RaytracerConfiguration &configuration,
+                              std::shared_ptr<LoadedScene> scene, const control::Done &done);
+    bool finish_swaps();
+    void abandon_swap(std::unique_ptr<Stage> next, const std::string &reason);
+    void retire(std::unique_ptr<Stage> stage);
+    void recompute_cameras();
+    void remove_ended();
+    SinkQueue &start_output(const run_config::ComponentConfiguration &output, const std::string &name,
+                            const control::Done &done);
+    std::filesystem::path free_path(const std::filesystem::path &pattern) const;
+    const run_config::ComponentConfiguration &configuration_of(const supervise::Component &component) const;
+    std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
+                                              const run_config::ComponentConfiguration &component,
+                                              std::size_t candidate);
+    nlohmann::ordered_json status() const;
+    nlohmann::ordered_json status_of(const supervise::Component &component) const;
+    std::size_t index_of(const run_config::ComponentConfiguration &output) const {
+        return static_cast<std::size_t>(&output - configuration_.outputs.data());
+    }
+
+    std::vector<supervise::Component *> components_before_outputs() const;
     void pump();
     void advance_phase();
     void end_run(); // has the same effect as the end of the source
@@ -88,6 +122,8 @@ private:
     camera::Coordinates coordinates() const {
         return raytracer_ ? raytracer_->scene->coordinates : camera::Coordinates();
     }
+    void copy_sink_inputs(const Frame &frame, const ImageView &overlay, const Region &region,
+                          std::span<std::byte> slot) const;
     void check_buffers_unmodified(const Frame &frame);
     void cancel_stages();
     std::chrono::milliseconds longest_stop_deadline() const;
@@ -104,6 +140,7 @@ private:
     void on_rendered(const ipc::Command &command, const ipc::Result &result);
     void on_stage_lost(Stage &stage, const std::vector<ipc::Command> &unanswered, Frame::Stage waiting);
 
+    static bool is_running(const auto &part) { return part && part->running(); }
     // Returns whether a frame may skip `stage` because the stage's worker is down.
     bool may_skip(const Stage &stage) const;
     bool is_behind() const;
@@ -134,8 +171,13 @@ private:
     std::unique_ptr<supervise::Component> source_;
     std::unique_ptr<TrackerStage> tracker_;
     std::unique_ptr<RaytracerStage> raytracer_;
+    // The successors that a command has started, and the stages that were replaced and have not ended yet.
+    std::unique_ptr<TrackerStage> next_tracker_;
+    std::unique_ptr<RaytracerStage> next_raytracer_;
+    std::unique_ptr<SceneLoading> next_scene_loading_;
+    std::vector<std::unique_ptr<Stage>> retired_;
     std::vector<std::unique_ptr<SinkQueue>> sinks_;
-    std::map<std::size_t, run_config::OutputFile> output_files_; // by the output's index
+    std::map<const run_config::ComponentConfiguration *, run_config::OutputFile> output_files_;
     std::shared_ptr<SlotPool> source_slots_, output_slots_;
 
     std::optional<arhost_frame_format> format_;
@@ -152,6 +194,15 @@ private:
     bool abandoned_ = false; // the run must end immediately
     ipc::Reactor::Registration interrupt_deadline_;
     std::map<std::uint64_t, std::unique_ptr<Frame>> frames_;
+    std::vector<arhost_marker> last_markers_;          // of the last composited frame
+    bool video_input_ = false, overlay_input_ = false; // whether a sink reads the video frame and the overlay
+    bool frozen_ = false;
+    OutputFramePointer last_output_; // for the command `snapshot`
+    struct OptionsInUse {
+        std::vector<ipc::OptionValue> values;
+        std::set<std::string> changed; // the keys that the command `set` has changed
+    };
+    std::map<const run_config::ComponentConfiguration *, OptionsInUse> options_;
     std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // with the number of its frame
 
     Statistics statistics_;

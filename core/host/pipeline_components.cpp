@@ -32,6 +32,7 @@ Component::Callbacks Pipeline::common_callbacks(const std::string &name, const y
     callbacks.ready = [](const messages::Ready &) { return SlotLayout{}; };
     callbacks.running = [] {};
     callbacks.end_requested = [] {};
+    callbacks.request = [](const messages::Request &) {};
     callbacks.stopped = [this, name](arhost_status status, const std::string &text) {
         if (status != ARHOST_STATUS_OK)
             fail(name + ": " + (text.empty() ? status_text(status) : text), false);
@@ -50,7 +51,7 @@ void Pipeline::make_source() {
         if (std::exchange(last, candidate) != candidate)
             source_checks_.reset(); // the checks apply to one plugin; this is a different one
         return Component::Create{
-            {run_config::options_for(plugin, ARHOST_KIND_SOURCE, source, candidate),
+            {options_for(plugin, ARHOST_KIND_SOURCE, source, candidate),
              messages::SourceSetup{next_read_ + skipped_, source.fps, live_, configuration_.camera}},
             {}};
     };
@@ -122,7 +123,7 @@ void Pipeline::load_scene() {
     const run_config::RaytracerConfiguration &raytracer = *configuration_.raytracer;
     SceneLoading::Callbacks callbacks;
     callbacks.loaded = [this](SharedMemory arena) {
-        scene_ = use_scene(std::move(arena));
+        scene_ = use_scene(std::move(arena), configuration_.scenes.front());
         scene_loading_.reset();
     };
     callbacks.failed = [this](const std::string &reason) {
@@ -133,10 +134,11 @@ void Pipeline::load_scene() {
                                                     raytracer.limits, configuration_.files, std::move(callbacks));
 }
 
-std::shared_ptr<LoadedScene> Pipeline::use_scene(SharedMemory arena) const {
+std::shared_ptr<LoadedScene> Pipeline::use_scene(SharedMemory arena, const run_config::Scene &source) const {
     const Mapping mapping = arena.map(Access::read_only);
     const auto &scene = mapping.as<const arhost_scene>();
     auto loaded = std::make_shared<LoadedScene>();
+    loaded->name = source.name;
     loaded->coordinates = configuration_.coordinates.value_or(camera::default_for(scene.axes));
     if (configuration_.raytracer->conform)
         loaded->overlay_checks.emplace(scene);
@@ -151,7 +153,7 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(const run_config::TrackerCo
     Component::Callbacks callbacks = common_callbacks("tracker", configuration.node);
     callbacks.hello = [this, stage](const PluginDescription &plugin, std::size_t candidate) {
         const run_config::TrackerConfiguration &own = *stage->configuration;
-        std::vector<OptionValue> options = run_config::options_for(plugin, ARHOST_KIND_TRACKER, own, candidate);
+        std::vector<OptionValue> options = options_for(plugin, ARHOST_KIND_TRACKER, own, candidate);
         stage->looked_for = describe_targets(own.markers, plugin, options);
         return Component::Create{{std::move(options), messages::TrackerSetup{*format_, intrinsics_, own.markers}},
                                  {}};
@@ -160,6 +162,11 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(const run_config::TrackerCo
         return SlotLayout{sizeof(arhost_tracker_result), stage_slot_count};
     };
     callbacks.running = [stage] { stage->slots = pool_of(*stage->component); };
+    callbacks.disabled = [this, stage](const std::string &reason, bool is_configuration_error) {
+        if (stage == next_tracker_.get())
+            return abandon_swap(std::exchange(next_tracker_, nullptr), reason);
+        on_disabled("tracker", stage->configuration->node, reason, is_configuration_error);
+    };
     callbacks.result = [this](const Command &command, const Result &result) { on_tracked(command, result); };
     callbacks.lost = [this, stage](const std::vector<Command> &unanswered) {
         on_stage_lost(*stage, unanswered, Frame::Stage::to_track);
@@ -178,7 +185,7 @@ std::unique_ptr<RaytracerStage> Pipeline::make_raytracer(const run_config::Raytr
     Component::Callbacks callbacks = common_callbacks("raytracer", configuration.node);
     callbacks.hello = [this, stage](const PluginDescription &plugin, std::size_t candidate) {
         std::vector<OptionValue> options =
-            run_config::options_for(plugin, ARHOST_KIND_RAYTRACER, *stage->configuration, candidate);
+            options_for(plugin, ARHOST_KIND_RAYTRACER, *stage->configuration, candidate);
         if (intrinsics_.distortion != ARHOST_DISTORTION_NONE &&
             !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION))
             stage->component->log(
@@ -187,12 +194,17 @@ std::unique_ptr<RaytracerStage> Pipeline::make_raytracer(const run_config::Raytr
                             "sharpness and time");
         return Component::Create{
             {std::move(options), messages::RaytracerSetup{format_->width, format_->height, intrinsics_}},
-            stage->scene->arena.fd()};
+            {stage->scene->arena.fd()}};
     };
     callbacks.ready = [this](const messages::Ready &) {
         return SlotLayout{std::uint64_t(overlay_stride(format_->width)) * format_->height, stage_slot_count};
     };
     callbacks.running = [stage] { stage->slots = pool_of(*stage->component); };
+    callbacks.disabled = [this, stage](const std::string &reason, bool is_configuration_error) {
+        if (stage == next_raytracer_.get())
+            return abandon_swap(std::exchange(next_raytracer_, nullptr), reason);
+        on_disabled("raytracer", stage->configuration->node, reason, is_configuration_error);
+    };
     callbacks.result = [this](const Command &command, const Result &result) { on_rendered(command, result); };
     callbacks.lost = [this, stage](const std::vector<Command> &unanswered) {
         on_stage_lost(*stage, unanswered, Frame::Stage::to_render);
@@ -205,45 +217,54 @@ std::unique_ptr<RaytracerStage> Pipeline::make_raytracer(const run_config::Raytr
 void Pipeline::make_outputs() {
     output_slots_ = std::make_shared<SlotPool>(supervise::make_host_region(
         "arhost-outputs",
-        {OutputSlot::byte_size(format_->width, format_->height),
+        {OutputSlot(*format_).byte_size,
          // Sinks may lag by different amounts and hold different frames, so each sink needs slots of its own.
-         static_cast<std::uint32_t>(live_sink_depth + 2 * configuration_.outputs.size() + 1)}));
+         static_cast<std::uint32_t>(live_sink_depth + 2 * (configuration_.outputs.size() + max_started_outputs) +
+                                    2)}));
     for (std::size_t i = 0; i < configuration_.outputs.size(); ++i) {
         const run_config::ComponentConfiguration &output = configuration_.outputs[i];
         std::string name = output.plugins.front().stem().string();
         if (std::any_of(sinks_.begin(), sinks_.end(),
                         [&](const auto &sink) { return sink->component->name() == name; }))
             name += "#" + std::to_string(i);
-        make_sink(i, name);
+        make_sink(output, name);
     }
 }
 
-void Pipeline::make_sink(std::size_t index, const std::string &name) {
-    const run_config::ComponentConfiguration &output = configuration_.outputs[index];
+// `path`: for an output that a command starts, the file to write instead of the configured one.
+SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output, const std::string &name,
+                               const std::string &path) {
     sinks_.push_back(std::make_unique<SinkQueue>(statistics_));
     SinkQueue *sink = sinks_.back().get();
+    sink->configuration = &output;
     sink->max_waiting = live_ ? live_sink_depth : 0;
     Component::Callbacks callbacks = common_callbacks(name, output.node);
-    callbacks.hello = [this, &output, index, sink](const PluginDescription &plugin, std::size_t candidate) {
+    callbacks.hello = [this, &output, sink](const PluginDescription &plugin, std::size_t candidate) {
         if (plugin.capabilities & ARHOST_CAPABILITY_REALTIME_SINK)
             sink->max_waiting = live_sink_depth; // a window drops frames instead of delaying other outputs
-        messages::SinkSetup setup{format_->width, format_->height, format_->fps, sink->first_sequence(), {}};
+        messages::SinkSetup setup{format_->width, format_->height, format_->fps, sink->first_sequence(), {},
+                                  *format_};
         if (configuration_.source && configuration_.source->fps > 0)
             setup.fps = configuration_.source->fps;
         if (intrinsics_.width > 0)
             setup.intrinsics = intrinsics_;
-        std::vector<OptionValue> options = run_config::options_for(plugin, ARHOST_KIND_SINK, output, candidate);
-        expect_distinct_files(index, plugin);
+        std::vector<OptionValue> options = options_for(plugin, ARHOST_KIND_SINK, output, candidate);
+        expect_distinct_files(output, plugin);
         for (OptionValue &option : options)
             if (check_scratch_ && option.type == ARHOST_OPTION_OUTPUT_PATH && !option.text.empty() &&
                 option.text != "-")
-                option.text = check_folder(*check_scratch_, index) / std::filesystem::path(option.text).filename();
+                option.text =
+                    check_folder(*check_scratch_, index_of(output)) / std::filesystem::path(option.text).filename();
+            else if (option.key == "path" && !sink->path.empty())
+                option.text = sink->path;
+        video_input_ |= (plugin.capabilities & ARHOST_CAPABILITY_VIDEO_INPUT) != 0;
+        overlay_input_ |= (plugin.capabilities & ARHOST_CAPABILITY_OVERLAY_INPUT) != 0;
         return Component::Create{{std::move(options), setup}, {}};
     };
     callbacks.result = [this, sink, name, &output](const Command &command, const Result &result) {
         sink->on_result(command, result);
         if (result.status == ARHOST_STATUS_END)
-            end_sink(*sink, output.may_quit);
+            end_sink(*sink, output.control.contains("quit"));
         if (result.status >= 0 || sink->closed)
             return;
         if (interrupted_ && result.status == ARHOST_STATUS_ERROR_CANCELLED) { // its receiver did not take the frame
@@ -256,27 +277,43 @@ void Pipeline::make_sink(std::size_t index, const std::string &name) {
                                    status_text(result.status) + "; see the output's messages above";
         context_.log(ARHOST_SEVERITY_ERROR, name, reason);
         fail(name + ": " + reason, false, true);
+        sink->answer(reason);
         close_sink(*sink);
         sink->component->stop();
     };
     callbacks.lost = [sink](const std::vector<Command> &) { sink->on_lost(); };
-    callbacks.end_requested = [this, sink, &output] { end_sink(*sink, output.may_quit); };
+    callbacks.end_requested = [this, sink, &output] { end_sink(*sink, output.control.contains("quit")); };
+    callbacks.request = [this, sink, &output](const messages::Request &request) {
+        on_request(*sink, output, request);
+    };
+    callbacks.running = [sink] {
+        if (!sink->ending)
+            sink->answer("");
+    };
+    callbacks.stopped = [sink, common = callbacks.stopped](arhost_status status, const std::string &text) {
+        common(status, text);
+        sink->answer(status == ARHOST_STATUS_OK ? "" : text.empty() ? status_text(status) : text);
+    };
     callbacks.disabled = [this, sink, name, &output](const std::string &reason, bool is_configuration_error) {
         on_disabled(name, output.node, reason, is_configuration_error);
+        sink->answer(reason);
         close_sink(*sink);
     };
     sink->component = std::make_unique<Component>(context_, name, output.plugins, output.limits, output.policy,
                                                   std::move(callbacks));
+    sink->path = path;
     sink->component->start();
+    return *sink;
 }
 
 // Compares the output's file with those of the plugins that are already known.
-void Pipeline::expect_distinct_files(std::size_t index, const PluginDescription &plugin) {
-    if (const auto path = run_config::path_of(configuration_.outputs[index].node))
+void Pipeline::expect_distinct_files(const run_config::ComponentConfiguration &output,
+                                     const PluginDescription &plugin) {
+    if (const auto path = run_config::path_of(output.node))
         output_files_.insert_or_assign(
-            index, run_config::OutputFile{*path, (plugin.capabilities & ARHOST_CAPABILITY_NUMBERED_FILES) != 0});
+            &output, run_config::OutputFile{*path, (plugin.capabilities & ARHOST_CAPABILITY_NUMBERED_FILES) != 0});
     std::vector<run_config::OutputFile> files = configuration_.report_files();
-    for (const auto &[other, file] : output_files_)
+    for (const auto &[writer, file] : output_files_)
         files.push_back(file);
     run_config::expect_distinct(files);
 }
@@ -306,7 +343,8 @@ void Pipeline::close_sink(SinkQueue &sink) {
 }
 
 void Pipeline::end_without_sinks() {
-    if (!sinks_.empty() && std::all_of(sinks_.begin(), sinks_.end(), [](const auto &sink) { return sink->closed; }))
+    if (!sinks_.empty() &&
+        std::all_of(sinks_.begin(), sinks_.end(), [](const auto &sink) { return sink->closed || sink->on_demand; }))
         end_run();
 }
 

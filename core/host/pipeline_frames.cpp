@@ -28,7 +28,7 @@ const char *name_of_stage(Frame::Stage waiting) {
 bool Pipeline::read() {
     if (!source_)
         return read_from_trajectory();
-    if (no_more_frames() || !source_->running() || reads_.size() >= max_reads_in_flight)
+    if (no_more_frames() || !source_->running() || reads_.size() >= max_reads_in_flight || (frozen_ && !live_))
         return false;
     std::optional<Lease> slot = source_slots_->acquire();
     if (!slot)
@@ -45,7 +45,7 @@ bool Pipeline::read() {
 // Creates the next frame of a run without a source: one for each frame of the trajectory. Frames that the recorded
 // run dropped are not rendered.
 bool Pipeline::read_from_trajectory() {
-    if (no_more_frames())
+    if (no_more_frames() || frozen_)
         return false;
     std::optional<Lease> slot = source_slots_->acquire();
     if (!slot)
@@ -100,7 +100,11 @@ void Pipeline::on_read(const Command &command, const Result &result) {
     frame->times.source = std::chrono::nanoseconds(result.busy_ns);
     skipped_ += result.frame.skipped;
     statistics_.dropped["source"] = skipped_;
-    statistics_.stages["source"].add(std::chrono::nanoseconds(result.busy_ns));
+    statistics_.stages.add("source", std::chrono::nanoseconds(result.busy_ns));
+    if (frozen_ && live_) {
+        ++statistics_.dropped["freeze"];
+        return;
+    }
     start_frame(std::move(frame));
 }
 
@@ -123,10 +127,12 @@ bool Pipeline::track() {
     Frame *frame = next_waiting(Frame::Stage::to_track);
     if (!frame)
         return false;
-    if (may_skip(*tracker_)) {
+    if (!is_running(next_tracker_) && may_skip(*tracker_)) {
         skip(*frame, "tracker");
         return true;
     }
+    if (is_running(next_tracker_)) // finish_swaps waits until the current tracker has no frames
+        return false;
     if (!tracker_->running() || tracker_->component->in_flight() >= (live_ ? 1u : 2u))
         return false;
     std::optional<Lease> slot = tracker_->slots->acquire();
@@ -147,7 +153,7 @@ bool Pipeline::track() {
 
 // Records the result of a stage and returns the result's frame; null if the frame was overtaken or the stage failed.
 Frame *Pipeline::accept_result(const Command &command, const Result &result, Component &stage) {
-    statistics_.stages[stage.name()].add(std::chrono::nanoseconds(result.busy_ns));
+    statistics_.stages.add(stage.name(), std::chrono::nanoseconds(result.busy_ns));
     const auto found = frames_.find(command.sequence);
     if (found == frames_.end())
         return nullptr;
@@ -233,10 +239,12 @@ bool Pipeline::render() {
     Frame *frame = next_waiting(Frame::Stage::to_render);
     if (!frame)
         return false;
-    if (may_skip(*raytracer_)) {
+    if (!is_running(next_raytracer_) && may_skip(*raytracer_)) {
         skip(*frame, "raytracer");
         return true;
     }
+    if (is_running(next_raytracer_))
+        return false;
     if (!raytracer_->running() || raytracer_->component->in_flight() >= (live_ ? 1u : 2u))
         return false;
     std::optional<Lease> slot = raytracer_->slots->acquire();
@@ -257,7 +265,7 @@ bool Pipeline::render() {
 void Pipeline::on_rendered(const Command &command, const Result &result) {
     const std::chrono::nanoseconds busy(result.busy_ns), device = device_time(result.render, busy);
     if (device.count())
-        statistics_.stages["device"].add(device);
+        statistics_.stages.add("device", device);
     Frame *accepted = accept_result(command, result, *raytracer_->component);
     if (!accepted)
         return;
@@ -370,6 +378,8 @@ bool Pipeline::compose() {
         if (slot) {
             auto output = std::make_shared<OutputFrame>(OutputFrame{ready->first, std::move(*slot)});
             compose(*ready->second, output->slot.bytes());
+            if (configuration_.snapshot)
+                last_output_ = output;
             for (const auto &sink : sinks_)
                 sink->offer(output);
             for (const auto &sink : sinks_)
@@ -379,11 +389,13 @@ bool Pipeline::compose() {
         }
     }
     const std::uint64_t sequence = ready->first;
+    const arhost_record &record = ready->second->record;
+    last_markers_.assign(record.markers, record.markers + record.marker_count);
     statistics_.composited += is_shown;
     statistics_.augmented += is_shown && ready->second->record.overlay != ARHOST_OVERLAY_NONE;
     statistics_.last_frame = Clock::now();
     const Clock::duration latency = statistics_.last_frame - ready->second->received;
-    statistics_.stages["latency"].add(latency);
+    statistics_.stages.add("latency", latency);
     if (configuration_.timeline && is_shown) {
         FrameTimes &times = statistics_.timeline.emplace_back(ready->second->times);
         times.frame = sequence;
@@ -416,8 +428,29 @@ void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
     composite(*format_, planes, overlay, region,
               {reinterpret_cast<std::uint8_t *>(slot.data()) + OutputSlot::image_offset,
                OutputSlot::stride(format_->width)});
+    copy_sink_inputs(frame, overlay, region, slot);
     frame.times.composite = Clock::now() - begin;
-    statistics_.stages["composite"].add(frame.times.composite);
+    statistics_.stages.add("composite", frame.times.composite);
+}
+
+// Copies the video frame and the overlay for the sinks that read them.
+void Pipeline::copy_sink_inputs(const Frame &frame, const ImageView &overlay, const Region &region,
+                                std::span<std::byte> slot) const {
+    const OutputSlot layout(*format_);
+    if (video_input_)
+        std::memcpy(slot.data() + layout.video_offset, frame.pixels.bytes().data(), format_->byte_size);
+    if (!overlay_input_)
+        return;
+    const std::size_t stride = overlay_stride(format_->width);
+    std::byte *const rgba = slot.data() + layout.overlay_offset;
+    std::memset(rgba, 0, stride * format_->height);
+    if (frame.record.overlay == ARHOST_OVERLAY_NONE)
+        return;
+    for (std::size_t y = region.y; y < region.y + region.height; ++y) {
+        const std::size_t begin = y * stride + 4 * std::size_t{region.x};
+        std::memcpy(rgba + begin, reinterpret_cast<const std::byte *>(overlay.rgba) + begin,
+                    4 * std::size_t{region.width});
+    }
 }
 
 void Pipeline::drop_overtaken(std::uint64_t shown) {

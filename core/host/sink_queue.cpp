@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/sink_queue.hpp"
 
+#include <nlohmann/json.hpp>
+
+#include <utility>
+
 namespace arhost::host {
 
 using namespace ipc;
 
 void SinkQueue::offer(OutputFramePointer frame) {
-    if (closed)
+    if (closed || ending)
         return;
     waiting_.push_back(std::move(frame));
     if (max_waiting > 0 && waiting_.size() > max_waiting) {
@@ -33,12 +37,17 @@ void SinkQueue::on_result(const Command &command, const Result &result) {
         next_sequence_ = command.sequence + 1;
     if (!unconfirmed_.empty())
         unconfirmed_.pop_front();
-    statistics_.stages[component->name()].add(std::chrono::nanoseconds(result.busy_ns));
+    statistics_.stages.add(component->name(), std::chrono::nanoseconds(result.busy_ns));
 }
 
 void SinkQueue::on_lost() {
     waiting_.insert(waiting_.begin(), unconfirmed_.begin(), unconfirmed_.end());
     unconfirmed_.clear();
+}
+
+void SinkQueue::answer(const std::string &error) {
+    if (const control::Done answer = std::exchange(done, nullptr))
+        answer(error, {});
 }
 
 void SinkQueue::clear() {

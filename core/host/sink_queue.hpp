@@ -3,8 +3,10 @@
 // One output: its sink, the frames waiting for it, and the frames that it has not confirmed.
 #pragma once
 
+#include "host/control.hpp"
 #include "host/frames.hpp"
 #include "host/statistics.hpp"
+#include "run_config/configuration.hpp"
 
 #include <deque>
 
@@ -14,12 +16,18 @@ class SinkQueue {
 public:
     explicit SinkQueue(Statistics &statistics) : statistics_(statistics) {}
 
+    const run_config::ComponentConfiguration *configuration = nullptr;
     std::unique_ptr<supervise::Component> component;
     // Maximum number of waiting frames; if there are more, the queue drops the oldest. 0: unlimited, the run waits
     // for the sink.
     std::size_t max_waiting = 0;
     bool closed = false;   // has failed or ended, and accepts no more frames
     bool has_quit = false; // has ended the run; receives the remaining frames
+    bool ending = false;   // accepts no more frames, and stops once it has written those that wait
+    // For an output that a command has started: its file, and what answers the command in progress.
+    bool on_demand = false;
+    std::string path;
+    control::Done done;
 
     void offer(OutputFramePointer frame);
     void pump(); // submits waiting frames to the sink
@@ -29,6 +37,7 @@ public:
 
     bool empty() const { return waiting_.empty() && unconfirmed_.empty(); }
     void clear();
+    void answer(const std::string &error); // answers the command in progress; error "": success
     // Returns the number of the first unconfirmed frame, with which a restarted sink continues.
     std::uint64_t first_sequence() const;
 

@@ -6,6 +6,7 @@
 
 #include "camera/coordinates.hpp"
 #include "host/contract_checks.hpp"
+#include "host/control.hpp"
 #include "host/slots.hpp"
 #include "run_config/configuration.hpp"
 
@@ -16,7 +17,10 @@
 namespace arhost::host {
 
 struct Stage {
+    virtual ~Stage() = default;
+
     std::unique_ptr<supervise::Component> component;
+    control::Done swapped;           // answers the command that started this stage as the successor of another one
     std::shared_ptr<SlotPool> slots; // of the current worker; null unless it is running
 
     bool running() const { return component->running(); }
@@ -28,6 +32,7 @@ struct TrackerStage : Stage {
 };
 
 struct LoadedScene {
+    std::string name;
     ipc::SharedMemory arena;
     camera::Coordinates coordinates;             // from the configuration or from the scene's axes
     std::optional<OverlayChecks> overlay_checks; // only for `conform: true`

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/statistics.hpp"
 
-#include "supervise/component.hpp"
-
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
+#include <utility>
 
 namespace arhost::host {
 
@@ -27,6 +27,13 @@ void Timing::add(std::chrono::nanoseconds time) {
     max_ns_ = std::max(max_ns_, ns);
 }
 
+void Timing::add(const Timing &other) {
+    buckets_.resize(std::max(buckets_.size(), other.buckets_.size()));
+    std::transform(other.buckets_.begin(), other.buckets_.end(), buckets_.begin(), buckets_.begin(), std::plus<>());
+    count_ += other.count_;
+    max_ns_ = std::max(max_ns_, other.max_ns_);
+}
+
 double Timing::percentile_ms(double share) const {
     const auto rank = static_cast<std::uint64_t>(std::ceil(share * static_cast<double>(count_)));
     std::uint64_t seen = 0;
@@ -42,6 +49,40 @@ Json Timing::to_json() const {
             {"p95_ms", percentile_ms(0.95)},
             {"p99_ms", percentile_ms(0.99)},
             {"max_ms", max_ms()}};
+}
+
+void StageTimings::add(const std::string &name, std::chrono::nanoseconds time, Clock::time_point now) {
+    if (now - window_begin_ > std::chrono::seconds(5)) {
+        previous_window_ = std::exchange(window_, {});
+        previous_begin_ = std::exchange(window_begin_, now);
+    }
+    window_[name].add(time);
+    all_[name].add(time);
+}
+
+StageTimings::ByName StageTimings::recent() const {
+    ByName recent = previous_window_;
+    for (const auto &[name, timing] : window_)
+        recent[name].add(timing);
+    return recent;
+}
+
+double StageTimings::recent_rate(const std::string &name, Clock::time_point now) const {
+    const ByName timings = recent();
+    const auto timing = timings.find(name);
+    const double seconds =
+        std::chrono::duration<double>(now - (previous_window_.empty() ? window_begin_ : previous_begin_)).count();
+    return timing == timings.end() || seconds <= 0 ? 0 : static_cast<double>(timing->second.count()) / seconds;
+}
+
+void EndedComponents::add(const supervise::Component &component) {
+    constexpr std::size_t max_crashes = 20;
+    cpu_seconds[component.name()] += component.cpu_seconds();
+    restarts[component.name()] += component.restarts();
+    for (const supervise::Crash &crash : component.crashes())
+        crashes.push_back({component.name(), crash});
+    while (crashes.size() > max_crashes)
+        crashes.pop_front();
 }
 
 double Statistics::fps() const {
@@ -74,31 +115,31 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
                    {"dropped", statistics.dropped},
                    {"passed_unaugmented", statistics.skipped}}},
                  {"fps", statistics.fps()}};
-    for (const auto &[name, timing] : statistics.stages)
+    for (const auto &[name, timing] : statistics.stages.all())
         json["stages"][name] = timing.to_json();
     for (const auto &[name, check] : statistics.contract_checks.all()) {
         Json &entry = json["conformance"][name] = {{"checked", check.checked}, {"violations", check.violations}};
         if (check.violations > 0)
             entry["first_violation"] = check.first_violation;
     }
+    EndedComponents totals = statistics.ended;
+    for (const supervise::Component *component : components)
+        totals.add(*component);
     double total = host_cpu_seconds;
     json["cpu_seconds"]["host"] = host_cpu_seconds;
-    for (const supervise::Component *component : components) {
-        json["cpu_seconds"][component->name()] = component->cpu_seconds();
-        total += component->cpu_seconds();
+    for (const auto &[name, seconds] : totals.cpu_seconds) {
+        json["cpu_seconds"][name] = seconds;
+        total += seconds;
     }
     json["cpu_seconds"]["total"] = total;
-    json["restarts"] = Json::object();
+    json["restarts"] = totals.restarts;
     json["crashes"] = Json::array();
-    for (const supervise::Component *component : components) {
-        json["restarts"][component->name()] = component->restarts();
-        for (const supervise::Component::Crash &crash : component->crashes()) {
-            Json entry = {{"component", component->name()}, {"plugin", crash.plugin}, {"how", crash.how}};
-            if (crash.frame != supervise::Component::Crash::no_frame)
-                entry["frame"] = crash.frame;
-            entry["log_tail"] = crash.log_tail;
-            json["crashes"].push_back(std::move(entry));
-        }
+    for (const auto &[name, crash] : totals.crashes) {
+        Json entry = {{"component", name}, {"plugin", crash.plugin}, {"how", crash.how}};
+        if (crash.frame != supervise::Crash::no_frame)
+            entry["frame"] = crash.frame;
+        entry["log_tail"] = crash.log_tail;
+        json["crashes"].push_back(std::move(entry));
     }
     return json;
 }

@@ -4,18 +4,16 @@
 #pragma once
 
 #include "host/contract_checks.hpp"
+#include "supervise/component.hpp"
 
 #include <nlohmann/json_fwd.hpp>
 
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <string>
 #include <vector>
-
-namespace arhost::supervise {
-class Component;
-}
 
 namespace arhost::host {
 
@@ -24,6 +22,7 @@ namespace arhost::host {
 class Timing {
 public:
     void add(std::chrono::nanoseconds time);
+    void add(const Timing &other);
     std::uint64_t count() const { return count_; }
     double percentile_ms(double share) const; // nearest-rank percentile, accurate to 0.5 %; 0 without samples
     double max_ms() const { return 1e-6 * static_cast<double>(max_ns_); }
@@ -43,6 +42,35 @@ struct FrameTimes {
     std::chrono::nanoseconds source{}, tracker{}, raytracer{}, device{}, composite{}, latency{};
 };
 
+// Timings by name (source, tracker, raytracer, device, composite, latency, …), of the whole run and of the last 5 to
+// 10 s.
+class StageTimings {
+public:
+    using Clock = std::chrono::steady_clock;
+    using ByName = std::map<std::string, Timing>;
+
+    void add(const std::string &name, std::chrono::nanoseconds time, Clock::time_point now = Clock::now());
+    const ByName &all() const { return all_; }
+    ByName recent() const;
+    double recent_rate(const std::string &name, Clock::time_point now = Clock::now()) const; // timings per second
+
+private:
+    ByName all_, window_, previous_window_;
+    Clock::time_point window_begin_{}, previous_begin_{};
+};
+
+// What remains of components that ended before the run did: replaced ones, and outputs that a command has stopped.
+struct EndedComponents {
+    struct Crash {
+        std::string component;
+        supervise::Crash crash;
+    };
+    std::map<std::string, double> cpu_seconds;     // by the component's name
+    std::map<std::string, std::uint32_t> restarts; // by the component's name
+    std::deque<Crash> crashes;                     // the last 20
+    void add(const supervise::Component &component);
+};
+
 struct Statistics {
     std::uint64_t frames_in = 0;                  // frames received from the source
     std::uint64_t tracker_results = 0;            // frames for which the tracker delivered a result in time
@@ -51,7 +79,8 @@ struct Statistics {
     std::uint64_t composited = 0;                 // frames sent to the outputs, augmented or not
     std::map<std::string, std::uint64_t> dropped; // number of dropped frames by stage
     std::map<std::string, std::uint64_t> skipped; // number of unaugmented frames by the failed stage
-    std::map<std::string, Timing> stages; // by name: source, tracker, raytracer, device, composite, latency, …
+    StageTimings stages;
+    EndedComponents ended;
     std::chrono::steady_clock::time_point first_frame{}, last_frame{};
     ContractChecks contract_checks;   // checks of the components with `conform: true`
     std::vector<FrameTimes> timeline; // only if the configuration requests it

@@ -21,7 +21,7 @@ std::pair<Channel, Channel> Channel::make_pair() {
     return {Channel(base::UniqueFd(ends[0])), Channel(base::UniqueFd(ends[1]))};
 }
 
-bool Channel::send(const Json &body, std::initializer_list<int> fds, bool wait) const {
+bool Channel::send(const Json &body, const std::vector<int> &fds, bool wait) const {
     // Replaces invalid UTF-8, for example in a plugin's log message, instead of throwing.
     const std::string text = body.dump(-1, ' ', false, Json::error_handler_t::replace);
     if (text.size() > max_message_size || fds.size() > max_passed_fds)

@@ -9,8 +9,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include <initializer_list>
 #include <utility>
+#include <vector>
 
 namespace arhost::ipc {
 
@@ -37,7 +37,7 @@ public:
 
     // Returns false if the peer has closed its end, or if `wait` is false and the queue of the peer is full (errno is
     // EAGAIN in this case).
-    bool send(const Json &body, std::initializer_list<int> fds = {}, bool wait = true) const;
+    bool send(const Json &body, const std::vector<int> &fds = {}, bool wait = true) const;
 
     // Receives a message. Waits for up to `timeout_ms`; 0: does not wait; -1: waits without limit.
     ReceiveState receive(Message &message, int timeout_ms) const;

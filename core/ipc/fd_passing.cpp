@@ -6,20 +6,20 @@
 
 namespace arhost::ipc {
 
-ssize_t send_with_fds(int socket, std::span<const std::byte> bytes, std::initializer_list<int> fds, int flags) {
+ssize_t send_with_fds(int socket, std::span<const std::byte> bytes, const std::vector<int> &fds, int flags) {
     iovec part{const_cast<std::byte *>(bytes.data()), bytes.size()};
     msghdr header{};
     header.msg_iov = &part;
     header.msg_iovlen = 1;
     alignas(cmsghdr) char ancillary[CMSG_SPACE(sizeof(int) * max_passed_fds)] = {};
-    if (fds.size() > 0) {
+    if (!fds.empty()) {
         header.msg_control = ancillary;
         header.msg_controllen = CMSG_SPACE(sizeof(int) * fds.size());
         cmsghdr *control = CMSG_FIRSTHDR(&header);
         control->cmsg_level = SOL_SOCKET;
         control->cmsg_type = SCM_RIGHTS;
         control->cmsg_len = CMSG_LEN(sizeof(int) * fds.size());
-        std::memcpy(CMSG_DATA(control), fds.begin(), sizeof(int) * fds.size());
+        std::memcpy(CMSG_DATA(control), fds.data(), sizeof(int) * fds.size());
     }
     ssize_t sent;
     do

@@ -6,7 +6,6 @@
 #include "base/unique_fd.hpp"
 
 #include <cstddef>
-#include <initializer_list>
 #include <span>
 #include <vector>
 
@@ -16,7 +15,7 @@ constexpr std::size_t max_passed_fds = 4;
 
 // Sends one message. Like sendmsg(2), returns the number of bytes sent, or -1 with errno. Never raises SIGPIPE;
 // retries on EINTR.
-ssize_t send_with_fds(int socket, std::span<const std::byte> bytes, std::initializer_list<int> fds, int flags = 0);
+ssize_t send_with_fds(int socket, std::span<const std::byte> bytes, const std::vector<int> &fds, int flags = 0);
 
 struct Received {
     ssize_t size;   // return value of recvmsg(2): 0 at end of file, -1 with errno on error

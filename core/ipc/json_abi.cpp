@@ -63,6 +63,7 @@ PluginDescription describe(const arhost_descriptor &descriptor) {
                         text_or_empty(descriptor.description),
                         descriptor.capabilities,
                         {},
+                        {},
                         {}};
     for (const arhost_option_descriptor *o : options_of(descriptor)) {
         OptionDeclaration option{text_or_empty(o->key), o->type, {}, o->minimum, o->maximum, {},
@@ -96,7 +97,8 @@ Json to_json(const PluginDescription &d) {
             {"description", d.description},
             {"capabilities", d.capabilities},
             {"options", std::move(options)},
-            {"needs", d.needs}};
+            {"needs", d.needs},
+            {"changeable", d.changeable}};
 }
 
 Json to_json(const arhost_descriptor &descriptor) {
@@ -117,11 +119,13 @@ PluginDescription description_from_json(const Json &json) {
     d.capabilities = json.at("capabilities").get<std::uint32_t>();
     for (const Json &need : json.at("needs"))
         d.needs.push_back(need.get<std::string>());
+    for (const Json &key : json.at("changeable"))
+        d.changeable.push_back(key.get<std::string>());
     for (const Json &o : json.at("options")) {
         OptionDeclaration option;
         option.key = text_of(o, "key");
         option.type = o.at("type").get<arhost_option_type>();
-        if (option.type < ARHOST_OPTION_BOOL || option.type > ARHOST_OPTION_OUTPUT_PATH)
+        if (option.type < ARHOST_OPTION_BOOL || option.type > ARHOST_OPTION_LISTEN)
             throw std::runtime_error("the option '" + option.key + "' has an invalid type");
         if (o.contains("default"))
             option.default_value = text_of(o, "default");

@@ -29,7 +29,8 @@ struct PluginDescription {
     std::string id, name, version, vendor, licence, description;
     std::uint32_t capabilities = 0;
     std::vector<OptionDeclaration> options;
-    std::vector<std::string> needs; // elements of sandbox::allowances
+    std::vector<std::string> needs;      // elements of sandbox::allowances
+    std::vector<std::string> changeable; // keys of the options that arhost_set_option accepts
 };
 struct OptionValue {
     std::string key;

@@ -73,11 +73,13 @@ struct SinkSetup {
     double fps = 0;
     std::uint64_t first_sequence = 0;
     std::optional<arhost_intrinsics> intrinsics;
+    arhost_frame_format video_format{};
 };
 using Setup = std::variant<SourceSetup, TrackerSetup, RaytracerSetup, SinkSetup>;
 
-// Requests the worker to create and start the plugin's instance. For a ray tracer, the descriptor of the scene's
-// arena accompanies it.
+// Requests the worker to create and start the plugin's instance. The descriptor of the scene's arena accompanies it
+// for a ray tracer. The sockets of options of type LISTEN follow; the option's `integer` is its position among the
+// descriptors.
 struct Create {
     static constexpr const char *type = "create";
     std::vector<OptionValue> options;
@@ -97,6 +99,19 @@ struct Attach {
 struct Detach {
     static constexpr const char *type = "detach";
     std::uint32_t generation = 0;
+};
+
+// Requests the worker to change an option of the running plugin. The worker answers with OptionSet.
+struct SetOption {
+    static constexpr const char *type = "set-option";
+    OptionValue option;
+};
+
+// Answers the Request with this id.
+struct Answer {
+    static constexpr const char *type = "answer";
+    std::uint64_t id = 0;
+    std::string answer; // a JSON object
 };
 
 struct Stop {
@@ -159,6 +174,20 @@ struct Progress {
 struct Failed {
     static constexpr const char *type = "failed";
     arhost_status status = ARHOST_STATUS_ERROR_INTERNAL;
+    std::string text;
+};
+
+// A sink sends a command (arhost/control.h).
+struct Request {
+    static constexpr const char *type = "request";
+    std::uint64_t id = 0;
+    std::string command; // a JSON object
+};
+
+// The plugin has accepted a new value of an option, or `text` says why it has not.
+struct OptionSet {
+    static constexpr const char *type = "option-set";
+    arhost_status status = ARHOST_STATUS_OK;
     std::string text;
 };
 

@@ -25,6 +25,8 @@ std::string to_text(Call call, std::string_view per_frame) {
         return "in destroy";
     case Call::devices:
         return "while it listed its devices";
+    case Call::set_option:
+        return "in set";
     }
     return "in an unknown call";
 }

@@ -48,7 +48,19 @@ struct Result {
 };
 
 // The plugin function that a worker is executing, for crash reports.
-enum class Call : std::uint32_t { none, load, negotiate, create, start, per_frame, idle, stop, destroy, devices };
+enum class Call : std::uint32_t {
+    none,
+    load,
+    negotiate,
+    create,
+    start,
+    per_frame,
+    idle,
+    stop,
+    destroy,
+    devices,
+    set_option
+};
 
 // Returns, for example, "in create" or "while its library was loaded". `per_frame`: name of the per-frame function of
 // the plugin's kind.
@@ -76,17 +88,26 @@ using CommandConsumer = Consumer<Command, ring_capacity>;
 using ResultProducer = Producer<Result, ring_capacity>;
 using ResultConsumer = Consumer<Result, ring_capacity>;
 
-// Layout of a slot that sinks read: the record, then the image at `image_offset`.
-struct OutputSlot {
-    static constexpr std::uint64_t image_offset = (sizeof(arhost_record) + 4095) / 4096 * 4096;
-    static std::uint32_t stride(std::uint32_t width) { return (width * 3 + 63) / 64 * 64; }
-    static std::uint64_t byte_size(std::uint32_t width, std::uint32_t height) {
-        return image_offset + std::uint64_t(stride(width)) * height;
-    }
-};
 // Bytes from one row of the RGBA8 image in a ray tracer's slot to the next.
 inline std::uint32_t overlay_stride(std::uint32_t width) {
     return (width * 4 + 63) / 64 * 64;
 }
+
+// Layout of a slot that sinks read: the record, the composited image, the video frame and the overlay. The host fills
+// the last two only if a sink reads them; unused pages take no memory.
+class OutputSlot {
+public:
+    static constexpr std::uint64_t image_offset = (sizeof(arhost_record) + 4095) / 4096 * 4096;
+    static std::uint32_t stride(std::uint32_t width) { return (width * 3 + 63) / 64 * 64; }
+
+    explicit OutputSlot(const arhost_frame_format &video)
+        : video_offset(aligned(image_offset + std::uint64_t(stride(video.width)) * video.height)),
+          overlay_offset(aligned(video_offset + video.byte_size)),
+          byte_size(overlay_offset + std::uint64_t(overlay_stride(video.width)) * video.height) {}
+    const std::uint64_t video_offset, overlay_offset, byte_size;
+
+private:
+    static std::uint64_t aligned(std::uint64_t offset) { return (offset + 4095) / 4096 * 4096; }
+};
 
 } // namespace arhost::ipc

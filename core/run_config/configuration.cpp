@@ -49,21 +49,25 @@ base::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
     return limits;
 }
 
-// Returns whether `control` lists `quit`.
-bool parse_control(const yaml::Node &control) {
-    bool may_quit = false;
+// Returns the commands that `control` grants. Commands that choose from a list of the configuration need this list.
+std::set<std::string, std::less<>> parse_control(const yaml::Node &control, const yaml::Node &root) {
+    std::set<std::string, std::less<>> granted;
     for (const yaml::Node &command : control.items()) {
-        const std::string name =
-            command.choice({"quit", "freeze", "snapshot", "record", "load_scene", "swap", "set", "status"});
-        if (name != "quit")
-            command.fail("'" + name + "' is not available yet; the only command so far is 'quit'");
-        may_quit = true;
+        const std::string name = command.choice(control_commands);
+        for (const auto &[needing, key] : {std::pair{"load_scene", "scenes"},
+                                           {"swap", "alternatives"},
+                                           {"snapshot", "snapshot"},
+                                           {"record", "record"}})
+            if (name == needing && !root.find(key))
+                command.fail("'" + name + "' needs the key '" + key + "' of the configuration (docs/control.md)");
+        granted.insert(name);
     }
-    return may_quit;
+    return granted;
 }
 
 // Settings that apply to all components.
 struct Shared {
+    yaml::Node root;
     PluginPath plugin_path;
     base::RestartLimits restart;
     sandbox::Mode sandbox;
@@ -76,8 +80,9 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
             "'arhost conform PLUGIN.so' (docs/conformance.md)");
     node.allow_keys(keys_of(schema_path));
     ComponentConfiguration component{
-        node, {shared.plugin_path.resolve(node.require("plugin"))}, node.find("path"), node.find("options"), {}, {},
-        false};
+        node, {shared.plugin_path.resolve(node.require("plugin"))}, node.find("path"), node.find("options"), {}, {}};
+    const auto name = node.find("name");
+    component.name = name ? name->text() : component.plugins.front().stem().string();
     if (const auto fallback = node.find("fallback"))
         component.plugins.push_back(shared.plugin_path.resolve(*fallback));
     // "options:" without a value is an empty map.
@@ -92,7 +97,8 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
     component.limits.start_total = base::Limits::total_factor * component.limits.start;
     component.limits.stop_total = base::Limits::total_factor * component.limits.stop;
     component.limits.restart = shared.restart;
-    component.policy = access_of(node, schema_path == "outputs[]", shared.sandbox);
+    const bool is_output = schema_path == "outputs[]" || schema_path == "snapshot" || schema_path == "record";
+    component.policy = access_of(node, is_output, shared.sandbox);
     component.policy.memory_bytes =
         static_cast<std::uint64_t>(integer_or_default(node, schema_path + ".memory_mb", 0, 1'000'000'000)) << 20;
     if (component.policy.memory_bytes && component.policy.allows("gpu"))
@@ -102,7 +108,7 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
     if (const auto conform = node.find("conform"))
         component.conform = conform->boolean();
     if (const auto control = node.find("control"))
-        component.may_quit = parse_control(*control);
+        component.control = parse_control(*control, shared.root);
     return component;
 }
 
@@ -143,13 +149,14 @@ FilesInUse files_read_by(const Configuration &configuration) {
         if (const auto path = path_of(configuration.source->node))
             files.read_numbered(path->input_path()); // for a numbered file name, also registers the matching files
     }
-    if (configuration.tracker)
-        read_all_of(*configuration.tracker);
-    if (configuration.raytracer) {
-        read_all_of(*configuration.raytracer);
-        files.read(configuration.raytracer->scene);
-    }
+    std::for_each(configuration.trackers.begin(), configuration.trackers.end(), read_all_of);
+    std::for_each(configuration.raytracers.begin(), configuration.raytracers.end(), read_all_of);
+    for (const Scene &scene : configuration.scenes)
+        files.read(scene.file);
     std::for_each(configuration.outputs.begin(), configuration.outputs.end(), read_all_of);
+    for (const auto *output : {&configuration.snapshot, &configuration.record})
+        if (*output)
+            read_all_of(**output);
     return files;
 }
 
@@ -175,7 +182,56 @@ std::filesystem::path find_scene(const yaml::Node &scene, const std::filesystem:
     scene.fail("there is no scene file '" + file.string() + "'" + hint_at_similar_name(file));
 }
 
+// Parses the lists from which the commands `swap` and `load_scene` choose.
+void parse_choices(Configuration &configuration, const Shared &shared,
+                   const std::filesystem::path &built_in_plugins) {
+    const auto expect_new_name = [](const yaml::Node &node, const std::string &name, const auto &others) {
+        if (std::ranges::any_of(others, [&](const auto &other) { return other.name == name; }))
+            node.fail("there are two with the name '" + name + "'; give each its own 'name'");
+    };
+    // An alternative has the settings of the configured component that are not the plugin's.
+    const auto add_alternatives = [&](const char *kind, const auto &configured, auto &all) {
+        if (configured)
+            all.push_back(*configured);
+        const auto alternatives = shared.root.find("alternatives");
+        const auto nodes = alternatives ? alternatives->find(kind) : std::nullopt;
+        if (!nodes)
+            return;
+        if (!configured)
+            nodes->fail(std::string("there is no '") + kind + "' to which these are alternatives");
+        for (const yaml::Node &node : nodes->items()) {
+            auto alternative = *configured;
+            static_cast<ComponentConfiguration &>(alternative) =
+                parse_component(node, std::string("alternatives.") + kind + "[]", shared);
+            expect_new_name(node, alternative.name, all);
+            all.push_back(std::move(alternative));
+        }
+    };
+    if (const auto alternatives = shared.root.find("alternatives"))
+        alternatives->allow_keys(keys_of("alternatives"));
+    add_alternatives("tracker", configuration.tracker, configuration.trackers);
+    add_alternatives("raytracer", configuration.raytracer, configuration.raytracers);
+    if (configuration.raytracer)
+        configuration.scenes.push_back(
+            {configuration.raytracer->scene.stem().string(), configuration.raytracer->scene});
+    const auto scenes = shared.root.find("scenes");
+    if (scenes && !configuration.raytracer)
+        scenes->fail("there is no 'raytracer' to render the scenes");
+    if (scenes)
+        for (const yaml::Node &node : scenes->items()) {
+            const std::filesystem::path file = find_scene(node, built_in_plugins);
+            if (file == configuration.raytracer->scene)
+                continue;
+            expect_new_name(node, file.stem().string(), configuration.scenes);
+            configuration.scenes.push_back({file.stem().string(), file});
+        }
+}
+
 } // namespace
+
+ipc::OptionValue option_value(const ipc::OptionDeclaration &declared, const std::string &text) {
+    return value_of(declared, yaml::Node::scalar(text, declared.key));
+}
 
 std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
                                           const ComponentConfiguration &component, std::size_t candidate) {
@@ -227,7 +283,7 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     Configuration configuration{.node = root};
     if (const auto node = root.find("sandbox"))
         configuration.sandbox = sandbox::mode_of(node->choice(sandbox::modes));
-    const Shared shared{PluginPath(folders, built_in_plugins), parse_restart(root.find("restart")),
+    const Shared shared{root, PluginPath(folders, built_in_plugins), parse_restart(root.find("restart")),
                         configuration.sandbox};
 
     const auto trajectory_node = root.find("trajectory");
@@ -278,6 +334,7 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
             node->fail("a ray tracer needs camera poses from a 'tracker' or a 'trajectory'");
         configuration.raytracer->scene = find_scene(scene, built_in_plugins);
     }
+    parse_choices(configuration, shared, built_in_plugins);
     if (const auto node = root.find("coordinates")) {
         node->allow_keys(keys_of("coordinates"));
         configuration.coordinates = camera::parse_coordinates(*node);
@@ -285,6 +342,10 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     if (const auto node = root.find("outputs"))
         for (const yaml::Node &output : node->items())
             configuration.outputs.push_back(parse_component(output, "outputs[]", shared));
+    if (const auto node = root.find("snapshot"))
+        configuration.snapshot = parse_component(*node, "snapshot", shared);
+    if (const auto node = root.find("record"))
+        configuration.record = parse_component(*node, "record", shared);
     configuration.files = files_read_by(configuration);
     for (const ComponentConfiguration &output : configuration.outputs)
         if (const auto path = path_of(output.node)) {

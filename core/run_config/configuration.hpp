@@ -15,14 +15,21 @@
 #include <arhost/camera.h>
 #include <arhost/tracker.h>
 
+#include <array>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace arhost::run_config {
 
 enum class Mode { lockstep, live };
+
+// The commands that the key `control` can grant to an output (docs/control.md).
+constexpr std::array<std::string_view, 8> control_commands = {"quit",       "freeze", "snapshot", "record",
+                                                              "load_scene", "swap",   "set",      "status"};
 
 // Settings that all kinds of components have in common.
 struct ComponentConfiguration {
@@ -30,9 +37,10 @@ struct ComponentConfiguration {
     std::vector<std::filesystem::path> plugins; // shared objects: the plugin, then its fallback
     std::optional<yaml::Node> path, options;
     base::Limits limits;
-    sandbox::Policy policy; // docs/security.md
-    bool conform = false;   // check results at run time (docs/conformance.md)
-    bool may_quit = false;  // the output may end the run (`control: [quit]`)
+    sandbox::Policy policy;                       // docs/security.md
+    bool conform = false;                         // check results at run time (docs/conformance.md)
+    std::set<std::string, std::less<>> control{}; // the commands that the output may send
+    std::string name{}; // of a tracker or ray tracer among the alternatives; by default the plugin's
 };
 
 struct SourceConfiguration : ComponentConfiguration {
@@ -49,6 +57,11 @@ struct RaytracerConfiguration : ComponentConfiguration {
     yaml::Node scene_node;
 };
 
+struct Scene {
+    std::string name; // the file's name without extension
+    std::filesystem::path file;
+};
+
 struct Configuration {
     yaml::Node node;
     Mode mode = Mode::lockstep;
@@ -62,6 +75,12 @@ struct Configuration {
     std::optional<RaytracerConfiguration> raytracer{};
     std::optional<camera::Coordinates> coordinates{};
     std::vector<ComponentConfiguration> outputs{};
+    // For the commands `swap` and `load_scene`: the configured component or scene, then the alternatives to it.
+    std::vector<TrackerConfiguration> trackers{};
+    std::vector<RaytracerConfiguration> raytracers{};
+    std::vector<Scene> scenes{};
+    // The outputs that the commands `snapshot` and `record` start.
+    std::optional<ComponentConfiguration> snapshot{}, record{};
     std::chrono::milliseconds max_latency{500};
     std::vector<std::string> warnings{};
     std::optional<std::filesystem::path> stats{}, timeline{}; // absolute
@@ -76,6 +95,9 @@ struct Configuration {
 // input file cannot be read or an output file cannot be written.
 std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
                                           const ComponentConfiguration &component, std::size_t candidate);
+
+// Returns the value of the declared option that `text`, in YAML syntax, represents. Throws yaml::Error.
+ipc::OptionValue option_value(const ipc::OptionDeclaration &declared, const std::string &text);
 
 // Parses and checks a configuration. Throws yaml::Error at the first error. `built_in_plugins` is the folder of the
 // built-in plugins.

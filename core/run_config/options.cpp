@@ -7,7 +7,6 @@
 #include <limits>
 
 namespace arhost::run_config {
-namespace {
 
 ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::Node &node) {
     ipc::OptionValue value{declared.key, declared.type, 0, 0.0, ""};
@@ -40,6 +39,8 @@ ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::No
     }
     return value;
 }
+
+namespace {
 
 // Parses a default value. The message about an invalid default names the plugin, not the configuration.
 ipc::OptionValue default_of(const ipc::OptionDeclaration &declared, const std::string &plugin) {

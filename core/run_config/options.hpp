@@ -11,6 +11,9 @@
 
 namespace arhost::run_config {
 
+// Returns the value of `node` as a value of the declared option. Throws yaml::Error.
+ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::Node &node);
+
 // Returns a value for every option that the plugin declares, in the order of the descriptor. `options` is the YAML
 // map of the configured options, if any. `path` is the component's key `path:`, which sets the option of the same
 // name. Throws yaml::Error for unknown keys, wrong types, values out of range, and missing required options. The

@@ -28,7 +28,8 @@ void add_component(std::vector<Key> &keys, const Key &component, const std::stri
     add(keys, prefix,
         {{"options", free_map, false, "", "The plugin's own options; `arhost plugins --options` lists them."},
          {"allow", list, false, "nothing",
-          "Sandbox permissions: `video`, `usb`, `gpu`, `display`, `network`, `processes` (docs/security.md)."},
+          "Sandbox permissions: `video`, `usb`, `gpu`, `display`, `network`, `listen`, `processes` "
+          "(docs/security.md)."},
          {"reads", list, false, "", "Additional files and folders that the plugin may read."},
          {"writes", list, false, "", "Additional folders that the plugin may write to."},
          {"environment", list, false, "",
@@ -119,13 +120,31 @@ std::vector<Key> make_table() {
          {"coordinates.rotations", list, false, "", "One or two rotations, applied if the profiles differ."},
          {"coordinates.rotations[].degrees", real, true, "", "Angle in degrees, counter-clockwise."},
          {"coordinates.rotations[].axis", reals, true, "", "Three numbers, not all zero."}});
-    add_component(
-        keys, {"outputs", list, false, "", "Outputs for the augmented frames."}, "sink_video",
-        {{"path", output_path, false, "",
-          "Output file, for plugins that write files; its folder becomes writable. `-`: standard output "
-          "(`sink_pipe`)."},
-         {"control", list, false, "nothing",
-          "Commands that the output may give: `quit` ends the run, for example when its window is closed."}});
+    add_component(keys, {"outputs", list, false, "", "Outputs for the augmented frames."}, "sink_video",
+                  {{"path", output_path, false, "",
+                    "Output file, for plugins that write files; its folder becomes writable. `-`: standard output "
+                    "(`sink_pipe`)."},
+                   {"control", list, false, "nothing",
+                    "Commands that the output may send (docs/control.md): `quit`, `freeze`, `snapshot`, `record`, "
+                    "`load_scene`, "
+                    "`swap`, `set`, `status`."}});
+    const Key name = {"name", text, false, "the plugin's name", "Name for the command `swap`."};
+    add(keys, "",
+        {{"scenes", list, false, "",
+          "Scenes from which the command `load_scene` chooses, besides `raytracer.scene`."},
+         {"alternatives", map, false, "", "Components from which the command `swap` chooses."}});
+    add_component(keys,
+                  {"alternatives.tracker", list, false, "", "Alternatives to the tracker; they use its markers."},
+                  "tracker_apriltag", {name, fallback, conform});
+    add_component(keys,
+                  {"alternatives.raytracer", list, false, "", "Alternatives to the ray tracer; they use its scene."},
+                  "rt_vulkan", {name, fallback, conform});
+    const Key numbered_path = {"path", output_path, false, "",
+                               "Output file; the host replaces %d or %03d by the first free number."};
+    add_component(keys, {"snapshot", map, false, "", "Output that writes one frame at the command `snapshot`."},
+                  "sink_images", {numbered_path});
+    add_component(keys, {"record", map, false, "", "Output that the command `record` starts and stops."},
+                  "sink_video", {numbered_path});
     add(keys, "",
         {
             {"live", map, false, "", "Settings of mode `live`."},

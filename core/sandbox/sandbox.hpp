@@ -18,7 +18,8 @@
 namespace arhost::sandbox {
 
 // Permissions beyond the default: the valid values in arhost_descriptor.needs and of the key `allow`.
-constexpr std::array<std::string_view, 6> allowances = {"video", "usb", "gpu", "display", "network", "processes"};
+constexpr std::array<std::string_view, 7> allowances = {"video",   "usb",    "gpu",      "display",
+                                                        "network", "listen", "processes"};
 
 enum class Mode {
     standard = 1, // like permissive, but opens only arhost's own plugins if no layer limits which files can be read

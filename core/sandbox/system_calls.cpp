@@ -102,11 +102,13 @@ struct CallsOf {
 constexpr CallsOf allowed_by[] = {
     {"usb", {"bind"}}, // netlink
     {"network", {"accept", "accept4", "bind", "connect", "listen"}},
+    {"listen", {"accept", "accept4"}},
     {"processes", {"execve", "execveat", "fork", "setpgid", "setsid", "vfork", "wait4", "waitid"}},
 };
 
-// Allowed with `network` and `processes`; without them, libraries fall back to poll. The watches of epoll are counted
-// per user, and they slow down the host's use and release of shared files: the kernel calls or frees each of them.
+// Allowed with `network`, `listen` and `processes`; without them, libraries fall back to poll. The watches of epoll
+// are counted per user, and they slow down the host's use and release of shared files: the kernel calls or frees each
+// of them.
 constexpr const char *epoll_calls[] = {"epoll_create", "epoll_create1", "epoll_ctl",
                                        "epoll_pwait",  "epoll_pwait2",  "epoll_wait"};
 
@@ -229,6 +231,12 @@ void deny_sockets(Filter &filter, const Policy &policy) {
     if (!policy.allows("network"))
         for (const std::uint64_t requests : {0x8900ul /* SIOC… */, 0x8b00ul /* wireless */})
             filter.deny("ioctl", {has_bits(1, 0xffffff00u, requests)});
+    // An inherited listening socket, shut down, could connect by sending its first data (TCP Fast Open).
+    if (!policy.allows("network")) {
+        filter.deny("sendto", {has_bits(3, MSG_FASTOPEN, MSG_FASTOPEN)});
+        filter.deny("sendmsg", {has_bits(2, MSG_FASTOPEN, MSG_FASTOPEN)});
+        filter.deny("sendmmsg", {has_bits(3, MSG_FASTOPEN, MSG_FASTOPEN)});
+    }
     if (!families.contains(AF_UNIX))
         for (const int type : {SOCK_DGRAM, SOCK_RAW}) // sockets of these types can send to any socket
             filter.deny("socketpair", {has_bits(1, 0xf, static_cast<unsigned>(type))});
@@ -285,7 +293,7 @@ void allow_needed_calls(const Policy &policy) {
         if (policy.allows(added.allowance))
             for (const char *call : added.calls)
                 filter.allow(call);
-    if (policy.allows("network") || policy.allows("processes"))
+    if (policy.allows("network") || policy.allows("listen") || policy.allows("processes"))
         for (const char *call : epoll_calls)
             filter.allow(call);
     filter.load();

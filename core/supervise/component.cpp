@@ -147,6 +147,13 @@ void Component::on_message(Message &message) {
         stop_response_ = parse<messages::Stopped>(message);
     } else if (is<messages::End>(message) && description_.kind == ARHOST_KIND_SINK) {
         callbacks_.end_requested();
+    } else if (is<messages::Request>(message) && description_.kind == ARHOST_KIND_SINK && running()) {
+        callbacks_.request(parse<messages::Request>(message));
+    } else if (is<messages::OptionSet>(message) && !unset_options_.empty()) {
+        const auto [status, text] = parse<messages::OptionSet>(message);
+        const auto done = std::move(unset_options_.front());
+        unset_options_.pop_front();
+        done(status > 0 ? "" : text.empty() ? status_text(status) : text);
     } else if (!is<messages::Detached>(message)) {
         process_->end("protocol violation: unexpected message " + message.body["type"].dump());
     }
@@ -155,12 +162,11 @@ void Component::on_message(Message &message) {
 void Component::on_hello(const Message &message) {
     handshake_ = Handshake::creating;
     try {
-        description_ = parse<messages::Hello>(message).descriptor;
+        messages::Hello hello = parse<messages::Hello>(message);
+        description_ = std::move(hello.descriptor);
+        sandbox_level_ = std::move(hello.sandbox);
         const Create create = callbacks_.hello(description_, candidate_);
-        if (create.arena_fd)
-            process_->send(create.message, {*create.arena_fd});
-        else
-            process_->send(create.message);
+        process_->send(create.message, create.fds);
         set_progress_deadline(limits_.start, "did not start");
     } catch (const std::exception &error) {
         configuration_error_ = error.what();
@@ -216,6 +222,21 @@ void Component::stop_when_idle() {
     set_total_deadline(limits_.stop_total, "did not stop");
 }
 
+void Component::answer(const messages::Answer &answer, std::uint32_t restarts) {
+    if (running() && restarts == restarts_ && !stop_sent_)
+        process_->send_ordered(answer);
+}
+
+void Component::set_option(const OptionValue &option, std::function<void(const std::string &)> done) {
+    constexpr std::size_t max_unset_options = 4; // the command ring has room for them besides other commands
+    if (!running() || stop_sent_)
+        return done(name_ + " is not running");
+    if (unset_options_.size() >= max_unset_options)
+        return done(name_ + " has not applied the previous changes yet; retry later");
+    unset_options_.push_back(std::move(done));
+    process_->send_ordered(messages::SetOption{option});
+}
+
 void Component::on_result(const Result &result) {
     if (in_flight_.empty() || result.ticket != in_flight_.front().ticket)
         return process_->end("protocol violation: unexpected response");
@@ -248,6 +269,8 @@ void Component::on_died(const Death &death) {
     const std::vector<Command> unanswered(in_flight_.begin(), in_flight_.end());
     in_flight_.clear();
     waits_ = false;
+    for (const auto &done : std::exchange(unset_options_, {}))
+        done(name_ + " has died");
 
     state_ = State::waiting;
     const bool finished = death.clean && stop_response_;

@@ -22,6 +22,13 @@ struct Region {
 };
 using RegionPointer = std::shared_ptr<const Region>;
 
+struct Crash {
+    std::string plugin; // id of the plugin, or its file name if it died before Hello
+    std::string how, log_tail;
+    std::uint64_t frame; // the frame that was being processed, or no_frame
+    static constexpr std::uint64_t no_frame = ~std::uint64_t(0);
+};
+
 //   idle ─start─▶ starting ─ready, memory attached─▶ running ─stop, nothing in flight─▶ stopped
 //                  ▲  │ died                           │ died
 //                  │  ▼                                ▼
@@ -33,7 +40,7 @@ public:
 
     struct Create {
         ipc::messages::Create message;
-        std::optional<int> arena_fd; // descriptor of the scene's arena; only for a ray tracer
+        std::vector<int> fds; // as described at messages::Create
     };
 
     // All callbacks except `hello` and `ready` are called after the state has changed.
@@ -53,13 +60,7 @@ public:
         std::function<void(const std::string &reason, bool is_configuration_error)> disabled;
         std::function<void(arhost_status, const std::string &text)> stopped; // after stop()
         std::function<void()> end_requested; // a sink has ended while it was idle; only called for sinks
-    };
-
-    struct Crash {
-        std::string plugin; // id of the plugin, or its file name if it died before Hello
-        std::string how, log_tail;
-        std::uint64_t frame; // the frame that was being processed, or no_frame
-        static constexpr std::uint64_t no_frame = ~std::uint64_t(0);
+        std::function<void(const ipc::messages::Request &)> request; // a sink has sent a command
     };
 
     // `plugins`: the shared object of the plugin, followed by its fallbacks. `sandbox` applies to all of them.
@@ -98,7 +99,15 @@ public:
     // Detaches inputs to which nothing refers any more.
     void submit(ipc::Command command, const RegionPointer &input = nullptr);
 
+    // Answers a command of the sink, unless its worker is not the one that had sent the command: `restarts` is the
+    // number of restarts at that time.
+    void answer(const ipc::messages::Answer &answer, std::uint32_t restarts);
+    // Changes an option of the running plugin. Calls `done` with "" or with the reason why the option is unchanged.
+    // The caller has to pass the new value when a restarted worker creates the plugin.
+    void set_option(const ipc::OptionValue &option, std::function<void(const std::string &error)> done);
+
     std::uint32_t restarts() const { return restarts_; }
+    const std::string &sandbox_level() const { return sandbox_level_; } // as in messages::Hello
     // Logs a line for which the worker is responsible (WorkerBudget::log).
     void log(arhost_severity severity, const std::string &text) { budget_.log(severity, text); }
     double cpu_seconds() const { return cpu_seconds_of_dead_ + (process_ ? process_->cpu_seconds() : 0); }
@@ -148,6 +157,8 @@ private:
     std::map<std::uint32_t, std::weak_ptr<const Region>> attached_inputs_;
     std::uint32_t next_generation_ = 1;
     std::deque<ipc::Command> in_flight_;
+    std::deque<std::function<void(const std::string &)>> unset_options_; // the calls of set_option without a response
+    std::string sandbox_level_;
     std::uint64_t next_ticket_ = 1;
     std::uint32_t restarts_ = 0;
     double cpu_seconds_of_dead_ = 0;

@@ -43,7 +43,7 @@ Process::~Process() {
         signal_process(spawned_.pidfd, SIGKILL);
 }
 
-void Process::send_json(const Json &body, std::initializer_list<int> fds) {
+void Process::send_json(const Json &body, const std::vector<int> &fds) {
     if (spawned_.channel.send(body, fds, false))
         return;
     // If the queue is full, the worker has stopped receiving. Other errors mean that the worker is dead, which the
@@ -55,7 +55,7 @@ void Process::send_json(const Json &body, std::initializer_list<int> fds) {
             "(ETOOMANYREFS)");
 }
 
-void Process::send_json_ordered(const Json &body, std::initializer_list<int> fds) {
+void Process::send_json_ordered(const Json &body, const std::vector<int> &fds) {
     send_json(body, fds);
     Command command{};
     command.kind = CommandKind::control;
@@ -63,8 +63,9 @@ void Process::send_json_ordered(const Json &body, std::initializer_list<int> fds
 }
 
 void Process::submit(const Command &command) {
-    if (commands_.push(command) != RingResult::done)
-        return end("protocol violation: its command ring is inconsistent");
+    if (const RingResult result = commands_.push(command); result != RingResult::done)
+        return end(result == RingResult::wait ? "does not read its commands"
+                                              : "protocol violation: its command ring is inconsistent");
     wake(host_page_.as<HostPage>().wake);
 }
 

@@ -56,11 +56,11 @@ public:
     Process &operator=(const Process &) = delete;
 
     // For a worker that has not sent Ready yet and therefore waits only for messages.
-    template <class T> void send(const T &message, std::initializer_list<int> fds = {}) {
+    template <class T> void send(const T &message, const std::vector<int> &fds = {}) {
         send_json(ipc::encode(message), fds);
     }
     // For a worker that has sent Ready: it receives the message in order relative to the commands.
-    template <class T> void send_ordered(const T &message, std::initializer_list<int> fds = {}) {
+    template <class T> void send_ordered(const T &message, const std::vector<int> &fds = {}) {
         send_json_ordered(ipc::encode(message), fds);
     }
     void submit(const ipc::Command &command);
@@ -76,8 +76,8 @@ public:
 
 private:
     Process(Context &context, WorkerBudget &budget, Callbacks callbacks, const ipc::Json &first, Isolation isolation);
-    void send_json(const ipc::Json &body, std::initializer_list<int> fds);
-    void send_json_ordered(const ipc::Json &body, std::initializer_list<int> fds);
+    void send_json(const ipc::Json &body, const std::vector<int> &fds);
+    void send_json_ordered(const ipc::Json &body, const std::vector<int> &fds);
     void receive_messages(int max_messages);
     void on_doorbell();
     void watch_output();

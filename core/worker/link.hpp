@@ -30,6 +30,10 @@ public:
     template <class T> void send(const T &message, std::initializer_list<int> fds = {}) const {
         send_json(ipc::encode(message), fds);
     }
+    // Returns false if the host cannot keep up. May be called on any thread.
+    template <class T> bool try_send(const T &message) const {
+        return channel_.send(ipc::encode(message), {}, false);
+    }
     // Both never block, and drop what exceeds their rates: per second, 200 warnings and errors and 200 other lines,
     // or 100 KB of each; one progress report per 5 ms. The host prints fewer lines, and ends a worker that sends many
     // more.

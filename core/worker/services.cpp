@@ -148,7 +148,7 @@ public:
     arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &fds,
                         messages::Ready &) override {
         const auto &message = setup_of_kind<messages::RaytracerSetup>(any);
-        require(fds.size() == 1, "'create' was sent without the descriptor of the scene's arena");
+        require(!fds.empty(), "'create' was sent without the descriptor of the scene's arena");
         arena_ = SharedMemory::adopt(base::UniqueFd(::dup(fds[0].get()))).map(Access::read_only);
         require(arena_.bytes().size() >= sizeof(arhost_scene), "the scene's arena is too small");
         arhost_raytracer_setup setup{};
@@ -221,30 +221,41 @@ private:
 
 class SinkService final : public Service {
 public:
-    SinkService(const arhost_sink &sink, arhost_instance *instance) : sink_(sink), instance_(instance) {}
+    SinkService(const arhost_plugin &plugin, arhost_instance *instance)
+        : sink_(*static_cast<const arhost_sink *>(plugin.functions)), instance_(instance),
+          capabilities_(plugin.descriptor->capabilities) {}
 
     arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &, messages::Ready &) override {
         const auto &message = setup_of_kind<messages::SinkSetup>(any);
         arhost_sink_setup setup{};
         setup.struct_size = sizeof setup;
-        setup.width = width_ = message.width;
-        setup.height = height_ = message.height;
+        setup.width = message.width;
+        setup.height = message.height;
         setup.fps = message.fps;
         setup.first_sequence = message.first_sequence;
         setup.intrinsics = message.intrinsics ? &*message.intrinsics : nullptr;
+        setup.video_format = &(video_format_ = message.video_format);
         return sink_.start(instance_, &setup);
     }
 
     arhost_status execute(const Command &command, const Memory &memory, Result &) override {
         require(command.kind == CommandKind::write, "a sink got a command other than write");
         const std::span<std::byte> input = memory.input(command.input_generation).slot(command.input_slot);
-        require(input.size() >= OutputSlot::byte_size(width_, height_), "the output slots are too small");
+        const OutputSlot slot(video_format_);
+        require(input.size() >= slot.byte_size, "the output slots are too small");
         arhost_output output{};
         output.struct_size = sizeof output;
-        output.stride = OutputSlot::stride(width_);
-        output.width = width_;
-        output.height = height_;
+        output.stride = OutputSlot::stride(video_format_.width);
+        output.width = video_format_.width;
+        output.height = video_format_.height;
         output.bgr = as_pixels(input) + OutputSlot::image_offset;
+        if (capabilities_ & ARHOST_CAPABILITY_VIDEO_INPUT)
+            for (std::uint32_t i = 0; i < video_format_.plane_count; ++i)
+                output.video[i] = as_pixels(input) + slot.video_offset + video_format_.offset[i];
+        if (capabilities_ & ARHOST_CAPABILITY_OVERLAY_INPUT) {
+            output.overlay_rgba = as_pixels(input) + slot.overlay_offset;
+            output.overlay_stride = overlay_stride(video_format_.width);
+        }
         output.record = reinterpret_cast<const arhost_record *>(input.data());
         return sink_.write(instance_, &output);
     }
@@ -256,7 +267,8 @@ public:
 private:
     const arhost_sink &sink_;
     arhost_instance *instance_;
-    std::uint32_t width_ = 0, height_ = 0;
+    std::uint32_t capabilities_;
+    arhost_frame_format video_format_{};
 };
 
 } // namespace
@@ -282,7 +294,7 @@ std::unique_ptr<Service> make_service(const Link &link, const arhost_host &host,
     case ARHOST_KIND_RAYTRACER:
         return std::make_unique<RaytracerService>(link, host, plugin, instance);
     default:
-        return std::make_unique<SinkService>(*static_cast<const arhost_sink *>(plugin.functions), instance);
+        return std::make_unique<SinkService>(plugin, instance);
     }
 }
 

@@ -2,6 +2,7 @@
 #include "worker/session.hpp"
 
 #include "sandbox/sandbox.hpp"
+#include "worker/command_sender.hpp"
 #include "worker/devices.hpp"
 #include "worker/library.hpp"
 #include "worker/loader.hpp"
@@ -21,14 +22,16 @@ using namespace ipc;
 // Failed and Stopped report.
 class PluginHost {
 public:
-    explicit PluginHost(Link &link)
-        : link_(link), host_{sizeof host_, ARHOST_ABI_VERSION, "arhost",      ARHOST_VERSION, this,
-                             &on_log,      &on_progress,       &on_cancelled, &on_extension} {}
+    PluginHost(Link &link, arhost_kind kind)
+        : link_(link), kind_(kind),
+          sender_(link), host_{sizeof host_, ARHOST_ABI_VERSION, "arhost",      ARHOST_VERSION, this,
+                               &on_log,      &on_progress,       &on_cancelled, &on_extension} {}
     const arhost_host *get() const { return &host_; }
     std::string last_error() const {
         std::lock_guard lock(mutex_);
         return last_error_;
     }
+    void deliver(const messages::Answer &answer) { sender_.deliver(answer); }
     // Returns the message to send after a plugin function has returned the error `status`.
     messages::Failed failed(arhost_status status) const {
         const std::string reason = last_error();
@@ -49,19 +52,44 @@ private:
         self(host).link_.progress(fraction, what);
     }
     static std::int32_t on_cancelled(const arhost_host *host) { return self(host).link_.cancelled(); }
-    static const void *on_extension(const arhost_host *, const char *) { return nullptr; }
+    static const void *on_extension(const arhost_host *host, const char *id) {
+        static constexpr arhost_control control = {
+            sizeof control, [](const arhost_host *sink_host, const char *command, arhost_take_answer take,
+                               void *context) { return self(sink_host).sender_.send(command, take, context); }};
+        return id && std::string_view(id) == ARHOST_CONTROL_EXTENSION && self(host).kind_ == ARHOST_KIND_SINK
+                   ? &control
+                   : nullptr;
+    }
 
     Link &link_;
+    arhost_kind kind_;
+    CommandSender sender_;
     arhost_host host_;
     mutable std::mutex mutex_;
     std::string last_error_;
 };
 
+const arhost_set_option *set_option_of(const arhost_plugin &plugin) {
+    return static_cast<const arhost_set_option *>(plugin.get_extension(ARHOST_SET_OPTION_EXTENSION));
+}
+
+PluginDescription describe_plugin(const arhost_plugin &plugin) {
+    PluginDescription description = describe(*plugin.descriptor);
+    if (const auto *extension = set_option_of(plugin))
+        for (const char *const *key = extension->keys; *key; ++key)
+            description.changeable.emplace_back(*key);
+    return description;
+}
+
+// The result refers to the strings of `value`.
+arhost_option to_abi(const OptionValue &value) {
+    return {sizeof(arhost_option), value.type, value.key.c_str(), value.integer, value.real, value.text.c_str()};
+}
+
 // A plugin's instance, from create to destroy.
 class Session {
 public:
-    Session(Link &link, const PluginHost &host, const arhost_plugin &plugin)
-        : link_(link), host_(host), plugin_(plugin) {}
+    Session(Link &link, PluginHost &host, const arhost_plugin &plugin) : link_(link), host_(host), plugin_(plugin) {}
     ~Session() {
         if (!instance_)
             return;
@@ -91,8 +119,14 @@ private:
     bool start(const messages::Create &create, const std::vector<base::UniqueFd> &fds) {
         std::vector<arhost_option> options;
         options.reserve(create.options.size());
-        for (const OptionValue &v : create.options)
-            options.push_back({sizeof(arhost_option), v.type, v.key.c_str(), v.integer, v.real, v.text.c_str()});
+        for (const OptionValue &value : create.options) {
+            options.push_back(to_abi(value));
+            if (value.type != ARHOST_OPTION_LISTEN || value.integer < 0)
+                continue;
+            if (std::cmp_greater_equal(value.integer, fds.size()))
+                throw ProtocolViolation("'create' was sent without the socket of the option '" + value.key + "'");
+            options.back().integer = fds[static_cast<std::size_t>(value.integer)].get();
+        }
         arhost_status status;
         {
             Link::InCall call(link_, Call::create);
@@ -142,6 +176,11 @@ private:
             const auto generation = parse<messages::Detach>(message).generation;
             memory_.inputs.erase(generation);
             link_.send(messages::Detached{generation});
+        } else if (is<messages::Answer>(message)) {
+            Link::InCall call(link_, Call::idle);
+            host_.deliver(parse<messages::Answer>(message));
+        } else if (is<messages::SetOption>(message)) {
+            link_.send(set(parse<messages::SetOption>(message).option));
         } else if (is<messages::Stop>(message)) {
             Link::InCall call(link_, Call::stop);
             const arhost_status status = service_->stop();
@@ -150,6 +189,19 @@ private:
         } else {
             throw ProtocolViolation("the host sent a message of unknown type " + message.body["type"].dump());
         }
+    }
+
+    messages::OptionSet set(const OptionValue &value) {
+        const auto *extension = set_option_of(plugin_);
+        if (!extension)
+            throw ProtocolViolation("the host sent 'set-option' to a plugin without this extension");
+        const arhost_option option = to_abi(value);
+        arhost_status status;
+        {
+            Link::InCall call(link_, Call::set_option);
+            status = extension->set(instance_, &option);
+        }
+        return {status, status == ARHOST_STATUS_OK ? std::string() : host_.last_error()};
     }
 
     void attach(const messages::Attach &attach, std::vector<base::UniqueFd> fds) {
@@ -164,7 +216,7 @@ private:
     }
 
     Link &link_;
-    const PluginHost &host_;
+    PluginHost &host_;
     const arhost_plugin &plugin_;
     Memory memory_;
     arhost_instance *instance_ = nullptr;
@@ -205,8 +257,8 @@ int serve_plugin(Link &link, const messages::Open &open) {
         plugin = &negotiate(open.plugin, *entry);
     }
     ::prctl(PR_SET_NAME, plugin->descriptor->id);
-    link.send(messages::Hello{describe(*plugin->descriptor), sandbox::to_text(level)});
-    PluginHost host(link);
+    link.send(messages::Hello{describe_plugin(*plugin), sandbox::to_text(level)});
+    PluginHost host(link, plugin->descriptor->kind);
     Message next = link.receive();
     for (; is<messages::ListDevices>(next); next = link.receive())
         send_devices(link, host, *plugin);

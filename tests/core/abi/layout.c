@@ -51,6 +51,7 @@ VALUE(ARHOST_OPTION_REAL, 3);
 VALUE(ARHOST_OPTION_TEXT, 4);
 VALUE(ARHOST_OPTION_INPUT_PATH, 5);
 VALUE(ARHOST_OPTION_OUTPUT_PATH, 6);
+VALUE(ARHOST_OPTION_LISTEN, 7);
 
 STRUCT(arhost_option_descriptor, 56);
 FIELD(arhost_option_descriptor, struct_size, 0, 4);
@@ -83,6 +84,8 @@ VALUE(ARHOST_CAPABILITY_ENVIRONMENT, 1024);
 VALUE(ARHOST_CAPABILITY_MOTION, 2048);
 VALUE(ARHOST_CAPABILITY_EVERY_SCENE, 4064);
 VALUE(ARHOST_CAPABILITY_STANDARD_OUTPUT, 4096);
+VALUE(ARHOST_CAPABILITY_VIDEO_INPUT, 8192);
+VALUE(ARHOST_CAPABILITY_OVERLAY_INPUT, 16384);
 
 STRUCT(arhost_descriptor, 80);
 FIELD(arhost_descriptor, struct_size, 0, 4);
@@ -139,6 +142,19 @@ FIELD(arhost_device, abilities, 32, 8);
 STRUCT(arhost_devices, 16);
 FIELD(arhost_devices, struct_size, 0, 4);
 FIELD(arhost_devices, list, 8, 8);
+
+/* arhost/control.h */
+
+STRUCT(arhost_control, 16);
+FIELD(arhost_control, struct_size, 0, 4);
+FIELD(arhost_control, send, 8, 8);
+VALUE(ARHOST_MAX_COMMAND_SIZE, 16384);
+VALUE(ARHOST_MAX_PENDING_COMMANDS, 8);
+
+STRUCT(arhost_set_option, 24);
+FIELD(arhost_set_option, struct_size, 0, 4);
+FIELD(arhost_set_option, keys, 8, 8);
+FIELD(arhost_set_option, set, 16, 8);
 
 /* arhost/frame.h */
 VALUE(ARHOST_PIXEL_FORMAT_GREY8, 1);
@@ -521,7 +537,7 @@ FIELD(arhost_raytracer, capabilities, 32, 8);
 
 /* arhost/sink.h */
 
-STRUCT(arhost_sink_setup, 40);
+STRUCT(arhost_sink_setup, 48);
 FIELD(arhost_sink_setup, struct_size, 0, 4);
 FIELD(arhost_sink_setup, width, 4, 4);
 FIELD(arhost_sink_setup, height, 8, 4);
@@ -529,6 +545,7 @@ FIELD(arhost_sink_setup, reserved, 12, 4);
 FIELD(arhost_sink_setup, fps, 16, 8);
 FIELD(arhost_sink_setup, first_sequence, 24, 8);
 FIELD(arhost_sink_setup, intrinsics, 32, 8);
+FIELD(arhost_sink_setup, video_format, 40, 8);
 VALUE(ARHOST_OVERLAY_RENDERED, 1);
 VALUE(ARHOST_OVERLAY_HELD, 2);
 VALUE(ARHOST_OVERLAY_NONE, 3);
@@ -548,13 +565,17 @@ FIELD(arhost_record, marker_count, 400, 4);
 FIELD(arhost_record, reserved, 404, 4);
 FIELD(arhost_record, markers, 408, 24576);
 
-STRUCT(arhost_output, 32);
+STRUCT(arhost_output, 72);
 FIELD(arhost_output, struct_size, 0, 4);
 FIELD(arhost_output, stride, 4, 4);
 FIELD(arhost_output, width, 8, 4);
 FIELD(arhost_output, height, 12, 4);
 FIELD(arhost_output, bgr, 16, 8);
 FIELD(arhost_output, record, 24, 8);
+FIELD(arhost_output, video, 32, 24);
+FIELD(arhost_output, overlay_rgba, 56, 8);
+FIELD(arhost_output, overlay_stride, 64, 4);
+FIELD(arhost_output, reserved, 68, 4);
 
 STRUCT(arhost_sink, 40);
 FIELD(arhost_sink, struct_size, 0, 4);

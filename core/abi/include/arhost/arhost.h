@@ -3,6 +3,7 @@
 #ifndef ARHOST_ARHOST_H
 #define ARHOST_ARHOST_H
 #include "camera.h"
+#include "control.h"
 #include "devices.h"
 #include "frame.h"
 #include "plugin.h"

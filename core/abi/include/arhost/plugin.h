@@ -128,7 +128,13 @@ enum {
     ARHOST_OPTION_INPUT_PATH = 5, /* arhost_option.text; absolute, resolved against the configuration's folder */
     /* arhost_option.text; absolute, resolved against the working directory; or "-", see
      * ARHOST_CAPABILITY_STANDARD_OUTPUT */
-    ARHOST_OPTION_OUTPUT_PATH = 6
+    ARHOST_OPTION_OUTPUT_PATH = 6,
+    /* arhost_option.integer: the descriptor of a listening, non-blocking stream socket, which belongs to the worker
+     * and stays open until the process ends; -1: none. The host opens it, so that the plugin needs no permission to
+     * open others, and keeps it open while the worker restarts. arhost_option.text: the address: "127.0.0.1:8080",
+     * "[::1]:8080", or the absolute path of a Unix socket. In the configuration, a plain name stands for the Unix
+     * socket $XDG_RUNTIME_DIR/arhost/NAME.sock, and "" for none */
+    ARHOST_OPTION_LISTEN = 7
 };
 
 /* Declares an option. Before `create` is called, the host checks the configuration against the declarations, and
@@ -189,7 +195,9 @@ enum {
     ARHOST_CAPABILITY_EVERY_SCENE = 0xfe0,   /* all of these: REFLECTION to MOTION */
     /* sink: accepts "-" as the option `path`, and then writes to standard output, descriptor 1. Without this
      * capability, the host rejects "-" as the path of an output. */
-    ARHOST_CAPABILITY_STANDARD_OUTPUT = 1 << 12
+    ARHOST_CAPABILITY_STANDARD_OUTPUT = 1 << 12,
+    ARHOST_CAPABILITY_VIDEO_INPUT = 1 << 13,  /* sink: reads arhost_output.video */
+    ARHOST_CAPABILITY_OVERLAY_INPUT = 1 << 14 /* sink: reads arhost_output.overlay_rgba */
 };
 
 /* Describes the plugin. Static storage: valid as long as the library is loaded. Each string may have up to 4,096
@@ -207,7 +215,8 @@ typedef struct arhost_descriptor {
     uint32_t option_count;
     const arhost_option_descriptor *options; /* option_count elements; may be NULL if there are none */
     /* Permissions that the plugin needs from the sandbox, a NULL-terminated list; NULL: none. "video" (/dev/video*),
-     * "usb", "gpu", "display" (X or Wayland, and the GPU), "network", "processes" (fork and exec). The configuration
+     * "usb", "gpu", "display" (X or Wayland, and the GPU), "network", "listen" (accept connections on the sockets of
+     * its options), "processes" (fork and exec). The configuration
      * grants them (`allow: [video]`); the host rejects the plugin before `create` if one of them is not granted. */
     const char *const *needs;
 } arhost_descriptor;

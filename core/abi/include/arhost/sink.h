@@ -22,7 +22,8 @@ typedef struct arhost_sink_setup {
     /* Sequence number of the first frame: 0 on a fresh start, higher after a restart. Keep the output for earlier
      * frames; replace the output for this frame and later ones. */
     uint64_t first_sequence;
-    const arhost_intrinsics *intrinsics; /* the same for every camera in the records; NULL if unknown */
+    const arhost_intrinsics *intrinsics;     /* the same for every camera in the records; NULL if unknown */
+    const arhost_frame_format *video_format; /* format of arhost_output.video */
 } arhost_sink_setup;
 
 /* The origin of a frame's overlay. */
@@ -57,6 +58,14 @@ typedef struct arhost_output {
     uint32_t width, height;
     const uint8_t *bgr;
     const arhost_record *record;
+    /* The frame under the overlay, as the source delivered it: one pointer per plane of
+     * arhost_sink_setup.video_format. NULL without ARHOST_CAPABILITY_VIDEO_INPUT. */
+    const uint8_t *video[ARHOST_MAX_PLANES];
+    /* The overlay: R, G, B, A bytes with straight alpha, top row first, transparent where there is no overlay. NULL
+     * without ARHOST_CAPABILITY_OVERLAY_INPUT. */
+    const uint8_t *overlay_rgba;
+    uint32_t overlay_stride; /* bytes per row of overlay_rgba */
+    uint32_t reserved;       /* 0 */
 } arhost_output;
 
 typedef struct arhost_sink {

@@ -57,6 +57,7 @@ pub const ARHOST_OPTION_REAL: arhost_option_type = 3;
 pub const ARHOST_OPTION_TEXT: arhost_option_type = 4;
 pub const ARHOST_OPTION_INPUT_PATH: arhost_option_type = 5;
 pub const ARHOST_OPTION_OUTPUT_PATH: arhost_option_type = 6;
+pub const ARHOST_OPTION_LISTEN: arhost_option_type = 7;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_option_descriptor {
@@ -97,6 +98,8 @@ pub const ARHOST_CAPABILITY_ENVIRONMENT: u32 = 1024;
 pub const ARHOST_CAPABILITY_MOTION: u32 = 2048;
 pub const ARHOST_CAPABILITY_EVERY_SCENE: u32 = 4064;
 pub const ARHOST_CAPABILITY_STANDARD_OUTPUT: u32 = 4096;
+pub const ARHOST_CAPABILITY_VIDEO_INPUT: u32 = 8192;
+pub const ARHOST_CAPABILITY_OVERLAY_INPUT: u32 = 16384;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_descriptor {
@@ -184,6 +187,31 @@ pub struct arhost_devices {
 }
 const _: () = assert!(size_of::<arhost_devices>() == 16);
 unsafe impl Sync for arhost_devices {} // a plugin's statics are immutable
+
+// ---- arhost/control.h ----
+
+pub const ARHOST_CONTROL_EXTENSION: &[u8] = b"arhost.host.control/1\0";
+pub type arhost_take_answer = Option<unsafe extern "C" fn(*mut c_void, *const c_char)>;
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_control {
+    pub struct_size: u32,
+    pub send: Option<unsafe extern "C" fn(*const arhost_host, *const c_char, arhost_take_answer, *mut c_void) -> arhost_status>,
+}
+const _: () = assert!(size_of::<arhost_control>() == 16);
+unsafe impl Sync for arhost_control {} // a plugin's statics are immutable
+pub const ARHOST_MAX_COMMAND_SIZE: usize = 16384;
+pub const ARHOST_MAX_PENDING_COMMANDS: usize = 8;
+pub const ARHOST_SET_OPTION_EXTENSION: &[u8] = b"arhost.set_option/1\0";
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_set_option {
+    pub struct_size: u32,
+    pub keys: *const *const c_char,
+    pub set: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_option) -> arhost_status>,
+}
+const _: () = assert!(size_of::<arhost_set_option>() == 24);
+unsafe impl Sync for arhost_set_option {} // a plugin's statics are immutable
 
 // ---- arhost/frame.h ----
 
@@ -710,8 +738,9 @@ pub struct arhost_sink_setup {
     pub fps: f64,
     pub first_sequence: u64,
     pub intrinsics: *const arhost_intrinsics,
+    pub video_format: *const arhost_frame_format,
 }
-const _: () = assert!(size_of::<arhost_sink_setup>() == 40);
+const _: () = assert!(size_of::<arhost_sink_setup>() == 48);
 unsafe impl Sync for arhost_sink_setup {} // a plugin's statics are immutable
 pub type arhost_overlay = i32;
 pub const ARHOST_OVERLAY_RENDERED: arhost_overlay = 1;
@@ -744,8 +773,12 @@ pub struct arhost_output {
     pub height: u32,
     pub bgr: *const u8,
     pub record: *const arhost_record,
+    pub video: [*const u8; ARHOST_MAX_PLANES],
+    pub overlay_rgba: *const u8,
+    pub overlay_stride: u32,
+    pub reserved: u32,
 }
-const _: () = assert!(size_of::<arhost_output>() == 32);
+const _: () = assert!(size_of::<arhost_output>() == 72);
 unsafe impl Sync for arhost_output {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]

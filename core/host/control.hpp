@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The commands that outputs send while the video runs (docs/control.md). Control never widens privilege: a command
+// chooses among the scenes, plugins and options of the configuration; it never contains a path or a permission.
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <variant>
+
+namespace arhost::host::control {
+
+struct Quit {};
+struct Freeze {
+    std::optional<bool> on; // nullopt: toggle
+};
+struct Snapshot {};
+struct Record {
+    std::optional<bool> on; // nullopt: toggle
+};
+struct LoadScene {
+    std::string scene;
+};
+struct Swap {
+    std::string component; // "tracker" or "raytracer"
+    std::string plugin;    // name of an alternative
+};
+struct Set {
+    std::string component, option;
+    std::string value; // in YAML syntax
+};
+struct Status {};
+using Command = std::variant<Quit, Freeze, Snapshot, Record, LoadScene, Swap, Set, Status>;
+
+// Why a command was not executed, as a message for the user.
+class Error : public std::runtime_error {
+    using std::runtime_error::runtime_error;
+};
+
+// Parses a command. `granted`: the elements of the output's key `control`. Throws Error if the text is not a valid
+// command, or if the command is not granted.
+Command parse(const std::string &text, const std::set<std::string, std::less<>> &granted);
+
+// Called once with the answer to a command: "" and the answer's members, or the reason why the command failed.
+using Done = std::function<void(const std::string &error, const nlohmann::ordered_json &members)>;
+
+std::string answer_text(const std::string &error, const nlohmann::ordered_json &members);
+
+} // namespace arhost::host::control

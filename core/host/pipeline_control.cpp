@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Executes the commands of outputs: freezes the video, exchanges the tracker, the ray tracer and the scene, starts
+// and stops outputs, changes options.
+#include "host/pipeline.hpp"
+
+#include "base/text.hpp"
+#include "run_config/access.hpp"
+
+#include <arhost-cpp/numbered_name.hpp>
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+
+namespace arhost::host {
+
+using namespace ipc;
+using supervise::Component;
+
+namespace {
+
+// Returns the element of `choices` with this name. Throws control::Error, which lists the names.
+template <class Choice> const Choice &find_choice(const std::vector<Choice> &choices, const std::string &name) {
+    const auto found = std::ranges::find(choices, name, &Choice::name);
+    if (found != choices.end())
+        return *found;
+    std::string names;
+    for (const Choice &choice : choices)
+        names += (names.empty() ? "" : ", ") + choice.name;
+    throw control::Error("there is no '" + base::printable(name, 100) + "'; choose one of: " + names);
+}
+
+} // namespace
+
+void Pipeline::on_request(SinkQueue &sink, const run_config::ComponentConfiguration &output,
+                          const messages::Request &request) {
+    const auto done = [&sink, id = request.id, restarts = sink.component->restarts()](
+                          const std::string &error, const nlohmann::ordered_json &members) {
+        sink.component->answer({id, control::answer_text(error, members)}, restarts);
+    };
+    try {
+        const control::Command command = control::parse(request.command, output.control);
+        if (phase_ != Phase::running)
+            throw control::Error("the run is starting or ending");
+        if (!std::holds_alternative<control::Status>(command))
+            sink.component->log(ARHOST_SEVERITY_INFO, "command: " + request.command);
+        std::visit([&](const auto &each) { execute(each, done); }, command);
+    } catch (const control::Error &error) {
+        done(error.what(), {});
+    }
+}
+
+void Pipeline::execute(const control::Quit &, const control::Done &done) {
+    end_run();
+    done("", {});
+}
+
+void Pipeline::execute(const control::Freeze &freeze, const control::Done &done) {
+    frozen_ = freeze.on.value_or(!frozen_);
+    done("", {{"frozen", frozen_}});
+}
+
+void Pipeline::execute(const control::Status &, const control::Done &done) {
+    done("", {{"status", status()}});
+}
+
+void Pipeline::execute(const control::Swap &swap, const control::Done &done) {
+    if (swap.component == "tracker") {
+        expect_no_swap(next_tracker_ != nullptr, "tracker");
+        const auto &chosen = find_choice(configuration_.trackers, swap.plugin);
+        next_tracker_ = make_tracker(chosen);
+        next_tracker_->swapped = done;
+        next_tracker_->component->start();
+    } else {
+        expect_no_swap(next_raytracer_ || next_scene_loading_, "ray tracer");
+        start_next_raytracer(find_choice(configuration_.raytracers, swap.plugin), raytracer_->scene, done);
+    }
+}
+
+void Pipeline::execute(const control::LoadScene &command, const control::Done &done) {
+    expect_no_swap(next_raytracer_ || next_scene_loading_, "ray tracer");
+    const run_config::Scene &chosen = find_choice(configuration_.scenes, command.scene);
+    SceneLoading::Callbacks callbacks;
+    callbacks.loaded = [this, done, &chosen](SharedMemory arena) {
+        next_scene_loading_.reset();
+        start_next_raytracer(*raytracer_->configuration, use_scene(std::move(arena), chosen), done);
+    };
+    callbacks.failed = [this, done](const std::string &reason) {
+        context_.log(ARHOST_SEVERITY_WARNING, "arhost", reason + "; the previous scene stays");
+        done(reason, {});
+        next_scene_loading_.reset();
+    };
+    next_scene_loading_ =
+        std::make_unique<SceneLoading>(context_, chosen.file, configuration_.sandbox,
+                                       raytracer_->configuration->limits, configuration_.files, std::move(callbacks));
+}
+
+void Pipeline::expect_no_swap(bool in_progress, const char *component) {
+    if (in_progress)
+        throw control::Error(std::string("the ") + component + " is being replaced; retry when this has ended");
+}
+
+void Pipeline::start_next_raytracer(const run_config::RaytracerConfiguration &configuration,
+                                    std::shared_ptr<LoadedScene> scene, const control::Done &done) {
+    next_raytracer_ = make_raytracer(configuration, std::move(scene));
+    next_raytracer_->swapped = done;
+    next_raytracer_->component->start();
+}
+
+// Exchanges a stage for its successor, once the successor runs and no frame is in the old stage.
+bool Pipeline::finish_swaps() {
+    const auto finish = [this](auto &current, auto &next) {
+        if (!next || !next->running() || current->component->in_flight() > 0)
+            return false;
+        retire(std::exchange(current, std::exchange(next, nullptr)));
+        context_.log(ARHOST_SEVERITY_INFO, "arhost",
+                     current->component->name() + " is now " + current->configuration->name);
+        current->swapped("", {{"plugin", current->configuration->name}, {"frame", next_read_}});
+        return true;
+    };
+    const bool tracker = finish(tracker_, next_tracker_);
+    const bool raytracer = finish(raytracer_, next_raytracer_);
+    if (raytracer)
+        recompute_cameras();
+    return tracker || raytracer;
+}
+
+void Pipeline::abandon_swap(std::unique_ptr<Stage> next, const std::string &reason) {
+    context_.log(ARHOST_SEVERITY_WARNING, "arhost", reason + "; the previous " + next->component->name() + " stays");
+    next->swapped(reason, {});
+    retire(std::move(next));
+}
+
+void Pipeline::retire(std::unique_ptr<Stage> stage) {
+    if (stage->running())
+        stage->component->stop();
+    else if (stage->component->state() != Component::State::disabled)
+        stage->component->kill();
+    retired_.push_back(std::move(stage));
+}
+
+// The scenes of the old and the new ray tracer may have different axes.
+void Pipeline::recompute_cameras() {
+    if (configuration_.trajectory)
+        return;
+    last_camera_.reset();
+    for (const auto &[sequence, frame] : frames_)
+        if (frame->stage == Frame::Stage::to_render)
+            set_camera_from_markers(*frame);
+}
+
+void Pipeline::remove_ended() {
+    const auto take_if_ended = [this](const Component &component) {
+        const bool ended =
+            component.state() == Component::State::stopped || component.state() == Component::State::disabled;
+        if (ended)
+            statistics_.ended.add(component);
+        return ended;
+    };
+    std::erase_if(retired_, [&](const auto &stage) { return take_if_ended(*stage->component); });
+    std::erase_if(sinks_, [&](const auto &sink) { return sink->on_demand && take_if_ended(*sink->component); });
+}
+
+void Pipeline::execute(const control::Snapshot &, const control::Done &done) {
+    if (!last_output_)
+        throw control::Error("there is no frame yet");
+    SinkQueue &sink = start_output(*configuration_.snapshot, "snapshot", done);
+    sink.offer(last_output_);
+    sink.ending = true;
+}
+
+void Pipeline::execute(const control::Record &record, const control::Done &done) {
+    const auto active = std::ranges::find_if(sinks_, [](const auto &sink) {
+        return sink->on_demand && sink->component->name() == "record" && !sink->ending;
+    });
+    const bool is_recording = active != sinks_.end();
+    if (record.on.value_or(!is_recording) == is_recording)
+        throw control::Error(is_recording ? "a recording is already in progress" : "there is no recording to stop");
+    if (!is_recording) {
+        start_output(*configuration_.record, "record", done);
+        return;
+    }
+    SinkQueue &sink = **active;
+    if (!sink.component->running())
+        throw control::Error("the recording is starting; retry when it has started");
+    sink.done = done;
+    sink.ending = true;
+}
+
+// Starts an output that is not in the list `outputs`.
+SinkQueue &Pipeline::start_output(const run_config::ComponentConfiguration &output, const std::string &name,
+                                  const control::Done &done) {
+    std::string path;
+    if (const auto node = run_config::path_of(output.node))
+        path = free_path(node->output_path()).string();
+    const auto started = std::ranges::count_if(sinks_, [](const auto &sink) { return sink->on_demand; });
+    if (std::cmp_greater_equal(started, max_started_outputs))
+        throw control::Error("too many recordings and snapshots are being written; retry later");
+    SinkQueue &sink = make_sink(output, name, path);
+    sink.on_demand = true;
+    sink.done = [done, path](const std::string &error, nlohmann::ordered_json members) {
+        if (error.empty() && !path.empty())
+            members["file"] = path;
+        done(error, members);
+    };
+    return sink;
+}
+
+// Replaces the number in a numbered file name by the first one for which there is no file.
+std::filesystem::path Pipeline::free_path(const std::filesystem::path &pattern) const {
+    if (pattern.filename().string().find('%') == std::string::npos)
+        return pattern;
+    const NumberedName name(pattern.filename().string());
+    for (std::uint64_t number = 1;; ++number) {
+        std::filesystem::path path = pattern.parent_path() / name.name(number);
+        std::error_code ignored;
+        if (!std::filesystem::exists(std::filesystem::symlink_status(path, ignored)) &&
+            std::ranges::none_of(sinks_, [&](const auto &sink) { return sink->path == path; }))
+            return path;
+    }
+}
+
+void Pipeline::execute(const control::Set &set, const control::Done &done) {
+    const auto all = components();
+    const auto component = std::ranges::find_if(
+        all, [&](const Component *each) { return each->name() == set.component && each->running(); });
+    if (component == all.end())
+        throw control::Error("there is no running component '" + base::printable(set.component, 100) + "'");
+    const PluginDescription &plugin = (*component)->description();
+    const auto declared = std::ranges::find(plugin.options, set.option, &OptionDeclaration::key);
+    if (declared == plugin.options.end() || !std::ranges::count(plugin.changeable, set.option)) {
+        std::string names;
+        for (const std::string &key : plugin.changeable)
+            names += (names.empty() ? "" : ", ") + key;
+        throw control::Error("'" + base::printable(set.option, 100) + "' cannot be changed while " + plugin.id +
+                             " runs; " + (names.empty() ? "none of its options can" : "these can: " + names));
+    }
+    OptionValue value;
+    try {
+        value = run_config::option_value(*declared, set.value);
+    } catch (const yaml::Error &error) {
+        throw control::Error(error.what());
+    }
+    OptionsInUse &options = options_[&configuration_of(**component)];
+    (*component)->set_option(value, [&options, value, done](const std::string &error) {
+        if (const auto old = std::ranges::find(options.values, value.key, &OptionValue::key);
+            error.empty() && old != options.values.end()) {
+            *old = value;
+            options.changed.insert(value.key);
+        }
+        done(error, {});
+    });
+}
+
+const run_config::ComponentConfiguration &Pipeline::configuration_of(const Component &component) const {
+    if (tracker_ && &component == tracker_->component.get())
+        return *tracker_->configuration;
+    if (raytracer_ && &component == raytracer_->component.get())
+        return *raytracer_->configuration;
+    for (const auto &sink : sinks_)
+        if (&component == sink->component.get())
+            return *sink->configuration;
+    return *configuration_.source;
+}
+
+// Returns the options for creating a plugin: the configured ones, except for those that `set` has changed.
+std::vector<OptionValue> Pipeline::options_for(const PluginDescription &plugin, arhost_kind kind,
+                                               const run_config::ComponentConfiguration &component,
+                                               std::size_t candidate) {
+    std::vector<OptionValue> values = run_config::options_for(plugin, kind, component, candidate);
+    OptionsInUse &in_use = options_[&component];
+    if (candidate > 0)
+        in_use.changed.clear();
+    for (OptionValue &value : values)
+        if (in_use.changed.contains(value.key))
+            value = *std::ranges::find(in_use.values, value.key, &OptionValue::key);
+    in_use.values = values;
+    return values;
+}
+
+} // namespace arhost::host
