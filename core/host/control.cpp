@@ -113,7 +113,8 @@ std::string answer_text(const std::string &error, const Json &members) {
     Json answer = {{"ok", error.empty()}};
     if (!error.empty())
         answer["error"] = error;
-    answer.update(members);
+    if (members.is_object())
+        answer.update(members);
     return answer.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

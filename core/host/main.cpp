@@ -2,8 +2,10 @@
 //
 // Command line of arhost.
 #include "base/write_all.hpp"
+#include "host/ctl.hpp"
 #include "host/new_plugin.hpp"
 #include "host/program.hpp"
+#include "run_config/configuration.hpp"
 #include "sandbox/sandbox.hpp"
 
 #include <csignal>
@@ -108,6 +110,19 @@ int main(int argc, char **argv) {
         .type_name("FOLDER")
         .one_value_each();
 
+    CtlArguments ctl_arguments;
+    CommandLine ctl_command = app.subcommand("ctl", "Send a command to a running arhost (docs/control.md)");
+    ctl_command.option("COMMAND", ctl_arguments.command, "The command")
+        .required()
+        .one_of({arhost::run_config::control_commands.begin(), arhost::run_config::control_commands.end()});
+    ctl_command.option("VALUE", ctl_arguments.values,
+                       "freeze and record: on|off; load_scene: SCENE; swap: COMPONENT PLUGIN; set: COMPONENT OPTION "
+                       "VALUE");
+    ctl_command.option("--name", ctl_arguments.name, "Name of the run, the option 'listen' of its sink_control")
+        .type_name("NAME")
+        .show_default();
+    ctl_command.flag("--json", ctl_arguments.json, "Print the answer as JSON");
+
     bool markdown = false;
     CommandLine schema_command = app.subcommand("schema", "Print the JSON Schema of configurations, for editors");
     schema_command.flag("--markdown", markdown, "Print the Markdown table of docs/config.md instead");
@@ -138,6 +153,8 @@ int main(int argc, char **argv) {
         }
         if (schema_command.selected())
             return print_schema(markdown);
+        if (ctl_command.selected())
+            return ctl(ctl_arguments);
         if (new_plugin_command.selected())
             return new_plugin(plugin, own_prefix());
         if (conform_command.selected())

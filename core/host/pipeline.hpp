@@ -12,6 +12,7 @@
 // frames through the stages.
 #pragma once
 
+#include "base/listening_socket.hpp"
 #include "host/frames.hpp"
 #include "host/scene_loading.hpp"
 #include "host/sink_queue.hpp"
@@ -70,6 +71,8 @@ private:
     void make_outputs();
     SinkQueue &make_sink(const run_config::ComponentConfiguration &output, const std::string &name,
                          const std::string &path = "");
+    std::vector<int> open_sockets(const run_config::ComponentConfiguration &output,
+                                  std::vector<ipc::OptionValue> &options);
     void expect_distinct_files(const run_config::ComponentConfiguration &output,
                                const ipc::PluginDescription &plugin);
     void load_scene();
@@ -211,6 +214,8 @@ private:
     std::optional<SourceChecks> source_checks_; // for the current plugin; survives restarts
     std::string failure_;
     bool failed_by_configuration_ = false, failure_was_logged_ = false;
+    std::map<std::pair<const run_config::ComponentConfiguration *, std::string>, base::ListeningSocket>
+        sockets_;                                        // by output and option
     std::optional<std::filesystem::path> check_scratch_; // set by check()
 };
 

@@ -259,7 +259,8 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
                 option.text = sink->path;
         video_input_ |= (plugin.capabilities & ARHOST_CAPABILITY_VIDEO_INPUT) != 0;
         overlay_input_ |= (plugin.capabilities & ARHOST_CAPABILITY_OVERLAY_INPUT) != 0;
-        return Component::Create{{std::move(options), setup}, {}};
+        std::vector<int> sockets = open_sockets(output, options);
+        return Component::Create{{std::move(options), setup}, std::move(sockets)};
     };
     callbacks.result = [this, sink, name, &output](const Command &command, const Result &result) {
         sink->on_result(command, result);
@@ -304,6 +305,33 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
     sink->path = path;
     sink->component->start();
     return *sink;
+}
+
+// Opens the sockets of an output's options, unless they are still open because its worker has restarted. Returns
+// their descriptors.
+std::vector<int> Pipeline::open_sockets(const run_config::ComponentConfiguration &output,
+                                        std::vector<OptionValue> &options) {
+    std::vector<int> descriptors;
+    for (OptionValue &option : options) {
+        if (option.type != ARHOST_OPTION_LISTEN || option.text.empty())
+            continue;
+        const auto configured = output.options ? output.options->find(option.key) : std::nullopt;
+        const yaml::Node node = configured.value_or(output.node);
+        if (output.policy.mode != sandbox::Mode::none && !output.policy.allows("listen"))
+            node.fail("needs 'allow: [listen]' in " + output.node.path() + " (docs/security.md)");
+        auto socket = sockets_.find({&output, option.key});
+        if (socket == sockets_.end()) {
+            try {
+                socket = sockets_.try_emplace({&output, option.key}, option.text).first;
+            } catch (const std::exception &error) {
+                node.fail(error.what());
+            }
+        }
+        option.text = socket->second.address();
+        option.integer = static_cast<std::int64_t>(descriptors.size());
+        descriptors.push_back(socket->second.fd());
+    }
+    return descriptors;
 }
 
 // Compares the output's file with those of the plugins that are already known.

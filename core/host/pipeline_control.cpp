@@ -115,7 +115,10 @@ bool Pipeline::finish_swaps() {
         retire(std::exchange(current, std::exchange(next, nullptr)));
         context_.log(ARHOST_SEVERITY_INFO, "arhost",
                      current->component->name() + " is now " + current->configuration->name);
-        current->swapped("", {{"plugin", current->configuration->name}, {"frame", next_read_}});
+        nlohmann::ordered_json members = {{"plugin", current->configuration->name}};
+        if constexpr (requires { current->scene; })
+            members["scene"] = current->scene->name;
+        current->swapped("", members);
         return true;
     };
     const bool tracker = finish(tracker_, next_tracker_);
@@ -198,11 +201,7 @@ SinkQueue &Pipeline::start_output(const run_config::ComponentConfiguration &outp
         throw control::Error("too many recordings and snapshots are being written; retry later");
     SinkQueue &sink = make_sink(output, name, path);
     sink.on_demand = true;
-    sink.done = [done, path](const std::string &error, nlohmann::ordered_json members) {
-        if (error.empty() && !path.empty())
-            members["file"] = path;
-        done(error, members);
-    };
+    sink.done = done;
     return sink;
 }
 

@@ -74,7 +74,9 @@ Json changeable_options(const PluginDescription &plugin, const std::vector<Optio
                        {"value", value_of(values[i])},
                        {"help", declared.help}};
         if (declared.minimum != 0 || declared.maximum != 0)
-            option.update({{"minimum", declared.minimum}, {"maximum", declared.maximum}});
+            for (const auto &[key, bound] : {std::pair{"minimum", declared.minimum}, {"maximum", declared.maximum}})
+                option[key] =
+                    declared.type == ARHOST_OPTION_INTEGER ? Json(static_cast<std::int64_t>(bound)) : Json(bound);
         if (!declared.choices.empty())
             option["choices"] = declared.choices;
         options.push_back(std::move(option));

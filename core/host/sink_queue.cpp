@@ -47,7 +47,7 @@ void SinkQueue::on_lost() {
 
 void SinkQueue::answer(const std::string &error) {
     if (const control::Done answer = std::exchange(done, nullptr))
-        answer(error, {});
+        answer(error, path.empty() ? nlohmann::ordered_json() : nlohmann::ordered_json{{"file", path}});
 }
 
 void SinkQueue::clear() {

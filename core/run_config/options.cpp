@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_config/options.hpp"
 
+#include "base/listening_socket.hpp"
 #include "run_config/access.hpp"
 
 #include <algorithm>
@@ -29,6 +30,12 @@ ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::No
     case ARHOST_OPTION_OUTPUT_PATH:
         value.text = is_standard_output(node) ? "-" : node.output_path().string();
         break;
+    case ARHOST_OPTION_LISTEN:
+        value.integer = -1; // the host opens the socket
+        value.text = node.text();
+        if (const std::string problem = base::problem_with_address(value.text); !problem.empty())
+            node.fail(problem);
+        break;
     default:
         if (declared.choices.empty()) {
             value.text = node.text();
@@ -45,7 +52,7 @@ namespace {
 // Parses a default value. The message about an invalid default names the plugin, not the configuration.
 ipc::OptionValue default_of(const ipc::OptionDeclaration &declared, const std::string &plugin) {
     if (declared.default_value->empty())
-        return {declared.key, declared.type, 0, 0.0, ""};
+        return {declared.key, declared.type, declared.type == ARHOST_OPTION_LISTEN ? -1 : 0, 0.0, ""};
     const yaml::Node node =
         yaml::Node::scalar(*declared.default_value, plugin + "'s default of '" + declared.key + "'");
     return value_of(declared, node);

@@ -42,6 +42,14 @@ public:
         }
     }
 
+    static constexpr const char *changeable[] = {"samples", "light_samples", nullptr};
+    void set(const arhost::Options &changed) {
+        if (changed.contains("samples"))
+            renderer_->set_samples(static_cast<std::uint32_t>(changed.integer("samples")));
+        else
+            renderer_->set_light_samples(static_cast<std::int32_t>(changed.integer("light_samples")));
+    }
+
     void stop() { renderer_.reset(); }
 
 private:

@@ -119,6 +119,19 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
         history_.resize(sum_rows * ray_table_.tiles().size() * tile_pixels);
 }
 
+void Renderer::set_samples(std::uint32_t samples) {
+    if (samples > 1 && !ray_table_.rays().has_derivatives)
+        ray_table_ = RayTable(intrinsics_, true, threads_);
+    samples_per_frame_ = samples;
+    samples_ = arhost::raytracer_common::sample_positions(samples);
+    history_camera_.reset();
+}
+
+void Renderer::set_light_samples(std::int32_t samples) {
+    light_samples_ = samples;
+    history_camera_.reset();
+}
+
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
     arhost::raytracer_common::check_render(camera, image, intrinsics_);
     const Pose pose(camera);

@@ -45,6 +45,9 @@ public:
     // is NULL if nothing has moved since the last call.
     Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr);
     const EmbreeScene &scene() const { return scene_; }
+    // Both change the images of later calls as if the renderer had been created with this setting.
+    void set_samples(std::uint32_t samples);
+    void set_light_samples(std::int32_t samples);
 
     const char *kernel_name() const { return kernel_.name; }
     unsigned thread_count() const { return threads_.thread_count(); }

@@ -152,30 +152,53 @@ public:
                                              : refinement == "contour"  ? cv::aruco::CORNER_REFINE_CONTOUR
                                              : refinement == "apriltag" ? cv::aruco::CORNER_REFINE_APRILTAG
                                                                         : cv::aruco::CORNER_REFINE_NONE;
-        parameters_.cornerRefinementWinSize = static_cast<int>(options.integer("subpix_window_px"));
-        parameters_.adaptiveThreshWinSizeMin = static_cast<int>(options.integer("threshold_window_min_px"));
-        parameters_.adaptiveThreshWinSizeMax = static_cast<int>(options.integer("threshold_window_max_px"));
-        parameters_.adaptiveThreshWinSizeStep = static_cast<int>(options.integer("threshold_window_step_px"));
-        parameters_.minMarkerPerimeterRate = options.real("min_perimeter_rate");
-        parameters_.minMarkerDistanceRate = options.real("min_distance_rate");
-        parameters_.errorCorrectionRate = options.real("error_correction_rate");
-        parameters_.markerBorderBits = static_cast<int>(options.integer("border_bits"));
-        parameters_.detectInvertedMarker = options.boolean("inverted");
-        if (parameters_.adaptiveThreshWinSizeMax < parameters_.adaptiveThreshWinSizeMin)
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          "threshold_window_max_px: must not be less than threshold_window_min_px");
+        set(options);
         if (refinement == "apriltag")
             centre_shift_px_ = 0.5;
     }
 
+    static constexpr const char *changeable[] = {"subpix_window_px",
+                                                 "threshold_window_min_px",
+                                                 "threshold_window_max_px",
+                                                 "threshold_window_step_px",
+                                                 "min_perimeter_rate",
+                                                 "min_distance_rate",
+                                                 "error_correction_rate",
+                                                 "border_bits",
+                                                 "inverted",
+                                                 nullptr};
+    // Takes the options that `changed` contains.
+    void set(const arhost::Options &changed) {
+        cv::aruco::DetectorParameters parameters = parameters_;
+        const auto take_integer = [&](const char *key, int &value) {
+            if (changed.contains(key))
+                value = static_cast<int>(changed.integer(key));
+        };
+        const auto take_real = [&](const char *key, double &value) {
+            if (changed.contains(key))
+                value = changed.real(key);
+        };
+        take_integer("subpix_window_px", parameters.cornerRefinementWinSize);
+        take_integer("threshold_window_min_px", parameters.adaptiveThreshWinSizeMin);
+        take_integer("threshold_window_max_px", parameters.adaptiveThreshWinSizeMax);
+        take_integer("threshold_window_step_px", parameters.adaptiveThreshWinSizeStep);
+        take_real("min_perimeter_rate", parameters.minMarkerPerimeterRate);
+        take_real("min_distance_rate", parameters.minMarkerDistanceRate);
+        take_real("error_correction_rate", parameters.errorCorrectionRate);
+        take_integer("border_bits", parameters.markerBorderBits);
+        if (changed.contains("inverted"))
+            parameters.detectInvertedMarker = changed.boolean("inverted");
+        if (parameters.adaptiveThreshWinSizeMax < parameters.adaptiveThreshWinSizeMin)
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          "threshold_window_max_px: must not be less than threshold_window_min_px");
+        parameters_ = parameters;
+        if (detector_)
+            make_detector();
+    }
+
     void start(const arhost_tracker_setup &setup) {
         report_.emplace(setup, family_, static_cast<std::size_t>(dictionary_.bytesList.rows));
-        // Use a dictionary of only the listed markers, which is faster and gives fewer false positives.
-        cv::Mat listed;
-        for (int id : report_->ids())
-            listed.push_back(dictionary_.bytesList.row(id));
-        detector_.emplace(cv::aruco::Dictionary(listed, dictionary_.markerSize, dictionary_.maxCorrectionBits),
-                          parameters_);
+        make_detector();
     }
 
     void track(const arhost_frame &frame, arhost_tracker_result &result) {
@@ -201,6 +224,15 @@ public:
     void stop() { detector_.reset(); }
 
 private:
+    void make_detector() {
+        // Use a dictionary of only the listed markers, which is faster and gives fewer false positives.
+        cv::Mat listed;
+        for (int id : report_->ids())
+            listed.push_back(dictionary_.bytesList.row(id));
+        detector_.emplace(cv::aruco::Dictionary(listed, dictionary_.markerSize, dictionary_.maxCorrectionBits),
+                          parameters_);
+    }
+
     cv::aruco::Dictionary dictionary_;
     std::string family_;
     bool rotated_180_ = false, refine_edges_ = false;

@@ -19,6 +19,10 @@
 #include <algorithm>
 #include <chrono>
 #include <concepts>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -61,8 +65,57 @@ public:
         }
     }
 
+    const arhost_host *get() const { return host_; }
+
 private:
     const arhost_host *host_;
+};
+
+// Sends the commands of a sink to the host (arhost/control.h). Destroy it no earlier than the plugin's instance.
+class HostControl {
+public:
+    // Receives an answer as JSON, on the thread that calls the plugin's functions.
+    using Take = std::function<void(const std::string &answer)>;
+
+    explicit HostControl(const Host &host)
+        : host_(host.get()),
+          functions_(static_cast<const arhost_control *>(host_->get_extension(host_, ARHOST_CONTROL_EXTENSION))) {}
+    explicit operator bool() const { return functions_ != nullptr; } // whether the host accepts commands
+
+    // May be called on any thread. Returns as arhost_control.send; without success, `take` is not called.
+    arhost_status send(const std::string &command, Take take) {
+        auto pending = std::make_unique<Pending>(Pending{this, std::move(take)});
+        Pending *const context = pending.get();
+        {
+            const std::lock_guard lock(mutex_);
+            pending_[context] = std::move(pending);
+        }
+        const arhost_status status = functions_->send(host_, command.c_str(), deliver, context);
+        if (status != ARHOST_STATUS_OK)
+            release(context);
+        return status;
+    }
+
+private:
+    struct Pending {
+        HostControl *control;
+        Take take;
+    };
+    static void deliver(void *context, const char *answer) {
+        const std::unique_ptr<Pending> pending =
+            static_cast<Pending *>(context)->control->release(static_cast<Pending *>(context));
+        if (pending->take)
+            pending->take(answer);
+    }
+    std::unique_ptr<Pending> release(Pending *pending) {
+        const std::lock_guard lock(mutex_);
+        return std::move(pending_.extract(pending).mapped());
+    }
+
+    const arhost_host *host_;
+    const arhost_control *functions_;
+    std::mutex mutex_;
+    std::map<Pending *, std::unique_ptr<Pending>> pending_;
 };
 
 // The option values passed to `create`. The accessors throw Failure if the descriptor does not declare `key`.
@@ -73,6 +126,7 @@ public:
     std::int64_t integer(const std::string &key) const { return find(key).integer; }
     double real(const std::string &key) const { return find(key).real; }
     std::string text(const std::string &key) const { return find(key).text; }
+    bool contains(const std::string &key) const { return arhost_find_option(first_, count_, key.c_str()) != nullptr; }
 
 private:
     const arhost_option &find(const std::string &key) const {
@@ -191,6 +245,20 @@ arhost_status list_devices(const arhost_host *host, arhost_take_device take, voi
 template <ListsDevices T>
 inline constexpr arhost_devices devices_functions = {sizeof(arhost_devices), list_devices<T>};
 
+// A plugin class accepts changes of options while it runs if it has a static member `changeable`, an array of keys
+// that ends with nullptr, and a member function `set(const Options &)`, whose argument contains the changed option
+// alone.
+template <class T>
+concept AcceptsChanges = requires(T &plugin, const Options &changed) {
+    plugin.set(changed);
+    { +T::changeable } -> std::convertible_to<const char *const *>;
+};
+template <AcceptsChanges T>
+inline constexpr arhost_set_option set_option_functions = {
+    sizeof(arhost_set_option), T::changeable, [](arhost_instance *i, const arhost_option *option) {
+        return with<T>(i, [&](T &p) { return p.set(Options(option, 1)), ARHOST_STATUS_OK; });
+    }};
+
 // `stop` and `get_extension` are optional members of the plugin class.
 template <class T> void stop(T &plugin) {
     if constexpr (requires { plugin.stop(); })
@@ -203,6 +271,9 @@ template <class T> const void *get_extension(const char *id) {
     if constexpr (ListsDevices<T>)
         if (std::string_view(id) == ARHOST_DEVICES_EXTENSION)
             return &devices_functions<T>;
+    if constexpr (AcceptsChanges<T>)
+        if (std::string_view(id) == ARHOST_SET_OPTION_EXTENSION)
+            return &set_option_functions<T>;
     if constexpr (requires { T::get_extension(id); })
         return T::get_extension(id);
     else
