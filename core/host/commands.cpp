@@ -6,6 +6,7 @@
 #include "base/text.hpp"
 #include "camera/coordinates.hpp"
 #include "host/console.hpp"
+#include "host/device_report.hpp"
 #include "host/outcome.hpp"
 #include "host/pipeline.hpp"
 #include "host/probe.hpp"
@@ -434,26 +435,50 @@ void check_by_opening(run_config::Configuration configuration, supervise::Contex
         std::printf("%s\n", base::printable(line).c_str());
 }
 
-// Returns the lines that `arhost plugins --devices` prints for a plugin; empty if the plugin cannot list devices.
-std::vector<std::string> lines_of(const DevicesResult &result) {
-    if (const auto *reason = std::get_if<std::string>(&result))
-        return {"cannot list the devices: " + *reason};
-    const auto &list = std::get<std::optional<ipc::DeviceList>>(result);
-    if (!list)
-        return {};
-    if (list->devices.empty())
-        return {"found no device that the plugin can run on"};
-    std::vector<std::string> lines;
-    for (const ipc::DeviceDescription &device : list->devices) {
-        lines.push_back(fmt::format("device {}: {} ({}{}{}){}", device.index, device.name,
-                                    ipc::device_kind_text(device.kind), device.uuid.empty() ? "" : ", ", device.uuid,
-                                    device.is_default ? ", the default" : ""));
-        if (!device.abilities.empty())
-            lines.push_back("    " + device.abilities);
+// Returns the files of the plugins with these names; of all plugins if there are none.
+std::vector<fs::path> plugin_files(const std::vector<std::string> &names) {
+    const run_config::PluginPath path({}, built_in_plugins());
+    if (names.empty())
+        return path.all();
+    std::vector<fs::path> files;
+    try {
+        for (const std::string &name : names)
+            files.push_back(path.find(name));
+    } catch (const std::runtime_error &error) {
+        throw yaml::Error(error.what()); // an invalid command line
     }
-    if (list->left_out > 0)
-        lines.push_back(fmt::format("and {} more", list->left_out));
-    return lines;
+    return files;
+}
+
+sandbox::Policy reading(const std::vector<fs::path> &paths) {
+    sandbox::Policy policy;
+    for (const fs::path &path : paths)
+        policy.readable.push_back(fs::absolute(path));
+    return policy;
+}
+
+// Returns nullopt if the plugin does not list devices.
+std::optional<PluginDevices> devices_of(supervise::Context &context, const fs::path &file,
+                                        const sandbox::Policy &policy) {
+    PluginDevices devices;
+    devices.plugin = file.stem().string();
+    const ProbeResult probed = probe(context, file, policy);
+    if (const auto *reason = std::get_if<std::string>(&probed)) {
+        devices.problem = "cannot be used: " + *reason;
+        return devices;
+    }
+    const auto &plugin = std::get<ipc::PluginDescription>(probed);
+    devices.kind = plugin.kind;
+    DevicesResult listed = list_devices(context, file, policy, plugin.needs);
+    if (const auto *reason = std::get_if<std::string>(&listed)) {
+        devices.problem = "cannot list its devices: " + *reason;
+        return devices;
+    }
+    auto &list = std::get<std::optional<ipc::DeviceList>>(listed);
+    if (!list)
+        return std::nullopt;
+    devices.list = std::move(*list);
+    return devices;
 }
 
 } // namespace
@@ -496,10 +521,8 @@ int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, su
     Console console(arguments.verbose);
     ipc::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
-    const std::vector<fs::path> files = run_config::PluginPath({}, built_in_plugins()).all();
-    sandbox::Policy policy;
-    for (const fs::path &path : plugins.reads)
-        policy.readable.push_back(fs::absolute(path));
+    const std::vector<fs::path> files = plugin_files({});
+    const sandbox::Policy policy = reading(plugins.reads);
     int status = success;
     std::string level;
     const auto print = [](const std::string &line) { std::printf("%s\n", base::printable(line).c_str()); };
@@ -516,13 +539,6 @@ int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, su
         print(fmt::format("{:<18} {}", "", plugin.description));
         for (const std::string &need : plugin.needs)
             print(fmt::format("{:<18} needs 'allow: [{}]'", "", need));
-        if (plugins.with_devices) {
-            const DevicesResult devices = list_devices(context, file, policy, plugin.needs);
-            for (const std::string &line : lines_of(devices))
-                print(fmt::format("{:<18} {}", "", line));
-            if (std::holds_alternative<std::string>(devices))
-                status = run_failed;
-        }
         if (!plugins.with_options)
             continue;
         for (const ipc::OptionDeclaration &option : plugin.options) {
@@ -538,6 +554,27 @@ int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, su
     if (files.empty())
         print("no plugins in " + built_in_plugins().string());
     return status;
+}
+
+int devices(const Arguments &arguments, const DevicesArguments &options, supervise::Starter &launcher) {
+    const std::vector<fs::path> files = plugin_files(options.plugins);
+    Console console(arguments.verbose);
+    ipc::Reactor reactor;
+    supervise::Context context = make_context(reactor, launcher, console);
+    const sandbox::Policy policy = reading(options.reads);
+    std::vector<PluginDevices> found;
+    for (const fs::path &file : files)
+        if (auto devices = devices_of(context, file, policy))
+            found.push_back(std::move(*devices));
+    if (options.as_json)
+        std::printf(
+            "%s\n",
+            devices_as_json(found).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace).c_str());
+    else
+        for (const std::string &line : devices_as_text(found))
+            std::printf("%s\n", base::printable(line).c_str());
+    const bool failed = std::ranges::any_of(found, [](const PluginDevices &p) { return !p.problem.empty(); });
+    return failed ? run_failed : success;
 }
 
 int print_schema(bool markdown) {

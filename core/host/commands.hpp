@@ -38,7 +38,13 @@ struct ReplayArguments {
 // Command-line options of `arhost plugins`.
 struct PluginsArguments {
     bool with_options = false;
-    bool with_devices = false; // listing devices is slow if drivers must be loaded
+    std::vector<std::filesystem::path> reads;
+};
+
+// Command-line options of `arhost devices`.
+struct DevicesArguments {
+    bool as_json = false;
+    std::vector<std::string> plugins; // names; empty: all plugins
     std::vector<std::filesystem::path> reads;
 };
 
@@ -48,6 +54,7 @@ int replay(const Arguments &arguments, const ReplayArguments &replay, supervise:
 // what it found; outputs then write to a temporary folder.
 int check(const Arguments &arguments, bool open, supervise::Starter &launcher);
 int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, supervise::Starter &launcher);
+int devices(const Arguments &arguments, const DevicesArguments &options, supervise::Starter &launcher);
 int print_schema(bool markdown);
 // Replaces this process with arhost-conform (exec), because the host process never loads a plugin itself.
 int conform(std::vector<std::string> arguments);

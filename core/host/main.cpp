@@ -101,14 +101,21 @@ int main(int argc, char **argv) {
     PluginsArguments plugins_arguments;
     CommandLine plugins_command = app.subcommand("plugins", "List the plugins; for unusable ones, print the reason");
     plugins_command.flag("--options", plugins_arguments.with_options, "Also list the options of each plugin");
-    plugins_command.flag("--devices", plugins_arguments.with_devices,
-                         "Also list the devices that each plugin can run on (loading drivers may be slow)");
-    plugins_command
-        .option("--reads", plugins_arguments.reads, "A folder with libraries that the plugins need (repeatable)")
-        .existing_path()
-        .check(arhost::sandbox::obstacle_to_grant)
-        .type_name("FOLDER")
-        .one_value_each();
+    const auto add_reads = [](CommandLine &command, std::vector<std::filesystem::path> &reads) {
+        command.option("--reads", reads, "A folder with libraries that the plugins need (repeatable)")
+            .existing_path()
+            .check(arhost::sandbox::obstacle_to_grant)
+            .type_name("FOLDER")
+            .one_value_each();
+    };
+    add_reads(plugins_command, plugins_arguments.reads);
+
+    DevicesArguments devices_arguments;
+    CommandLine devices_command =
+        app.subcommand("devices", "List cameras, GPUs and displays; for unusable ones, print the reason");
+    devices_command.option("PLUGIN", devices_arguments.plugins, "List only the devices of these plugins");
+    devices_command.flag("--json", devices_arguments.as_json, "Print JSON (docs/devices.schema.json)");
+    add_reads(devices_command, devices_arguments.reads);
 
     CtlArguments ctl_arguments;
     CommandLine ctl_command = app.subcommand("ctl", "Send a command to a running arhost (docs/control.md)");
@@ -166,6 +173,8 @@ int main(int argc, char **argv) {
             return check(arguments, !no_open, launcher);
         if (plugins_command.selected())
             return list_plugins(arguments, plugins_arguments, launcher);
+        if (devices_command.selected())
+            return devices(arguments, devices_arguments, launcher);
         if (arguments.file.empty()) {
             std::fputs(app.help().c_str(), stderr);
             return bad_configuration;

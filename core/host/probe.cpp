@@ -69,8 +69,9 @@ DevicesResult list_devices(supervise::Context &context, const std::filesystem::p
                            const std::vector<std::string> &needs, std::chrono::seconds timeout) {
     policy.writable.clear();
     for (const std::string &need : needs)
-        if (need == "video" || need == "usb" || need == "gpu")
+        if (need == "video" || need == "usb" || need == "gpu" || need == "display")
             policy.allow.insert(need);
+    std::string text;
     std::optional<DeviceList> list;
     const std::string reason = query(context, plugin, policy, timeout, "did not respond",
                                      [&](supervise::Process &process, const Message &message) {
@@ -78,8 +79,13 @@ DevicesResult list_devices(supervise::Context &context, const std::filesystem::p
                                              process.send(messages::ListDevices{});
                                          if (!is<messages::Devices>(message))
                                              return false;
-                                         list = parse<messages::Devices>(message).list;
-                                         return true;
+                                         const auto devices = parse<messages::Devices>(message);
+                                         text += devices.part;
+                                         if (text.size() > max_device_list_size)
+                                             throw std::runtime_error("its list of devices is too long");
+                                         if (devices.is_last)
+                                             list = devices_from_text(text);
+                                         return devices.is_last;
                                      });
     if (!reason.empty())
         return reason;

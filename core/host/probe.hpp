@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Queries a plugin's description and devices in a worker, for `arhost plugins` and `arhost check`.
+// Queries a plugin's description and devices in a worker, for `arhost plugins`, `check` and `devices`.
 #pragma once
 
+#include "ipc/device_list.hpp"
 #include "ipc/json_abi.hpp"
 #include "sandbox/sandbox.hpp"
 #include "supervise/process.hpp"
@@ -28,8 +29,7 @@ ProbeResult probe(supervise::Context &context, const std::filesystem::path &plug
 using DevicesResult = std::variant<std::optional<ipc::DeviceList>, std::string>;
 
 // Asks the plugin in a worker for its devices. Of the permissions in `needs` (from the plugin's descriptor), only
-// those for devices are granted, and not network, processes and display. The timeout is long because drivers may load
-// slowly.
+// those for devices are granted, and not network and processes. The timeout is long because drivers may load slowly.
 DevicesResult list_devices(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
                            const std::vector<std::string> &needs,
                            std::chrono::seconds timeout = std::chrono::seconds(20));

@@ -26,15 +26,6 @@ std::string text_of(const Json &json, const char *key) {
     return text;
 }
 
-// Returns a string of a device, printable and truncated to max_device_text_size. Reads no further than needed,
-// because a faulty plugin may not terminate the string.
-std::string device_text(const char *text) {
-    constexpr std::size_t longest_character = 4;
-    return text ? base::printable({text, ::strnlen(text, max_device_text_size + longest_character)},
-                                  max_device_text_size)
-                : std::string();
-}
-
 double finite(const Json &json, const char *key) {
     const double value = json.at(key).get<double>();
     if (!std::isfinite(value))
@@ -139,54 +130,6 @@ PluginDescription description_from_json(const Json &json) {
     return d;
 }
 
-DeviceDescription describe(const arhost_device &device) {
-    return {device.index,
-            device.kind,
-            device.is_default != 0,
-            device_text(device.name),
-            device_text(device.uuid),
-            device_text(device.abilities)};
-}
-
-Json to_json(const DeviceList &list) {
-    Json devices = Json::array();
-    for (const DeviceDescription &d : list.devices)
-        devices.push_back({{"index", d.index},
-                           {"kind", d.kind},
-                           {"is_default", d.is_default},
-                           {"name", d.name},
-                           {"uuid", d.uuid},
-                           {"abilities", d.abilities}});
-    return {{"devices", std::move(devices)}, {"left_out", list.left_out}};
-}
-constexpr std::size_t longest_device_text = max_device_text_size + std::string_view("…").size();
-// The longest list fits into a message, even if JSON escapes each byte of each text.
-static_assert(max_devices * (3 * 2 * longest_device_text + 128) < Channel::max_message_size);
-
-DeviceList devices_from_json(const Json &json) {
-    const auto text_of = [](const Json &device, const char *key) {
-        std::string text = device.at(key).get<std::string>();
-        if (text.size() > longest_device_text)
-            throw std::runtime_error(std::string("a device's '") + key + "' is too long");
-        return text;
-    };
-    DeviceList list;
-    if (json.at("devices").size() > max_devices)
-        throw std::runtime_error("the list has more than " + std::to_string(max_devices) + " devices");
-    for (const Json &d : json.at("devices")) {
-        DeviceDescription device;
-        device.index = d.at("index").get<std::uint32_t>();
-        device.kind = d.at("kind").get<arhost_device_kind>();
-        device.is_default = d.at("is_default").get<bool>();
-        device.name = text_of(d, "name");
-        device.uuid = text_of(d, "uuid");
-        device.abilities = text_of(d, "abilities");
-        list.devices.push_back(std::move(device));
-    }
-    list.left_out = json.at("left_out").get<std::uint64_t>();
-    return list;
-}
-
 Json to_json(const arhost_intrinsics &i) {
     return {{"width", i.width},
             {"height", i.height},
@@ -263,21 +206,6 @@ const char *to_text(arhost_kind kind) {
         return "sink";
     default:
         return "unknown kind";
-    }
-}
-
-const char *device_kind_text(arhost_device_kind kind) {
-    switch (kind) {
-    case ARHOST_DEVICE_DISCRETE_GPU:
-        return "discrete GPU";
-    case ARHOST_DEVICE_INTEGRATED_GPU:
-        return "integrated GPU";
-    case ARHOST_DEVICE_VIRTUAL_GPU:
-        return "virtual GPU";
-    case ARHOST_DEVICE_CPU:
-        return "CPU";
-    default:
-        return "other device";
     }
 }
 

@@ -54,25 +54,6 @@ Json to_json(const PluginDescription &description);
 Json to_json(const arhost_descriptor &descriptor);
 PluginDescription description_from_json(const Json &json);
 
-// A device that a plugin lists through the extension arhost.devices/1. The texts are printable.
-struct DeviceDescription {
-    std::uint32_t index = 0;
-    arhost_device_kind kind = 0;
-    bool is_default = false;
-    std::string name, uuid, abilities; // may be empty
-    bool operator==(const DeviceDescription &) const = default;
-};
-struct DeviceList {
-    std::vector<DeviceDescription> devices;
-    std::uint64_t left_out = 0; // devices beyond max_devices
-};
-constexpr std::size_t max_devices = 64, max_device_text_size = 256; // bytes, not counting the "…" of a truncated text
-
-DeviceDescription describe(const arhost_device &device);
-
-Json to_json(const DeviceList &list);
-DeviceList devices_from_json(const Json &json);
-
 Json to_json(const arhost_intrinsics &intrinsics);
 arhost_intrinsics intrinsics_from_json(const Json &json);
 
@@ -84,7 +65,6 @@ Json to_json(const SlotLayout &layout);
 SlotLayout layout_from_json(const Json &json);
 
 const char *to_text(arhost_kind kind);
-const char *device_kind_text(arhost_device_kind kind);
 const char *status_text(arhost_status status);
 
 } // namespace arhost::ipc

@@ -29,10 +29,6 @@ template <> struct adl_serializer<ipc::PluginDescription> {
     static void to_json(json &out, const ipc::PluginDescription &value) { out = ipc::to_json(value); }
     static void from_json(const json &in, ipc::PluginDescription &value) { value = ipc::description_from_json(in); }
 };
-template <> struct adl_serializer<ipc::DeviceList> {
-    static void to_json(json &out, const ipc::DeviceList &value) { out = ipc::to_json(value); }
-    static void from_json(const json &in, ipc::DeviceList &value) { value = ipc::devices_from_json(in); }
-};
 template <> struct adl_serializer<ipc::SlotLayout> {
     static void to_json(json &out, const ipc::SlotLayout &value) { out = ipc::to_json(value); }
     static void from_json(const json &in, ipc::SlotLayout &value) { value = ipc::layout_from_json(in); }
@@ -76,7 +72,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Answer, id, answer)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Request, id, command)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(OptionSet, status, text)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Hello, descriptor, sandbox)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Devices, list)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Devices, part, is_last)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Ready, format, frame_count, intrinsics)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Attached, is_output, generation)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Detached, generation)

@@ -43,7 +43,8 @@ struct Load {
     sandbox::Policy sandbox;
 };
 
-// May be sent after Hello and before Create, any number of times. The worker answers with Devices or Failed.
+// May be sent after Hello and before Create, any number of times. The worker answers with Devices, in
+// one or more parts, or with Failed.
 struct ListDevices {
     static constexpr const char *type = "list-devices";
 };
@@ -127,9 +128,13 @@ struct Hello {
     std::string sandbox; // active and missing layers, from sandbox::to_text
 };
 
+// A part of the answer to ListDevices, which may be longer than a message. The parts together are the text of
+// to_text(optional<DeviceList>).
 struct Devices {
     static constexpr const char *type = "devices";
-    std::optional<DeviceList> list; // nullopt: the plugin does not support the extension
+    static constexpr std::size_t max_part = 32 * 1024; // fits even if JSON escapes each byte
+    std::string part;
+    bool is_last = true;
 };
 
 // The plugin has started.

@@ -2,6 +2,7 @@
 #include "worker/devices.hpp"
 
 #include <cstddef>
+#include <exception>
 #include <stdexcept>
 
 namespace arhost::worker {
@@ -9,22 +10,21 @@ namespace {
 
 struct Listing {
     ipc::DeviceList list;
-    const char *fault = nullptr; // contract violation
+    std::exception_ptr fault; // contract violation
 };
 
 void add_device(void *context, const arhost_device *device) noexcept {
     Listing &listing = *static_cast<Listing *>(context);
-    constexpr std::size_t min_size = offsetof(arhost_device, abilities) + sizeof(arhost_device::abilities);
-    if (!device)
-        listing.fault = "it reported a device that is NULL";
-    else if (device->struct_size < min_size)
-        listing.fault = "it reported a device whose struct_size is too small";
-    else if (!device->name)
-        listing.fault = "it reported a device without a name";
-    else if (listing.list.devices.size() < ipc::max_devices)
-        listing.list.devices.push_back(ipc::describe(*device));
-    else
-        ++listing.list.left_out;
+    if (listing.fault)
+        return;
+    try {
+        if (listing.list.devices.size() < ARHOST_MAX_DEVICES)
+            listing.list.devices.push_back(ipc::describe(device));
+        else
+            ++listing.list.left_out;
+    } catch (...) { // no exception may propagate into the plugin
+        listing.fault = std::current_exception();
+    }
 }
 
 } // namespace
@@ -42,7 +42,7 @@ arhost_status list_devices(const arhost_plugin &plugin, const arhost_host &host,
     Listing listing;
     const arhost_status status = extension->list(&host, add_device, &listing);
     if (listing.fault)
-        throw std::runtime_error(listing.fault);
+        std::rethrow_exception(listing.fault);
     list = std::move(listing.list);
     return status;
 }

@@ -3,7 +3,7 @@
 // Lists a plugin's devices through the extension of arhost/devices.h.
 #pragma once
 
-#include "ipc/json_abi.hpp"
+#include "ipc/device_list.hpp"
 
 #include <arhost/arhost.h>
 

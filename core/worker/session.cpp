@@ -231,16 +231,20 @@ sandbox::Level log_level(const Link &link, sandbox::Level level) {
 }
 
 void send_devices(const Link &link, const PluginHost &host, const arhost_plugin &plugin) {
-    messages::Devices devices;
+    std::optional<DeviceList> list;
     arhost_status status;
     {
         const Link::InCall call(link, Call::devices);
-        status = list_devices(plugin, *host.get(), devices.list);
+        status = list_devices(plugin, *host.get(), list);
     }
-    if (status == ARHOST_STATUS_OK)
-        link.send(devices);
-    else
+    if (status != ARHOST_STATUS_OK) {
         link.send(host.failed(status));
+        return;
+    }
+    const std::string text = to_text(list);
+    for (std::size_t at = 0; at < text.size(); at += messages::Devices::max_part)
+        link.send(messages::Devices{text.substr(at, messages::Devices::max_part),
+                                    at + messages::Devices::max_part >= text.size()});
 }
 
 int serve_plugin(Link &link, const messages::Open &open) {

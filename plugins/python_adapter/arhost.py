@@ -170,7 +170,7 @@ class _Adapter:
         def devices():
             return STATUS_OK, [
                 (index, int(device.get("kind", DEVICE_OTHER)), bool(device.get("is_default", False)), str(device["name"]),
-                 str(device.get("uuid", "")), str(device.get("abilities", "")))
+                 str(device.get("serial", "")), str(device.get("abilities", "")))
                 for index, device in enumerate(self.plugin.devices())]
 
         return self._guarded(devices)

@@ -371,9 +371,10 @@ private:
             for (Py_ssize_t i = 0; i < PyList_Size(answer.value.get()); ++i) {
                 arhost_device device{};
                 device.struct_size = sizeof device;
+                device.state = ARHOST_DEVICE_STATE_USABLE;
                 require(PyArg_ParseTuple(PyList_GetItem(answer.value.get(), i), "Iipsss", &device.index, &device.kind,
-                                         &device.is_default, &device.name, &device.uuid, &device.abilities));
-                device.uuid = *device.uuid ? device.uuid : nullptr;
+                                         &device.is_default, &device.name, &device.serial, &device.abilities));
+                device.serial = *device.serial ? device.serial : nullptr;
                 device.abilities = *device.abilities ? device.abilities : nullptr;
                 take(context, &device);
             }

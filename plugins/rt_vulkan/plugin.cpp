@@ -44,7 +44,7 @@ PhysicalDevice chosen_device(const Instance &instance, const std::string &wanted
 
 class Plugin {
 public:
-    // Lists the choices of the option `device`, for `arhost plugins --devices`.
+    // Lists the choices of the option `device`, for `arhost devices`.
     static std::vector<arhost::Device> devices(const arhost::Host &host) {
         const Instance instance(host, false);
         const std::vector<PhysicalDevice> found = instance.devices();
@@ -52,9 +52,14 @@ public:
         devices.reserve(found.size());
         for (const PhysicalDevice &device : found) {
             const std::string why_not = missing_requirement(device);
-            devices.push_back({static_cast<std::uint32_t>(devices.size()), kind_of(device.properties.deviceType),
-                               why_not.empty() && &device == &choose_device(found, "auto"), device.name, device.uuid,
-                               why_not.empty() ? "paths: " + list_of(device.paths) : why_not});
+            devices.push_back({.index = static_cast<std::uint32_t>(devices.size()),
+                               .kind = kind_of(device.properties.deviceType),
+                               .state = why_not.empty() ? ARHOST_DEVICE_STATE_USABLE : ARHOST_DEVICE_STATE_UNUSABLE,
+                               .is_default = why_not.empty() && &device == &choose_device(found, "auto"),
+                               .name = device.name,
+                               .serial = device.uuid,
+                               .abilities = why_not.empty() ? "paths: " + list_of(device.paths) : "",
+                               .problem = why_not.empty() ? "" : "it " + why_not});
         }
         return devices;
     }

@@ -19,12 +19,16 @@ namespace {
 
 using namespace arhost;
 
-Failure glfw_failure(const std::string &what) {
+std::string glfw_reason() {
     const char *reason = nullptr;
     glfwGetError(&reason);
+    return reason ? reason : "no reason given";
+}
+
+Failure glfw_failure(const std::string &what) {
     return Failure(
         ARHOST_STATUS_ERROR_CONFIGURATION,
-        what + (reason ? std::string(": ") + reason : "") +
+        what + ": " + glfw_reason() +
             ". A window needs a desktop (the variable DISPLAY) and OpenGL 2.1: start arhost there, or under "
             "`xvfb-run -a`, or write to a file with sink_video or sink_images instead");
 }
@@ -59,6 +63,39 @@ Rectangle fit(int image_width, int image_height, int width, int height) {
 
 class WindowSink {
 public:
+    // Lists the monitors, or one display with the reason why no window can be opened.
+    static std::vector<Device> devices() {
+        Device unusable{.kind = ARHOST_DEVICE_DISPLAY,
+                        .state = ARHOST_DEVICE_STATE_UNUSABLE,
+                        .is_default = true,
+                        .name = "desktop"};
+        if (!glfwInit()) {
+            unusable.problem = glfw_reason();
+            return {unusable};
+        }
+        const Glfw glfw;
+        request_context();
+        glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);
+        if (!std::unique_ptr<GLFWwindow, DestroyWindow>(glfwCreateWindow(1, 1, "", nullptr, nullptr))) {
+            unusable.problem = "no OpenGL 2.1: " + glfw_reason();
+            return {unusable};
+        }
+        std::vector<Device> devices;
+        int count = 0;
+        GLFWmonitor **monitors = glfwGetMonitors(&count);
+        for (int i = 0; i < count; ++i) {
+            const GLFWvidmode *mode = glfwGetVideoMode(monitors[i]);
+            devices.push_back({.index = static_cast<std::uint32_t>(i),
+                               .kind = ARHOST_DEVICE_DISPLAY,
+                               .is_default = monitors[i] == glfwGetPrimaryMonitor(),
+                               .name = glfwGetMonitorName(monitors[i]),
+                               .width = static_cast<std::uint32_t>(mode->width),
+                               .height = static_cast<std::uint32_t>(mode->height),
+                               .rate = static_cast<double>(mode->refreshRate)});
+        }
+        return devices;
+    }
+
     WindowSink(const Host &, const Options &options)
         : title_(options.text("title")), scale_(options.real("scale")), vsync_(options.boolean("vsync")) {}
 
@@ -96,9 +133,13 @@ private:
         return *static_cast<WindowSink *>(glfwGetWindowUserPointer(window));
     }
 
-    void open_window() {
+    static void request_context() {
         glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 2);
         glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 1);
+    }
+
+    void open_window() {
+        request_context();
         glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
         int width = static_cast<int>(std::lround(width_ * scale_)),
             height = static_cast<int>(std::lround(height_ * scale_));

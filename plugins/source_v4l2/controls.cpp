@@ -139,6 +139,8 @@ std::int64_t Controls::parse(const Control &control, std::string_view text, cons
 }
 
 std::optional<std::int64_t> Controls::value_of(const Control &control) const {
+    if (control.type == V4L2_CTRL_TYPE_BUTTON || (control.flags & V4L2_CTRL_FLAG_WRITE_ONLY))
+        return std::nullopt;
     v4l2_ext_control found{};
     found.id = control.id;
     v4l2_ext_controls request{};
@@ -147,7 +149,11 @@ std::optional<std::int64_t> Controls::value_of(const Control &control) const {
     request.controls = &found;
     if (device_.control(VIDIOC_G_EXT_CTRLS, &request) != 0)
         return std::nullopt;
-    return control.type == V4L2_CTRL_TYPE_INTEGER64 ? found.value64 : found.value;
+    if (control.type == V4L2_CTRL_TYPE_INTEGER64)
+        return static_cast<std::int64_t>(found.value64);
+    if (control.type == V4L2_CTRL_TYPE_BITMASK)
+        return static_cast<std::uint32_t>(found.value);
+    return static_cast<std::int64_t>(found.value);
 }
 
 std::string Controls::set(const Control &control, std::string_view text, const std::string &key) const {
@@ -170,8 +176,6 @@ std::string Controls::set(const Control &control, std::string_view text, const s
                           "' automatically, or another program does; disable its automatic mode");
         device_.fail("setting '" + control.name + "' to " + std::string(text), error);
     }
-    if (control.type == V4L2_CTRL_TYPE_BUTTON || (control.flags & V4L2_CTRL_FLAG_WRITE_ONLY))
-        return "";
     const std::optional<std::int64_t> set = value_of(control);
     if (!set || *set == value)
         return "";

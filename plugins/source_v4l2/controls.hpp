@@ -31,6 +31,9 @@ public:
     const Control *find(std::uint32_t id) const;
     const Control *find(std::string_view name) const;
 
+    // Returns the current value, or std::nullopt if it cannot be read.
+    std::optional<std::int64_t> value_of(const Control &control) const;
+
     // Sets a control to a value in text form: a number, "true" or "false", or the number or name of a menu item.
     // `key` names the option for messages. Returns a warning if the camera sets another value, else an empty string.
     std::string set(const Control &control, std::string_view text, const std::string &key) const;
@@ -43,7 +46,6 @@ public:
 
 private:
     std::int64_t parse(const Control &control, std::string_view text, const std::string &key) const;
-    std::optional<std::int64_t> value_of(const Control &control) const;
     [[noreturn]] void fail(const std::string &key, const std::string &what) const;
 
     const CaptureDevice &device_;

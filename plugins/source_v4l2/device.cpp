@@ -23,17 +23,10 @@ namespace {
 // Lists the existing devices for a message: "/dev/video0 (Integrated Camera), /dev/video2".
 std::string existing_devices() {
     std::string list;
-    glob_t found{};
-    if (glob("/dev/video*", 0, nullptr, &found) == 0)
-        for (std::size_t i = 0; i < found.gl_pathc; ++i) {
-            const std::filesystem::path node = found.gl_pathv[i];
-            std::string card;
-            std::getline(std::ifstream("/sys/class/video4linux" / node.filename() / "name"), card);
-            list += (list.empty() ? "" : ", ") + node.string();
-            if (!card.empty())
-                list += " (" + card + ")";
-        }
-    globfree(&found);
+    for (const std::string &node : video_nodes()) {
+        const std::string card = card_of(node);
+        list += (list.empty() ? "" : ", ") + node + (card.empty() ? "" : " (" + card + ")");
+    }
     return list;
 }
 
@@ -42,7 +35,7 @@ std::string other_devices() {
     if (existing.empty())
         return "no /dev/video* exists; connect a camera, or use 'source_synthetic' or "
                "'source_file' instead";
-    return "available: " + existing + "; set 'device' to one of them (list them with 'v4l2-ctl --list-devices')";
+    return "available: " + existing + "; set 'device' to one of them (list them with 'arhost devices')";
 }
 
 double rate(const v4l2_fract &interval) {
@@ -55,9 +48,9 @@ std::string size_text(std::uint32_t width, std::uint32_t height) {
 
 std::string size_text(const CaptureSize &size) {
     std::string text = size_text(size.width, size.height);
-    if (size.max_fps > 0) {
+    if (size.max_fps() > 0) {
         char fps[32];
-        std::snprintf(fps, sizeof fps, " %.4g fps", size.max_fps);
+        std::snprintf(fps, sizeof fps, " %.4g fps", size.max_fps());
         text += fps;
     }
     return text;
@@ -70,18 +63,24 @@ int retried_ioctl(int fd, unsigned long request, void *argument) {
     return 0;
 }
 
-double fastest(int fd, std::uint32_t fourcc, std::uint32_t width, std::uint32_t height) {
-    double fps = 0;
+CaptureSize capture_size(int fd, std::uint32_t fourcc, std::uint32_t width, std::uint32_t height) {
+    CaptureSize size{width, height, {}, false};
     v4l2_frmivalenum interval{};
     interval.pixel_format = fourcc;
     interval.width = width;
     interval.height = height;
-    for (; retried_ioctl(fd, VIDIOC_ENUM_FRAMEINTERVALS, &interval) == 0; ++interval.index) {
-        if (interval.type != V4L2_FRMIVAL_TYPE_DISCRETE)
-            return rate(interval.stepwise.min);
-        fps = std::max(fps, rate(interval.discrete));
+    for (; !size.any_rate && retried_ioctl(fd, VIDIOC_ENUM_FRAMEINTERVALS, &interval) == 0; ++interval.index) {
+        if (interval.type == V4L2_FRMIVAL_TYPE_DISCRETE) {
+            size.rates.push_back(rate(interval.discrete));
+        } else {
+            size.any_rate = true;
+            size.rates = {rate(interval.stepwise.min), rate(interval.stepwise.max)};
+        }
     }
-    return fps;
+    std::erase_if(size.rates, [](double fps) { return fps <= 0; });
+    size.any_rate = size.any_rate && size.rates.size() == 2;
+    std::sort(size.rates.begin(), size.rates.end(), std::greater<>());
+    return size;
 }
 
 std::vector<CaptureFormat> list_formats(int fd, v4l2_buf_type buffer_type) {
@@ -92,7 +91,7 @@ std::vector<CaptureFormat> list_formats(int fd, v4l2_buf_type buffer_type) {
         CaptureFormat format;
         format.fourcc = description.pixelformat;
         const auto add = [&](std::uint32_t width, std::uint32_t height) {
-            format.sizes.push_back({width, height, fastest(fd, format.fourcc, width, height)});
+            format.sizes.push_back(capture_size(fd, format.fourcc, width, height));
         };
         v4l2_frmsizeenum size{};
         size.pixel_format = format.fourcc;
@@ -164,39 +163,60 @@ std::string fourcc_text(std::uint32_t fourcc) {
     return text;
 }
 
+std::vector<std::string> video_nodes() {
+    std::vector<std::string> nodes;
+    glob_t found{};
+    if (glob("/dev/video*", 0, nullptr, &found) == 0)
+        nodes.assign(found.gl_pathv, found.gl_pathv + found.gl_pathc);
+    globfree(&found);
+    std::stable_sort(nodes.begin(), nodes.end(), [](const std::string &a, const std::string &b) {
+        return a.size() < b.size(); // /dev/video10 follows /dev/video9
+    });
+    return nodes;
+}
+
+std::string card_of(const std::string &node) {
+    std::string card;
+    std::getline(std::ifstream("/sys/class/video4linux" / std::filesystem::path(node).filename() / "name"), card);
+    return card;
+}
+
 CaptureDevice::CaptureDevice(const std::string &path)
     : path_(path), fd_(open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)) {
     if (fd_.get() < 0) {
         const int error = errno;
         const std::string start = "device: '" + path + "' ";
         if (error == ENOENT || error == ENODEV || error == ENXIO || error == ENOTDIR)
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, start + "does not exist; " + other_devices());
+            throw CannotOpen(ARHOST_STATUS_ERROR_CONFIGURATION, start + "does not exist; " + other_devices(), error);
         if (error == EACCES || error == EPERM)
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          start + "cannot be opened by this user: cameras belong to the group 'video' ('sudo usermod "
-                                  "-aG video $USER', then log in again)");
+            throw CannotOpen(ARHOST_STATUS_ERROR_CONFIGURATION,
+                             start + "cannot be opened by this user: cameras belong to the group 'video' ('sudo "
+                                     "usermod -aG video $USER', then log in again)",
+                             error);
         if (error == EISDIR)
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, start + "is a folder, not a camera; " + other_devices());
-        fail("opening it", error);
+            throw CannotOpen(ARHOST_STATUS_ERROR_CONFIGURATION,
+                             start + "is a folder, not a camera; " + other_devices(), error);
+        const Failure failure = failure_of("opening it", error);
+        throw CannotOpen(failure.status(), failure.what(), error);
     }
     v4l2_capability capability{};
     if (const int error = control(VIDIOC_QUERYCAP, &capability); error == ENODEV)
         fail("querying its capabilities", error);
     else if (error != 0)
-        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      "device: '" + path + "' is not a video device; " + other_devices());
+        throw NotACamera(ARHOST_STATUS_ERROR_CONFIGURATION,
+                         "device: '" + path + "' is not a video device; " + other_devices());
     card_ = reinterpret_cast<const char *>(capability.card);
     const std::uint32_t able =
         capability.capabilities & V4L2_CAP_DEVICE_CAPS ? capability.device_caps : capability.capabilities;
     if (!(able & V4L2_CAP_VIDEO_CAPTURE))
         buffer_type_ = V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE;
     if (!(able & (V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_VIDEO_CAPTURE_MPLANE)) || !(able & V4L2_CAP_STREAMING))
-        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      "device: '" + path + "' (" + card_ + ") does not capture pictures" +
-                          (able & V4L2_CAP_META_CAPTURE ? " (it delivers metadata; the camera itself is "
-                                                          "usually the node with the next lower number)"
-                                                        : "") +
-                          "; " + other_devices());
+        throw NotACamera(ARHOST_STATUS_ERROR_CONFIGURATION,
+                         "device: '" + path + "' (" + card_ + ") does not capture pictures" +
+                             (able & V4L2_CAP_META_CAPTURE ? " (it delivers metadata; the camera itself is "
+                                                             "usually the node with the next lower number)"
+                                                           : "") +
+                             "; " + other_devices());
     formats_ = list_formats(fd_.get(), buffer_type_);
 }
 
@@ -205,17 +225,21 @@ int CaptureDevice::control(unsigned long request, void *argument) const {
 }
 
 void CaptureDevice::fail(const std::string &what, int error) const {
+    throw failure_of(what, error);
+}
+
+Failure CaptureDevice::failure_of(const std::string &what, int error) const {
     const std::string start = "the camera '" + path_ + "'" + (card_.empty() ? "" : " (" + card_ + ")") + " ";
     if (error == ENODEV || error == ENXIO || error == ESHUTDOWN)
-        throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST, start + "has disappeared; was it unplugged?");
+        return Failure(ARHOST_STATUS_ERROR_DEVICE_LOST, start + "has disappeared; was it unplugged?");
     if (error == EBUSY)
-        throw Failure(ARHOST_STATUS_ERROR_IO, start + "is in use by another program ('fuser " + path_ +
-                                                  "' shows which); close it, or set 'device' to another camera");
+        return Failure(ARHOST_STATUS_ERROR_IO, start + "is in use by another program ('fuser " + path_ +
+                                                   "' shows which); close it, or set 'device' to another camera");
     if (error == ENOSPC)
-        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      start + "gets too little bandwidth on its USB bus; choose a smaller size, 'format: mjpeg', or "
-                              "another port");
-    throw Failure(ARHOST_STATUS_ERROR_IO, start + "reported an error while " + what + ": " + std::strerror(error));
+        return Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                       start + "gets too little bandwidth on its USB bus; choose a smaller size, 'format: mjpeg', or "
+                               "another port");
+    return Failure(ARHOST_STATUS_ERROR_IO, start + "reported an error while " + what + ": " + std::strerror(error));
 }
 
 const CaptureFormat *CaptureDevice::find(std::uint32_t fourcc) const {
@@ -225,7 +249,15 @@ const CaptureFormat *CaptureDevice::find(std::uint32_t fourcc) const {
 }
 
 double CaptureDevice::max_fps(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height) const {
-    return fastest(fd_.get(), fourcc, width, height);
+    return capture_size(fd_.get(), fourcc, width, height).max_fps();
+}
+
+bool CaptureDevice::is_busy() const {
+    // Freeing this descriptor's buffers, of which there are none, fails only if another descriptor has some.
+    v4l2_requestbuffers none{};
+    none.type = buffer_type_;
+    none.memory = V4L2_MEMORY_MMAP;
+    return control(VIDIOC_REQBUFS, &none) == EBUSY;
 }
 
 std::string CaptureDevice::describe_formats() const {

@@ -34,7 +34,9 @@ private:
 
 struct CaptureSize {
     std::uint32_t width = 0, height = 0;
-    double max_fps = 0; // 0: unknown
+    std::vector<double> rates; // frames per second, highest first; empty: unknown
+    bool any_rate = false;     // `rates` has the two ends of a range
+    double max_fps() const { return rates.empty() ? 0 : rates.front(); }
 };
 
 // The sizes that a camera offers in one pixel format. For a range of sizes, `sizes` has its minimum and maximum.
@@ -60,9 +62,23 @@ struct Capture {
 
 std::string fourcc_text(std::uint32_t fourcc); // such as "YUYV"
 
+// The nodes /dev/video*, in the order of their numbers, and what the kernel calls them ("" if unknown).
+std::vector<std::string> video_nodes();
+std::string card_of(const std::string &node);
+
+// The reasons why CaptureDevice cannot be constructed.
+struct CannotOpen : Failure {
+    CannotOpen(arhost_status status, const std::string &message, int error)
+        : Failure(status, message), error(error) {}
+    int error; // errno of open()
+};
+struct NotACamera : Failure {
+    using Failure::Failure;
+};
+
 class CaptureDevice {
 public:
-    // Opens the device and checks that it captures video.
+    // Opens the device and checks that it captures video; throws CannotOpen or NotACamera.
     explicit CaptureDevice(const std::string &path);
 
     const std::string &path() const { return path_; }
@@ -70,6 +86,7 @@ public:
     const std::vector<CaptureFormat> &formats() const { return formats_; }
     const CaptureFormat *find(std::uint32_t fourcc) const;
     double max_fps(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height) const; // 0: unknown
+    bool is_busy() const;                 // whether another program captures
     std::string describe_formats() const; // such as "YUYV (640×480 30 fps, …), MJPG (…)"
     std::string describe_sizes_near(const CaptureFormat &format, std::uint32_t width, std::uint32_t height) const;
 
@@ -79,7 +96,8 @@ public:
 
     // Calls ioctl and repeats it on EINTR. Returns 0 or an errno value.
     int control(unsigned long request, void *argument) const;
-    // Throws Failure for the errno value `error`, which occurred while `what` ("querying its format").
+    // Throws, or returns, a Failure for the errno value `error`, which occurred while `what` ("querying its format").
+    Failure failure_of(const std::string &what, int error) const;
     [[noreturn]] void fail(const std::string &what, int error) const;
     int fd() const { return fd_.get(); }
     v4l2_buf_type buffer_type() const { return buffer_type_; }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // source_v4l2: captures frames from Video4Linux devices (USB and built-in cameras, capture cards).
+#include "cameras.hpp"
 #include "controls.hpp"
 #include "device.hpp"
 #include "jpeg.hpp"
@@ -95,6 +96,8 @@ struct Losses {
 
 class V4l2Source {
 public:
+    static std::vector<arhost::Device> devices() { return arhost::list_cameras(); }
+
     V4l2Source(const arhost::Host &host, const arhost::Options &options)
         : host_(host),
           path_(options.text("device")), configured_size_{static_cast<std::uint32_t>(options.integer("width")),

@@ -124,20 +124,72 @@ FIELD(arhost_entry_point, struct_size, 0, 4);
 FIELD(arhost_entry_point, negotiate, 8, 8);
 
 /* arhost/devices.h */
+VALUE(ARHOST_MAX_DEVICES, 64);
+VALUE(ARHOST_MAX_DEVICE_FORMATS, 128);
+VALUE(ARHOST_MAX_DEVICE_SIZES, 64);
+VALUE(ARHOST_MAX_DEVICE_RATES, 64);
+VALUE(ARHOST_MAX_DEVICE_CONTROLS, 256);
 VALUE(ARHOST_DEVICE_DISCRETE_GPU, 1);
 VALUE(ARHOST_DEVICE_INTEGRATED_GPU, 2);
 VALUE(ARHOST_DEVICE_VIRTUAL_GPU, 3);
 VALUE(ARHOST_DEVICE_CPU, 4);
 VALUE(ARHOST_DEVICE_OTHER, 5);
+VALUE(ARHOST_DEVICE_CAMERA, 6);
+VALUE(ARHOST_DEVICE_DISPLAY, 7);
+VALUE(ARHOST_DEVICE_STATE_USABLE, 1);
+VALUE(ARHOST_DEVICE_STATE_BUSY, 2);
+VALUE(ARHOST_DEVICE_STATE_FORBIDDEN, 3);
+VALUE(ARHOST_DEVICE_STATE_UNUSABLE, 4);
 
-STRUCT(arhost_device, 40);
+STRUCT(arhost_device_size, 32);
+FIELD(arhost_device_size, struct_size, 0, 4);
+FIELD(arhost_device_size, width, 4, 4);
+FIELD(arhost_device_size, height, 8, 4);
+FIELD(arhost_device_size, rate_count, 12, 4);
+FIELD(arhost_device_size, is_rate_range, 16, 4);
+FIELD(arhost_device_size, rates, 24, 8);
+
+STRUCT(arhost_device_format, 32);
+FIELD(arhost_device_format, struct_size, 0, 4);
+FIELD(arhost_device_format, size_count, 4, 4);
+FIELD(arhost_device_format, is_size_range, 8, 4);
+FIELD(arhost_device_format, pixel_format, 16, 8);
+FIELD(arhost_device_format, sizes, 24, 8);
+VALUE(ARHOST_DEVICE_CONTROL_INTEGER, 1);
+VALUE(ARHOST_DEVICE_CONTROL_BOOLEAN, 2);
+VALUE(ARHOST_DEVICE_CONTROL_MENU, 3);
+VALUE(ARHOST_DEVICE_CONTROL_BITMASK, 4);
+VALUE(ARHOST_DEVICE_CONTROL_BUTTON, 5);
+
+STRUCT(arhost_device_control, 64);
+FIELD(arhost_device_control, struct_size, 0, 4);
+FIELD(arhost_device_control, type, 4, 4);
+FIELD(arhost_device_control, has_value, 8, 4);
+FIELD(arhost_device_control, name, 16, 8);
+FIELD(arhost_device_control, minimum, 24, 8);
+FIELD(arhost_device_control, maximum, 32, 8);
+FIELD(arhost_device_control, step, 40, 8);
+FIELD(arhost_device_control, default_value, 48, 8);
+FIELD(arhost_device_control, value, 56, 8);
+
+STRUCT(arhost_device, 104);
 FIELD(arhost_device, struct_size, 0, 4);
 FIELD(arhost_device, index, 4, 4);
 FIELD(arhost_device, kind, 8, 4);
-FIELD(arhost_device, is_default, 12, 4);
-FIELD(arhost_device, name, 16, 8);
-FIELD(arhost_device, uuid, 24, 8);
-FIELD(arhost_device, abilities, 32, 8);
+FIELD(arhost_device, state, 12, 4);
+FIELD(arhost_device, is_default, 16, 4);
+FIELD(arhost_device, format_count, 20, 4);
+FIELD(arhost_device, control_count, 24, 4);
+FIELD(arhost_device, width, 28, 4);
+FIELD(arhost_device, height, 32, 4);
+FIELD(arhost_device, rate, 40, 8);
+FIELD(arhost_device, name, 48, 8);
+FIELD(arhost_device, path, 56, 8);
+FIELD(arhost_device, serial, 64, 8);
+FIELD(arhost_device, abilities, 72, 8);
+FIELD(arhost_device, problem, 80, 8);
+FIELD(arhost_device, formats, 88, 8);
+FIELD(arhost_device, controls, 96, 8);
 
 STRUCT(arhost_devices, 16);
 FIELD(arhost_devices, struct_size, 0, 4);

@@ -20,8 +20,12 @@ public:
           ahead_at_(options.integer("ahead_at")), hold_at_(options.integer("hold_at")) {}
 
     static std::vector<Device> devices() {
-        return {{0, ARHOST_DEVICE_DISCRETE_GPU, false, "Abacus \x1b[2J3000", "0d15c0de-0000", "counts: up, down"},
-                {1, ARHOST_DEVICE_CPU, true, "Ten fingers", "", ""}};
+        return {{.index = 0,
+                 .kind = ARHOST_DEVICE_DISCRETE_GPU,
+                 .name = "Abacus \x1b[2J3000",
+                 .serial = "0d15c0de-0000",
+                 .abilities = "counts: up, down"},
+                {.index = 1, .kind = ARHOST_DEVICE_CPU, .is_default = true, .name = "Ten fingers"}};
     }
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {

@@ -24,6 +24,7 @@
 #include <memory>
 #include <mutex>
 #include <new>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -151,13 +152,35 @@ constexpr arhost_option_descriptor option(arhost_option_type type, const char *k
     return {sizeof(arhost_option_descriptor), type, key, default_value, minimum, maximum, choices, help};
 }
 
-// Same fields as arhost_device (arhost/devices.h), with "" for NULL. A plugin class supports the devices extension if
-// it has a static member function `std::vector<arhost::Device> devices()` or `devices(const arhost::Host &)`.
+// The structs of arhost/devices.h with the same fields, and "" for NULL. A plugin class supports the devices
+// extension if it has a static member function `std::vector<arhost::Device> devices()` or `devices(const arhost::Host
+// &)`.
+struct DeviceSize {
+    std::uint32_t width = 0, height = 0;
+    std::vector<double> rates{};
+    bool is_rate_range = false;
+};
+struct DeviceFormat {
+    std::string pixel_format{};
+    std::vector<DeviceSize> sizes{};
+    bool is_size_range = false;
+};
+struct DeviceControl {
+    std::string name{};
+    arhost_device_control_type type = ARHOST_DEVICE_CONTROL_INTEGER;
+    std::int64_t minimum = 0, maximum = 0, step = 0, default_value = 0;
+    std::optional<std::int64_t> value{};
+};
 struct Device {
     std::uint32_t index = 0;
     arhost_device_kind kind = ARHOST_DEVICE_OTHER;
+    arhost_device_state state = ARHOST_DEVICE_STATE_USABLE;
     bool is_default = false;
-    std::string name, uuid, abilities;
+    std::string name{}, path{}, serial{}, abilities{}, problem{};
+    std::vector<DeviceFormat> formats{};   // cameras
+    std::vector<DeviceControl> controls{}; // cameras
+    std::uint32_t width = 0, height = 0;   // displays
+    double rate = 0;                       // displays
 };
 
 namespace detail {
@@ -230,15 +253,46 @@ template <ListsDevices T> std::vector<Device> devices_of(const Host &host) {
     else
         return T::devices();
 }
+inline void report(const Device &d, arhost_take_device take, void *context) {
+    const auto or_null = [](const std::string &text) { return text.empty() ? nullptr : text.c_str(); };
+    std::vector<std::vector<arhost_device_size>> sizes; // of each format
+    std::vector<arhost_device_format> formats;
+    for (const DeviceFormat &f : d.formats) {
+        auto &list = sizes.emplace_back();
+        for (const DeviceSize &s : f.sizes)
+            list.push_back({sizeof(arhost_device_size), s.width, s.height, static_cast<std::uint32_t>(s.rates.size()),
+                            s.is_rate_range, s.rates.data()});
+        formats.push_back({sizeof(arhost_device_format), static_cast<std::uint32_t>(list.size()), f.is_size_range,
+                           f.pixel_format.c_str(), list.data()});
+    }
+    std::vector<arhost_device_control> controls;
+    for (const DeviceControl &c : d.controls)
+        controls.push_back({sizeof(arhost_device_control), c.type, c.value.has_value(), c.name.c_str(), c.minimum,
+                            c.maximum, c.step, c.default_value, c.value.value_or(0)});
+    const arhost_device device{sizeof device,
+                               d.index,
+                               d.kind,
+                               d.state,
+                               d.is_default,
+                               static_cast<std::uint32_t>(formats.size()),
+                               static_cast<std::uint32_t>(controls.size()),
+                               d.width,
+                               d.height,
+                               d.rate,
+                               d.name.c_str(),
+                               or_null(d.path),
+                               or_null(d.serial),
+                               or_null(d.abilities),
+                               or_null(d.problem),
+                               formats.data(),
+                               controls.data()};
+    take(context, &device);
+}
 template <ListsDevices T>
 arhost_status list_devices(const arhost_host *host, arhost_take_device take, void *context) {
     return guarded(Host(host), [&] {
-        const auto or_null = [](const std::string &text) { return text.empty() ? nullptr : text.c_str(); };
-        for (const Device &d : devices_of<T>(Host(host))) {
-            const arhost_device device{
-                sizeof device, d.index, d.kind, d.is_default, d.name.c_str(), or_null(d.uuid), or_null(d.abilities)};
-            take(context, &device);
-        }
+        for (const Device &device : devices_of<T>(Host(host)))
+            report(device, take, context);
         return ARHOST_STATUS_OK;
     });
 }

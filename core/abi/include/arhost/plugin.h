@@ -244,7 +244,7 @@ typedef struct arhost_plugin {
     void (*destroy)(arhost_instance *instance);
 
     /* [worker, negotiated or later] Returns the function table of the extension with this id and revision
-     * ("arhost.devices/1"), in static storage, or NULL if the plugin does not support the extension. */
+     * ("arhost.devices/2"), in static storage, or NULL if the plugin does not support the extension. */
     const void *(*get_extension)(const char *id);
 } arhost_plugin;
 

@@ -158,25 +158,91 @@ unsafe impl Sync for arhost_entry_point {} // a plugin's statics are immutable
 
 // ---- arhost/devices.h ----
 
-pub const ARHOST_DEVICES_EXTENSION: &[u8] = b"arhost.devices/1\0";
+pub const ARHOST_DEVICES_EXTENSION: &[u8] = b"arhost.devices/2\0";
+pub const ARHOST_MAX_DEVICES: usize = 64;
+pub const ARHOST_MAX_DEVICE_FORMATS: usize = 128;
+pub const ARHOST_MAX_DEVICE_SIZES: usize = 64;
+pub const ARHOST_MAX_DEVICE_RATES: usize = 64;
+pub const ARHOST_MAX_DEVICE_CONTROLS: usize = 256;
 pub type arhost_device_kind = i32;
 pub const ARHOST_DEVICE_DISCRETE_GPU: arhost_device_kind = 1;
 pub const ARHOST_DEVICE_INTEGRATED_GPU: arhost_device_kind = 2;
 pub const ARHOST_DEVICE_VIRTUAL_GPU: arhost_device_kind = 3;
 pub const ARHOST_DEVICE_CPU: arhost_device_kind = 4;
 pub const ARHOST_DEVICE_OTHER: arhost_device_kind = 5;
+pub const ARHOST_DEVICE_CAMERA: arhost_device_kind = 6;
+pub const ARHOST_DEVICE_DISPLAY: arhost_device_kind = 7;
+pub type arhost_device_state = i32;
+pub const ARHOST_DEVICE_STATE_USABLE: arhost_device_state = 1;
+pub const ARHOST_DEVICE_STATE_BUSY: arhost_device_state = 2;
+pub const ARHOST_DEVICE_STATE_FORBIDDEN: arhost_device_state = 3;
+pub const ARHOST_DEVICE_STATE_UNUSABLE: arhost_device_state = 4;
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_device_size {
+    pub struct_size: u32,
+    pub width: u32,
+    pub height: u32,
+    pub rate_count: u32,
+    pub is_rate_range: i32,
+    pub rates: *const f64,
+}
+const _: () = assert!(size_of::<arhost_device_size>() == 32);
+unsafe impl Sync for arhost_device_size {} // a plugin's statics are immutable
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_device_format {
+    pub struct_size: u32,
+    pub size_count: u32,
+    pub is_size_range: i32,
+    pub pixel_format: *const c_char,
+    pub sizes: *const arhost_device_size,
+}
+const _: () = assert!(size_of::<arhost_device_format>() == 32);
+unsafe impl Sync for arhost_device_format {} // a plugin's statics are immutable
+pub type arhost_device_control_type = i32;
+pub const ARHOST_DEVICE_CONTROL_INTEGER: arhost_device_control_type = 1;
+pub const ARHOST_DEVICE_CONTROL_BOOLEAN: arhost_device_control_type = 2;
+pub const ARHOST_DEVICE_CONTROL_MENU: arhost_device_control_type = 3;
+pub const ARHOST_DEVICE_CONTROL_BITMASK: arhost_device_control_type = 4;
+pub const ARHOST_DEVICE_CONTROL_BUTTON: arhost_device_control_type = 5;
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_device_control {
+    pub struct_size: u32,
+    pub type_: arhost_device_control_type,
+    pub has_value: i32,
+    pub name: *const c_char,
+    pub minimum: i64,
+    pub maximum: i64,
+    pub step: i64,
+    pub default_value: i64,
+    pub value: i64,
+}
+const _: () = assert!(size_of::<arhost_device_control>() == 64);
+unsafe impl Sync for arhost_device_control {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_device {
     pub struct_size: u32,
     pub index: u32,
     pub kind: arhost_device_kind,
+    pub state: arhost_device_state,
     pub is_default: i32,
+    pub format_count: u32,
+    pub control_count: u32,
+    pub width: u32,
+    pub height: u32,
+    pub rate: f64,
     pub name: *const c_char,
-    pub uuid: *const c_char,
+    pub path: *const c_char,
+    pub serial: *const c_char,
     pub abilities: *const c_char,
+    pub problem: *const c_char,
+    pub formats: *const arhost_device_format,
+    pub controls: *const arhost_device_control,
 }
-const _: () = assert!(size_of::<arhost_device>() == 40);
+const _: () = assert!(size_of::<arhost_device>() == 104);
 unsafe impl Sync for arhost_device {} // a plugin's statics are immutable
 pub type arhost_take_device = Option<unsafe extern "C" fn(*mut c_void, *const arhost_device)>;
 #[repr(C)]

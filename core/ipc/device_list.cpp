@@ -1,0 +1,327 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "ipc/device_list.hpp"
+
+#include "base/text.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <functional>
+#include <stdexcept>
+
+namespace arhost::ipc {
+namespace {
+
+constexpr std::size_t longest_text = max_device_text_size + std::string_view("…").size();
+
+[[noreturn]] void reject(const std::string &what) {
+    throw std::runtime_error("it reported " + what);
+}
+
+// Returns a printable and truncated copy. Reads no further than needed, because a faulty plugin may not terminate the
+// string.
+std::string text_of(const char *text) {
+    constexpr std::size_t longest_character = 4;
+    return text ? base::printable({text, ::strnlen(text, max_device_text_size + longest_character)},
+                                  max_device_text_size)
+                : std::string();
+}
+
+// Returns pointers to at most `limit` elements of an array of structs, whose stride is the struct_size of the first.
+template <class T>
+std::vector<const T *> elements(const T *first, std::size_t count, std::size_t limit, std::size_t min_size,
+                                const char *what) {
+    std::vector<const T *> found;
+    if (count == 0)
+        return found;
+    if (!first)
+        reject(std::string("an array of ") + what + " that is NULL");
+    if (first->struct_size < min_size)
+        reject(std::string("an array of ") + what + " whose struct_size is too small");
+    for (std::size_t i = 0; i < std::min(count, limit); ++i)
+        found.push_back(
+            reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(first) + i * first->struct_size));
+    return found;
+}
+
+template <class T, class Field> constexpr std::size_t end_of(std::size_t offset, Field T::*) {
+    return offset + sizeof(Field);
+}
+#define END_OF(type, field) end_of(offsetof(type, field), &type::field)
+
+DeviceSize describe(const arhost_device_size &size) {
+    if (size.rate_count > 0 && !size.rates)
+        reject("an array of rates that is NULL");
+    const std::size_t count = std::min<std::size_t>(size.rate_count, ARHOST_MAX_DEVICE_RATES);
+    return {size.width, size.height, size.is_rate_range != 0, {size.rates, size.rates + count}};
+}
+
+DeviceFormat describe(const arhost_device_format &format) {
+    DeviceFormat copy{text_of(format.pixel_format), format.is_size_range != 0, {}};
+    for (const auto *size : elements(format.sizes, format.size_count, ARHOST_MAX_DEVICE_SIZES,
+                                     END_OF(arhost_device_size, rates), "sizes"))
+        copy.sizes.push_back(describe(*size));
+    return copy;
+}
+
+DeviceControl describe(const arhost_device_control &control) {
+    DeviceControl copy{text_of(control.name),
+                       control.type,
+                       control.minimum,
+                       control.maximum,
+                       control.step,
+                       control.default_value,
+                       {}};
+    if (control.has_value)
+        copy.value = control.value;
+    return copy;
+}
+
+void check(const DeviceSize &size) {
+    if (size.width < 1 || size.height < 1)
+        reject("a size of " + std::to_string(size.width) + "×" + std::to_string(size.height) + " px");
+    if (!std::ranges::all_of(size.rates, [](double rate) { return std::isfinite(rate) && rate > 0; }))
+        reject("a frame rate that is not finite and above 0");
+    if (!std::ranges::is_sorted(size.rates, std::greater<>()))
+        reject("frame rates that do not begin with the highest");
+    if (size.is_rate_range && size.rates.size() != 2)
+        reject("a range of frame rates without two ends");
+}
+
+void check(const DeviceFormat &format) {
+    if (format.pixel_format.empty())
+        reject("a pixel format without a name");
+    std::ranges::for_each(format.sizes, [](const DeviceSize &size) { check(size); });
+    if (format.is_size_range && (format.sizes.size() != 2 || format.sizes[0].width > format.sizes[1].width ||
+                                 format.sizes[0].height > format.sizes[1].height))
+        reject("a range of sizes without a smallest and a largest size");
+}
+
+void check(const DeviceControl &control) {
+    if (control.name.empty())
+        reject("a control without a name");
+    if (control.type < ARHOST_DEVICE_CONTROL_INTEGER || control.type > ARHOST_DEVICE_CONTROL_BUTTON)
+        reject("the control '" + control.name + "' with an invalid type");
+    if (control.minimum > control.maximum || control.step < 0)
+        reject("the control '" + control.name + "' with an invalid range");
+}
+
+// Throws if the device violates the contract.
+void check(const DeviceDescription &device) {
+    if (device.name.empty())
+        reject("a device without a name");
+    const std::string which = "the device '" + device.name + "' ";
+    if (device.state < ARHOST_DEVICE_STATE_USABLE || device.state > ARHOST_DEVICE_STATE_UNUSABLE)
+        reject(which + "with an invalid state");
+    if ((device.state == ARHOST_DEVICE_STATE_UNUSABLE) == device.problem.empty())
+        reject(which + (device.problem.empty() ? "as unusable without its problem" : "with a problem but usable"));
+    const bool by_path = device.state == ARHOST_DEVICE_STATE_BUSY || device.state == ARHOST_DEVICE_STATE_FORBIDDEN;
+    if (by_path && device.path.empty())
+        reject(which + "as busy or forbidden without its path");
+    if (device.kind != ARHOST_DEVICE_CAMERA && (!device.formats.empty() || !device.controls.empty()))
+        reject(which + "with formats or controls, although it is no camera");
+    if (!std::isfinite(device.rate) || device.rate < 0)
+        reject(which + "with a refresh rate that is not finite and at least 0");
+    std::ranges::for_each(device.formats, [](const DeviceFormat &format) { check(format); });
+    std::ranges::for_each(device.controls, [](const DeviceControl &control) { check(control); });
+}
+
+// ---- JSON ----
+
+Json to_json(const DeviceFormat &format) {
+    Json sizes = Json::array();
+    for (const DeviceSize &s : format.sizes)
+        sizes.push_back(
+            {{"width", s.width}, {"height", s.height}, {"is_rate_range", s.is_rate_range}, {"rates", s.rates}});
+    return {
+        {"pixel_format", format.pixel_format}, {"is_size_range", format.is_size_range}, {"sizes", std::move(sizes)}};
+}
+
+Json to_json(const DeviceControl &c) {
+    Json json = {{"name", c.name},       {"type", c.type}, {"minimum", c.minimum},
+                 {"maximum", c.maximum}, {"step", c.step}, {"default", c.default_value},
+                 {"value", nullptr}};
+    if (c.value)
+        json["value"] = *c.value;
+    return json;
+}
+
+Json to_json(const DeviceDescription &d) {
+    Json formats = Json::array(), controls = Json::array();
+    for (const DeviceFormat &format : d.formats)
+        formats.push_back(to_json(format));
+    for (const DeviceControl &control : d.controls)
+        controls.push_back(to_json(control));
+    return {{"index", d.index},
+            {"kind", d.kind},
+            {"state", d.state},
+            {"is_default", d.is_default},
+            {"name", d.name},
+            {"path", d.path},
+            {"serial", d.serial},
+            {"abilities", d.abilities},
+            {"problem", d.problem},
+            {"formats", std::move(formats)},
+            {"controls", std::move(controls)},
+            {"width", d.width},
+            {"height", d.height},
+            {"rate", d.rate}};
+}
+
+std::string text_from(const Json &json, const char *key) {
+    std::string text = json.at(key).get<std::string>();
+    if (text.size() > longest_text)
+        reject(std::string("a '") + key + "' that is too long");
+    return text;
+}
+
+const Json &array_from(const Json &json, const char *key, std::size_t limit) {
+    const Json &array = json.at(key);
+    if (!array.is_array() || array.size() > limit)
+        reject(std::string("more than ") + std::to_string(limit) + " '" + key + "'");
+    return array;
+}
+
+DeviceFormat format_from(const Json &json) {
+    DeviceFormat format{text_from(json, "pixel_format"), json.at("is_size_range").get<bool>(), {}};
+    for (const Json &size : array_from(json, "sizes", ARHOST_MAX_DEVICE_SIZES))
+        format.sizes.push_back({size.at("width").get<std::uint32_t>(), size.at("height").get<std::uint32_t>(),
+                                size.at("is_rate_range").get<bool>(),
+                                array_from(size, "rates", ARHOST_MAX_DEVICE_RATES).get<std::vector<double>>()});
+    return format;
+}
+
+DeviceControl control_from(const Json &json) {
+    DeviceControl control{text_from(json, "name"),
+                          json.at("type").get<arhost_device_control_type>(),
+                          json.at("minimum").get<std::int64_t>(),
+                          json.at("maximum").get<std::int64_t>(),
+                          json.at("step").get<std::int64_t>(),
+                          json.at("default").get<std::int64_t>(),
+                          {}};
+    if (!json.at("value").is_null())
+        control.value = json.at("value").get<std::int64_t>();
+    return control;
+}
+
+void check_size(std::string_view text) {
+    if (text.size() > max_device_list_size)
+        reject("a list of devices that is longer than " + std::to_string(max_device_list_size) + " bytes");
+}
+
+DeviceDescription device_from(const Json &json) {
+    DeviceDescription device;
+    device.index = json.at("index").get<std::uint32_t>();
+    device.kind = json.at("kind").get<arhost_device_kind>();
+    device.state = json.at("state").get<arhost_device_state>();
+    device.is_default = json.at("is_default").get<bool>();
+    device.name = text_from(json, "name");
+    device.path = text_from(json, "path");
+    device.serial = text_from(json, "serial");
+    device.abilities = text_from(json, "abilities");
+    device.problem = text_from(json, "problem");
+    for (const Json &format : array_from(json, "formats", ARHOST_MAX_DEVICE_FORMATS))
+        device.formats.push_back(format_from(format));
+    for (const Json &control : array_from(json, "controls", ARHOST_MAX_DEVICE_CONTROLS))
+        device.controls.push_back(control_from(control));
+    device.width = json.at("width").get<std::uint32_t>();
+    device.height = json.at("height").get<std::uint32_t>();
+    device.rate = json.at("rate").get<double>();
+    check(device);
+    return device;
+}
+
+} // namespace
+
+DeviceDescription describe(const arhost_device *device) {
+    if (!device)
+        reject("a device that is NULL");
+    if (device->struct_size < END_OF(arhost_device, controls))
+        reject("a device whose struct_size is too small");
+    DeviceDescription copy{device->index,
+                           device->kind,
+                           device->state,
+                           device->is_default != 0,
+                           text_of(device->name),
+                           text_of(device->path),
+                           text_of(device->serial),
+                           text_of(device->abilities),
+                           text_of(device->problem),
+                           {},
+                           {},
+                           device->width,
+                           device->height,
+                           device->rate};
+    for (const auto *format : elements(device->formats, device->format_count, ARHOST_MAX_DEVICE_FORMATS,
+                                       END_OF(arhost_device_format, sizes), "formats"))
+        copy.formats.push_back(describe(*format));
+    for (const auto *control : elements(device->controls, device->control_count, ARHOST_MAX_DEVICE_CONTROLS,
+                                        END_OF(arhost_device_control, value), "controls"))
+        copy.controls.push_back(describe(*control));
+    check(copy);
+    return copy;
+}
+
+std::string to_text(const std::optional<DeviceList> &list) {
+    Json json; // null
+    if (list) {
+        Json devices = Json::array();
+        for (const DeviceDescription &device : list->devices)
+            devices.push_back(to_json(device));
+        json = {{"devices", std::move(devices)}, {"left_out", list->left_out}};
+    }
+    std::string text = json.dump(-1, ' ', true);
+    check_size(text);
+    return text;
+}
+
+std::optional<DeviceList> devices_from_text(std::string_view text) {
+    check_size(text);
+    const Json json = Json::parse(text);
+    if (json.is_null())
+        return std::nullopt;
+    DeviceList list;
+    for (const Json &device : array_from(json, "devices", ARHOST_MAX_DEVICES))
+        list.devices.push_back(device_from(device));
+    list.left_out = json.at("left_out").get<std::uint64_t>();
+    return list;
+}
+
+const char *device_kind_text(arhost_device_kind kind) {
+    switch (kind) {
+    case ARHOST_DEVICE_DISCRETE_GPU:
+        return "discrete GPU";
+    case ARHOST_DEVICE_INTEGRATED_GPU:
+        return "integrated GPU";
+    case ARHOST_DEVICE_VIRTUAL_GPU:
+        return "virtual GPU";
+    case ARHOST_DEVICE_CPU:
+        return "CPU";
+    case ARHOST_DEVICE_CAMERA:
+        return "camera";
+    case ARHOST_DEVICE_DISPLAY:
+        return "display";
+    default:
+        return "other device";
+    }
+}
+
+const char *control_type_text(arhost_device_control_type type) {
+    switch (type) {
+    case ARHOST_DEVICE_CONTROL_BOOLEAN:
+        return "boolean";
+    case ARHOST_DEVICE_CONTROL_MENU:
+        return "menu";
+    case ARHOST_DEVICE_CONTROL_BITMASK:
+        return "bitmask";
+    case ARHOST_DEVICE_CONTROL_BUTTON:
+        return "button";
+    default:
+        return "integer";
+    }
+}
+
+} // namespace arhost::ipc
