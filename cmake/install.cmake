@@ -25,7 +25,7 @@ install(DIRECTORY sdk/ DESTINATION share/arhost PATTERN target EXCLUDE PATTERN C
 
 # Examples and documentation
 install(DIRECTORY config DESTINATION share/arhost PATTERN README.md EXCLUDE)
-install(FILES docs/arhost.schema.json DESTINATION share/arhost)
+install(FILES docs/arhost.schema.json docs/devices.schema.json DESTINATION share/arhost)
 set(documentation share/doc/arhost)
 install(FILES LICENSE DESTINATION ${documentation} COMPONENT licence) # Debian has the text elsewhere
 # The documentation has the folders of the repository, so that its relative links work: all documents, copies of the files

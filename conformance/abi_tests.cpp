@@ -313,20 +313,25 @@ void devices(Context &context) {
             throw Failure(call_result("list", status, host));
         return listed ? listed->devices : std::vector<ipc::DeviceDescription>();
     };
+    // A camera may change the value of a control at any time, for example if it sets its gain automatically.
+    const auto without_values = [](std::vector<ipc::DeviceDescription> listed) {
+        for (ipc::DeviceDescription &device : listed)
+            for (ipc::DeviceControl &control : device.controls)
+                control.value.reset();
+        return listed;
+    };
     const std::vector<ipc::DeviceDescription> first = list();
     const ProcessUsage before = ProcessUsage::now();
     const std::vector<ipc::DeviceDescription> again = list();
     constexpr long allowed_kib = 4096;
     if (const std::string grown = growth(before, ProcessUsage::now(), allowed_kib); !grown.empty())
         throw Failure("listing the devices again, the process grew " + grown);
-    if (again != first)
+    if (without_values(again) != without_values(first))
         throw Failure("listing the devices again gives another list");
     std::size_t defaults = 0;
     for (std::size_t i = 0; i < first.size(); ++i) {
         if (first[i].index != i)
             throw Failure(fmt::format("device {} of the list has the index {}", i, first[i].index));
-        if (first[i].name.empty())
-            throw Failure(fmt::format("device {} has an empty name", i));
         defaults += first[i].is_default ? 1 : 0;
         context.note += (i > 0 ? ", " : "") + first[i].name;
     }
@@ -357,8 +362,10 @@ constexpr Test tests[] = {
      20s, two_instances},
     {"abi.create-1000-times", "1,000 create/destroy cycles, or 20 s of them, leak no descriptors, threads or memory.",
      0, "abi.create", 240s, create_repeatedly},
-    {"abi.devices", "It lists its devices repeatedly: in order of their index, at most one of them the default.", 0,
-     "abi.create", 60s, devices},
+    {"abi.devices",
+     "It lists its devices repeatedly: in order of their index, at most one of them the default, with valid states, "
+     "sizes, rates and ranges.",
+     0, "abi.create", 60s, devices},
     {"abi.cancelled-create", "After cancellation, create promptly returns OK or CANCELLED.", 0, "abi.create", 10s,
      cancelled},
 };

@@ -133,7 +133,10 @@ Json json_of(const DeviceDescription &d, const std::string &plugin) {
                      {"is_default", d.is_default}});
         break;
     case Section::displays:
-        json.update({{"name", d.name}, {"width", d.width}, {"height", d.height}, {"rate", d.rate}});
+        json.update({{"name", d.name},
+                     {"width", d.width > 0 ? Json(d.width) : Json()},
+                     {"height", d.height > 0 ? Json(d.height) : Json()},
+                     {"rate", d.rate > 0 ? Json(d.rate) : Json()}});
         break;
     }
     json["problem"] = problem;
@@ -155,14 +158,16 @@ std::string text_of(const DeviceFormat &format) {
     std::vector<std::string> sizes;
     for (const DeviceSize &size : format.sizes)
         sizes.push_back(fmt::format("{}×{}{}", size.width, size.height, text_of_rates(size.rates)));
-    return fmt::format("    {:<8}{}", format.pixel_format, fmt::join(sizes, format.is_size_range ? " to " : ", "));
+    if (sizes.empty())
+        return "    " + format.pixel_format;
+    return fmt::format("    {:<7} {}", format.pixel_format, fmt::join(sizes, format.is_size_range ? " to " : ", "));
 }
 
 std::string text_of(const DeviceControl &control) {
-    std::string text = fmt::format("    {:<32} {:<8}", control.name, ipc::control_type_text(control.type));
+    std::string text = fmt::format("    {:<31} {}", control.name, ipc::control_type_text(control.type));
     if (control.type == ARHOST_DEVICE_CONTROL_BUTTON)
         return text;
-    text += fmt::format("{} to {}", control.minimum, control.maximum);
+    text += fmt::format(" {} to {}", control.minimum, control.maximum);
     if (control.step > 1)
         text += fmt::format(" in steps of {}", control.step);
     text += fmt::format(", default {}", control.default_value);
@@ -173,8 +178,8 @@ std::string text_of(const DeviceControl &control) {
 std::string headline(const DeviceDescription &d, const std::string &plugin) {
     switch (section_of(d)) {
     case Section::cameras:
-        return fmt::format("camera {}: {}{}{} [{}]", d.path, d.name, d.serial.empty() ? "" : ", serial number ",
-                           d.serial, plugin);
+        return fmt::format("camera{}{}: {}{}{} [{}]", d.path.empty() ? "" : " ", d.path, d.name,
+                           d.serial.empty() ? "" : ", serial number ", d.serial, plugin);
     case Section::displays: {
         std::string text = "display: " + d.name;
         if (d.width > 0)

@@ -420,7 +420,7 @@ const std::string idle_sink = "class S:\n"
 TEST_F(ConformPython, RunsAScript) {
     ConformRun run;
     run.write("my.py", idle_tracker + "    def devices(self): return [{'name': 'first', 'is_default': True}, "
-                                      "{'name': 'second'}]\n");
+                                      "{'name': 'second', 'serial': 's-2'}]\n");
     EXPECT_EQ(run.run({"my.py", "--only", "abi.create,abi.devices,tracker.start"}), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("tracker_python"));
     EXPECT_THAT(run.output(), HasSubstr("pass     tracker.start"));

@@ -236,6 +236,16 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
     {"devices_without_index", "gives every device the index 0", "fail", {"abi.devices"}},
     {"two_default_devices", "lists two default devices", "fail", {"abi.devices"}},
     {"unnamed_device", "lists a device whose name is NULL", "fail", {"abi.devices"}},
+    {"device_without_state", "lists a device without a state", "fail", {"abi.devices"}},
+    {"busy_device_without_path", "lists a busy device without its node", "fail", {"abi.devices"}},
+    {"device_infinite_rate", "lists a camera with an infinite frame rate", "fail", {"abi.devices"}},
+    {"device_slowest_rate_first", "lists a camera with the slowest frame rate first", "fail", {"abi.devices"}},
+    {"device_empty_size", "lists a camera with a size of 0 px", "fail", {"abi.devices"}},
+    {"device_reversed_range",
+     "lists a camera with a control whose minimum is above its maximum",
+     "fail",
+     {"abi.devices"}},
+    {"device_formats_null", "lists a camera with formats at NULL", "fail", {"abi.devices"}},
 };
 
 } // namespace arhost::test

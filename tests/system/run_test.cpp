@@ -520,46 +520,6 @@ TEST(CommandLine, RejectsAnUnknownKindOfPage) {
     EXPECT_EQ(run.output(), "--generate: 'nonsense' is not one of man, bash, zsh, fish\n");
 }
 
-TEST(CommandLine, ListsDevicesOfPluginsThatSupportIt) {
-    ArhostRun run;
-    // Shader caches are written to the scratch folder.
-    run.start({"plugins", "--devices"}, [&] { ::setenv("XDG_CACHE_HOME", run.path("cache").c_str(), 1); });
-    EXPECT_EQ(run.wait(), 1) << "some test plugins are broken";
-    const std::string blank(19, ' '), output = run.output();
-    EXPECT_THAT(output,
-                HasSubstr("\n" + blank + "device 0: Abacus  [2J3000 (discrete GPU, 0d15c0de-0000)\n" + blank +
-                          "    counts: up, down\n" + blank + "device 1: Ten fingers (CPU), the default\nsource_"));
-    const auto lines_below = [&](const std::string &plugin) {
-        const std::size_t at = output.find("\n" + plugin + " ");
-        const std::size_t end = output.find("\n\n", at);
-        std::istringstream lines(output.substr(at + 1, end - at));
-        std::string line, found;
-        std::getline(lines, line); // the line with the plugin's name
-        while (std::getline(lines, line) && line.starts_with(blank))
-            found += line.substr(blank.size()) + "\n";
-        return found;
-    };
-    EXPECT_EQ(lines_below("tracker_counter"), "Tracks numbered frames, for tests.\n");
-    const std::string what = "Lists devices, for tests.\nneeds 'allow: [gpu]'\nneeds 'allow: [network]'\n";
-    EXPECT_EQ(lines_below("lister_none"), what + "found no device that the plugin can run on\n");
-    EXPECT_EQ(lines_below("lister_fail"), what + "cannot list the devices: the driver is too old\n");
-    EXPECT_EQ(lines_below("lister_broken"), what + "cannot list the devices: it reported a device without a name\n");
-    EXPECT_THAT(lines_below("lister_crash"),
-                testing::StartsWith(what + "cannot list the devices: killed by signal 11 "));
-    EXPECT_THAT(lines_below("lister_crash"), testing::EndsWith(" while it listed its devices\n"));
-    EXPECT_THAT(lines_below("lister_hang"),
-                testing::StartsWith(what + "cannot list the devices: did not respond within 20 s; "));
-    const std::string many = lines_below("lister_many"), text(256, '"');
-    EXPECT_THAT(many, testing::StartsWith(what + "device 0: " + text + "… (integrated GPU)\n    " + text + "…\n"));
-    EXPECT_THAT(many, HasSubstr("\ndevice 63: "));
-    EXPECT_THAT(many, testing::EndsWith("…\nand 9936 more\n"));
-
-    EXPECT_EQ(run.run({"plugins"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("lister_hang"));
-    EXPECT_THAT(run.output(), testing::AllOf(Not(HasSubstr("device 0")), Not(HasSubstr("its devices"))))
-        << "devices must be listed only with --devices";
-}
-
 TEST(CommandLine, ChecksAConfigurationWithoutRunningIt) {
     ArhostRun run(counting("lockstep", "frames: 5", "", ""));
     run.write("scene.yaml", small_scene);

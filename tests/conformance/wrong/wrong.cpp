@@ -572,9 +572,31 @@ arhost_status list_devices(const arhost_host *, arhost_take_device take, void *c
         return ARHOST_STATUS_ERROR_INTERNAL;
     if (has("devices_leak"))
         (void)::dup(0);
+    double rates[] = {30, 15};
+    arhost_device_size size{sizeof size, 640, 480, 2, 0, rates};
+    const arhost_device_format format{sizeof format, 1, 0, "yuyv", &size};
+    arhost_device_control control{sizeof control, ARHOST_DEVICE_CONTROL_INTEGER, 1, "gain", 0, 9, 1, 5, list};
+    if (has("device_infinite_rate"))
+        rates[0] = std::numeric_limits<double>::infinity();
+    if (has("device_slowest_rate_first"))
+        rates[0] = 1;
+    if (has("device_empty_size"))
+        size.height = 0;
+    if (has("device_reversed_range"))
+        control.minimum = 10;
     for (std::uint32_t i = 0; i < 2; ++i) {
-        arhost_device device{sizeof device, i,      ARHOST_DEVICE_CPU, i == 0, i == 0 ? "first" : "second",
-                             nullptr,       nullptr};
+        arhost_device device{};
+        device.struct_size = sizeof device;
+        device.index = i;
+        device.kind = ARHOST_DEVICE_CAMERA;
+        device.state = has("device_without_state") ? 0 : ARHOST_DEVICE_STATE_USABLE;
+        device.is_default = i == 0;
+        device.name = i == 0 ? "first" : "second";
+        device.formats = has("device_formats_null") ? nullptr : &format;
+        device.controls = &control;
+        device.format_count = device.control_count = 1;
+        if (has("busy_device_without_path"))
+            device.state = ARHOST_DEVICE_STATE_BUSY;
         if (has("devices_without_index"))
             device.index = 0;
         if (has("two_default_devices"))

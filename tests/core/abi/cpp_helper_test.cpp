@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <sstream>
+
 namespace {
 
 class Thrower {
@@ -18,8 +20,22 @@ public:
     static std::vector<arhost::Device> devices() {
         if (no_devices)
             throw arhost::Failure(ARHOST_STATUS_ERROR_IO, "no driver");
-        return {{3, ARHOST_DEVICE_VIRTUAL_GPU, true, "Thrower's", "a-b", "throws"},
-                {.index = 4, .kind = ARHOST_DEVICE_CPU, .name = "Else", .uuid = "", .abilities = ""}};
+        return {{.index = 3,
+                 .kind = ARHOST_DEVICE_VIRTUAL_GPU,
+                 .is_default = true,
+                 .name = "Thrower's",
+                 .serial = "a-b",
+                 .abilities = "throws"},
+                {.index = 4,
+                 .kind = ARHOST_DEVICE_CAMERA,
+                 .state = ARHOST_DEVICE_STATE_UNUSABLE,
+                 .name = "Else",
+                 .path = "/dev/else",
+                 .problem = "broken",
+                 .formats = {{"grey", {{4, 3, {30, 5}, true}}, false}, {"yuyv", {}, true}},
+                 .controls = {{"gain", ARHOST_DEVICE_CONTROL_INTEGER, -1, 9, 2, 3, 5},
+                              {"reset", ARHOST_DEVICE_CONTROL_BUTTON}}},
+                {.index = 5, .kind = ARHOST_DEVICE_DISPLAY, .name = "Screen", .width = 8, .height = 6, .rate = 60}};
     }
     static inline bool no_devices = false;
 };
@@ -81,8 +97,8 @@ TEST(CppHelper, ConvertsExceptionsToStatusesAndMessages) {
 }
 
 TEST(CppHelper, AddsTheDevicesExtensionToAClassWithDevices) {
-    EXPECT_EQ(arhost_plugin_object.get_extension("arhost.devices/2"), nullptr);
-    const void *extension = arhost_plugin_object.get_extension("arhost.devices/1");
+    EXPECT_EQ(arhost_plugin_object.get_extension("arhost.devices/1"), nullptr);
+    const void *extension = arhost_plugin_object.get_extension("arhost.devices/2");
     ASSERT_NE(extension, nullptr);
     const auto &devices = *static_cast<const arhost_devices *>(extension);
     EXPECT_EQ(devices.struct_size, sizeof(arhost_devices));
@@ -91,18 +107,42 @@ TEST(CppHelper, AddsTheDevicesExtensionToAClassWithDevices) {
     const arhost_take_device take = [](void *context, const arhost_device *device) {
         EXPECT_EQ(device->struct_size, sizeof(arhost_device));
         const auto text = [](const char *t) { return t ? std::string(t) : "none"; };
-        static_cast<std::vector<std::string> *>(context)->push_back(
-            std::to_string(device->index) + " " + std::to_string(device->kind) +
-            (device->is_default ? " default " : " ") + device->name + " " + text(device->uuid) + " " +
-            text(device->abilities));
+        std::ostringstream line;
+        line << device->index << " " << device->kind << " " << device->state
+             << (device->is_default ? " default " : " ") << device->name << " " << text(device->path) << " "
+             << text(device->serial) << " " << text(device->abilities) << " " << text(device->problem) << " "
+             << device->width << "x" << device->height << "@" << device->rate;
+        for (std::uint32_t f = 0; f < device->format_count; ++f) {
+            const arhost_device_format &format = device->formats[f];
+            EXPECT_EQ(format.struct_size, sizeof format);
+            line << " " << format.pixel_format << format.is_size_range;
+            for (std::uint32_t s = 0; s < format.size_count; ++s) {
+                const arhost_device_size &size = format.sizes[s];
+                EXPECT_EQ(size.struct_size, sizeof size);
+                line << ":" << size.width << "x" << size.height << "@" << size.is_rate_range;
+                for (std::uint32_t r = 0; r < size.rate_count; ++r)
+                    line << "," << size.rates[r];
+            }
+        }
+        for (std::uint32_t c = 0; c < device->control_count; ++c) {
+            const arhost_device_control &control = device->controls[c];
+            EXPECT_EQ(control.struct_size, sizeof control);
+            line << " " << control.name << control.type << ":" << control.minimum << ".." << control.maximum << "/"
+                 << control.step << " " << control.default_value << " " << control.has_value << control.value;
+        }
+        static_cast<std::vector<std::string> *>(context)->push_back(line.str());
     };
     ASSERT_EQ(devices.list(&host, take, &listed), ARHOST_STATUS_OK);
-    EXPECT_EQ(listed, (std::vector<std::string>{"3 3 default Thrower's a-b throws", "4 4 Else none none"}));
+    EXPECT_EQ(listed, (std::vector<std::string>{
+                          "3 3 1 default Thrower's none a-b throws none 0x0@0",
+                          "4 6 4 Else /dev/else none none broken 0x0@0 grey0:4x3@1,30,5 yuyv1 gain1:-1..9/2 3 15 "
+                          "reset5:0..0/0 0 00",
+                          "5 7 1 Screen none none none none 8x6@60"}));
 
     Thrower::no_devices = true;
     EXPECT_EQ(devices.list(&host, take, &listed), ARHOST_STATUS_ERROR_IO);
     EXPECT_EQ(logged, "no driver");
-    EXPECT_EQ(listed.size(), 2u);
+    EXPECT_EQ(listed.size(), 3u);
     Thrower::no_devices = false;
 }
 

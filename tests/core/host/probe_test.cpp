@@ -73,11 +73,11 @@ TEST_F(Probe, ListsDevices) {
     EXPECT_EQ(first.kind, ARHOST_DEVICE_DISCRETE_GPU);
     EXPECT_FALSE(first.is_default);
     EXPECT_EQ(first.name, "Abacus  [2J3000") << "control characters must be replaced";
-    EXPECT_EQ(first.uuid, "0d15c0de-0000");
+    EXPECT_EQ(first.serial, "0d15c0de-0000");
     EXPECT_EQ(first.abilities, "counts: up, down");
     EXPECT_EQ(second.index, 1u);
     EXPECT_TRUE(second.is_default);
-    EXPECT_EQ(second.uuid, "");
+    EXPECT_EQ(second.serial, "");
     EXPECT_EQ(list("lister_none").devices.size(), 0u);
 }
 
@@ -85,10 +85,25 @@ TEST_F(Probe, ReportsAPluginWithoutTheDevicesExtension) {
     EXPECT_EQ(std::get<std::optional<DeviceList>>(devices("tracker_counter")), std::nullopt);
 }
 
-TEST_F(Probe, LimitsDevicesToTheSizeOfAMessage) {
+TEST_F(Probe, ListsFormatsAndControls) {
+    const DeviceList listed = list("lister_cameras");
+    ASSERT_EQ(listed.devices.size(), 5u);
+    const DeviceDescription &camera = listed.devices[0];
+    EXPECT_EQ(camera.path, "/dev/video-eye");
+    ASSERT_EQ(camera.formats.size(), 3u);
+    EXPECT_EQ(camera.formats[0],
+              (DeviceFormat{"yuyv", false, {{640, 480, false, {30, 30000. / 1001, 7.5}}, {1280, 720, false, {30}}}}));
+    EXPECT_EQ(camera.formats[1], (DeviceFormat{"grey", true, {{32, 24, true, {60, 1}}, {4096, 3072, false, {}}}}));
+    ASSERT_EQ(camera.controls.size(), 3u);
+    EXPECT_EQ(camera.controls[0], (DeviceControl{"gain", ARHOST_DEVICE_CONTROL_INTEGER, -16, 16, 4, 0, 8}));
+    EXPECT_EQ(camera.controls[1], (DeviceControl{"mute", ARHOST_DEVICE_CONTROL_BOOLEAN, 0, 1, 1, 1, {}}));
+    EXPECT_EQ(listed.devices[4].rate, 59.94);
+}
+
+TEST_F(Probe, LimitsTheNumberAndTheTextsOfDevices) {
     const DeviceList listed = list("lister_many");
-    EXPECT_EQ(listed.devices.size(), max_devices);
-    EXPECT_EQ(listed.left_out, 10'000 - max_devices);
+    EXPECT_EQ(listed.devices.size(), std::size_t{ARHOST_MAX_DEVICES});
+    EXPECT_EQ(listed.left_out, 10'000u - ARHOST_MAX_DEVICES);
     EXPECT_EQ(listed.devices.back().name, std::string(max_device_text_size, '"') + "…");
 }
 
@@ -110,21 +125,4 @@ TEST_F(Probe, GrantsDevicesButNoNetwork) {
     EXPECT_EQ(with.devices.at(0).name, "with its shaders");
     EXPECT_EQ(with.devices.at(0).abilities, "no network");
     EXPECT_EQ(without.devices.at(0).name, "without its shaders");
-}
-
-TEST(DevicesFromJson, RejectsMalformedLists) {
-    const Json device = {{"index", 0}, {"kind", 1},  {"is_default", false},
-                         {"name", ""}, {"uuid", ""}, {"abilities", ""}};
-    const auto list = [](const Json &devices) { return Json{{"devices", devices}, {"left_out", 0}}; };
-    EXPECT_EQ(devices_from_json(list(Json::array({device}))).devices.size(), 1u);
-    EXPECT_THROW(devices_from_json(list(Json(max_devices + 1, device))), std::runtime_error);
-    EXPECT_THROW(devices_from_json(list(5)), std::exception);
-    for (const auto &[key, value] : {std::pair<const char *, Json>{"name", std::string(1000, 'x')},
-                                     {"uuid", nullptr},
-                                     {"index", "first"},
-                                     {"is_default", 2}}) {
-        Json wrong = device;
-        wrong[key] = value;
-        EXPECT_THROW(devices_from_json(list(Json::array({wrong}))), std::exception) << key;
-    }
 }

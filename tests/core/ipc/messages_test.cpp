@@ -111,9 +111,9 @@ TEST(Messages, PreserveWhatAWorkerReports) {
     EXPECT_EQ(received.sandbox, "level");
     EXPECT_EQ(sent(messages::Ready{format(), 30, lens()}).format.value().width, 64u);
     EXPECT_EQ(sent(messages::Ready{}).format, std::nullopt);
-    EXPECT_EQ(sent(messages::Devices{}).list.has_value(), false);
-    EXPECT_EQ(sent(messages::Devices{DeviceList{{{1, ARHOST_DEVICE_CPU, true, "n", "u", "a"}}, 2}}).list->left_out,
-              2u);
+    const std::string quotes(messages::Devices::max_part, '"');
+    EXPECT_EQ(sent(messages::Devices{quotes, false}).part, quotes);
+    EXPECT_EQ(sent(messages::Devices{"null", false}).is_last, false);
     EXPECT_EQ(sent(messages::Stopped{ARHOST_STATUS_ERROR_IO, "disk"}).status, ARHOST_STATUS_ERROR_IO);
     EXPECT_EQ(sent(messages::Failed{ARHOST_STATUS_ERROR_CONFIGURATION, "why"}).text, "why");
     EXPECT_EQ(sent(messages::Reads{"/a", "1:2"}).node, "1:2");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Tests a worker process with a plugin; the test takes the role of the host.
+#include "ipc/device_list.hpp"
 #include "supervise/process.hpp"
 
 #include "plugin_under_test.hpp"
@@ -60,7 +61,9 @@ TEST(Worker, ListsDevicesRepeatedlyBeforeCreate) {
     ASSERT_TRUE(hello);
     for (int i = 0; i < 2; ++i) {
         worker.process.send(messages::ListDevices{});
-        EXPECT_EQ(worker.next<messages::Devices>().value().list.value().devices.size(), 2u);
+        const auto answer = worker.next<messages::Devices>().value();
+        EXPECT_TRUE(answer.is_last);
+        EXPECT_EQ(devices_from_text(answer.part).value().devices.size(), 2u);
     }
     worker.process.send(messages::Create{default_options(*hello), messages::SourceSetup{}});
     EXPECT_TRUE(worker.next<messages::Ready>().value().format);

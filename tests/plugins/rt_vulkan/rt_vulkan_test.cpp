@@ -489,7 +489,7 @@ TEST(Device, IsListedByTheHost) {
 #endif
     ARHOST_REQUIRE_VULKAN();
     const std::unique_ptr<FILE, int (*)(FILE *)> pipe(
-        ::popen(ARHOST_BINARY_DIRECTORY "/bin/arhost plugins --devices 2>&1", "r"), ::pclose);
+        ::popen(ARHOST_BINARY_DIRECTORY "/bin/arhost devices rt_vulkan 2>&1", "r"), ::pclose);
     std::string text;
     for (char part[4096]; const std::size_t size = std::fread(part, 1, sizeof part, pipe.get());)
         text.append(part, size);

@@ -3,18 +3,22 @@
 // Captures from vivid, the kernel's virtual camera, and makes vivid inject faults. To be run in a virtual machine:
 //   tools/vm/run-in-vm -m "vivid n_devs=1 node_types=0x1" …/source_v4l2-vivid-test
 #include "../../system/arhost_run.hpp"
+#include "../../system/device_schema.hpp"
 #include "../source_file/source_under_test.hpp"
 #include "frame_colours.hpp"
 
 #include <gmock/gmock.h>
 
 #include <fcntl.h>
+#include <grp.h>
 #include <linux/videodev2.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <ctime>
 #include <fstream>
@@ -396,6 +400,112 @@ TEST_F(Vivid, ReportsACameraInUse) {
 TEST_F(Vivid, ListsCamerasIfTheConfiguredOneIsMissing) {
     EXPECT_EQ(start(30, {{"device", "/dev/video9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("/dev/video0 (vivid-000-vid-cap)"));
+}
+
+// ---- arhost devices ----------------------------------------------------------------------------------
+
+namespace {
+
+// Returns the entry of the camera `device` in the output of `arhost devices --json`, run by the user with this id.
+nlohmann::json listed_camera(const char *node, uid_t user = 0) {
+    arhost::test::ArhostRun run;
+    run.start({"devices", "--json", "source_v4l2"}, [user] {
+        if (user != 0 && (setgroups(0, nullptr) != 0 || setgid(user) != 0 || setuid(user) != 0))
+            _exit(126);
+    });
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    const nlohmann::json json = nlohmann::json::parse(run.messages(), nullptr, false);
+    EXPECT_FALSE(json.is_discarded()) << run.messages();
+    if (json.is_discarded())
+        return {};
+    if (arhost::test::can_validate()) {
+        EXPECT_EQ(arhost::test::schema_violation(json), "");
+    }
+    for (const nlohmann::json &camera : json["cameras"])
+        if (camera["path"] == node)
+            return camera;
+    ADD_FAILURE() << run.output();
+    return {};
+}
+
+nlohmann::json named(const nlohmann::json &list, const char *key, const char *name) {
+    for (const nlohmann::json &entry : list)
+        if (entry[key] == name)
+            return entry;
+    return {};
+}
+
+} // namespace
+
+TEST_F(Vivid, IsListedWithFormatsSizesRatesAndControls) {
+    constexpr std::uint32_t bitmask = 0x0098f906; // its range exceeds 31 bits
+    set(bitmask, static_cast<int>(0x80000010));
+    const nlohmann::json camera = listed_camera(device);
+    EXPECT_EQ(camera["plugin"], "source_v4l2");
+    EXPECT_EQ(camera["name"], "vivid");
+    EXPECT_EQ(camera["serial"], nullptr) << "it is no USB device";
+    EXPECT_EQ(camera["problem"], nullptr);
+    for (const char *format : {"yuyv", "uyvy", "nv12", "yuv420", "rgb24", "bgr24", "grey", "y10", "y12", "y16"}) {
+        const nlohmann::json sizes = named(camera["formats"], "pixel_format", format)["sizes"];
+        ASSERT_EQ(sizes.size(), 6u) << format;
+        EXPECT_EQ(sizes[0]["width"], 320);
+        EXPECT_EQ(sizes[0]["height"], 180);
+        EXPECT_EQ(sizes[0]["rates"],
+                  nlohmann::json({60.0, 50.0, 40.0, 30.0, 25.0, 15.0, 12.5, 10.0, 5.0, 4.0, 2.0, 1.0}));
+        EXPECT_EQ(sizes[5]["width"], 3840);
+        EXPECT_EQ(sizes[5]["rates"], nlohmann::json({2.0, 1.0}));
+    }
+    set(V4L2_CID_BRIGHTNESS, 200);
+    EXPECT_EQ(named(listed_camera(device)["controls"], "name", "brightness"), nlohmann::json({{"name", "brightness"},
+                                                                                              {"type", "integer"},
+                                                                                              {"minimum", 0},
+                                                                                              {"maximum", 255},
+                                                                                              {"step", 1},
+                                                                                              {"default", 128},
+                                                                                              {"value", 200}}));
+    EXPECT_EQ(named(camera["controls"], "name", "bitmask")["value"], 0x80000010u);
+    EXPECT_EQ(named(camera["controls"], "name", "horizontal_flip")["type"], "boolean");
+    EXPECT_EQ(named(camera["controls"], "name", "test_pattern")["value"], 1) << "as SetUp has set it";
+    EXPECT_EQ(named(camera["controls"], "name", "disconnect")["type"], "button");
+    EXPECT_EQ(named(camera["controls"], "name", "disconnect")["value"], nullptr);
+}
+
+TEST_F(Vivid, ABusyCameraNamesTheProcessAndKeepsCapturing) {
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    const std::string self =
+        std::string(program_invocation_short_name).substr(0, 15) + " (process " + std::to_string(getpid()) + ")";
+    const nlohmann::json camera = listed_camera(device);
+    EXPECT_EQ(camera["problem"], "in use by " + self);
+    EXPECT_GE(camera["formats"].size(), 10u) << "a camera in use can still be described";
+    EXPECT_EQ(source_.read(1).status, ARHOST_STATUS_OK);
+    source_.stop();
+    EXPECT_EQ(listed_camera(device)["problem"], nullptr) << "open, but not capturing";
+}
+
+// vivid's nodes belong to root. udev would change the group to `video` and the mode to 0660.
+TEST_F(Vivid, AForbiddenCameraNamesTheGroup) {
+    const group *video = getgrnam("video");
+    ASSERT_TRUE(video);
+    ASSERT_EQ(chown(device, 0, video->gr_gid), 0);
+    ASSERT_EQ(chmod(device, 0660), 0);
+    const nlohmann::json camera = listed_camera(device, 1000);
+    EXPECT_EQ(camera["problem"],
+              "only the group 'video' may open it: run 'sudo usermod -aG video $USER', then log in again");
+    EXPECT_EQ(camera["name"], "vivid-000-vid-cap") << "the name is known without opening it";
+    EXPECT_EQ(camera["formats"].size(), 0u);
+    ASSERT_EQ(chmod(device, 0600), 0);
+    EXPECT_EQ(listed_camera(device, 1000)["problem"], "only the user 'root' may open it");
+    EXPECT_EQ(listed_camera(device)["problem"], nullptr) << "root may open it";
+}
+
+// An ordinary user cannot see the files of other users' processes.
+TEST_F(Vivid, ABusyCameraOfAnotherUserSaysHowToFindTheProcess) {
+    ASSERT_EQ(chmod(device, 0666), 0);
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    EXPECT_EQ(listed_camera(device, 1000)["problem"],
+              "in use by a program of another user; 'sudo fuser -v /dev/video0' shows it");
+    ASSERT_EQ(chmod(device, 0600), 0);
 }
 
 // As udev creates them; they name the camera even if its node gets another number.

@@ -17,6 +17,7 @@ static void report(arhost_take_device take, void *context, uint32_t index, const
     device.struct_size = sizeof device;
     device.index = index;
     device.kind = ARHOST_DEVICE_INTEGRATED_GPU;
+    device.state = ARHOST_DEVICE_STATE_USABLE;
     device.name = name;
     device.abilities = abilities;
     take(context, &device);
@@ -69,6 +70,67 @@ static inline arhost_status list_gpu(const arhost_host *host, arhost_take_device
     (void)host;
     report(take, context, 0, end && !strcmp(end, "/" ID) ? "with its shaders" : "without its shaders",
            socket(AF_INET, SOCK_STREAM, 0) < 0 ? "no network" : "the network");
+    return ARHOST_STATUS_OK;
+}
+/* Lists cameras and displays in every state. /dev/full and /dev/null stand for nodes of cameras. */
+static inline arhost_status list_cameras(const arhost_host *host, arhost_take_device take, void *context) {
+    static const double rates[] = {30, 30000. / 1001, 7.5}, ends[] = {60, 1};
+    static const arhost_device_size sizes[] = {{sizeof(arhost_device_size), 640, 480, 3, 0, rates},
+                                               {sizeof(arhost_device_size), 1280, 720, 1, 0, rates}};
+    static const arhost_device_size range[] = {{sizeof(arhost_device_size), 32, 24, 2, 1, ends},
+                                               {sizeof(arhost_device_size), 4096, 3072, 0, 0, NULL}};
+    static const arhost_device_format formats[] = {{sizeof(arhost_device_format), 2, 0, "yuyv", sizes},
+                                                   {sizeof(arhost_device_format), 2, 1, "grey", range},
+                                                   {sizeof(arhost_device_format), 0, 0, "mjpeg", NULL}};
+    static const arhost_device_control controls[] = {
+        {sizeof(arhost_device_control), ARHOST_DEVICE_CONTROL_INTEGER, 1, "gain", -16, 16, 4, 0, 8},
+        {sizeof(arhost_device_control), ARHOST_DEVICE_CONTROL_BOOLEAN, 0, "mute", 0, 1, 1, 1, 0},
+        {sizeof(arhost_device_control), ARHOST_DEVICE_CONTROL_BUTTON, 0, "reset", 0, 0, 0, 0, 0}};
+    arhost_device device;
+    (void)host;
+    memset(&device, 0, sizeof device);
+    device.struct_size = sizeof device;
+    device.kind = ARHOST_DEVICE_CAMERA;
+    device.state = ARHOST_DEVICE_STATE_USABLE;
+    device.is_default = 1;
+    device.name = "Eye";
+    device.path = "/dev/video-eye";
+    device.serial = "0042";
+    device.format_count = 3;
+    device.formats = formats;
+    device.control_count = 3;
+    device.controls = controls;
+    take(context, &device);
+
+    memset(&device, 0, sizeof device);
+    device.struct_size = sizeof device;
+    device.kind = ARHOST_DEVICE_CAMERA;
+    device.index = 1;
+    device.state = ARHOST_DEVICE_STATE_BUSY;
+    device.name = "Taken";
+    device.path = "/dev/full";
+    take(context, &device);
+    device.index = 2;
+    device.state = ARHOST_DEVICE_STATE_FORBIDDEN;
+    device.name = "Private";
+    device.path = "/dev/null";
+    take(context, &device);
+    device.index = 3;
+    device.state = ARHOST_DEVICE_STATE_UNUSABLE;
+    device.name = "Broken";
+    device.path = NULL;
+    device.problem = "no lens";
+    take(context, &device);
+
+    device.kind = ARHOST_DEVICE_DISPLAY;
+    device.index = 4;
+    device.state = ARHOST_DEVICE_STATE_USABLE;
+    device.name = "Screen";
+    device.problem = NULL;
+    device.width = 1920;
+    device.height = 1080;
+    device.rate = 59.94;
+    take(context, &device);
     return ARHOST_STATUS_OK;
 }
 

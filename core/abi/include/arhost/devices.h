@@ -20,8 +20,8 @@ extern "C" {
 
 #define ARHOST_DEVICES_EXTENSION "arhost.devices/2"
 
-/* The host ignores what exceeds these limits, and displays at most 256 bytes of each string. The whole list is at most
- * 4 MiB of JSON. */
+/* The host ignores what exceeds these limits, and displays at most 256 bytes of each string. The whole list is at
+ * most 4 MiB of JSON. */
 enum {
     ARHOST_MAX_DEVICES = 64,
     ARHOST_MAX_DEVICE_FORMATS = 128,  /* per device */
