@@ -137,6 +137,8 @@ public:
     template <class Functions> const Functions &functions() const {
         return *static_cast<const Functions *>(plugin_->functions);
     }
+    const void *extension(const char *id) const { return plugin_->get_extension(id); }
+    const arhost_host *host() const { return &host_; }
     const arhost_descriptor &descriptor() const { return *plugin_->descriptor; }
     arhost_instance *instance() const { return instance_; }
     // Makes the host's function `cancelled` return true after `after` more calls.

@@ -224,6 +224,37 @@ TEST_F(SinkWindow, CanBeReopened) {
     }
 }
 
+namespace {
+
+// Returns the devices of the sink as "name width×height problem".
+std::vector<std::string> listed_displays() {
+    const PluginUnderTest plugin("sink_window");
+    const auto *devices = static_cast<const arhost_devices *>(plugin.extension(ARHOST_DEVICES_EXTENSION));
+    std::vector<std::string> listed;
+    const auto take = [](void *context, const arhost_device *d) {
+        EXPECT_EQ(d->kind, ARHOST_DEVICE_DISPLAY);
+        static_cast<std::vector<std::string> *>(context)->push_back(
+            std::string(d->name) + " " + std::to_string(d->width) + "×" + std::to_string(d->height) + " " +
+            (d->problem ? d->problem : "usable"));
+    };
+    EXPECT_EQ(devices->list(plugin.host(), take, &listed), ARHOST_STATUS_OK);
+    return listed;
+}
+
+} // namespace
+
+TEST_F(SinkWindow, ListsTheScreen) {
+    keep_libraries();
+    EXPECT_THAT(listed_displays(), testing::ElementsAre("screen 640×480 usable"));
+    EXPECT_THAT(listed_displays(), testing::ElementsAre("screen 640×480 usable"));
+}
+
+TEST(SinkWindowWithoutScreen, ListsADisplayWithItsProblem) {
+    unsetenv("DISPLAY");
+    EXPECT_THAT(listed_displays(),
+                testing::ElementsAre(AllOf(testing::StartsWith("desktop 0×0 "), HasSubstr("DISPLAY"))));
+}
+
 TEST(SinkWindowWithoutScreen, NamesWhatIsMissingAndWhatToTry) {
     for (const char *display : {"", ":54321"}) {
         setenv("DISPLAY", display, 1);

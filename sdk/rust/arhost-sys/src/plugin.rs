@@ -87,14 +87,73 @@ impl Options<'_> {
 }
 
 /// A device that the plugin can run on: the fields of `arhost_device`, with "" for NULL.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Device {
     pub index: u32,
     pub kind: arhost_device_kind,
+    pub state: arhost_device_state,
     pub is_default: bool,
     pub name: String,
-    pub uuid: String,
+    pub path: String,
+    pub serial: String,
     pub abilities: String,
+    pub problem: String,
+    /// Cameras.
+    pub formats: Vec<DeviceFormat>,
+    /// Cameras.
+    pub controls: Vec<DeviceControl>,
+    /// Displays: px.
+    pub width: u32,
+    /// Displays: px.
+    pub height: u32,
+    /// Displays: refreshes per second.
+    pub rate: f64,
+}
+impl Default for Device {
+    fn default() -> Self {
+        Device {
+            index: 0,
+            kind: ARHOST_DEVICE_OTHER,
+            state: ARHOST_DEVICE_STATE_USABLE,
+            is_default: false,
+            name: String::new(),
+            path: String::new(),
+            serial: String::new(),
+            abilities: String::new(),
+            problem: String::new(),
+            formats: Vec::new(),
+            controls: Vec::new(),
+            width: 0,
+            height: 0,
+            rate: 0.0,
+        }
+    }
+}
+/// A pixel format of a camera: the fields of `arhost_device_format`.
+#[derive(Clone, Debug, Default)]
+pub struct DeviceFormat {
+    pub pixel_format: String,
+    pub sizes: Vec<DeviceSize>,
+    pub is_size_range: bool,
+}
+/// A picture size of a camera: the fields of `arhost_device_size`.
+#[derive(Clone, Debug, Default)]
+pub struct DeviceSize {
+    pub width: u32,
+    pub height: u32,
+    pub rates: Vec<f64>,
+    pub is_rate_range: bool,
+}
+/// A control of a camera: the fields of `arhost_device_control`.
+#[derive(Clone, Debug, Default)]
+pub struct DeviceControl {
+    pub name: String,
+    pub type_: arhost_device_control_type,
+    pub minimum: i64,
+    pub maximum: i64,
+    pub step: i64,
+    pub default_value: i64,
+    pub value: Option<i64>,
 }
 
 /// Lists the devices that a plugin can run on, before an instance exists (arhost/devices.h).
@@ -102,7 +161,7 @@ pub type ListDevices = fn(Host) -> Result<Vec<Device>, Failure>;
 
 /// Common to all kinds of plugin.
 pub trait Plugin: Sized {
-    /// The extension "arhost.devices/1": `Some(list)` if the user can choose among devices.
+    /// The extension "arhost.devices/2": `Some(list)` if the user can choose among devices.
     const DEVICES: Option<ListDevices> = None;
     fn new(host: Host, options: &Options) -> Result<Self, Failure>;
     fn stop(&mut self) -> Result<(), Failure> {
@@ -336,28 +395,78 @@ unsafe extern "C" fn list_devices<T: Plugin>(
     take: arhost_take_device,
     context: *mut c_void,
 ) -> arhost_status {
-    let c_text = |text: &str| CString::new(text.replace('\0', " ")).unwrap_or_default();
-    let or_null = |text: &CString| if text.as_bytes().is_empty() { std::ptr::null() } else { text.as_ptr() };
     guarded(Host(host), || {
         let list = T::DEVICES.map_or(Ok(Vec::new()), |list| list(Host(host)))?;
-        for device in list {
-            let (name, uuid) = (c_text(&device.name), c_text(&device.uuid));
-            let abilities = c_text(&device.abilities);
-            let device = arhost_device {
-                struct_size: std::mem::size_of::<arhost_device>() as u32,
-                index: device.index,
-                kind: device.kind,
-                is_default: device.is_default.into(),
-                name: name.as_ptr(),
-                uuid: or_null(&uuid),
-                abilities: or_null(&abilities),
-            };
-            if let Some(take) = take {
-                take(context, &device);
-            }
+        if let Some(take) = take {
+            list.iter().for_each(|device| report(device, take, context));
         }
         Ok(ARHOST_STATUS_OK)
     })
+}
+unsafe fn report(d: &Device, take: unsafe extern "C" fn(*mut c_void, *const arhost_device), context: *mut c_void) {
+    let c_text = |text: &str| CString::new(text.replace('\0', " ")).unwrap_or_default();
+    let or_null = |text: &CString| {
+        if text.as_bytes().is_empty() {
+            std::ptr::null()
+        } else {
+            text.as_ptr()
+        }
+    };
+    let c_size = |s: &DeviceSize| arhost_device_size {
+        struct_size: std::mem::size_of::<arhost_device_size>() as u32,
+        width: s.width,
+        height: s.height,
+        rate_count: s.rates.len() as u32,
+        is_rate_range: s.is_rate_range.into(),
+        rates: s.rates.as_ptr(),
+    };
+    let sizes: Vec<Vec<arhost_device_size>> = d.formats.iter().map(|f| f.sizes.iter().map(c_size).collect()).collect();
+    let format_names: Vec<CString> = d.formats.iter().map(|f| c_text(&f.pixel_format)).collect();
+    let formats: Vec<arhost_device_format> = (0..d.formats.len())
+        .map(|i| arhost_device_format {
+            struct_size: std::mem::size_of::<arhost_device_format>() as u32,
+            size_count: sizes[i].len() as u32,
+            is_size_range: d.formats[i].is_size_range.into(),
+            pixel_format: format_names[i].as_ptr(),
+            sizes: sizes[i].as_ptr(),
+        })
+        .collect();
+    let control_names: Vec<CString> = d.controls.iter().map(|c| c_text(&c.name)).collect();
+    let controls: Vec<arhost_device_control> = (d.controls.iter().zip(&control_names))
+        .map(|(c, name)| arhost_device_control {
+            struct_size: std::mem::size_of::<arhost_device_control>() as u32,
+            type_: c.type_,
+            has_value: c.value.is_some().into(),
+            name: name.as_ptr(),
+            minimum: c.minimum,
+            maximum: c.maximum,
+            step: c.step,
+            default_value: c.default_value,
+            value: c.value.unwrap_or(0),
+        })
+        .collect();
+    let (name, path, serial) = (c_text(&d.name), c_text(&d.path), c_text(&d.serial));
+    let (abilities, problem) = (c_text(&d.abilities), c_text(&d.problem));
+    let device = arhost_device {
+        struct_size: std::mem::size_of::<arhost_device>() as u32,
+        index: d.index,
+        kind: d.kind,
+        state: d.state,
+        is_default: d.is_default.into(),
+        format_count: formats.len() as u32,
+        control_count: controls.len() as u32,
+        width: d.width,
+        height: d.height,
+        rate: d.rate,
+        name: name.as_ptr(),
+        path: or_null(&path),
+        serial: or_null(&serial),
+        abilities: or_null(&abilities),
+        problem: or_null(&problem),
+        formats: formats.as_ptr(),
+        controls: controls.as_ptr(),
+    };
+    take(context, &device);
 }
 
 #[doc(hidden)]

@@ -8,8 +8,24 @@ use std::os::raw::{c_char, c_void};
 struct Window;
 
 fn list(_: Host) -> Result<Vec<Device>, Failure> {
-    let first = Device { kind: ARHOST_DEVICE_CPU, name: "first".into(), ..Device::default() };
-    let second = Device { index: 1, is_default: true, name: "second".into(), uuid: "u-2".into(), ..first.clone() };
+    let size = DeviceSize { width: 4, height: 3, rates: vec![30.0, 15.0], ..DeviceSize::default() };
+    let first = Device {
+        kind: ARHOST_DEVICE_CAMERA,
+        name: "first".into(),
+        formats: vec![DeviceFormat { pixel_format: "grey".into(), sizes: vec![size; 2], ..DeviceFormat::default() }],
+        controls: vec![DeviceControl { name: "gain".into(), type_: 1, value: Some(7), ..DeviceControl::default() }],
+        ..Device::default()
+    };
+    let second = Device {
+        kind: ARHOST_DEVICE_CPU,
+        index: 1,
+        state: ARHOST_DEVICE_STATE_UNUSABLE,
+        is_default: true,
+        name: "second".into(),
+        serial: "u-2".into(),
+        problem: "too hot".into(),
+        ..Device::default()
+    };
     Ok(vec![first, second])
 }
 
@@ -44,7 +60,19 @@ unsafe extern "C" fn take(context: *mut c_void, device: *const arhost_device) {
     };
     let seen = &mut *context.cast::<Vec<String>>();
     let d = &*device;
-    seen.push(format!("{} {} {} {}", d.index, d.is_default, text(d.name), text(d.uuid)));
+    let (serial, problem) = (text(d.serial), text(d.problem));
+    let mut line = format!("{} {} {} {} {} {}", d.index, d.state, d.is_default, text(d.name), serial, problem);
+    for f in std::slice::from_raw_parts(d.formats, d.format_count as usize) {
+        line += &format!(" {}", text(f.pixel_format));
+        for s in std::slice::from_raw_parts(f.sizes, f.size_count as usize) {
+            let rates = std::slice::from_raw_parts(s.rates, s.rate_count as usize);
+            line += &format!(" {}x{} {:?}", s.width, s.height, rates);
+        }
+    }
+    for c in std::slice::from_raw_parts(d.controls, d.control_count as usize) {
+        line += &format!(" {} {} {} {}", text(c.name), c.type_, c.has_value, c.value);
+    }
+    seen.push(line);
 }
 
 #[test]
@@ -69,5 +97,8 @@ fn the_extension_lists_the_devices() {
         let context = (&mut seen as *mut Vec<String>).cast();
         assert_eq!(((*devices).list.unwrap())(std::ptr::null(), Some(take), context), ARHOST_STATUS_OK);
     }
-    assert_eq!(seen, ["0 0 first none", "1 1 second u-2"]);
+    assert_eq!(
+        seen,
+        ["0 1 0 first none none grey 4x3 [30.0, 15.0] 4x3 [30.0, 15.0] gain 1 1 7", "1 4 1 second u-2 too hot"]
+    );
 }
