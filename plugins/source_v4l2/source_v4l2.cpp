@@ -421,7 +421,7 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "power_line_frequency", "",
            "Frequency of the lamps, to avoid flicker: disabled, 50_hz, 60_hz or auto; not set: unchanged."),
     option(ARHOST_OPTION_TEXT, "controls", "",
-           "Further controls by the names that v4l2-ctl -l lists: 'sharpness=3, backlight_compensation=1'."),
+           "Further controls by the names that arhost devices lists: 'sharpness=3, backlight_compensation=1'."),
 };
 constexpr const char *needs[] = {"video", nullptr};
 

@@ -409,6 +409,9 @@ TEST(CommandLine, HelpDescribesCommands) {
         EXPECT_THAT(run.output(), HasSubstr(line));
     EXPECT_EQ(run.run({"help", "check"}), 0);
     EXPECT_THAT(run.output(), HasSubstr("Usage: arhost check [OPTIONS] FILE"));
+    EXPECT_EQ(run.run({"help", "devices"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("Usage: arhost devices [OPTIONS] [PLUGIN...]"));
+    EXPECT_EQ(run.run({"plugins", "--devices"}), 2) << "replaced with 'arhost devices'";
     EXPECT_EQ(run.run({"help", "conform"}), 0);
     EXPECT_THAT(run.output(), HasSubstr("Usage: arhost conform [OPTIONS] [PLUGIN]"));
     EXPECT_EQ(run.run({"help", "help"}), 0);
@@ -448,6 +451,9 @@ TEST(CommandLine, CompletesInBash) {
     EXPECT_EQ(completed("arhost check --no"), "--no-open ");
     EXPECT_EQ(completed("arhost new-plugin ra"), "raytracer ");
     EXPECT_EQ(completed("arhost new-plugin raytracer x --language py"), "python ");
+    EXPECT_EQ(completed("arhost dev"), "devices ");
+    EXPECT_EQ(completed("arhost devices --js"), "--json ");
+    EXPECT_EQ(completed("arhost plugins --dev"), " ");
     EXPECT_EQ(completed("arhost help rep"), "replay ");
     EXPECT_EQ(completed("arhost conform --timeo"), "--timeout-factor ");
     EXPECT_EQ(completed("arhost conform plugins/"), "plugins/x.so ");

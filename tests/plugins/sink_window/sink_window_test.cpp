@@ -249,6 +249,12 @@ TEST_F(SinkWindow, ListsTheScreen) {
     EXPECT_THAT(listed_displays(), testing::ElementsAre("screen 640×480 usable"));
 }
 
+TEST_F(SinkWindow, ListsAScreenWithoutOpenGlAsUnusable) {
+    const XServer server(screen_width, screen_height, false);
+    setenv("DISPLAY", server.name().c_str(), 1);
+    EXPECT_THAT(listed_displays(), testing::ElementsAre(testing::StartsWith("desktop 0×0 no OpenGL 2.1: ")));
+}
+
 TEST(SinkWindowWithoutScreen, ListsADisplayWithItsProblem) {
     unsetenv("DISPLAY");
     EXPECT_THAT(listed_displays(),

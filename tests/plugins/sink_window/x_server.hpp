@@ -28,7 +28,7 @@ constexpr const char *xvfb_path = "/usr/bin/Xvfb";
 
 class XServer {
 public:
-    XServer(int width, int height) {
+    XServer(int width, int height, bool has_opengl = true) {
         int ends[2];
         if (pipe(ends) != 0)
             throw std::runtime_error("pipe");
@@ -41,7 +41,7 @@ public:
             dup2(nowhere, STDERR_FILENO);
             // With -displayfd, Xvfb chooses a free display number and writes it to the pipe when it is ready.
             execl(xvfb_path, "Xvfb", "-displayfd", number_fd.c_str(), "-screen", "0", screen.c_str(), "-nolisten",
-                  "tcp", nullptr);
+                  "tcp", has_opengl ? "+extension" : "-extension", "GLX", nullptr);
             _exit(127);
         }
         ::close(ends[1]);

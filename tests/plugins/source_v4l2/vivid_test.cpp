@@ -470,6 +470,13 @@ TEST_F(Vivid, IsListedWithFormatsSizesRatesAndControls) {
     EXPECT_EQ(named(camera["controls"], "name", "disconnect")["value"], nullptr);
 }
 
+TEST_F(Vivid, IsListedRepeatedlyWithoutLeaks) {
+    arhost::test::ArhostRun run;
+    EXPECT_EQ(run.run({"conform", "source_v4l2", "--allow", "video", "--only", "abi.create,abi.devices"}), 0)
+        << run.output();
+    EXPECT_THAT(run.output(), testing::ContainsRegex("pass     abi.devices\\s+vivid"));
+}
+
 TEST_F(Vivid, IsDescribedAsTheSchemaDemands) {
     if (!arhost::test::can_validate())
         GTEST_SKIP() << "Debian's package python3-jsonschema is not installed";
