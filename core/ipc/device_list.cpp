@@ -47,10 +47,11 @@ std::vector<const T *> elements(const T *first, std::size_t count, std::size_t l
     return found;
 }
 
-template <class T, class Field> constexpr std::size_t end_of(std::size_t offset, Field T::*) {
-    return offset + sizeof(Field);
-}
-#define END_OF(type, field) end_of(offsetof(type, field), &type::field)
+// The sizes of the structs in revision 2 of the extension.
+constexpr std::size_t size_of_size = offsetof(arhost_device_size, rates) + sizeof(void *);
+constexpr std::size_t size_of_format = offsetof(arhost_device_format, sizes) + sizeof(void *);
+constexpr std::size_t size_of_control = offsetof(arhost_device_control, value) + sizeof(std::int64_t);
+constexpr std::size_t size_of_device = offsetof(arhost_device, controls) + sizeof(void *);
 
 DeviceSize describe(const arhost_device_size &size) {
     if (size.rate_count > 0 && !size.rates)
@@ -61,8 +62,7 @@ DeviceSize describe(const arhost_device_size &size) {
 
 DeviceFormat describe(const arhost_device_format &format) {
     DeviceFormat copy{text_of(format.pixel_format), format.is_size_range != 0, {}};
-    for (const auto *size : elements(format.sizes, format.size_count, ARHOST_MAX_DEVICE_SIZES,
-                                     END_OF(arhost_device_size, rates), "sizes"))
+    for (const auto *size : elements(format.sizes, format.size_count, ARHOST_MAX_DEVICE_SIZES, size_of_size, "sizes"))
         copy.sizes.push_back(describe(*size));
     return copy;
 }
@@ -239,7 +239,7 @@ DeviceDescription device_from(const Json &json) {
 DeviceDescription describe(const arhost_device *device) {
     if (!device)
         reject("a device that is NULL");
-    if (device->struct_size < END_OF(arhost_device, controls))
+    if (device->struct_size < size_of_device)
         reject("a device whose struct_size is too small");
     DeviceDescription copy{device->index,
                            device->kind,
@@ -255,11 +255,11 @@ DeviceDescription describe(const arhost_device *device) {
                            device->width,
                            device->height,
                            device->rate};
-    for (const auto *format : elements(device->formats, device->format_count, ARHOST_MAX_DEVICE_FORMATS,
-                                       END_OF(arhost_device_format, sizes), "formats"))
+    for (const auto *format :
+         elements(device->formats, device->format_count, ARHOST_MAX_DEVICE_FORMATS, size_of_format, "formats"))
         copy.formats.push_back(describe(*format));
-    for (const auto *control : elements(device->controls, device->control_count, ARHOST_MAX_DEVICE_CONTROLS,
-                                        END_OF(arhost_device_control, value), "controls"))
+    for (const auto *control :
+         elements(device->controls, device->control_count, ARHOST_MAX_DEVICE_CONTROLS, size_of_control, "controls"))
         copy.controls.push_back(describe(*control));
     check(copy);
     return copy;

@@ -8,6 +8,7 @@
 #include <link.h>
 
 #include <chrono>
+#include <cstdio>
 #include <functional>
 #include <thread>
 
@@ -247,6 +248,19 @@ TEST_F(SinkWindow, ListsTheScreen) {
     keep_libraries();
     EXPECT_THAT(listed_displays(), testing::ElementsAre("screen 640×480 usable"));
     EXPECT_THAT(listed_displays(), testing::ElementsAre("screen 640×480 usable"));
+}
+
+// In a worker, whose sandbox has a socket of the X server only with the permission `display`.
+TEST_F(SinkWindow, HasAScreenThatTheHostLists) {
+#if defined(__SANITIZE_ADDRESS__)
+    GTEST_SKIP() << "the leak checker would report leaks of OpenGL drivers, and arhost would fail";
+#endif
+    const std::unique_ptr<FILE, int (*)(FILE *)> pipe(
+        ::popen(ARHOST_BINARY_DIRECTORY "/bin/arhost devices sink_window 2>&1", "r"), ::pclose);
+    std::string text;
+    for (char part[4096]; const std::size_t size = std::fread(part, 1, sizeof part, pipe.get());)
+        text.append(part, size);
+    EXPECT_THAT(text, HasSubstr("display: screen, 640×480 [sink_window]\n"));
 }
 
 TEST_F(SinkWindow, ListsAScreenWithoutOpenGlAsUnusable) {
