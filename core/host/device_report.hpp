@@ -12,7 +12,7 @@
 
 namespace arhost::host {
 
-// What `arhost devices` has learned from one plugin.
+// The answer of one plugin to `arhost devices`.
 struct PluginDevices {
     std::string plugin;
     arhost_kind kind = 0;
