@@ -292,6 +292,26 @@ void cancelled(Context &context) {
                                   instance.get() ? " not" : ""));
 }
 
+void set_option(Context &context) {
+    const arhost_plugin &plugin = context.library.plugin();
+    const auto *extension = static_cast<const arhost_set_option *>(plugin.get_extension(ARHOST_SET_OPTION_EXTENSION));
+    if (!extension)
+        throw Skip("it does not have the extension " ARHOST_SET_OPTION_EXTENSION);
+    if (extension->struct_size < sizeof *extension || !extension->set || !extension->keys)
+        throw Failure("the extension " ARHOST_SET_OPTION_EXTENSION " is too short, or a member is NULL");
+    const std::vector<const arhost_option_descriptor *> options = ipc::options_of(*plugin.descriptor);
+    for (const char *const *key = extension->keys; *key; ++key) {
+        const auto declared =
+            std::find_if(options.begin(), options.end(),
+                         [&](const arhost_option_descriptor *option) { return !std::strcmp(option->key, *key); });
+        if (declared == options.end())
+            throw Failure(fmt::format("it accepts changes of '{}', which is not one of its options", *key));
+        if ((*declared)->type >= ARHOST_OPTION_INPUT_PATH)
+            throw Failure(fmt::format("it accepts changes of '{}', which is a path or an address", *key));
+        context.note += (key == extension->keys ? "" : ", ") + std::string(*key);
+    }
+}
+
 // A plugin may offer the extension only while an instance exists, as those for Python do.
 void devices(Context &context) {
     Instance instance(context.library);
@@ -351,6 +371,8 @@ constexpr Test tests[] = {
      0, "abi.load", 10s, descriptor},
     {"abi.unknown-extension", "get_extension returns NULL for an unknown extension.", 0, "abi.load", 10s,
      unknown_extension},
+    {"abi.set-option", "The options that it accepts while it runs are declared, and are not paths or addresses.", 0,
+     "abi.load", 10s, set_option},
     {"abi.create", "An instance can be created with the default options and destroyed without a start.", 0,
      "abi.load", 20s, create},
     {"abi.same-answer", "Every call of negotiate returns the same plugin with the same descriptor.", 0, "abi.create",

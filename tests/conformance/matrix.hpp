@@ -231,6 +231,8 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
      "pass",
      {}},
     {"devices_differ", "lists other devices the second time", "fail", {"abi.devices"}},
+    {"set_option_undeclared", "accepts changes of an option that it does not declare", "fail", {"abi.set-option"}},
+    {"set_option_without_function", "accepts changes of options without a function", "fail", {"abi.set-option"}},
     {"devices_fail", "cannot list its devices", "fail", {"abi.devices"}},
     {"devices_leak", "leaks a descriptor when it lists its devices", "fail", {"abi.devices"}},
     {"devices_without_index", "gives every device the index 0", "fail", {"abi.devices"}},
