@@ -82,6 +82,7 @@ inline constexpr Attack attacks[] = {
     {"sockets", "a path", by_other_layers},
     {"sockets", "an abstract name", by_other_layers},
     {"sockets", "a pair that can send anywhere", by_other_layers},
+    {"sockets", "a connection by sending", by_other_layers},
     {"sockets", "a filter", by_other_layers},
     {"sockets", "the host's process", by_other_layers},
     {"processes", "fork", by_other_layers},

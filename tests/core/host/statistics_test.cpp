@@ -77,3 +77,29 @@ TEST(Statistics, ComputeFpsBetweenTheFirstAndTheLastFrame) {
     statistics.last_frame = std::chrono::steady_clock::time_point(std::chrono::seconds(11));
     EXPECT_DOUBLE_EQ(statistics.fps(), 30);
 }
+
+TEST(StageTimings, RecentOnesAreThoseOfTheLastTwoWindows) {
+    using namespace std::chrono_literals;
+    StageTimings timings;
+    const auto begin = StageTimings::Clock::time_point(1h);
+    for (int i = 0; i < 160; ++i) // 10 per second, in windows of just over 5 s; later ones are longer
+        timings.add("tracker", i < 100 ? 1ms : 4ms, begin + i * 100ms);
+    EXPECT_EQ(timings.all().at("tracker").count(), 160u);
+    const Timing recent = timings.recent().at("tracker");
+    EXPECT_GE(recent.count(), 50u);
+    EXPECT_LE(recent.count(), 102u);
+    EXPECT_NEAR(recent.percentile_ms(1), 4, 0.04);
+    EXPECT_NEAR(timings.recent_rate("tracker", begin + 16s), 10, 0.3);
+    EXPECT_EQ(timings.recent_rate("raytracer", begin + 16s), 0);
+}
+
+TEST(Timing, AddsAnotherTiming) {
+    Timing sum, other;
+    for (int i = 0; i < 3; ++i)
+        sum.add(std::chrono::milliseconds(1));
+    other.add(std::chrono::milliseconds(9));
+    sum.add(other);
+    EXPECT_EQ(sum.count(), 4u);
+    EXPECT_NEAR(sum.percentile_ms(0.5), 1, 0.01);
+    EXPECT_EQ(sum.max_ms(), 9);
+}

@@ -235,6 +235,9 @@ static void open_sockets(const tracker *self) {
     report(self, "a path", connects(self, 0));
     report(self, "an abstract name", connects(self, 1));
     report(self, "a pair that can send anywhere", socketpair(AF_UNIX, SOCK_DGRAM, 0, ends) == 0);
+    /* A listening socket that was shut down connects by this flag. Other sockets ignore it. */
+    report(self, "a connection by sending",
+           socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0 && sendto(ends[0], "x", 1, MSG_FASTOPEN, NULL, 0) == 1);
     report(self, "a filter", setsockopt(doorbell, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program) == 0);
     report(self, "the host's process", getsockopt(control, SOL_SOCKET, 77 /* SO_PEERPIDFD */, &pidfd, &size) == 0);
 }
