@@ -102,7 +102,7 @@ bool OutputDevice::supports(Transfer transfer) const {
     return capabilities_ & (transfer == Transfer::write ? V4L2_CAP_READWRITE : V4L2_CAP_STREAMING);
 }
 
-DeviceFormat OutputDevice::set_format(const DeviceFormat &wanted) {
+OutputFormat OutputDevice::set_format(const OutputFormat &wanted) {
     v4l2_format format{};
     format.type = type_;
     const auto set = [&](auto &pixels) {
@@ -122,12 +122,12 @@ DeviceFormat OutputDevice::set_format(const DeviceFormat &wanted) {
     if (const int error = control(VIDIOC_S_FMT, &format))
         fail("setting the format " + fourcc_text(wanted.fourcc), error);
     const auto chosen = [](const auto &pixels, std::uint32_t stride, std::uint32_t size) {
-        return DeviceFormat{pixels.pixelformat, pixels.width,    pixels.height, stride, size,
+        return OutputFormat{pixels.pixelformat, pixels.width,    pixels.height, stride, size,
                             pixels.colorspace,  pixels.ycbcr_enc};
     };
     const v4l2_pix_format &single = format.fmt.pix;
     const v4l2_plane_pix_format &plane = format.fmt.pix_mp.plane_fmt[0];
-    const DeviceFormat set_to = is_multiplanar() ? chosen(format.fmt.pix_mp, plane.bytesperline, plane.sizeimage)
+    const OutputFormat set_to = is_multiplanar() ? chosen(format.fmt.pix_mp, plane.bytesperline, plane.sizeimage)
                                                  : chosen(single, single.bytesperline, single.sizeimage);
     image_size_ = set_to.image_size;
     return set_to;

@@ -17,7 +17,7 @@
 namespace arhost {
 
 // What the device expects. `colour_space` and the other constants are V4L2's.
-struct DeviceFormat {
+struct OutputFormat {
     std::uint32_t fourcc = 0, width = 0, height = 0;
     std::uint32_t stride = 0;     // bytes per row of the first plane
     std::uint32_t image_size = 0; // bytes
@@ -39,13 +39,13 @@ public:
     bool supports(Transfer transfer) const;
 
     // Requests a format; returns the one that the driver has chosen.
-    DeviceFormat set_format(const DeviceFormat &wanted);
+    OutputFormat set_format(const OutputFormat &wanted);
     double set_fps(double fps); // returns the resulting rate; 0: unknown
 
     // Allocates memory for images. Afterwards the format cannot change, and with Transfer::mmap other programs cannot
     // use the device.
     void reserve(Transfer transfer);
-    // Waits until the device takes another image, and returns the memory to write it to, of DeviceFormat::image_size
+    // Waits until the device takes another image, and returns the memory to write it to, of OutputFormat::image_size
     // bytes. Empty: the host has cancelled the call.
     std::span<std::uint8_t> begin_image(const Host &host);
     void end_image(const Host &host); // hands over the image; the first one starts the stream

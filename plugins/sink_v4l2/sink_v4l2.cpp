@@ -29,7 +29,7 @@ std::string size_text(std::uint32_t width, std::uint32_t height) {
     return std::to_string(width) + "×" + std::to_string(height);
 }
 
-Matrix matrix_of(const DeviceFormat &format) {
+Matrix matrix_of(const OutputFormat &format) {
     const std::uint32_t encoding = format.ycbcr_encoding == V4L2_YCBCR_ENC_DEFAULT
                                        ? std::uint32_t{V4L2_MAP_YCBCR_ENC_DEFAULT(format.colour_space)}
                                        : format.ycbcr_encoding;
@@ -158,7 +158,7 @@ private:
     std::string path_, format_option_, io_option_;
     std::uint32_t width_ = 0, height_ = 0; // of the frames
     std::optional<OutputDevice> device_;
-    DeviceFormat format_;
+    OutputFormat format_;
     const PixelFormat *pixels_ = nullptr;
     std::optional<BgrConverter> converter_;
 };
