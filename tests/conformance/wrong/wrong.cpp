@@ -614,7 +614,7 @@ const void *get_extension(const char *id) {
     static const char *const undeclared[] = {"samples", "no_such_option", nullptr};
     static const arhost_set_option set_option = {
         sizeof set_option, undeclared,
-        has("set_option_without_function") ? nullptr : [](arhost_instance *, const arhost_option *) {
+        has("set_option_without_function") ? nullptr : +[](arhost_instance *, const arhost_option *) {
             return ARHOST_STATUS_OK;
         }};
     if (!std::strcmp(id, ARHOST_SET_OPTION_EXTENSION))
