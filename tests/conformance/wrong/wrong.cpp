@@ -610,15 +610,16 @@ arhost_status list_devices(const arhost_host *, arhost_take_device take, void *c
     return ARHOST_STATUS_OK;
 }
 
+arhost_status set_option(arhost_instance *, const arhost_option *) {
+    return ARHOST_STATUS_OK;
+}
+
 const void *get_extension(const char *id) {
-    static const char *const undeclared[] = {"samples", "no_such_option", nullptr};
-    static const arhost_set_option set_option = {
-        sizeof set_option, undeclared,
-        has("set_option_without_function") ? nullptr : +[](arhost_instance *, const arhost_option *) {
-            return ARHOST_STATUS_OK;
-        }};
+    static const char *const keys[] = {"samples", "no_such_option", nullptr};
+    static const arhost_set_option changes = {sizeof changes, keys,
+                                              has("set_option_without_function") ? nullptr : set_option};
     if (!std::strcmp(id, ARHOST_SET_OPTION_EXTENSION))
-        return library_name().find("set_option") != std::string::npos ? &set_option : nullptr;
+        return library_name().find("set_option") != std::string::npos ? &changes : nullptr;
     static const arhost_devices devices = {sizeof devices, list_devices};
     if (!std::strcmp(id, ARHOST_DEVICES_EXTENSION))
         return library_name().find("device") != std::string::npos ? &devices : nullptr;
