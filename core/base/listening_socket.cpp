@@ -20,7 +20,8 @@ namespace fs = std::filesystem;
 constexpr int backlog = 64;
 
 bool is_name(const std::string &text) {
-    return !text.empty() &&
+    const bool is_number = std::ranges::all_of(text, [](unsigned char c) { return std::isdigit(c); });
+    return !is_number &&
            std::ranges::all_of(text, [](unsigned char c) { return std::isalnum(c) || c == '-' || c == '_'; });
 }
 

@@ -14,8 +14,9 @@ namespace arhost::base {
 // variable is not set.
 std::filesystem::path named_socket(const std::string &name);
 
-// Returns why `address` is invalid, or "". Valid are a name of letters, digits, "-" and "_"; the absolute path of a
-// Unix socket; "127.0.0.1:8080", "[::1]:8080" and "localhost:8080", whose port may be 0 for any free port.
+// Returns why `address` is invalid, or "". Valid are a name of letters, digits, "-" and "_" that is not a number; the
+// absolute path of a Unix socket; "127.0.0.1:8080", "[::1]:8080" and "localhost:8080", whose port may be 0 for any
+// free port.
 std::string problem_with_address(const std::string &address);
 
 // A non-blocking stream socket that listens at an address.

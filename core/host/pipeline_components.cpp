@@ -242,8 +242,7 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
     callbacks.hello = [this, &output, sink](const PluginDescription &plugin, std::size_t candidate) {
         if (plugin.capabilities & ARHOST_CAPABILITY_REALTIME_SINK)
             sink->max_waiting = live_sink_depth; // a window drops frames instead of delaying other outputs
-        messages::SinkSetup setup{format_->width, format_->height, format_->fps, sink->first_sequence(), {},
-                                  *format_};
+        messages::SinkSetup setup{*format_, format_->fps, sink->first_sequence(), {}};
         if (configuration_.source && configuration_.source->fps > 0)
             setup.fps = configuration_.source->fps;
         if (intrinsics_.width > 0)

@@ -70,11 +70,10 @@ struct RaytracerSetup {
 };
 struct SinkSetup {
     static constexpr const char *kind = "sink";
-    std::uint32_t width = 0, height = 0;
+    arhost_frame_format video_format{};
     double fps = 0;
     std::uint64_t first_sequence = 0;
     std::optional<arhost_intrinsics> intrinsics;
-    arhost_frame_format video_format{};
 };
 using Setup = std::variant<SourceSetup, TrackerSetup, RaytracerSetup, SinkSetup>;
 

@@ -16,6 +16,7 @@ class CommandSender {
 public:
     explicit CommandSender(Link &link) : link_(link) {}
 
+    void enable(); // the plugin is started
     // As arhost_control.send; may be called on any thread.
     arhost_status send(const char *command, arhost_take_answer take, void *context);
     // Calls the function that waits for the answer. Must be called on the worker's main thread.
@@ -28,6 +29,7 @@ private:
     };
     Link &link_;
     std::mutex mutex_; // protects the members below
+    bool enabled_ = false;
     std::uint64_t next_id_ = 1;
     std::map<std::uint64_t, Pending> pending_; // key: id of the command
 };

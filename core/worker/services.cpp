@@ -229,8 +229,8 @@ public:
         const auto &message = setup_of_kind<messages::SinkSetup>(any);
         arhost_sink_setup setup{};
         setup.struct_size = sizeof setup;
-        setup.width = message.width;
-        setup.height = message.height;
+        setup.width = message.video_format.width;
+        setup.height = message.video_format.height;
         setup.fps = message.fps;
         setup.first_sequence = message.first_sequence;
         setup.intrinsics = message.intrinsics ? &*message.intrinsics : nullptr;

@@ -31,6 +31,7 @@ public:
         std::lock_guard lock(mutex_);
         return last_error_;
     }
+    void accept_commands() { sender_.enable(); }
     void deliver(const messages::Answer &answer) { sender_.deliver(answer); }
     // Returns the message to send after a plugin function has returned the error `status`.
     messages::Failed failed(arhost_status status) const {
@@ -147,6 +148,7 @@ private:
         }
         link_.send(ready);
         link_.serving = true;
+        host_.accept_commands();
         return true;
     }
 

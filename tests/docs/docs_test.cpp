@@ -48,7 +48,7 @@ TEST(Documentation, ConfigurationsWorkWithEitherTracker) {
                 configurations.push_back(document.filename().string() + ".yaml");
                 run.write(configurations.back(), block);
             }
-    EXPECT_THAT(configurations, testing::UnorderedElementsAre("README.md.yaml", "config.md.yaml",
+    EXPECT_THAT(configurations, testing::UnorderedElementsAre("README.md.yaml", "config.md.yaml", "control.md.yaml",
                                                               "backend-guide.md.yaml", "trajectories.md.yaml"));
     for (const auto &entry : fs::directory_iterator(root / "config"))
         if (entry.path().extension() == ".yaml")

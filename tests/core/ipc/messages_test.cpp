@@ -67,7 +67,7 @@ TEST(Messages, PreserveTheSetupOfEachKind) {
     EXPECT_EQ(tracker_setup.markers.at(0).side_mm, 80);
     const auto raytracer = sent(messages::Create{{}, messages::RaytracerSetup{64, 48, lens()}});
     EXPECT_EQ(std::get<messages::RaytracerSetup>(raytracer.setup).height, 48u);
-    const auto sink = sent(messages::Create{{}, messages::SinkSetup{64, 48, 25, 12, {}}});
+    const auto sink = sent(messages::Create{{}, messages::SinkSetup{format(), 25, 12, {}}});
     EXPECT_EQ(std::get<messages::SinkSetup>(sink.setup).first_sequence, 12u);
     EXPECT_EQ(std::get<messages::SinkSetup>(sink.setup).intrinsics, std::nullopt);
 }

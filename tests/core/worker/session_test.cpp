@@ -93,7 +93,12 @@ TEST(Worker, ExitsIfTheSetupIsForAnotherKind) {
     Conversation worker("source_counter");
     const auto hello = worker.next<messages::Hello>();
     ASSERT_TRUE(hello);
-    worker.process.send(messages::Create{default_options(*hello), messages::SinkSetup{}});
+    arhost_frame_format format{};
+    format.struct_size = sizeof format;
+    format.pixel_format = ARHOST_PIXEL_FORMAT_GREY8;
+    format.width = format.height = 16;
+    ASSERT_TRUE(arhost_frame_layout(&format));
+    worker.process.send(messages::Create{default_options(*hello), messages::SinkSetup{format}});
     const auto failed = worker.next<messages::Failed>();
     ASSERT_TRUE(failed);
     EXPECT_EQ(failed->status, ARHOST_STATUS_ERROR_INTERNAL);
