@@ -26,10 +26,11 @@ void run_pattern(Bytes); // input: a pattern, a NUL, a file name
 void run_scene(Bytes);
 void run_obj(Bytes);
 void run_ply(Bytes);
-void run_gltf(Bytes);  // including .glb
-void run_arena(Bytes); // the output of the scene loader process
-void run_ring(Bytes);  // shared memory that a worker writes
-void run_host(Bytes);  // the whole host with misbehaving workers
+void run_gltf(Bytes);            // including .glb
+void run_arena(Bytes);           // the output of the scene loader process
+void run_ring(Bytes);            // shared memory that a worker writes
+void run_host(Bytes);            // the whole host with misbehaving workers
+void run_uvc_descriptors(Bytes); // of a USB camera
 
 inline constexpr Target targets[] = {
     {"configuration", run_configuration, 8000},
@@ -43,6 +44,7 @@ inline constexpr Target targets[] = {
     {"arena", run_arena, 20000},
     {"ring", run_ring, 20000},
     {"host", run_host, 1000},
+    {"uvc_descriptors", run_uvc_descriptors, 20000},
 };
 
 // Returns the scratch folder of this process. It is in /dev/shm if available.
