@@ -31,6 +31,7 @@ void run_arena(Bytes);           // the output of the scene loader process
 void run_ring(Bytes);            // shared memory that a worker writes
 void run_host(Bytes);            // the whole host with misbehaving workers
 void run_uvc_descriptors(Bytes); // of a USB camera
+void run_uvc_payloads(Bytes);    // and its clock
 
 inline constexpr Target targets[] = {
     {"configuration", run_configuration, 8000},
@@ -45,6 +46,7 @@ inline constexpr Target targets[] = {
     {"ring", run_ring, 20000},
     {"host", run_host, 1000},
     {"uvc_descriptors", run_uvc_descriptors, 20000},
+    {"uvc_payloads", run_uvc_payloads, 20000},
 };
 
 // Returns the scratch folder of this process. It is in /dev/shm if available.

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Targets for bytes that a USB camera sends.
+#include "input.hpp"
 #include "targets.hpp"
 
+#include "source_uvc/clock.hpp"
 #include "source_uvc/descriptors.hpp"
+#include "source_uvc/payload.hpp"
 
 #include <algorithm>
 #include <stdexcept>
@@ -47,6 +50,39 @@ void run_uvc_descriptors(Bytes bytes) {
             }
         }
     }
+}
+
+// Input: the sizes of a frame, the frequency of the clock, and payloads, each after its size, kind and time of
+// arrival.
+void run_uvc_payloads(Bytes bytes) {
+    Input input(bytes);
+    const std::size_t max_bytes = input.number<std::uint16_t>();
+    const std::size_t exact_bytes = std::min<std::size_t>(input.number<std::uint16_t>(), max_bytes);
+    uvc::CaptureTimes times(input.number<std::uint32_t>());
+    uvc::Losses losses;
+    std::int64_t last_ns = 0, now_ns = 0;
+    uvc::FrameAssembler assembler(max_bytes, exact_bytes, [&](uvc::AssembledFrame &frame) {
+        require(frame.bytes.size() <= max_bytes, "a frame larger than its maximum");
+        require(frame.damage != uvc::Damage::none || frame.bytes.size() >= exact_bytes, "a truncated frame");
+        if (frame.clock_ticks)
+            times.add_clock(*frame.clock_ticks, frame.clock_arrival_ns);
+        const std::int64_t time_ns = times.time_of(frame.presentation_ticks, frame.arrival_ns);
+        require(time_ns >= last_ns && time_ns <= frame.arrival_ns, "a time that decreases or is in the future");
+        last_ns = time_ns;
+        losses.count(frame.damage);
+    });
+    while (!input.empty()) {
+        const std::uint8_t size = input.number(), kind = input.number();
+        now_ns += std::int64_t{1000} * input.number<std::uint16_t>() * input.number();
+        const Bytes payload = input.take(size);
+        if (kind & 1)
+            assembler.add_bulk(payload, kind & 2, now_ns);
+        else if (kind & 4)
+            assembler.lose_packet();
+        else
+            assembler.add_payload(payload, now_ns);
+    }
+    losses.text();
 }
 
 } // namespace arhost::fuzz
