@@ -4,14 +4,23 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 
 namespace arhost {
 namespace {
 
-bool is_menu(const Control &control) {
-    return control.type == V4L2_CTRL_TYPE_MENU || control.type == V4L2_CTRL_TYPE_INTEGER_MENU;
+ControlKind kind_of(std::uint32_t type) {
+    switch (type) {
+    case V4L2_CTRL_TYPE_MENU:
+    case V4L2_CTRL_TYPE_INTEGER_MENU:
+        return ControlKind::menu;
+    case V4L2_CTRL_TYPE_BOOLEAN:
+        return ControlKind::boolean;
+    case V4L2_CTRL_TYPE_BUTTON:
+        return ControlKind::button;
+    default:
+        return ControlKind::integer;
+    }
 }
 
 // Whether the control has a value that fits into 64 bits.
@@ -28,29 +37,6 @@ bool is_scalar(const v4l2_query_ext_ctrl &query) {
     default:
         return false;
     }
-}
-
-std::string_view trimmed(std::string_view text) {
-    const auto begin = text.find_first_not_of(' '), end = text.find_last_not_of(' ');
-    return begin == std::string_view::npos ? std::string_view() : text.substr(begin, end - begin + 1);
-}
-
-std::optional<std::int64_t> number(std::string_view text) {
-    std::int64_t value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    return error == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
-}
-
-std::string describe_values(const Control &control) {
-    if (control.type == V4L2_CTRL_TYPE_BOOLEAN)
-        return "true or false";
-    std::string text;
-    for (const auto &[value, item] : control.items)
-        text += (text.empty() ? "" : ", ") + std::to_string(value) + " (" + item + ")";
-    if (!text.empty())
-        return text;
-    text = std::to_string(control.minimum) + " to " + std::to_string(control.maximum);
-    return control.step > 1 ? text + " in steps of " + std::to_string(control.step) : text;
 }
 
 } // namespace
@@ -73,17 +59,13 @@ Controls::Controls(const CaptureDevice &device) : device_(device) {
     for (; device_.control(VIDIOC_QUERY_EXT_CTRL, &query) == 0; query.id |= V4L2_CTRL_FLAG_NEXT_CTRL) {
         if ((query.flags & V4L2_CTRL_FLAG_DISABLED) || !is_scalar(query))
             continue;
-        Control control{query.id,
+        Control control{{kind_of(query.type), query.minimum, query.maximum, query.default_value, query.step, {}},
+                        query.id,
                         query.type,
                         query.flags,
-                        control_name(query.name),
-                        query.minimum,
-                        query.maximum,
-                        query.default_value,
-                        query.step,
-                        {}};
-        for (std::int64_t i = query.minimum; is_menu(control) && i <= std::min<std::int64_t>(query.maximum, 255);
-             ++i) {
+                        control_name(query.name)};
+        for (std::int64_t i = query.minimum;
+             control.kind == ControlKind::menu && i <= std::min<std::int64_t>(query.maximum, 255); ++i) {
             v4l2_querymenu item{};
             item.id = query.id;
             item.index = static_cast<std::uint32_t>(i);
@@ -119,20 +101,8 @@ void Controls::fail_missing(std::string_view name, const std::string &key) const
 }
 
 std::int64_t Controls::parse(const Control &control, std::string_view text, const std::string &key) const {
-    if (control.type == V4L2_CTRL_TYPE_BUTTON)
-        return 0;
-    if (control.type == V4L2_CTRL_TYPE_BOOLEAN && (text == "true" || text == "false"))
-        return text == "true";
-    for (const auto &[value, item] : control.items)
-        if (item == text)
-            return value;
-    const std::optional<std::int64_t> value = number(text);
-    const bool is_valid =
-        value && *value >= control.minimum && *value <= control.maximum &&
-        (is_menu(control)
-             ? control.items.contains(*value)
-             : control.step <= 1 || static_cast<std::uint64_t>(*value - control.minimum) % control.step == 0);
-    if (!is_valid)
+    const std::optional<std::int64_t> value = parse_value(control, text);
+    if (!value)
         fail(key, "does not accept '" + std::string(text) + "' for '" + control.name +
                       "'; valid: " + describe_values(control));
     return *value;
@@ -185,18 +155,13 @@ std::string Controls::set(const Control &control, std::string_view text, const s
 
 std::vector<std::string> Controls::set_list(std::string_view list, const std::string &key) const {
     std::vector<std::string> warnings;
-    while (!trimmed(list).empty()) {
-        const std::size_t comma = std::min(list.find(','), list.size());
-        const std::string_view entry = trimmed(list.substr(0, comma));
-        list.remove_prefix(std::min(comma + 1, list.size()));
-        const std::size_t equals = entry.find('=');
-        const std::string_view name = trimmed(entry.substr(0, equals));
-        if (equals == std::string_view::npos || name.empty())
-            fail(key, "cannot be set up: '" + std::string(entry) + "' is not of the form NAME=VALUE");
-        const Control *control = find(name);
+    for (const ControlSetting &setting : split_settings(list)) {
+        if (!setting.value || setting.name.empty())
+            fail(key, "cannot be set up: '" + setting.text + "' is not of the form NAME=VALUE");
+        const Control *control = find(setting.name);
         if (!control)
-            fail_missing(name, key);
-        if (const std::string warning = set(*control, trimmed(entry.substr(equals + 1)), key); !warning.empty())
+            fail_missing(setting.name, key);
+        if (const std::string warning = set(*control, *setting.value, key); !warning.empty())
             warnings.push_back(warning);
     }
     return warnings;

@@ -6,18 +6,16 @@
 
 #include "device.hpp"
 
-#include <map>
+#include "camera_common/control_values.hpp"
+
 #include <string>
 #include <vector>
 
 namespace arhost {
 
-struct Control {
-    std::uint32_t id = 0, type = 0, flags = 0;
-    std::string name; // as v4l2-ctl prints it: "white_balance_temperature"
-    std::int64_t minimum = 0, maximum = 0, default_value = 0;
-    std::uint64_t step = 1;
-    std::map<std::int64_t, std::string> items; // of a menu
+struct Control : ControlValues {
+    std::uint32_t id = 0, type = 0, flags = 0; // type: V4L2's
+    std::string name;                          // as v4l2-ctl prints it: "white_balance_temperature"
 };
 
 // "White Balance, Automatic" becomes "white_balance_automatic".

@@ -4,8 +4,9 @@
 #include "cameras.hpp"
 #include "controls.hpp"
 #include "device.hpp"
-#include "jpeg.hpp"
 #include "pixels.hpp"
+
+#include "camera_common/jpeg.hpp"
 
 #include <algorithm>
 #include <array>

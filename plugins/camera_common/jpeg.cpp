@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "jpeg.hpp"
+#include "camera_common/jpeg.hpp"
 
 #include <turbojpeg.h>
 
