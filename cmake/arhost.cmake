@@ -81,20 +81,21 @@ function(arhost_add_test name)
   endif()
 endfunction()
 
-# arhost_add_vm_test(name target [MODULE "name parameter=value…"] [ARGUMENTS …] [EXHAUSTIVE]): runs a test program in a
-# virtual machine with a stock kernel. Skipped (exit status 77) if QEMU or the kernel is missing.
+# arhost_add_vm_test(name target [MODULES "name parameter=value…" …] [ARGUMENTS …] [EXHAUSTIVE]): runs a test program in
+# a virtual machine with a stock kernel. Skipped (exit status 77) if QEMU or the kernel is missing.
 function(arhost_add_vm_test name target)
-  cmake_parse_arguments(ARG "EXHAUSTIVE" "MODULE" "ARGUMENTS" ${ARGN})
+  cmake_parse_arguments(ARG "EXHAUSTIVE" "" "MODULES;ARGUMENTS" ${ARGN})
   set(labels vm)
   set(timeout 300)
   if(ARG_EXHAUSTIVE)
     list(APPEND labels exhaustive)
     set(timeout 1800)
   endif()
-  if(ARG_MODULE)
-    set(module -m ${ARG_MODULE})
-  endif()
-  add_test(NAME ${name} COMMAND ${CMAKE_SOURCE_DIR}/tools/vm/run-in-vm ${module} $<TARGET_FILE:${target}> ${ARG_ARGUMENTS})
+  set(modules)
+  foreach(module ${ARG_MODULES})
+    list(APPEND modules -m ${module})
+  endforeach()
+  add_test(NAME ${name} COMMAND ${CMAKE_SOURCE_DIR}/tools/vm/run-in-vm ${modules} $<TARGET_FILE:${target}> ${ARG_ARGUMENTS})
   set_tests_properties(${name} PROPERTIES LABELS "${labels}" TIMEOUT ${timeout} SKIP_RETURN_CODE 77
                                           ENVIRONMENT ARHOST_VM_TIMEOUT=${timeout})
 endfunction()

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "../../support/usb_camera_layouts.hpp"
 #include "descriptors.hpp"
-#include "device_layouts.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The controls of a camera terminal and a processing unit, under the names that the kernel's driver gives them, and
+// extension units as raw bytes. Functions that fail throw Failure with a message for the user.
+#pragma once
+
+#include "usb.hpp"
+
+#include "camera_common/control_values.hpp"
+
+#include <string_view>
+
+namespace arhost::uvc {
+
+// A control as the class defines it ("USB Device Class Definition for Video Devices" 1.5, section 4.2.2).
+struct ControlDefinition {
+    std::string_view name;
+    UnitKind unit;
+    std::uint8_t bit, selector; // in bmControls
+    std::uint8_t size;          // of the data of the selector, in bytes
+    std::uint8_t offset, width; // of the value in the data
+    bool is_signed;
+    ControlKind kind;
+};
+
+std::span<const ControlDefinition> control_definitions();
+
+class Controls {
+public:
+    Controls(const UsbDevice &device, const VideoFunction &function);
+
+    // The control of this name, if the camera has it.
+    const ControlDefinition *find(std::string_view name) const;
+    ControlValues values_of(const ControlDefinition &control) const;
+
+    // Sets a control to a value in text form. `key` names the option for messages. Returns a warning if the camera
+    // sets another value, else an empty string.
+    std::string set(const ControlDefinition &control, std::string_view text, const std::string &key) const;
+
+    // Sets controls as listed by a user: "gain=20, auto_exposure=manual_mode", in this order. Returns the warnings.
+    std::vector<std::string> set_list(std::string_view list, const std::string &key) const;
+
+    // Sets controls of extension units as listed by a user: "UNIT:SELECTOR=BYTES", with the unit's ID or GUID and
+    // hexadecimal bytes: "4:9=01ff, 28f03370-…:2=00". Returns the warnings.
+    std::vector<std::string> set_extensions(std::string_view list, const std::string &key) const;
+
+    // The camera has no such control.
+    [[noreturn]] void fail_missing(std::string_view name, const std::string &key) const;
+
+private:
+    std::uint16_t entity_of(const Unit &unit) const;
+    const Unit *unit_of(const ControlDefinition &control) const;
+    std::vector<std::uint8_t> read(std::uint8_t request, const ControlDefinition &control) const; // empty: rejected
+    std::string set_extension(const ControlSetting &setting, const std::string &key) const;
+
+    const UsbDevice &device_;
+    const VideoFunction &function_;
+};
+
+} // namespace arhost::uvc

@@ -1,0 +1,460 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// source_uvc: captures frames from USB cameras (UVC 1.0 to 1.5) through libusb, without the kernel's camera driver.
+#include "controls.hpp"
+#include "negotiation.hpp"
+#include "stream.hpp"
+#include "usb.hpp"
+
+#include "camera_common/jpeg.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <iterator>
+
+namespace {
+
+namespace uvc = arhost::uvc;
+using arhost::Failure;
+using Clock = std::chrono::steady_clock;
+
+// A camera that delivers no intact frame for this long is reported as lost.
+constexpr auto silence_limit = std::chrono::seconds(5);
+constexpr auto poll_slice = std::chrono::milliseconds(50);
+
+struct Size {
+    std::uint32_t width = 0, height = 0;
+    std::string text() const { return std::to_string(width) + "×" + std::to_string(height); }
+    bool operator==(const Size &) const = default;
+};
+
+// An option that sets a frequent control, which has an automatic mode.
+struct ControlOption {
+    const char *name, *value, *mode;             // value, mode: names of controls
+    std::vector<const char *> automatic, manual; // values of the mode, in the order of preference
+};
+const ControlOption control_options[] = {
+    {"exposure",
+     "exposure_time_absolute",
+     "auto_exposure",
+     {"auto_mode", "aperture_priority_mode"},
+     {"manual_mode", "shutter_priority_mode"}},
+    {"gain", "gain", nullptr, {}, {}}, // the class defines no automatic gain; automatic exposure includes it
+    {"focus", "focus_absolute", "focus_automatic_continuous", {"true"}, {"false"}},
+    {"white_balance", "white_balance_temperature", "white_balance_automatic", {"true"}, {"false"}},
+};
+
+struct Encoding {
+    uvc::Encoding encoding;
+    const char *name; // value of the option `format`
+};
+constexpr Encoding encodings[] = { // in the order of preference
+    {uvc::Encoding::yuy2, "yuyv"},
+    {uvc::Encoding::nv12, "nv12"},
+    {uvc::Encoding::mjpeg, "mjpeg"}};
+
+// A frame size in a format of a streaming interface.
+struct Mode {
+    const uvc::StreamingInterface *stream;
+    const uvc::Format *format;
+    const uvc::FrameSize *frame;
+    Size size() const { return {frame->width, frame->height}; }
+};
+
+std::string rate_text(double fps) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.4g fps", fps);
+    return text;
+}
+
+class UvcSource {
+public:
+    UvcSource(const arhost::Host &host, const arhost::Options &options)
+        : host_(host), configured_size_{static_cast<std::uint32_t>(options.integer("width")),
+                                        static_cast<std::uint32_t>(options.integer("height"))},
+          camera_(static_cast<std::size_t>(options.integer("camera"))), format_option_(options.text("format")),
+          controls_option_(options.text("controls")), extension_option_(options.text("extension")),
+          power_line_option_(options.text("power_line_frequency")),
+          buffer_count_(static_cast<std::size_t>(options.integer("buffers"))) {
+        if ((configured_size_.width == 0) != (configured_size_.height == 0))
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: set both or neither");
+        if (const std::string usb = options.text("usb"); !usb.empty()) {
+            identity_ = uvc::parse_identity(usb);
+            if (!identity_)
+                throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                              "usb: '" + usb + "' is not of the form VENDOR:PRODUCT[:SERIAL], such as 046d:0825");
+        }
+        for (const ControlOption &option : control_options)
+            if (const std::string text = options.text(option.name); !text.empty())
+                control_values_.emplace_back(&option, text);
+    }
+    ~UvcSource() { stop(); }
+
+    void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
+        newest_only_ = setup.paced != 0;
+        device_.emplace(uvc::UsbDevice::open(identity_));
+        const uvc::VideoFunction &function = choose_function();
+        const Mode mode = choose_mode(function, setup);
+        claim(function.control_interface);
+        claim(mode.stream->number);
+        set_controls(function);
+        const uvc::ProbeControl agreed = negotiate(function, mode, setup.fps);
+        const std::string what = mode.format->name + " " + mode.size().text();
+        const double fps =
+            agreed.interval > 0 ? static_cast<double>(uvc::intervals_per_second) / agreed.interval : setup.fps;
+        if (setup.fps > 0 && std::abs(fps - setup.fps) > 0.05 * setup.fps)
+            host_.warn("the camera delivers " + rate_text(fps) + " at " + what + ", not the configured " +
+                       rate_text(setup.fps) + "; it offers " + describe(function));
+        start_stream(function, mode, agreed);
+
+        arhost_frame_format format{};
+        format.struct_size = properties.format.struct_size;
+        format.width = mode.frame->width;
+        format.height = mode.frame->height;
+        format.pixel_format =
+            mode.format->encoding == uvc::Encoding::yuy2 ? ARHOST_PIXEL_FORMAT_YUYV : ARHOST_PIXEL_FORMAT_NV12;
+        constexpr std::uint8_t bt709 = 1; // bMatrixCoefficients
+        format.yuv_matrix = mode.format->matrix == bt709 ? ARHOST_YUV_MATRIX_BT709 : ARHOST_YUV_MATRIX_BT601;
+        format.yuv_range = ARHOST_YUV_RANGE_LIMITED;
+        encoding_ = mode.format->encoding;
+        if (encoding_ == uvc::Encoding::mjpeg) {
+            describe_first_picture(format);
+            if (Size{format.width, format.height} != mode.size())
+                throw Failure(ARHOST_STATUS_ERROR_IO, device_->name() + " was set to " + what +
+                                                          ", but sends pictures of " +
+                                                          Size{format.width, format.height}.text());
+        }
+        format.fps = fps;
+        if (!arhost_frame_layout(&format))
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          device_->name() + " delivers " + what + ", which is unsupported");
+        properties.format = format;
+        host_.info(device_->name() + ": " + what + ", " + rate_text(fps));
+    }
+
+    arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
+        const auto give_up = Clock::now() + silence_limit;
+        for (;;) {
+            auto frame = next(give_up);
+            if (!frame)
+                return ARHOST_STATUS_ERROR_CANCELLED;
+            lost_ += frame->lost_before;
+            const bool is_good = copy(frame->bytes, buffer);
+            info.capture_ns = frame->capture_ns;
+            stream_->recycle(std::move(*frame));
+            if (!is_good) {
+                ++undecodable_;
+                ++lost_;
+                continue;
+            }
+            info.clock = ARHOST_CLOCK_MONOTONIC;
+            info.skipped = has_delivered_ ? lost_ : 0; // frames before the first delivered one do not count
+            has_delivered_ = true;
+            lost_ = 0;
+            return ARHOST_STATUS_OK;
+        }
+    }
+
+    void stop() {
+        if (stream_) {
+            uvc::Losses losses = stream_->losses();
+            losses.undecodable = undecodable_;
+            losses.superseded += superseded_;
+            stream_.reset();
+            if (const std::string text = losses.text(); !text.empty())
+                host_.info("frames of the camera that were not delivered: " + text);
+        }
+        // The kernel's driver takes all interfaces when it gets the control interface, so that must be free last.
+        for (; device_ && !claimed_.empty(); claimed_.pop_back())
+            device_->release(claimed_.back());
+        device_.reset();
+    }
+
+private:
+    void claim(std::uint8_t interface) {
+        device_->claim(interface);
+        claimed_.push_back(interface);
+    }
+
+    const uvc::VideoFunction &choose_function() const {
+        const std::vector<uvc::VideoFunction> &functions = device_->configuration().functions;
+        if (camera_ >= functions.size())
+            device_->fail_configuration("camera", "has no camera number " + std::to_string(camera_) + ", only " +
+                                                      std::to_string(functions.size()) +
+                                                      "; the number of the first one is 0");
+        return functions[camera_];
+    }
+
+    static std::string describe(const uvc::VideoFunction &function) {
+        std::string text;
+        for (const uvc::StreamingInterface &stream : function.streams)
+            for (const uvc::Format &format : stream.formats) {
+                text += (text.empty() ? "" : ", ") + format.name;
+                if (format.encoding == uvc::Encoding::unsupported)
+                    text += " (unsupported)";
+                std::string sizes;
+                for (const uvc::FrameSize &frame : format.frames)
+                    sizes += (sizes.empty() ? "" : ", ") + Size{frame.width, frame.height}.text() + " " +
+                             rate_text(frame.max_fps());
+                if (!sizes.empty())
+                    text += " (" + sizes + ")";
+            }
+        return text.empty() ? "no format" : text;
+    }
+
+    // Returns the modes that the camera offers and the option `format` permits, in the order of preference.
+    std::vector<Mode> permitted_modes(const uvc::VideoFunction &function) const {
+        std::vector<Mode> modes;
+        for (const auto &[encoding, name] : encodings)
+            for (const uvc::StreamingInterface &stream : function.streams)
+                for (const uvc::Format &format : stream.formats)
+                    if (format.encoding == encoding && (format_option_ == "auto" || format_option_ == name))
+                        for (const uvc::FrameSize &frame : format.frames)
+                            if (frame.width <= ARHOST_MAX_IMAGE_SIDE && frame.height <= ARHOST_MAX_IMAGE_SIDE)
+                                modes.push_back({&stream, &format, &frame});
+        return modes;
+    }
+
+    // Chooses the first permitted format in which the camera reaches the configured rate, else the fastest.
+    Mode choose_mode(const uvc::VideoFunction &function, const arhost_source_setup &setup) const {
+        Size size = configured_size_;
+        std::string wanted_by = "set 'width' and 'height'";
+        if (setup.intrinsics) {
+            const Size calibrated{setup.intrinsics->width, setup.intrinsics->height};
+            if (size != Size{} && size != calibrated)
+                throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                              "width, height: " + size.text() + " is configured, but the camera calibration is for " +
+                                  calibrated.text());
+            if (size == Size{})
+                wanted_by =
+                    "the camera calibration is for " + calibrated.text() + "; calibrate at the size that you use";
+            size = calibrated;
+        }
+        std::vector<Mode> modes = permitted_modes(function);
+        if (modes.empty())
+            device_->fail_configuration(
+                "format", "offers no " + (format_option_ == "auto" ? "supported format" : format_option_) +
+                              ", only " + describe(function));
+        if (size == Size{}) {
+            const auto standard = std::ranges::find_if(
+                modes, [](const Mode &mode) { return mode.frame->index == mode.format->default_frame; });
+            size = (standard == modes.end() ? modes.front() : *standard).size();
+        }
+        std::erase_if(modes, [&](const Mode &mode) { return mode.size() != size; });
+        if (modes.empty())
+            device_->fail_configuration("width, height", "has no size " + size.text() + "; it offers " +
+                                                             describe(function) + "; " + wanted_by);
+        const double wanted_fps = 0.95 * (setup.fps > 0 ? setup.fps : 25);
+        const auto fast = std::ranges::find_if(modes, [&](const Mode &mode) {
+            const double fps = mode.frame->max_fps();
+            return fps <= 0 || fps >= wanted_fps;
+        });
+        return fast != modes.end()
+                   ? *fast
+                   : *std::ranges::max_element(modes, {}, [](const Mode &mode) { return mode.frame->max_fps(); });
+    }
+
+    // Sets the controls before the stream starts, so that the first frame has them.
+    void set_controls(const uvc::VideoFunction &function) const {
+        const uvc::Controls controls(*device_, function);
+        const auto warn = [&](const std::string &warning) {
+            if (!warning.empty())
+                host_.warn(warning);
+        };
+        const auto set = [&](const char *name, const std::string &text, const std::string &key) {
+            const uvc::ControlDefinition *control = controls.find(name);
+            if (!control)
+                controls.fail_missing(name, key);
+            warn(controls.set(*control, text, key));
+        };
+        for (const auto &[option, text] : control_values_) {
+            const bool is_automatic = text == "auto";
+            if (const uvc::ControlDefinition *mode = option->mode ? controls.find(option->mode) : nullptr) {
+                const arhost::ControlValues accepted = controls.values_of(*mode);
+                // The last value is an error of set() if the camera has none of them.
+                const std::vector<const char *> &values = is_automatic ? option->automatic : option->manual;
+                const auto value = std::find_if(values.begin(), values.end() - 1, [&](const char *candidate) {
+                    return arhost::parse_value(accepted, candidate).has_value();
+                });
+                warn(controls.set(*mode, *value, option->name));
+            } else if (is_automatic) {
+                controls.fail_missing(std::string("auto ") + option->name, option->name);
+            }
+            if (!is_automatic)
+                set(option->value, text, option->name);
+        }
+        if (!power_line_option_.empty())
+            set("power_line_frequency", power_line_option_, "power_line_frequency");
+        for (const std::string &warning : controls.set_list(controls_option_, "controls"))
+            warn(warning);
+        for (const std::string &warning : controls.set_extensions(extension_option_, "extension"))
+            warn(warning);
+    }
+
+    // Agrees with the camera on the mode and the nearest possible rate; fps 0: the camera's default.
+    uvc::ProbeControl negotiate(const uvc::VideoFunction &function, const Mode &mode, double fps) const {
+        constexpr std::uint8_t probe = 1, commit = 2; // selectors
+        const std::uint16_t entity = mode.stream->number;
+        const double wanted = fps > 0 ? uvc::intervals_per_second / fps : mode.frame->default_interval;
+        const auto interval = static_cast<std::uint32_t>(std::clamp(std::round(wanted), 1.0, 4e9));
+        std::vector<std::uint8_t> data = uvc::encode_probe(
+            {mode.format->index, mode.frame->index, mode.frame->nearest_interval(interval), 0, 0, 0},
+            uvc::probe_size(function.version));
+        if (const int sent = device_->set(probe, entity, data); sent < 0)
+            device_->fail("setting the format", sent);
+        const int got = device_->get(uvc::get_current, probe, entity, data);
+        if (got < 0)
+            device_->fail("reading the format", got);
+        data.resize(static_cast<std::size_t>(got));
+        auto agreed = uvc::decode_probe(data);
+        if (!agreed || agreed->format != mode.format->index || agreed->frame != mode.frame->index)
+            throw Failure(ARHOST_STATUS_ERROR_IO, device_->name() + " rejects " + mode.format->name + " at " +
+                                                      mode.size().text() + ", although it lists " +
+                                                      describe(function));
+        if (const int sent = device_->set(commit, entity, data); sent < 0)
+            device_->fail("confirming the format", sent);
+        return *agreed;
+    }
+
+    void start_stream(const uvc::VideoFunction &function, const Mode &mode, const uvc::ProbeControl &agreed) {
+        const uvc::AlternateSetting *alternate = uvc::choose_alternate(*mode.stream, agreed.max_payload_bytes);
+        if (!alternate)
+            device_->fail_configuration("width, height", "needs packets of " +
+                                                             std::to_string(agreed.max_payload_bytes) +
+                                                             " bytes, for which it has no setting; choose a smaller "
+                                                             "size, a lower 'fps' or 'format: mjpeg'");
+        uvc::FrameStream::Setup setup;
+        setup.interface = mode.stream->number;
+        setup.alternate = *alternate;
+        setup.payload_bytes = agreed.max_payload_bytes;
+        setup.max_frame_bytes = uvc::max_frame_bytes(*mode.format, *mode.frame, agreed.max_frame_bytes);
+        setup.exact_frame_bytes =
+            uvc::exact_frame_bytes(mode.format->encoding, mode.frame->width, mode.frame->height);
+        setup.clock_hz = agreed.clock_hz > 0 ? agreed.clock_hz : function.clock_hz;
+        setup.queue_length = buffer_count_;
+        setup.keeps_newest = newest_only_;
+        stream_.emplace(*device_, setup);
+    }
+
+    // Waits for a picture and describes its format. The chroma subsampling is known only from a picture.
+    void describe_first_picture(arhost_frame_format &format) {
+        for (const auto give_up = Clock::now() + silence_limit;;) {
+            host_.progress(-1, "waiting for the camera's first picture");
+            auto frame = next(give_up);
+            if (!frame)
+                throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "starting " + device_->name() + " was cancelled");
+            const bool is_good = jpeg_.describe(frame->bytes, format);
+            stream_->recycle(std::move(*frame));
+            if (is_good)
+                return;
+            fault_ = "it is not a JPEG picture";
+        }
+    }
+
+    // Returns a frame: in live mode the newest one, otherwise the oldest one. Waits until `give_up`, then throws
+    // Failure. Returns std::nullopt if cancelled.
+    std::optional<uvc::CapturedFrame> next(Clock::time_point give_up) {
+        for (;;) {
+            if (host_.cancelled())
+                return std::nullopt;
+            auto found = stream_->next(poll_slice);
+            while (found && newest_only_ && stream_->has_more()) {
+                lost_ += found->lost_before + 1;
+                ++superseded_;
+                stream_->recycle(std::move(*found));
+                found = stream_->next(poll_slice);
+            }
+            if (found)
+                return found;
+            if (Clock::now() > give_up)
+                throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST,
+                              device_->name() + " has delivered no intact picture for " +
+                                  std::to_string(silence_limit.count()) + " s" +
+                                  (fault_.empty() ? "" : "; the last picture was rejected: " + fault_));
+        }
+    }
+
+    bool copy(const std::vector<std::uint8_t> &bytes, const arhost_frame_buffer &buffer) {
+        const arhost_frame_format &format = *buffer.format;
+        if (encoding_ == uvc::Encoding::mjpeg)
+            return jpeg_.decode(bytes, format, buffer.plane, fault_);
+        const std::uint8_t *from = bytes.data(); // an intact frame has all rows, without padding
+        const auto copy_rows = [&](std::uint32_t plane, std::size_t row_bytes, std::size_t rows) {
+            for (std::size_t y = 0; y < rows; ++y, from += row_bytes)
+                std::memcpy(buffer.plane[plane] + y * format.stride[plane], from, row_bytes);
+        };
+        if (encoding_ == uvc::Encoding::yuy2) {
+            copy_rows(0, 2 * std::size_t{format.width}, format.height);
+        } else {
+            copy_rows(0, format.width, format.height);
+            copy_rows(1, format.width, format.height / 2);
+        }
+        return true;
+    }
+
+    arhost::Host host_;
+    Size configured_size_; // 0×0: use the size of the calibration or the camera's default
+    std::size_t camera_;
+    std::string format_option_, controls_option_, extension_option_, power_line_option_;
+    std::size_t buffer_count_;
+    std::optional<uvc::UsbIdentity> identity_;
+    std::vector<std::pair<const ControlOption *, std::string>> control_values_; // of the options that are set
+
+    std::optional<uvc::UsbDevice> device_;
+    std::vector<std::uint8_t> claimed_; // interfaces
+    std::optional<uvc::FrameStream> stream_;
+    uvc::Encoding encoding_ = uvc::Encoding::yuy2;
+    arhost::JpegDecoder jpeg_;
+    bool newest_only_ = false, has_delivered_ = false;
+    std::uint32_t lost_ = 0; // since the last delivered frame
+    std::uint64_t undecodable_ = 0, superseded_ = 0;
+    std::string fault_; // what was wrong with the last damaged picture
+};
+
+using arhost::option;
+constexpr const char *formats[] = {"auto", "yuyv", "nv12", "mjpeg", nullptr};
+constexpr arhost_option_descriptor options[] = {
+    option(ARHOST_OPTION_TEXT, "usb", "",
+           "The camera: VENDOR:PRODUCT or VENDOR:PRODUCT:SERIAL. Usually set by the key 'usb' of the source."),
+    option(ARHOST_OPTION_INTEGER, "camera", "0", "Number of the camera, if the device contains several.", 0,
+           uvc::max_functions - 1),
+    option(ARHOST_OPTION_INTEGER, "width", "0",
+           "Frame size in px; 0: the size of the calibration if set, otherwise the camera's default.", 0,
+           ARHOST_MAX_IMAGE_SIDE),
+    option(ARHOST_OPTION_INTEGER, "height", "0",
+           "Frame size in px; 0: the size of the calibration if set, otherwise the camera's default.", 0,
+           ARHOST_MAX_IMAGE_SIDE),
+    option(ARHOST_OPTION_TEXT, "format", "auto",
+           "Pixel format of the camera; auto: uncompressed if that is fast enough, otherwise mjpeg.", 0, 0, formats),
+    option(ARHOST_OPTION_INTEGER, "buffers", "4", "Number of frames that may wait.", 2, 32),
+    option(ARHOST_OPTION_TEXT, "exposure", "", "Exposure time in units of 100 µs, or auto; not set: unchanged."),
+    option(ARHOST_OPTION_TEXT, "gain", "", "Gain in units of the camera; not set: unchanged."),
+    option(ARHOST_OPTION_TEXT, "focus", "", "Focus in units of the camera, or auto; not set: unchanged."),
+    option(ARHOST_OPTION_TEXT, "white_balance", "", "Colour temperature in K, or auto; not set: unchanged."),
+    option(ARHOST_OPTION_TEXT, "power_line_frequency", "",
+           "Frequency of the lamps, to avoid flicker: disabled, 50_hz, 60_hz or auto; not set: unchanged."),
+    option(ARHOST_OPTION_TEXT, "controls", "", "Further controls by name: 'sharpness=3, backlight_compensation=1'."),
+    option(ARHOST_OPTION_TEXT, "extension", "",
+           "Controls of extension units, as UNIT:SELECTOR=BYTES in hexadecimal digits: '4:9=01ff, 4:10=00'."),
+};
+constexpr const char *needs[] = {"usb", nullptr};
+
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),
+    ARHOST_KIND_SOURCE,
+    "source_uvc",
+    "USB camera",
+    "0.1.0",
+    "arhost",
+    "Apache-2.0",
+    "Captures frames from a USB camera through libusb, uncompressed or as Motion-JPEG.",
+    ARHOST_CAPABILITY_LIVE,
+    std::size(options),
+    options,
+    needs};
+
+} // namespace
+
+ARHOST_SOURCE(UvcSource, descriptor)

@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A USB camera, opened through libusb without a scan for devices: only the nodes in /dev/bus/usb that may be opened
+// are used, so that it works in a sandbox that has only one. Functions that fail throw Failure with a message for the
+// user.
+#pragma once
+
+#include "descriptors.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <libusb.h>
+
+#include <memory>
+#include <optional>
+#include <utility>
+
+namespace arhost::uvc {
+
+// "VENDOR:PRODUCT" or "VENDOR:PRODUCT:SERIAL", with the IDs in hexadecimal digits, as lsusb prints them.
+struct UsbIdentity {
+    std::uint16_t vendor = 0, product = 0;
+    std::string serial; // empty: any
+};
+std::optional<UsbIdentity> parse_identity(const std::string &text);
+
+class UsbDevice {
+public:
+    // Opens the camera with this identity; without one, the first camera that can be opened.
+    static UsbDevice open(const std::optional<UsbIdentity> &identity);
+
+    const std::string &name() const { return name_; } // "the camera 046d:0825 (/dev/bus/usb/001/004)"
+    const Configuration &configuration() const { return configuration_; }
+    libusb_context *context() const { return context_.get(); }
+    libusb_device_handle *handle() const { return handle_.get(); }
+
+    // Takes an interface from the kernel's driver until release(), after which the driver has it again.
+    void claim(std::uint8_t interface);
+    void release(std::uint8_t interface);
+    void set_alternate(std::uint8_t interface, std::uint8_t alternate) const;
+
+    // A request of the video class to an entity (a unit's ID and an interface). Returns the number of bytes received,
+    // or a negative error of libusb; LIBUSB_ERROR_PIPE: the camera rejects it.
+    int get(std::uint8_t request, std::uint8_t selector, std::uint16_t entity, std::span<std::uint8_t> data) const;
+    int set(std::uint8_t selector, std::uint16_t entity, Bytes data) const;
+
+    // Throws Failure for an error of libusb, which occurred while `what` ("setting the format").
+    [[noreturn]] void fail(const std::string &what, int error) const;
+    [[noreturn]] void fail_configuration(const std::string &key, const std::string &what) const;
+
+private:
+    struct Node;
+    struct ExitContext {
+        void operator()(libusb_context *context) const { libusb_exit(context); }
+    };
+    struct CloseHandle {
+        void operator()(libusb_device_handle *handle) const { libusb_close(handle); }
+    };
+    class FileDescriptor {
+    public:
+        explicit FileDescriptor(int fd = -1) : fd_(fd) {}
+        ~FileDescriptor();
+        FileDescriptor(FileDescriptor &&other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
+        FileDescriptor &operator=(FileDescriptor &&other) noexcept {
+            std::swap(fd_, other.fd_);
+            return *this;
+        }
+        int get() const { return fd_; }
+
+    private:
+        int fd_;
+    };
+
+    UsbDevice() = default;
+    static std::vector<Node> list_nodes();
+    static std::optional<UsbDevice> open_node(Node &node, const std::string &serial);
+    void fail_lost() const;
+
+    std::string name_;
+    Configuration configuration_;
+    FileDescriptor fd_; // closed after the handle, which does not own it
+    std::unique_ptr<libusb_context, ExitContext> context_;
+    std::unique_ptr<libusb_device_handle, CloseHandle> handle_;
+};
+
+// bRequest
+constexpr std::uint8_t set_current = 0x01, get_current = 0x81, get_minimum = 0x82, get_maximum = 0x83,
+                       get_resolution = 0x84, get_length = 0x85, get_info = 0x86, get_default = 0x87;
+
+} // namespace arhost::uvc

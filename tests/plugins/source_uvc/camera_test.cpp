@@ -1,0 +1,330 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Captures from a USB camera in user space, through the kernel's USB stack. To be run in a virtual machine:
+//   tools/vm/run-in-vm -m vhci_hcd -m uvcvideo …/source_uvc-camera-test
+#include "../../support/usb_camera.hpp"
+#include "../../system/arhost_run.hpp"
+#include "../source_file/source_under_test.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <fstream>
+#include <memory>
+
+namespace fs = std::filesystem;
+using arhost::test::CameraControl;
+using arhost::test::Octets;
+using arhost::test::SourceFrame;
+using arhost::test::SourceUnderTest;
+using arhost::test::UsbCamera;
+using testing::HasSubstr;
+using testing::Not;
+
+namespace {
+
+std::int64_t monotonic_ns() {
+    timespec time{};
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec;
+}
+
+std::size_t open_files() {
+    return static_cast<std::size_t>(std::distance(fs::directory_iterator("/proc/self/fd"), {}));
+}
+
+// Waits until a condition holds, for at most 20 s.
+template <class Condition> bool eventually(Condition &&condition) {
+    for (int i = 0; i < 2000 && !condition(); ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return condition();
+}
+
+// The number of camera interfaces that the kernel's driver uses. Each camera has two.
+std::ptrdiff_t kernel_driven() {
+    const fs::path driver = "/sys/bus/usb/drivers/uvcvideo";
+    return !fs::exists(driver) ? 0 : std::count_if(fs::directory_iterator(driver), {}, [](const auto &entry) {
+        return entry.path().filename().string().find(':') != std::string::npos;
+    });
+}
+
+std::uint32_t number_of(const Octets &bytes) {
+    return bytes[0] | bytes[1] << 8 | bytes[2] << 16 | std::uint32_t{bytes[3]} << 24;
+}
+
+class Connected {
+protected:
+    void connect(const UsbCamera::Setup &setup) {
+        camera_ = std::make_unique<UsbCamera>(setup);
+        ASSERT_TRUE(eventually([] { return kernel_driven() >= 2; })) << "the kernel does not see the camera";
+    }
+    void unplug() {
+        camera_.reset();
+        ASSERT_TRUE(eventually([] { return kernel_driven() == 0; }));
+    }
+    // Captures small pictures, because the virtual machine is emulated and slow.
+    arhost_status start(std::map<std::string, std::string> options = {}, bool live = true, double fps = 30) {
+        options.try_emplace("usb", "1d6b:0104");
+        arhost_source_setup setup{};
+        setup.fps = fps;
+        setup.paced = live;
+        return source_.start(options, setup);
+    }
+    std::string start_error(const std::map<std::string, std::string> &options, arhost_status expected) {
+        SourceUnderTest source("source_uvc");
+        std::map<std::string, std::string> all = options;
+        all.try_emplace("usb", "1d6b:0104");
+        EXPECT_EQ(source.start(all), expected) << source.log();
+        const std::string errors = source.log(ARHOST_SEVERITY_ERROR);
+        EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << "expected one error message, got:\n"
+                                                                     << errors;
+        return errors;
+    }
+
+    std::unique_ptr<UsbCamera> camera_;
+    SourceUnderTest source_{"source_uvc"};
+};
+
+class UvcCamera : public Connected, public testing::Test {
+protected:
+    void SetUp() override { connect({}); }
+    void TearDown() override {
+        source_.stop();
+        unplug();
+    }
+};
+
+struct Kind {
+    const char *name;
+    bool is_bulk;
+    std::uint16_t version;
+};
+
+class UvcStream : public Connected, public testing::TestWithParam<Kind> {
+protected:
+    void SetUp() override { connect({.is_bulk = GetParam().is_bulk, .version = GetParam().version}); }
+    void TearDown() override {
+        source_.stop();
+        unplug();
+    }
+};
+
+} // namespace
+
+TEST_P(UvcStream, DeliversUncompressedFramesUnchanged) {
+    for (const bool is_nv12 : {false, true}) {
+        SCOPED_TRACE(is_nv12 ? "NV12" : "YUY2");
+        ASSERT_EQ(start({{"format", is_nv12 ? "nv12" : "yuyv"}}, false), ARHOST_STATUS_OK) << source_.log();
+        EXPECT_EQ(source_.format().pixel_format, is_nv12 ? ARHOST_PIXEL_FORMAT_NV12 : ARHOST_PIXEL_FORMAT_YUYV);
+        EXPECT_EQ(source_.format().width, UsbCamera::width);
+        EXPECT_EQ(source_.format().height, UsbCamera::height);
+        EXPECT_NEAR(source_.format().fps, 30, 0.01);
+        EXPECT_EQ(source_.format().yuv_matrix, ARHOST_YUV_MATRIX_BT709);
+        std::uint32_t last = 0;
+        for (std::uint64_t n = 0; n < 20; ++n) {
+            const SourceFrame frame = source_.read(n);
+            ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << source_.log();
+            const std::uint32_t number = number_of(frame.bytes);
+            ASSERT_TRUE(frame.bytes == UsbCamera::picture(number, is_nv12)) << "frame " << number;
+            if (n > 0) {
+                EXPECT_EQ(number, last + 1 + frame.info.skipped) << "the skipped frames are counted";
+            }
+            last = number;
+        }
+        EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
+        source_.stop();
+    }
+}
+
+TEST_P(UvcStream, DecodesMotionJpeg) {
+    ASSERT_EQ(start({{"format", "mjpeg"}}), ARHOST_STATUS_OK) << source_.log();
+    ASSERT_EQ(source_.format().pixel_format, ARHOST_PIXEL_FORMAT_BGR8);
+    for (std::uint64_t n = 0; n < 10; ++n) {
+        const SourceFrame frame = source_.read(n);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << source_.log();
+        const int luma = frame.bytes[0], nearest = UsbCamera::luma_of(static_cast<std::uint32_t>((luma - 35) / 10));
+        EXPECT_NEAR(luma, nearest, 2);
+        EXPECT_TRUE(std::ranges::all_of(frame.bytes, [&](int value) { return std::abs(value - luma) <= 2; }));
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, UvcStream,
+                         testing::Values(Kind{"isochronous_1_0", false, 0x0100},
+                                         Kind{"isochronous_1_1", false, 0x0110},
+                                         Kind{"isochronous_1_5", false, 0x0150}, Kind{"bulk_1_1", true, 0x0110}),
+                         [](const auto &info) { return std::string(info.param.name); });
+
+TEST_F(UvcCamera, StampsFramesWithTheMonotonicClock) {
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    std::int64_t last = 0;
+    for (std::uint64_t n = 0; n < 30; ++n) {
+        const SourceFrame frame = source_.read(n);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+        EXPECT_EQ(frame.info.clock, ARHOST_CLOCK_MONOTONIC);
+        EXPECT_GT(frame.info.capture_ns, last);
+        const std::int64_t age = monotonic_ns() - frame.info.capture_ns;
+        EXPECT_GE(age, 0);
+        EXPECT_LT(age, 1'000'000'000);
+        last = frame.info.capture_ns;
+    }
+}
+
+TEST_F(UvcCamera, DropsDamagedFramesAndCountsThemByCause) {
+    ASSERT_EQ(start({}, false), ARHOST_STATUS_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    std::uint64_t n = 1, skipped = 0;
+    for (const auto fault : {UsbCamera::Fault::marked, UsbCamera::Fault::shortened, UsbCamera::Fault::malformed}) {
+        camera_->inject(fault);
+        const std::uint64_t end = n + 8;
+        for (; n < end; ++n) {
+            const SourceFrame frame = source_.read(n);
+            ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+            EXPECT_TRUE(frame.bytes == UsbCamera::picture(number_of(frame.bytes), false));
+            skipped += frame.info.skipped;
+        }
+    }
+    EXPECT_GE(skipped, 3u);
+    source_.stop();
+    const std::string text = source_.log(ARHOST_SEVERITY_INFO);
+    EXPECT_THAT(text, HasSubstr("1 marked as damaged by the camera"));
+    EXPECT_THAT(text, HasSubstr("1 with malformed payloads"));
+    EXPECT_THAT(text, HasSubstr("1 truncated"));
+}
+
+TEST_F(UvcCamera, SetsControlsByName) {
+    ASSERT_EQ(start({{"exposure", "100"},
+                     {"focus", "40"},
+                     {"gain", "7"},
+                     {"white_balance", "5000"},
+                     {"power_line_frequency", "60_hz"},
+                     {"controls", "brightness=-5, tilt_absolute=-3, pan_absolute=7"},
+                     {"extension", "4:2=0a0bff"}}),
+              ARHOST_STATUS_OK)
+        << source_.log();
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x02), Octets{1}) << "manual";
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x04), (Octets{100, 0, 0, 0}));
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x08), Octets{0}) << "no automatic focus";
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x06), (Octets{40, 0}));
+    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x04), (Octets{7, 0}));
+    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x0b), Octets{0});
+    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x0a), (Octets{0x88, 0x13}));
+    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x05), Octets{2});
+    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x02), (Octets{0xfb, 0xff}));
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x0d), (Octets{7, 0, 0, 0, 0xfd, 0xff, 0xff, 0xff}));
+    EXPECT_EQ(camera_->value(UsbCamera::extension, 2), (Octets{0x0a, 0x0b, 0xff}));
+    EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
+
+    ASSERT_EQ(start({{"exposure", "auto"},
+                     {"focus", "auto"},
+                     {"extension", "43424140-4544-4746-4849-4a4b4c4d4e4f:2=000000"}}),
+              ARHOST_STATUS_OK)
+        << source_.log();
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x02), Octets{8})
+        << "aperture priority; it has no fully automatic mode";
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x08), Octets{1});
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x06), (Octets{40, 0})) << "unchanged";
+    EXPECT_EQ(camera_->value(UsbCamera::extension, 2), (Octets{0, 0, 0}));
+}
+
+TEST_F(UvcCamera, RejectsControlsAndValuesThatItDoesNotHave) {
+    const auto error = [&](const std::string &option, const std::string &value) {
+        return start_error({{option, value}}, ARHOST_STATUS_ERROR_CONFIGURATION);
+    };
+    EXPECT_THAT(error("controls", "sharpnes=3"),
+                HasSubstr("has no control 'sharpnes'; it has: auto_exposure, exposure_time_absolute, "));
+    EXPECT_THAT(error("controls", "hue=3"), HasSubstr("has no control 'hue'"));
+    EXPECT_THAT(error("controls", "gain"), HasSubstr("'gain' is not of the form NAME=VALUE"));
+    EXPECT_THAT(error("exposure", "2"),
+                HasSubstr("does not accept '2' for 'exposure_time_absolute'; valid: 3 to 2047"));
+    EXPECT_THAT(error("focus", "12"), HasSubstr("valid: 0 to 250 in steps of 5"));
+    EXPECT_THAT(error("gain", "auto"), HasSubstr("has no control 'auto gain'"));
+    EXPECT_THAT(error("controls", "auto_exposure=auto_mode"),
+                HasSubstr("valid: 1 (manual_mode), 3 (aperture_priority_mode)"));
+    EXPECT_THAT(error("power_line_frequency", "auto"), HasSubstr("valid: 0 (disabled), 1 (50_hz), 2 (60_hz)"));
+    EXPECT_THAT(error("extension", "5:2=00"), HasSubstr("has no extension unit '5'; it has: 4 (43424140-4544-"));
+    EXPECT_THAT(error("extension", "4:2=00"), HasSubstr("expects 3 bytes for extension unit 4, selector 2, not 1"));
+    for (const char *malformed : {"4=00", "4:2", "4:2=", "4:2=0", "4:2=0g", "4:0=00", ":2=00", "=00", "4:300=00"})
+        EXPECT_THAT(error("extension", malformed), HasSubstr("extension: ")) << malformed;
+    camera_->change(UsbCamera::processing, 0x04, [](CameraControl &gain) { gain.info = 1; });
+    EXPECT_THAT(error("gain", "3"), HasSubstr("does not let programs set 'gain'"));
+    camera_->change(UsbCamera::processing, 0x04, [](CameraControl &gain) { gain.info = 5; });
+    EXPECT_THAT(error("gain", "3"), HasSubstr("controls 'gain' automatically"));
+}
+
+TEST_F(UvcCamera, NamesWhatItOffersIfASizeOrFormatIsMissing) {
+    EXPECT_THAT(start_error({{"width", "640"}, {"height", "480"}}, ARHOST_STATUS_ERROR_CONFIGURATION),
+                HasSubstr("has no size 640×480; it offers YUY2 (320×180 30 fps), NV12 (320×180 30 fps), MJPEG"));
+    EXPECT_THAT(start_error({{"camera", "1"}}, ARHOST_STATUS_ERROR_CONFIGURATION),
+                HasSubstr("has no camera number 1, only 1"));
+    ASSERT_EQ(start({}, true, 10), ARHOST_STATUS_OK) << source_.log();
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_WARNING),
+                HasSubstr("delivers 30 fps at YUY2 320×180, not the configured 10 fps"));
+}
+
+TEST_F(UvcCamera, IsChosenBySerialNumber) {
+    UsbCamera second({.serial = "0002:b"});
+    ASSERT_TRUE(eventually([] { return kernel_driven() == 4; }));
+    second.change(UsbCamera::processing, 0x04, [](CameraControl &gain) { gain.maximum = {3, 0}; });
+    EXPECT_THAT(start_error({{"usb", "1d6b:0104:0002:b"}, {"gain", "50"}}, ARHOST_STATUS_ERROR_CONFIGURATION),
+                HasSubstr("valid: 0 to 3"));
+    EXPECT_EQ(start({{"usb", "1d6b:0104:0001"}, {"gain", "50"}}), ARHOST_STATUS_OK) << source_.log();
+    EXPECT_THAT(
+        start_error({{"usb", "1d6b:0104:0003"}}, ARHOST_STATUS_ERROR_DEVICE_LOST),
+        HasSubstr("there is no camera 1d6b:0104 with the serial number '0003'; visible: 1d6b:0104 (/dev/bus/usb/"));
+}
+
+TEST_F(UvcCamera, ReportsACameraInUse) {
+    SourceUnderTest first("source_uvc");
+    ASSERT_EQ(first.start({{"usb", "1d6b:0104"}}), ARHOST_STATUS_OK) << first.log();
+    EXPECT_THAT(start_error({}, ARHOST_STATUS_ERROR_IO), HasSubstr("is in use by another program"));
+    first.stop();
+    EXPECT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+}
+
+TEST_F(UvcCamera, ReturnsToTheKernelsDriver) {
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    EXPECT_EQ(kernel_driven(), 0);
+    source_.stop();
+    EXPECT_EQ(kernel_driven(), 2);
+}
+
+TEST_F(UvcCamera, ReportsAnUnplugAndReconnects) {
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    source_.stop();
+    const std::size_t files = open_files();
+    for (int round = 0; round < 3; ++round) {
+        ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+        ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+        camera_.reset();
+        SourceFrame frame;
+        for (std::uint64_t n = 1; n < 10 && (frame = source_.read(n)).status == ARHOST_STATUS_OK; ++n) {
+        }
+        EXPECT_EQ(frame.status, ARHOST_STATUS_ERROR_DEVICE_LOST);
+        EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has disappeared; was it unplugged?"));
+        source_.stop();
+        connect({});
+        EXPECT_EQ(open_files(), files);
+    }
+}
+
+TEST_F(UvcCamera, StopsWaitingWhenCancelled) {
+    camera_.reset();
+    ASSERT_TRUE(eventually([] { return kernel_driven() == 0; }));
+    connect({.is_silent = true});
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    source_.plugin().cancel(3);
+    EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_ERROR_CANCELLED);
+    EXPECT_EQ(source_.log(ARHOST_SEVERITY_ERROR), "");
+}
+
+TEST_F(UvcCamera, ThatSendsNothingIsLost) {
+    camera_.reset();
+    ASSERT_TRUE(eventually([] { return kernel_driven() == 0; }));
+    connect({.is_silent = true});
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_ERROR_DEVICE_LOST);
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has delivered no intact picture for 5 s"));
+}
