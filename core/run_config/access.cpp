@@ -2,7 +2,10 @@
 #include "run_config/access.hpp"
 
 #include "base/file_identity.hpp"
+#include "run_config/schema.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <cstdlib>
 
 namespace arhost::run_config {
@@ -67,6 +70,24 @@ void add_environment(sandbox::Policy &policy, const yaml::Node &variables) {
     }
 }
 
+std::string usb_id(const yaml::Node &node) {
+    std::string id = node.text();
+    std::ranges::transform(id, id.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    if (id.size() != 4 || id.find_first_not_of("0123456789abcdef") != std::string::npos)
+        node.fail("must have four hexadecimal digits, such as 046d; 'lsusb' lists VENDOR:PRODUCT of each device");
+    return id;
+}
+
+base::UsbIdentity usb_identity(const yaml::Node &usb) {
+    usb.allow_keys(keys_of("source.usb"));
+    base::UsbIdentity identity = usb_id(usb.require("vendor")) + ":" + usb_id(usb.require("product"));
+    if (const auto serial = usb.find("serial"))
+        identity += ":" + serial->text();
+    if (identity.size() > base::max_usb_identity)
+        usb.fail("the serial number is too long");
+    return identity;
+}
+
 } // namespace
 
 std::optional<yaml::Node> path_of(const yaml::Node &component) {
@@ -84,6 +105,8 @@ sandbox::Policy access_of(const yaml::Node &node, bool is_output, sandbox::Mode 
     if (const auto allow = node.find("allow"))
         for (const yaml::Node &what : allow->items())
             policy.allow.insert(what.choice(sandbox::allowances));
+    if (const auto usb = node.find("usb"))
+        policy.usb_device = usb_identity(*usb);
     if (const auto reads = node.find("reads"))
         add_reads(policy, *reads);
     if (const auto writes = node.find("writes"))

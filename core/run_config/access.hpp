@@ -9,9 +9,9 @@
 
 namespace arhost::run_config {
 
-// Returns the sandbox policy of the component at `node`, computed from `allow`, `reads`, `writes`, `environment`,
-// `path` (an output may write to its folder, a source may read the file), and options whose value is an existing file
-// or folder (readable). Throws yaml::Error.
+// Returns the sandbox policy of the component at `node`, computed from `allow`, `usb`, `reads`, `writes`,
+// `environment`, `path` (an output may write to its folder, a source may read the file), and options whose value is
+// an existing file or folder (readable). Throws yaml::Error.
 sandbox::Policy access_of(const yaml::Node &node, bool is_output, sandbox::Mode mode);
 
 // Returns the component's `path`, which may be a key of the component or one of its options.

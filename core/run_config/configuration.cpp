@@ -240,12 +240,19 @@ std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, 
         component.node.require(configured ? "plugin" : "fallback")
             .fail("'" + plugin.id + "' is a " + ipc::to_text(plugin.kind) + ", not a " + ipc::to_text(kind));
     for (const std::string &need : plugin.needs)
-        if (component.policy.mode != sandbox::Mode::none && !component.policy.allows(need))
+        if (component.policy.mode != sandbox::Mode::none && !component.policy.meets(need))
             component.node.require(configured ? "plugin" : "fallback")
                 .fail("'" + plugin.id + "' needs '" + need + "', which the sandbox blocks: add 'allow: [" + need +
-                      "]' to " + component.node.path() + " (docs/security.md)");
+                      "]'" + (need == "usb" ? ", or better 'usb: {vendor: …, product: …}'," : "") + " to " +
+                      component.node.path() + " (docs/security.md)");
     const std::optional<yaml::Node> options = configured ? component.options : std::nullopt;
     std::vector<ipc::OptionValue> values = resolve_options(plugin, options, component.path, component.node);
+    if (const auto usb = std::ranges::find(values, "usb", &ipc::OptionValue::key);
+        usb != values.end() && !component.policy.usb_device.empty()) {
+        if (const auto option = options ? options->find("usb") : std::nullopt)
+            option->fail("the device is also given by the key 'usb' next to 'plugin'; remove one of them");
+        usb->text = component.policy.usb_device;
+    }
     for (const ipc::OptionDeclaration &declared : plugin.options) {
         const auto option = options ? options->find(declared.key) : std::nullopt;
         const auto node = declared.key == "path" && component.path ? component.path : option;

@@ -30,6 +30,10 @@ void add_component(std::vector<Key> &keys, const Key &component, const std::stri
          {"allow", list, false, "nothing",
           "Sandbox permissions: `video`, `usb`, `gpu`, `display`, `network`, `listen`, `processes` "
           "(docs/security.md)."},
+         {"usb", map, false, "", "The USB device that the plugin may use, and no other (docs/security.md)."},
+         {"usb.vendor", text, true, "", "Vendor ID: four hexadecimal digits, as `lsusb` prints them."},
+         {"usb.product", text, true, "", "Product ID: four hexadecimal digits."},
+         {"usb.serial", text, false, "any", "Serial number, if there are several of these devices."},
          {"reads", list, false, "", "Additional files and folders that the plugin may read."},
          {"writes", list, false, "", "Additional folders that the plugin may write to."},
          {"environment", list, false, "",

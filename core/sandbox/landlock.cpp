@@ -104,6 +104,8 @@ Layer enter_landlock(const Policy &policy) {
         rules.allow(path, access::write | execute);
     if (policy.allows("video"))
         rules.allow("/dev", access::read_folder); // to enumerate cameras
+    if (!policy.usb_device.empty())
+        rules.allow("/dev/bus/usb", access::read_folder);
     if (!rules.enforce()) {
         layer.missing = error_text("cannot enforce the ruleset");
         return layer;

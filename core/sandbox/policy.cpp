@@ -128,6 +128,8 @@ Paths paths_of(const Policy &policy) {
             append(paths.readable, allowance.readable);
             append(paths.devices, allowance.devices);
         }
+    if (!policy.usb_node.empty())
+        paths.devices.push_back(policy.usb_node);
     if (policy.allows("display"))
         append_display(paths);
     paths.readable.insert(paths.readable.end(), policy.readable.begin(), policy.readable.end());
@@ -180,6 +182,7 @@ nlohmann::json to_json(const Policy &policy) {
             {"allow", policy.allow},
             {"readable", texts(policy.readable)},
             {"writable", texts(policy.writable)},
+            {"usb_device", policy.usb_device},
             {"environment", policy.environment},
             {"memory_bytes", policy.memory_bytes},
             {"makes_shared_memory", policy.makes_shared_memory},
@@ -199,6 +202,7 @@ Policy policy_from_json(const nlohmann::json &json) {
         policy.environment.insert(variable.get<std::string>());
     policy.readable = paths("readable");
     policy.writable = paths("writable");
+    policy.usb_device = json.at("usb_device").get<std::string>();
     policy.memory_bytes = json.at("memory_bytes").get<std::uint64_t>();
     policy.makes_shared_memory = json.at("makes_shared_memory").get<bool>();
     policy.standard_output = json.at("standard_output").get<bool>();

@@ -54,7 +54,7 @@ std::string to_text(const Level &level) {
     return active + (missing.empty() ? "" : "; MISSING " + missing);
 }
 
-Level enter(const Policy &policy) {
+Level enter(Policy policy) {
     Level level;
     if (policy.mode == Mode::none)
         return level;
@@ -62,6 +62,11 @@ Level enter(const Policy &policy) {
         std::error_code ignored; // a later write to the folder reports the error
         std::filesystem::create_directories(folder, ignored);
     }
+    // The layers hide the folder where the device is found. A device that is connected later has another node, so the
+    // worker must be restarted.
+    if (!policy.usb_device.empty())
+        if (const auto device = base::find_usb_device(policy.usb_device))
+            policy.usb_node = device->node;
     drop_environment(policy);
     level.push_back(raise_oom_score());
     level.push_back(report_control_group());

@@ -5,6 +5,8 @@
 // needs privileges.
 #pragma once
 
+#include "base/usb_device.hpp"
+
 #include <nlohmann/json_fwd.hpp>
 
 #include <array>
@@ -33,13 +35,17 @@ struct Policy {
     std::set<std::string, std::less<>> allow{}; // elements of `allowances`
     // Absolute paths; a folder includes its contents. System libraries and settings are always readable.
     std::vector<std::filesystem::path> readable{};
-    std::vector<std::filesystem::path> writable{};    // folders; created if missing
+    std::vector<std::filesystem::path> writable{}; // folders; created if missing
+    base::UsbIdentity usb_device{};   // the only USB device that may be used, unless `allow` has "usb"; empty: none
+    std::filesystem::path usb_node{}; // of usb_device; set by enter()
     std::set<std::string, std::less<>> environment{}; // variables to keep in addition to the standard ones
     std::uint64_t memory_bytes = 0;   // limit of private memory; 0: three quarters of the memory of the machine
     bool makes_shared_memory = false; // set for the scene loader; such memory does not count towards memory_bytes
     bool standard_output = false;     // the worker writes to the standard output of the host
 
     bool allows(std::string_view what) const { return allow.contains(what); }
+    // Whether a plugin that needs `need` (an element of `allowances`) may run.
+    bool meets(std::string_view need) const { return allows(need) || (need == "usb" && !usb_device.empty()); }
 };
 
 // The number of bytes that a process with this policy may use; 0 (only in a build with sanitizers): unlimited.
@@ -91,7 +97,7 @@ std::string enter_user_namespace();
 
 // Permanently sandboxes the calling process, which must be single-threaded. Returns the state of each layer; throws
 // std::runtime_error if a layer is incomplete and the mode is strict. Mode::none does nothing.
-Level enter(const Policy &policy);
+Level enter(Policy policy);
 
 // Like enter, for a process that will open `plugin`. Also makes readable the file `plugin` and the folder of the
 // plugins that are installed with this program.

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // arhost-launcher: started by the host (supervise/launcher.hpp) with a socket to the host as descriptor 3. Starts
-// workers, reports how they exited, and kills the processes that they leave behind.
+// workers, reports how they exited, kills the processes that they leave behind, and returns their USB devices to the
+// kernel's drivers.
 //
 // Each isolated worker is PID 2 of its own PID namespace, so that it can receive all signals. (The kernel discards
 // signals to PID 1 from its own namespace.)
 #include "base/exec.hpp"
 #include "base/orphans.hpp"
+#include "base/usb_device.hpp"
 #include "sandbox/sandbox.hpp"
 #include "supervise/control_group.hpp"
 #include "supervise/launcher_protocol.hpp"
@@ -43,8 +45,10 @@ struct Init {
 struct Worker {
     std::optional<Init> init; // nullopt: the worker has no PID namespace
     ControlGroup group;
+    arhost::base::UsbIdentity usb_device; // empty: none
 };
 using Workers = std::map<pid_t, Worker>; // those that have not exited
+using Helpers = std::set<pid_t>;         // processes that return USB devices
 
 [[noreturn]] void run_init(int pipe) {
     ::prctl(PR_SET_NAME, "arhost-init");
@@ -139,6 +143,7 @@ void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds,
            ControlGroups &groups) {
     const pid_t launcher = ::getpid();
     Worker worker;
+    worker.usb_device = request.isolation.usb_device.data();
     if (request.isolation.enabled)
         worker.group = groups.create(request.isolation.memory_bytes);
     pid_t pid = request.isolation.enabled ? fork_isolated(request, fds, worker) : -1;
@@ -172,6 +177,22 @@ void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds,
     send_struct(socket, reply, {pidfd.get()});
 }
 
+// Returns the USB device of a worker that has exited to the kernel's drivers, if it was killed before it could do so.
+// Starts a process for this, because drivers may take seconds.
+void return_usb_device(const arhost::base::UsbIdentity &identity, Helpers &helpers) {
+    const auto device = identity.empty() ? std::nullopt : arhost::base::find_usb_device(identity);
+    if (!device || device->driver_less.empty())
+        return;
+    const pid_t pid = ::fork();
+    if (pid == 0) {
+        ::syscall(SYS_close_range, static_cast<unsigned>(launcher_fd), ~0u, 0u);
+        arhost::base::bind_usb_drivers(*device);
+        ::_exit(0);
+    }
+    if (pid > 0)
+        helpers.insert(pid);
+}
+
 // Called after the host has exited. Kills the workers and their children, and exits. Uses _exit, because the leak
 // check of a sanitizer would stop this process at a normal exit, which conflicts with the SIGCONT that a waiting host
 // sends.
@@ -189,14 +210,18 @@ void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds,
             break;
         ::usleep(1000);
     }
+    for (const auto &[pid, worker] : workers)
+        if (const auto device =
+                worker.usb_device.empty() ? std::nullopt : arhost::base::find_usb_device(worker.usb_device))
+            arhost::base::bind_usb_drivers(*device);
     groups.remove_ended();
     groups.restore();
     ::_exit(0);
 }
 
-// Kills children that are neither workers nor the first process of a worker's namespace.
-void kill_other_children(const Workers &workers) {
-    std::set<pid_t> kept;
+// Kills children that are neither workers nor the first process of a worker's namespace nor helpers.
+void kill_other_children(const Workers &workers, const Helpers &helpers) {
+    std::set<pid_t> kept = helpers;
     for (const auto &[pid, worker] : workers) {
         kept.insert(pid);
         if (worker.init)
@@ -205,12 +230,12 @@ void kill_other_children(const Workers &workers) {
     kill_orphans(kept);
 }
 
-void reap(int socket, Workers &workers, ControlGroups &groups) {
+void reap(int socket, Workers &workers, Helpers &helpers, ControlGroups &groups) {
     groups.remove_ended();
     for (;;) {
         siginfo_t info{};
         if (::waitid(P_ALL, 0, &info, WEXITED | WNOHANG | WNOWAIT) != 0 || info.si_pid == 0)
-            return kill_other_children(workers);
+            return kill_other_children(workers, helpers);
         const auto ended = workers.extract(info.si_pid);
         // The id of a worker's process group cannot be reused before the worker is reaped. kill_other_children kills
         // children that have left the group.
@@ -220,8 +245,10 @@ void reap(int socket, Workers &workers, ControlGroups &groups) {
         rusage usage{};
         reply.kind = Reply::exited;
         reply.exit.pid = ::wait4(info.si_pid, &reply.exit.wait_status, 0, &usage);
+        helpers.erase(info.si_pid);
         if (!ended)
-            continue; // an orphan of a worker, or the first process of a namespace
+            continue; // a helper, an orphan of a worker, or the first process of a namespace
+        return_usb_device(ended.mapped().usb_device, helpers);
         reply.exit.exceeded_memory = ended.mapped().group.exceeded_memory();
         groups.end(ended.mapped().group);
         reply.exit.cpu_seconds = cpu_seconds(usage);
@@ -254,6 +281,7 @@ int main() {
     ::sigprocmask(SIG_BLOCK, &child, nullptr);
     const UniqueFd signals = arhost::base::checked(::signalfd(-1, &child, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
     Workers workers;
+    Helpers helpers;
     ControlGroups groups;
     for (;;) {
         pollfd ready[2] = {{launcher_fd, POLLIN, 0}, {signals.get(), POLLIN, 0}};
@@ -263,7 +291,7 @@ int main() {
             signalfd_siginfo info;
             while (::read(signals.get(), &info, sizeof info) > 0) {
             }
-            reap(launcher_fd, workers, groups);
+            reap(launcher_fd, workers, helpers, groups);
         }
         if (ready[0].revents) {
             Request request;

@@ -3,6 +3,9 @@
 // How arhost-launcher isolates a worker. The worker adds the rest of the sandbox itself (sandbox/sandbox.hpp).
 #pragma once
 
+#include "base/usb_device.hpp"
+
+#include <array>
 #include <cstdint>
 
 namespace arhost::supervise {
@@ -14,6 +17,8 @@ struct Isolation {
     std::uint64_t memory_bytes = 0; // limit of the control group; 0: none
     // The worker's standard output is that of the host, which the launcher has inherited.
     bool standard_output = false;
+    // base::UsbIdentity of the device that the kernel's drivers get back if the worker is killed; "": none
+    std::array<char, base::max_usb_identity + 1> usb_device{};
 };
 
 } // namespace arhost::supervise

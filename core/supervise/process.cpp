@@ -21,6 +21,12 @@ bool signal_process(const base::UniqueFd &pidfd, int signal) {
 
 } // namespace
 
+Isolation isolation_of(const sandbox::Policy &policy) {
+    Isolation isolation{policy.mode != sandbox::Mode::none, sandbox::memory_limit(policy), policy.standard_output, {}};
+    policy.usb_device.copy(isolation.usb_device.data(), isolation.usb_device.size() - 1); // the rest remains 0
+    return isolation;
+}
+
 Process::Process(Context &context, WorkerBudget &budget, Callbacks callbacks, const Json &first, Isolation isolation)
     : context_(context), budget_(budget), callbacks_(std::move(callbacks)),
       spawned_(context.launcher.spawn(context.worker_program, isolation, context.log)),

@@ -34,6 +34,9 @@ struct Death {
     std::string log_tail; // the last 20 lines that the worker logged or printed
 };
 
+// How the launcher isolates a worker with this policy.
+Isolation isolation_of(const sandbox::Policy &policy);
+
 class Process {
 public:
     // Called from the reactor. `died` is called once, as the last callback, and is the only one that may destroy the
@@ -48,9 +51,7 @@ public:
     // the Process.
     template <class T>
     Process(Context &context, WorkerBudget &budget, Callbacks callbacks, const T &first)
-        : Process(context, budget, std::move(callbacks), ipc::encode(first),
-                  Isolation{first.sandbox.mode != sandbox::Mode::none, sandbox::memory_limit(first.sandbox),
-                            first.sandbox.standard_output}) {}
+        : Process(context, budget, std::move(callbacks), ipc::encode(first), isolation_of(first.sandbox)) {}
     ~Process(); // kills the process if it is still running
     Process(const Process &) = delete;
     Process &operator=(const Process &) = delete;

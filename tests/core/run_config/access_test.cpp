@@ -54,6 +54,19 @@ TEST_F(Access, ASourceMayReadItsFile) {
                 ElementsAre(folder / "video.mp4"));
 }
 
+TEST_F(Access, AUsbDeviceIsNamedByItsIdsAndSerialNumber) {
+    EXPECT_EQ(of("{plugin: source_uvc, usb: {vendor: 046D, product: 0825}}", false).usb_device, "046d:0825");
+    EXPECT_EQ(of("{plugin: source_uvc, usb: {vendor: 046d, product: 0825, serial: 0001}}", false).usb_device,
+              "046d:0825:0001");
+    EXPECT_EQ(of("{plugin: source_uvc}", false).usb_device, "");
+    EXPECT_THAT(error_of("{usb: {vendor: 46d, product: 0825}}"), HasSubstr("must have four hexadecimal digits"));
+    EXPECT_THAT(error_of("{usb: {vendor: 046g, product: 0825}}"), HasSubstr("must have four hexadecimal digits"));
+    EXPECT_THAT(error_of("{usb: {vendor: 046d}}"), HasSubstr("product"));
+    EXPECT_THAT(error_of("{usb: {vendor: 046d, product: 0825, bus: 1}}"), HasSubstr("bus"));
+    EXPECT_THAT(error_of("{usb: {vendor: 046d, product: 0825, serial: " + std::string(300, 'a') + "}}"),
+                HasSubstr("too long"));
+}
+
 TEST_F(Access, APatternGrantsItsFolder) {
     file("frames/0001.png");
     EXPECT_THAT(of("{plugin: source_file, path: frames/%04d.png}", false).readable, ElementsAre(folder / "frames"));

@@ -601,10 +601,14 @@ TEST_F(Sandbox, PolicySurvivesAJsonRoundTrip) {
     policy.environment = {"GIVEN"};
     policy.memory_bytes = 1ull << 40;
     policy.makes_shared_memory = true;
+    policy.usb_device = "046d:0825:A";
     const Policy read = policy_from_json(to_json(policy));
     EXPECT_EQ(to_json(read), to_json(policy));
     EXPECT_EQ(read.writable, policy.writable);
     EXPECT_EQ(read.environment, policy.environment);
+    EXPECT_EQ(read.usb_device, policy.usb_device);
+    EXPECT_TRUE(read.meets("usb"));
+    EXPECT_FALSE(read.allows("usb"));
     EXPECT_TRUE(read.allows("gpu"));
     EXPECT_FALSE(read.allows("network"));
     EXPECT_THROW(policy_from_json({{"mode", 1}}), nlohmann::json::exception);

@@ -328,3 +328,159 @@ TEST_F(UvcCamera, ThatSendsNothingIsLost) {
     EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_ERROR_DEVICE_LOST);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has delivered no intact picture for 5 s"));
 }
+
+// ---- arhost with its sandbox -----------------------------------------------------------------------
+
+namespace {
+
+class UvcRun : public UvcCamera {
+protected:
+    static std::string configuration(const std::string &access, const std::string &more = "") {
+        return "version: 1\nmode: live\nsandbox: strict\nsource: {plugin: source_uvc, fps: 30, " + access +
+               "}\ncamera: {width: 320, height: 180, fx: 300}\n"
+               "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+               "outputs: [{plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n" +
+               more;
+    }
+    static std::ptrdiff_t frames(const arhost::test::ArhostRun &run) {
+        const std::string text = run.exists("out/poses.jsonl") ? run.read("out/poses.jsonl") : "";
+        return std::count(text.begin(), text.end(), '\n');
+    }
+    // Waits for further frames.
+    static bool proceeds(arhost::test::ArhostRun &run, std::ptrdiff_t count = 15) {
+        const std::ptrdiff_t before = frames(run);
+        return eventually([&] { return !run.running() || frames(run) >= before + count; }) && run.running();
+    }
+    static void end(arhost::test::ArhostRun &run) {
+        arhost::test::send_signal(run.pid(), SIGINT);
+        run.wait();
+    }
+    // The worker that uses the camera's node.
+    static pid_t worker_of_camera() {
+        std::error_code ignored;
+        for (const auto &process : fs::directory_iterator("/proc", ignored)) {
+            const std::string pid = process.path().filename();
+            if (pid.find_first_not_of("0123456789") != std::string::npos || std::stoi(pid) == getpid())
+                continue;
+            for (const auto &fd : fs::directory_iterator(process.path() / "fd", ignored))
+                if (fs::read_symlink(fd.path(), ignored).string().find("/bus/usb/") != std::string::npos)
+                    return std::stoi(pid);
+        }
+        return -1;
+    }
+    const std::string usb = "usb: {vendor: 1d6b, product: 0104, serial: 0001}";
+};
+
+} // namespace
+
+TEST_F(UvcRun, CapturesInTheSandboxWithAccessToOneDevice) {
+    arhost::test::ArhostRun run(configuration(usb));
+    run.start({"run.yaml", "--allow-no-target"});
+    EXPECT_TRUE(proceeds(run)) << run.output();
+    EXPECT_EQ(kernel_driven(), 0);
+    end(run);
+    EXPECT_THAT(run.output(), HasSubstr("YUY2 320×180"));
+    EXPECT_TRUE(eventually([] { return kernel_driven() == 2; }));
+}
+
+TEST_F(UvcRun, OtherDevicesDoNotExistInTheSandbox) {
+    arhost::test::ArhostRun absent(configuration("usb: {vendor: 1d6b, product: 0104, serial: 9}"));
+    EXPECT_NE(absent.run({"check", "run.yaml"}), 0);
+    EXPECT_THAT(absent.output(),
+                HasSubstr("there is no camera 1d6b:0104 with the serial number '9'; no USB camera is "
+                          "visible"));
+    arhost::test::ArhostRun forbidden(configuration("allow: []"));
+    EXPECT_NE(forbidden.run({"check", "run.yaml"}), 0);
+    EXPECT_THAT(forbidden.output(), HasSubstr("or better 'usb: {vendor: …, product: …}'"));
+    arhost::test::ArhostRun twice(configuration(usb + ", options: {usb: '1d6b:0104'}"));
+    EXPECT_NE(twice.run({"check", "run.yaml"}), 0);
+    EXPECT_THAT(twice.output(), HasSubstr("the device is also given by the key 'usb'"));
+    arhost::test::ArhostRun all(configuration("allow: [usb]"));
+    EXPECT_EQ(all.run({"check", "run.yaml"}), 0) << all.output();
+}
+
+TEST_F(UvcRun, SurvivesAnUnplug) {
+    arhost::test::ArhostRun run(configuration(usb));
+    run.start({"run.yaml", "--allow-no-target"});
+    ASSERT_TRUE(proceeds(run)) << run.output();
+    for (int round = 0; round < 2; ++round) {
+        camera_.reset();
+        camera_ = std::make_unique<UsbCamera>(UsbCamera::Setup{});
+        EXPECT_TRUE(proceeds(run, 30)) << run.output();
+    }
+    end(run);
+    EXPECT_THAT(run.output(), HasSubstr("was it unplugged?"));
+    EXPECT_GE(run.stats()["restarts"]["source"], 2);
+    EXPECT_TRUE(eventually([] { return kernel_driven() == 2; }));
+}
+
+TEST_F(UvcRun, TheKernelsDriverReturnsIfTheWorkerIsKilled) {
+    // Without further attempts, nothing else returns the camera.
+    arhost::test::ArhostRun run(configuration(usb, "restart: {proven_after_frames: 1000000, quarantine_after: 1}\n"));
+    run.start({"run.yaml", "--allow-no-target"});
+    ASSERT_TRUE(proceeds(run)) << run.output();
+    const pid_t worker = worker_of_camera();
+    ASSERT_GT(worker, 0);
+    arhost::test::send_signal(worker, SIGKILL);
+    EXPECT_TRUE(eventually([] { return kernel_driven() == 2; })) << run.output();
+    run.wait();
+}
+
+TEST_F(UvcRun, ContinuesIfTheWorkerIsKilled) {
+    arhost::test::ArhostRun run(configuration(usb));
+    run.start({"run.yaml", "--allow-no-target"});
+    ASSERT_TRUE(proceeds(run)) << run.output();
+    for (int round = 0; round < 3; ++round) {
+        arhost::test::send_signal(worker_of_camera(), SIGKILL);
+        EXPECT_TRUE(proceeds(run, 30)) << run.output();
+    }
+    end(run);
+    EXPECT_TRUE(eventually([] { return kernel_driven() == 2; }));
+}
+
+TEST_F(UvcRun, TheKernelsDriverReturnsIfArhostIsKilled) {
+    arhost::test::ArhostRun run(configuration(usb));
+    run.start({"run.yaml", "--allow-no-target"});
+    ASSERT_TRUE(proceeds(run)) << run.output();
+    arhost::test::send_signal(run.pid(), SIGKILL);
+    EXPECT_TRUE(eventually([] { return kernel_driven() == 2; }));
+}
+
+// ---- The kernel's driver with the same camera ------------------------------------------------------
+
+TEST_F(UvcCamera, IsCapturedByTheV4l2SourceToo) {
+    ASSERT_TRUE(eventually([] { return fs::exists("/dev/video0"); }));
+    SourceUnderTest v4l2("source_v4l2");
+    arhost_source_setup setup{};
+    setup.fps = 30;
+    ASSERT_EQ(v4l2.start({{"device", "/dev/video0"},
+                          {"format", "yuyv"},
+                          {"exposure", "100"},
+                          {"focus", "40"},
+                          {"white_balance", "5000"},
+                          {"power_line_frequency", "60_hz"},
+                          {"controls", "gain=7, tilt_absolute=-3"}},
+                         setup),
+              ARHOST_STATUS_OK)
+        << v4l2.log();
+    for (std::uint64_t n = 0; n < 10; ++n) {
+        const SourceFrame frame = v4l2.read(n);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << v4l2.log();
+        EXPECT_TRUE(frame.bytes == UsbCamera::picture(number_of(frame.bytes), false));
+    }
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x02), Octets{1});
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x04), (Octets{100, 0, 0, 0}));
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x08), Octets{0});
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x06), (Octets{40, 0}));
+    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x0a), (Octets{0x88, 0x13}));
+    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x05), Octets{2});
+    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x04), (Octets{7, 0}));
+    v4l2.stop();
+    ASSERT_EQ(
+        v4l2.start({{"device", "/dev/video0"}, {"format", "mjpeg"}, {"exposure", "auto"}, {"focus", "auto"}}, setup),
+        ARHOST_STATUS_OK)
+        << v4l2.log();
+    EXPECT_EQ(v4l2.read(0).status, ARHOST_STATUS_OK);
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x02), Octets{8});
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x08), Octets{1});
+}
