@@ -265,7 +265,7 @@ private:
         }
         if (unit.id == 0 || std::ranges::count(function.units, unit.id, &Unit::id))
             return defect(at, "is ignored: its unit ID " + std::to_string(unit.id) + " is 0 or not unique");
-        append(function.units, max_units, at, std::move(unit));
+        append(function.units, max_units, at, unit);
     }
 
     void add_streaming(std::size_t at, const Descriptor &descriptor) {

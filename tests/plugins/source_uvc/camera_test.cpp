@@ -35,6 +35,14 @@ std::size_t open_files() {
     return static_cast<std::size_t>(std::distance(fs::directory_iterator("/proc/self/fd"), {}));
 }
 
+[[maybe_unused]] std::size_t resident_kib() {
+    std::ifstream status("/proc/self/status");
+    for (std::string line; std::getline(status, line);)
+        if (line.starts_with("VmRSS:"))
+            return std::stoul(line.substr(6));
+    return 0;
+}
+
 // Waits until a condition holds, for at most 20 s.
 template <class Condition> bool eventually(Condition &&condition) {
     for (int i = 0; i < 2000 && !condition(); ++i)
@@ -95,6 +103,8 @@ protected:
         unplug();
     }
 };
+
+class UvcReplug : public UvcCamera {};
 
 struct Kind {
     const char *name;
@@ -308,6 +318,31 @@ TEST_F(UvcCamera, ReportsAnUnplugAndReconnects) {
         connect({});
         EXPECT_EQ(open_files(), files);
     }
+}
+
+// Takes a quarter of an hour.
+TEST_F(UvcReplug, IsBackAThousandTimesWithoutLeaks) {
+    std::size_t files = 0;
+    [[maybe_unused]] std::size_t memory = 0;
+    for (int round = 0; round < 1000; ++round) {
+        ASSERT_EQ(start({{"format", "mjpeg"}}), ARHOST_STATUS_OK) << "round " << round << "\n" << source_.log();
+        ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK) << "round " << round << "\n" << source_.log();
+        camera_.reset();
+        SourceFrame frame;
+        for (std::uint64_t n = 1; n < 10 && (frame = source_.read(n)).status == ARHOST_STATUS_OK; ++n) {
+        }
+        ASSERT_EQ(frame.status, ARHOST_STATUS_ERROR_DEVICE_LOST) << "round " << round << "\n" << source_.log();
+        source_.stop();
+        connect({});
+        if (round == 20) {
+            files = open_files();
+            memory = resident_kib();
+        }
+    }
+    EXPECT_EQ(open_files(), files);
+#ifndef __SANITIZE_ADDRESS__ // ASan delays freeing memory and has its own leak checker
+    EXPECT_LT(resident_kib(), memory + 4096);
+#endif
 }
 
 TEST_F(UvcCamera, StopsWaitingWhenCancelled) {
