@@ -46,7 +46,8 @@ void run_uvc_descriptors(Bytes bytes) {
                         "an endpoint that cannot be used");
             for (const uvc::Format &format : stream.formats) {
                 require(format.frames.size() <= uvc::max_frames && !format.name.empty(), "no limit or no name");
-                std::ranges::for_each(format.frames, check);
+                for (const uvc::FrameSize &frame : format.frames)
+                    check(frame);
             }
         }
     }
