@@ -98,7 +98,7 @@ TEST(Worker, ExitsIfTheSetupIsForAnotherKind) {
     format.pixel_format = ARHOST_PIXEL_FORMAT_GREY8;
     format.width = format.height = 16;
     ASSERT_TRUE(arhost_frame_layout(&format));
-    worker.process.send(messages::Create{default_options(*hello), messages::SinkSetup{format}});
+    worker.process.send(messages::Create{default_options(*hello), messages::SinkSetup{format, 25, 0, {}}});
     const auto failed = worker.next<messages::Failed>();
     ASSERT_TRUE(failed);
     EXPECT_EQ(failed->status, ARHOST_STATUS_ERROR_INTERNAL);
