@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "controls.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace sink_window {
+
+using Json = nlohmann::json;
+
+void Controls::send(const Json &command, Take take) {
+    if (!control_)
+        return show_("this version of arhost takes no commands from outputs", true);
+    const arhost_status status =
+        control_.send(command.dump(), [this, take = std::move(take)](const std::string &text) {
+            changed_ = true;
+            const Json answer = Json::parse(text, nullptr, false);
+            try {
+                if (answer.at("ok").get<bool>())
+                    take(answer);
+                else
+                    show_(answer.at("error").get<std::string>(), true);
+            } catch (const Json::exception &error) {
+                show_(std::string("cannot understand the answer of arhost: ") + error.what(), true);
+            }
+        });
+    if (status != ARHOST_STATUS_OK)
+        show_("arhost has not answered the previous commands yet; retry later", true);
+}
+
+void Controls::freeze() {
+    send({{"command", "freeze"}}, [this](const Json &answer) { frozen_ = answer.at("frozen").get<bool>(); });
+}
+
+void Controls::snapshot() {
+    send({{"command", "snapshot"}},
+         [this](const Json &answer) { show_("snapshot: " + answer.value("file", "written"), false); });
+}
+
+void Controls::record() {
+    send({{"command", "record"}, {"on", !recording_}}, [this, on = !recording_](const Json &answer) {
+        recording_ = on;
+        show_((on ? "recording: " : "recorded: ") + answer.value("file", ""), false);
+    });
+}
+
+void Controls::load_scene(std::size_t index) {
+    if (scenes_.empty())
+        return show_("the names of the scenes are not known: add status to the output's key 'control'", true);
+    if (index >= scenes_.size())
+        return show_("there is no scene " + std::to_string(index + 1) + "; add more to the key 'scenes'", true);
+    show_("loading scene " + scenes_[index], false);
+    send({{"command", "load_scene"}, {"scene", scenes_[index]}}, [this](const Json &answer) {
+        scene_ = answer.at("scene").get<std::string>();
+        show_("scene: " + scene_, false);
+    });
+}
+
+void Controls::poll(Clock::time_point now) {
+    if (!control_ || !status_granted_ || status_pending_ || now < next_poll_)
+        return;
+    next_poll_ = now + std::chrono::milliseconds(500);
+    status_pending_ = control_.send(R"({"command": "status"})", [this](const std::string &text) {
+        status_pending_ = false;
+        changed_ = true;
+        try {
+            const Json answer = Json::parse(text);
+            status_granted_ = answer.at("ok").get<bool>();
+            if (status_granted_)
+                take_status(answer.at("status"));
+        } catch (const Json::exception &) {
+            status_granted_ = false;
+        }
+    }) == ARHOST_STATUS_OK;
+}
+
+void Controls::take_status(const Json &status) {
+    frozen_ = status.at("frozen").get<bool>();
+    recording_ = !status.at("recording").is_null();
+    scenes_ = status.at("scenes").get<std::vector<std::string>>();
+    scene_ = status.at("scene").is_string() ? status.at("scene").get<std::string>() : "";
+    Numbers numbers;
+    numbers.fps = status.at("fps").get<double>();
+    if (status.at("stages").contains("latency"))
+        numbers.latency_ms = status.at("stages").at("latency").at("p50_ms").get<double>();
+    for (const Json &target : status.at("targets"))
+        numbers.targets += target.at("state") != "lost";
+    for (const Json &component : status.at("components"))
+        numbers.restarts += component.at("restarts").get<int>();
+    numbers_ = numbers;
+}
+
+} // namespace sink_window

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Sends the commands of keys to the host, and keeps what the host answers (docs/control.md).
+#pragma once
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include <chrono>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace sink_window {
+
+class Controls {
+public:
+    using Clock = std::chrono::steady_clock;
+    // Receives a message to the user.
+    using Show = std::function<void(const std::string &text, bool is_error)>;
+
+    // From the host's status document.
+    struct Numbers {
+        double fps = 0;
+        std::optional<double> latency_ms; // median
+        int targets = 0, restarts = 0;
+    };
+
+    Controls(const arhost::Host &host, Show show) : control_(host), show_(std::move(show)) {}
+
+    void freeze();
+    void snapshot();
+    void record();
+    void load_scene(std::size_t index);
+    // Asks for the status twice a second, unless the host has refused it. Call it often while frames arrive.
+    void poll(Clock::time_point now);
+
+    bool frozen() const { return frozen_; }
+    bool recording() const { return recording_; }
+    const std::vector<std::string> &scenes() const { return scenes_; } // empty: not known
+    const std::string &scene() const { return scene_; }                // the one in use
+    const std::optional<Numbers> &numbers() const { return numbers_; }
+    // Returns whether an answer has changed the state since the last call.
+    bool take_changed() { return std::exchange(changed_, false); }
+
+private:
+    // Receives the answer to a command that has succeeded.
+    using Take = std::function<void(const nlohmann::json &answer)>;
+    void send(const nlohmann::json &command, Take take);
+    void take_status(const nlohmann::json &status);
+
+    arhost::HostControl control_;
+    Show show_;
+    bool frozen_ = false, recording_ = false, changed_ = false;
+    std::vector<std::string> scenes_;
+    std::string scene_;
+    std::optional<Numbers> numbers_;
+    bool status_granted_ = true, status_pending_ = false; // granted until the host has refused it
+    Clock::time_point next_poll_{};
+};
+
+} // namespace sink_window

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The frame in the window: a texture, and where the window shows it.
+#pragma once
+
+#include "window.hpp"
+
+#include <arhost/sink.h>
+
+#include <cstdint>
+#include <vector>
+
+namespace sink_window {
+
+struct Point {
+    double x, y;
+};
+
+// Where and how the window shows a frame.
+struct View {
+    Rectangle area; // px of the window
+    int width, height; // of the frame, px
+    bool mirrored;
+
+    // Converts pixel coordinates of the frame, whose pixel centres are at integers, to coordinates of the window.
+    Point to_window(Point pixel) const {
+        const double u = (pixel.x + 0.5) / width, v = (pixel.y + 0.5) / height;
+        return {area.x + (mirrored ? 1 - u : u) * area.width, area.y + v * area.height};
+    }
+};
+
+class Picture {
+public:
+    // Creates a black picture in the current OpenGL context, with which the texture is deleted. Throws
+    // arhost::Failure if OpenGL does not support the size.
+    Picture(int width, int height);
+
+    void upload(const arhost_output &output);
+    void draw(const View &view, const Rectangle &window) const;
+
+private:
+    int width_, height_;
+    std::vector<std::uint8_t> packed_;
+};
+
+} // namespace sink_window
