@@ -12,7 +12,6 @@ namespace {
 
 using arhost::shading::Lens;
 
-
 double distance_of(const arhost_marker &marker) {
     return std::hypot(marker.mt[12], marker.mt[13], marker.mt[14]);
 }
@@ -27,11 +26,11 @@ void draw_axes(const Overlay &overlay, const View &view, const arhost_marker &ma
         side_px = std::max(side_px, std::hypot(to[0] - from[0], to[1] - from[1]));
     }
     const double length = side_px * distance_of(marker) / focal_length_px / 2;
-    // Returns the pixel of a point on an axis; columns 0 to 2 of `mt` are the axes. Eye space has y up and z backward.
+    // Returns the pixel of a point on an axis; columns 0 to 2 of `mt` are the axes. Eye space has y up and z
+    // backward.
     const auto project = [&](int axis, double at) {
         const double *m = marker.mt, *direction = m + 4 * axis;
-        return lens.project(
-            {m[12] + at * direction[0], -(m[13] + at * direction[1]), -(m[14] + at * direction[2])});
+        return lens.project({m[12] + at * direction[0], -(m[13] + at * direction[1]), -(m[14] + at * direction[2])});
     };
     const auto origin = project(0, 0);
     for (int axis = 0; origin && axis < 3; ++axis)
@@ -58,25 +57,25 @@ void draw_marker(const Overlay &overlay, const View &view, const arhost_marker &
 
 } // namespace
 
-void draw_debug_view(const Overlay &overlay, const View &view, const arhost_record &record, const Lens *lens,
-                     double focal_length_px) {
+double draw_debug_view(const Overlay &overlay, const View &view, const arhost_record &record, const Lens *lens,
+                       double focal_length_px) {
     std::vector<Row> rows = {
         {"frame", fmt::format("{}   {:.3f} s   {}", record.sequence, static_cast<double>(record.capture_ns) * 1e-9,
-                            record.overlay == ARHOST_OVERLAY_RENDERED ? "overlay rendered"
-                            : record.overlay == ARHOST_OVERLAY_HELD   ? "overlay held"
-                                                                      : "no overlay")}};
+                              record.overlay == ARHOST_OVERLAY_RENDERED ? "overlay rendered"
+                              : record.overlay == ARHOST_OVERLAY_HELD   ? "overlay held"
+                                                                        : "no overlay")}};
     for (const arhost_marker &marker : std::span(record.markers, record.marker_count)) {
         if (marker.state == ARHOST_MARKER_LOST) {
             rows.push_back({std::to_string(marker.id), "lost", grey});
             continue;
         }
         draw_marker(overlay, view, marker, lens, focal_length_px);
-        rows.push_back({std::to_string(marker.id),
-                        fmt::format("{}   {:.0f} mm   {:.2f} px   ambiguity {:.2f}",
-                                  marker.state == ARHOST_MARKER_DETECTED ? "detected" : "predicted",
-                                  distance_of(marker), marker.reprojection_px, marker.ambiguity)});
+        rows.push_back(
+            {std::to_string(marker.id), fmt::format("{}{:.0f} mm   error {:.2f} px   ambiguity {:.2f}",
+                                                    marker.state == ARHOST_MARKER_PREDICTED ? "predicted   " : "",
+                                                    distance_of(marker), marker.reprojection_px, marker.ambiguity)});
     }
-    overlay.box(rows, 0, 0);
+    return overlay.box(rows, 0, 0);
 }
 
 } // namespace sink_window

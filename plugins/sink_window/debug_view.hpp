@@ -11,8 +11,8 @@
 namespace sink_window {
 
 // Draws the outlines, the ids and, if the lens is known, the axes of the markers (x red, y green, z blue), and their
-// numbers in a box.
-void draw_debug_view(const Overlay &overlay, const View &view, const arhost_record &record,
-                     const arhost::shading::Lens *lens, double focal_length_px);
+// numbers in a box at the top. Returns the height of the box in px.
+double draw_debug_view(const Overlay &overlay, const View &view, const arhost_record &record,
+                       const arhost::shading::Lens *lens, double focal_length_px);
 
 } // namespace sink_window

@@ -16,7 +16,8 @@ constexpr int baseline_offset = 2; // centres letters, which are up to 9 px high
 
 // Replaces characters that the font lacks.
 std::string printable(std::string text) {
-    std::ranges::replace_if(text, [](char c) { return c < ' ' || c > '~'; }, '?');
+    std::ranges::replace_if(
+        text, [](char c) { return c < ' ' || c > '~'; }, '?');
     return text;
 }
 
@@ -91,7 +92,7 @@ void Overlay::text(double x, double y, int scale, const std::string &text, Colou
     glPopMatrix();
 }
 
-double Overlay::box(const std::vector<Row> &rows, double x, double y, double above_bottom) const {
+double Overlay::box(const std::vector<Row> &rows, double x, double y, double top, double bottom) const {
     int labels = 0, texts = 0;
     for (const Row &row : rows) {
         labels = std::max(labels, width_of(row.label));
@@ -101,15 +102,15 @@ double Overlay::box(const std::vector<Row> &rows, double x, double y, double abo
         labels += label_gap;
     const int columns = labels + texts + 2 * padding,
               lines = static_cast<int>(rows.size()) * line_height + 2 * padding;
-    const double free_height = height_ - above_bottom;
+    const double free_height = height_ - top - bottom;
     int scale = scale_;
     while (scale > 1 && ((columns + 2 * margin) * scale > width_ || (lines + 2 * margin) * scale > free_height))
         --scale;
     const double gap = margin * scale, width = columns * scale, height = lines * scale;
     const double left = std::round(gap + x * std::max(0.0, width_ - width - 2 * gap)),
-                 top = std::round(gap + y * std::max(0.0, free_height - height - 2 * gap));
-    rectangle(left, top, width, height);
-    double line = top + padding * scale;
+                 upper = std::round(top + gap + y * std::max(0.0, free_height - height - 2 * gap));
+    rectangle(left, upper, width, height);
+    double line = upper + padding * scale;
     for (const Row &row : rows) {
         text(left + padding * scale, line, scale, row.label, yellow);
         text(left + (padding + labels) * scale, line, scale, row.text, row.colour);

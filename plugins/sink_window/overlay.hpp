@@ -32,9 +32,10 @@ public:
     double text_height() const; // of one line, px
     // Draws a line that is visible on every background.
     void line(Point from, Point to, Colour colour) const;
-    // Draws text in a dark box. `x`, `y`: where in the free space, from 0 (left, top) to 1 (right, bottom).
-    // Uses smaller text if the box would not fit into the window. Returns the height of the box in px.
-    double box(const std::vector<Row> &rows, double x, double y, double above_bottom = 0) const;
+    // Draws text in a dark box. `x`, `y`: where in the free space, from 0 (left, top) to 1 (right, bottom). `top`,
+    // `bottom`: height of the space at the edges that is not free, px. Uses smaller text if the box would not fit
+    // into the window. Returns the height of the box and its margin in px.
+    double box(const std::vector<Row> &rows, double x, double y, double top = 0, double bottom = 0) const;
     // Draws text in a dark box around a point.
     void label(Point centre, const std::string &text, Colour colour) const;
     // Draws a dark bar with text at its left and right end along the bottom of the window; returns its height in px.

@@ -18,7 +18,7 @@ struct Point {
 
 // Where and how the window shows a frame.
 struct View {
-    Rectangle area; // px of the window
+    Rectangle area;    // px of the window
     int width, height; // of the frame, px
     bool mirrored;
 

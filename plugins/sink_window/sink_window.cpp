@@ -151,22 +151,23 @@ private:
     }
 
     void draw_overlay(const Overlay &overlay, const View &view) {
+        double top = 0;
         if (debug_ && record_)
-            draw_debug_view(overlay, view, *record_, lens_ ? &*lens_ : nullptr, focal_length_px_);
+            top = draw_debug_view(overlay, view, *record_, lens_ ? &*lens_ : nullptr, focal_length_px_);
         std::vector<Row> states;
         if (controls_.recording())
             states.push_back({"", "REC", red});
         if (controls_.frozen())
             states.push_back({"", "FROZEN", blue});
         if (!states.empty())
-            overlay.box(states, 1, 0);
+            overlay.box(states, 1, 0, top);
         double bottom = status_line_ && record_ ? overlay.bar(status(), "h: help") : 0;
         if (message_ && Clock::now() > message_->end)
             message_.reset();
         if (message_)
-            bottom += overlay.box(overlay.wrap(message_->text, message_->colour), 0.5, 1, bottom);
+            bottom += overlay.box(overlay.wrap(message_->text, message_->colour), 0.5, 1, 0, bottom);
         if (help_)
-            overlay.box(help(), 0.5, 0.5, bottom);
+            overlay.box(help(), 0.5, 0.5, 0, bottom);
     }
 
     std::string status() const {
@@ -176,10 +177,11 @@ private:
             text += fmt::format("   {:.0f} ms", *latency);
         const auto markers = std::span(record_->markers, record_->marker_count);
         text += "   " + count_of(numbers ? numbers->targets
-                                         : static_cast<int>(std::ranges::count_if(
-                                               markers, [](const arhost_marker &marker) {
-                                                   return marker.state != ARHOST_MARKER_LOST;
-                                               })),
+                                         : static_cast<int>(std::ranges::count_if(markers,
+                                                                                  [](const arhost_marker &marker) {
+                                                                                      return marker.state !=
+                                                                                             ARHOST_MARKER_LOST;
+                                                                                  })),
                                  "target");
         if (numbers)
             text += "   " + count_of(numbers->restarts, "restart");
@@ -198,8 +200,8 @@ private:
         if (scenes.empty())
             rows.push_back({"1-9", "scenes"});
         for (std::size_t i = 0; i < std::min<std::size_t>(scenes.size(), 9); ++i)
-            rows.push_back({std::to_string(i + 1), "scene " + scenes[i],
-                            scenes[i] == controls_.scene() ? green : white});
+            rows.push_back(
+                {std::to_string(i + 1), "scene " + scenes[i], scenes[i] == controls_.scene() ? green : white});
         rows.push_back({"q", "quit"});
         return rows;
     }

@@ -83,8 +83,7 @@ Window::Window(int width, int height, double scale, bool vsync, const std::strin
     : on_character_(std::move(on_character)) {
     request_context();
     glfwWindowHint(GLFW_SCALE_TO_MONITOR, GLFW_TRUE);
-    Rectangle area{0, 0, static_cast<int>(std::lround(width * scale)),
-                   static_cast<int>(std::lround(height * scale))};
+    Rectangle area{0, 0, static_cast<int>(std::lround(width * scale)), static_cast<int>(std::lround(height * scale))};
     if (GLFWmonitor *monitor = glfwGetPrimaryMonitor()) {
         Rectangle work{};
         glfwGetMonitorWorkarea(monitor, &work.x, &work.y, &work.width, &work.height);

@@ -7,6 +7,8 @@
 #include <dlfcn.h>
 #include <link.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <functional>
@@ -71,6 +73,18 @@ double worst_difference(const Screenshot &shot, const Picture &picture, int left
     return worst;
 }
 
+// Colours of the overlay that the test picture does not contain.
+using Bgr = std::array<std::uint8_t, 3>;
+constexpr Bgr white{255, 255, 255}, yellow{60, 210, 255}, red{80, 96, 255}, axis_x = red, axis_y{110, 230, 90};
+
+bool is(const Screenshot &shot, const Bgr &colour, int x, int y) {
+    return std::equal(colour.begin(), colour.end(), shot.pixel(x, y));
+}
+
+struct Area {
+    int left, top, right, bottom, count;
+};
+
 class SinkWindow : public testing::Test {
 protected:
     void SetUp() override {
@@ -86,7 +100,8 @@ protected:
         observer_.reset();
         server_.reset();
     }
-    SinkUnderTest &start(int width, int height, const std::map<std::string, std::string> &options = {}) {
+    SinkUnderTest &start(int width, int height, std::map<std::string, std::string> options = {}) {
+        options.try_emplace("status_line", "false"); // covers a part of the frame
         sink_.emplace("sink_window", options);
         EXPECT_EQ(sink_->start(width, height), ARHOST_STATUS_OK) << sink_->log();
         keep_libraries();
@@ -103,12 +118,37 @@ protected:
         }
         return false;
     }
-    // Waits until the window shows the frame in this rectangle; returns the last worst_difference().
-    double difference(const Picture &picture, int left, int top, int width, int height) {
+    // Waits until the window shows the frame in this rectangle, except for `covered` rows at the bottom; returns the
+    // last worst_difference().
+    double difference(const Picture &picture, int left, int top, int width, int height, int covered = 0) {
         double worst = 255;
-        becomes(
-            [&] { return (worst = worst_difference(observer_->window(), picture, left, top, width, height)) <= 2; });
+        becomes([&] {
+            Screenshot shot = observer_->window();
+            shot.height -= covered;
+            return (worst = worst_difference(shot, picture, left, top, width, height)) <= 2;
+        });
         return worst;
+    }
+    // Returns the bounding box of the pixels that differ from a former screenshot, and their number.
+    Area changed_area(const Screenshot &before) const {
+        const Screenshot shot = observer_->window();
+        Area area{shot.width, shot.height, -1, -1, 0};
+        for (int y = 0; y < shot.height; ++y)
+            for (int x = 0; x < shot.width; ++x)
+                if (!std::equal(shot.pixel(x, y), shot.pixel(x, y) + 3, before.pixel(x, y))) {
+                    area = {std::min(area.left, x), std::min(area.top, y), std::max(area.right, x),
+                            std::max(area.bottom, y), area.count + 1};
+                }
+        return area;
+    }
+    // Returns the number of pixels with this colour.
+    int count(const Bgr &colour) const {
+        const Screenshot shot = observer_->window();
+        int count = 0;
+        for (int y = 0; y < shot.height; ++y)
+            for (int x = 0; x < shot.width; ++x)
+                count += is(shot, colour, x, y);
+        return count;
     }
 
     std::optional<XServer> server_;
@@ -215,6 +255,118 @@ TEST_F(SinkWindow, FTogglesFullScreen) {
     observer_->press(XK_f);
     ASSERT_TRUE(becomes(has_size(160, 120)));
     EXPECT_LE(difference(picture, 0, 0, 160, 120), 2);
+}
+
+TEST_F(SinkWindow, MMirrorsTheFrameExactly) {
+    SinkUnderTest &sink = start(320, 200);
+    const Picture picture(320, 200, 5);
+    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
+    ASSERT_LE(difference(picture, 0, 0, 320, 200), 2);
+    const Screenshot before = observer_->window();
+    const auto is_mirrored = [&] {
+        const Screenshot shot = observer_->window();
+        for (int y = 0; y < 200; ++y)
+            for (int x = 0; x < 320; ++x)
+                if (!std::equal(shot.pixel(x, y), shot.pixel(x, y) + 3, before.pixel(319 - x, y)))
+                    return false;
+        return true;
+    };
+    observer_->press(XK_m);
+    EXPECT_TRUE(becomes(is_mirrored));
+    observer_->press(XK_m);
+    EXPECT_LE(difference(picture, 0, 0, 320, 200), 2);
+}
+
+TEST_F(SinkWindow, HShowsAHelpInTheMiddleOfTheWindow) {
+    SinkUnderTest &sink = start(640, 480);
+    const Picture picture(640, 480, 5);
+    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
+    ASSERT_LE(difference(picture, 0, 0, 640, 480), 2);
+    const Screenshot before = observer_->window();
+    observer_->press(XK_h);
+    ASSERT_TRUE(becomes([&] { return changed_area(before).count > 0; }));
+    const Area help = changed_area(before);
+    EXPECT_NEAR(help.left + help.right, 639, 4);
+    EXPECT_NEAR(help.top + help.bottom, 479, 4);
+    EXPECT_GT(help.right - help.left, 150);
+    EXPECT_GT(help.bottom - help.top, 200);
+    EXPECT_GT(count(white), 500) << "text";
+    observer_->press(XK_h);
+    EXPECT_LE(difference(picture, 0, 0, 640, 480), 2);
+}
+
+TEST_F(SinkWindow, TheStatusLineIsAtTheBottom) {
+    SinkUnderTest &sink = start(640, 480, {{"status_line", "true"}});
+    const Picture picture(640, 480, 5);
+    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
+    EXPECT_LE(difference(picture, 0, 0, 640, 480, 40), 2);
+    EXPECT_GT(count(white), 200);
+}
+
+TEST_F(SinkWindow, AHeldKeyCountsOnce) {
+    SinkUnderTest &sink = start(320, 200);
+    const Picture picture(320, 200, 5);
+    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
+    ASSERT_LE(difference(picture, 0, 0, 320, 200), 2);
+    const Screenshot before = observer_->window();
+    observer_->press(XK_h, 4);
+    EXPECT_TRUE(becomes([&] { return changed_area(before).count > 0; }));
+}
+
+TEST_F(SinkWindow, AKeyForTheHostShowsAMessageIfTheHostTakesNoCommands) {
+    for (const KeySym key : {XK_s, XK_space, XK_r, XK_1}) {
+        SinkUnderTest &sink = start(320, 200);
+        ASSERT_EQ(sink.write(Picture(320, 200, 5), make_record(0)), ARHOST_STATUS_OK);
+        EXPECT_EQ(count(red), 0);
+        observer_->press(key);
+        EXPECT_TRUE(becomes([&] { return count(red) > 100; })) << key;
+    }
+}
+
+TEST_F(SinkWindow, DShowsTheOutlineAndTheAxesOfAMarkerWhereTheyAre) {
+    SinkUnderTest &sink = start(640, 480);
+    arhost_record record = make_record(0);
+    record.marker_count = 2;
+    arhost_marker &marker = record.markers[0];
+    marker.id = 23;
+    marker.state = ARHOST_MARKER_DETECTED;
+    const double corners[4][2] = {{200, 150}, {300, 160}, {310, 260}, {190, 250}};
+    std::copy_n(&corners[0][0], 8, &marker.corners_px[0][0]);
+    // In front of the camera, at the marker's centre.
+    const arhost_intrinsics lens = make_intrinsics(640, 480);
+    const double distance = 500;
+    marker.mt[0] = marker.mt[5] = marker.mt[10] = marker.mt[15] = 1;
+    marker.mt[12] = (250 - lens.cx) / lens.fx * distance;
+    marker.mt[13] = -(205 - lens.cy) / lens.fy * distance;
+    marker.mt[14] = -distance;
+    record.markers[1] = marker;
+    record.markers[1].state = ARHOST_MARKER_LOST; // is not drawn
+    record.markers[1].corners_px[0][0] = 500;
+    const Picture picture(640, 480, 5);
+    ASSERT_EQ(sink.write(picture, record), ARHOST_STATUS_OK);
+    ASSERT_LE(difference(picture, 0, 0, 640, 480), 2);
+    EXPECT_EQ(count(yellow), 0);
+    observer_->press(XK_d);
+    ASSERT_TRUE(becomes([&] { return count(yellow) > 0; }));
+    for (const bool mirrored : {false, true}) {
+        const Screenshot shot = observer_->window();
+        const auto column = [&](double x) { return static_cast<int>(mirrored ? 639 - x : x); };
+        for (int i = 0; i < 4; ++i) { // at each corner and in the middle of each edge
+            const double *a = corners[i], *b = corners[(i + 1) % 4];
+            EXPECT_TRUE(is(shot, yellow, column(a[0]), static_cast<int>(a[1]))) << i;
+            EXPECT_TRUE(is(shot, yellow, column((a[0] + b[0]) / 2), static_cast<int>((a[1] + b[1]) / 2))) << i;
+        }
+        EXPECT_FALSE(is(shot, yellow, column(500), 150));
+        EXPECT_TRUE(is(shot, axis_x, column(265), 205)) << "x points to the right";
+        EXPECT_TRUE(is(shot, axis_y, column(250), 195)) << "y points upwards";
+        if (mirrored)
+            break;
+        observer_->press(XK_m);
+        ASSERT_TRUE(becomes([&] { return is(observer_->window(), yellow, 639 - 200, 150); }));
+    }
+    observer_->press(XK_m);
+    observer_->press(XK_d);
+    EXPECT_LE(difference(picture, 0, 0, 640, 480), 2);
 }
 
 TEST_F(SinkWindow, CanBeReopened) {

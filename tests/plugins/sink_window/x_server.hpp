@@ -108,8 +108,10 @@ public:
         XResizeWindow(display_, find(), static_cast<unsigned>(width), static_cast<unsigned>(height));
         XSync(display_, False);
     }
-    void press(KeySym key) {
-        for (const int type : {KeyPress, KeyRelease}) {
+    // `times`: more than 1 for a key that the user holds, which repeats it.
+    void press(KeySym key, int times = 1) {
+        for (int i = 0; i <= times; ++i) {
+            const int type = i < times ? KeyPress : KeyRelease;
             XEvent event{};
             event.xkey.type = type;
             event.xkey.display = display_;

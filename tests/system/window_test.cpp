@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Tests of the keys of sink_window, which send commands to the host (docs/control.md).
+#include "arhost_run.hpp"
+#include "x_server.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <functional>
+#include <optional>
+#include <span>
+
+using namespace arhost::test;
+
+namespace {
+
+// Runs arhost with a window on its own X server.
+class WindowRun : public testing::Test {
+protected:
+    void SetUp() override {
+        if (access(xvfb_path, X_OK) != 0)
+            GTEST_SKIP() << "needs Xvfb, which is not installed (Debian package xvfb)";
+        server_.emplace(640, 480);
+    }
+
+    // `granted`: the value of `control`. Frames of source_counter have one colour, which changes from frame to frame.
+    void start(const std::string &granted, const std::string &options = "") {
+        std::string yaml = counting("live", "frames: 1000000, width: 640, height: 480", "", "");
+        const std::string counter = "outputs: [{plugin: sink_counter, path: counted.txt}]";
+        yaml.replace(yaml.find(counter), counter.size(),
+                     "outputs: [{plugin: sink_window, allow: [display], control: " + granted + ", options: {" +
+                         options +
+                         "}}]\nsnapshot: {plugin: sink_images, path: out/snapshot-%02d.png}\n"
+                         "record: {plugin: sink_poses, path: out/take-%02d.jsonl}\nscenes: [other.yaml]");
+        run_.write("run.yaml", yaml);
+        run_.write("scene.yaml", small_scene);
+        run_.write("other.yaml", small_scene);
+        run_.start({"--config", "run.yaml"}, [this] {
+            setenv("DISPLAY", server_->name().c_str(), 1);
+            setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
+        });
+        observer_.emplace(server_->name());
+        ASSERT_TRUE(becomes([this] { return has_frame(screen()); })) << run_.output();
+    }
+    // Returns false after 30 seconds.
+    static bool becomes(const std::function<bool()> &done) {
+        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
+        while (!done()) {
+            if (std::chrono::steady_clock::now() > end)
+                return false;
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        }
+        return true;
+    }
+    Screenshot screen() const { return observer_->screen(); }
+    static bool has_frame(const Screenshot &shot) { return shot.pixel(0, 240)[2] > 0; }
+    // Returns the number of pixels with the colour of error messages.
+    static std::ptrdiff_t error_pixels(const Screenshot &shot) {
+        std::ptrdiff_t count = 0;
+        for (int y = 0; y < shot.height; ++y)
+            for (int x = 0; x < shot.width; ++x) {
+                const std::uint8_t *p = shot.pixel(x, y);
+                count += p[0] == 80 && p[1] == 96 && p[2] == 255;
+            }
+        return count;
+    }
+    bool logs(const std::string &text) const { return run_.output().find(text) != std::string::npos; }
+    // Whether the video changes within the time in which it shows several frames.
+    bool moves() const {
+        const Screenshot before = screen();
+        for (int i = 0; i < 20; ++i) {
+            std::this_thread::sleep_for(std::chrono::milliseconds(20));
+            if (!std::ranges::equal(std::span(screen().pixel(0, 240), 3), std::span(before.pixel(0, 240), 3)))
+                return true;
+        }
+        return false;
+    }
+
+    std::optional<XServer> server_;
+    std::optional<XObserver> observer_;
+    ArhostRun run_;
+};
+
+constexpr const char *all_commands = "[quit, freeze, snapshot, record, load_scene, status]";
+
+} // namespace
+
+TEST_F(WindowRun, SpaceFreezesTheVideoAndContinuesIt) {
+    start(all_commands);
+    ASSERT_TRUE(becomes([this] { return moves(); }));
+    observer_->press(XK_space);
+    EXPECT_TRUE(becomes([this] { return !moves(); })) << run_.output();
+    observer_->press(XK_space);
+    EXPECT_TRUE(becomes([this] { return moves(); })) << run_.output();
+    observer_->press(XK_q);
+    EXPECT_EQ(run_.wait(), 0) << run_.output();
+}
+
+TEST_F(WindowRun, SWritesASnapshot) {
+    start(all_commands);
+    observer_->press(XK_s);
+    EXPECT_TRUE(becomes([this] { return run_.exists("out/snapshot-01.png"); })) << run_.output();
+    EXPECT_EQ(error_pixels(screen()), 0);
+    observer_->press(XK_q);
+    EXPECT_EQ(run_.wait(), 0) << run_.output();
+}
+
+TEST_F(WindowRun, RRecordsUntilItIsPressedAgain) {
+    start(all_commands);
+    observer_->press(XK_r);
+    ASSERT_TRUE(becomes([this] { return error_pixels(screen()) > 0; })) << "REC is red: " << run_.output();
+    observer_->press(XK_r);
+    EXPECT_TRUE(becomes([this] { return error_pixels(screen()) == 0; })) << run_.output();
+    EXPECT_TRUE(run_.exists("out/take-01.jsonl"));
+    observer_->press(XK_q);
+    EXPECT_EQ(run_.wait(), 0) << run_.output();
+}
+
+TEST_F(WindowRun, ADigitLoadsTheSceneWithThisNumber) {
+    start(all_commands);
+    ASSERT_TRUE(becomes([this] {
+        observer_->press(XK_2); // reports an error until the first status has arrived
+        return logs(R"("scene":"other")");
+    })) << run_.output();
+    EXPECT_TRUE(becomes([this] { return logs("raytracer is now rt_counter"); })) << run_.output();
+    observer_->press(XK_q);
+    EXPECT_EQ(run_.wait(), 0) << run_.output();
+}
+
+TEST_F(WindowRun, ACommandThatIsNotGrantedShowsTheReason) {
+    start("[quit]");
+    EXPECT_EQ(error_pixels(screen()), 0) << "the window shows no error about the status";
+    observer_->press(XK_space);
+    EXPECT_TRUE(becomes([this] { return error_pixels(screen()) > 100; })) << run_.output();
+    EXPECT_TRUE(moves());
+    EXPECT_TRUE(becomes([this] { return error_pixels(screen()) == 0; })) << "the message disappears";
+    observer_->press(XK_2);
+    EXPECT_TRUE(becomes([this] { return error_pixels(screen()) > 100; })) << "the names of scenes are unknown";
+    observer_->press(XK_q);
+    EXPECT_EQ(run_.wait(), 0) << run_.output();
+}
