@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <optional>
 #include <span>
@@ -14,6 +15,9 @@
 using namespace arhost::test;
 
 namespace {
+
+// Colours of text.
+constexpr std::array<std::uint8_t, 3> red{80, 96, 255}, blue{255, 160, 90};
 
 // Runs arhost with a window on its own X server.
 class WindowRun : public testing::Test {
@@ -25,7 +29,7 @@ protected:
     }
 
     // `granted`: the value of `control`. Frames of source_counter have one colour, which changes from frame to frame.
-    void start(const std::string &granted, const std::string &options = "") {
+    void start(const std::string &granted) {
         std::string yaml = counting("live", "frames: 1000000, width: 640, height: 480", "", "");
         const std::string counter = "outputs: [{plugin: sink_counter, path: counted.txt}]";
         yaml.replace(yaml.find(counter), counter.size(),
@@ -55,14 +59,13 @@ protected:
     }
     Screenshot screen() const { return observer_->screen(); }
     static bool has_frame(const Screenshot &shot) { return shot.pixel(0, 240)[2] > 0; }
-    // Returns the number of pixels with the colour of error messages.
-    static std::ptrdiff_t error_pixels(const Screenshot &shot) {
-        std::ptrdiff_t count = 0;
+    // Returns the number of pixels on the screen with this colour of text.
+    int count(const std::array<std::uint8_t, 3> &bgr) const {
+        const Screenshot shot = screen();
+        int count = 0;
         for (int y = 0; y < shot.height; ++y)
-            for (int x = 0; x < shot.width; ++x) {
-                const std::uint8_t *p = shot.pixel(x, y);
-                count += p[0] == 80 && p[1] == 96 && p[2] == 255;
-            }
+            for (int x = 0; x < shot.width; ++x)
+                count += std::equal(bgr.begin(), bgr.end(), shot.pixel(x, y));
         return count;
     }
     bool logs(const std::string &text) const { return run_.output().find(text) != std::string::npos; }
@@ -90,9 +93,10 @@ TEST_F(WindowRun, SpaceFreezesTheVideoAndContinuesIt) {
     start(all_commands);
     ASSERT_TRUE(becomes([this] { return moves(); }));
     observer_->press(XK_space);
-    EXPECT_TRUE(becomes([this] { return !moves(); })) << run_.output();
+    ASSERT_TRUE(becomes([this] { return count(blue) > 0; })) << "FROZEN is blue: " << run_.output();
+    EXPECT_TRUE(becomes([this] { return !moves(); }));
     observer_->press(XK_space);
-    EXPECT_TRUE(becomes([this] { return moves(); })) << run_.output();
+    EXPECT_TRUE(becomes([this] { return moves() && count(blue) == 0; })) << run_.output();
     observer_->press(XK_q);
     EXPECT_EQ(run_.wait(), 0) << run_.output();
 }
@@ -101,7 +105,7 @@ TEST_F(WindowRun, SWritesASnapshot) {
     start(all_commands);
     observer_->press(XK_s);
     EXPECT_TRUE(becomes([this] { return run_.exists("out/snapshot-01.png"); })) << run_.output();
-    EXPECT_EQ(error_pixels(screen()), 0);
+    EXPECT_EQ(count(red), 0);
     observer_->press(XK_q);
     EXPECT_EQ(run_.wait(), 0) << run_.output();
 }
@@ -109,9 +113,9 @@ TEST_F(WindowRun, SWritesASnapshot) {
 TEST_F(WindowRun, RRecordsUntilItIsPressedAgain) {
     start(all_commands);
     observer_->press(XK_r);
-    ASSERT_TRUE(becomes([this] { return error_pixels(screen()) > 0; })) << "REC is red: " << run_.output();
+    ASSERT_TRUE(becomes([this] { return count(red) > 0; })) << "REC is red: " << run_.output();
     observer_->press(XK_r);
-    EXPECT_TRUE(becomes([this] { return error_pixels(screen()) == 0; })) << run_.output();
+    EXPECT_TRUE(becomes([this] { return count(red) == 0; })) << run_.output();
     EXPECT_TRUE(run_.exists("out/take-01.jsonl"));
     observer_->press(XK_q);
     EXPECT_EQ(run_.wait(), 0) << run_.output();
@@ -130,13 +134,13 @@ TEST_F(WindowRun, ADigitLoadsTheSceneWithThisNumber) {
 
 TEST_F(WindowRun, ACommandThatIsNotGrantedShowsTheReason) {
     start("[quit]");
-    EXPECT_EQ(error_pixels(screen()), 0) << "the window shows no error about the status";
+    EXPECT_EQ(count(red), 0) << "the window shows no error about the status";
     observer_->press(XK_space);
-    EXPECT_TRUE(becomes([this] { return error_pixels(screen()) > 100; })) << run_.output();
+    EXPECT_TRUE(becomes([this] { return count(red) > 100; })) << run_.output();
     EXPECT_TRUE(moves());
-    EXPECT_TRUE(becomes([this] { return error_pixels(screen()) == 0; })) << "the message disappears";
+    EXPECT_TRUE(becomes([this] { return count(red) == 0; })) << "the message disappears";
     observer_->press(XK_2);
-    EXPECT_TRUE(becomes([this] { return error_pixels(screen()) > 100; })) << "the names of scenes are unknown";
+    EXPECT_TRUE(becomes([this] { return count(red) > 100; })) << "the names of scenes are unknown";
     observer_->press(XK_q);
     EXPECT_EQ(run_.wait(), 0) << run_.output();
 }
