@@ -31,10 +31,8 @@ void request_context() {
 } // namespace
 
 std::vector<arhost::Device> list_displays() {
-    arhost::Device unusable{.kind = ARHOST_DEVICE_DISPLAY,
-                            .state = ARHOST_DEVICE_STATE_UNUSABLE,
-                            .is_default = true,
-                            .name = "desktop"};
+    arhost::Device unusable{
+        .kind = ARHOST_DEVICE_DISPLAY, .state = ARHOST_DEVICE_STATE_UNUSABLE, .is_default = true, .name = "desktop"};
     if (!glfwInit()) {
         unusable.problem = glfw_reason();
         return {unusable};
