@@ -33,9 +33,8 @@ protected:
         std::string yaml = counting("live", "frames: 1000000, width: 640, height: 480", "", "");
         const std::string counter = "outputs: [{plugin: sink_counter, path: counted.txt}]";
         yaml.replace(yaml.find(counter), counter.size(),
-                     "outputs: [{plugin: sink_window, allow: [display], control: " + granted + ", options: {" +
-                         options +
-                         "}}]\nsnapshot: {plugin: sink_images, path: out/snapshot-%02d.png}\n"
+                     "outputs: [{plugin: sink_window, allow: [display], control: " + granted +
+                         "}]\nsnapshot: {plugin: sink_images, path: out/snapshot-%02d.png}\n"
                          "record: {plugin: sink_poses, path: out/take-%02d.jsonl}\nscenes: [other.yaml]");
         run_.write("run.yaml", yaml);
         run_.write("scene.yaml", small_scene);
