@@ -70,7 +70,8 @@ std::string parse_component(Members &members) {
     return component;
 }
 
-Command parse_members(const std::string &name, Members &members) {
+Command parse_members(const std::string &name, Members &members,
+                      const std::set<std::string, std::less<>> &granted) {
     if (name == "quit")
         return Quit{};
     if (name == "freeze")
@@ -89,7 +90,7 @@ Command parse_members(const std::string &name, Members &members) {
         const std::string component = members.text("component"), option = members.text("option");
         return Set{component, option, members.scalar("value")};
     }
-    return Status{};
+    return Status{granted};
 }
 
 } // namespace
@@ -104,7 +105,7 @@ Command parse(const std::string &text, const std::set<std::string, std::less<>> 
         throw Error("unknown command '" + base::printable(name, 100) + "'");
     if (!granted.contains(name))
         throw Error("the configuration does not grant '" + name + "' to this output: add it to its key 'control'");
-    const Command command = parse_members(name, members);
+    const Command command = parse_members(name, members, granted);
     members.expect_no_more();
     return command;
 }

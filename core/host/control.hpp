@@ -36,7 +36,9 @@ struct Set {
     std::string component, option;
     std::string value; // in YAML syntax
 };
-struct Status {};
+struct Status {
+    std::set<std::string, std::less<>> granted; // the commands that this output may send
+};
 using Command = std::variant<Quit, Freeze, Snapshot, Record, LoadScene, Swap, Set, Status>;
 
 // Why a command was not executed, as a message for the user.

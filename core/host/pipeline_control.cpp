@@ -60,8 +60,8 @@ void Pipeline::execute(const control::Freeze &freeze, const control::Done &done)
     done("", {{"frozen", frozen_}});
 }
 
-void Pipeline::execute(const control::Status &, const control::Done &done) {
-    done("", {{"status", status()}});
+void Pipeline::execute(const control::Status &command, const control::Done &done) {
+    done("", {{"status", status()}, {"granted", command.granted}});
 }
 
 void Pipeline::execute(const control::Swap &swap, const control::Done &done) {

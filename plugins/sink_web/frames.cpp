@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "frames.hpp"
+
+#include <turbojpeg.h>
+
+namespace arhost::web {
+
+void Frames::Free::operator()(void *compressor) const {
+    tjDestroy(compressor);
+}
+
+Frames::Frames(int quality) : quality_(quality), compressor_(tjInitCompress()) {
+    if (!compressor_)
+        throw std::bad_alloc();
+}
+
+void Frames::put(const arhost_output &output) {
+    const std::size_t row = std::size_t{3} * output.width;
+    written_.number = number_.load() + 1;
+    written_.width = output.width;
+    written_.height = output.height;
+    written_.bgr.resize(row * output.height);
+    for (std::size_t y = 0; y < output.height; ++y)
+        std::copy_n(output.bgr + y * output.stride, row, written_.bgr.data() + y * row);
+    const std::lock_guard lock(mutex_);
+    std::swap(written_, newest_);
+    number_ = newest_.number;
+}
+
+std::shared_ptr<const Jpeg> Frames::newest() {
+    {
+        const std::lock_guard lock(mutex_);
+        if (newest_.number <= encoding_.number)
+            return jpeg_;
+        std::swap(newest_, encoding_);
+    }
+    const int width = static_cast<int>(encoding_.width), height = static_cast<int>(encoding_.height);
+    auto jpeg = std::make_shared<Jpeg>();
+    jpeg->number = encoding_.number;
+    std::vector<std::uint8_t> file(tjBufSize(width, height, TJSAMP_420));
+    unsigned char *bytes = file.data();
+    unsigned long size = file.size();
+    if (tjCompress2(compressor_.get(), encoding_.bgr.data(), width, 0, height, TJPF_BGR, &bytes, &size, TJSAMP_420,
+                    quality_, TJFLAG_NOREALLOC | TJFLAG_FASTDCT) != 0)
+        throw std::runtime_error(std::string("cannot encode the picture: ") + tjGetErrorStr2(compressor_.get()));
+    jpeg->bytes.assign(bytes, bytes + size); // viewers keep it, so without the unused part of the buffer
+    jpeg_ = std::move(jpeg);
+    ++encoded_;
+    return jpeg_;
+}
+
+} // namespace arhost::web

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <atomic>
+
+namespace arhost::web {
+
+struct Jpeg {
+    std::uint64_t number; // of the frame
+    std::vector<std::uint8_t> bytes;
+};
+
+// The newest frame. It is encoded only if somebody asks for it, and only once.
+class Frames {
+public:
+    explicit Frames(int quality);
+
+    // Called by the plugin's thread, which never waits for the encoder.
+    void put(const arhost_output &output);
+    void set_quality(int quality) { quality_ = quality; }
+
+    // Counts the frames; 0: there is none.
+    std::uint64_t number() const { return number_.load(); }
+    std::uint64_t encoded() const { return encoded_.load(); }
+
+    // Called by the server's thread. Returns the newest frame, or nullptr if there is none.
+    std::shared_ptr<const Jpeg> newest();
+
+private:
+    struct Picture {
+        std::uint64_t number = 0;
+        std::uint32_t width = 0, height = 0;
+        std::vector<std::uint8_t> bgr; // without padding
+    };
+    struct Free {
+        void operator()(void *compressor) const;
+    };
+
+    std::atomic<std::uint64_t> number_{0}, encoded_{0};
+    std::atomic<int> quality_;
+    Picture written_; // belongs to the plugin's thread
+    std::mutex mutex_;
+    Picture newest_;   // guarded by mutex_
+    Picture encoding_; // belongs to the server's thread, as do the following members
+    std::unique_ptr<void, Free> compressor_;
+    std::shared_ptr<const Jpeg> jpeg_;
+};
+
+} // namespace arhost::web

@@ -1,0 +1,435 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "server.hpp"
+
+#include "checks.hpp"
+#include "files.hpp"
+#include "metrics.hpp"
+
+#include <fcntl.h>
+#include <microhttpd.h>
+#include <random>
+#include <sys/socket.h>
+#include <utility>
+
+namespace arhost::web {
+namespace {
+
+constexpr unsigned max_connections = 128, max_connections_per_address = 64;
+constexpr std::size_t max_viewers = 48;
+constexpr std::size_t connection_memory = 16384, stream_block = 65536; // bytes
+constexpr unsigned inactivity_s = 30;
+constexpr auto request_time = std::chrono::seconds(10), response_time = std::chrono::seconds(60),
+               frame_time = std::chrono::seconds(30); // a viewer that needs longer for a frame is disconnected
+// After this time without a new frame, viewers receive the last one again, which shows whether they are still there.
+constexpr auto repeat_time = std::chrono::seconds(1);
+constexpr std::string_view boundary = "arhostframe";
+
+std::string header(MHD_Connection *connection, const char *name) {
+    const char *value = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, name);
+    return value ? value : "";
+}
+
+std::string make_nonce() {
+    std::random_device random;
+    std::string nonce;
+    for (int i = 0; i < 32; ++i)
+        nonce += "0123456789abcdef"[random() % 16];
+    return nonce;
+}
+
+std::string error_text(const std::string &error) {
+    return "{\"ok\":false,\"error\":\"" + error + "\"}\n";
+}
+
+} // namespace
+
+struct Server::Request {
+    MHD_Connection *connection;
+    std::string method, path;
+    std::string body{};
+    bool has_begun = false, is_too_large = false;
+    std::string answer{}; // of the host, guarded by mutex_
+};
+
+struct Server::Viewer {
+    Server *server;
+    MHD_Connection *connection;
+    bool is_waiting = false; // suspended, guarded by mutex_
+    std::uint64_t number = 0;
+    Clock::time_point sent_at{};
+    std::shared_ptr<const Jpeg> jpeg{};
+    std::string head{};       // before the JPEG
+    std::size_t position = 0; // in head, JPEG and end
+};
+
+struct Server::Callbacks {
+    // Exceptions must not cross libmicrohttpd: they close the connection.
+    template <class Call> static MHD_Result guarded(Call &&call) noexcept {
+        try {
+            return call() ? MHD_YES : MHD_NO;
+        } catch (...) {
+            return MHD_NO;
+        }
+    }
+
+    static MHD_Result handle(void *self, MHD_Connection *connection, const char *path, const char *method,
+                             const char *, const char *upload, std::size_t *upload_size, void **context) {
+        auto &server = *static_cast<Server *>(self);
+        return guarded([&] {
+            if (!*context) {
+                auto request = std::make_unique<SharedRequest>(
+                    std::make_shared<Request>(Request{connection, method, path}));
+                *context = request.release();
+            }
+            const SharedRequest &request = *static_cast<SharedRequest *>(*context);
+            if (!std::exchange(request->has_begun, true))
+                return server.check(*request);
+            if (*upload_size == 0)
+                return server.process(request);
+            if (request->body.size() + *upload_size > ARHOST_MAX_COMMAND_SIZE)
+                request->is_too_large = true;
+            else
+                request->body.append(upload, *upload_size);
+            *upload_size = 0;
+            return true;
+        });
+    }
+
+    static void complete(void *self, MHD_Connection *connection, void **context, MHD_RequestTerminationCode) noexcept {
+        delete static_cast<SharedRequest *>(std::exchange(*context, nullptr));
+        static_cast<Server *>(self)->limit_time(connection, request_time); // for the next request
+    }
+
+    static void notify(void *self, MHD_Connection *connection, void **,
+                       MHD_ConnectionNotificationCode what) noexcept {
+        auto &server = *static_cast<Server *>(self);
+        const std::lock_guard lock(server.mutex_);
+        if (what == MHD_CONNECTION_NOTIFY_CLOSED) {
+            server.connections_.erase(connection);
+            return;
+        }
+        const auto *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CONNECTION_FD);
+        server.connections_[connection] = {info->connect_fd, Clock::now() + request_time};
+    }
+
+    static ssize_t read(void *viewer, std::uint64_t, char *to, std::size_t size) noexcept {
+        auto &self = *static_cast<Viewer *>(viewer);
+        try {
+            return self.server->read_stream(self, {to, size});
+        } catch (...) {
+            return MHD_CONTENT_READER_END_WITH_ERROR;
+        }
+    }
+
+    static void free_viewer(void *viewer) noexcept {
+        const std::unique_ptr<Viewer> self(static_cast<Viewer *>(viewer));
+        const std::lock_guard lock(self->server->mutex_);
+        self->server->viewers_.erase(self.get());
+    }
+};
+
+Server::Server(Settings settings, Frames &frames, HostControl &control)
+    : settings_(std::move(settings)), frames_(frames), control_(control) {
+    daemon_ = MHD_start_daemon(
+        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr, nullptr, Callbacks::handle, this,
+        MHD_OPTION_LISTEN_SOCKET, settings_.socket, MHD_OPTION_CONNECTION_LIMIT, max_connections,
+        MHD_OPTION_PER_IP_CONNECTION_LIMIT, max_connections_per_address, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
+        connection_memory, MHD_OPTION_CONNECTION_TIMEOUT, inactivity_s, MHD_OPTION_NOTIFY_COMPLETED,
+        Callbacks::complete, this, MHD_OPTION_NOTIFY_CONNECTION, Callbacks::notify, this, MHD_OPTION_STRICT_FOR_CLIENT,
+        1, MHD_OPTION_END);
+    if (!daemon_)
+        throw Failure(ARHOST_STATUS_ERROR_IO, "cannot start the web server");
+}
+
+Server::~Server() {
+    MHD_quiesce_daemon(daemon_); // the listening socket stays open for the next worker
+    {
+        const std::lock_guard lock(mutex_);
+        is_stopping_ = true;
+        for (Viewer *viewer : viewers_)
+            if (std::exchange(viewer->is_waiting, false))
+                MHD_resume_connection(viewer->connection);
+        while (!suspended_.empty()) {
+            const SharedRequest request = *suspended_.begin();
+            resume(request);
+        }
+    }
+    MHD_stop_daemon(daemon_);
+}
+
+void Server::tick() {
+    const std::lock_guard lock(mutex_);
+    const auto now = Clock::now();
+    for (Viewer *viewer : viewers_)
+        if (viewer->is_waiting && (viewer->number != frames_.number() || now - viewer->sent_at >= repeat_time)) {
+            viewer->is_waiting = false;
+            MHD_resume_connection(viewer->connection);
+        }
+    for (auto &[connection, each] : connections_)
+        if (now > each.deadline) {
+            each.deadline = Clock::time_point::max();
+            ::shutdown(each.fd, SHUT_RDWR); // the server's thread then closes it
+        }
+}
+
+void Server::limit_time(MHD_Connection *connection, std::chrono::seconds time) {
+    const std::lock_guard lock(mutex_);
+    if (const auto found = connections_.find(connection); found != connections_.end())
+        found->second.deadline = Clock::now() + time;
+}
+
+// Checks the headers of a request, before its body arrives. Returns whether the connection remains usable.
+bool Server::check(const Request &request) {
+    const std::string host = header(request.connection, "Host"), origin = header(request.connection, "Origin");
+    if (!is_own_host(host, settings_.hosts))
+        return refuse(request, MHD_HTTP_MISDIRECTED_REQUEST,
+                      "use the server's IP address, or add the name in the header Host to the option 'hosts'");
+    if (!origin.empty() && !is_own_origin(origin, host))
+        return refuse(request, MHD_HTTP_FORBIDDEN, "requests of pages of other servers are not allowed");
+    const bool is_command = request.path == "/api/control";
+    if (is_command ? request.method != "POST" : request.method != "GET" && request.method != "HEAD")
+        return refuse(request, MHD_HTTP_METHOD_NOT_ALLOWED, is_command ? "use POST" : "use GET");
+    if (!is_command)
+        return true;
+    if (!settings_.token.empty() && !has_token(header(request.connection, "Authorization"), settings_.token))
+        return refuse(request, MHD_HTTP_UNAUTHORIZED, "commands need the token: 'Authorization: Bearer TOKEN'");
+    // Pages of other servers cannot send this type without asking first.
+    if (!header(request.connection, "Content-Type").starts_with("application/json"))
+        return refuse(request, MHD_HTTP_UNSUPPORTED_MEDIA_TYPE, "the type must be application/json");
+    return true;
+}
+
+// Answers a request that has arrived completely.
+bool Server::process(const SharedRequest &request) {
+    if (request->is_too_large)
+        return refuse(*request, MHD_HTTP_CONTENT_TOO_LARGE, "the command is too long");
+    {
+        const std::lock_guard lock(mutex_);
+        if (const auto found = connections_.find(request->connection); found != connections_.end())
+            found->second.deadline = Clock::time_point::max();
+        if (is_stopping_)
+            request->answer = error_text("the run is ending");
+    }
+    const std::string &path = request->path;
+    if (path == "/")
+        return respond_with_page(*request);
+    if (path == "/stream.mjpg")
+        return respond_with_stream(*request);
+    if (path == "/snapshot.jpg")
+        return respond_with_snapshot(*request);
+    if (path == "/openapi.json")
+        return respond(*request, MHD_HTTP_OK, "application/json", openapi_json());
+    if (path != "/api/status" && path != "/api/control" && path != "/metrics")
+        return refuse(*request, MHD_HTTP_NOT_FOUND, "there is no such resource");
+    if (!request->answer.empty())
+        return respond_with_answer(*request);
+    return path == "/api/control" ? send_command(request) : ask_status(request);
+}
+
+bool Server::send_command(const SharedRequest &request) {
+    if (!control_)
+        return refuse(*request, MHD_HTTP_SERVICE_UNAVAILABLE, "this host does not accept commands");
+    const arhost_status status =
+        request->body.find('\0') != std::string::npos
+            ? ARHOST_STATUS_ERROR_INVALID_ARGUMENT
+            : control_.send(request->body, [this, request](const std::string &answer) { take(request, answer); });
+    if (status == ARHOST_STATUS_ERROR_INVALID_ARGUMENT)
+        return refuse(*request, MHD_HTTP_BAD_REQUEST, "a command must be a JSON object");
+    if (status != ARHOST_STATUS_OK)
+        return refuse(*request, MHD_HTTP_SERVICE_UNAVAILABLE, "the host is busy; retry later");
+    return suspend_until_answer(request);
+}
+
+// All requests that arrive while the host answers get the same answer, so any number of clients costs the host one
+// command at a time.
+bool Server::ask_status(const SharedRequest &request) {
+    bool sends = false;
+    {
+        const std::lock_guard lock(mutex_);
+        waiting_for_status_.insert(request);
+        sends = control_ && !std::exchange(is_status_pending_, true);
+    }
+    if (!control_)
+        take_status(error_text("this host does not give its status"));
+    else if (sends && control_.send(R"({"command":"status"})", [this](const std::string &answer) {
+                 take_status(answer);
+             }) != ARHOST_STATUS_OK)
+        take_status(error_text("the host is busy; retry later"));
+    return suspend_until_answer(request);
+}
+
+bool Server::suspend_until_answer(const SharedRequest &request) {
+    {
+        const std::lock_guard lock(mutex_);
+        if (request->answer.empty() && !is_stopping_) {
+            suspended_.insert(request);
+            MHD_suspend_connection(request->connection);
+            return true;
+        }
+    }
+    return process(request);
+}
+
+void Server::take(const SharedRequest &request, const std::string &answer) {
+    const std::lock_guard lock(mutex_);
+    request->answer = answer;
+    resume(request);
+}
+
+void Server::take_status(const std::string &answer) {
+    const std::lock_guard lock(mutex_);
+    is_status_pending_ = false;
+    for (const SharedRequest &request : std::exchange(waiting_for_status_, {})) {
+        request->answer = answer;
+        resume(request);
+    }
+}
+
+void Server::resume(const SharedRequest &request) {
+    if (suspended_.erase(request) > 0)
+        MHD_resume_connection(request->connection);
+}
+
+bool Server::respond_with_answer(const Request &request) {
+    if (request.path == "/metrics") {
+        OwnCounts own{frames_.number(), frames_.encoded(), 0, 0};
+        {
+            const std::lock_guard lock(mutex_);
+            own.viewers = viewers_.size();
+            own.connections = connections_.size();
+        }
+        return respond(request, MHD_HTTP_OK, "text/plain; version=0.0.4; charset=utf-8",
+                       metrics(request.answer, own));
+    }
+    // The host's answers begin with the member "ok".
+    const bool is_ok = request.answer.starts_with("{\"ok\":true");
+    const unsigned failed =
+        request.path == "/api/status" ? MHD_HTTP_SERVICE_UNAVAILABLE : MHD_HTTP_UNPROCESSABLE_CONTENT;
+    return respond(request, is_ok ? MHD_HTTP_OK : failed, "application/json", request.answer);
+}
+
+bool Server::respond_with_page(const Request &request) {
+    const std::string nonce = make_nonce();
+    constexpr std::string_view placeholder = "NONCE";
+    std::string page(page_html());
+    for (std::size_t at = 0; (at = page.find(placeholder, at)) != std::string::npos; at += nonce.size())
+        page.replace(at, placeholder.size(), nonce);
+    return respond(request, MHD_HTTP_OK, "text/html; charset=utf-8", page, nonce);
+}
+
+bool Server::respond_with_snapshot(const Request &request) {
+    const std::shared_ptr<const Jpeg> jpeg = frames_.newest();
+    if (!jpeg)
+        return refuse(request, MHD_HTTP_SERVICE_UNAVAILABLE, "there is no picture yet");
+    return respond(request, MHD_HTTP_OK, "image/jpeg",
+                   {reinterpret_cast<const char *>(jpeg->bytes.data()), jpeg->bytes.size()});
+}
+
+bool Server::respond_with_stream(const Request &request) {
+    auto viewer = std::make_unique<Viewer>(Viewer{this, request.connection});
+    {
+        const std::lock_guard lock(mutex_);
+        if (viewers_.size() < max_viewers)
+            viewers_.insert(viewer.get());
+        else
+            viewer.reset();
+    }
+    if (!viewer)
+        return refuse(request, MHD_HTTP_SERVICE_UNAVAILABLE, "there are too many viewers");
+    viewer->head = "--" + std::string(boundary) + "\r\n";
+    viewer->jpeg = std::make_shared<Jpeg>();
+    MHD_Response *response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, stream_block, Callbacks::read,
+                                                               viewer.get(), Callbacks::free_viewer);
+    if (!response) {
+        Callbacks::free_viewer(viewer.release());
+        return false;
+    }
+    viewer.release(); // NOLINT(bugprone-unused-return-value): the response owns it
+    const std::string type = "multipart/x-mixed-replace; boundary=" + std::string(boundary);
+    MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, type.c_str());
+    return queue(request, MHD_HTTP_OK, response);
+}
+
+// Copies the next bytes of the stream. Browsers show a frame once they have the boundary after it, so this boundary
+// is sent with the frame.
+std::ptrdiff_t Server::read_stream(Viewer &viewer, std::span<char> to) {
+    static const std::string end = "\r\n--" + std::string(boundary) + "\r\n";
+    const auto size_of = [&](const Viewer &v) {
+        return v.head.size() + (v.number > 0 ? v.jpeg->bytes.size() + end.size() : 0);
+    };
+    if (viewer.position == size_of(viewer)) {
+        {
+            const std::lock_guard lock(mutex_);
+            if (is_stopping_)
+                return MHD_CONTENT_READER_END_OF_STREAM;
+            const std::uint64_t number = frames_.number();
+            const auto now = Clock::now();
+            auto &deadline = connections_.at(viewer.connection).deadline;
+            if (number == 0 || (number == viewer.number && now - viewer.sent_at < repeat_time)) {
+                deadline = Clock::time_point::max();
+                viewer.is_waiting = true;
+                MHD_suspend_connection(viewer.connection);
+                return 0;
+            }
+            deadline = now + frame_time;
+            viewer.sent_at = now;
+        }
+        viewer.jpeg = frames_.newest();
+        viewer.number = viewer.jpeg->number;
+        viewer.head =
+            "Content-Type: image/jpeg\r\nContent-Length: " + std::to_string(viewer.jpeg->bytes.size()) + "\r\n\r\n";
+        viewer.position = 0;
+    }
+    std::size_t copied = 0, begin = 0; // of the part within the whole
+    const std::string_view jpeg(reinterpret_cast<const char *>(viewer.jpeg->bytes.data()), viewer.jpeg->bytes.size());
+    for (const std::string_view part : {std::string_view(viewer.head), jpeg, std::string_view(end)}) {
+        if (viewer.number == 0 && begin > 0)
+            break;
+        if (viewer.position < begin + part.size() && copied < to.size()) {
+            const std::string_view rest = part.substr(viewer.position - begin, to.size() - copied);
+            std::ranges::copy(rest, to.data() + copied);
+            copied += rest.size();
+            viewer.position += rest.size();
+        }
+        begin += part.size();
+    }
+    return static_cast<std::ptrdiff_t>(copied);
+}
+
+bool Server::refuse(const Request &request, unsigned status, const std::string &error) {
+    return respond(request, status, "application/json", error_text(error));
+}
+
+bool Server::respond(const Request &request, unsigned status, const char *type, std::string_view body,
+                     const std::string &nonce) {
+    limit_time(request.connection, response_time);
+    MHD_Response *response = MHD_create_response_from_buffer(body.size(), const_cast<char *>(body.data()),
+                                                             MHD_RESPMEM_MUST_COPY);
+    if (!response)
+        return false;
+    MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, type);
+    if (status == MHD_HTTP_UNAUTHORIZED)
+        MHD_add_response_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, "Bearer");
+    if (status == MHD_HTTP_METHOD_NOT_ALLOWED)
+        MHD_add_response_header(response, MHD_HTTP_HEADER_ALLOW, request.path == "/api/control" ? "POST" : "GET, HEAD");
+    return queue(request, status, response, nonce);
+}
+
+bool Server::queue(const Request &request, unsigned status, MHD_Response *response, const std::string &nonce) {
+    const std::string policy =
+        nonce.empty() ? "default-src 'none'; frame-ancestors 'none'"
+                      : "default-src 'none'; img-src 'self' data:; connect-src 'self'; style-src 'nonce-" + nonce +
+                            "'; script-src 'nonce-" + nonce +
+                            "'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+    for (const auto &[name, value] :
+         {std::pair{"Content-Security-Policy", policy.c_str()}, {"X-Content-Type-Options", "nosniff"},
+          {"X-Frame-Options", "DENY"}, {"Cross-Origin-Resource-Policy", "same-origin"},
+          {"Cross-Origin-Opener-Policy", "same-origin"}, {"Referrer-Policy", "no-referrer"},
+          {"Cache-Control", "no-store"}})
+        MHD_add_response_header(response, name, value);
+    const MHD_Result queued = MHD_queue_response(request.connection, status, response);
+    MHD_destroy_response(response);
+    return queued == MHD_YES;
+}
+
+} // namespace arhost::web

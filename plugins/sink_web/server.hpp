@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "frames.hpp"
+
+#include <map>
+#include <set>
+#include <span>
+
+struct MHD_Connection;
+struct MHD_Daemon;
+struct MHD_Response;
+
+namespace arhost::web {
+
+struct Settings {
+    int socket;        // listening
+    std::string token; // "": none
+    std::string hosts; // see is_own_host
+};
+
+// Serves the page, the live picture and the commands, in a thread of libmicrohttpd.
+class Server {
+public:
+    // `control` may be without functions; there are then no status and no commands.
+    Server(Settings settings, Frames &frames, HostControl &control);
+    ~Server();
+    Server(const Server &) = delete;
+    Server &operator=(const Server &) = delete;
+
+    // Called by the plugin's thread after each frame, and 30 times per second without frames: sends new frames and
+    // closes the connections of clients that exceed their time.
+    void tick();
+
+private:
+    using Clock = std::chrono::steady_clock;
+    struct Callbacks; // of libmicrohttpd
+    struct Request;
+    struct Viewer;
+    using SharedRequest = std::shared_ptr<Request>;
+    struct Connection {
+        int fd;
+        Clock::time_point deadline;
+    };
+
+    bool check(const Request &request);
+    bool process(const SharedRequest &request);
+    bool send_command(const SharedRequest &request);
+    bool ask_status(const SharedRequest &request);
+    bool suspend_until_answer(const SharedRequest &request);
+    void take(const SharedRequest &request, const std::string &answer);
+    void take_status(const std::string &answer);
+    void resume(const SharedRequest &request);
+
+    bool respond_with_answer(const Request &request);
+    bool respond_with_page(const Request &request);
+    bool respond_with_snapshot(const Request &request);
+    bool respond_with_stream(const Request &request);
+    bool respond(const Request &request, unsigned status, const char *type, std::string_view body,
+                 const std::string &nonce = "");
+    bool refuse(const Request &request, unsigned status, const std::string &error);
+    bool queue(const Request &request, unsigned status, MHD_Response *response, const std::string &nonce = "");
+    void limit_time(MHD_Connection *connection, std::chrono::seconds time);
+    std::ptrdiff_t read_stream(Viewer &viewer, std::span<char> to);
+
+    Settings settings_;
+    Frames &frames_;
+    HostControl &control_;
+    MHD_Daemon *daemon_ = nullptr;
+    std::mutex mutex_; // guards the following members
+    bool is_stopping_ = false, is_status_pending_ = false;
+    std::map<MHD_Connection *, Connection> connections_;
+    std::set<Viewer *> viewers_;
+    std::set<SharedRequest> suspended_, waiting_for_status_;
+};
+
+} // namespace arhost::web

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// sink_web: a web page with the live picture, the state of the run and its commands.
+#include "checks.hpp"
+#include "server.hpp"
+
+namespace {
+
+constexpr std::size_t min_token_size = 16;
+
+class WebSink {
+public:
+    static constexpr const char *changeable[] = {"quality", nullptr};
+
+    WebSink(const arhost::Host &host, const arhost::Options &options)
+        : host_(host), control_(host), frames_(static_cast<int>(options.integer("quality"))),
+          settings_{static_cast<int>(options.integer("listen")), options.text("token"), options.text("hosts")},
+          address_(options.text("listen")) {
+        if (settings_.socket < 0)
+            fail("the option 'listen' must not be empty");
+        if (!settings_.token.empty() && settings_.token.size() < min_token_size)
+            fail("the option 'token' must have at least 16 characters");
+        if (settings_.token.empty() && !arhost::web::is_local(settings_.socket))
+            fail("other machines can reach " + address_ +
+                 ", so the option 'token' must be set; or set 'listen' to 127.0.0.1:PORT");
+    }
+
+    void start(const arhost_sink_setup &) {
+        server_ = std::make_unique<arhost::web::Server>(settings_, frames_, control_);
+        host_.info(address_.starts_with('/') ? "listens at " + address_ : "open http://" + address_ + "/");
+    }
+
+    arhost_status write(const arhost_output &output) {
+        frames_.put(output);
+        return idle();
+    }
+
+    arhost_status idle() {
+        server_->tick();
+        return ARHOST_STATUS_OK;
+    }
+
+    void set(const arhost::Options &changed) { frames_.set_quality(static_cast<int>(changed.integer("quality"))); }
+
+    void stop() { server_.reset(); }
+
+private:
+    [[noreturn]] static void fail(const std::string &message) {
+        throw arhost::Failure(ARHOST_STATUS_ERROR_CONFIGURATION, message);
+    }
+
+    arhost::Host host_;
+    arhost::HostControl control_;
+    arhost::web::Frames frames_;
+    arhost::web::Settings settings_;
+    std::string address_;
+    std::unique_ptr<arhost::web::Server> server_;
+};
+
+constexpr arhost_option_descriptor options[] = {
+    arhost::option(ARHOST_OPTION_LISTEN, "listen", "127.0.0.1:8080",
+                   "Address and port of the page; an address that other machines can reach needs a token."),
+    arhost::option(ARHOST_OPTION_TEXT, "token", "",
+                   "Secret that each command must contain, at least 16 characters; empty: none."),
+    arhost::option(ARHOST_OPTION_TEXT, "hosts", "",
+                   "Names of this machine, separated by commas, under which browsers may open the page."),
+    arhost::option(ARHOST_OPTION_INTEGER, "quality", "80", "JPEG quality.", 1, 100),
+};
+
+constexpr const char *needs[] = {"listen", nullptr};
+
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),
+    ARHOST_KIND_SINK,
+    "sink_web",
+    "Web page",
+    "0.1.0",
+    "arhost",
+    "Apache-2.0",
+    "Shows the live picture and the state of the run in a browser, and passes its commands to the host.",
+    ARHOST_CAPABILITY_REALTIME_SINK,
+    std::size(options),
+    options,
+    needs,
+};
+
+} // namespace
+
+ARHOST_SINK(WebSink, descriptor)

@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Runs arhost with the page, in its sandbox, and sends requests to it.
+#include "arhost_run.hpp"
+#include "http_client.hpp"
+#include "sink_under_test.hpp"
+
+#include <gmock/gmock.h>
+
+using namespace arhost::test;
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::StartsWith;
+using Json = nlohmann::json;
+
+namespace {
+
+const std::string token = "0123456789abcdef";
+
+std::string yaml(const std::string &granted, const std::string &options) {
+    return "version: 1\nmode: live\n"
+           "source: {plugin: source_synthetic, options: {frames: 0, id: 0, side_mm: 80, width: 160, height: 120}}\n"
+           "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+           "raytracer: {plugin: rt_embree, scene: scene.yaml}\n"
+           "outputs: [{plugin: sink_web, allow: [listen], control: " +
+           granted + ", options: {" + options + "}}]\nstats: stats.json\n";
+}
+
+class WebRun : public ArhostRun {
+public:
+    explicit WebRun(const std::string &granted = "[quit, freeze, status]", const std::string &options = "")
+        : ArhostRun(yaml(granted, "listen: \"127.0.0.1:0\"" + (options.empty() ? "" : ", " + options))) {
+        write("scene.yaml", small_scene);
+        start();
+        const std::string url = "http://127.0.0.1:";
+        std::size_t at = 0;
+        while ((at = output().find(url)) == std::string::npos || output().find('/', at + url.size()) == std::string::npos) {
+            if (!running())
+                throw std::runtime_error(output());
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        }
+        port_ = static_cast<std::uint16_t>(std::stoi(output().substr(at + url.size())));
+        while (get("/snapshot.jpg").status != 200 && running())
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    std::uint16_t port() const { return port_; }
+    HttpClient connect() const { return HttpClient(port_); }
+    HttpAnswer request(const std::string &text) const {
+        HttpClient client = connect();
+        client.send(text);
+        return client.receive_answer();
+    }
+    HttpAnswer get(const std::string &path, const std::string &headers = "") const {
+        return request("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n" + headers + "\r\n");
+    }
+    HttpAnswer post(const std::string &body, const std::string &headers = "") const {
+        return request("POST /api/control HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\n"
+                       "Content-Length: " +
+                       std::to_string(body.size()) + "\r\n" + headers + "\r\n" + body);
+    }
+    Json status() const { return Json::parse(get("/api/status").body); }
+    HttpClient watch(int receive_buffer = 0) const {
+        HttpClient client(port_, receive_buffer);
+        client.send("GET /stream.mjpg HTTP/1.1\r\nHost: localhost\r\n\r\n");
+        return client;
+    }
+    int quit() {
+        EXPECT_EQ(post(R"({"command":"quit"})").status, 200) << output();
+        return wait();
+    }
+
+private:
+    std::uint16_t port_ = 0;
+};
+
+} // namespace
+
+TEST(SinkWeb, ServesThePageThePictureAndTheDescription) {
+    WebRun run;
+    const HttpAnswer page = run.get("/");
+    EXPECT_EQ(page.status, 200);
+    EXPECT_THAT(page.body, AllOf(HasSubstr("src=\"/stream.mjpg\""), testing::Not(HasSubstr("NONCE"))));
+    EXPECT_THAT(page.head, AllOf(HasSubstr("Content-Security-Policy: default-src 'none'"), HasSubstr("nosniff"),
+                                 HasSubstr("X-Frame-Options: DENY"), HasSubstr("no-store")));
+    EXPECT_NE(page.body, run.get("/").body) << "each page must have its own nonce";
+    EXPECT_THAT(run.get("/snapshot.jpg").body, StartsWith("\xff\xd8\xff"));
+    EXPECT_EQ(Json::parse(run.get("/openapi.json").body)["openapi"], "3.1.0");
+    EXPECT_EQ(run.get("/nothing").status, 404);
+    EXPECT_EQ(run.get("/../etc/passwd").status, 404);
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
+TEST(SinkWeb, StreamsChangingFrames) {
+    WebRun run;
+    HttpClient viewer = run.watch();
+    EXPECT_THAT(viewer.receive_to("\r\n\r\n"), HasSubstr("multipart/x-mixed-replace"));
+    const std::string first = viewer.receive_frame();
+    EXPECT_THAT(first, StartsWith("\xff\xd8\xff"));
+    std::string other = first;
+    for (int i = 0; i < 100 && other == first; ++i)
+        other = viewer.receive_frame();
+    EXPECT_NE(other, first);
+    EXPECT_EQ(run.quit(), 0) << run.output();
+    EXPECT_THAT(viewer.receive_all(), HasSubstr("0\r\n")) << "the end of the run ends the stream";
+}
+
+TEST(SinkWeb, RepeatsTheLastFrameWhileTheVideoIsFrozen) {
+    WebRun run;
+    EXPECT_EQ(Json::parse(run.post(R"({"command":"freeze","on":true})").body)["frozen"], true);
+    HttpClient viewer = run.watch();
+    viewer.receive_to("\r\n\r\n");
+    std::string last = viewer.receive_frame(), next = viewer.receive_frame();
+    for (int i = 0; i < 10 && last != next; ++i) // frames in progress
+        last = std::exchange(next, viewer.receive_frame());
+    EXPECT_EQ(last, next);
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
+TEST(SinkWeb, GivesTheStatusAndTheGrantedCommands) {
+    WebRun run;
+    const Json answer = run.status();
+    EXPECT_EQ(answer["ok"], true);
+    EXPECT_THAT(answer["granted"], ElementsAre("freeze", "quit", "status"));
+    EXPECT_EQ(answer["status"]["mode"], "live");
+    const HttpAnswer metrics = run.get("/metrics");
+    EXPECT_EQ(metrics.status, 200);
+    EXPECT_THAT(metrics.body, AllOf(HasSubstr("arhost_component_running{component=\"tracker\",plugin=\"tracker_aruco\"} 1\n"),
+                                    HasSubstr("arhost_stage_milliseconds{stage=\"latency\",quantile=\"0.5\"} "),
+                                    HasSubstr("arhost_web_viewers 0\n")));
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
+TEST(SinkWeb, EncodesNothingWithoutViewers) {
+    WebRun run;
+    const auto count = [&](const std::string &name) {
+        const std::string text = "\n" + run.get("/metrics").body;
+        return std::stoul(text.substr(text.find("\n" + name + " ") + name.size() + 2));
+    };
+    const auto encoded = count("arhost_web_encoded_frames_total"), frames = count("arhost_web_frames_total");
+    while (count("arhost_web_frames_total") < frames + 10)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_EQ(count("arhost_web_encoded_frames_total"), encoded);
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
+TEST(SinkWeb, ExecutesOnlyGrantedCommands) {
+    WebRun run("[quit]");
+    const HttpAnswer freeze = run.post(R"({"command":"freeze"})");
+    EXPECT_EQ(freeze.status, 422);
+    EXPECT_THAT(freeze.body, HasSubstr("does not grant 'freeze'"));
+    EXPECT_EQ(run.get("/api/status").status, 503);
+    EXPECT_THAT(run.get("/metrics").body, HasSubstr("arhost_web_frames_total"));
+    EXPECT_EQ(run.post("[]").status, 400);
+    EXPECT_EQ(run.post("").status, 400);
+    EXPECT_EQ(run.post(std::string("{\"command\":\"quit\"}\0x", 20)).status, 400);
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
+TEST(SinkWeb, RejectsOtherHostsOriginsAndTypes) {
+    WebRun run("[quit, freeze]", "hosts: lab");
+    const auto with_host = [&](const std::string &host) {
+        return run.request("GET / HTTP/1.1\r\nHost: " + host + "\r\n\r\n").status;
+    };
+    EXPECT_EQ(with_host("lab:8080"), 200);
+    EXPECT_EQ(with_host("evil.example"), 421);
+    const std::string freeze = R"({"command":"freeze"})";
+    EXPECT_EQ(run.post(freeze, "Origin: http://localhost\r\n").status, 200);
+    EXPECT_EQ(run.post(freeze, "Origin: http://evil.example\r\n").status, 403);
+    EXPECT_EQ(run.post(freeze, "Origin: null\r\n").status, 403);
+    EXPECT_EQ(run.get("/stream.mjpg", "Origin: http://evil.example\r\n").status, 403);
+    const std::string form = "POST /api/control HTTP/1.1\r\nHost: localhost\r\nContent-Length: 20\r\n"
+                             "Content-Type: text/plain\r\n\r\n" + freeze;
+    EXPECT_EQ(run.request(form).status, 415);
+    EXPECT_EQ(run.get("/api/control").status, 405);
+    EXPECT_EQ(run.request("OPTIONS /api/control HTTP/1.1\r\nHost: localhost\r\n\r\n").status, 405);
+    EXPECT_EQ(run.request("PUT / HTTP/1.1\r\nHost: localhost\r\n\r\n").status, 405);
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
+TEST(SinkWeb, CommandsNeedTheToken) {
+    WebRun run("[quit]", "token: \"" + token + "\"");
+    const std::string quit = R"({"command":"quit"})";
+    EXPECT_EQ(run.post(quit).status, 401);
+    EXPECT_EQ(run.post(quit, "Authorization: Bearer 0123456789abcdee\r\n").status, 401);
+    EXPECT_EQ(run.get("/snapshot.jpg").status, 200);
+    EXPECT_EQ(run.post(quit, "Authorization: Bearer " + token + "\r\n").status, 200);
+    EXPECT_EQ(run.wait(), 0) << run.output();
+}
+
+TEST(SinkWeb, OtherMachinesNeedAToken) {
+    ArhostRun run(yaml("[quit]", "listen: \"0.0.0.0:0\""));
+    run.write("scene.yaml", small_scene);
+    EXPECT_NE(run.run(), 0);
+    EXPECT_THAT(run.output(), HasSubstr("the option 'token' must be set"));
+}
+
+TEST(SinkWeb, RejectsAShortToken) {
+    ArhostRun run(yaml("[quit]", "listen: \"127.0.0.1:0\", token: short"));
+    run.write("scene.yaml", small_scene);
+    EXPECT_NE(run.run(), 0);
+    EXPECT_THAT(run.output(), HasSubstr("at least 16 characters"));
+}
+
+TEST(SinkWeb, NeedsASocket) {
+    SinkUnderTest sink("sink_web", {{"listen", ""}});
+    EXPECT_EQ(sink.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
+}
+
+TEST(SinkWeb, SurvivesMalformedRequests) {
+    WebRun run;
+    for (const std::string &text :
+         {std::string("\r\n\r\n\r\n"), std::string("GET\r\n\r\n"), std::string("GET / HTTP/9.9\r\n\r\n"),
+          std::string("GET / HTTP/1.1\r\n\r\n"), std::string("\0\1\2\3", 4) + "\r\n\r\n",
+          "GET /" + std::string(100000, 'a') + " HTTP/1.1\r\nHost: localhost\r\n\r\n",
+          "GET / HTTP/1.1\r\nHost: localhost\r\nX: " + std::string(100000, 'a') + "\r\n\r\n",
+          std::string("POST /api/control HTTP/1.1\r\nHost: localhost\r\nContent-Length: -1\r\n\r\n"),
+          std::string("POST /api/control HTTP/1.1\r\nHost: localhost\r\nContent-Length: 99999999999999999999\r\n\r\n")}) {
+        HttpClient client = run.connect();
+        client.send(text);
+        ::shutdown(client.fd(), SHUT_WR);
+        const std::string answer = client.receive_all();
+        EXPECT_FALSE(answer.starts_with("HTTP/1.1 200")) << answer;
+    }
+    EXPECT_EQ(run.post(std::string(100000, ' ')).status, 413);
+    EXPECT_EQ(run.get("/").status, 200);
+    EXPECT_EQ(run.quit(), 0) << run.output();
+    EXPECT_EQ(run.stats()["restarts"]["sink_web"], 0) << run.output();
+}
+
+TEST(SinkWeb, AViewerThatDoesNotReadDelaysNobody) {
+    WebRun run;
+    std::vector<HttpClient> viewers;
+    for (int i = 0; i < 10; ++i)
+        viewers.push_back(run.watch(4096));
+    HttpClient viewer = run.watch();
+    viewer.receive_to("\r\n\r\n");
+    for (int i = 0; i < 50; ++i)
+        ASSERT_NE(viewer.receive_frame(), "") << run.output();
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
+TEST(SinkWeb, ClosesConnectionsThatSendTooSlowly) {
+    WebRun run;
+    HttpClient slow = run.connect();
+    std::atomic<bool> is_closed = false;
+    std::thread reader([&] { slow.receive_all(), is_closed = true; });
+    slow.send("GET / HTTP/1.1\r\nHost: localhost\r\n");
+    for (int i = 0; i < 600 && !is_closed; ++i) {
+        slow.send("X");
+        std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    reader.join();
+    EXPECT_TRUE(is_closed) << "the server accepts one byte at a time forever";
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
+TEST(SinkWeb, ManyConnectionsNeverStopTheVideo) {
+    WebRun run;
+    HttpClient viewer = run.watch();
+    viewer.receive_to("\r\n\r\n");
+    std::vector<HttpClient> idle;
+    for (int i = 0; i < 300; ++i)
+        idle.push_back(run.connect());
+    for (int i = 0; i < 50; ++i)
+        ASSERT_NE(viewer.receive_frame(), "") << run.output();
+    idle.clear();
+    EXPECT_EQ(run.get("/").status, 200);
+    EXPECT_EQ(run.quit(), 0) << run.output();
+    EXPECT_EQ(run.stats()["restarts"]["sink_web"], 0) << run.output();
+}
+
+TEST(SinkWeb, ARestartedWorkerServesAgain) {
+    WebRun run;
+    const pid_t worker = run.worker("sink_web");
+    send_signal(worker, SIGKILL);
+    while (run.running() && run.get("/snapshot.jpg").status != 200)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_NE(run.worker("sink_web"), worker);
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
