@@ -70,8 +70,7 @@ std::string parse_component(Members &members) {
     return component;
 }
 
-Command parse_members(const std::string &name, Members &members,
-                      const std::set<std::string, std::less<>> &granted) {
+Command parse_members(const std::string &name, Members &members, const std::set<std::string, std::less<>> &granted) {
     if (name == "quit")
         return Quit{};
     if (name == "freeze")

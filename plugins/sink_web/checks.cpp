@@ -12,7 +12,8 @@ namespace arhost::web {
 namespace {
 
 bool equal_ignoring_case(std::string_view a, std::string_view b) {
-    return std::ranges::equal(a, b, [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
+    return std::ranges::equal(a, b,
+                              [](unsigned char x, unsigned char y) { return std::tolower(x) == std::tolower(y); });
 }
 
 // Returns the host without its port, or "" if the text is malformed.
@@ -85,8 +86,7 @@ bool is_own_origin(std::string_view origin, std::string_view host) {
 
 bool has_token(std::string_view authorization, std::string_view token) {
     constexpr std::string_view scheme = "Bearer ";
-    if (authorization.size() < scheme.size() ||
-        !equal_ignoring_case(authorization.substr(0, scheme.size()), scheme))
+    if (authorization.size() < scheme.size() || !equal_ignoring_case(authorization.substr(0, scheme.size()), scheme))
         return false;
     authorization.remove_prefix(scheme.size());
     volatile unsigned char difference = authorization.size() != token.size();

@@ -77,8 +77,8 @@ struct Server::Callbacks {
         auto &server = *static_cast<Server *>(self);
         return guarded([&] {
             if (!*context) {
-                auto request = std::make_unique<SharedRequest>(
-                    std::make_shared<Request>(Request{connection, method, path}));
+                auto request =
+                    std::make_unique<SharedRequest>(std::make_shared<Request>(Request{connection, method, path}));
                 *context = request.release();
             }
             const SharedRequest &request = *static_cast<SharedRequest *>(*context);
@@ -95,7 +95,8 @@ struct Server::Callbacks {
         });
     }
 
-    static void complete(void *self, MHD_Connection *connection, void **context, MHD_RequestTerminationCode) noexcept {
+    static void complete(void *self, MHD_Connection *connection, void **context,
+                         MHD_RequestTerminationCode) noexcept {
         delete static_cast<SharedRequest *>(std::exchange(*context, nullptr));
         static_cast<Server *>(self)->limit_time(connection, request_time); // for the next request
     }
@@ -130,13 +131,13 @@ struct Server::Callbacks {
 
 Server::Server(Settings settings, Frames &frames, HostControl &control)
     : settings_(std::move(settings)), frames_(frames), control_(control) {
-    daemon_ = MHD_start_daemon(
-        MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr, nullptr, Callbacks::handle, this,
-        MHD_OPTION_LISTEN_SOCKET, settings_.socket, MHD_OPTION_CONNECTION_LIMIT, max_connections,
-        MHD_OPTION_PER_IP_CONNECTION_LIMIT, max_connections_per_address, MHD_OPTION_CONNECTION_MEMORY_LIMIT,
-        connection_memory, MHD_OPTION_CONNECTION_TIMEOUT, inactivity_s, MHD_OPTION_NOTIFY_COMPLETED,
-        Callbacks::complete, this, MHD_OPTION_NOTIFY_CONNECTION, Callbacks::notify, this, MHD_OPTION_STRICT_FOR_CLIENT,
-        1, MHD_OPTION_END);
+    daemon_ = MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr, nullptr,
+                               Callbacks::handle, this, MHD_OPTION_LISTEN_SOCKET, settings_.socket,
+                               MHD_OPTION_CONNECTION_LIMIT, max_connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT,
+                               max_connections_per_address, MHD_OPTION_CONNECTION_MEMORY_LIMIT, connection_memory,
+                               MHD_OPTION_CONNECTION_TIMEOUT, inactivity_s, MHD_OPTION_NOTIFY_COMPLETED,
+                               Callbacks::complete, this, MHD_OPTION_NOTIFY_CONNECTION, Callbacks::notify, this,
+                               MHD_OPTION_STRICT_FOR_CLIENT, 1, MHD_OPTION_END);
     if (!daemon_)
         throw Failure(ARHOST_STATUS_ERROR_IO, "cannot start the web server");
 }
@@ -251,9 +252,8 @@ bool Server::ask_status(const SharedRequest &request) {
     }
     if (!control_)
         take_status(error_text("this host does not give its status"));
-    else if (sends && control_.send(R"({"command":"status"})", [this](const std::string &answer) {
-                 take_status(answer);
-             }) != ARHOST_STATUS_OK)
+    else if (sends && control_.send(R"({"command":"status"})",
+                                    [this](const std::string &answer) { take_status(answer); }) != ARHOST_STATUS_OK)
         take_status(error_text("the host is busy; retry later"));
     return suspend_until_answer(request);
 }
@@ -374,7 +374,10 @@ std::ptrdiff_t Server::read_stream(Viewer &viewer, std::span<char> to) {
             deadline = now + frame_time;
             viewer.sent_at = now;
         }
-        viewer.jpeg = frames_.newest();
+        std::shared_ptr<const Jpeg> jpeg = frames_.newest();
+        if (!jpeg) // the encoder has failed
+            return MHD_CONTENT_READER_END_WITH_ERROR;
+        viewer.jpeg = std::move(jpeg);
         viewer.number = viewer.jpeg->number;
         viewer.head =
             "Content-Type: image/jpeg\r\nContent-Length: " + std::to_string(viewer.jpeg->bytes.size()) + "\r\n\r\n";
@@ -403,29 +406,32 @@ bool Server::refuse(const Request &request, unsigned status, const std::string &
 bool Server::respond(const Request &request, unsigned status, const char *type, std::string_view body,
                      const std::string &nonce) {
     limit_time(request.connection, response_time);
-    MHD_Response *response = MHD_create_response_from_buffer(body.size(), const_cast<char *>(body.data()),
-                                                             MHD_RESPMEM_MUST_COPY);
+    MHD_Response *response =
+        MHD_create_response_from_buffer(body.size(), const_cast<char *>(body.data()), MHD_RESPMEM_MUST_COPY);
     if (!response)
         return false;
     MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, type);
     if (status == MHD_HTTP_UNAUTHORIZED)
         MHD_add_response_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, "Bearer");
     if (status == MHD_HTTP_METHOD_NOT_ALLOWED)
-        MHD_add_response_header(response, MHD_HTTP_HEADER_ALLOW, request.path == "/api/control" ? "POST" : "GET, HEAD");
+        MHD_add_response_header(response, MHD_HTTP_HEADER_ALLOW,
+                                request.path == "/api/control" ? "POST" : "GET, HEAD");
     return queue(request, status, response, nonce);
 }
 
 bool Server::queue(const Request &request, unsigned status, MHD_Response *response, const std::string &nonce) {
     const std::string policy =
-        nonce.empty() ? "default-src 'none'; frame-ancestors 'none'"
-                      : "default-src 'none'; img-src 'self' data:; connect-src 'self'; style-src 'nonce-" + nonce +
-                            "'; script-src 'nonce-" + nonce +
-                            "'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-    for (const auto &[name, value] :
-         {std::pair{"Content-Security-Policy", policy.c_str()}, {"X-Content-Type-Options", "nosniff"},
-          {"X-Frame-Options", "DENY"}, {"Cross-Origin-Resource-Policy", "same-origin"},
-          {"Cross-Origin-Opener-Policy", "same-origin"}, {"Referrer-Policy", "no-referrer"},
-          {"Cache-Control", "no-store"}})
+        nonce.empty()
+            ? "default-src 'none'; frame-ancestors 'none'"
+            : "default-src 'none'; img-src 'self' data:; connect-src 'self'; style-src 'nonce-" + nonce +
+                  "'; script-src 'nonce-" + nonce + "'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+    for (const auto &[name, value] : {std::pair{"Content-Security-Policy", policy.c_str()},
+                                      {"X-Content-Type-Options", "nosniff"},
+                                      {"X-Frame-Options", "DENY"},
+                                      {"Cross-Origin-Resource-Policy", "same-origin"},
+                                      {"Cross-Origin-Opener-Policy", "same-origin"},
+                                      {"Referrer-Policy", "no-referrer"},
+                                      {"Cache-Control", "no-store"}})
         MHD_add_response_header(response, name, value);
     const MHD_Result queued = MHD_queue_response(request.connection, status, response);
     MHD_destroy_response(response);

@@ -158,6 +158,8 @@ TEST(Control, StatusDescribesTheRun) {
     ControlledRun run(controlled("live"));
     run.start_and_connect();
     const Json status = run.status();
+    EXPECT_THAT(run.succeed({{"command", "status"}})["granted"],
+                ElementsAre("freeze", "load_scene", "quit", "record", "set", "snapshot", "status", "swap"));
     EXPECT_EQ(status["mode"], "live");
     EXPECT_EQ(status["frozen"], false);
     EXPECT_EQ(status["recording"], nullptr);

@@ -9,8 +9,9 @@ TEST(WebChecks, AcceptsAddressesLocalhostAndConfiguredNamesAsHost) {
     for (const char *host : {"127.0.0.1", "127.0.0.1:8080", "[::1]:8080", "[::1]", "192.168.1.7:80", "localhost:8080",
                              "LocalHost", "lab:8080", "Rig.example:1"})
         EXPECT_TRUE(is_own_host(host, "lab, rig.example")) << host;
-    for (const char *host : {"", "evil.example", "evil.example:8080", "127.0.0.1.evil.example", "localhost.evil.example",
-                             "127.0.0.1:", "127.0.0.1:x", "[::1", "::1", "[::1]x:1", "[127.0.0.1]", "lab,", "localhost:1:2"})
+    for (const char *host :
+         {"", "evil.example", "evil.example:8080", "127.0.0.1.evil.example", "localhost.evil.example",
+          "127.0.0.1:", "127.0.0.1:x", "[::1", "::1", "[::1]x:1", "[127.0.0.1]", "lab,", "localhost:1:2"})
         EXPECT_FALSE(is_own_host(host, "lab, rig.example")) << host;
     EXPECT_FALSE(is_own_host("", ""));
 }

@@ -23,8 +23,8 @@ struct HttpAnswer {
 class HttpClient {
 public:
     explicit HttpClient(std::uint16_t port, int receive_buffer = 0) : fd_(::socket(AF_INET, SOCK_STREAM, 0)) {
-        const timeval patience{30, 0};
-        ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+        const timeval limit{30, 0};
+        ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
         if (receive_buffer > 0)
             ::setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
         sockaddr_in address{};
@@ -38,8 +38,7 @@ public:
             ::close(fd_);
     }
     HttpClient(HttpClient &&other) noexcept
-        : fd_(std::exchange(other.fd_, -1)),
-          received_(std::move(other.received_)) {}
+        : fd_(std::exchange(other.fd_, -1)), received_(std::move(other.received_)) {}
     HttpClient &operator=(HttpClient &&) = delete;
 
     int fd() const { return fd_; }
