@@ -68,7 +68,7 @@ void print_members(const Json &answer) {
     for (const auto &[key, value] : answer.items())
         if (key == "status")
             std::printf("%s\n", value.dump(2).c_str());
-        else if (key != "ok")
+        else if (key != "ok" && key != "granted")
             std::printf("%s: %s\n", key.c_str(),
                         base::printable(value.is_string() ? value.get<std::string>() : value.dump()).c_str());
 }
