@@ -59,7 +59,7 @@ private:
     Clock::time_point window_begin_{}, previous_begin_{};
 };
 
-// What remains of components that ended before the run did: replaced ones, and outputs that a command has stopped.
+// Totals of components that ended before the run did: replaced ones, and outputs that a command has stopped.
 struct EndedComponents {
     struct Crash {
         std::string component;

@@ -178,14 +178,10 @@ nlohmann::json to_json(const Policy &policy) {
     const auto texts = [](const std::vector<fs::path> &paths) {
         return std::vector<std::string>(paths.begin(), paths.end());
     };
-    return {{"mode", static_cast<int>(policy.mode)},
-            {"allow", policy.allow},
-            {"readable", texts(policy.readable)},
-            {"writable", texts(policy.writable)},
-            {"usb_device", policy.usb_device},
-            {"environment", policy.environment},
-            {"memory_bytes", policy.memory_bytes},
-            {"makes_shared_memory", policy.makes_shared_memory},
+    return {{"mode", static_cast<int>(policy.mode)},    {"allow", policy.allow},
+            {"readable", texts(policy.readable)},       {"writable", texts(policy.writable)},
+            {"usb_device", policy.usb_device},          {"environment", policy.environment},
+            {"memory_bytes", policy.memory_bytes},      {"makes_shared_memory", policy.makes_shared_memory},
             {"standard_output", policy.standard_output}};
 }
 

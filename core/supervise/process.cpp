@@ -22,7 +22,8 @@ bool signal_process(const base::UniqueFd &pidfd, int signal) {
 } // namespace
 
 Isolation isolation_of(const sandbox::Policy &policy) {
-    Isolation isolation{policy.mode != sandbox::Mode::none, sandbox::memory_limit(policy), policy.standard_output, {}};
+    Isolation isolation{
+        policy.mode != sandbox::Mode::none, sandbox::memory_limit(policy), policy.standard_output, {}};
     policy.usb_device.copy(isolation.usb_device.data(), isolation.usb_device.size() - 1); // the rest remains 0
     return isolation;
 }

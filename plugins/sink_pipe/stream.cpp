@@ -100,8 +100,8 @@ bool Stream::write(std::span<const std::uint8_t> bytes) {
             throw io_failure("cannot write to " + name());
         if (count <= 0) {
             wait("waiting for the reader");
-            constexpr auto patience = std::chrono::seconds(3);
-            if (std::chrono::steady_clock::now() - started > patience && !std::exchange(reported, true))
+            constexpr auto report_after = std::chrono::seconds(3);
+            if (std::chrono::steady_clock::now() - started > report_after && !std::exchange(reported, true))
                 host_.info("waiting for the reader of " + name() + ", which has paused");
             continue;
         }

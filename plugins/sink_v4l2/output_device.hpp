@@ -16,7 +16,7 @@
 
 namespace arhost {
 
-// What the device expects. `colour_space` and the other constants are V4L2's.
+// The format that the device expects. `colour_space` and the other constants are V4L2's.
 struct OutputFormat {
     std::uint32_t fourcc = 0, width = 0, height = 0;
     std::uint32_t stride = 0;     // bytes per row of the first plane

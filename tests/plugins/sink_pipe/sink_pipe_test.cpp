@@ -28,7 +28,7 @@ struct SinkPipe : testing::Test {
     static std::future<std::string> read_all(const fs::path &fifo) {
         return std::async(std::launch::async, [fifo] { return FifoReader(fifo).read_all(); });
     }
-    // What a reader gets of `frames` frames.
+    // The bytes that a reader receives for `frames` frames.
     std::string stream(const std::string &format, int width, int height, std::uint64_t frames, double fps = 30,
                        const std::string &matrix = "auto") {
         std::future<std::string> received = read_all(fifo);
