@@ -64,7 +64,7 @@ private:
 };
 
 std::string parse_component(Members &members) {
-    const std::string component = members.text("component");
+    std::string component = members.text("component");
     if (component != "tracker" && component != "raytracer")
         throw Error("'component' must be 'tracker' or 'raytracer'");
     return component;
@@ -104,7 +104,7 @@ Command parse(const std::string &text, const std::set<std::string, std::less<>> 
         throw Error("unknown command '" + base::printable(name, 100) + "'");
     if (!granted.contains(name))
         throw Error("the configuration does not grant '" + name + "' to this output: add it to its key 'control'");
-    const Command command = parse_members(name, members, granted);
+    Command command = parse_members(name, members, granted);
     members.expect_no_more();
     return command;
 }
