@@ -609,7 +609,7 @@ TEST(Conform, ReportsAnUnknownNeed) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("unknown_need").string(), "--only", "abi.load"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("it needs 'bluetooth', which this arhost cannot allow; a plugin may need "
-                                        "video, usb, gpu, display, network, processes"));
+                                        "video, usb, gpu, display, network, listen, processes"));
 }
 
 TEST(Conform, RemovesASinksFiles) {
@@ -660,7 +660,7 @@ TEST(Conform, WritesJUnitForContinuousIntegration) {
     ConformRun run;
     run.run({run.link_wrong("no_licence").string(), "--only", "abi.*", "--junit", "junit.xml"});
     const std::string xml = run.read("junit.xml");
-    EXPECT_THAT(xml, HasSubstr("tests=\"13\" failures=\"1\" errors=\"0\" skipped=\"1\""));
+    EXPECT_THAT(xml, HasSubstr("tests=\"14\" failures=\"1\" errors=\"0\" skipped=\"2\""));
     EXPECT_THAT(xml, HasSubstr("<testcase classname=\"abi\" name=\"descriptor\""));
     EXPECT_THAT(xml, HasSubstr("<failure type=\"fail\" message=\"the descriptor's licence is empty\">"));
 }
