@@ -40,9 +40,10 @@ void Pipeline::on_request(SinkQueue &sink, const run_config::ComponentConfigurat
     };
     try {
         const control::Command command = control::parse(request.command, output.control);
-        if (phase_ != Phase::running)
+        const bool changes_run = !std::holds_alternative<control::Status>(command);
+        if (changes_run && phase_ != Phase::running)
             throw control::Error("the run is starting or ending");
-        if (!std::holds_alternative<control::Status>(command))
+        if (changes_run)
             sink.component->log(ARHOST_SEVERITY_INFO, "command: " + request.command);
         std::visit([&](const auto &each) { execute(each, done); }, command);
     } catch (const control::Error &error) {
