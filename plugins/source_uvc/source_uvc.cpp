@@ -6,6 +6,7 @@
 #include "stream.hpp"
 #include "usb.hpp"
 
+#include "camera_common/frame_size.hpp"
 #include "camera_common/jpeg.hpp"
 
 #include <algorithm>
@@ -18,17 +19,12 @@ namespace {
 
 namespace uvc = arhost::uvc;
 using arhost::Failure;
+using Size = arhost::FrameSize;
 using Clock = std::chrono::steady_clock;
 
 // A camera that delivers no intact frame for this long is reported as lost.
 constexpr auto silence_limit = std::chrono::seconds(5);
 constexpr auto poll_slice = std::chrono::milliseconds(50);
-
-struct Size {
-    std::uint32_t width = 0, height = 0;
-    std::string text() const { return std::to_string(width) + "×" + std::to_string(height); }
-    bool operator==(const Size &) const = default;
-};
 
 // An option that sets a frequent control, which has an automatic mode.
 struct ControlOption {
@@ -219,19 +215,8 @@ private:
 
     // Chooses the first permitted format in which the camera reaches the configured rate, else the fastest.
     Mode choose_mode(const uvc::VideoFunction &function, const arhost_source_setup &setup) const {
-        Size size = configured_size_;
-        std::string wanted_by = "set 'width' and 'height'";
-        if (setup.intrinsics) {
-            const Size calibrated{setup.intrinsics->width, setup.intrinsics->height};
-            if (size != Size{} && size != calibrated)
-                throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                              "width, height: " + size.text() + " is configured, but the camera calibration is for " +
-                                  calibrated.text());
-            if (size == Size{})
-                wanted_by =
-                    "the camera calibration is for " + calibrated.text() + "; calibrate at the size that you use";
-            size = calibrated;
-        }
+        const arhost::DemandedSize wanted = arhost::demanded_size(configured_size_, setup.intrinsics);
+        Size size = wanted.size;
         std::vector<Mode> modes = permitted_modes(function);
         if (modes.empty())
             device_->fail_configuration(
@@ -245,7 +230,7 @@ private:
         std::erase_if(modes, [&](const Mode &mode) { return mode.size() != size; });
         if (modes.empty())
             device_->fail_configuration("width, height", "has no size " + size.text() + "; it offers " +
-                                                             describe(function) + "; " + wanted_by);
+                                                             describe(function) + "; " + wanted.advice);
         const double wanted_fps = 0.95 * (setup.fps > 0 ? setup.fps : 25);
         const auto fast = std::ranges::find_if(modes, [&](const Mode &mode) {
             const double fps = mode.frame->max_fps();

@@ -92,11 +92,6 @@ struct UsbDevice::Node {
     std::string text() const { return id_text(vendor(), product()) + " (" + path + ")"; }
 };
 
-UsbDevice::FileDescriptor::~FileDescriptor() {
-    if (fd_ >= 0)
-        close(fd_);
-}
-
 std::vector<UsbDevice::Node> UsbDevice::list_nodes() {
     std::vector<Node> nodes;
     glob_t found{};

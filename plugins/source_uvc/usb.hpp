@@ -7,13 +7,14 @@
 
 #include "descriptors.hpp"
 
+#include "camera_common/file_descriptor.hpp"
+
 #include <arhost-cpp/plugin.hpp>
 
 #include <libusb.h>
 
 #include <memory>
 #include <optional>
-#include <utility>
 
 namespace arhost::uvc {
 
@@ -55,20 +56,6 @@ private:
     };
     struct CloseHandle {
         void operator()(libusb_device_handle *handle) const { libusb_close(handle); }
-    };
-    class FileDescriptor {
-    public:
-        explicit FileDescriptor(int fd = -1) : fd_(fd) {}
-        ~FileDescriptor();
-        FileDescriptor(FileDescriptor &&other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-        FileDescriptor &operator=(FileDescriptor &&other) noexcept {
-            std::swap(fd_, other.fd_);
-            return *this;
-        }
-        int get() const { return fd_; }
-
-    private:
-        int fd_;
     };
 
     UsbDevice() = default;

@@ -151,11 +151,6 @@ struct Buffer {
 
 } // namespace
 
-FileDescriptor::~FileDescriptor() {
-    if (fd_ >= 0)
-        close(fd_);
-}
-
 std::string fourcc_text(std::uint32_t fourcc) {
     std::string text;
     for (int i = 0; i < 4; ++i)

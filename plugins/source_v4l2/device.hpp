@@ -4,6 +4,8 @@
 // API. Functions that fail throw Failure with a message for the user.
 #pragma once
 
+#include "camera_common/file_descriptor.hpp"
+
 #include <arhost-cpp/plugin.hpp>
 
 #include <linux/videodev2.h>
@@ -12,25 +14,9 @@
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace arhost {
-
-class FileDescriptor {
-public:
-    explicit FileDescriptor(int fd = -1) : fd_(fd) {}
-    ~FileDescriptor();
-    FileDescriptor(FileDescriptor &&other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-    FileDescriptor &operator=(FileDescriptor &&other) noexcept {
-        std::swap(fd_, other.fd_);
-        return *this;
-    }
-    int get() const { return fd_; }
-
-private:
-    int fd_;
-};
 
 struct CaptureSize {
     std::uint32_t width = 0, height = 0;

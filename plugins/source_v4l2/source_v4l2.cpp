@@ -6,6 +6,7 @@
 #include "device.hpp"
 #include "pixels.hpp"
 
+#include "camera_common/frame_size.hpp"
 #include "camera_common/jpeg.hpp"
 
 #include <algorithm>
@@ -27,18 +28,13 @@ using arhost::CaptureDevice;
 using arhost::CaptureFormat;
 using arhost::CaptureStream;
 using arhost::Failure;
+using Size = arhost::FrameSize;
 using arhost::PictureFormat;
 using Clock = std::chrono::steady_clock;
 
 // A camera that delivers no intact frame for this long is reported as lost.
 constexpr auto silence_limit = std::chrono::seconds(5);
 constexpr int poll_slice_ms = 50;
-
-struct Size {
-    std::uint32_t width = 0, height = 0;
-    std::string text() const { return std::to_string(width) + "×" + std::to_string(height); }
-    bool operator==(const Size &) const = default;
-};
 
 bool offers(const CaptureFormat &format, const Size &size) {
     if (format.any_size)
@@ -177,19 +173,8 @@ public:
 
 private:
     PictureFormat set_format(const arhost_source_setup &setup) {
-        Size size = configured_size_;
-        std::string wanted_by = "set 'width' and 'height'";
-        if (setup.intrinsics) {
-            const Size calibrated{setup.intrinsics->width, setup.intrinsics->height};
-            if (size != Size{} && size != calibrated)
-                throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                              "width, height: " + size.text() + " is configured, but the camera calibration is for " +
-                                  calibrated.text());
-            if (size == Size{})
-                wanted_by =
-                    "the camera calibration is for " + calibrated.text() + "; calibrate at the size that you use";
-            size = calibrated;
-        }
+        const arhost::DemandedSize wanted = arhost::demanded_size(configured_size_, setup.intrinsics);
+        Size size = wanted.size;
         const bool demanded = size != Size{};
         if (!demanded) {
             const PictureFormat current = device_->current_format();
@@ -206,7 +191,7 @@ private:
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           camera + " has no size " + size.text() + " in " + arhost::fourcc_text(chosen.fourcc) +
                               " (it would deliver " + Size{set.width, set.height}.text() + "); the nearest are " +
-                              device_->describe_sizes_near(chosen, size.width, size.height) + "; " + wanted_by);
+                              device_->describe_sizes_near(chosen, size.width, size.height) + "; " + wanted.advice);
         if (const std::string defect = arhost::find_raw_format(set.fourcc) ? arhost::defect_of(set) : "";
             !defect.empty())
             throw Failure(ARHOST_STATUS_ERROR_IO, camera + " has a defective driver: " + defect);

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The frame size that a camera must have, according to the options `width` and `height` and to the calibration.
+#pragma once
+
+#include <arhost/camera.h>
+
+#include <cstdint>
+#include <string>
+
+namespace arhost {
+
+struct FrameSize {
+    std::uint32_t width = 0, height = 0; // px
+    std::string text() const { return std::to_string(width) + "×" + std::to_string(height); }
+    bool operator==(const FrameSize &) const = default;
+};
+
+struct DemandedSize {
+    FrameSize size;     // 0×0: any
+    std::string advice; // what the user can change if the camera does not have this size
+};
+
+// `configured`: the options; 0×0 if they are not set. `calibration`: may be NULL. Throws Failure if they differ.
+DemandedSize demanded_size(const FrameSize &configured, const arhost_intrinsics *calibration);
+
+} // namespace arhost
