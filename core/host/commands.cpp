@@ -311,7 +311,7 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     return problem && !is_accepted ? run_failed : success;
 }
 
-// Checks the plugins, fallbacks included, and their options. Returns the ray tracer and its fallback.
+// Checks the plugins, fallbacks included, and their options. Returns the ray tracers.
 std::vector<ipc::PluginDescription> check_plugins(const run_config::Configuration &configuration,
                                                   supervise::Context &context) {
     const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
@@ -327,11 +327,14 @@ std::vector<ipc::PluginDescription> check_plugins(const run_config::Configuratio
     };
     if (configuration.source)
         check_component(*configuration.source, ARHOST_KIND_SOURCE);
-    if (configuration.tracker)
-        check_component(*configuration.tracker, ARHOST_KIND_TRACKER);
+    for (const run_config::TrackerConfiguration &tracker : configuration.trackers)
+        check_component(tracker, ARHOST_KIND_TRACKER);
     std::vector<ipc::PluginDescription> raytracers;
-    if (configuration.raytracer)
-        raytracers = check_component(*configuration.raytracer, ARHOST_KIND_RAYTRACER);
+    for (const run_config::RaytracerConfiguration &raytracer : configuration.raytracers)
+        std::ranges::move(check_component(raytracer, ARHOST_KIND_RAYTRACER), std::back_inserter(raytracers));
+    for (const auto *output : {&configuration.snapshot, &configuration.record})
+        if (*output)
+            check_component(**output, ARHOST_KIND_SINK);
     std::vector<run_config::OutputFile> files = configuration.report_files();
     for (const run_config::ComponentConfiguration &output : configuration.outputs) {
         const ipc::PluginDescription plugin = check_component(output, ARHOST_KIND_SINK).back();

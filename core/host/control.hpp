@@ -7,12 +7,10 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include <functional>
-#include <map>
 #include <optional>
 #include <set>
 #include <stdexcept>
 #include <string>
-#include <string_view>
 #include <variant>
 
 namespace arhost::host::control {

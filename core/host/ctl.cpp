@@ -9,7 +9,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
 #include <cstdio>
 #include <map>
 #include <unistd.h>
@@ -33,8 +32,7 @@ const std::map<std::string, std::vector<std::string>, std::less<>> members_of = 
 
 Json command_of(const CtlArguments &arguments) {
     Json command = {{"command", arguments.command}};
-    const auto found = members_of.find(arguments.command);
-    const std::vector<std::string> members = found == members_of.end() ? std::vector<std::string>() : found->second;
+    const std::vector<std::string> &members = members_of.at(arguments.command); // the command line was checked
     if (arguments.values.size() > members.size())
         throw std::runtime_error("'" + arguments.command + "' takes at most " + std::to_string(members.size()) +
                                  " values");

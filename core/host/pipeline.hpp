@@ -79,8 +79,7 @@ private:
     std::shared_ptr<LoadedScene> use_scene(ipc::SharedMemory arena, const run_config::Scene &scene) const;
     supervise::Component::Callbacks common_callbacks(const std::string &name, const yaml::Node &node);
 
-    void on_request(SinkQueue &sink, const run_config::ComponentConfiguration &output,
-                    const ipc::messages::Request &request);
+    void on_request(SinkQueue &sink, const ipc::messages::Request &request);
     void execute(const control::Quit &command, const control::Done &done);
     void execute(const control::Freeze &command, const control::Done &done);
     void execute(const control::Snapshot &command, const control::Done &done);
@@ -154,7 +153,7 @@ private:
     Frame *next_waiting(Frame::Stage stage);
     void drop_overtaken(std::uint64_t shown);
 
-    void end_sink(SinkQueue &sink, bool may_quit);
+    void end_sink(SinkQueue &sink);
     void close_sink(SinkQueue &sink);
     void end_without_sinks(); // ends the run if all outputs are closed
     // `was_logged`: the user has already seen the reason.

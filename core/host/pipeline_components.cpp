@@ -261,10 +261,10 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
         std::vector<int> sockets = open_sockets(output, options);
         return Component::Create{{std::move(options), setup}, std::move(sockets)};
     };
-    callbacks.result = [this, sink, name, &output](const Command &command, const Result &result) {
+    callbacks.result = [this, sink, name](const Command &command, const Result &result) {
         sink->on_result(command, result);
         if (result.status == ARHOST_STATUS_END)
-            end_sink(*sink, output.control.contains("quit"));
+            end_sink(*sink);
         if (result.status >= 0 || sink->closed)
             return;
         if (interrupted_ && result.status == ARHOST_STATUS_ERROR_CANCELLED) { // its receiver did not take the frame
@@ -282,10 +282,8 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
         sink->component->stop();
     };
     callbacks.lost = [sink](const std::vector<Command> &) { sink->on_lost(); };
-    callbacks.end_requested = [this, sink, &output] { end_sink(*sink, output.control.contains("quit")); };
-    callbacks.request = [this, sink, &output](const messages::Request &request) {
-        on_request(*sink, output, request);
-    };
+    callbacks.end_requested = [this, sink] { end_sink(*sink); };
+    callbacks.request = [this, sink](const messages::Request &request) { on_request(*sink, request); };
     callbacks.running = [sink] {
         if (!sink->ending)
             sink->answer("");
@@ -346,11 +344,11 @@ void Pipeline::expect_distinct_files(const run_config::ComponentConfiguration &o
 }
 
 // Called when a sink has returned ARHOST_STATUS_END.
-void Pipeline::end_sink(SinkQueue &sink, bool may_quit) {
+void Pipeline::end_sink(SinkQueue &sink) {
     const std::string &name = sink.component->name();
     if (sink.closed || sink.has_quit)
         return;
-    if (may_quit) {
+    if (sink.configuration->control.contains("quit")) {
         sink.has_quit = true;
         context_.log(ARHOST_SEVERITY_INFO, name, "ends the run");
         return end_run();

@@ -32,14 +32,13 @@ template <class Choice> const Choice &find_choice(const std::vector<Choice> &cho
 
 } // namespace
 
-void Pipeline::on_request(SinkQueue &sink, const run_config::ComponentConfiguration &output,
-                          const messages::Request &request) {
+void Pipeline::on_request(SinkQueue &sink, const messages::Request &request) {
     const auto done = [&sink, id = request.id, restarts = sink.component->restarts()](
                           const std::string &error, const nlohmann::ordered_json &members) {
         sink.component->answer({id, control::answer_text(error, members)}, restarts);
     };
     try {
-        const control::Command command = control::parse(request.command, output.control);
+        const control::Command command = control::parse(request.command, sink.configuration->control);
         const bool changes_run = !std::holds_alternative<control::Status>(command);
         if (changes_run && phase_ != Phase::running)
             throw control::Error("the run is starting or ending");
@@ -123,8 +122,9 @@ bool Pipeline::finish_swaps() {
         return true;
     };
     const bool tracker = finish(tracker_, next_tracker_);
+    const std::shared_ptr<LoadedScene> scene = raytracer_ ? raytracer_->scene : nullptr;
     const bool raytracer = finish(raytracer_, next_raytracer_);
-    if (raytracer)
+    if (raytracer && raytracer_->scene != scene)
         recompute_cameras();
     return tracker || raytracer;
 }
@@ -143,14 +143,19 @@ void Pipeline::retire(std::unique_ptr<Stage> stage) {
     retired_.push_back(std::move(stage));
 }
 
-// The scenes of the old and the new ray tracer may have different axes.
+// The previous and the new scene may have different axes.
 void Pipeline::recompute_cameras() {
     if (configuration_.trajectory)
         return;
     last_camera_.reset();
-    for (const auto &[sequence, frame] : frames_)
-        if (frame->stage == Frame::Stage::to_render)
-            set_camera_from_markers(*frame);
+    for (const auto &[sequence, frame] : frames_) {
+        if (frame->stage != Frame::Stage::to_render)
+            continue;
+        frame->record.has_camera = 0;
+        set_camera_from_markers(*frame);
+        if (!frame->record.has_camera) // its camera was that of an earlier frame
+            frame->stage = Frame::Stage::done;
+    }
 }
 
 void Pipeline::remove_ended() {

@@ -19,6 +19,14 @@ namespace {
 constexpr std::size_t max_reads_in_flight = 2;
 constexpr std::uint32_t max_attempts = 2; // per frame and stage, if the worker dies while processing the frame
 
+// Returns the first marker that is not lost, or null. Trackers report markers in the order of the configuration.
+const arhost_marker *anchor_of(const arhost_record &record) {
+    const arhost_marker *const end = record.markers + record.marker_count;
+    const arhost_marker *const anchor =
+        std::find_if(record.markers, end, [](const arhost_marker &m) { return m.state != ARHOST_MARKER_LOST; });
+    return anchor == end ? nullptr : anchor;
+}
+
 const char *name_of_stage(Frame::Stage waiting) {
     return waiting == Frame::Stage::to_track ? "tracker" : "raytracer";
 }
@@ -189,20 +197,16 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
     if (tracker_->configuration->conform)
         check_markers(statistics_.contract_checks, frame.record, intrinsics_, tracker_->configuration->markers);
     frame.times.tracker = std::chrono::nanoseconds(result.busy_ns);
+    statistics_.tracked += anchor_of(frame.record) != nullptr;
     set_camera_from_markers(frame);
     on_camera_known(frame);
 }
 
 void Pipeline::set_camera_from_markers(Frame &frame) {
-    // Uses the first marker that is not lost. Trackers report markers in the order of the configuration.
-    const std::span markers(frame.record.markers, frame.record.marker_count);
-    const auto anchor = std::find_if(markers.begin(), markers.end(),
-                                     [](const arhost_marker &m) { return m.state != ARHOST_MARKER_LOST; });
-    statistics_.tracked += anchor != markers.end();
     if (configuration_.trajectory)
         return;
     const std::uint64_t sequence = frame.record.sequence;
-    if (anchor != markers.end())
+    if (const arhost_marker *anchor = anchor_of(frame.record))
         last_camera_ = {sequence, *camera::camera_from_marker(anchor->mt, coordinates(), intrinsics_)};
     if (!last_camera_ || sequence - last_camera_->first > tracker_->configuration->hold_frames)
         return;

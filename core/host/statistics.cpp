@@ -76,13 +76,14 @@ double StageTimings::recent_rate(const std::string &name, Clock::time_point now)
 }
 
 void EndedComponents::add(const supervise::Component &component) {
-    constexpr std::size_t max_crashes = 20;
     cpu_seconds[component.name()] += component.cpu_seconds();
     restarts[component.name()] += component.restarts();
     for (const supervise::Crash &crash : component.crashes())
         crashes.push_back({component.name(), crash});
-    while (crashes.size() > max_crashes)
-        crashes.pop_front();
+    const auto is_of_component = [&](const Crash &crash) { return crash.component == component.name(); };
+    auto count = std::ranges::count_if(crashes, is_of_component);
+    for (; std::cmp_greater(count, supervise::Crash::max_kept); --count)
+        crashes.erase(std::ranges::find_if(crashes, is_of_component));
 }
 
 double Statistics::fps() const {

@@ -67,7 +67,7 @@ struct EndedComponents {
     };
     std::map<std::string, double> cpu_seconds;     // by the component's name
     std::map<std::string, std::uint32_t> restarts; // by the component's name
-    std::deque<Crash> crashes;                     // the last 20
+    std::deque<Crash> crashes;                     // the last supervise::Crash::max_kept of each component
     void add(const supervise::Component &component);
 };
 

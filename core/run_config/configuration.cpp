@@ -354,15 +354,21 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     if (const auto node = root.find("record"))
         configuration.record = parse_component(*node, "record", shared);
     configuration.files = files_read_by(configuration);
-    for (const ComponentConfiguration &output : configuration.outputs)
-        if (const auto path = path_of(output.node)) {
-            configuration.files.write(*path);
-            const std::filesystem::path &plugin = output.plugins.front();
-            if (configuration.sandbox == sandbox::Mode::none || plugin.parent_path() == built_in_plugins)
-                continue; // no warning for built-in plugins, which are trusted
-            if (const std::string warning = warning_of_output(*path, plugin.stem()); !warning.empty())
-                configuration.warnings.push_back(warning);
-        }
+    const auto register_file = [&](const ComponentConfiguration &output) {
+        const auto path = path_of(output.node);
+        if (!path)
+            return;
+        configuration.files.write(*path);
+        const std::filesystem::path &plugin = output.plugins.front();
+        if (configuration.sandbox == sandbox::Mode::none || plugin.parent_path() == built_in_plugins)
+            return; // no warning for built-in plugins, which are trusted
+        if (const std::string warning = warning_of_output(*path, plugin.stem()); !warning.empty())
+            configuration.warnings.push_back(warning);
+    };
+    std::ranges::for_each(configuration.outputs, register_file);
+    for (const auto *output : {&configuration.snapshot, &configuration.record})
+        if (*output)
+            register_file(**output);
     if (const auto node = root.find("live")) {
         node->allow_keys(keys_of("live"));
         configuration.max_latency =

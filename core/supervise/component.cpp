@@ -321,9 +321,8 @@ bool Component::loses_its_device_often() {
 }
 
 void Component::record_crash(Crash crash) {
-    constexpr std::size_t max_crashes = 20; // limits the statistics and the memory of the host
     crashes_.push_back(std::move(crash));
-    if (crashes_.size() > max_crashes)
+    if (crashes_.size() > Crash::max_kept)
         crashes_.pop_front();
 }
 

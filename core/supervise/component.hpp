@@ -27,6 +27,8 @@ struct Crash {
     std::string how, log_tail;
     std::uint64_t frame; // the frame that was being processed, or no_frame
     static constexpr std::uint64_t no_frame = ~std::uint64_t(0);
+    // Number of crashes kept per component; limits the statistics and the memory of the host.
+    static constexpr std::size_t max_kept = 20;
 };
 
 //   idle ─start─▶ starting ─ready, memory attached─▶ running ─stop, nothing in flight─▶ stopped
@@ -111,7 +113,7 @@ public:
     // Logs a line for which the worker is responsible (WorkerBudget::log).
     void log(arhost_severity severity, const std::string &text) { budget_.log(severity, text); }
     double cpu_seconds() const { return cpu_seconds_of_dead_ + (process_ ? process_->cpu_seconds() : 0); }
-    const std::deque<Crash> &crashes() const { return crashes_; } // the last 20
+    const std::deque<Crash> &crashes() const { return crashes_; } // the last Crash::max_kept
 
 private:
     void spawn();

@@ -221,7 +221,9 @@ TEST(Control, ReplacesTrackerAndRayTracerWithoutLosingAFrame) {
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     EXPECT_EQ(run.quit(), 0) << run.output();
     expect_all_frames_with_their_overlays(run);
-    EXPECT_EQ(run.stats()["restarts"]["tracker"], 0);
+    const Json stats = run.stats();
+    EXPECT_EQ(stats["restarts"]["tracker"], 0);
+    EXPECT_EQ(stats["frames"]["tracked"], stats["frames"]["composited"]) << "no frame may count twice";
 }
 
 TEST(Control, ReplacesComponentsInModeLiveWithTheirFramesOverlays) {
@@ -499,9 +501,24 @@ INSTANTIATE_TEST_SUITE_P(
                   "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
                   "raytracer: {plugin: rt_counter, scene: scene.yaml}\nscenes: [missing.yaml]\n",
                   "run.yaml:5:10: scenes[0]: there is no scene file"},
+        BadChoice{"RecordingOverAnInput", "record: {plugin: sink_poses, path: run.yaml}\n",
+                  "run.yaml:3:36: record.path: 'run.yaml' is a file that this run reads; choose another path"},
         BadChoice{"BadAddress", "outputs: [{plugin: sink_control, allow: [listen], options: {listen: 'a b'}}]\n",
                   "outputs[0].options.listen: must be a name, the absolute path of a Unix socket, or ADDRESS:PORT"}),
     [](const auto &info) { return info.param.name; });
+
+TEST(Control, CheckCoversAlternativesAndOutputsOfCommands) {
+    const std::string base = "version: 1\nsource: {plugin: source_counter}\n"
+                             "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n";
+    for (const auto &[yaml, message] :
+         {std::pair<std::string, const char *>{"alternatives: {tracker: [{name: a, plugin: rt_counter}]}\n",
+                                               "'rt_counter' is a raytracer, not a tracker"},
+          {"record: {plugin: sink_null, options: {nothing: 1}}\n", "record.options.nothing: unknown key"}}) {
+        ArhostRun run(base + yaml);
+        EXPECT_EQ(run.run({"check", "run.yaml"}), 2);
+        EXPECT_THAT(run.messages(), HasSubstr(message));
+    }
+}
 
 TEST(Ctl, SendsCommandsAndPrintsTheirAnswers) {
     ControlledRun run(controlled("live"));
