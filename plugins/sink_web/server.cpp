@@ -19,7 +19,8 @@ constexpr std::size_t max_viewers = 48;
 constexpr std::size_t connection_memory = 16384, stream_block = 65536; // bytes
 constexpr unsigned inactivity_s = 30;
 constexpr auto request_time = std::chrono::seconds(10), response_time = std::chrono::seconds(60),
-               frame_time = std::chrono::seconds(30); // a viewer that needs longer for a frame is disconnected
+               frame_time = std::chrono::seconds(30);      // a viewer that needs longer for a frame is disconnected
+constexpr auto last_answer_time = std::chrono::seconds(1); // for sending the last answers when the run ends
 // After this time without a new frame, viewers receive the last one again, which shows whether they are still there.
 constexpr auto repeat_time = std::chrono::seconds(1);
 constexpr std::string_view boundary = "arhostframe";
@@ -48,7 +49,8 @@ struct Server::Request {
     std::string method, path;
     std::string body{};
     bool has_begun = false, is_too_large = false;
-    std::string answer{}; // of the host, guarded by mutex_
+    bool was_suspended = false; // guarded by mutex_
+    std::string answer{};       // of the host, guarded by mutex_
 };
 
 struct Server::Viewer {
@@ -97,8 +99,12 @@ struct Server::Callbacks {
 
     static void complete(void *self, MHD_Connection *connection, void **context,
                          MHD_RequestTerminationCode) noexcept {
-        delete static_cast<SharedRequest *>(std::exchange(*context, nullptr));
-        static_cast<Server *>(self)->limit_time(connection, request_time); // for the next request
+        auto &server = *static_cast<Server *>(self);
+        const std::unique_ptr<SharedRequest> request(static_cast<SharedRequest *>(std::exchange(*context, nullptr)));
+        server.limit_time(connection, request_time); // for the next request
+        const std::lock_guard lock(server.mutex_);
+        if (request && (*request)->was_suspended && --server.unsent_answers_ == 0)
+            server.all_sent_.notify_all();
     }
 
     static void notify(void *self, MHD_Connection *connection, void **,
@@ -145,7 +151,7 @@ Server::Server(Settings settings, Frames &frames, HostControl &control)
 Server::~Server() {
     MHD_quiesce_daemon(daemon_); // the listening socket stays open for the next worker
     {
-        const std::lock_guard lock(mutex_);
+        std::unique_lock lock(mutex_);
         is_stopping_ = true;
         for (Viewer *viewer : viewers_)
             if (std::exchange(viewer->is_waiting, false))
@@ -154,6 +160,8 @@ Server::~Server() {
             const SharedRequest request = *suspended_.begin();
             resume(request);
         }
+        // The answer to `quit` may have arrived just now.
+        all_sent_.wait_for(lock, last_answer_time, [this] { return unsent_answers_ == 0; });
     }
     MHD_stop_daemon(daemon_);
 }
@@ -263,6 +271,8 @@ bool Server::suspend_until_answer(const SharedRequest &request) {
         const std::lock_guard lock(mutex_);
         if (request->answer.empty() && !is_stopping_) {
             suspended_.insert(request);
+            request->was_suspended = true;
+            ++unsent_answers_;
             MHD_suspend_connection(request->connection);
             return true;
         }

@@ -3,6 +3,7 @@
 
 #include "frames.hpp"
 
+#include <condition_variable>
 #include <map>
 #include <set>
 #include <span>
@@ -72,6 +73,8 @@ private:
     std::map<MHD_Connection *, Connection> connections_;
     std::set<Viewer *> viewers_;
     std::set<SharedRequest> suspended_, waiting_for_status_;
+    std::size_t unsent_answers_ = 0; // to requests that were suspended
+    std::condition_variable all_sent_;
 };
 
 } // namespace arhost::web
