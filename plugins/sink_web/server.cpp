@@ -216,7 +216,7 @@ bool Server::process(const SharedRequest &request) {
         const std::lock_guard lock(mutex_);
         if (const auto found = connections_.find(request->connection); found != connections_.end())
             found->second.deadline = Clock::time_point::max();
-        if (is_stopping_)
+        if (is_stopping_ && request->answer.empty())
             request->answer = error_text("the run is ending");
     }
     const std::string &path = request->path;
