@@ -288,6 +288,11 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     if (problem)
         console.log(is_accepted || stopped_by_signal ? ARHOST_SEVERITY_WARNING : ARHOST_SEVERITY_ERROR,
                     problem->component, problem->text);
+    if (configuration.mode == run_config::Mode::live && statistics.composited > 0)
+        console.log(ARHOST_SEVERITY_INFO, "arhost",
+                    fmt::format("{} frames, {:.1f} fps, latency from {}, {}", statistics.composited, statistics.fps(),
+                                statistics.latency_from_capture ? "capture" : "arrival",
+                                percentiles_text(statistics.stages.all(), statistics.latencies.all())));
     log_contract_checks(statistics.contract_checks, console);
     bool written = true;
     if (configuration.stats && statistics.frames_in > 0)

@@ -77,9 +77,8 @@ void Console::show(const Progress &progress, const Statistics &statistics) {
         line += fmt::format("  {:.1f} fps  finishing the outputs", statistics.fps());
     else
         line += fmt::format("  {:.1f} fps", fps);
-    for (const char *stage : {"source", "tracker", "raytracer", "composite"})
-        if (const auto timing = statistics.stages.all().find(stage); timing != statistics.stages.all().end())
-            line += fmt::format("  {} {:.1f} ms", stage, timing->second.percentile_ms(0.5));
+    line += "  " + (progress.finishing ? percentiles_text(statistics.stages.all(), statistics.latencies.all())
+                                       : percentiles_text(statistics.stages.recent(), statistics.latencies.recent()));
     if (terminal_) {
         winsize size{};
         if (::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 && line.size() >= size.ws_col)

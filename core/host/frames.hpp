@@ -43,6 +43,7 @@ struct Frame {
     arhost_render_info render{};
     arhost_record record{};
     std::optional<std::size_t> pixels_sample, overlay_sample; // hashes for the contract checks
+    Clock::time_point captured; // arrival, unless the source reports capture times of CLOCK_MONOTONIC
     Clock::time_point received;
     FrameTimes times; // `shown` and `latency` are not set here
 
@@ -58,6 +59,7 @@ inline std::int64_t monotonic_ns() {
 struct OutputFrame {
     std::uint64_t sequence;
     Lease slot;
+    Frame::Clock::time_point captured; // as in Frame
 };
 using OutputFramePointer = std::shared_ptr<const OutputFrame>;
 

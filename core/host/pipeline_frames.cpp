@@ -69,6 +69,7 @@ bool Pipeline::read_from_trajectory() {
     frame->record.clock = trajectory.clock.value_or(ARHOST_CLOCK_MEDIA);
     frame->record.capture_ns = recorded->capture_ns;
     frame->pixels = std::move(*slot);
+    frame->captured = Clock::now();
     next_read_ = recorded->frame + 1;
     start_frame(std::move(frame));
     return true;
@@ -105,6 +106,9 @@ void Pipeline::on_read(const Command &command, const Result &result) {
         source_checks_->check(statistics_.contract_checks, frame->record, result.frame.skipped, arrival_ns);
         frame->pixels_sample = sample_hash(frame->pixels.bytes(), frame->record.sequence);
     }
+    statistics_.latency_from_capture = frame->record.clock == ARHOST_CLOCK_MONOTONIC;
+    frame->captured = Clock::time_point(std::chrono::nanoseconds(
+        statistics_.latency_from_capture ? std::min(frame->record.capture_ns, arrival_ns) : arrival_ns));
     frame->times.source = std::chrono::nanoseconds(result.busy_ns);
     skipped_ += result.frame.skipped;
     statistics_.dropped["source"] = skipped_;
@@ -380,7 +384,8 @@ bool Pipeline::compose() {
             return false; // no free slot: waits for the outputs, and the source has to wait, too
         is_shown = slot.has_value();
         if (slot) {
-            auto output = std::make_shared<OutputFrame>(OutputFrame{ready->first, std::move(*slot)});
+            auto output =
+                std::make_shared<OutputFrame>(OutputFrame{ready->first, std::move(*slot), ready->second->captured});
             compose(*ready->second, output->slot.bytes());
             if (configuration_.snapshot)
                 last_output_ = output;
@@ -398,7 +403,7 @@ bool Pipeline::compose() {
     statistics_.composited += is_shown;
     statistics_.augmented += is_shown && ready->second->record.overlay != ARHOST_OVERLAY_NONE;
     statistics_.last_frame = Clock::now();
-    const Clock::duration latency = statistics_.last_frame - ready->second->received;
+    const Clock::duration latency = statistics_.last_frame - ready->second->captured;
     statistics_.stages.add("latency", latency);
     if (configuration_.timeline && is_shown) {
         FrameTimes &times = statistics_.timeline.emplace_back(ready->second->times);

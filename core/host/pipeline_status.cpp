@@ -144,6 +144,7 @@ Json Pipeline::status() const {
               {"dropped", statistics_.dropped},
               {"passed_unaugmented", statistics_.skipped}}},
             {"stages", std::move(stages)},
+            {"latency", latency_json(statistics_, statistics_.latencies.recent())},
             {"targets", std::move(targets)},
             {"components", std::move(components)},
             {"scene", raytracer_ ? Json(raytracer_->scene->name) : Json(nullptr)},

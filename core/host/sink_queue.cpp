@@ -3,11 +3,22 @@
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <utility>
 
 namespace arhost::host {
 
 using namespace ipc;
+
+namespace {
+
+std::chrono::nanoseconds latency_of(const OutputFrame &frame, const Result &result) {
+    const std::int64_t captured_ns = std::chrono::nanoseconds(frame.captured.time_since_epoch()).count();
+    // The worker may report any number.
+    return std::chrono::nanoseconds(std::clamp(result.ended_ns, captured_ns, monotonic_ns()) - captured_ns);
+}
+
+} // namespace
 
 void SinkQueue::offer(OutputFramePointer frame) {
     if (closed || ending)
@@ -35,8 +46,12 @@ void SinkQueue::pump() {
 void SinkQueue::on_result(const Command &command, const Result &result) {
     if (result.status > 0)
         next_sequence_ = command.sequence + 1;
-    if (!unconfirmed_.empty())
+    if (!unconfirmed_.empty()) {
+        // A snapshot writes a frame that was composited long ago.
+        if (result.status >= 0 && !on_demand)
+            statistics_.latencies.add(component->name(), latency_of(*unconfirmed_.front(), result));
         unconfirmed_.pop_front();
+    }
     statistics_.stages.add(component->name(), std::chrono::nanoseconds(result.busy_ns));
 }
 

@@ -51,6 +51,12 @@ Json Timing::to_json() const {
             {"max_ms", max_ms()}};
 }
 
+std::string Timing::to_text() const {
+    char text[64];
+    std::snprintf(text, sizeof text, "%.1f/%.1f/%.1f", percentile_ms(0.50), percentile_ms(0.95), percentile_ms(0.99));
+    return text;
+}
+
 void StageTimings::add(const std::string &name, std::chrono::nanoseconds time, Clock::time_point now) {
     if (now - window_begin_ > std::chrono::seconds(5)) {
         previous_window_ = std::exchange(window_, {});
@@ -91,6 +97,27 @@ double Statistics::fps() const {
     return composited > 1 && seconds > 0 ? static_cast<double>(composited - 1) / seconds : 0;
 }
 
+std::string percentiles_text(const StageTimings::ByName &stages, const StageTimings::ByName &latencies) {
+    std::string text = "ms p50/p95/p99:";
+    const auto add = [&](const StageTimings::ByName &timings, const char *name) {
+        if (const auto timing = timings.find(name); timing != timings.end())
+            text += std::string("  ") + name + " " + timing->second.to_text();
+    };
+    add(stages, "latency");
+    for (const auto &[output, timing] : latencies)
+        text += "  to " + output + " " + timing.to_text();
+    for (const char *stage : {"source", "tracker", "raytracer", "composite"})
+        add(stages, stage);
+    return text;
+}
+
+Json latency_json(const Statistics &statistics, const StageTimings::ByName &latencies) {
+    Json outputs = Json::object();
+    for (const auto &[output, timing] : latencies)
+        outputs[output] = timing.to_json();
+    return {{"from", statistics.latency_from_capture ? "capture" : "arrival"}, {"outputs", std::move(outputs)}};
+}
+
 std::string timeline_csv(const Statistics &statistics) {
     std::string text = "frame,shown_s,source_ms,tracker_ms,raytracer_ms,device_ms,composite_ms,latency_ms\n";
     for (const FrameTimes &times : statistics.timeline) {
@@ -118,6 +145,7 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
                  {"fps", statistics.fps()}};
     for (const auto &[name, timing] : statistics.stages.all())
         json["stages"][name] = timing.to_json();
+    json["latency"] = latency_json(statistics, statistics.latencies.all());
     for (const auto &[name, check] : statistics.contract_checks.all()) {
         Json &entry = json["conformance"][name] = {{"checked", check.checked}, {"violations", check.violations}};
         if (check.violations > 0)

@@ -27,6 +27,7 @@ public:
     double percentile_ms(double share) const; // nearest-rank percentile, accurate to 0.5 %; 0 without samples
     double max_ms() const { return 1e-6 * static_cast<double>(max_ns_); }
     nlohmann::ordered_json to_json() const; // count, p50, p95, p99, max in ms
+    std::string to_text() const;            // p50/p95/p99 in ms
 
 private:
     std::vector<std::uint64_t> buckets_;
@@ -80,6 +81,10 @@ struct Statistics {
     std::map<std::string, std::uint64_t> dropped; // number of dropped frames by stage
     std::map<std::string, std::uint64_t> skipped; // number of unaugmented frames by the failed stage
     StageTimings stages;
+    // From the capture of a frame until an output has written it, by output; `latency` of `stages` ends when the
+    // frame is composited. Both begin at the arrival of the frame if the source does not know when it was captured.
+    StageTimings latencies;
+    bool latency_from_capture = false;
     EndedComponents ended;
     std::chrono::steady_clock::time_point first_frame{}, last_frame{};
     ContractChecks contract_checks;   // checks of the components with `conform: true`
@@ -87,6 +92,12 @@ struct Statistics {
 
     double fps() const;
 };
+
+// Returns the percentiles as one line: of the latencies, then of the stages.
+std::string percentiles_text(const StageTimings::ByName &stages, const StageTimings::ByName &latencies);
+
+// Returns the member `latency` of the statistics and of the status document.
+nlohmann::ordered_json latency_json(const Statistics &statistics, const StageTimings::ByName &latencies);
 
 // Returns CSV with a header and one line per frame:
 // frame,shown_s,source_ms,tracker_ms,raytracer_ms,device_ms,composite_ms,latency_ms. shown_s counts from the arrival

@@ -43,6 +43,7 @@ struct Result {
     arhost_status status;
     std::uint32_t reserved;
     std::int64_t busy_ns;      // time spent in the plugin function
+    std::int64_t ended_ns;     // when the plugin function returned, CLOCK_MONOTONIC
     arhost_frame_info frame;   // set only by CommandKind::read
     arhost_render_info render; // set only by CommandKind::render
 };

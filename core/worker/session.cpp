@@ -166,7 +166,9 @@ private:
             Link::InCall call(link_, Call::per_frame);
             result.status = service_->execute(command, memory_, result);
         }
-        result.busy_ns = (std::chrono::steady_clock::now() - begin).count();
+        const auto end = std::chrono::steady_clock::now();
+        result.busy_ns = (end - begin).count();
+        result.ended_ns = std::chrono::nanoseconds(end.time_since_epoch()).count();
         link_.send_result(result);
     }
 

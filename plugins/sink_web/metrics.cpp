@@ -12,6 +12,9 @@ namespace {
 using Json = nlohmann::json;
 using Labels = std::initializer_list<std::pair<const char *, std::string>>;
 
+constexpr std::pair<const char *, const char *> percentiles[] = {
+    {"0.5", "p50_ms"}, {"0.95", "p95_ms"}, {"0.99", "p99_ms"}};
+
 class Text {
 public:
     void begin(const std::string &name, const char *type, const char *help) {
@@ -58,8 +61,14 @@ void add_status(Text &text, const Json &status) {
         text.add(count, {{"cause", cause}});
     text.begin("arhost_stage_milliseconds", "gauge", "Recent percentiles of the time of each stage.");
     for (const auto &[stage, timing] : stages.items())
-        for (const auto &[quantile, key] : {std::pair{"0.5", "p50_ms"}, {"0.95", "p95_ms"}, {"0.99", "p99_ms"}})
+        for (const auto &[quantile, key] : percentiles)
             text.add(timing.value(key, Json()), {{"stage", stage}, {"quantile", quantile}});
+    text.begin("arhost_latency_milliseconds", "gauge",
+               "Recent percentiles of the time from the capture of a frame until an output has written it.");
+    const Json outputs = status.value("latency", Json::object()).value("outputs", Json::object());
+    for (const auto &[output, timing] : outputs.items())
+        for (const auto &[quantile, key] : percentiles)
+            text.add(timing.value(key, Json()), {{"output", output}, {"quantile", quantile}});
     const Json components = status.value("components", Json::array());
     text.begin("arhost_component_running", "gauge", "1 while the component runs.");
     for (const Json &each : components)

@@ -1,11 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controls.hpp"
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 namespace sink_window {
 
 using Json = nlohmann::json;
+
+namespace {
+
+std::string percentiles_of(const Json &timing) {
+    return fmt::format("{:.1f}/{:.1f}/{:.1f} ms", timing.at("p50_ms").get<double>(),
+                       timing.at("p95_ms").get<double>(), timing.at("p99_ms").get<double>());
+}
+
+} // namespace
 
 void Controls::send(const Json &command, Take take) {
     if (!control_)
@@ -80,8 +90,13 @@ void Controls::take_status(const Json &status) {
     scene_ = status.at("scene").is_string() ? status.at("scene").get<std::string>() : "";
     Numbers numbers;
     numbers.fps = status.at("fps").get<double>();
-    if (status.at("stages").contains("latency"))
-        numbers.latency_ms = status.at("stages").at("latency").at("p50_ms").get<double>();
+    const Json &stages = status.at("stages"), &outputs = status.at("latency").at("outputs");
+    for (const auto &[name, timing] : stages.items())
+        numbers.timings.emplace_back(name, percentiles_of(timing));
+    for (const auto &[name, timing] : outputs.items())
+        numbers.timings.emplace_back("to " + name, percentiles_of(timing));
+    if (stages.contains("latency"))
+        numbers.latency = percentiles_of(stages.at("latency"));
     for (const Json &target : status.at("targets"))
         numbers.targets += target.at("state") != "lost";
     for (const Json &component : status.at("components"))

@@ -25,7 +25,10 @@ public:
     // From the host's status document.
     struct Numbers {
         double fps = 0;
-        std::optional<double> latency_ms; // median
+        // Percentiles p50/p95/p99 of the latency from the capture of a frame until it is composited ("": not known),
+        // and of each stage and output, with its name.
+        std::string latency;
+        std::vector<std::pair<std::string, std::string>> timings;
         int targets = 0, restarts = 0;
     };
 

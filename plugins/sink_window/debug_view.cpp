@@ -58,7 +58,7 @@ void draw_marker(const Overlay &overlay, const View &view, const arhost_marker &
 } // namespace
 
 double draw_debug_view(const Overlay &overlay, const View &view, const arhost_record &record, const Lens *lens,
-                       double focal_length_px) {
+                       double focal_length_px, const Timings &timings) {
     std::vector<Row> rows = {
         {"frame", fmt::format("{}   {:.3f} s   {}", record.sequence, static_cast<double>(record.capture_ns) * 1e-9,
                               record.overlay == ARHOST_OVERLAY_RENDERED ? "overlay rendered"
@@ -75,6 +75,8 @@ double draw_debug_view(const Overlay &overlay, const View &view, const arhost_re
                                                     marker.state == ARHOST_MARKER_PREDICTED ? "predicted   " : "",
                                                     distance_of(marker), marker.reprojection_px, marker.ambiguity)});
     }
+    for (const auto &[name, percentiles] : timings)
+        rows.push_back({name, percentiles});
     return overlay.box(rows, 0, 0);
 }
 

@@ -8,11 +8,17 @@
 #include <arhost/shading/lens.hpp>
 #include <arhost/sink.h>
 
+#include <string>
+#include <utility>
+#include <vector>
+
 namespace sink_window {
 
+using Timings = std::vector<std::pair<std::string, std::string>>; // name of a stage or output, percentiles
+
 // Draws the outlines, the ids and, if the lens is known, the axes of the markers (x red, y green, z blue), and their
-// numbers in a box at the top. Returns the height of the box in px.
+// numbers and the times of the stages in a box at the top. Returns the height of the box in px.
 double draw_debug_view(const Overlay &overlay, const View &view, const arhost_record &record,
-                       const arhost::shading::Lens *lens, double focal_length_px);
+                       const arhost::shading::Lens *lens, double focal_length_px, const Timings &timings);
 
 } // namespace sink_window

@@ -153,7 +153,8 @@ private:
     void draw_overlay(const Overlay &overlay, const View &view) {
         double top = 0;
         if (debug_ && record_)
-            top = draw_debug_view(overlay, view, *record_, lens_ ? &*lens_ : nullptr, focal_length_px_);
+            top = draw_debug_view(overlay, view, *record_, lens_ ? &*lens_ : nullptr, focal_length_px_,
+                                  controls_.numbers() ? controls_.numbers()->timings : Timings());
         std::vector<Row> states;
         if (controls_.recording())
             states.push_back({"", "REC", red});
@@ -173,8 +174,10 @@ private:
     std::string status() const {
         const auto &numbers = controls_.numbers();
         std::string text = fmt::format("{:.1f} fps", numbers ? numbers->fps : rate_.per_second());
-        if (const auto &latency = numbers ? numbers->latency_ms : latency_ms_)
-            text += fmt::format("   {:.0f} ms", *latency);
+        if (numbers && !numbers->latency.empty())
+            text += "   " + numbers->latency;
+        else if (latency_ms_)
+            text += fmt::format("   {:.0f} ms", *latency_ms_);
         const auto markers = std::span(record_->markers, record_->marker_count);
         text += "   " + count_of(numbers ? numbers->targets
                                          : static_cast<int>(std::ranges::count_if(markers,

@@ -167,6 +167,7 @@ TEST(Control, StatusDescribesTheRun) {
     EXPECT_THAT(status["scenes"], ElementsAre("scene", "other"));
     EXPECT_GT(status["fps"], 0);
     EXPECT_GT(status["stages"]["latency"]["count"], 0);
+    EXPECT_EQ(status["latency"]["from"], "arrival");
     EXPECT_EQ(status["targets"][0]["id"], 3);
     const Json tracker = run.status_of("tracker");
     EXPECT_EQ(tracker["plugin"], "tracker_counter");

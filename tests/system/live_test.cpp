@@ -179,3 +179,29 @@ TEST(Live, ARestartedSourceDoesNotRepeatSkippedFrames) {
     for (const auto &[promise, entry] : stats["conformance"].items())
         EXPECT_EQ(entry["violations"], 0) << promise;
 }
+
+TEST(Live, LatencyCountsFromTheCapture) {
+    // The frames arrive 200 ms after their capture.
+    ArhostRun run(counting("live", "frames: 30, ahead_ms: -200", "", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    const auto stats = run.stats();
+    EXPECT_EQ(stats["latency"]["from"], "capture");
+    const auto composited = stats["stages"]["latency"], written = stats["latency"]["outputs"]["sink_counter"];
+    EXPECT_EQ(composited["count"], stats["frames"]["composited"]);
+    EXPECT_EQ(written["count"], stats["frames"]["composited"]);
+    EXPECT_GE(composited["p50_ms"], 199) << stats.dump(1); // percentiles are accurate to 0.5 %
+    for (const char *percentile : {"p50_ms", "p95_ms", "p99_ms", "max_ms"})
+        EXPECT_GE(written[percentile], composited[percentile]) << percentile;
+    EXPECT_THAT(run.output(), HasSubstr("fps, latency from capture, ms p50/p95/p99:  latency 2"));
+}
+
+TEST(Live, LatencyCountsFromTheArrivalOfAFilm) {
+    // Media times are shortly after 0: counted from them, the latency would be the age of this machine's clock.
+    ArhostRun run(counting("live", "frames: 30", "", ""));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    const auto stats = run.stats();
+    EXPECT_EQ(stats["latency"]["from"], "arrival");
+    EXPECT_LT(stats["stages"]["latency"]["max_ms"], 30'000) << stats.dump(1);
+}

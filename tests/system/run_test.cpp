@@ -356,8 +356,9 @@ TEST(Run, RedrawsProgressOnATerminal) {
     ::close(terminal);
     EXPECT_EQ(run.wait(), 0);
     EXPECT_THAT(shown, HasSubstr("\r\033[Kframe ")); // the line must overwrite the previous one
-    EXPECT_THAT(shown, testing::ContainsRegex("frame 60/60  [0-9.]+ fps  finishing the outputs  source [0-9.]+ ms  "
-                                              "tracker [0-9.]+ ms  raytracer [0-9.]+ ms  composite [0-9.]+ ms"));
+    EXPECT_THAT(shown, testing::ContainsRegex("frame 60/60  [0-9.]+ fps  finishing the outputs  ms p50/p95/p99:  "
+                                              "latency [0-9./]+  to sink_counter [0-9./]+  source [0-9./]+  "
+                                              "tracker [0-9./]+  raytracer [0-9./]+  composite [0-9./]+"));
     EXPECT_TRUE(shown.ends_with("\r\033[K")) << "the line must be cleared";
     EXPECT_EQ(shown.find('\n'), std::string::npos) << shown;
 }

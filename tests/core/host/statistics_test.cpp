@@ -103,3 +103,14 @@ TEST(Timing, AddsAnotherTiming) {
     EXPECT_NEAR(sum.percentile_ms(0.5), 1, 0.01);
     EXPECT_EQ(sum.max_ms(), 9);
 }
+
+TEST(Percentiles, AreOneLineOfLatenciesThenStages) {
+    using namespace std::chrono_literals;
+    StageTimings stages, latencies;
+    stages.add("tracker", 2ms);
+    stages.add("latency", 12ms);
+    stages.add("sink_window", 1ms);
+    latencies.add("sink_window", 20ms);
+    EXPECT_EQ(percentiles_text(stages.all(), latencies.all()),
+              "ms p50/p95/p99:  latency 12.0/12.0/12.0  to sink_window 20.0/20.0/20.0  tracker 2.0/2.0/2.0");
+}

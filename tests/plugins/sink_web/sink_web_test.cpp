@@ -128,6 +128,7 @@ TEST(SinkWeb, GivesTheStatusAndTheGrantedCommands) {
     EXPECT_THAT(metrics.body,
                 AllOf(HasSubstr("arhost_component_running{component=\"tracker\",plugin=\"tracker_aruco\"} 1\n"),
                       HasSubstr("arhost_stage_milliseconds{stage=\"latency\",quantile=\"0.5\"} "),
+                      HasSubstr("arhost_latency_milliseconds{output=\"sink_web\",quantile=\"0.99\"} "),
                       HasSubstr("arhost_web_viewers 0\n")));
     EXPECT_EQ(run.quit(), 0) << run.output();
 }

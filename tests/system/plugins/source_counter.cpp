@@ -73,7 +73,7 @@ public:
         last_ = buffer.plane[0];
         info.clock = ARHOST_CLOCK_MEDIA;
         info.capture_ns = static_cast<std::int64_t>(1e9 * static_cast<double>(buffer.sequence) / fps_);
-        if (ahead_ms_ > 0) {
+        if (ahead_ms_ != 0) {
             const bool now =
                 ahead_at_ < 0 || (first_ == 0 && buffer.sequence == static_cast<std::uint64_t>(ahead_at_));
             info.clock = ARHOST_CLOCK_MONOTONIC;
@@ -103,7 +103,7 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_INTEGER, "height", "48", "Height, in px", 1, 4096),
     option(ARHOST_OPTION_BOOL, "writes_later", "false", "Also writes to the previous frame"),
     option(ARHOST_OPTION_REAL, "ahead_ms", "0",
-           "Reports capture times this far in the future, in ms; 0: media times"),
+           "Reports capture times this far in the future, or in the past if negative, in ms; 0: media times"),
     option(ARHOST_OPTION_INTEGER, "ahead_at", "-1",
            "Applies ahead_ms only to this frame, and not after a restart; -1: always"),
     option(ARHOST_OPTION_INTEGER, "hold_at", "-1", "Hangs at this frame, but not after a restart; -1: never"),
