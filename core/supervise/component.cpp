@@ -56,6 +56,7 @@ void Component::spawn() {
     stop_response_.reset();
     configuration_error_.clear();
     failure_.clear();
+    has_lost_device_ = false;
     description_ = {};
     Process::Callbacks callbacks;
     callbacks.message = [this](Message &message) { on_message(message); };
@@ -137,6 +138,7 @@ void Component::on_message(Message &message) {
         on_attached(parse<messages::Attached>(message));
     } else if (is<messages::Failed>(message)) {
         const auto [status, text] = parse<messages::Failed>(message);
+        has_lost_device_ = has_lost_device_ || status == ARHOST_STATUS_ERROR_DEVICE_LOST;
         if (state_ != State::starting)
             log(ARHOST_SEVERITY_WARNING, text);
         else if (status == ARHOST_STATUS_ERROR_CONFIGURATION || status == ARHOST_STATUS_ERROR_UNSUPPORTED)
@@ -208,6 +210,8 @@ void Component::run() {
     deadline_.cancel();
     total_deadline_.cancel();
     state_ = State::running;
+    if (!std::exchange(missing_device_, "").empty())
+        log(ARHOST_SEVERITY_INFO, "its device is back");
     callbacks_.running();
     if (stop_requested_)
         stop_when_idle();
@@ -242,8 +246,10 @@ void Component::on_result(const Result &result) {
         return process_->end("protocol violation: unexpected response");
     if (!is_valid_status(description_.kind, result.status))
         return process_->end("contract violation: its status is " + std::to_string(result.status));
-    if (result.status == ARHOST_STATUS_ERROR_DEVICE_LOST)
+    if (result.status == ARHOST_STATUS_ERROR_DEVICE_LOST) {
+        has_lost_device_ = true;
         device_losses_.push_back(Reactor::Clock::now());
+    }
     if (needs_new_process(description_.kind, result.status))
         return process_->end(status_text(result.status)); // the command counts as unanswered, as after a crash
     const Command command = in_flight_.front();
@@ -308,6 +314,8 @@ void Component::on_died(const Death &death) {
         return fall_back_or_disable(reason + "; its device was lost " + std::to_string(device_losses_.size()) +
                                         " times within a minute",
                                     false);
+    if (has_lost_device_ && may_wait_for_device())
+        return wait_for_device(reason);
     restart(reason);
 }
 
@@ -334,7 +342,27 @@ void Component::restart(const std::string &reason) {
     const std::string wait = delay->count() ? " in " + std::to_string(delay->count()) + " ms" : "";
     budget_.log_death(reason + "; restarting it" + wait);
     ++restarts_;
-    restart_timer_ = context_.reactor.at(Reactor::Clock::now() + *delay, [this] { spawn(); });
+    spawn_after(*delay);
+}
+
+void Component::spawn_after(std::chrono::milliseconds delay) {
+    restart_timer_ = context_.reactor.at(Reactor::Clock::now() + delay, [this] { spawn(); });
+}
+
+// A camera that has worked may come back after any time. Sources have no fallback.
+bool Component::may_wait_for_device() const {
+    return description_.kind == ARHOST_KIND_SOURCE && description_.capabilities & ARHOST_CAPABILITY_LIVE &&
+           restart_policy_.has_completed_frames();
+}
+
+// Restarts the process until it finds its device: a worker's sandbox has no devices that were connected later. Counts
+// and reports one restart, however long this takes.
+void Component::wait_for_device(const std::string &reason) {
+    restarts_ += missing_device_.empty();
+    if (missing_device_ != reason)
+        budget_.log_death(reason + "; waiting for its device");
+    missing_device_ = reason;
+    spawn_after(restart_policy_.delay_while_device_is_lost(std::uniform_real_distribution<double>(0, 1)(jitter_)));
 }
 
 void Component::fall_back_or_disable(const std::string &reason, bool is_configuration_error) {
@@ -344,7 +372,7 @@ void Component::fall_back_or_disable(const std::string &reason, bool is_configur
         device_losses_.clear();
         restart_policy_ = RestartPolicy(limits_.restart);
         ++restarts_;
-        restart_timer_ = context_.reactor.at(Reactor::Clock::now(), [this] { spawn(); });
+        spawn_after(std::chrono::milliseconds(0));
         return;
     }
     state_ = State::disabled;

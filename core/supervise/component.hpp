@@ -81,6 +81,8 @@ public:
     // Whether a live source or a sink has reported progress in the current call: it waits for its camera, or for
     // another program that does not take the frame.
     bool waits() const { return waits_; }
+    // Why a live source has no camera at present; "" if it has one.
+    const std::string &missing_device() const { return missing_device_; }
     // Terminates the process, which is then restarted.
     void end_process(const std::string &reason);
 
@@ -128,6 +130,9 @@ private:
     bool loses_its_device_often();
     void record_crash(Crash crash);
     void restart(const std::string &reason);
+    bool may_wait_for_device() const;
+    void wait_for_device(const std::string &reason);
+    void spawn_after(std::chrono::milliseconds delay);
     void fall_back_or_disable(const std::string &reason, bool is_configuration_error);
     void stopped(arhost_status status, const std::string &text);
     void set_progress_deadline(std::chrono::milliseconds limit, const char *what);
@@ -150,6 +155,8 @@ private:
     enum class Handshake { opening, creating, done }; // waits for Hello; waits for Ready; has received both
     Handshake handshake_ = Handshake::opening;
     bool stop_requested_ = false, stop_sent_ = false, waits_ = false, call_cancelled_ = false;
+    bool has_lost_device_ = false; // the process has reported it
+    std::string missing_device_;
     std::optional<ipc::messages::Stopped> stop_response_;
     std::string configuration_error_, failure_; // text of Failed, or of an exception of `hello` or `ready`
     ipc::PluginDescription description_;

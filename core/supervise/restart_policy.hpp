@@ -28,12 +28,22 @@ public:
     // that share a failed device do not restart at the same time.
     std::optional<std::chrono::milliseconds> delay_after_death(double jitter);
 
+    // Call this instead if the process of a live source has died because its device is lost. The device may return
+    // after any time, so this is no failure: the delay starts at 0 and grows up to longest_wait at most.
+    std::chrono::milliseconds delay_while_device_is_lost(double jitter);
+
     std::uint32_t failures() const { return failures_; }
+    bool has_completed_frames() const { return frames_total_ > 0; }
 
 private:
+    static constexpr std::chrono::milliseconds longest_wait{2000}; // so that a camera is soon used when it is back
+
+    std::chrono::milliseconds back_off(std::uint32_t failures, std::chrono::milliseconds longest,
+                                       double jitter) const;
+
     base::RestartLimits limits_;
     std::uint64_t frames_in_process_ = 0, frames_total_ = 0;
-    std::uint32_t failures_ = 0;
+    std::uint32_t failures_ = 0, waits_ = 0; // waits_: processes in a row that have not found the device
 };
 
 } // namespace arhost::supervise

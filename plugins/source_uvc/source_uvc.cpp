@@ -8,6 +8,7 @@
 
 #include "camera_common/frame_size.hpp"
 #include "camera_common/jpeg.hpp"
+#include "camera_common/start_camera.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -89,45 +90,7 @@ public:
     ~UvcSource() { stop(); }
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
-        newest_only_ = setup.paced != 0;
-        device_.emplace(uvc::UsbDevice::open(identity_));
-        const uvc::VideoFunction &function = choose_function();
-        const Mode mode = choose_mode(function, setup);
-        claim(function.control_interface);
-        claim(mode.stream->number);
-        set_controls(function);
-        const uvc::ProbeControl agreed = negotiate(function, mode, setup.fps);
-        const std::string what = mode.format->name + " " + mode.size().text();
-        const double fps =
-            agreed.interval > 0 ? static_cast<double>(uvc::intervals_per_second) / agreed.interval : setup.fps;
-        if (setup.fps > 0 && std::abs(fps - setup.fps) > 0.05 * setup.fps)
-            host_.warn("the camera delivers " + rate_text(fps) + " at " + what + ", not the configured " +
-                       rate_text(setup.fps) + "; it offers " + describe(function));
-        start_stream(function, mode, agreed);
-
-        arhost_frame_format format{};
-        format.struct_size = properties.format.struct_size;
-        format.width = mode.frame->width;
-        format.height = mode.frame->height;
-        format.pixel_format =
-            mode.format->encoding == uvc::Encoding::yuy2 ? ARHOST_PIXEL_FORMAT_YUYV : ARHOST_PIXEL_FORMAT_NV12;
-        constexpr std::uint8_t bt709 = 1; // bMatrixCoefficients
-        format.yuv_matrix = mode.format->matrix == bt709 ? ARHOST_YUV_MATRIX_BT709 : ARHOST_YUV_MATRIX_BT601;
-        format.yuv_range = ARHOST_YUV_RANGE_LIMITED;
-        encoding_ = mode.format->encoding;
-        if (encoding_ == uvc::Encoding::mjpeg) {
-            describe_first_picture(format);
-            if (Size{format.width, format.height} != mode.size())
-                throw Failure(ARHOST_STATUS_ERROR_IO, device_->name() + " was set to " + what +
-                                                          ", but sends pictures of " +
-                                                          Size{format.width, format.height}.text());
-        }
-        format.fps = fps;
-        if (!arhost_frame_layout(&format))
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          device_->name() + " delivers " + what + ", which is unsupported");
-        properties.format = format;
-        host_.info(device_->name() + ": " + what + ", " + rate_text(fps));
+        arhost::start_camera(setup, [&] { open(setup, properties); });
     }
 
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
@@ -169,6 +132,48 @@ public:
     }
 
 private:
+    void open(const arhost_source_setup &setup, arhost_source_properties &properties) {
+        newest_only_ = setup.paced != 0;
+        device_.emplace(uvc::UsbDevice::open(identity_));
+        const uvc::VideoFunction &function = choose_function();
+        const Mode mode = choose_mode(function, setup);
+        claim(function.control_interface);
+        claim(mode.stream->number);
+        set_controls(function);
+        const uvc::ProbeControl agreed = negotiate(function, mode, setup.fps);
+        const std::string what = mode.format->name + " " + mode.size().text();
+        const double fps =
+            agreed.interval > 0 ? static_cast<double>(uvc::intervals_per_second) / agreed.interval : setup.fps;
+        if (setup.fps > 0 && std::abs(fps - setup.fps) > 0.05 * setup.fps)
+            host_.warn("the camera delivers " + rate_text(fps) + " at " + what + ", not the configured " +
+                       rate_text(setup.fps) + "; it offers " + describe(function));
+        start_stream(function, mode, agreed);
+
+        arhost_frame_format format{};
+        format.struct_size = properties.format.struct_size;
+        format.width = mode.frame->width;
+        format.height = mode.frame->height;
+        format.pixel_format =
+            mode.format->encoding == uvc::Encoding::yuy2 ? ARHOST_PIXEL_FORMAT_YUYV : ARHOST_PIXEL_FORMAT_NV12;
+        constexpr std::uint8_t bt709 = 1; // bMatrixCoefficients
+        format.yuv_matrix = mode.format->matrix == bt709 ? ARHOST_YUV_MATRIX_BT709 : ARHOST_YUV_MATRIX_BT601;
+        format.yuv_range = ARHOST_YUV_RANGE_LIMITED;
+        encoding_ = mode.format->encoding;
+        if (encoding_ == uvc::Encoding::mjpeg) {
+            describe_first_picture(format);
+            if (Size{format.width, format.height} != mode.size())
+                throw Failure(ARHOST_STATUS_ERROR_IO, device_->name() + " was set to " + what +
+                                                          ", but sends pictures of " +
+                                                          Size{format.width, format.height}.text());
+        }
+        format.fps = fps;
+        if (!arhost_frame_layout(&format))
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          device_->name() + " delivers " + what + ", which is unsupported");
+        properties.format = format;
+        host_.info(device_->name() + ": " + what + ", " + rate_text(fps));
+    }
+
     void claim(std::uint8_t interface) {
         device_->claim(interface);
         claimed_.push_back(interface);

@@ -8,6 +8,7 @@
 
 #include "camera_common/frame_size.hpp"
 #include "camera_common/jpeg.hpp"
+#include "camera_common/start_camera.hpp"
 
 #include <algorithm>
 #include <array>
@@ -110,6 +111,39 @@ public:
     }
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
+        arhost::start_camera(setup, [&] { open(setup, properties); });
+    }
+
+    arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
+        const auto give_up = Clock::now() + silence_limit;
+        for (;;) {
+            const auto captured = next(give_up);
+            if (!captured)
+                return ARHOST_STATUS_ERROR_CANCELLED;
+            const bool good = copy(captured->planes, buffer);
+            stream_->queue(captured->index);
+            if (!good) {
+                ++dropped_;
+                ++losses_.damaged;
+                continue;
+            }
+            info.clock = ARHOST_CLOCK_MONOTONIC;
+            info.capture_ns = last_ns_ = std::max(last_ns_, capture_ns(*captured));
+            info.skipped = skipped_before(captured->sequence);
+            return ARHOST_STATUS_OK;
+        }
+    }
+
+    void stop() {
+        if (const std::string text = losses_.text(); !text.empty())
+            host_.info("frames of the camera that were not delivered: " + text);
+        losses_ = {};
+        stream_.reset();
+        device_.reset();
+    }
+
+private:
+    void open(const arhost_source_setup &setup, arhost_source_properties &properties) {
         newest_only_ = setup.paced != 0;
         device_.emplace(path_);
         camera_ = set_format(setup);
@@ -143,35 +177,6 @@ public:
         host_.info(device_->card() + " at " + path_ + ": " + mode + ", " + std::to_string(fps) + " fps");
     }
 
-    arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
-        const auto give_up = Clock::now() + silence_limit;
-        for (;;) {
-            const auto captured = next(give_up);
-            if (!captured)
-                return ARHOST_STATUS_ERROR_CANCELLED;
-            const bool good = copy(captured->planes, buffer);
-            stream_->queue(captured->index);
-            if (!good) {
-                ++dropped_;
-                ++losses_.damaged;
-                continue;
-            }
-            info.clock = ARHOST_CLOCK_MONOTONIC;
-            info.capture_ns = last_ns_ = std::max(last_ns_, capture_ns(*captured));
-            info.skipped = skipped_before(captured->sequence);
-            return ARHOST_STATUS_OK;
-        }
-    }
-
-    void stop() {
-        if (const std::string text = losses_.text(); !text.empty())
-            host_.info("frames of the camera that were not delivered: " + text);
-        losses_ = {};
-        stream_.reset();
-        device_.reset();
-    }
-
-private:
     PictureFormat set_format(const arhost_source_setup &setup) {
         const arhost::DemandedSize wanted = arhost::demanded_size(configured_size_, setup.intrinsics);
         Size size = wanted.size;

@@ -611,3 +611,40 @@ TEST(Supervision, OneSignalEndsARunWhoseLiveSourceWaitsForever) {
     EXPECT_EQ(run.wait(), 130) << run.output();
     EXPECT_TRUE(run.exists("out/counted.txt.done"));
 }
+
+namespace {
+
+// A camera that is unplugged at frame 3 and plugged in again at a time of CLOCK_MONOTONIC; -1: never.
+std::string unplugged_camera(const std::string &plugin, std::int64_t back_at_ms) {
+    return "version: 1\nmode: live\nrestart: {first_delay_ms: 1, quarantine_after: 2}\nsource: {plugin: " + plugin +
+           ", options: {wait_ms: 10, unplugged_at: 3, back_at: " + std::to_string(back_at_ms) +
+           "}}\noutputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n";
+}
+
+std::int64_t monotonic_ms() {
+    return std::chrono::duration_cast<std::chrono::milliseconds>(std::chrono::steady_clock::now().time_since_epoch())
+        .count();
+}
+
+} // namespace
+
+// quarantine_after would disable it after a few milliseconds.
+TEST(Supervision, ALiveSourceWaitsUntilItsCameraIsBack) {
+    ArhostRun run(unplugged_camera("source_waiting_live", monotonic_ms() + 3000) + "frames: 20\n");
+    EXPECT_EQ(run.run(), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("the camera is not connected; waiting for its device"));
+    EXPECT_THAT(run.output(), HasSubstr("its device is back"));
+    EXPECT_EQ(run.stats()["frames"]["in"], 20);
+    EXPECT_EQ(run.stats()["restarts"]["source"], 1) << "the attempts to open the camera are no restarts";
+}
+
+TEST(Supervision, OneSignalEndsARunWhoseCameraIsUnplugged) {
+    ArhostRun run(unplugged_camera("source_waiting_live", -1));
+    run.start();
+    while (run.running() && run.output().find("is not connected; waiting") == std::string::npos)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    send_signal(run.pid(), SIGTERM);
+    EXPECT_EQ(run.wait(), 130) << run.output();
+    EXPECT_TRUE(run.exists("counted.txt.done"));
+    EXPECT_EQ(run.stats()["frames"]["in"], 3);
+}

@@ -49,3 +49,19 @@ TEST(RestartPolicy, AddsUpToAQuarterOfJitter) {
     RestartPolicy policy({});
     EXPECT_EQ(policy.delay_after_death(1), 312ms);
 }
+
+TEST(RestartPolicy, WaitsForALostDeviceWithoutEnd) {
+    RestartPolicy policy({.quarantine_after = 2, .first_delay = 250ms});
+    EXPECT_FALSE(policy.has_completed_frames());
+    policy.frame_done();
+    EXPECT_TRUE(policy.has_completed_frames());
+    EXPECT_EQ(policy.delay_while_device_is_lost(0), 0ms);
+    EXPECT_EQ(policy.delay_while_device_is_lost(0), 250ms);
+    EXPECT_EQ(policy.delay_while_device_is_lost(0), 500ms);
+    for (int i = 0; i < 100; ++i)
+        policy.delay_while_device_is_lost(0);
+    EXPECT_EQ(policy.delay_while_device_is_lost(0), 2000ms);
+    EXPECT_EQ(policy.failures(), 0u);
+    policy.frame_done();
+    EXPECT_EQ(policy.delay_while_device_is_lost(0), 0ms) << "the device was back";
+}

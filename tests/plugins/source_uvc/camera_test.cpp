@@ -449,6 +449,25 @@ TEST_F(UvcRun, SurvivesAnUnplug) {
     EXPECT_TRUE(eventually([] { return kernel_driven() == 2; }));
 }
 
+// The keys `restart` have their defaults, by which five failures in about four seconds disable a component.
+TEST_F(UvcRun, WaitsUntilTheCameraIsPluggedInAgain) {
+    arhost::test::ArhostRun run(configuration(usb));
+    run.start({"run.yaml", "--allow-no-target"});
+    ASSERT_TRUE(proceeds(run)) << run.output();
+    unplug();
+    std::this_thread::sleep_for(std::chrono::seconds(20));
+    connect({});
+    EXPECT_TRUE(proceeds(run)) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("is it connected?; waiting for its device"));
+    EXPECT_THAT(run.output(), HasSubstr("its device is back"));
+    unplug();
+    EXPECT_TRUE(eventually([&] { return run.output().rfind("waiting for") > run.output().rfind("is back"); }));
+    arhost::test::send_signal(run.pid(), SIGINT);
+    EXPECT_EQ(run.wait(), 130) << run.output();
+    EXPECT_EQ(run.stats()["restarts"]["source"], 2);
+    connect({});
+}
+
 TEST_F(UvcRun, TheKernelsDriverReturnsIfTheWorkerIsKilled) {
     // Without further attempts, nothing else returns the camera.
     arhost::test::ArhostRun run(configuration(usb, "restart: {proven_after_frames: 1000000, quarantine_after: 1}\n"));

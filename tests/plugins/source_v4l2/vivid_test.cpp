@@ -533,41 +533,80 @@ TEST_F(Vivid, IsFoundByALinkInTheSandbox) {
     fs::remove_all("/dev/v4l");
 }
 
-// A camera that is unplugged comes back as another node.
-TEST_F(Vivid, ComesBackUnderAnotherNumber) {
-    const char *const other = "/dev/video1";
-    if (!fs::exists(other))
-        GTEST_SKIP() << "needs two cameras: -m \"vivid n_devs=2 node_types=0x1,0x1\"";
+namespace {
+
+// A run that captures by a link, as udev creates it, which names the camera even if its node gets another number.
+class VividRun : public Vivid {
+protected:
+    void SetUp() override {
+        Vivid::SetUp();
+        fs::create_directories(link.parent_path());
+        fs::create_symlink("../../video0", link);
+        run.start({"run.yaml", "--allow-no-target"});
+        ASSERT_TRUE(wait_for(20)) << run.output();
+    }
+    void TearDown() override {
+        fs::remove_all("/dev/v4l");
+        Vivid::TearDown();
+    }
+    std::ptrdiff_t frames() const {
+        const std::string text = run.exists("out/poses.jsonl") ? run.read("out/poses.jsonl") : "";
+        return std::count(text.begin(), text.end(), '\n');
+    }
+    // Waits until the run has output this number of frames, for at most 30 s.
+    bool wait_for(std::ptrdiff_t count) {
+        for (int i = 0; run.running() && frames() < count && i < 3000; ++i)
+            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        return frames() >= count;
+    }
+    void end() {
+        arhost::test::send_signal(run.pid(), SIGINT);
+        EXPECT_EQ(run.wait(), 130) << run.output();
+    }
+
     const fs::path link = "/dev/v4l/by-id/usb-vivid-index0";
-    fs::create_directories(link.parent_path());
-    fs::create_symlink("../../video0", link);
-    arhost::test::ArhostRun run("version: 1\nmode: live\n"
+    arhost::test::ArhostRun run{"version: 1\nmode: live\n"
                                 "source: {plugin: source_v4l2, allow: [video], fps: 30, options: {device: " +
                                 link.string() +
                                 ", width: 320, height: 180}}\ncamera: {width: 320, height: 180, fx: 300}\n"
                                 "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
-                                "outputs: [{plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n");
-    run.start({"run.yaml", "--allow-no-target"});
-    const auto frames = [&] {
-        const std::string text = run.exists("out/poses.jsonl") ? run.read("out/poses.jsonl") : "";
-        return std::count(text.begin(), text.end(), '\n');
-    };
-    const auto wait_for = [&](std::ptrdiff_t count) {
-        for (int i = 0; run.running() && frames() < count && i < 3000; ++i)
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
-        return frames() >= count;
-    };
-    ASSERT_TRUE(wait_for(20)) << run.output();
+                                "outputs: [{plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n"};
+};
+
+} // namespace
+
+// A camera that is unplugged comes back as another node.
+TEST_F(VividRun, ComesBackUnderAnotherNumber) {
+    if (!fs::exists("/dev/video1"))
+        GTEST_SKIP() << "needs two cameras: -m \"vivid n_devs=2 node_types=0x1,0x1\"";
     fs::remove(link);
     fs::create_symlink("../../video1", link);
     set(disconnect, 1);
-    const std::ptrdiff_t before = frames();
-    EXPECT_TRUE(wait_for(before + 60)) << run.output();
-    arhost::test::send_signal(run.pid(), SIGINT);
-    run.wait();
+    EXPECT_TRUE(wait_for(frames() + 60)) << run.output();
+    end();
     EXPECT_THAT(run.output(), HasSubstr("was it unplugged?"));
     EXPECT_GE(run.stats()["restarts"]["source"], 1);
-    fs::remove_all("/dev/v4l");
+}
+
+// The keys `restart` have their defaults, by which five failures in about four seconds disable a component.
+TEST_F(VividRun, WaitsUntilTheCameraIsPluggedInAgain) {
+    fs::remove(link);
+    set(disconnect, 1);
+    close(fd_); // vivid reconnects when all programs have closed the device
+    std::this_thread::sleep_for(std::chrono::seconds(20));
+    EXPECT_TRUE(run.running()) << run.output();
+    fd_ = open(device, O_RDWR | O_CLOEXEC);
+    fs::create_symlink("../../video0", link);
+    EXPECT_TRUE(wait_for(frames() + 20)) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("does not exist; "));
+    EXPECT_THAT(run.output(), HasSubstr("waiting for its device"));
+    EXPECT_THAT(run.output(), HasSubstr("its device is back"));
+    fs::remove(link);
+    set(disconnect, 1);
+    for (int i = 0; i < 2000 && run.output().rfind("waiting for") < run.output().rfind("is back"); ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    end();
+    EXPECT_EQ(run.stats()["restarts"]["source"], 2);
 }
 
 TEST_F(Vivid, StopsWaitingWhenCancelled) {
