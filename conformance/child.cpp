@@ -130,7 +130,22 @@ Pipe::Pipe() {
     write_end.reset(ends[1]);
 }
 
-pid_t start_process(std::vector<std::string> arguments, std::initializer_list<int> descriptors, bool new_group) {
+void pass_sockets(const Sockets &sockets, std::vector<std::string> &arguments, std::vector<int> &descriptors) {
+    for (const auto &[key, socket] : sockets) {
+        arguments.insert(arguments.end(), {"--socket", key + "=" + socket.address});
+        descriptors.push_back(socket.fd);
+    }
+}
+
+Sockets passed_sockets(const std::vector<std::string> &texts) {
+    Sockets sockets;
+    int fd = first_socket_fd;
+    for (const std::string &text : texts)
+        sockets[text.substr(0, text.find('='))] = {fd++, text.substr(text.find('=') + 1)};
+    return sockets;
+}
+
+pid_t start_process(std::vector<std::string> arguments, const std::vector<int> &descriptors, bool new_group) {
     std::vector<char *> argv;
     argv.reserve(arguments.size() + 1);
     for (std::string &argument : arguments)
@@ -145,7 +160,7 @@ pid_t start_process(std::vector<std::string> arguments, std::initializer_list<in
     // A plugin may have started threads: only async-signal-safe calls until exec.
     if (new_group)
         ::setpgid(0, 0);
-    base::exec_child("/proc/self/exe", argv.data(), {descriptors.begin(), descriptors.size()}, parent);
+    base::exec_child("/proc/self/exe", argv.data(), descriptors, parent);
     ::_exit(127);
 }
 
@@ -156,7 +171,7 @@ int run_child(const std::string &name, const Subject &subject) {
     for (const Test &test : tests) {
         if (name != test.name)
             continue;
-        PluginLibrary library(subject.plugin, subject.settings, calls, subject.scratch);
+        PluginLibrary library(subject.plugin, subject.settings, calls, subject.scratch, subject.sockets);
         discard_standard_output(subject.settings);
         Context context{library, subject.reference, std::mt19937_64(subject.seed)};
         context.prints = subject.prints;

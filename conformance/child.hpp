@@ -10,7 +10,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <initializer_list>
 #include <string>
 #include <sys/types.h>
 #include <vector>
@@ -27,13 +26,22 @@ struct Subject {
     PrintFiles prints{};
     sandbox::Policy policy{};                  // without the scratch folder
     std::vector<std::string> policy_options{}; // the policy's command line options
+    Settings addresses{};                      // of the options of type ARHOST_OPTION_LISTEN
+    Sockets sockets{};                         // of one test
 };
 
 // The ray tracer that images are compared with by default.
 std::filesystem::path default_reference();
 
 // Descriptors of a test's process.
-inline constexpr int result_fd = 3, call_page_fd = 4;
+inline constexpr int result_fd = 3, call_page_fd = 4, first_socket_fd = 5;
+inline constexpr std::size_t max_sockets = 3; // limited by base::exec_child
+
+// Adds the sockets to the arguments and descriptors of a test's process.
+void pass_sockets(const Sockets &sockets, std::vector<std::string> &arguments, std::vector<int> &descriptors);
+
+// Returns the sockets for the texts KEY=ADDRESS of the argument --socket.
+Sockets passed_sockets(const std::vector<std::string> &texts);
 
 struct Pipe {
     Pipe();
@@ -42,8 +50,7 @@ struct Pipe {
 
 // Executes this program in a child process, with `descriptors` as 0, 1, 2, … The kernel kills the child when this
 // process ends. `new_group`: the child leads a new process group.
-pid_t start_process(std::vector<std::string> arguments, std::initializer_list<int> descriptors,
-                    bool new_group = false);
+pid_t start_process(std::vector<std::string> arguments, const std::vector<int> &descriptors, bool new_group = false);
 
 // Runs one test and writes its result to `result_fd` as a line of JSON. Returns the exit status.
 int run_child(const std::string &test, const Subject &subject);

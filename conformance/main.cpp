@@ -4,6 +4,7 @@
 #include "base/atomic_file.hpp"
 #include "base/command_line.hpp"
 #include "base/file_identity.hpp"
+#include "base/listening_socket.hpp"
 #include "base/text.hpp"
 #include "conformance/report.hpp"
 #include "run_config/plugin_path.hpp"
@@ -184,6 +185,7 @@ std::string reference_problem(std::span<const Test> tests, const RunSettings &se
     RunSettings reference_settings = settings;
     reference_settings.subject.plugin = file;
     reference_settings.subject.settings.clear();
+    reference_settings.subject.addresses.clear();
     for (const Test &test : tests)
         if (test.name == std::string_view("abi.load") || test.name == std::string_view("raytracer.render")) {
             const Result result = run_alone(test, reference_settings);
@@ -196,6 +198,21 @@ std::string reference_problem(std::span<const Test> tests, const RunSettings &se
                                    file.string(), arhost::ipc::to_text(kind));
         }
     return {};
+}
+
+// Returns the addresses of the options of type ARHOST_OPTION_LISTEN, as set or by default. Tests report invalid ones.
+Settings addresses_of(const arhost::ipc::PluginDescription &plugin, const Settings &settings) {
+    Settings addresses;
+    for (const arhost::ipc::OptionDeclaration &option : plugin.options) {
+        const auto set = settings.find(option.key);
+        const std::string address = set != settings.end() ? set->second : option.default_value.value_or("");
+        if (option.type == ARHOST_OPTION_LISTEN && base::problem_with_address(address).empty())
+            addresses[option.key] = address;
+    }
+    if (addresses.size() > max_sockets)
+        throw std::runtime_error(
+            fmt::format("the plugin has {} sockets, but the suite supports only {}", addresses.size(), max_sockets));
+    return addresses;
 }
 
 // Returns the plugin that runs the class of the Python script in the option `script`: the only one that finds a class
@@ -234,7 +251,7 @@ void print(const std::string &text, int signals = -1) {
     }
 }
 
-Report run(const RunSettings &settings, const std::vector<std::string> &patterns, bool quiet) {
+Report run(RunSettings settings, const std::vector<std::string> &patterns, bool quiet) {
     Report report{settings, all_tests(), {}, {}};
     const auto is_selected = [&](const char *test) { return matches(patterns, test); };
     const auto is_fine = [](const Result &result) {
@@ -251,6 +268,8 @@ Report run(const RunSettings &settings, const std::vector<std::string> &patterns
     // Always first: abi.load reports the plugin's kind.
     run_all({report.tests.data(), 1}, settings, report.results, print_result);
     report.plugin = report.results.front().facts;
+    if (report.plugin)
+        settings.subject.addresses = addresses_of(report.plugin->descriptor, settings.subject.settings);
     const arhost_kind kind = report.plugin ? report.plugin->descriptor.kind : 0;
     std::vector<Test> selected;
     std::set<std::string_view> needed;
@@ -280,7 +299,7 @@ Report run(const RunSettings &settings, const std::vector<std::string> &patterns
 void expect_descriptors(unsigned jobs) {
     rlimit limit{};
     ::getrlimit(RLIMIT_NOFILE, &limit);
-    const rlim_t needed = 64 + 4 * jobs;
+    const rlim_t needed = 64 + (4 + max_sockets) * jobs;
     if (limit.rlim_cur < needed && limit.rlim_max >= needed) {
         limit.rlim_cur = needed;
         ::setrlimit(RLIMIT_NOFILE, &limit);
@@ -366,7 +385,7 @@ int main(int argc, char **argv) {
         "128 plus a signal's number: interrupted.",
         "arhost conform");
     RunSettings settings;
-    std::vector<std::string> option_texts, print_texts, patterns = {"*"};
+    std::vector<std::string> option_texts, print_texts, socket_texts, patterns = {"*"};
     std::string plugin, json, junit, html, child_test;
     std::string reference = default_reference();
     bool only_list = false, quiet = false;
@@ -401,6 +420,7 @@ int main(int argc, char **argv) {
     add_file("--html", html, "Write the results as an HTML page with images");
     app.option("--run", child_test, "").hidden(); // internal: run that test in this process
     app.option("--scratch", settings.subject.scratch, "").hidden();
+    app.option("--socket", socket_texts, "").one_value_each().hidden();
     if (const auto status = app.parse(argc, argv))
         return base::flush_stdout() ? *status : usage_or_suite_failed;
     base::UniqueFd signals;
@@ -420,6 +440,7 @@ int main(int argc, char **argv) {
         settings.subject.prints = parse_prints(print_texts);
         settings.subject.policy = policy_options.policy(settings.subject);
         settings.subject.policy_options = policy_options.texts();
+        settings.subject.sockets = passed_sockets(socket_texts);
         if (!child_test.empty())
             return run_child(child_test, settings.subject);
         expect_utf8(option_texts);

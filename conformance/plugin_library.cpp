@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conformance/plugin_library.hpp"
 
+#include "base/listening_socket.hpp"
 #include "conformance/verdict.hpp"
 #include "worker/library.hpp"
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include <cmath>
 #include <cstring>
@@ -71,6 +73,11 @@ arhost_option parse_option(const arhost_option_descriptor &option, const std::st
         case ARHOST_OPTION_INPUT_PATH:
         case ARHOST_OPTION_OUTPUT_PATH:
             break;
+        case ARHOST_OPTION_LISTEN:
+            if (const std::string problem = base::problem_with_address(text); !text.empty() && !problem.empty())
+                reject(problem.c_str());
+            value.integer = -1; // without a socket
+            break;
         default:
             reject("has an unknown type");
         }
@@ -97,7 +104,41 @@ Host::Host()
     };
     host_.progress = [](const arhost_host *, double, const char *) {};
     host_.cancelled = [](const arhost_host *host) { return static_cast<std::int32_t>(self(host).cancelled_); };
-    host_.get_extension = [](const arhost_host *, const char *) -> const void * { return nullptr; };
+    host_.get_extension = [](const arhost_host *host, const char *name) -> const void * {
+        static constexpr arhost_control control = {
+            sizeof control, [](const arhost_host *sink_host, const char *command, arhost_take_answer take,
+                               void *context) { return self(sink_host).send(command, take, context); }};
+        return self(host).offers_control_ && name && std::string_view(name) == ARHOST_CONTROL_EXTENSION ? &control
+                                                                                                        : nullptr;
+    };
+}
+
+arhost_status Host::send(const char *command, arhost_take_answer take, void *context) {
+    const std::lock_guard lock(mutex_);
+    if (!accepts_commands_ || !command || std::strlen(command) > ARHOST_MAX_COMMAND_SIZE ||
+        !ipc::Json::parse(command, nullptr, false).is_object())
+        return ARHOST_STATUS_ERROR_INVALID_ARGUMENT;
+    if (commands_.size() >= ARHOST_MAX_PENDING_COMMANDS)
+        return ARHOST_STATUS_ERROR_OUT_OF_MEMORY;
+    commands_.emplace_back(take, context);
+    return ARHOST_STATUS_OK;
+}
+
+void Host::accept_commands(bool accept) {
+    const std::lock_guard lock(mutex_);
+    accepts_commands_ = accept;
+    commands_.clear();
+}
+
+void Host::answer_commands() {
+    std::vector<std::pair<arhost_take_answer, void *>> commands;
+    {
+        const std::lock_guard lock(mutex_);
+        commands.swap(commands_);
+    }
+    for (const auto &[take, context] : commands)
+        if (take)
+            take(context, R"({"ok":false,"error":"arhost conform executes no commands"})");
 }
 
 std::vector<std::string> Host::log() const {
@@ -116,6 +157,8 @@ Instance::Instance(PluginLibrary &library, Settings overrides, std::filesystem::
 
 arhost_status Instance::create(Newer newer) {
     const arhost_plugin &plugin = library_.plugin();
+    if (plugin.descriptor->kind == ARHOST_KIND_SINK)
+        host_.offer_control();
     std::vector<std::string> texts; // referenced by the values
     std::vector<arhost_option> values;
     const auto declared = options_of(*plugin.descriptor);
@@ -131,6 +174,9 @@ arhost_status Instance::create(Newer newer) {
             if (option->type == ARHOST_OPTION_OUTPUT_PATH && path != standard_output)
                 texts.back() = library_.scratch() / folder_ / path.filename();
         }
+        const auto socket = texts.back().empty() ? library_.sockets().end() : library_.sockets().find(option->key);
+        if (socket != library_.sockets().end())
+            texts.back() = socket->second.address;
         try {
             values.push_back(parse_option(*option, texts.back()));
         } catch (const std::runtime_error &error) {
@@ -138,6 +184,8 @@ arhost_status Instance::create(Newer newer) {
                 throw;
             throw Failure(std::string("invalid default: ") + error.what());
         }
+        if (socket != library_.sockets().end())
+            values.back().integer = socket->second.fd;
     }
     for (const auto &[key, value] : settings_)
         if (!library_.option(key))

@@ -7,6 +7,7 @@
 #include "ipc/protocol.hpp"
 
 #include <arhost/arhost.h>
+#include <arhost/control.h>
 
 #include <atomic>
 #include <filesystem>
@@ -46,12 +47,20 @@ using Settings = std::map<std::string, std::string>; // option values as text, a
 // Value of an output path; see ARHOST_CAPABILITY_STANDARD_OUTPUT.
 constexpr const char *standard_output = "-";
 
+// A listening socket for an option of the type ARHOST_OPTION_LISTEN.
+struct Socket {
+    int fd;
+    std::string address;
+};
+using Sockets = std::map<std::string, Socket>; // by the option's key
+
 class PluginLibrary {
 public:
     // `settings`: the user's option values. `scratch`: the folder for outputs. Does not open the plugin yet.
     PluginLibrary(std::filesystem::path file, Settings settings, const CallPage &calls,
-                  std::filesystem::path scratch = {})
-        : file_(std::move(file)), settings_(std::move(settings)), calls_(calls), scratch_(std::move(scratch)) {}
+                  std::filesystem::path scratch = {}, Sockets sockets = {})
+        : file_(std::move(file)), settings_(std::move(settings)), calls_(calls), scratch_(std::move(scratch)),
+          sockets_(std::move(sockets)) {}
 
     // The first call opens the plugin; throws std::runtime_error if arhost-worker would reject it.
     const arhost_entry_point &entry();
@@ -63,12 +72,14 @@ public:
     const Settings &settings() const { return settings_; }
     const CallPage &calls() const { return calls_; }
     const std::filesystem::path &scratch() const { return scratch_; }
+    const Sockets &sockets() const { return sockets_; }
 
 private:
     std::filesystem::path file_;
     Settings settings_;
     const CallPage &calls_;
     std::filesystem::path scratch_;
+    Sockets sockets_;
     const arhost_entry_point *entry_ = nullptr;
     const arhost_plugin *plugin_ = nullptr;
 };
@@ -90,12 +101,24 @@ public:
     std::vector<std::string> log() const;
     std::string last_error() const; // empty if there is none
 
+    // For sinks: offers ARHOST_CONTROL_EXTENSION.
+    void offer_control() { offers_control_ = true; }
+    // While the sink is started. Commands without an answer are dropped at the end.
+    void accept_commands(bool accept);
+    // Answers each command with an error. Call between two calls of the sink's functions.
+    void answer_commands();
+
 private:
     static Host &self(const arhost_host *host) { return *static_cast<Host *>(host->context); }
+    arhost_status send(const char *command, arhost_take_answer take, void *context);
+
     arhost_host host_;
+    bool offers_control_ = false;
     mutable std::mutex mutex_; // plugins may log from any thread
     std::vector<std::string> log_;
     std::string last_error_;
+    bool accepts_commands_ = false;
+    std::vector<std::pair<arhost_take_answer, void *>> commands_; // without an answer
     std::atomic<bool> cancelled_{false};
 };
 
@@ -103,7 +126,8 @@ private:
 class Instance {
 public:
     // `overrides` take precedence over the user's settings. An output path keeps its file name but is placed in
-    // `folder` of the scratch folder, unless it is `standard_output`.
+    // `folder` of the scratch folder, unless it is `standard_output`. A socket replaces the value of an option that
+    // has one.
     explicit Instance(PluginLibrary &library, Settings overrides = {}, std::filesystem::path folder = {});
     ~Instance() { destroy(); }
     Instance(const Instance &) = delete;

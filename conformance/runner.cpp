@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conformance/runner.hpp"
 
+#include "base/listening_socket.hpp"
 #include "base/orphans.hpp"
 #include "base/text.hpp"
 #include "ipc/memory.hpp"
@@ -60,6 +61,14 @@ public:
 private:
     std::filesystem::path path_;
 };
+
+// Returns a socket of the same kind that neither other tests nor other programs use: at a free port, or in `folder`.
+base::ListeningSocket listen_like(const std::string &address, const std::string &key,
+                                  const std::filesystem::path &folder) {
+    const std::size_t colon = address.starts_with('/') ? std::string::npos : address.rfind(':');
+    return base::ListeningSocket(colon == std::string::npos ? (folder / (key + ".sock")).string()
+                                                            : address.substr(0, colon) + ":0");
+}
 
 // Copies what a plugin prints to standard error, up to 64 KiB, as lines without control characters. It is not part of
 // the report.
@@ -122,8 +131,14 @@ public:
         ::fcntl(output_.read_end.get(), F_SETFL, O_NONBLOCK);
         const UniqueFd no_input = base::checked(::open("/dev/null", O_RDONLY | O_CLOEXEC), "open /dev/null");
         const int output = output_.write_end.get();
-        pid_ = start_process(std::move(arguments),
-                             {no_input.get(), output, output, result_.write_end.get(), memory_.fd()}, true);
+        std::vector<int> descriptors = {no_input.get(), output, output, result_.write_end.get(), memory_.fd()};
+        Sockets sockets;
+        for (const auto &[key, address] : subject.addresses) {
+            const base::ListeningSocket &socket = listening_.emplace_back(listen_like(address, key, scratch_.path()));
+            sockets[key] = {socket.fd(), socket.address()};
+        }
+        pass_sockets(sockets, arguments, descriptors);
+        pid_ = start_process(std::move(arguments), descriptors, true);
         result_.write_end.reset();
         output_.write_end.reset();
         ::setpgid(pid_, pid_); // also here, to avoid a race with the child
@@ -225,6 +240,7 @@ private:
     std::set<pid_t> &alive_;
     Clock::time_point begin_, deadline_;
     ScratchFolder scratch_; // removed after the process has ended
+    std::list<base::ListeningSocket> listening_;
     ipc::SharedMemory memory_;
     CallPage calls_;
     Pipe result_, output_;

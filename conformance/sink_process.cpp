@@ -55,8 +55,10 @@ SinkProcess::SinkProcess(Context &context, const Work &work) {
 
     Pipe work_pipe, progress_pipe;
     const ipc::SharedMemory call_page = ipc::SharedMemory::create("arhost-conform-call", sizeof(ipc::Call));
-    pid_ = start_process(std::move(arguments), {work_pipe.read_end.get(), STDOUT_FILENO, STDERR_FILENO,
-                                                progress_pipe.write_end.get(), call_page.fd()});
+    std::vector<int> descriptors = {work_pipe.read_end.get(), STDOUT_FILENO, STDERR_FILENO,
+                                    progress_pipe.write_end.get(), call_page.fd()};
+    pass_sockets(library.sockets(), arguments, descriptors);
+    pid_ = start_process(std::move(arguments), descriptors);
     work_pipe_ = std::move(work_pipe.write_end);
     progress_pipe_ = std::move(progress_pipe.read_end);
     const std::string line =

@@ -141,6 +141,7 @@ arhost_status SinkRun::try_start(std::uint64_t first_sequence, const Size &size)
     const arhost_status status =
         in_call(library_.calls(), Call::start, [&] { return functions_.start(instance_->get(), &setup); });
     started_ = status == ARHOST_STATUS_OK;
+    instance_->host().accept_commands(started_);
     size_ = size;
     return status;
 }
@@ -158,6 +159,7 @@ arhost_status SinkRun::try_write(const SealedOutput &frame) {
         output.overlay_rgba = nullptr;
         output.overlay_stride = 0;
     }
+    instance_->host().answer_commands();
     return in_call(library_.calls(), Call::per_frame, [&] { return functions_.write(instance_->get(), &output); });
 }
 
@@ -178,13 +180,17 @@ Files SinkRun::run(std::uint64_t frames) {
 }
 
 arhost_status SinkRun::try_idle() {
+    instance_->host().answer_commands();
     return in_call(library_.calls(), Call::idle, [&] { return functions_.idle(instance_->get()); });
 }
 
 arhost_status SinkRun::try_stop() {
     if (!std::exchange(started_, false))
         return ARHOST_STATUS_OK;
-    return in_call(library_.calls(), Call::stop, [&] { return functions_.stop(instance_->get()); });
+    const arhost_status status =
+        in_call(library_.calls(), Call::stop, [&] { return functions_.stop(instance_->get()); });
+    instance_->host().accept_commands(false);
+    return status;
 }
 
 void SinkRun::stop() {

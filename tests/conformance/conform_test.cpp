@@ -466,6 +466,14 @@ TEST(Conform, FailsOnAnUnknownOption) {
     EXPECT_THAT(run.output(), HasSubstr("sampels"));
 }
 
+TEST(Conform, FailsOnAnInvalidAddressOfASocket) {
+    ConformRun run;
+    EXPECT_EQ(run.run({ARHOST_PLUGIN_DIRECTORY "/sink_web.so", "--allow", "listen", "--only", "abi.create", "--set",
+                       "listen=local host"}),
+              2);
+    EXPECT_THAT(run.output(), HasSubstr("option 'listen': 'local host' must be a name"));
+}
+
 TEST(Conform, FailsAFileThatIsNotAPlugin) {
     ConformRun run;
     std::ofstream(run.path("text.so")) << "no library";
