@@ -4,7 +4,10 @@
 #include "pixels/rows.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <utility>
+#include <vector>
 
 namespace arhost {
 namespace {
@@ -57,7 +60,70 @@ Bgr pixel(const arhost_frame_format &format, const std::uint8_t *const planes[],
     }
 }
 
+constexpr std::uint32_t one = 128; // weights are multiples of 1/128, so that the sums fit in 32 bits
+
+// The two pixels of the small image between which a pixel of the large one is, and the weight of the second.
+struct Between {
+    std::uint32_t first, second, weight;
+};
+
+Between between(std::uint32_t at, std::uint32_t from_size, std::uint32_t to_size) {
+    const double position =
+        std::clamp((at + 0.5) * from_size / to_size - 0.5, 0.0, static_cast<double>(from_size - 1));
+    const auto first = static_cast<std::uint32_t>(position);
+    return {first, std::min(first + 1, from_size - 1),
+            static_cast<std::uint32_t>(std::lround((position - first) * one))};
+}
+
+// Returns the pixels of the large image between which and the pixels from `begin` to `end` of the small image there
+// is less than one pixel of the small image.
+std::pair<std::uint32_t, std::uint32_t> enlarged(std::uint32_t begin, std::uint32_t end, std::uint32_t from_size,
+                                                 std::uint32_t to_size) {
+    const double factor = static_cast<double>(to_size) / from_size;
+    return {static_cast<std::uint32_t>(std::max(0.0, std::floor((begin - 0.5) * factor - 0.5))),
+            std::min(to_size, static_cast<std::uint32_t>(std::ceil((end + 0.5) * factor + 0.5)))};
+}
+
 } // namespace
+
+Region enlarge(const ImageView &image, std::uint32_t from_width, std::uint32_t from_height, const Region &region,
+               const arhost_frame_format &format, std::uint8_t *rgba, std::size_t stride) {
+    if (region.width == 0 || region.height == 0 || region.x >= from_width || region.y >= from_height)
+        return {};
+    const auto [x0, x1] =
+        enlarged(region.x, region.x + std::min(region.width, from_width - region.x), from_width, format.width);
+    const auto [y0, y1] =
+        enlarged(region.y, region.y + std::min(region.height, from_height - region.y), from_height, format.height);
+    std::vector<Between> columns;
+    for (std::uint32_t x = x0; x < x1; ++x)
+        columns.push_back(between(x, from_width, format.width));
+    for (std::uint32_t y = y0; y < y1; ++y) {
+        const Between row = between(y, from_height, format.height);
+        const std::uint8_t *upper = image.rgba + row.first * image.stride,
+                           *lower = image.rgba + row.second * image.stride;
+        std::uint8_t *to = rgba + y * stride + 4 * std::size_t{x0};
+        for (const Between &column : columns) {
+            const std::uint8_t *pixels[] = {
+                upper + std::size_t{4} * column.first, upper + std::size_t{4} * column.second,
+                lower + std::size_t{4} * column.first, lower + std::size_t{4} * column.second};
+            const std::uint32_t weights[] = {(one - column.weight) * (one - row.weight),
+                                             column.weight * (one - row.weight), (one - column.weight) * row.weight,
+                                             column.weight * row.weight};
+            std::uint32_t alpha = 0, sums[3] = {};
+            for (int i = 0; i < 4; ++i) {
+                const std::uint32_t share = weights[i] * pixels[i][3];
+                alpha += share;
+                for (int c = 0; c < 3; ++c)
+                    sums[c] += share * pixels[i][c];
+            }
+            for (int c = 0; c < 3; ++c)
+                to[c] = static_cast<std::uint8_t>(alpha > 0 ? (sums[c] + alpha / 2) / alpha : 0);
+            to[3] = static_cast<std::uint8_t>((alpha + one * one / 2) / (one * one));
+            to += 4;
+        }
+    }
+    return {x0, y0, x1 - x0, y1 - y0};
+}
 
 void composite(const arhost_frame_format &format, const std::uint8_t *const planes[ARHOST_MAX_PLANES],
                const ImageView &overlay, const Region &region, const OutputView &out) {

@@ -36,6 +36,13 @@ constexpr Region region_of(const arhost_render_info &info, std::uint32_t width, 
     return {info.region_x, info.region_y, info.region_width, info.region_height};
 }
 
+// Enlarges an image of the size `from_width` × `from_height` to that of `format`, bilinearly with premultiplied
+// alpha. The edges of both images coincide. Writes only the pixels in the returned region, which contains what
+// `region` of the image becomes; alpha is 0 elsewhere. The region may come from an untrusted worker. `rgba` has
+// `stride` bytes per row.
+Region enlarge(const ImageView &image, std::uint32_t from_width, std::uint32_t from_height, const Region &region,
+               const arhost_frame_format &format, std::uint8_t *rgba, std::size_t stride);
+
 // Writes (A·(255 − α) + B·α) / 255 for each 8-bit channel inside the region, and a copy of A outside the region.
 // Results are rounded to nearest; there are no ties because 255 is odd. The region may come from an untrusted worker,
 // as it is clipped to the image. `format` must have passed arhost_frame_layout. Accesses only bytes of pixels, not

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "compositor/compositor.hpp"
+#include "host/quality.hpp"
 #include "host/slots.hpp"
 #include "host/statistics.hpp"
 
@@ -41,6 +42,7 @@ struct Frame {
     Lease result;               // slot in the tracker's memory, while tracking
     Lease overlay;              // slot in the ray tracer's memory
     arhost_render_info render{};
+    Quality quality; // of the overlay
     arhost_record record{};
     std::optional<std::size_t> pixels_sample, overlay_sample; // hashes for the contract checks
     Clock::time_point captured; // arrival, unless the source reports capture times of CLOCK_MONOTONIC
@@ -60,6 +62,7 @@ struct OutputFrame {
     std::uint64_t sequence;
     Lease slot;
     Frame::Clock::time_point captured; // as in Frame
+    Quality quality;                   // of the overlay
 };
 using OutputFramePointer = std::shared_ptr<const OutputFrame>;
 

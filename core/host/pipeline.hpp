@@ -120,7 +120,11 @@ private:
     bool render();
     bool compose();
     void compose(Frame &frame, std::span<std::byte> slot);
+    void start_quality(RaytracerStage &stage);
+    void request_samples(RaytracerStage &stage, std::uint32_t samples);
+    std::pair<std::uint32_t, std::uint32_t> overlay_size(const Quality &quality) const; // width, height in px
     ImageView overlay_of(const Frame &frame) const;
+    std::pair<ImageView, Region> full_size_overlay(const Frame &frame);
     camera::Coordinates coordinates() const {
         return raytracer_ ? raytracer_->scene->coordinates : camera::Coordinates();
     }
@@ -199,7 +203,8 @@ private:
     std::vector<arhost_marker> last_markers_;          // of the last composited frame
     bool video_input_ = false, overlay_input_ = false; // whether a sink reads the video frame and the overlay
     bool frozen_ = false;
-    OutputFramePointer last_output_; // for the command `snapshot`
+    std::vector<std::uint8_t> enlarged_; // the overlay of a frame that was rendered smaller
+    OutputFramePointer last_output_;     // for the command `snapshot`
     struct OptionsInUse {
         std::vector<ipc::OptionValue> values;
         std::set<std::string> changed; // the keys that the command `set` has changed

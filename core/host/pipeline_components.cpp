@@ -199,7 +199,10 @@ std::unique_ptr<RaytracerStage> Pipeline::make_raytracer(const run_config::Raytr
     callbacks.ready = [this](const messages::Ready &) {
         return SlotLayout{std::uint64_t(overlay_stride(format_->width)) * format_->height, stage_slot_count};
     };
-    callbacks.running = [stage] { stage->slots = pool_of(*stage->component); };
+    callbacks.running = [this, stage] {
+        stage->slots = pool_of(*stage->component);
+        start_quality(*stage);
+    };
     callbacks.disabled = [this, stage](const std::string &reason, bool is_configuration_error) {
         if (stage == next_raytracer_.get())
             return abandon_swap(std::exchange(next_raytracer_, nullptr), reason);

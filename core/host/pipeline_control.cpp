@@ -247,11 +247,13 @@ void Pipeline::execute(const control::Set &set, const control::Done &done) {
         throw control::Error(error.what());
     }
     OptionsInUse &options = options_[&configuration_of(**component)];
-    (*component)->set_option(value, [&options, value, done](const std::string &error) {
+    (*component)->set_option(value, [this, &options, value, done](const std::string &error) {
         if (const auto old = std::ranges::find(options.values, value.key, &OptionValue::key);
             error.empty() && old != options.values.end()) {
             *old = value;
             options.changed.insert(value.key);
+            if (raytracer_ && raytracer_->running()) // the new value may be the full number of samples
+                start_quality(*raytracer_);
         }
         done(error, {});
     });

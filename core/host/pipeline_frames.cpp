@@ -5,8 +5,12 @@
 
 #include "camera/mapping.hpp"
 
+#include <arhost/shading/lens.hpp>
+
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <tuple>
 
 namespace arhost::host {
 
@@ -260,20 +264,74 @@ bool Pipeline::render() {
         return false;
     frame->overlay = std::move(*slot);
     frame->stage = Frame::Stage::rendering;
+    frame->quality = raytracer_->quality ? raytracer_->quality->current() : Quality();
+    request_samples(*raytracer_, frame->quality.samples);
     Command command{};
     command.kind = CommandKind::render;
     command.slot = frame->overlay.index();
     command.sequence = frame->record.sequence;
     command.time_s = 1e-9 * static_cast<double>(frame->record.capture_ns);
     command.camera = frame->record.camera;
+    if (frame->quality.scale < 1) {
+        const auto [width, height] = overlay_size(frame->quality);
+        command.camera.intrinsics = shading::scaled(frame->record.camera.intrinsics, width, height);
+    }
     raytracer_->component->submit(command);
     return true;
+}
+
+// Begins to adapt the quality of images to `live.target_fps`, unless `stage` already does so within the same limits.
+void Pipeline::start_quality(RaytracerStage &stage) {
+    if (!live_ || configuration_.target_fps == 0)
+        return;
+    const PluginDescription &plugin = stage.component->description();
+    const auto supports = [&](std::uint32_t capability) { return (plugin.capabilities & capability) != 0; };
+    QualityController::Limits limits{.target_fps = configuration_.target_fps};
+    // The worker that warps the images of a plugin without support for lenses needs them in full size.
+    if (supports(ARHOST_CAPABILITY_SCALED_IMAGES) &&
+        (supports(ARHOST_CAPABILITY_LENS_DISTORTION) || intrinsics_.distortion == ARHOST_DISTORTION_NONE))
+        limits.min_scale = configuration_.min_scale;
+    const std::vector<OptionValue> &options = options_[stage.configuration].values;
+    const auto samples = std::ranges::find(options, "samples", &OptionValue::key);
+    if (samples != options.end() && samples->type == ARHOST_OPTION_INTEGER && samples->integer > 0 &&
+        std::ranges::count(plugin.changeable, "samples"))
+        limits.max_samples = static_cast<std::uint32_t>(samples->integer);
+    limits.min_samples = std::min(configuration_.min_samples, limits.max_samples);
+    stage.samples_in_use = limits.max_samples;
+    if (stage.quality && stage.quality->limits() == limits)
+        return;
+    stage.quality.emplace(limits);
+    if (stage.quality->is_lowest() && limits.min_samples == 0 && configuration_.min_scale < 1)
+        stage.component->log(ARHOST_SEVERITY_WARNING, plugin.id +
+                                                          " can render neither smaller images nor fewer samples; "
+                                                          "'live.target_fps' has no effect");
+}
+
+// Lets the images that are requested from now on have this number of samples; 0: does not change it.
+void Pipeline::request_samples(RaytracerStage &stage, std::uint32_t samples) {
+    if (samples == 0 || samples == stage.samples_in_use)
+        return;
+    stage.samples_in_use = samples;
+    OptionValue value;
+    value.key = "samples";
+    value.type = ARHOST_OPTION_INTEGER;
+    value.integer = samples;
+    // If a worker dies before it answers, start_quality() is called for the next one.
+    stage.component->set_option(value, [&stage](const std::string &error) {
+        if (!error.empty())
+            stage.quality.reset();
+    });
 }
 
 void Pipeline::on_rendered(const Command &command, const Result &result) {
     const std::chrono::nanoseconds busy(result.busy_ns), device = device_time(result.render, busy);
     if (device.count())
         statistics_.stages.add("device", device);
+    if (const auto frame = frames_.find(command.sequence); frame != frames_.end() && raytracer_->quality) {
+        if (result.status >= 0)
+            statistics_.quality_changes += raytracer_->quality->add(frame->second->quality, busy, Clock::now());
+        statistics_.quality = raytracer_->quality->current();
+    }
     Frame *accepted = accept_result(command, result, *raytracer_->component);
     if (!accepted)
         return;
@@ -283,15 +341,35 @@ void Pipeline::on_rendered(const Command &command, const Result &result) {
     frame.times.device = device;
     frame.record.overlay = frame.held ? ARHOST_OVERLAY_HELD : ARHOST_OVERLAY_RENDERED;
     frame.stage = Frame::Stage::done;
-    if (auto &checks = raytracer_->scene->overlay_checks) {
+    if (auto &checks = raytracer_->scene->overlay_checks; checks && frame.quality.scale == 1) {
         checks->check(statistics_.contract_checks, command.sequence, command.camera,
                       region_of(frame.render, format_->width, format_->height), overlay_of(frame));
         frame.overlay_sample = sample_hash(frame.overlay.bytes(), command.sequence);
     }
 }
 
+std::pair<std::uint32_t, std::uint32_t> Pipeline::overlay_size(const Quality &quality) const {
+    const auto scaled = [&](std::uint32_t side) {
+        return std::max(1u, static_cast<std::uint32_t>(std::lround(side * quality.scale)));
+    };
+    return {scaled(format_->width), scaled(format_->height)};
+}
+
 ImageView Pipeline::overlay_of(const Frame &frame) const {
-    return {reinterpret_cast<const std::uint8_t *>(frame.overlay.bytes().data()), overlay_stride(format_->width)};
+    return {reinterpret_cast<const std::uint8_t *>(frame.overlay.bytes().data()),
+            overlay_stride(overlay_size(frame.quality).first)};
+}
+
+// Returns the overlay in the size of the frame, and its region. It is valid until the next call.
+std::pair<ImageView, Region> Pipeline::full_size_overlay(const Frame &frame) {
+    const auto [width, height] = overlay_size(frame.quality);
+    const Region region = region_of(frame.render, width, height);
+    if (width == format_->width && height == format_->height)
+        return {overlay_of(frame), region};
+    const std::size_t stride = overlay_stride(format_->width);
+    enlarged_.resize(stride * format_->height);
+    const Region larger = enlarge(overlay_of(frame), width, height, region, *format_, enlarged_.data(), stride);
+    return {ImageView{enlarged_.data(), stride}, larger};
 }
 
 // Reports a contract violation if a buffer changed after hand-over.
@@ -384,8 +462,8 @@ bool Pipeline::compose() {
             return false; // no free slot: waits for the outputs, and the source has to wait, too
         is_shown = slot.has_value();
         if (slot) {
-            auto output =
-                std::make_shared<OutputFrame>(OutputFrame{ready->first, std::move(*slot), ready->second->captured});
+            auto output = std::make_shared<OutputFrame>(
+                OutputFrame{ready->first, std::move(*slot), ready->second->captured, ready->second->quality});
             compose(*ready->second, output->slot.bytes());
             if (configuration_.snapshot)
                 last_output_ = output;
@@ -427,10 +505,8 @@ void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
         planes[i] = pixels + format_->offset[i];
     ImageView overlay;
     Region region;
-    if (frame.record.overlay != ARHOST_OVERLAY_NONE) {
-        overlay = overlay_of(frame);
-        region = region_of(frame.render, format_->width, format_->height);
-    }
+    if (frame.record.overlay != ARHOST_OVERLAY_NONE)
+        std::tie(overlay, region) = full_size_overlay(frame);
     // Copies the record only up to its last used marker.
     const std::size_t used = offsetof(arhost_record, markers) + frame.record.marker_count * sizeof(arhost_marker);
     std::memcpy(slot.data(), &frame.record, used);

@@ -145,6 +145,7 @@ Json Pipeline::status() const {
               {"passed_unaugmented", statistics_.skipped}}},
             {"stages", std::move(stages)},
             {"latency", latency_json(statistics_, statistics_.latencies.recent())},
+            {"quality", quality_json(statistics_)},
             {"targets", std::move(targets)},
             {"components", std::move(components)},
             {"scene", raytracer_ ? Json(raytracer_->scene->name) : Json(nullptr)},

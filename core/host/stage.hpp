@@ -7,6 +7,7 @@
 #include "camera/coordinates.hpp"
 #include "host/contract_checks.hpp"
 #include "host/control.hpp"
+#include "host/quality.hpp"
 #include "host/slots.hpp"
 #include "run_config/configuration.hpp"
 
@@ -41,6 +42,8 @@ struct LoadedScene {
 struct RaytracerStage : Stage {
     const run_config::RaytracerConfiguration *configuration = nullptr;
     std::shared_ptr<LoadedScene> scene;
+    std::optional<QualityController> quality; // only with `live.target_fps`
+    std::uint32_t samples_in_use = 0;         // the option of the current worker
 };
 
 } // namespace arhost::host

@@ -118,6 +118,15 @@ Json latency_json(const Statistics &statistics, const StageTimings::ByName &late
     return {{"from", statistics.latency_from_capture ? "capture" : "arrival"}, {"outputs", std::move(outputs)}};
 }
 
+Json quality_json(const Statistics &statistics) {
+    if (!statistics.quality)
+        return nullptr;
+    Json json = {{"scale", statistics.quality->scale}, {"changes", statistics.quality_changes}};
+    if (statistics.quality->samples > 0)
+        json["samples"] = statistics.quality->samples;
+    return json;
+}
+
 std::string timeline_csv(const Statistics &statistics) {
     std::string text = "frame,shown_s,source_ms,tracker_ms,raytracer_ms,device_ms,composite_ms,latency_ms\n";
     for (const FrameTimes &times : statistics.timeline) {
@@ -146,6 +155,8 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
     for (const auto &[name, timing] : statistics.stages.all())
         json["stages"][name] = timing.to_json();
     json["latency"] = latency_json(statistics, statistics.latencies.all());
+    if (statistics.quality)
+        json["quality"] = quality_json(statistics);
     for (const auto &[name, check] : statistics.contract_checks.all()) {
         Json &entry = json["conformance"][name] = {{"checked", check.checked}, {"violations", check.violations}};
         if (check.violations > 0)

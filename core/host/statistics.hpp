@@ -4,6 +4,7 @@
 #pragma once
 
 #include "host/contract_checks.hpp"
+#include "host/quality.hpp"
 #include "supervise/component.hpp"
 
 #include <nlohmann/json_fwd.hpp>
@@ -12,6 +13,7 @@
 #include <cstdint>
 #include <deque>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -85,6 +87,8 @@ struct Statistics {
     // frame is composited. Both begin at the arrival of the frame if the source does not know when it was captured.
     StageTimings latencies;
     bool latency_from_capture = false;
+    std::optional<Quality> quality;    // requested from the ray tracer; only with `live.target_fps`
+    std::uint64_t quality_changes = 0; // how often it was changed
     EndedComponents ended;
     std::chrono::steady_clock::time_point first_frame{}, last_frame{};
     ContractChecks contract_checks;   // checks of the components with `conform: true`
@@ -98,6 +102,9 @@ std::string percentiles_text(const StageTimings::ByName &stages, const StageTimi
 
 // Returns the member `latency` of the statistics and of the status document.
 nlohmann::ordered_json latency_json(const Statistics &statistics, const StageTimings::ByName &latencies);
+
+// Returns the member `quality` of both; null without `live.target_fps`.
+nlohmann::ordered_json quality_json(const Statistics &statistics);
 
 // Returns CSV with a header and one line per frame:
 // frame,shown_s,source_ms,tracker_ms,raytracer_ms,device_ms,composite_ms,latency_ms. shown_s counts from the arrival

@@ -373,6 +373,15 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         node->allow_keys(keys_of("live"));
         configuration.max_latency =
             std::chrono::milliseconds(integer_or_default(*node, "live.max_latency_ms", 1, max_ms));
+        if (const auto target = node->find("target_fps"))
+            configuration.target_fps = target->real(0, 10'000);
+        for (const char *key : {"min_scale", "min_samples"})
+            if (const auto limit = node->find(key); limit && configuration.target_fps == 0)
+                limit->fail("this limit needs 'target_fps', the frame rate for which the quality is reduced");
+        if (const auto scale = node->find("min_scale"))
+            configuration.min_scale = scale->real(0.1, 1);
+        configuration.min_samples =
+            static_cast<std::uint32_t>(integer_or_default(*node, "live.min_samples", 1, 65536));
     }
     for (const auto &[key, file] :
          {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}})

@@ -82,6 +82,9 @@ struct Configuration {
     // The outputs that the commands `snapshot` and `record` start.
     std::optional<ComponentConfiguration> snapshot{}, record{};
     std::chrono::milliseconds max_latency{500};
+    double target_fps = 0; // mode live: frame rate for which the quality of images is reduced; 0: never
+    double min_scale = 0.5;
+    std::uint32_t min_samples = 1;
     std::vector<std::string> warnings{};
     std::optional<std::filesystem::path> stats{}, timeline{}; // absolute
     FilesInUse files{};                                       // without the files to which the scene refers

@@ -154,6 +154,12 @@ std::vector<Key> make_table() {
             {"live", map, false, "", "Settings of mode `live`."},
             {"live.max_latency_ms", integer, false, "500",
              "If tracking and tracing take longer than this, in ms, frames are shown without overlay."},
+            {"live.target_fps", real, false, "0",
+             "If the ray tracer is too slow for this frame rate, it renders with fewer samples, then smaller images; "
+             "0: never."},
+            {"live.min_scale", real, false, "0.5",
+             "Smallest size of the images relative to the frame, 0.1 to 1; 1: never smaller images."},
+            {"live.min_samples", integer, false, "1", "Smallest number of samples per pixel."},
 
             {"restart", map, false, "", "Restart policy for failed components."},
             {"restart.proven_after_frames", integer, false, "10",

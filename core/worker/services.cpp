@@ -176,11 +176,13 @@ public:
         const std::span<std::byte> output = memory.output.slot(command.slot);
         arhost_image image{};
         image.struct_size = sizeof image;
-        image.stride = overlay_stride(width_);
-        image.width = width_;
-        image.height = height_;
+        const bool is_scaled = (descriptor_.capabilities & ARHOST_CAPABILITY_SCALED_IMAGES) != 0 && !warp_;
+        image.width = is_scaled ? command.camera.intrinsics.width : width_;
+        image.height = is_scaled ? command.camera.intrinsics.height : height_;
+        image.stride = overlay_stride(image.width);
+        require(image.width <= width_ && image.height <= height_, "the image is larger than that of the setup");
         image.rgba = as_pixels(output);
-        require(output.size() >= std::uint64_t(image.stride) * height_, "the image slots are too small");
+        require(output.size() >= std::uint64_t(image.stride) * image.height, "the image slots are too small");
         arhost_render_request request{};
         request.struct_size = sizeof request;
         request.sequence = command.sequence;

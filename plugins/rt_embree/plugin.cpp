@@ -88,7 +88,8 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "arhost",
                                           "Apache-2.0",
                                           "CPU ray tracer that traces packets of 16 rays with Intel Embree.",
-                                          ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE,
+                                          ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE |
+                                              ARHOST_CAPABILITY_SCALED_IMAGES,
                                           std::size(options),
                                           options,
                                           nullptr};

@@ -107,8 +107,8 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
 }
 
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host)
-    : host_(host), intrinsics_((arhost::raytracer_common::check_setup(setup), *setup.intrinsics)),
-      kernel_(choose_kernel(settings.instruction_set)), threads_(settings.threads),
+    : host_(host), full_intrinsics_((arhost::raytracer_common::check_setup(setup), *setup.intrinsics)),
+      intrinsics_(full_intrinsics_), kernel_(choose_kernel(settings.instruction_set)), threads_(settings.threads),
       ray_table_(intrinsics_, settings.samples > 1 || settings.accumulate, threads_),
       samples_per_frame_(settings.samples), samples_(arhost::raytracer_common::sample_positions(settings.samples)),
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
@@ -132,7 +132,21 @@ void Renderer::set_light_samples(std::int32_t samples) {
     history_camera_.reset();
 }
 
+// Prepares for images of the size that the camera has, unless it is larger than that of the setup.
+void Renderer::set_size(const arhost_camera &camera) {
+    const std::uint32_t width = camera.intrinsics.width, height = camera.intrinsics.height;
+    if ((width == intrinsics_.width && height == intrinsics_.height) || width < 1 || height < 1 ||
+        width > full_intrinsics_.width || height > full_intrinsics_.height)
+        return;
+    intrinsics_ = arhost::shading::scaled(full_intrinsics_, width, height);
+    ray_table_ = RayTable(intrinsics_, ray_table_.rays().has_derivatives, threads_);
+    if (!history_.empty())
+        history_.resize(sum_rows * ray_table_.tiles().size() * tile_pixels);
+    history_camera_.reset();
+}
+
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
+    set_size(camera);
     arhost::raytracer_common::check_render(camera, image, intrinsics_);
     const Pose pose(camera);
     if (motion)

@@ -53,8 +53,11 @@ public:
     unsigned thread_count() const { return threads_.thread_count(); }
 
 private:
+    void set_size(const arhost_camera &camera);
+
     arhost::Host host_;
-    arhost_intrinsics intrinsics_;
+    const arhost_intrinsics full_intrinsics_; // those passed to start
+    arhost_intrinsics intrinsics_;            // of the ray table
     Kernel kernel_;
     ThreadPool threads_;
     RayTable ray_table_;

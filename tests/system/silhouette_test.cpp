@@ -122,3 +122,41 @@ INSTANTIATE_TEST_SUITE_P(Trackers, Silhouette,
                          testing::Values("tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}",
                                          "tracker_apriltag, options: {family: tag36h11}"),
                          [](const auto &info) { return info.index == 0 ? "Aruco" : "AprilTag"; });
+
+// No ray tracer reaches this frame rate, so the quality falls to its limits on every machine.
+TEST(ReducedQuality, KeepsTheOverlayInPlace) {
+    ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_synthetic, fps: 15, options: {frames: 60, "
+                  "family: tag36h11, id: 0, side_mm: 80}}\n"
+                  "camera: {width: 960, height: 540, fx: 760, fy: 755, cx: 489.3, cy: 262.8,\n"
+                  "  distortion: {model: brown, coefficients: [-0.21, 0.09, 0.0012, -0.0008, 0.01]}}\n"
+                  "tracker: {plugin: tracker_apriltag, markers: [{id: 0, side_mm: 80}]}\n"
+                  "raytracer: {plugin: rt_embree, scene: plate.yaml, options: {samples: 16}}\n"
+                  "live: {target_fps: 10000, min_scale: 0.5, min_samples: 2, max_latency_ms: 60000}\n"
+                  "outputs:\n- {plugin: sink_images, path: \"frames/%04d.png\"}\n"
+                  "- {plugin: sink_poses, path: poses.jsonl}\nstats: stats.json\n");
+    run.write("plate.yaml", plate);
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_EQ(run.stats()["quality"]["scale"], 0.5) << run.stats().dump(1);
+    EXPECT_EQ(run.stats()["quality"]["samples"], 2);
+    std::vector<std::string> lines;
+    std::istringstream poses(run.read("poses.jsonl"));
+    for (std::string line; std::getline(poses, line);)
+        lines.push_back(line);
+    ASSERT_GE(lines.size(), 3u);
+    const auto record = nlohmann::json::parse(lines.back());
+    char name[32];
+    std::snprintf(name, sizeof name, "frames/%04d.png", record["frame"].get<int>());
+    const cv::Mat image = cv::imread(run.path(name).string());
+    cv::Mat mask; // at least half green, also where the plate covers only a part of a pixel
+    cv::inRange(image, cv::Scalar(0, 190, 0), cv::Scalar(128, 255, 128), mask);
+    std::vector<std::vector<cv::Point>> contours;
+    cv::findContours(mask, contours, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
+    ASSERT_EQ(contours.size(), 1u) << name;
+    const std::vector<cv::Point2d> outline = true_outline(record["truth"]["mt"]);
+    double sum_px = 0;
+    for (const cv::Point &point : contours[0])
+        sum_px += distance_to_outline(point, outline);
+    EXPECT_LE(sum_px / static_cast<double>(contours[0].size()), 1.0);
+    const std::vector<cv::Point2f> polygon(outline.begin(), outline.end());
+    EXPECT_NEAR(cv::countNonZero(mask) / cv::contourArea(polygon), 1, 0.02);
+}

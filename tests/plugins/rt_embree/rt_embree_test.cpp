@@ -130,6 +130,37 @@ TEST(Silhouette, SphereBehindAFisheyeCameraIsVisible) {
     EXPECT_EQ(picture.alpha(static_cast<int>(in.cx + 60 * theta), 150), 255);
 }
 
+// ---- Scaled images ---------------------------------------------------------------------------------
+
+TEST(ScaledImage, EqualsThatOfARendererOfThisSize) {
+    const arhost_intrinsics full = with_lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001});
+    Tracer tracer(one_sphere({-30, 20, 300, 60}), {{"samples", "4"}});
+    const std::vector<Pixel> full_size = tracer.render(opencv_axes(full)).pixels();
+    for (const double scale : {0.5, 0.71, 0.1}) {
+        const arhost_intrinsics small =
+            shading::scaled(full, static_cast<std::uint32_t>(std::lround(scale * full.width)),
+                            static_cast<std::uint32_t>(std::lround(scale * full.height)));
+        ASSERT_EQ(tracer.start(full), ARHOST_STATUS_OK);
+        Picture picture(small), again(full);
+        ASSERT_EQ(tracer.try_render(opencv_axes(small), picture), ARHOST_STATUS_OK) << tracer.plugin().log();
+        EXPECT_TRUE(picture.only_pixels_written());
+        ASSERT_EQ(tracer.try_render(opencv_axes(full), again), ARHOST_STATUS_OK);
+        EXPECT_EQ(again.pixels(), full_size) << "the renderer must return to the full size";
+        EXPECT_EQ(picture.pixels(), tracer.render(opencv_axes(small)).pixels()) << scale;
+    }
+}
+
+TEST(ScaledImage, MustBeTheScaledViewAndNotLarger) {
+    Tracer tracer(one_sphere({0, 0, 300, 60}));
+    ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
+    arhost_intrinsics wrong = shading::scaled(pinhole(), 100, 75);
+    wrong.fx *= 1.01;
+    for (const arhost_intrinsics &in : {wrong, shading::scaled(pinhole(), 201, 150)}) {
+        Picture picture(in);
+        EXPECT_EQ(tracer.try_render(opencv_axes(in), picture), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+    }
+}
+
 // ---- Alpha classes ---------------------------------------------------------------------------------
 
 ArenaBuilder sphere_over_catcher(arhost_role floor_role = ARHOST_ROLE_CATCHER) {

@@ -196,8 +196,11 @@ enum {
     /* sink: accepts "-" as the option `path`, and then writes to standard output, descriptor 1. Without this
      * capability, the host rejects "-" as the path of an output. */
     ARHOST_CAPABILITY_STANDARD_OUTPUT = 1 << 12,
-    ARHOST_CAPABILITY_VIDEO_INPUT = 1 << 13,  /* sink: reads arhost_output.video */
-    ARHOST_CAPABILITY_OVERLAY_INPUT = 1 << 14 /* sink: reads arhost_output.overlay_rgba */
+    ARHOST_CAPABILITY_VIDEO_INPUT = 1 << 13,   /* sink: reads arhost_output.video */
+    ARHOST_CAPABILITY_OVERLAY_INPUT = 1 << 14, /* sink: reads arhost_output.overlay_rgba */
+    /* raytracer: renders images of any size up to that of the setup. The intrinsics of a request are then those of
+     * arhost::shading::scaled() (arhost/shading/lens.hpp), and arhost_image has their size. */
+    ARHOST_CAPABILITY_SCALED_IMAGES = 1 << 15
 };
 
 /* Describes the plugin. Static storage: valid as long as the library is loaded. Each string may have up to 4,096

@@ -19,7 +19,8 @@ typedef struct arhost_raytracer_setup {
     uint32_t width, height;              /* size of the images to render, px */
     uint32_t reserved;                   /* 0 */
     const arhost_scene *scene;           /* read-only, valid until `stop`; validated by the host */
-    const arhost_intrinsics *intrinsics; /* the same in every request; precompute ray tables here */
+    const arhost_intrinsics *intrinsics; /* the same in every request, except with ARHOST_CAPABILITY_SCALED_IMAGES;
+                                            precompute ray tables here */
 } arhost_raytracer_setup;
 
 typedef struct arhost_render_request {

@@ -58,7 +58,8 @@ typedef struct arhost_frame_buffer {
 /* Results of `read`. Zeroed by the worker except for struct_size. */
 typedef struct arhost_frame_info {
     uint32_t struct_size;
-    arhost_clock clock; /* required; the same clock for all frames */
+    arhost_clock clock; /* required; the same clock for all frames. Cameras use ARHOST_CLOCK_MONOTONIC: the host then
+                           measures latency from the capture, otherwise from the arrival of the frame */
     /* Capture time in ns of `clock`; never decreases. With ARHOST_CLOCK_MONOTONIC it is never in the future: if it is
      * more than 1 s ahead, the host rejects the frame and restarts the source. If format.fps is set, frames are on
      * average 1/fps apart, counting skipped frames; live sources may be slower. */

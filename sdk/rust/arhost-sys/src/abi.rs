@@ -100,6 +100,7 @@ pub const ARHOST_CAPABILITY_EVERY_SCENE: u32 = 4064;
 pub const ARHOST_CAPABILITY_STANDARD_OUTPUT: u32 = 4096;
 pub const ARHOST_CAPABILITY_VIDEO_INPUT: u32 = 8192;
 pub const ARHOST_CAPABILITY_OVERLAY_INPUT: u32 = 16384;
+pub const ARHOST_CAPABILITY_SCALED_IMAGES: u32 = 32768;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_descriptor {

@@ -14,6 +14,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <numbers>
 #include <optional>
 
@@ -36,6 +37,19 @@ inline BrownConrady brown_conrady_of(const arhost_intrinsics &intrinsics) {
 inline KannalaBrandt kannala_brandt_of(const arhost_intrinsics &intrinsics) {
     const auto k = coefficients_of(intrinsics);
     return {k[0], k[1], k[2], k[3]};
+}
+
+// Returns the intrinsics of an image with the same view in another size. The edges of both images coincide, so the
+// pixel (x, y) becomes ((x + 0.5)·width/in.width − 0.5, (y + 0.5)·height/in.height − 0.5).
+inline arhost_intrinsics scaled(arhost_intrinsics in, std::uint32_t width, std::uint32_t height) {
+    const double x = static_cast<double>(width) / in.width, y = static_cast<double>(height) / in.height;
+    in.width = width;
+    in.height = height;
+    in.fx *= x;
+    in.fy *= y;
+    in.cx = (in.cx + 0.5) * x - 0.5;
+    in.cy = (in.cy + 0.5) * y - 0.5;
+    return in;
 }
 
 class Lens {

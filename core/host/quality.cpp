@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/quality.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace arhost::host {
+namespace {
+
+constexpr double scale_step = 0.84; // an image with 0.7 times the pixels
+constexpr std::size_t min_images = 3;
+constexpr std::chrono::milliseconds window_length{500};
+constexpr int fast_windows_to_raise = 4, windows_to_confirm = 10;
+
+// Shares of the time per frame.
+constexpr double too_slow = 0.95; // lowers the quality
+constexpr double intended = 0.8;  // highest predicted time of the level that is then chosen
+constexpr double fast = 0.75;     // highest predicted time of a better level
+
+// A level that was too slow is tried again when the level below it takes this share of the time.
+constexpr double relief = 0.9;
+
+std::vector<Quality> levels_of(const QualityController::Limits &limits) {
+    std::vector<Quality> levels = {{1, limits.max_samples}};
+    while (levels.back().samples > std::max(limits.min_samples, 1u))
+        levels.push_back({1, std::max(levels.back().samples / 2, limits.min_samples)});
+    while (levels.back().scale > limits.min_scale)
+        levels.push_back({std::max(levels.back().scale * scale_step, limits.min_scale), levels.back().samples});
+    return levels;
+}
+
+double cost(const Quality &quality) {
+    return quality.scale * quality.scale * std::max(quality.samples, 1u);
+}
+
+} // namespace
+
+QualityController::QualityController(const Limits &limits) : limits_(limits), levels_(levels_of(limits)) {}
+
+double QualityController::relative_cost(std::size_t level) const {
+    return cost(levels_[level]) / cost(current());
+}
+
+void QualityController::change(std::size_t level) {
+    level_ = level;
+    ++changes_;
+    fast_windows_ = 0;
+}
+
+void QualityController::lower(double median) {
+    if (median_before_raise_ > 0) { // the last raise was a mistake
+        failed_level_ = level_;
+        failed_from_median_ = median_before_raise_;
+    }
+    median_before_raise_ = 0;
+    std::size_t level = level_ + 1;
+    while (level + 1 < levels_.size() && median * relative_cost(level) > intended)
+        ++level;
+    change(level);
+}
+
+bool QualityController::add(const Quality &quality, std::chrono::nanoseconds render_time, Clock::time_point now) {
+    if (quality != current())
+        return false;
+    if (window_.empty())
+        window_begin_ = now;
+    window_.push_back(std::chrono::duration<double>(render_time).count() * limits_.target_fps);
+    if (window_.size() < min_images || now - window_begin_ < window_length)
+        return false;
+    std::vector<double> times = std::exchange(window_, {});
+    const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
+    std::nth_element(times.begin(), middle, times.end());
+    const double median = *middle;
+
+    if (median_before_raise_ > 0 && ++windows_since_raise_ == windows_to_confirm)
+        median_before_raise_ = 0;
+    if (median > too_slow && !is_lowest()) {
+        lower(median);
+        return true;
+    }
+    const bool may_raise =
+        level_ > 0 && median * relative_cost(level_ - 1) <= fast &&
+        (failed_from_median_ == 0 || level_ - 1 != failed_level_ || median <= relief * failed_from_median_);
+    fast_windows_ = may_raise ? fast_windows_ + 1 : 0;
+    if (fast_windows_ < fast_windows_to_raise)
+        return false;
+    median_before_raise_ = median;
+    windows_since_raise_ = 0;
+    failed_from_median_ = 0;
+    change(level_ - 1);
+    return true;
+}
+
+} // namespace arhost::host

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/quality.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+using namespace arhost::host;
+
+namespace {
+
+using namespace std::chrono_literals;
+using Limits = QualityController::Limits;
+constexpr Limits full_limits{.target_fps = 30, .min_scale = 0.5, .min_samples = 1, .max_samples = 4};
+
+// A ray tracer whose image takes fixed_ms + ms · scale² · samples, times a noise of ± `noise`.
+class Simulation {
+public:
+    explicit Simulation(const Limits &limits) : controller(limits) {}
+
+    void run(std::chrono::seconds duration, double ms, double fixed_ms = 0, double noise = 0) {
+        std::uniform_real_distribution<double> factor(1 - noise, 1 + noise);
+        for (const auto end = now_ + duration; now_ < end;) {
+            const Quality quality = controller.current();
+            last_ms = fixed_ms + ms * quality.scale * quality.scale * std::max(quality.samples, 1u);
+            const auto time = std::chrono::duration_cast<std::chrono::nanoseconds>(
+                std::chrono::duration<double, std::milli>(last_ms * factor(random_)));
+            now_ += std::max<std::chrono::nanoseconds>(time, 33ms); // the camera's rate
+            controller.add(quality, time, now_);
+        }
+    }
+
+    QualityController controller;
+    double last_ms = 0; // render time without noise
+
+private:
+    QualityController::Clock::time_point now_{1h};
+    std::minstd_rand random_{1};
+};
+
+} // namespace
+
+TEST(Quality, StaysFullWithoutLoad) {
+    Simulation simulation(full_limits);
+    simulation.run(600s, 6, 0, 0.3);
+    EXPECT_EQ(simulation.controller.current(), (Quality{1, 4}));
+    EXPECT_EQ(simulation.controller.changes(), 0u);
+}
+
+TEST(Quality, ReachesTheTargetAfterAStepOfTheLoad) {
+    Simulation simulation(full_limits);
+    simulation.run(10s, 6);
+    simulation.run(3s, 60);
+    EXPECT_LE(simulation.last_ms, 33.4);
+    EXPECT_EQ(simulation.controller.current().samples, 1u);
+    EXPECT_LT(simulation.controller.current().scale, 1);
+}
+
+TEST(Quality, ReducesSamplesBeforeTheScale) {
+    Simulation simulation(full_limits);
+    simulation.run(5s, 12); // 48 ms with 4 samples, 24 ms with 2
+    EXPECT_EQ(simulation.controller.current(), (Quality{1, 2}));
+}
+
+TEST(Quality, StopsAtTheLimits) {
+    Simulation simulation(full_limits);
+    simulation.run(60s, 1000);
+    EXPECT_EQ(simulation.controller.current(), (Quality{0.5, 1}));
+    EXPECT_TRUE(simulation.controller.is_lowest());
+    EXPECT_EQ(simulation.controller.changes(), 1u) << "goes straight to the level that it needs";
+    Simulation fixed({.target_fps = 30});
+    fixed.run(60s, 1000);
+    EXPECT_EQ(fixed.controller.current(), (Quality{1, 0}));
+    EXPECT_EQ(fixed.controller.changes(), 0u);
+}
+
+TEST(Quality, AdaptsTheScaleAloneIfTheRayTracerHasNoSamples) {
+    Simulation simulation({.target_fps = 30, .min_scale = 0.25});
+    simulation.run(10s, 100);
+    EXPECT_EQ(simulation.controller.current().samples, 0u);
+    EXPECT_LE(simulation.last_ms, 33.4);
+}
+
+TEST(Quality, RecoversWhenTheLoadEnds) {
+    Simulation simulation(full_limits);
+    simulation.run(10s, 200);
+    EXPECT_TRUE(simulation.controller.is_lowest());
+    simulation.run(30s, 5);
+    EXPECT_EQ(simulation.controller.current(), (Quality{1, 4}));
+    simulation.run(10s, 200); // and again
+    simulation.run(30s, 5);
+    EXPECT_EQ(simulation.controller.current(), (Quality{1, 4}));
+}
+
+TEST(Quality, NeverOscillatesAtAConstantLoad) {
+    for (double ms = 2; ms < 400; ms *= 1.07)
+        for (const double fixed_ms : {0.0, 5.0, 20.0})
+            for (const double noise : {0.0, 0.1, 0.3}) {
+                Simulation simulation(full_limits);
+                simulation.run(20s, ms, fixed_ms, noise);
+                const std::uint64_t changes = simulation.controller.changes();
+                EXPECT_LE(changes, 6u) << ms << " ms + " << fixed_ms << " ms, noise " << noise;
+                simulation.run(600s, ms, fixed_ms, noise);
+                EXPECT_LE(simulation.controller.changes(), changes + 2)
+                    << ms << " ms + " << fixed_ms << " ms, noise " << noise;
+            }
+}
+
+// The cost model predicts that the better level is affordable, but it is not.
+TEST(Quality, DoesNotTryAgainWhatWasTooSlow) {
+    QualityController controller({.target_fps = 30, .min_samples = 1, .max_samples = 2});
+    auto now = QualityController::Clock::time_point(1h);
+    const auto run = [&](std::chrono::seconds duration, std::chrono::nanoseconds with_two,
+                         std::chrono::nanoseconds with_one) {
+        for (const auto end = now + duration; now < end;) {
+            const Quality quality = controller.current();
+            now += 40ms;
+            controller.add(quality, quality.samples == 2 ? with_two : with_one, now);
+        }
+    };
+    run(3600s, 40ms, 10ms);
+    EXPECT_EQ(controller.current().samples, 1u);
+    EXPECT_EQ(controller.changes(), 3u) << "down, one attempt, down again";
+    run(60s, 20ms, 5ms);
+    EXPECT_EQ(controller.current().samples, 2u) << "the load has decreased";
+}
+
+TEST(Quality, IgnoresASingleSlowImageAndImagesOfAnotherQuality) {
+    QualityController controller(full_limits);
+    auto now = QualityController::Clock::time_point(1h);
+    for (int i = 0; i < 1000; ++i) {
+        now += 33ms;
+        controller.add(controller.current(), i % 10 == 0 ? 500ms : 10ms, now);
+        controller.add({0.5, 1}, 500ms, now);
+    }
+    EXPECT_EQ(controller.changes(), 0u);
+}
