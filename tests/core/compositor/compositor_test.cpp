@@ -210,4 +210,66 @@ TEST(RegionOf, IsTheWholeImageUnlessTheRayTracerReportsOne) {
     EXPECT_EQ(reported.height, 8u);
 }
 
+// An opaque rectangle on a transparent background of another colour.
+struct SmallOverlay {
+    static constexpr std::uint32_t width = 40, height = 30;
+    static constexpr Region rectangle{10, 8, 12, 9};
+    Bytes rgba;
+    SmallOverlay() {
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t x = 0; x < width; ++x) {
+                const bool inside = x >= rectangle.x && x < rectangle.x + rectangle.width && y >= rectangle.y &&
+                                    y < rectangle.y + rectangle.height;
+                const std::uint8_t pixel[] = {static_cast<std::uint8_t>(inside ? 200 : 13), 50, 7,
+                                              static_cast<std::uint8_t>(inside ? 255 : 0)};
+                rgba.insert(rgba.end(), pixel, pixel + 4);
+            }
+    }
+    ImageView view() const { return {rgba.data(), 4 * std::size_t{width}}; }
+};
+
+TEST(Enlarge, KeepsThePlaceAndTheColour) {
+    const SmallOverlay overlay;
+    const arhost_frame_format format = layout(ARHOST_PIXEL_FORMAT_BGR8, 80, 60);
+    Bytes large(std::size_t{4} * 80 * 60, 99);
+    const Region region = enlarge(overlay.view(), SmallOverlay::width, SmallOverlay::height, SmallOverlay::rectangle,
+                                  format, large.data(), std::size_t{4} * 80);
+    double area = 0, sum_x = 0, sum_y = 0;
+    for (std::uint32_t y = 0; y < 60; ++y)
+        for (std::uint32_t x = 0; x < 80; ++x) {
+            const std::uint8_t *pixel = &large[4 * (std::size_t{80} * y + x)];
+            if (x < region.x || x >= region.x + region.width || y < region.y || y >= region.y + region.height) {
+                ASSERT_EQ(pixel[0], 99) << "nothing is written outside the region";
+                continue;
+            }
+            area += pixel[3] / 255.0;
+            sum_x += pixel[3] / 255.0 * x;
+            sum_y += pixel[3] / 255.0 * y;
+            if (pixel[3] > 0) {
+                EXPECT_EQ(pixel[0], 200) << "the colour of transparent pixels must not bleed";
+            }
+        }
+    EXPECT_NEAR(area, 4 * 12 * 9, 0.5);
+    EXPECT_NEAR(sum_x / area, (10 + 6) * 2 - 0.5, 0.01); // the centre; pixel centres are at integers
+    EXPECT_NEAR(sum_y / area, (8 + 4.5) * 2 - 0.5, 0.01);
+}
+
+TEST(Enlarge, AcceptsAnyRegionAndRatio) {
+    const SmallOverlay overlay;
+    std::mt19937 random(1);
+    for (int i = 0; i < 2000; ++i) {
+        const arhost_frame_format format = layout(ARHOST_PIXEL_FORMAT_BGR8, SmallOverlay::width + random() % 60,
+                                                  SmallOverlay::height + random() % 60);
+        Bytes large(std::size_t{4} * format.width * format.height);
+        const auto any = [&](std::uint32_t below) -> std::uint32_t {
+            return random() % 8 == 0 ? UINT32_MAX - random() % 2 : random() % below;
+        };
+        const Region region =
+            enlarge(overlay.view(), SmallOverlay::width, SmallOverlay::height, {any(50), any(40), any(50), any(40)},
+                    format, large.data(), std::size_t{4} * format.width);
+        ASSERT_LE(std::uint64_t{region.x} + region.width, format.width);
+        ASSERT_LE(std::uint64_t{region.y} + region.height, format.height);
+    }
+}
+
 } // namespace arhost
