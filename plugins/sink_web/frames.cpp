@@ -17,6 +17,7 @@ Frames::Frames(int quality) : quality_(quality), compressor_(tjInitCompress()) {
 void Frames::put(const arhost_output &output) {
     const std::size_t row = std::size_t{3} * output.width;
     written_.number = number_.load() + 1;
+    written_.received = std::chrono::steady_clock::now().time_since_epoch();
     written_.width = output.width;
     written_.height = output.height;
     written_.bgr.resize(row * output.height);
@@ -37,6 +38,7 @@ std::shared_ptr<const Jpeg> Frames::newest() {
     const int width = static_cast<int>(encoding_.width), height = static_cast<int>(encoding_.height);
     auto jpeg = std::make_shared<Jpeg>();
     jpeg->number = encoding_.number;
+    jpeg->received = encoding_.received;
     std::vector<std::uint8_t> file(tjBufSize(width, height, TJSAMP_420));
     unsigned char *bytes = file.data();
     unsigned long size = file.size();

@@ -4,11 +4,13 @@
 #include <arhost-cpp/plugin.hpp>
 
 #include <atomic>
+#include <chrono>
 
 namespace arhost::web {
 
 struct Jpeg {
-    std::uint64_t number; // of the frame
+    std::uint64_t number = 0;            // of the frame
+    std::chrono::nanoseconds received{}; // by the plugin, CLOCK_MONOTONIC
     std::vector<std::uint8_t> bytes;
 };
 
@@ -31,6 +33,7 @@ public:
 private:
     struct Picture {
         std::uint64_t number = 0;
+        std::chrono::nanoseconds received{};
         std::uint32_t width = 0, height = 0;
         std::vector<std::uint8_t> bgr; // without padding
     };

@@ -220,15 +220,13 @@ bool Server::process(const SharedRequest &request) {
             request->answer = error_text("the run is ending");
     }
     const std::string &path = request->path;
-    if (path == "/")
-        return respond_with_page(*request);
     if (path == "/stream.mjpg")
         return respond_with_stream(*request);
     if (path == "/snapshot.jpg")
         return respond_with_snapshot(*request);
     if (path == "/openapi.json")
         return respond(*request, MHD_HTTP_OK, "application/json", openapi_json());
-    if (path != "/api/status" && path != "/api/control" && path != "/metrics")
+    if (path != "/" && path != "/api/status" && path != "/api/control" && path != "/metrics")
         return refuse(*request, MHD_HTTP_NOT_FOUND, "there is no such resource");
     if (!request->answer.empty())
         return respond_with_answer(*request);
@@ -301,6 +299,8 @@ void Server::resume(const SharedRequest &request) {
 }
 
 bool Server::respond_with_answer(const Request &request) {
+    if (request.path == "/")
+        return respond_with_page(request);
     if (request.path == "/metrics") {
         OwnCounts own{frames_.number(), frames_.encoded(), 0, 0};
         {
@@ -320,10 +320,23 @@ bool Server::respond_with_answer(const Request &request) {
 
 bool Server::respond_with_page(const Request &request) {
     const std::string nonce = make_nonce();
-    constexpr std::string_view placeholder = "NONCE";
-    std::string page(page_html());
-    for (std::size_t at = 0; (at = page.find(placeholder, at)) != std::string::npos; at += nonce.size())
-        page.replace(at, placeholder.size(), nonce);
+    std::string status;
+    for (const char c : request.answer)
+        status += c == '<' ? "\\u003c" : std::string(1, c); // in JSON, it is always part of a string
+    const std::map<std::string_view, std::string> values = {{"nonce", nonce},
+                                                            {"status", status},
+                                                            {"width", std::to_string(settings_.width)},
+                                                            {"height", std::to_string(settings_.height)},
+                                                            {"token", settings_.token.empty() ? " hidden" : ""}};
+    std::string page;
+    std::string_view rest = page_html();
+    for (std::size_t at = 0; (at = rest.find("{{")) != std::string_view::npos;) {
+        const std::size_t end = rest.find("}}", at);
+        page += rest.substr(0, at);
+        page += values.at(rest.substr(at + 2, end - at - 2));
+        rest.remove_prefix(end + 2);
+    }
+    page += rest;
     return respond(request, MHD_HTTP_OK, "text/html; charset=utf-8", page, nonce);
 }
 
@@ -389,8 +402,8 @@ std::ptrdiff_t Server::read_stream(Viewer &viewer, std::span<char> to) {
             return MHD_CONTENT_READER_END_WITH_ERROR;
         viewer.jpeg = std::move(jpeg);
         viewer.number = viewer.jpeg->number;
-        viewer.head =
-            "Content-Type: image/jpeg\r\nContent-Length: " + std::to_string(viewer.jpeg->bytes.size()) + "\r\n\r\n";
+        viewer.head = "Content-Type: image/jpeg\r\nX-Received-Ns: " + std::to_string(viewer.jpeg->received.count()) +
+                      "\r\nContent-Length: " + std::to_string(viewer.jpeg->bytes.size()) + "\r\n\r\n";
         viewer.position = 0;
     }
     std::size_t copied = 0, begin = 0; // of the part within the whole

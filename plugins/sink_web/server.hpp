@@ -15,9 +15,10 @@ struct MHD_Response;
 namespace arhost::web {
 
 struct Settings {
-    int socket;        // listening
-    std::string token; // "": none
-    std::string hosts; // see is_own_host
+    int socket;                          // listening
+    std::string token;                   // "": none
+    std::string hosts;                   // see is_own_host
+    std::uint32_t width = 0, height = 0; // of the frames
 };
 
 // Serves the page, the live picture and the commands, in a thread of libmicrohttpd.

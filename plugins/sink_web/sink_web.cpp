@@ -14,7 +14,7 @@ public:
 
     WebSink(const arhost::Host &host, const arhost::Options &options)
         : host_(host), control_(host), frames_(static_cast<int>(options.integer("quality"))),
-          settings_{static_cast<int>(options.integer("listen")), options.text("token"), options.text("hosts")},
+          settings_{static_cast<int>(options.integer("listen")), options.text("token"), options.text("hosts"), 0, 0},
           address_(options.text("listen")) {
         if (settings_.socket < 0)
             fail("the option 'listen' must not be empty");
@@ -25,7 +25,9 @@ public:
                  ", so the option 'token' must be set; or set 'listen' to 127.0.0.1:PORT");
     }
 
-    void start(const arhost_sink_setup &) {
+    void start(const arhost_sink_setup &setup) {
+        settings_.width = setup.width;
+        settings_.height = setup.height;
         server_ = std::make_unique<arhost::web::Server>(settings_, frames_, control_);
         host_.info(address_.starts_with('/') ? "listens at " + address_ : "open http://" + address_ + "/");
     }

@@ -5,7 +5,11 @@
 #include "http_client.hpp"
 #include "sink_under_test.hpp"
 
+#include "base/unique_fd.hpp"
+
+#include <arhost/control.h>
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
 using namespace arhost::test;
 using testing::AllOf;
@@ -30,7 +34,11 @@ std::string yaml(const std::string &granted, const std::string &options) {
 class WebRun : public ArhostRun {
 public:
     explicit WebRun(const std::string &granted = "[quit, freeze, status]", const std::string &options = "")
-        : ArhostRun(yaml(granted, "listen: \"127.0.0.1:0\"" + (options.empty() ? "" : ", " + options))) {
+        : WebRun(Configuration{yaml(granted, "listen: \"127.0.0.1:0\"" + (options.empty() ? "" : ", " + options))}) {}
+    struct Configuration {
+        std::string text;
+    };
+    explicit WebRun(const Configuration &configuration) : ArhostRun(configuration.text) {
         write("scene.yaml", small_scene);
         start();
         const std::string url = "http://127.0.0.1:";
@@ -75,13 +83,41 @@ private:
     std::uint16_t port_ = 0;
 };
 
+// A connection from an address of this machine, which may be unable to connect. Closed by the destructor.
+class AnyConnection {
+public:
+    AnyConnection(std::uint16_t port, int address, const std::string &text, int receive_buffer = 0)
+        : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK, 0)) {
+        if (receive_buffer > 0)
+            ::setsockopt(fd_.get(), SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
+        sockaddr_in own{}, server{};
+        own.sin_family = server.sin_family = AF_INET;
+        own.sin_addr.s_addr = htonl(0x7f000100u + static_cast<unsigned>(address)); // 127.0.1.0 and following
+        server.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+        server.sin_port = htons(port);
+        ::bind(fd_.get(), reinterpret_cast<const sockaddr *>(&own), sizeof own);
+        ::connect(fd_.get(), reinterpret_cast<const sockaddr *>(&server), sizeof server);
+        (void)!::send(fd_.get(), text.data(), text.size(), MSG_NOSIGNAL);
+    }
+
+private:
+    arhost::base::UniqueFd fd_;
+};
+
+// A value of /proc/PID/status in bytes.
+std::size_t memory_of(pid_t pid, const std::string &name) {
+    const std::string text = read_file("/proc/" + std::to_string(pid) + "/status");
+    return 1024 * std::stoul(text.substr(text.find(name + ":") + name.size() + 1));
+}
+
 } // namespace
 
 TEST(SinkWeb, ServesThePageThePictureAndTheDescription) {
     WebRun run;
     const HttpAnswer page = run.get("/");
     EXPECT_EQ(page.status, 200);
-    EXPECT_THAT(page.body, AllOf(HasSubstr("src=\"/stream.mjpg\""), testing::Not(HasSubstr("NONCE"))));
+    EXPECT_THAT(page.body, AllOf(HasSubstr("src=\"/stream.mjpg\""), HasSubstr("width=\"160\" height=\"120\""),
+                                 HasSubstr("\"granted\":["), testing::Not(HasSubstr("{{"))));
     EXPECT_THAT(page.head, AllOf(HasSubstr("Content-Security-Policy: default-src 'none'"), HasSubstr("nosniff"),
                                  HasSubstr("X-Frame-Options: DENY"), HasSubstr("no-store")));
     EXPECT_NE(page.body, run.get("/").body) << "each page must have its own nonce";
@@ -284,4 +320,60 @@ TEST(SinkWeb, ARestartedWorkerServesAgain) {
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     EXPECT_NE(run.worker("sink_web"), worker);
     EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
+// Slow readers, malformed requests, partial requests and idle connections, more than the server accepts.
+TEST(SinkWeb, HostileClientsCostNoFrameAndLittleMemory) {
+    constexpr std::size_t width = 160, height = 120, connections = 2000;
+    rlimit limit{};
+    ::getrlimit(RLIMIT_NOFILE, &limit);
+    limit.rlim_cur = std::min<rlim_t>(limit.rlim_max, connections + 500);
+    ::setrlimit(RLIMIT_NOFILE, &limit);
+    if (limit.rlim_cur < connections + 500)
+        GTEST_SKIP() << "the limit of open files is " << limit.rlim_cur;
+    WebRun run(WebRun::Configuration{
+        "version: 1\nmode: live\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 0, width: 160, "
+        "height: 120}}\noutputs: [{plugin: sink_web, allow: [listen], control: [quit, status], options: {listen: "
+        "\"127.0.0.1:0\"}}]\nstats: stats.json\n"});
+    const pid_t worker = run.worker("sink_web");
+    HttpClient viewer = run.watch();
+    viewer.receive_to("\r\n\r\n");
+    ASSERT_NE(viewer.receive_frame(), "");
+    const std::size_t before = memory_of(worker, "VmRSS");
+
+    std::vector<AnyConnection> hostile;
+    hostile.reserve(connections + 200);
+    const auto attack = [&](std::size_t count, const std::string &text, int receive_buffer = 0) {
+        for (std::size_t i = 0; i < count; ++i)
+            hostile.emplace_back(run.port(), static_cast<int>(hostile.size() / 40), text, receive_buffer);
+        for (int i = 0; i < 15; ++i)
+            ASSERT_NE(viewer.receive_frame(), "") << run.output();
+    };
+    const std::string get = "GET / HTTP/1.1\r\nHost: localhost\r\n";
+    attack(40, "GET /stream.mjpg HTTP/1.1\r\nHost: localhost\r\n\r\n", 2048);
+    while (run.running() && run.get("/metrics").body.find("arhost_web_viewers 41\n") == std::string::npos)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    attack(40, "GET \1\2\3 HTTP/7\r\n: \r\n\r\n" + std::string(20000, 'x'));
+    attack(40, "POST /api/control HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: " +
+                   std::to_string(ARHOST_MAX_COMMAND_SIZE) + "\r\n\r\n" + std::string(16000, ' '));
+    attack(500, get + std::string(15000, 'x'));
+    attack(connections - 500, "");
+    const std::size_t peak = memory_of(worker, "VmHWM");
+    // The limits in the README: each connection has its headers and a command or a block of the stream, each viewer a
+    // frame, which is smaller than its pixels. Then what the library and the allocator need.
+    constexpr std::size_t allowed = 128 * ((16 + 64) << 10) + 48 * 3 * width * height + (6 << 20);
+#ifdef __SANITIZE_ADDRESS__ // delays freeing memory
+    constexpr bool is_exact = false;
+#else
+    constexpr bool is_exact = true;
+#endif
+    EXPECT_TRUE(peak < before + allowed || !is_exact) << peak << " bytes, from " << before << " bytes";
+
+    hostile.clear();
+    while (run.running() && run.get("/").status != 200)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_EQ(run.quit(), 0) << run.output();
+    const Json stats = run.stats();
+    EXPECT_EQ(stats["restarts"]["sink_web"], 0) << run.output(); // no call exceeded its deadline
+    EXPECT_EQ(stats["frames"]["dropped"].value("output", 0), 0) << stats["frames"];
 }
