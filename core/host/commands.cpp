@@ -191,6 +191,28 @@ run_config::Configuration replay_configuration(const Arguments &arguments, const
     return configuration;
 }
 
+// Returns the configuration without tracker and ray tracer, with a tracker of time codes.
+run_config::Configuration latency_configuration(const Arguments &arguments) {
+    yaml::Node root = yaml::Node::load(arguments.file);
+    std::string markers;
+    for (int id = 0; id < TimeCodes::count; ++id)
+        markers += fmt::format("{}{{id: {}, side_mm: 100}}", id > 0 ? ", " : "", id);
+    root.override_value("mode", "live", "arhost latency");
+    root.override_value("tracker", "{plugin: tracker_apriltag, markers: [" + markers + "]}", "arhost latency");
+    run_config::Configuration configuration = parse_configuration(root, arguments);
+    if (!configuration.source || configuration.outputs.empty())
+        throw yaml::Error(arguments.file + ": to measure latency, it needs the camera as 'source' and an output that "
+                                           "shows the picture, as in 'outputs: [{plugin: sink_window, allow: "
+                                           "[display]}]'");
+    configuration.time_codes = true;
+    configuration.raytracer.reset();
+    configuration.trajectory.reset();
+    for (run_config::ComponentConfiguration &output : configuration.outputs)
+        std::erase_if(output.control,
+                      [](const std::string &command) { return command != "quit" && command != "status"; });
+    return configuration;
+}
+
 void show_warnings(const run_config::Configuration &configuration, Console &console) {
     for (const std::string &warning : configuration.warnings)
         console.log(ARHOST_SEVERITY_WARNING, "arhost", warning);
@@ -293,6 +315,12 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
                     fmt::format("{} frames, {:.1f} fps, latency from {}, {}", statistics.composited, statistics.fps(),
                                 statistics.latency_from_capture ? "capture" : "arrival",
                                 percentiles_text(statistics.stages.all(), statistics.latencies.all())));
+    if (const auto &stages = statistics.stages.all(); stages.contains("glass_to_glass")) {
+        const Timing &timing = stages.at("glass_to_glass");
+        std::printf("glass to glass: p50 %.1f ms, p95 %.1f ms, p99 %.1f ms, maximum %.1f ms, in %llu measurements\n",
+                    timing.percentile_ms(0.50), timing.percentile_ms(0.95), timing.percentile_ms(0.99),
+                    timing.max_ms(), static_cast<unsigned long long>(timing.count()));
+    }
     log_contract_checks(statistics.contract_checks, console);
     bool written = true;
     if (configuration.stats && statistics.frames_in > 0)
@@ -504,6 +532,12 @@ fs::path own_folder() {
 
 int run(const Arguments &arguments, supervise::Starter &launcher) {
     return run(read_configuration(arguments), arguments, launcher);
+}
+
+int latency(Arguments arguments, supervise::Starter &launcher) {
+    if (!arguments.frames)
+        arguments.frames = 600;
+    return run(latency_configuration(arguments), arguments, launcher);
 }
 
 int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Starter &launcher) {

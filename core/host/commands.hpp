@@ -49,6 +49,8 @@ struct DevicesArguments {
 };
 
 int run(const Arguments &arguments, supervise::Starter &launcher);
+// Measures the time from the camera's lens to the display of the configuration's outputs.
+int latency(Arguments arguments, supervise::Starter &launcher);
 int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Starter &launcher);
 // Checks a configuration. If `open`, also starts source, tracker, ray tracer and outputs as a run does, and prints
 // what it found; outputs then write to a temporary folder.

@@ -91,6 +91,15 @@ int main(int argc, char **argv) {
         .type_name("FILE");
     add_configuration_options(replay_command, arguments);
 
+    CommandLine latency_command =
+        app.subcommand("latency", "Measure the time from the camera's lens to the display (docs/latency.md)");
+    latency_command.option("FILE", arguments.file, "The configuration, with the camera and the output to measure")
+        .required();
+    latency_command.option("--frames", arguments.frames, "Stop after N frames (default 600)")
+        .type_name("N")
+        .range(0.0, 1e15);
+    add_configuration_options(latency_command, arguments);
+
     bool no_open = false;
     CommandLine check_command = app.subcommand("check", "Check a configuration: open everything that a run opens");
     check_command.option("FILE", arguments.file, "The configuration").required();
@@ -169,6 +178,8 @@ int main(int argc, char **argv) {
         arhost::supervise::Launcher launcher(own_folder() / "arhost-launcher");
         if (replay_command.selected())
             return replay(arguments, replay_arguments, launcher);
+        if (latency_command.selected())
+            return latency(arguments, launcher);
         if (check_command.selected())
             return check(arguments, !no_open, launcher);
         if (plugins_command.selected())

@@ -19,6 +19,12 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
                                         const std::string &looked_for) {
     if (statistics.frames_in == 0)
         return std::nullopt;
+    if (configuration.time_codes)
+        return statistics.stages.all().contains("glass_to_glass")
+                   ? std::nullopt
+                   : std::optional(Problem{"latency", fmt::format("no time code was seen in any of {} frames; point "
+                                                                  "the camera at the output's picture",
+                                                                  statistics.frames_in)});
     const bool poses_from_tracker = configuration.tracker && !configuration.trajectory;
     if (poses_from_tracker && statistics.tracker_results == 0 && count(statistics.skipped, "tracker") > 0)
         return Problem{"tracker", "it delivered no result: it failed in every frame; see its messages above"};

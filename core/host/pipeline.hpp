@@ -18,6 +18,7 @@
 #include "host/sink_queue.hpp"
 #include "host/stage.hpp"
 #include "host/statistics.hpp"
+#include "host/time_codes.hpp"
 #include "run_config/configuration.hpp"
 
 #include <functional>
@@ -120,6 +121,7 @@ private:
     bool render();
     bool compose();
     void compose(Frame &frame, std::span<std::byte> slot);
+    void exchange_time_code(const arhost_record &record, const OutputView &out);
     void start_quality(RaytracerStage &stage);
     void request_samples(RaytracerStage &stage, std::uint32_t samples);
     std::pair<std::uint32_t, std::uint32_t> overlay_size(const Quality &quality) const; // width, height in px
@@ -212,6 +214,7 @@ private:
     std::map<const run_config::ComponentConfiguration *, OptionsInUse> options_;
     std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // with the number of its frame
 
+    std::optional<TimeCodes> time_codes_; // only for `arhost latency`
     Statistics statistics_;
     std::map<std::pair<std::string, arhost_status>, std::uint64_t>
         frame_errors_;                          // number of frames by stage and error

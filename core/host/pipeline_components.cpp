@@ -72,6 +72,8 @@ void Pipeline::make_source() {
             intrinsics_ = *configuration_.camera;
         else if (ready.intrinsics)
             intrinsics_ = *ready.intrinsics;
+        else if (configuration_.time_codes) // only the ids of markers matter
+            intrinsics_ = camera::dissertation_camera({format.width, format.height});
         else if (configuration_.tracker)
             source.node.fail("this source does not report camera intrinsics: add 'camera: {file: calibration.yaml}' "
                              "(docs/camera.md)");

@@ -510,12 +510,30 @@ void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
     // Copies the record only up to its last used marker.
     const std::size_t used = offsetof(arhost_record, markers) + frame.record.marker_count * sizeof(arhost_marker);
     std::memcpy(slot.data(), &frame.record, used);
-    composite(*format_, planes, overlay, region,
-              {reinterpret_cast<std::uint8_t *>(slot.data()) + OutputSlot::image_offset,
-               OutputSlot::stride(format_->width)});
+    const OutputView out{reinterpret_cast<std::uint8_t *>(slot.data()) + OutputSlot::image_offset,
+                         OutputSlot::stride(format_->width)};
+    if (configuration_.time_codes)
+        exchange_time_code(frame.record, out);
+    else
+        composite(*format_, planes, overlay, region, out);
     copy_sink_inputs(frame, overlay, region, slot);
     frame.times.composite = Clock::now() - begin;
     statistics_.stages.add("composite", frame.times.composite);
+}
+
+// Measures the age of the picture that the frame shows, and draws the next one.
+void Pipeline::exchange_time_code(const arhost_record &record, const OutputView &out) {
+    const Clock::time_point now = Clock::now();
+    if (!time_codes_)
+        time_codes_.emplace(now);
+    if (const auto age = time_codes_->see({record.markers, record.marker_count}, now))
+        statistics_.stages.add("glass_to_glass", *age);
+    if (time_codes_->is_overdue(std::chrono::seconds(5), now))
+        context_.log(ARHOST_SEVERITY_WARNING, "latency",
+                     "the camera has not shown a time code for 5 s: point it at the output's picture, so that the "
+                     "whole black square with its white border is in view, sharp, without reflections and not "
+                     "mirrored");
+    time_codes_->draw(out, format_->width, format_->height, now);
 }
 
 // Copies the video frame and the overlay for the sinks that read them.

@@ -103,6 +103,7 @@ std::string percentiles_text(const StageTimings::ByName &stages, const StageTimi
         if (const auto timing = timings.find(name); timing != timings.end())
             text += std::string("  ") + name + " " + timing->second.to_text();
     };
+    add(stages, "glass_to_glass");
     add(stages, "latency");
     for (const auto &[output, timing] : latencies)
         text += "  to " + output + " " + timing.to_text();

@@ -205,3 +205,18 @@ TEST(Live, LatencyCountsFromTheArrivalOfAFilm) {
     EXPECT_EQ(stats["latency"]["from"], "arrival");
     EXPECT_LT(stats["stages"]["latency"]["max_ms"], 30'000) << stats.dump(1);
 }
+
+TEST(Latency, SaysHowToShowTheTimeCodes) {
+    ArhostRun run(
+        "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {width: 320, height: 240, frames: "
+        "0, id: 300, side_mm: 80}}\noutputs: [{plugin: sink_null}]\nstats: stats.json\n");
+    ASSERT_EQ(run.run({"latency", "run.yaml", "--frames", "180"}), 1) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("the camera has not shown a time code for 5 s: point it at"));
+    EXPECT_THAT(run.output(), HasSubstr("error: latency: no time code was seen in any of "));
+}
+
+TEST(Latency, NeedsACameraAndAnOutput) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter}\n");
+    ASSERT_EQ(run.run({"latency", "run.yaml"}), 2) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("run.yaml: to measure latency, it needs the camera as 'source'"));
+}

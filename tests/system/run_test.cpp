@@ -443,7 +443,7 @@ TEST(CommandLine, CompletesInBash) {
         return run.output();
     };
     EXPECT_EQ(completed("arhost ch"), "check ");
-    EXPECT_EQ(completed("arhost la"), "lab.yaml ");
+    EXPECT_EQ(completed("arhost lab"), "lab.yaml ");
     EXPECT_EQ(completed("arhost plug"), "plugins ") << "the command, not the folder";
     EXPECT_EQ(completed("arhost --config la"), "lab.yaml ");
     EXPECT_EQ(completed("arhost --set la"), " ");
@@ -473,7 +473,7 @@ TEST(CommandLine, CompletesInFish) {
         return run.output();
     };
     EXPECT_EQ(completed("arhost ch"), "check\tCheck a configuration: open everything that a run opens\n");
-    EXPECT_EQ(completed("arhost la"), "lab.yaml\n");
+    EXPECT_EQ(completed("arhost lab"), "lab.yaml\n");
     EXPECT_EQ(completed("arhost --config la"), "lab.yaml\n");
     EXPECT_THAT(completed("arhost --allow"), testing::StartsWith("--allow-no-target\tExit with status 0 even if"));
     EXPECT_EQ(completed("arhost check la"), "lab.yaml\n");
@@ -499,7 +499,7 @@ TEST(CommandLine, CompletesInZsh) {
                              words + "'$'\\t'\nzpty -r -m shell output '*" + rest + "*'") == 0;
     };
     EXPECT_TRUE(completes("arhost ch", "eck "));
-    EXPECT_TRUE(completes("arhost la", "b.yaml "));
+    EXPECT_TRUE(completes("arhost lab", ".yaml "));
     EXPECT_TRUE(completes("arhost --config ", "lab.yaml "));
     EXPECT_TRUE(completes("arhost --allow", "-no-target "));
     EXPECT_TRUE(completes("arhost check ", "lab.yaml "));

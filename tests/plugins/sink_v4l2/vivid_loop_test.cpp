@@ -207,3 +207,15 @@ TEST_F(VividLoop, ARunContinuesWhenALostDeviceIsBack) {
     EXPECT_THAT(run.output(), HasSubstr("has disappeared"));
     EXPECT_GE(run.stats()["restarts"]["sink_v4l2"], 1) << run.output();
 }
+
+TEST_F(VividLoop, ARunMeasuresTheLatencyFromTheOutputToTheCamera) {
+    ArhostRun run("version: 1\nsource: {plugin: source_v4l2, allow: [video], options: {device: " + capture_.path() +
+                  ", width: 640, height: 480}}\noutputs: [{plugin: sink_v4l2, allow: [video], options: {device: " +
+                  output_.path() + "}}]\nlive: {max_latency_ms: 60000}\nstats: stats.json\n");
+    ASSERT_EQ(run.run({"latency", "run.yaml", "--frames", "150"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("glass to glass: p50 "));
+    const auto stats = run.stats();
+    EXPECT_GE(stats["stages"]["glass_to_glass"]["count"], 3) << stats.dump(1) << run.output();
+    // The light travels for no time, but each picture passes through the camera, the host and the output.
+    EXPECT_GT(stats["stages"]["glass_to_glass"]["p50_ms"], stats["stages"]["latency"]["p50_ms"]) << run.output();
+}

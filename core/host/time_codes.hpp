@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The pictures with which `arhost latency` measures the time from the camera's lens to the display: while the camera
+// is pointed at the window, each frame replaces the picture by the next one, and the tracker reports which picture a
+// frame shows. A picture is a tag of the family tag36h11: two tags that an exposure mixes are not mistaken for a
+// third, because all differ in 11 of 36 cells.
+#pragma once
+
+#include "compositor/compositor.hpp"
+
+#include <arhost/tracker.h>
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+namespace arhost::host {
+
+class TimeCodes {
+public:
+    using Clock = std::chrono::steady_clock;
+    static constexpr std::int32_t count = ARHOST_MAX_MARKERS; // pictures; their ids are 0 to count − 1
+
+    explicit TimeCodes(Clock::time_point now) : last_seen_(now) {}
+
+    // Fills the image with the next picture, whose time is `now`.
+    void draw(const OutputView &out, std::uint32_t width, std::uint32_t height, Clock::time_point now);
+    // Returns the age of the picture that a frame shows. Returns nullopt if it shows none or several, or if an
+    // earlier frame has already shown it. Ages above the time of `count` frames are reported too low.
+    std::optional<std::chrono::nanoseconds> see(std::span<const arhost_marker> markers, Clock::time_point now);
+    // Whether no frame has shown a picture for `limit`. Returns true at most once per `limit`.
+    bool is_overdue(std::chrono::nanoseconds limit, Clock::time_point now);
+
+private:
+    struct Picture {
+        Clock::time_point drawn{};
+        bool is_seen = true; // also if it was not drawn yet
+    };
+    std::array<Picture, count> pictures_;
+    std::uint64_t drawn_ = 0;
+    Clock::time_point last_seen_; // or the time of the last reminder
+};
+
+} // namespace arhost::host
