@@ -260,6 +260,18 @@ void log_contract_checks(const ContractChecks &checks, Console &console) {
                         " contract checks passed");
 }
 
+// Logs what the plugins have counted: "lost_by_driver 3, superseded 12".
+void log_counters(const EndedComponents &totals, Console &console) {
+    for (const auto &[component, counters] : totals.counters) {
+        std::vector<std::string> texts;
+        for (const auto &[name, value] : counters)
+            if (value > 0)
+                texts.push_back(fmt::format("{} {}", name, value));
+        if (!texts.empty())
+            console.log(ARHOST_SEVERITY_INFO, component, fmt::format("counted: {}", fmt::join(texts, ", ")));
+    }
+}
+
 int run(const run_config::Configuration &configuration, const Arguments &arguments, supervise::Starter &launcher) {
     sigset_t signals;
     ::sigemptyset(&signals);
@@ -321,6 +333,7 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
                     timing.percentile_ms(0.50), timing.percentile_ms(0.95), timing.percentile_ms(0.99),
                     timing.max_ms(), static_cast<unsigned long long>(timing.count()));
     }
+    log_counters(statistics.ended.and_running(pipeline.components()), console);
     log_contract_checks(statistics.contract_checks, console);
     bool written = true;
     if (configuration.stats && statistics.frames_in > 0)

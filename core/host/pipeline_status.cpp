@@ -97,7 +97,9 @@ Json Pipeline::status_of(const Component &component) const {
     const PluginDescription &plugin = component.description();
     Json json = {{"name", component.name()},         {"plugin", plugin.id},
                  {"version", plugin.version},        {"state", to_text(component.state())},
-                 {"restarts", component.restarts()}, {"sandbox", component.sandbox_level()}};
+                 {"restarts", component.restarts()}, {"sandbox", component.sandbox_level()},
+                 {"counters", component.counters()}};
+    json["missing_device"] = component.missing_device().empty() ? Json() : Json(component.missing_device());
     const auto options = options_.find(&configuration_of(component));
     json["options"] = options == options_.end() ? Json::array() : changeable_options(plugin, options->second.values);
     return json;

@@ -84,12 +84,21 @@ double StageTimings::recent_rate(const std::string &name, Clock::time_point now)
 void EndedComponents::add(const supervise::Component &component) {
     cpu_seconds[component.name()] += component.cpu_seconds();
     restarts[component.name()] += component.restarts();
+    for (const auto &[name, value] : component.counters())
+        counters[component.name()][name] += value;
     for (const supervise::Crash &crash : component.crashes())
         crashes.push_back({component.name(), crash});
     const auto is_of_component = [&](const Crash &crash) { return crash.component == component.name(); };
     auto count = std::ranges::count_if(crashes, is_of_component);
     for (; std::cmp_greater(count, supervise::Crash::max_kept); --count)
         crashes.erase(std::ranges::find_if(crashes, is_of_component));
+}
+
+EndedComponents EndedComponents::and_running(const std::vector<supervise::Component *> &components) const {
+    EndedComponents totals = *this;
+    for (const supervise::Component *component : components)
+        totals.add(*component);
+    return totals;
 }
 
 double Statistics::fps() const {
@@ -163,9 +172,7 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
         if (check.violations > 0)
             entry["first_violation"] = check.first_violation;
     }
-    EndedComponents totals = statistics.ended;
-    for (const supervise::Component *component : components)
-        totals.add(*component);
+    const EndedComponents totals = statistics.ended.and_running(components);
     double total = host_cpu_seconds;
     json["cpu_seconds"]["host"] = host_cpu_seconds;
     for (const auto &[name, seconds] : totals.cpu_seconds) {
@@ -174,6 +181,7 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
     }
     json["cpu_seconds"]["total"] = total;
     json["restarts"] = totals.restarts;
+    json["counters"] = Json(totals.counters);
     json["crashes"] = Json::array();
     for (const auto &[name, crash] : totals.crashes) {
         Json entry = {{"component", name}, {"plugin", crash.plugin}, {"how", crash.how}};

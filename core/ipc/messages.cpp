@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ipc/messages.hpp"
 
+#include <algorithm>
 #include <type_traits>
 
 // JSON conversion of ABI structs and other types by their own functions.
@@ -71,6 +72,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SetOption, option)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Answer, id, answer)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Request, id, command)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(OptionSet, status, text)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CountersChanged, counters)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Hello, descriptor, sandbox)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Devices, part, is_last)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Ready, format, frame_count, intrinsics)
@@ -161,9 +163,19 @@ ARHOST_MESSAGE(Progress)
 ARHOST_MESSAGE(Failed)
 ARHOST_MESSAGE(Request)
 ARHOST_MESSAGE(OptionSet)
+ARHOST_MESSAGE(CountersChanged)
 ARHOST_MESSAGE(End)
 ARHOST_MESSAGE(Reads)
 ARHOST_MESSAGE(Loaded)
 #undef ARHOST_MESSAGE
+
+bool are_valid(const Counters &counters) {
+    constexpr std::string_view characters = "abcdefghijklmnopqrstuvwxyz0123456789_";
+    return counters.size() <= ARHOST_MAX_COUNTERS && std::ranges::all_of(counters, [&](const auto &counter) {
+               const std::string &name = counter.first;
+               return !name.empty() && name.size() <= ARHOST_MAX_COUNTER_NAME &&
+                      name.find_first_not_of(characters) == std::string::npos;
+           });
+}
 
 } // namespace arhost::ipc

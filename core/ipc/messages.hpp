@@ -11,6 +11,7 @@
 #include "ipc/message.hpp"
 #include "sandbox/sandbox.hpp"
 
+#include <map>
 #include <stdexcept>
 #include <variant>
 
@@ -20,6 +21,10 @@ namespace arhost::ipc {
 class ProtocolViolation : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
+
+// The events that a plugin has counted, by name (arhost/counters.h).
+using Counters = std::map<std::string, std::uint64_t>;
+bool are_valid(const Counters &counters); // number and names
 
 namespace messages {
 
@@ -193,6 +198,12 @@ struct OptionSet {
     static constexpr const char *type = "option-set";
     arhost_status status = ARHOST_STATUS_OK;
     std::string text;
+};
+
+// Sent when the plugin's counters have changed.
+struct CountersChanged {
+    static constexpr const char *type = "counters";
+    Counters counters; // all of them
 };
 
 // A sink requests the end of the run, because the user closed its window.

@@ -27,6 +27,8 @@ std::string to_text(Call call, std::string_view per_frame) {
         return "while it listed its devices";
     case Call::set_option:
         return "in set";
+    case Call::counters:
+        return "while it listed its counters";
     }
     return "in an unknown call";
 }

@@ -60,7 +60,8 @@ enum class Call : std::uint32_t {
     stop,
     destroy,
     devices,
-    set_option
+    set_option,
+    counters
 };
 
 // Returns, for example, "in create" or "while its library was loaded". `per_frame`: name of the per-frame function of

@@ -156,6 +156,12 @@ void Component::on_message(Message &message) {
         const auto done = std::move(unset_options_.front());
         unset_options_.pop_front();
         done(status > 0 ? "" : text.empty() ? status_text(status) : text);
+    } else if (is<messages::CountersChanged>(message)) {
+        counters_ = parse<messages::CountersChanged>(message).counters;
+        if (!are_valid(counters_)) {
+            counters_.clear();
+            process_->end("protocol violation: invalid counters");
+        }
     } else if (!is<messages::Detached>(message)) {
         process_->end("protocol violation: unexpected message " + message.body["type"].dump());
     }
@@ -269,6 +275,8 @@ void Component::on_died(const Death &death) {
     cpu_seconds_of_dead_ += death.cpu_seconds;
     deadline_.cancel();
     total_deadline_.cancel();
+    counters_of_dead_ = counters();
+    counters_.clear();
     output_.reset();
     pending_output_.reset();
     attached_inputs_.clear();
@@ -385,6 +393,14 @@ void Component::stopped(arhost_status status, const std::string &text) {
     state_ = State::stopped;
     budget_.report_repetitions();
     callbacks_.stopped(status, text);
+}
+
+Counters Component::counters() const {
+    Counters sum = counters_of_dead_;
+    for (const auto &[name, value] : counters_)
+        if (sum.contains(name) || sum.size() < ARHOST_MAX_COUNTERS) // restarts must not add names without end
+            sum[name] += value;
+    return sum;
 }
 
 void Component::set_progress_deadline(std::chrono::milliseconds limit, const char *what) {

@@ -114,6 +114,8 @@ public:
     const std::string &sandbox_level() const { return sandbox_level_; } // as in messages::Hello
     // Logs a line for which the worker is responsible (WorkerBudget::log).
     void log(arhost_severity severity, const std::string &text) { budget_.log(severity, text); }
+    // The events that the plugin has counted, in all processes.
+    ipc::Counters counters() const;
     double cpu_seconds() const { return cpu_seconds_of_dead_ + (process_ ? process_->cpu_seconds() : 0); }
     const std::deque<Crash> &crashes() const { return crashes_; } // the last Crash::max_kept
 
@@ -171,6 +173,7 @@ private:
     std::uint64_t next_ticket_ = 1;
     std::uint32_t restarts_ = 0;
     double cpu_seconds_of_dead_ = 0;
+    ipc::Counters counters_, counters_of_dead_; // of the current process, and of those before it
     std::deque<Crash> crashes_;
     std::uint32_t deaths_in_stop_ = 0;
     ipc::Reactor::Registration deadline_, total_deadline_, restart_timer_;

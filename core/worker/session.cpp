@@ -3,6 +3,7 @@
 
 #include "sandbox/sandbox.hpp"
 #include "worker/command_sender.hpp"
+#include "worker/counters.hpp"
 #include "worker/devices.hpp"
 #include "worker/library.hpp"
 #include "worker/loader.hpp"
@@ -169,7 +170,25 @@ private:
         const auto end = std::chrono::steady_clock::now();
         result.busy_ns = (end - begin).count();
         result.ended_ns = std::chrono::nanoseconds(end.time_since_epoch()).count();
+        if (result.status < 0) // the host may then end the process
+            report_counters(end);
         link_.send_result(result);
+        if (end >= next_counters_)
+            report_counters(end);
+    }
+
+    // Sends the plugin's counters if they have changed.
+    void report_counters(std::chrono::steady_clock::time_point now) {
+        next_counters_ = now + std::chrono::milliseconds(500);
+        Counters counters;
+        {
+            const Link::InCall call(link_, Call::counters);
+            counters = list_counters(plugin_, instance_);
+        }
+        if (counters == counters_)
+            return;
+        counters_ = std::move(counters);
+        link_.send(messages::CountersChanged{counters_});
     }
 
     void handle_message() {
@@ -186,6 +205,7 @@ private:
         } else if (is<messages::SetOption>(message)) {
             link_.send(set(parse<messages::SetOption>(message).option));
         } else if (is<messages::Stop>(message)) {
+            report_counters(std::chrono::steady_clock::now());
             Link::InCall call(link_, Call::stop);
             const arhost_status status = service_->stop();
             link_.send(messages::Stopped{status, status == ARHOST_STATUS_OK ? std::string() : host_.last_error()});
@@ -225,6 +245,8 @@ private:
     Memory memory_;
     arhost_instance *instance_ = nullptr;
     std::unique_ptr<Service> service_;
+    Counters counters_; // as last sent
+    std::chrono::steady_clock::time_point next_counters_;
     bool stopped_ = false;
 };
 

@@ -89,6 +89,11 @@ MAX_COMMAND_SIZE = 16384
 MAX_PENDING_COMMANDS = 8
 SET_OPTION_EXTENSION = 'arhost.set_option/1'
 
+# arhost/counters.h
+COUNTERS_EXTENSION = 'arhost.counters/1'
+MAX_COUNTERS = 32
+MAX_COUNTER_NAME = 63
+
 # arhost/frame.h
 PIXEL_FORMAT_GREY8 = 1
 PIXEL_FORMAT_RGB8 = 2

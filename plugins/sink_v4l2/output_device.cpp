@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "output_device.hpp"
 
+#include "camera_common/fourcc.hpp"
+
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/ioctl.h>
@@ -21,13 +23,6 @@ bool is_gone(int error) {
 }
 
 } // namespace
-
-std::string fourcc_text(std::uint32_t fourcc) {
-    std::string text;
-    for (int i = 0; i < 4; ++i)
-        text += static_cast<char>(fourcc >> (8 * i) & 0x7f);
-    return text;
-}
 
 void OutputDevice::Unmap::operator()(std::uint8_t *address) const {
     munmap(address, size);

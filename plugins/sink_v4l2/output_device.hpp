@@ -81,6 +81,4 @@ private:
     std::uint32_t current_ = 0;       // index of the buffer that begin_image has returned
 };
 
-std::string fourcc_text(std::uint32_t fourcc); // such as "YUYV"
-
 } // namespace arhost

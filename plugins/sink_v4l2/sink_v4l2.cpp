@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // sink_v4l2: writes frames to a Video4Linux output device, for example a virtual camera.
+#include "camera_common/fourcc.hpp"
 #include "libav_common/bgr_converter.hpp"
 #include "output_device.hpp"
 

@@ -42,6 +42,11 @@ double Receiver::fps() {
     return fps_;
 }
 
+Receiver::Losses Receiver::losses() const {
+    const std::lock_guard lock(mutex_);
+    return losses_;
+}
+
 void Receiver::run(const std::stop_token &stop) {
     while (!stop.stop_requested()) {
         try {
@@ -50,8 +55,11 @@ void Receiver::run(const std::stop_token &stop) {
         } catch (const Failure &failure) {
             if (!has_received_ && !settings_.retries_at_once)
                 return finish(std::current_exception());
-            if (!std::exchange(is_lost_, true) && !stop.stop_requested())
+            if (!std::exchange(is_lost_, true) && !stop.stop_requested()) {
                 host_.warn(std::string(failure.what()) + "; reconnecting until it is back");
+                const std::lock_guard lock(mutex_);
+                ++losses_.connections;
+            }
         } catch (...) {
             return finish(std::current_exception());
         }
@@ -124,12 +132,14 @@ void Receiver::publish(const Stream &stream) {
     const std::lock_guard lock(mutex_);
     fps_ = stream.fps();
     skipped_ += stream.damaged();
+    losses_.damaged += stream.damaged();
     received.skipped = std::exchange(skipped_, 0);
     kept_.push_back(std::move(received));
     if (kept_.size() > settings_.capacity) {
         const std::uint32_t dropped = kept_.front().skipped + 1;
         kept_.pop_front();
         kept_.front().skipped += dropped;
+        ++losses_.superseded;
     }
     changed_.notify_all();
 }

@@ -39,6 +39,12 @@ public:
     bool ended();
     double fps(); // 0: unknown
 
+    // Numbers of pictures that were not delivered, by cause, and of lost connections.
+    struct Losses {
+        std::uint64_t damaged = 0, superseded = 0, connections = 0;
+    };
+    Losses losses() const;
+
 private:
     void run(const std::stop_token &stop);
     void receive(const std::stop_token &stop);
@@ -59,10 +65,11 @@ private:
     std::chrono::milliseconds delay_ = first_delay; // before the next attempt
     std::optional<std::int64_t> epoch_ns_; // CLOCK_MONOTONIC at time stamp 0, for streams that are ahead of time
 
-    std::mutex mutex_;
+    mutable std::mutex mutex_;
     std::condition_variable_any changed_;
     std::deque<Received> kept_;
     std::uint32_t skipped_ = 0; // pictures since the newest kept one, or since the last taken one
+    Losses losses_;
     double fps_ = 0;
     bool ended_ = false;
     std::exception_ptr error_;

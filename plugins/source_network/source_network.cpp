@@ -76,6 +76,12 @@ public:
         return ARHOST_STATUS_OK;
     }
 
+    std::vector<arhost::CounterValue> counters() const {
+        const arhost::Receiver::Losses losses = receiver_->losses();
+        return {
+            {"damaged", losses.damaged}, {"superseded", losses.superseded}, {"lost_connections", losses.connections}};
+    }
+
     void stop() { receiver_.reset(); }
 
 private:

@@ -124,11 +124,18 @@ const ControlDefinition *Controls::find(std::string_view name) const {
     return found != definitions.end() && unit_of(*found) ? &*found : nullptr;
 }
 
-void Controls::fail_missing(std::string_view name, const std::string &key) const {
-    std::string names;
+std::vector<const ControlDefinition *> Controls::all() const {
+    std::vector<const ControlDefinition *> found;
     for (const ControlDefinition &control : definitions)
         if (unit_of(control))
-            names += (names.empty() ? "" : ", ") + std::string(control.name);
+            found.push_back(&control);
+    return found;
+}
+
+void Controls::fail_missing(std::string_view name, const std::string &key) const {
+    std::string names;
+    for (const ControlDefinition *control : all())
+        names += (names.empty() ? "" : ", ") + std::string(control->name);
     device_.fail_configuration(key, "has no control '" + std::string(name) + "'" +
                                         (names.empty() ? "" : "; it has: " + names));
 }
@@ -172,6 +179,11 @@ ControlValues Controls::values_of(const ControlDefinition &control) const {
     return values;
 }
 
+std::optional<std::int64_t> Controls::value_of(const ControlDefinition &control) const {
+    const std::vector<std::uint8_t> data = read(get_current, control);
+    return data.empty() ? std::nullopt : std::optional(item_of(control, decode(control, data)));
+}
+
 std::string Controls::set(const ControlDefinition &control, std::string_view text, const std::string &key) const {
     const std::string name(control.name);
     const ControlValues values = values_of(control);
@@ -202,25 +214,10 @@ std::string Controls::set(const ControlDefinition &control, std::string_view tex
     }
     if (sent < 0)
         device_.fail("setting '" + name + "' to " + std::string(text), sent);
-    const std::vector<std::uint8_t> found = read(get_current, control);
-    const std::int64_t now = found.empty() ? *value : item_of(control, decode(control, found));
+    const std::int64_t now = value_of(control).value_or(*value);
     if (now == *value)
         return "";
     return "the camera has set '" + name + "' to " + std::to_string(now) + " instead of " + std::to_string(*value);
-}
-
-std::vector<std::string> Controls::set_list(std::string_view list, const std::string &key) const {
-    std::vector<std::string> warnings;
-    for (const ControlSetting &setting : split_settings(list)) {
-        if (!setting.value || setting.name.empty())
-            device_.fail_configuration(key, "cannot be set up: '" + setting.text + "' is not of the form NAME=VALUE");
-        const ControlDefinition *control = find(setting.name);
-        if (!control)
-            fail_missing(setting.name, key);
-        if (const std::string warning = set(*control, *setting.value, key); !warning.empty())
-            warnings.push_back(warning);
-    }
-    return warnings;
 }
 
 std::vector<std::string> Controls::set_extensions(std::string_view list, const std::string &key) const {

@@ -31,19 +31,22 @@ public:
 
     // The control of this name, if the camera has it.
     const ControlDefinition *find(std::string_view name) const;
+    std::vector<const ControlDefinition *> all() const;
     ControlValues values_of(const ControlDefinition &control) const;
+    // Returns the current value, or std::nullopt if it cannot be read.
+    std::optional<std::int64_t> value_of(const ControlDefinition &control) const;
 
     // Sets a control to a value in text form. `key` names the option for messages. Returns a warning if the camera
     // sets another value, else an empty string.
     std::string set(const ControlDefinition &control, std::string_view text, const std::string &key) const;
 
-    // Sets controls as listed by a user: "gain=20, auto_exposure=manual_mode", in this order. Returns the warnings.
-    std::vector<std::string> set_list(std::string_view list, const std::string &key) const;
-
     // Sets controls of extension units as listed by a user: "UNIT:SELECTOR=BYTES", with the unit's ID or GUID and
     // hexadecimal bytes: "4:9=01ff, 28f03370-…:2=00". Returns the warnings.
     std::vector<std::string> set_extensions(std::string_view list, const std::string &key) const;
 
+    [[noreturn]] void fail(const std::string &key, const std::string &what) const {
+        device_.fail_configuration(key, what);
+    }
     // The camera has no such control.
     [[noreturn]] void fail_missing(std::string_view name, const std::string &key) const;
 

@@ -23,6 +23,14 @@ constexpr std::size_t max_functions = 16, max_units = 64, max_streams = 16, max_
 constexpr std::uint32_t intervals_per_second = 10'000'000; // frame intervals have units of 100 ns
 
 enum class Encoding { yuy2, nv12, mjpeg, unsupported };
+struct NamedEncoding {
+    Encoding encoding;
+    const char *name; // value of the option `format`
+};
+constexpr NamedEncoding encodings[] = { // in the order of preference
+    {Encoding::yuy2, "yuyv"},
+    {Encoding::nv12, "nv12"},
+    {Encoding::mjpeg, "mjpeg"}};
 
 // A frame size. The intervals are either a list or, if that is empty, a range. A maximum of 0: the camera lists none.
 struct FrameSize {

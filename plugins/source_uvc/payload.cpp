@@ -58,22 +58,6 @@ void Losses::count(Damage damage) {
     }
 }
 
-std::string Losses::text() const {
-    std::string list;
-    const auto add = [&](std::uint64_t count, const char *cause) {
-        if (count > 0)
-            list += (list.empty() ? "" : ", ") + std::to_string(count) + " " + cause;
-    };
-    add(marked, "marked as damaged by the camera");
-    add(lost_packet, "damaged on the USB bus");
-    add(malformed, "with malformed payloads");
-    add(truncated, "truncated");
-    add(oversized, "larger than announced");
-    add(undecodable, "undecodable");
-    add(superseded, "replaced by newer ones or not read in time");
-    return list;
-}
-
 FrameAssembler::FrameAssembler(std::size_t max_bytes, std::size_t exact_bytes, Take take)
     : max_bytes_(max_bytes), exact_bytes_(exact_bytes), take_(std::move(take)) {
     frame_.bytes.reserve(max_bytes);

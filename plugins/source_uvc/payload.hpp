@@ -35,11 +35,10 @@ struct Losses {
     std::uint64_t lost_packet = 0; // on the bus
     std::uint64_t malformed = 0;   // payloads without a valid header
     std::uint64_t truncated = 0, oversized = 0;
-    std::uint64_t undecodable = 0; // by the JPEG decoder
-    std::uint64_t superseded = 0;  // replaced by a newer one, or not read in time
+    std::uint64_t superseded = 0; // replaced by a newer one, or not read in time
 
     void count(Damage damage);
-    std::string text() const; // "1 truncated, 2 marked as damaged by the camera"; empty if there are none
+    bool operator==(const Losses &) const = default;
 };
 
 struct AssembledFrame {

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // source_uvc: captures frames from USB cameras (UVC 1.0 to 1.5) through libusb, without the kernel's camera driver.
+#include "cameras.hpp"
 #include "controls.hpp"
 #include "negotiation.hpp"
 #include "stream.hpp"
 #include "usb.hpp"
 
+#include "camera_common/control_options.hpp"
 #include "camera_common/frame_size.hpp"
 #include "camera_common/jpeg.hpp"
 #include "camera_common/start_camera.hpp"
@@ -27,30 +29,12 @@ using Clock = std::chrono::steady_clock;
 constexpr auto silence_limit = std::chrono::seconds(5);
 constexpr auto poll_slice = std::chrono::milliseconds(50);
 
-// An option that sets a frequent control, which has an automatic mode.
-struct ControlOption {
-    const char *name, *value, *mode;             // value, mode: names of controls
-    std::vector<const char *> automatic, manual; // values of the mode, in the order of preference
+constexpr arhost::AutomaticControl<std::string_view> automatic_controls[] = {
+    {"exposure", "exposure_time_absolute", "auto_exposure"},
+    {"gain", "gain", ""}, // the class defines no automatic gain; automatic exposure includes it
+    {"focus", "focus_absolute", "focus_automatic_continuous"},
+    {"white_balance", "white_balance_temperature", "white_balance_automatic"},
 };
-const ControlOption control_options[] = {
-    {"exposure",
-     "exposure_time_absolute",
-     "auto_exposure",
-     {"auto_mode", "aperture_priority_mode"},
-     {"manual_mode", "shutter_priority_mode"}},
-    {"gain", "gain", nullptr, {}, {}}, // the class defines no automatic gain; automatic exposure includes it
-    {"focus", "focus_absolute", "focus_automatic_continuous", {"true"}, {"false"}},
-    {"white_balance", "white_balance_temperature", "white_balance_automatic", {"true"}, {"false"}},
-};
-
-struct Encoding {
-    uvc::Encoding encoding;
-    const char *name; // value of the option `format`
-};
-constexpr Encoding encodings[] = { // in the order of preference
-    {uvc::Encoding::yuy2, "yuyv"},
-    {uvc::Encoding::nv12, "nv12"},
-    {uvc::Encoding::mjpeg, "mjpeg"}};
 
 // A frame size in a format of a streaming interface.
 struct Mode {
@@ -68,12 +52,17 @@ std::string rate_text(double fps) {
 
 class UvcSource {
 public:
+    // Not `extension`: an output that may change options could otherwise replace the firmware of some cameras.
+    static constexpr const char *changeable[] = {"exposure", "gain", "focus", "white_balance", "power_line_frequency",
+                                                 "controls", nullptr};
+
+    static std::vector<arhost::Device> devices() { return uvc::list_cameras(); }
+
     UvcSource(const arhost::Host &host, const arhost::Options &options)
         : host_(host), configured_size_{static_cast<std::uint32_t>(options.integer("width")),
                                         static_cast<std::uint32_t>(options.integer("height"))},
           camera_(static_cast<std::size_t>(options.integer("camera"))), format_option_(options.text("format")),
-          controls_option_(options.text("controls")), extension_option_(options.text("extension")),
-          power_line_option_(options.text("power_line_frequency")),
+          control_values_(arhost::given_options(options, changeable)), extension_option_(options.text("extension")),
           buffer_count_(static_cast<std::size_t>(options.integer("buffers"))) {
         if ((configured_size_.width == 0) != (configured_size_.height == 0))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: set both or neither");
@@ -83,9 +72,6 @@ public:
                 throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                               "usb: '" + usb + "' is not of the form VENDOR:PRODUCT[:SERIAL], such as 046d:0825");
         }
-        for (const ControlOption &option : control_options)
-            if (const std::string text = options.text(option.name); !text.empty())
-                control_values_.emplace_back(&option, text);
     }
     ~UvcSource() { stop(); }
 
@@ -116,15 +102,23 @@ public:
         }
     }
 
+    void set(const arhost::Options &changed) {
+        set_controls(choose_function(), arhost::given_options(changed, changeable));
+    }
+
+    std::vector<arhost::CounterValue> counters() const {
+        const uvc::Losses losses = stream_->losses();
+        return {{"marked_damaged", losses.marked},
+                {"lost_packet", losses.lost_packet},
+                {"malformed", losses.malformed},
+                {"truncated", losses.truncated},
+                {"oversized", losses.oversized},
+                {"undecodable", undecodable_},
+                {"superseded", losses.superseded + superseded_}};
+    }
+
     void stop() {
-        if (stream_) {
-            uvc::Losses losses = stream_->losses();
-            losses.undecodable = undecodable_;
-            losses.superseded += superseded_;
-            stream_.reset();
-            if (const std::string text = losses.text(); !text.empty())
-                host_.info("frames of the camera that were not delivered: " + text);
-        }
+        stream_.reset();
         // The kernel's driver takes all interfaces when it gets the control interface, so that must be free last.
         for (; device_ && !claimed_.empty(); claimed_.pop_back())
             device_->release(claimed_.back());
@@ -139,7 +133,10 @@ private:
         const Mode mode = choose_mode(function, setup);
         claim(function.control_interface);
         claim(mode.stream->number);
-        set_controls(function);
+        // Before the stream starts, so that the first frame has them.
+        set_controls(function, control_values_);
+        arhost::show_warnings(host_,
+                              uvc::Controls(*device_, function).set_extensions(extension_option_, "extension"));
         const uvc::ProbeControl agreed = negotiate(function, mode, setup.fps);
         const std::string what = mode.format->name + " " + mode.size().text();
         const double fps =
@@ -208,7 +205,7 @@ private:
     // Returns the modes that the camera offers and the option `format` permits, in the order of preference.
     std::vector<Mode> permitted_modes(const uvc::VideoFunction &function) const {
         std::vector<Mode> modes;
-        for (const auto &[encoding, name] : encodings)
+        for (const auto &[encoding, name] : uvc::encodings)
             for (const uvc::StreamingInterface &stream : function.streams)
                 for (const uvc::Format &format : stream.formats)
                     if (format.encoding == encoding && (format_option_ == "auto" || format_option_ == name))
@@ -246,41 +243,26 @@ private:
                    : *std::ranges::max_element(modes, {}, [](const Mode &mode) { return mode.frame->max_fps(); });
     }
 
-    // Sets the controls before the stream starts, so that the first frame has them.
-    void set_controls(const uvc::VideoFunction &function) const {
+    void set_controls(const uvc::VideoFunction &function,
+                      const std::vector<std::pair<std::string, std::string>> &values) const {
         const uvc::Controls controls(*device_, function);
-        const auto warn = [&](const std::string &warning) {
-            if (!warning.empty())
-                host_.warn(warning);
-        };
-        const auto set = [&](const char *name, const std::string &text, const std::string &key) {
-            const uvc::ControlDefinition *control = controls.find(name);
-            if (!control)
-                controls.fail_missing(name, key);
-            warn(controls.set(*control, text, key));
-        };
-        for (const auto &[option, text] : control_values_) {
-            const bool is_automatic = text == "auto";
-            if (const uvc::ControlDefinition *mode = option->mode ? controls.find(option->mode) : nullptr) {
-                const arhost::ControlValues accepted = controls.values_of(*mode);
-                // The last value is an error of set() if the camera has none of them.
-                const std::vector<const char *> &values = is_automatic ? option->automatic : option->manual;
-                const auto value = std::find_if(values.begin(), values.end() - 1, [&](const char *candidate) {
-                    return arhost::parse_value(accepted, candidate).has_value();
-                });
-                warn(controls.set(*mode, *value, option->name));
-            } else if (is_automatic) {
-                controls.fail_missing(std::string("auto ") + option->name, option->name);
-            }
-            if (!is_automatic)
-                set(option->value, text, option->name);
-        }
-        if (!power_line_option_.empty())
-            set("power_line_frequency", power_line_option_, "power_line_frequency");
-        for (const std::string &warning : controls.set_list(controls_option_, "controls"))
-            warn(warning);
-        for (const std::string &warning : controls.set_extensions(extension_option_, "extension"))
-            warn(warning);
+        for (const auto &[key, text] : values)
+            arhost::show_warnings(host_, set_control(controls, key, text));
+    }
+
+    // Sets the controls of an option. Returns warnings.
+    static std::vector<std::string> set_control(const uvc::Controls &controls, const std::string &key,
+                                                const std::string &text) {
+        if (const auto *found =
+                std::ranges::find(automatic_controls, key, &arhost::AutomaticControl<std::string_view>::key);
+            found != std::end(automatic_controls))
+            return arhost::set_automatic_control(controls, *found, text);
+        if (key == "controls")
+            return arhost::set_listed_controls(controls, text, key);
+        const uvc::ControlDefinition *control = controls.find(key); // power_line_frequency
+        if (!control)
+            controls.fail_missing(key, key);
+        return {controls.set(*control, text, key)};
     }
 
     // Agrees with the camera on the mode and the nearest possible rate; fps 0: the camera's default.
@@ -387,10 +369,11 @@ private:
     arhost::Host host_;
     Size configured_size_; // 0×0: use the size of the calibration or the camera's default
     std::size_t camera_;
-    std::string format_option_, controls_option_, extension_option_, power_line_option_;
+    std::string format_option_;
+    std::vector<std::pair<std::string, std::string>> control_values_; // of the options that set controls
+    std::string extension_option_;
     std::size_t buffer_count_;
     std::optional<uvc::UsbIdentity> identity_;
-    std::vector<std::pair<const ControlOption *, std::string>> control_values_; // of the options that are set
 
     std::optional<uvc::UsbDevice> device_;
     std::vector<std::uint8_t> claimed_; // interfaces
@@ -419,13 +402,12 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "format", "auto",
            "Pixel format of the camera; auto: uncompressed if that is fast enough, otherwise mjpeg.", 0, 0, formats),
     option(ARHOST_OPTION_INTEGER, "buffers", "4", "Number of frames that may wait.", 2, 32),
-    option(ARHOST_OPTION_TEXT, "exposure", "", "Exposure time in units of 100 µs, or auto; not set: unchanged."),
-    option(ARHOST_OPTION_TEXT, "gain", "", "Gain in units of the camera; not set: unchanged."),
-    option(ARHOST_OPTION_TEXT, "focus", "", "Focus in units of the camera, or auto; not set: unchanged."),
-    option(ARHOST_OPTION_TEXT, "white_balance", "", "Colour temperature in K, or auto; not set: unchanged."),
-    option(ARHOST_OPTION_TEXT, "power_line_frequency", "",
-           "Frequency of the lamps, to avoid flicker: disabled, 50_hz, 60_hz or auto; not set: unchanged."),
-    option(ARHOST_OPTION_TEXT, "controls", "", "Further controls by name: 'sharpness=3, backlight_compensation=1'."),
+    arhost::exposure_option,
+    arhost::gain_option,
+    arhost::focus_option,
+    arhost::white_balance_option,
+    arhost::power_line_frequency_option,
+    arhost::controls_option,
     option(ARHOST_OPTION_TEXT, "extension", "",
            "Controls of extension units, as UNIT:SELECTOR=BYTES in hexadecimal digits: '4:9=01ff, 4:10=00'."),
 };

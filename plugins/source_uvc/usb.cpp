@@ -3,6 +3,8 @@
 
 #include <fcntl.h>
 #include <glob.h>
+#include <linux/usbdevice_fs.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -87,6 +89,7 @@ struct UsbDevice::Node {
     }
     std::uint16_t vendor() const { return word(8); }
     std::uint16_t product() const { return word(10); }
+    std::uint8_t product_index() const { return descriptors[15]; }
     std::uint8_t serial_index() const { return descriptors[16]; }
     bool is_camera() const { return !find_configuration(Bytes(descriptors).subspan(18), 0).functions.empty(); }
     std::string text() const { return id_text(vendor(), product()) + " (" + path + ")"; }
@@ -167,6 +170,38 @@ UsbDevice UsbDevice::open(const std::optional<UsbIdentity> &identity) {
                   "usb: there is no camera " + id_text(identity->vendor, identity->product) +
                       (identity->serial.empty() ? "" : " with the serial number '" + identity->serial + "'") +
                       others + "; is it connected?");
+}
+
+std::vector<UsbDevice::Connected> UsbDevice::list() {
+    std::vector<Connected> cameras;
+    for (Node &node : list_nodes()) {
+        if (!node.is_camera())
+            continue;
+        Connected &camera = cameras.emplace_back();
+        camera.node = node.path;
+        camera.id = id_text(node.vendor(), node.product());
+        camera.configuration = find_configuration(Bytes(node.descriptors).subspan(18), 0);
+        camera.error = node.error;
+        if (node.error != 0)
+            continue;
+        try {
+            camera.device = open_node(node, "");
+            camera.configuration = camera.device->configuration();
+            camera.product = string_descriptor(camera.device->handle(), node.product_index());
+            camera.serial = string_descriptor(camera.device->handle(), node.serial_index());
+        } catch (const Failure &failure) {
+            camera.problem = failure.what();
+        }
+    }
+    return cameras;
+}
+
+UsbDevice::Driver UsbDevice::driver_of(std::uint8_t interface) const {
+    usbdevfs_getdriver driver{};
+    driver.interface = interface;
+    if (ioctl(fd_.get(), USBDEVFS_GETDRIVER, &driver) != 0)
+        return Driver::none;
+    return std::string_view(driver.driver) == "usbfs" ? Driver::user_space : Driver::kernel;
 }
 
 void UsbDevice::claim(std::uint8_t interface) {

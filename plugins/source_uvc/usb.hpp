@@ -29,11 +29,16 @@ class UsbDevice {
 public:
     // Opens the camera with this identity; without one, the first camera that can be opened.
     static UsbDevice open(const std::optional<UsbIdentity> &identity);
+    struct Connected;
+    static std::vector<Connected> list();
 
     const std::string &name() const { return name_; } // "the camera 046d:0825 (/dev/bus/usb/001/004)"
     const Configuration &configuration() const { return configuration_; }
     libusb_context *context() const { return context_.get(); }
     libusb_device_handle *handle() const { return handle_.get(); }
+
+    enum class Driver { none, kernel, user_space };
+    Driver driver_of(std::uint8_t interface) const;
 
     // Takes an interface from the kernel's driver until release(), after which the driver has it again.
     void claim(std::uint8_t interface);
@@ -68,6 +73,16 @@ private:
     FileDescriptor fd_; // closed after the handle, which does not own it
     std::unique_ptr<libusb_context, ExitContext> context_;
     std::unique_ptr<libusb_device_handle, CloseHandle> handle_;
+};
+
+// A camera that is connected, and what is known of it if it cannot be opened.
+struct UsbDevice::Connected {
+    std::string node, id; // "/dev/bus/usb/001/004", "046d:0825"
+    std::string product, serial;
+    Configuration configuration;
+    std::optional<UsbDevice> device;
+    int error = 0; // errno of open()
+    std::string problem;
 };
 
 // bRequest

@@ -153,18 +153,4 @@ std::string Controls::set(const Control &control, std::string_view text, const s
            std::to_string(value);
 }
 
-std::vector<std::string> Controls::set_list(std::string_view list, const std::string &key) const {
-    std::vector<std::string> warnings;
-    for (const ControlSetting &setting : split_settings(list)) {
-        if (!setting.value || setting.name.empty())
-            fail(key, "cannot be set up: '" + setting.text + "' is not of the form NAME=VALUE");
-        const Control *control = find(setting.name);
-        if (!control)
-            fail_missing(setting.name, key);
-        if (const std::string warning = set(*control, *setting.value, key); !warning.empty())
-            warnings.push_back(warning);
-    }
-    return warnings;
-}
-
 } // namespace arhost

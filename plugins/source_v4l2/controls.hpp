@@ -29,6 +29,7 @@ public:
     const Control *find(std::uint32_t id) const;
     const Control *find(std::string_view name) const;
 
+    static const ControlValues &values_of(const Control &control) { return control; }
     // Returns the current value, or std::nullopt if it cannot be read.
     std::optional<std::int64_t> value_of(const Control &control) const;
 
@@ -36,15 +37,12 @@ public:
     // `key` names the option for messages. Returns a warning if the camera sets another value, else an empty string.
     std::string set(const Control &control, std::string_view text, const std::string &key) const;
 
-    // Sets controls as listed by a user: "gain=20, auto_exposure=manual_mode", in this order. Returns the warnings.
-    std::vector<std::string> set_list(std::string_view list, const std::string &key) const;
-
+    [[noreturn]] void fail(const std::string &key, const std::string &what) const;
     // The camera has no such control.
     [[noreturn]] void fail_missing(std::string_view name, const std::string &key) const;
 
 private:
     std::int64_t parse(const Control &control, std::string_view text, const std::string &key) const;
-    [[noreturn]] void fail(const std::string &key, const std::string &what) const;
 
     const CaptureDevice &device_;
     std::vector<Control> controls_;

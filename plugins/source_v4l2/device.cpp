@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "device.hpp"
 
+#include "camera_common/fourcc.hpp"
+
 #include <fcntl.h>
 #include <glob.h>
 #include <poll.h>
@@ -150,13 +152,6 @@ struct Buffer {
 };
 
 } // namespace
-
-std::string fourcc_text(std::uint32_t fourcc) {
-    std::string text;
-    for (int i = 0; i < 4; ++i)
-        text += static_cast<char>(fourcc >> (8 * i) & 0x7f);
-    return text;
-}
 
 std::vector<std::string> video_nodes() {
     std::vector<std::string> nodes;

@@ -46,8 +46,6 @@ struct Capture {
     std::vector<std::span<const std::uint8_t>> planes; // of memory; as many bytes as the driver reported
 };
 
-std::string fourcc_text(std::uint32_t fourcc); // such as "YUYV"
-
 // The nodes /dev/video*, in the order of their numbers, and what the kernel calls them ("" if unknown).
 std::vector<std::string> video_nodes();
 std::string card_of(const std::string &node);

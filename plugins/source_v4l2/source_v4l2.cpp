@@ -6,6 +6,8 @@
 #include "device.hpp"
 #include "pixels.hpp"
 
+#include "camera_common/control_options.hpp"
+#include "camera_common/fourcc.hpp"
 #include "camera_common/frame_size.hpp"
 #include "camera_common/jpeg.hpp"
 #include "camera_common/start_camera.hpp"
@@ -47,22 +49,11 @@ bool offers(const CaptureFormat &format, const Size &size) {
            });
 }
 
-// An option that sets a frequent control, which has an automatic mode.
-struct ControlOption {
-    const char *name;
-    std::uint32_t value_id;
-    std::uint32_t mode_id;                       // of the control that switches the automatic mode on or off
-    std::vector<std::int64_t> automatic, manual; // values of the mode, in the order of preference
-};
-const ControlOption control_options[] = {
-    {"exposure",
-     V4L2_CID_EXPOSURE_ABSOLUTE,
-     V4L2_CID_EXPOSURE_AUTO,
-     {V4L2_EXPOSURE_AUTO, V4L2_EXPOSURE_APERTURE_PRIORITY},
-     {V4L2_EXPOSURE_MANUAL, V4L2_EXPOSURE_SHUTTER_PRIORITY}},
-    {"gain", V4L2_CID_GAIN, V4L2_CID_AUTOGAIN, {1}, {0}},
-    {"focus", V4L2_CID_FOCUS_ABSOLUTE, V4L2_CID_FOCUS_AUTO, {1}, {0}},
-    {"white_balance", V4L2_CID_WHITE_BALANCE_TEMPERATURE, V4L2_CID_AUTO_WHITE_BALANCE, {1}, {0}},
+constexpr arhost::AutomaticControl<std::uint32_t> automatic_controls[] = {
+    {"exposure", V4L2_CID_EXPOSURE_ABSOLUTE, V4L2_CID_EXPOSURE_AUTO},
+    {"gain", V4L2_CID_GAIN, V4L2_CID_AUTOGAIN},
+    {"focus", V4L2_CID_FOCUS_ABSOLUTE, V4L2_CID_FOCUS_AUTO},
+    {"white_balance", V4L2_CID_WHITE_BALANCE_TEMPERATURE, V4L2_CID_AUTO_WHITE_BALANCE},
 };
 
 std::int64_t clock_ns(clockid_t clock) {
@@ -77,37 +68,23 @@ struct Losses {
     std::uint64_t marked = 0;     // marked as damaged by the driver
     std::uint64_t damaged = 0;    // truncated, or impossible to decode
     std::uint64_t superseded = 0; // replaced by a newer frame in live mode
-
-    std::string text() const {
-        std::string list;
-        const auto add = [&](std::uint64_t count, const char *cause) {
-            if (count > 0)
-                list += (list.empty() ? "" : ", ") + std::to_string(count) + " " + cause;
-        };
-        add(driver, "lost by the driver");
-        add(marked, "marked as damaged by the driver");
-        add(damaged, "truncated or undecodable");
-        add(superseded, "replaced by newer ones");
-        return list;
-    }
 };
 
 class V4l2Source {
 public:
+    static constexpr const char *changeable[] = {"exposure", "gain", "focus", "white_balance", "power_line_frequency",
+                                                 "controls", nullptr};
+
     static std::vector<arhost::Device> devices() { return arhost::list_cameras(); }
 
     V4l2Source(const arhost::Host &host, const arhost::Options &options)
         : host_(host),
           path_(options.text("device")), configured_size_{static_cast<std::uint32_t>(options.integer("width")),
                                                           static_cast<std::uint32_t>(options.integer("height"))},
-          format_option_(options.text("format")), controls_option_(options.text("controls")),
-          power_line_option_(options.text("power_line_frequency")),
+          format_option_(options.text("format")), control_values_(arhost::given_options(options, changeable)),
           buffer_count_(static_cast<std::uint32_t>(options.integer("buffers"))) {
         if ((configured_size_.width == 0) != (configured_size_.height == 0))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: set both or neither");
-        for (const ControlOption &option : control_options)
-            if (const std::string text = options.text(option.name); !text.empty())
-                control_values_.emplace_back(&option, text);
     }
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
@@ -134,10 +111,16 @@ public:
         }
     }
 
+    void set(const arhost::Options &changed) { set_controls(arhost::given_options(changed, changeable)); }
+
+    std::vector<arhost::CounterValue> counters() const {
+        return {{"lost_by_driver", losses_.driver},
+                {"marked_damaged", losses_.marked},
+                {"undecodable", losses_.damaged},
+                {"superseded", losses_.superseded}};
+    }
+
     void stop() {
-        if (const std::string text = losses_.text(); !text.empty())
-            host_.info("frames of the camera that were not delivered: " + text);
-        losses_ = {};
         stream_.reset();
         device_.reset();
     }
@@ -147,7 +130,7 @@ private:
         newest_only_ = setup.paced != 0;
         device_.emplace(path_);
         camera_ = set_format(setup);
-        set_controls();
+        set_controls(control_values_); // before the stream starts, so that the first frame has them
         const double fps = device_->set_fps(setup.fps);
         const Size size{camera_.width, camera_.height};
         const std::string mode = arhost::fourcc_text(camera_.fourcc) + " " + size.text();
@@ -203,38 +186,24 @@ private:
         return set;
     }
 
-    // Sets the controls before the stream starts, so that the first frame has them.
-    void set_controls() const {
+    void set_controls(const std::vector<std::pair<std::string, std::string>> &values) const {
+        for (const auto &[key, text] : values)
+            arhost::show_warnings(host_, set_control(key, text));
+    }
+
+    // Sets the controls of an option. Returns warnings.
+    std::vector<std::string> set_control(const std::string &key, const std::string &text) const {
         const arhost::Controls controls(*device_);
-        const auto warn = [&](const std::string &warning) {
-            if (!warning.empty())
-                host_.warn(warning);
-        };
-        const auto set = [&](std::uint32_t id, const std::string &text, const std::string &key) {
-            const arhost::Control *control = controls.find(id);
-            if (!control)
-                controls.fail_missing(key, key);
-            warn(controls.set(*control, text, key));
-        };
-        for (const auto &[option, text] : control_values_) {
-            const bool is_automatic = text == "auto";
-            if (const arhost::Control *mode = controls.find(option->mode_id)) {
-                // The last value is an error of set() if the camera has none of them.
-                const std::vector<std::int64_t> &values = is_automatic ? option->automatic : option->manual;
-                const auto value = std::find_if(values.begin(), values.end() - 1, [&](std::int64_t candidate) {
-                    return mode->items.empty() || mode->items.contains(candidate);
-                });
-                warn(controls.set(*mode, std::to_string(*value), option->name));
-            } else if (is_automatic) {
-                controls.fail_missing(std::string("auto ") + option->name, option->name);
-            }
-            if (!is_automatic)
-                set(option->value_id, text, option->name);
-        }
-        if (!power_line_option_.empty())
-            set(V4L2_CID_POWER_LINE_FREQUENCY, power_line_option_, "power_line_frequency");
-        for (const std::string &warning : controls.set_list(controls_option_, "controls"))
-            warn(warning);
+        if (const auto *found =
+                std::ranges::find(automatic_controls, key, &arhost::AutomaticControl<std::uint32_t>::key);
+            found != std::end(automatic_controls))
+            return arhost::set_automatic_control(controls, *found, text);
+        if (key == "controls")
+            return arhost::set_listed_controls(controls, text, key);
+        const arhost::Control *lamps = controls.find(V4L2_CID_POWER_LINE_FREQUENCY);
+        if (!lamps)
+            controls.fail_missing(key, key);
+        return {controls.set(*lamps, text, key)};
     }
 
     // Returns the formats that the camera offers and the option `format` permits, in the order of preference.
@@ -340,17 +309,19 @@ private:
     std::int64_t capture_ns(const Capture &captured) {
         const std::int64_t stamp_ns =
             captured.time.tv_sec * std::int64_t{1'000'000'000} + captured.time.tv_usec * std::int64_t{1'000};
-        if ((captured.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC)
-            return stamp_ns;
+        const std::int64_t now_ns = clock_ns(CLOCK_MONOTONIC);
+        const auto is_recent = [](std::int64_t age_ns) { return std::abs(age_ns) < 10'000'000'000; };
+        if ((captured.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC &&
+            is_recent(now_ns - stamp_ns))
+            return std::min(stamp_ns, now_ns);
         // Old drivers use the wall clock or do not say which clock they use.
-        const std::int64_t now_ns = clock_ns(CLOCK_MONOTONIC), age_ns = clock_ns(CLOCK_REALTIME) - stamp_ns;
-        const bool wall_clock = std::abs(age_ns) < 10'000'000'000;
+        const std::int64_t age_ns = clock_ns(CLOCK_REALTIME) - stamp_ns;
         if (!clock_reported_)
             host_.warn("the camera driver does not use CLOCK_MONOTONIC; " +
-                       std::string(wall_clock ? "its wall-clock time stamps are converted"
-                                              : "arrival times are used instead"));
+                       std::string(is_recent(age_ns) ? "its wall-clock time stamps are converted"
+                                                     : "arrival times are used instead"));
         clock_reported_ = true;
-        return wall_clock ? now_ns - age_ns : now_ns;
+        return is_recent(age_ns) ? now_ns - std::max<std::int64_t>(age_ns, 0) : now_ns;
     }
 
     // Returns the number of frames lost since the last delivered frame. The gap in the driver's sequence numbers
@@ -374,9 +345,9 @@ private:
     arhost::Host host_;
     std::string path_;
     Size configured_size_; // 0×0: use the size of the calibration or the driver
-    std::string format_option_, controls_option_, power_line_option_;
+    std::string format_option_;
+    std::vector<std::pair<std::string, std::string>> control_values_; // of the options that set controls
     std::uint32_t buffer_count_;
-    std::vector<std::pair<const ControlOption *, std::string>> control_values_; // of the options that are set
 
     std::optional<CaptureDevice> device_;
     std::optional<CaptureStream> stream_; // declared after device_, because it must be destroyed first
@@ -405,14 +376,12 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "format", "auto",
            "Pixel format of the camera; auto: uncompressed if that is fast enough, otherwise mjpeg.", 0, 0, formats),
     option(ARHOST_OPTION_INTEGER, "buffers", "4", "Number of driver buffers.", 2, 32),
-    option(ARHOST_OPTION_TEXT, "exposure", "", "Exposure time in units of 100 µs, or auto; not set: unchanged."),
-    option(ARHOST_OPTION_TEXT, "gain", "", "Gain in units of the camera, or auto; not set: unchanged."),
-    option(ARHOST_OPTION_TEXT, "focus", "", "Focus in units of the camera, or auto; not set: unchanged."),
-    option(ARHOST_OPTION_TEXT, "white_balance", "", "Colour temperature in K, or auto; not set: unchanged."),
-    option(ARHOST_OPTION_TEXT, "power_line_frequency", "",
-           "Frequency of the lamps, to avoid flicker: disabled, 50_hz, 60_hz or auto; not set: unchanged."),
-    option(ARHOST_OPTION_TEXT, "controls", "",
-           "Further controls by the names that arhost devices lists: 'sharpness=3, backlight_compensation=1'."),
+    arhost::exposure_option,
+    arhost::gain_option,
+    arhost::focus_option,
+    arhost::white_balance_option,
+    arhost::power_line_frequency_option,
+    arhost::controls_option,
 };
 constexpr const char *needs[] = {"video", nullptr};
 

@@ -138,6 +138,28 @@ public:
         return *static_cast<const Functions *>(plugin_->functions);
     }
     const void *extension(const char *id) const { return plugin_->get_extension(id); }
+    // Changes an option of type TEXT while the plugin runs (arhost/control.h).
+    arhost_status set_text(const char *key, const char *text) {
+        const auto *extension = static_cast<const arhost_set_option *>(this->extension(ARHOST_SET_OPTION_EXTENSION));
+        if (!extension)
+            throw std::runtime_error("the plugin accepts no changes");
+        const arhost_option option{sizeof option, ARHOST_OPTION_TEXT, key, 0, 0.0, text};
+        return extension->set(instance_, &option);
+    }
+    // Returns the values of arhost/counters.h.
+    std::map<std::string, std::uint64_t> counters() const {
+        std::map<std::string, std::uint64_t> values;
+        const auto *extension = static_cast<const arhost_counters *>(this->extension(ARHOST_COUNTERS_EXTENSION));
+        if (!extension)
+            throw std::runtime_error("the plugin counts nothing");
+        extension->list(
+            instance_,
+            [](void *context, const char *name, std::uint64_t value) {
+                (*static_cast<std::map<std::string, std::uint64_t> *>(context))[name] = value;
+            },
+            &values);
+        return values;
+    }
     const arhost_host *host() const { return &host_; }
     const arhost_descriptor &descriptor() const { return *plugin_->descriptor; }
     arhost_instance *instance() const { return instance_; }

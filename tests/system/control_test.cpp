@@ -377,6 +377,17 @@ TEST(Control, ChangesAnOptionAlsoForARestartedPlugin) {
     EXPECT_EQ(run.quit(), 0) << run.output();
 }
 
+// The camera is unplugged at the third frame and does not come back.
+TEST(Control, TheStatusSaysWhichCameraIsMissing) {
+    ControlledRun run("version: 1\nmode: live\nrestart: {first_delay_ms: 1}\nsource: {plugin: source_waiting_live, "
+                      "options: {wait_ms: 10, unplugged_at: 3, back_at: -1}}\n"
+                      "outputs: [{plugin: sink_control, allow: [listen], control: [quit, status]}]\n");
+    run.start_and_connect();
+    while (run.status_of("source")["missing_device"].is_null())
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
 TEST(Control, RejectsWhatTheConfigurationDoesNotGrantOrList) {
     ControlledRun run(controlled("lockstep", "", "[quit, status, load_scene, swap]"));
     run.start_and_connect();

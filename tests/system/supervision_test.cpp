@@ -418,6 +418,9 @@ TEST(Supervision, AFailedSourceFrameIsRetriedAndNeverSkipped) {
     run.write("scene.yaml", small_scene);
     EXPECT_EQ(run.run(), 1) << "the source always fails at frame 30\n" << run.output();
     expect_all_frames_in_order(run, 30);
+    EXPECT_EQ(run.stats()["counters"]["source"], nlohmann::json({{"delivered", 30}, {"never", 0}}))
+        << "the counts of all processes";
+    EXPECT_THAT(run.output(), HasSubstr("counted: delivered 30"));
 }
 
 // Capture times in the future must be rejected: compared with them, later correct times would run backwards.

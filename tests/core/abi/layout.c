@@ -209,6 +209,14 @@ FIELD(arhost_set_option, struct_size, 0, 4);
 FIELD(arhost_set_option, keys, 8, 8);
 FIELD(arhost_set_option, set, 16, 8);
 
+/* arhost/counters.h */
+VALUE(ARHOST_MAX_COUNTERS, 32);
+VALUE(ARHOST_MAX_COUNTER_NAME, 63);
+
+STRUCT(arhost_counters, 16);
+FIELD(arhost_counters, struct_size, 0, 4);
+FIELD(arhost_counters, list, 8, 8);
+
 /* arhost/frame.h */
 VALUE(ARHOST_PIXEL_FORMAT_GREY8, 1);
 VALUE(ARHOST_PIXEL_FORMAT_RGB8, 2);

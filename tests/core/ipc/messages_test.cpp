@@ -117,6 +117,20 @@ TEST(Messages, PreserveWhatAWorkerReports) {
     EXPECT_EQ(sent(messages::Stopped{ARHOST_STATUS_ERROR_IO, "disk"}).status, ARHOST_STATUS_ERROR_IO);
     EXPECT_EQ(sent(messages::Failed{ARHOST_STATUS_ERROR_CONFIGURATION, "why"}).text, "why");
     EXPECT_EQ(sent(messages::Reads{"/a", "1:2"}).node, "1:2");
+    const Counters counters = {{"lost", 3}, {"superseded", 0}};
+    EXPECT_EQ(sent(messages::CountersChanged{counters}).counters, counters);
+}
+
+TEST(Messages, CountersHaveShortPlainNamesAndALimitedNumber) {
+    EXPECT_TRUE(are_valid({}));
+    EXPECT_TRUE(are_valid({{"lost_by_driver", 1}, {std::string(ARHOST_MAX_COUNTER_NAME, 'x'), 2}}));
+    for (const char *name : {"", "Lost", "lost frames", "lost\n", "\xc3\xa9"})
+        EXPECT_FALSE(are_valid({{name, 1}})) << name;
+    EXPECT_FALSE(are_valid({{std::string(ARHOST_MAX_COUNTER_NAME + 1, 'x'), 1}}));
+    Counters many;
+    for (int i = 0; i <= ARHOST_MAX_COUNTERS; ++i)
+        many["c" + std::to_string(i)] = 0;
+    EXPECT_FALSE(are_valid(many));
 }
 
 TEST(Messages, CutLongTexts) {

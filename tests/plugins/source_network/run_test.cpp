@@ -96,6 +96,7 @@ TEST(NetworkRun, ContinuesWhenTheCameraComesBack) {
     EXPECT_THAT(run.output(), HasSubstr("is back"));
     EXPECT_EQ(run.stats()["frames"]["in"], 100);
     EXPECT_EQ(run.stats()["restarts"]["source"], 0);
+    EXPECT_EQ(run.stats()["counters"]["source"]["lost_connections"], 1);
 }
 
 TEST(NetworkRun, PassesTheConformanceSuite) {

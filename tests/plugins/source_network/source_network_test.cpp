@@ -212,6 +212,7 @@ TEST(Http, TruncatedPicturesAreSkippedAndCounted) {
         EXPECT_EQ(number_of(frame, source) % 2, 0) << "delivers a truncated picture";
         EXPECT_EQ(frame.info.skipped % 2, 1u) << "counts each truncated picture";
     }
+    EXPECT_GE(source.plugin().counters().at("damaged"), 19u);
     source.stop();
     EXPECT_THAT(error_of({{"url", server.url("broken")}, {"timeout_ms", "1000"}}),
                 AllOf(HasSubstr("no intact picture has arrived for 1000 ms (timeout_ms)"), HasSubstr("damaged")));

@@ -8,6 +8,9 @@
 
 #include <gmock/gmock.h>
 
+#include <grp.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
 #include <ctime>
@@ -196,11 +199,11 @@ TEST_F(UvcCamera, DropsDamagedFramesAndCountsThemByCause) {
         }
     }
     EXPECT_GE(skipped, 3u);
-    source_.stop();
-    const std::string text = source_.log(ARHOST_SEVERITY_INFO);
-    EXPECT_THAT(text, HasSubstr("1 marked as damaged by the camera"));
-    EXPECT_THAT(text, HasSubstr("1 with malformed payloads"));
-    EXPECT_THAT(text, HasSubstr("1 truncated"));
+    const auto counters = source_.plugin().counters();
+    EXPECT_EQ(counters.at("marked_damaged"), 1u);
+    EXPECT_EQ(counters.at("malformed"), 1u);
+    EXPECT_EQ(counters.at("truncated"), 1u);
+    EXPECT_EQ(counters.at("undecodable"), 0u);
 }
 
 TEST_F(UvcCamera, SetsControlsByName) {
@@ -236,6 +239,26 @@ TEST_F(UvcCamera, SetsControlsByName) {
     EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x08), Octets{1});
     EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x06), (Octets{40, 0})) << "unchanged";
     EXPECT_EQ(camera_->value(UsbCamera::extension, 2), (Octets{0, 0, 0}));
+}
+
+TEST_F(UvcCamera, SetsControlsWhileItCaptures) {
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    for (const auto &[key, text] : {std::pair{"exposure", "100"},
+                                    {"gain", "7"},
+                                    {"power_line_frequency", "60_hz"},
+                                    {"controls", "brightness=-5"}})
+        EXPECT_EQ(source_.plugin().set_text(key, text), ARHOST_STATUS_OK) << key << "\n" << source_.log();
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x02), Octets{1}) << "manual";
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x04), (Octets{100, 0, 0, 0}));
+    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x04), (Octets{7, 0}));
+    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x05), Octets{2});
+    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x02), (Octets{0xfb, 0xff}));
+    EXPECT_EQ(source_.plugin().set_text("exposure", "2"), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("does not accept '2' for 'exposure_time_absolute'; "
+                                                              "valid: 3 to 2047"));
+    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x04), (Octets{100, 0, 0, 0})) << "unchanged";
+    EXPECT_EQ(source_.read(1).status, ARHOST_STATUS_OK);
 }
 
 TEST_F(UvcCamera, RejectsControlsAndValuesThatItDoesNotHave) {
@@ -498,6 +521,72 @@ TEST_F(UvcRun, TheKernelsDriverReturnsIfArhostIsKilled) {
     ASSERT_TRUE(proceeds(run)) << run.output();
     arhost::test::send_signal(run.pid(), SIGKILL);
     EXPECT_TRUE(eventually([] { return kernel_driven() == 2; }));
+}
+
+// ---- arhost devices ----------------------------------------------------------------------------------
+
+namespace {
+
+nlohmann::json listed_cameras(uid_t user = 0) {
+    arhost::test::ArhostRun run;
+    run.start({"devices", "--json", "source_uvc"}, [user] {
+        if (user != 0 && (setgroups(0, nullptr) != 0 || setgid(user) != 0 || setuid(user) != 0))
+            _exit(126);
+    });
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    const nlohmann::json json = nlohmann::json::parse(run.messages(), nullptr, false);
+    EXPECT_TRUE(json.is_object()) << run.messages();
+    EXPECT_TRUE(json["problems"].empty()) << json;
+    return json["cameras"];
+}
+
+} // namespace
+
+TEST_F(UvcCamera, IsListedWithFormatsSizesRatesAndControls) {
+    const nlohmann::json cameras = listed_cameras();
+    ASSERT_EQ(cameras.size(), 1u) << cameras;
+    EXPECT_EQ(cameras[0]["plugin"], "source_uvc");
+    EXPECT_THAT(cameras[0]["name"], HasSubstr("(usb 1d6b:0104)"));
+    EXPECT_THAT(cameras[0]["path"], testing::StartsWith("/dev/bus/usb/"));
+    EXPECT_EQ(cameras[0]["serial"], "0001");
+    EXPECT_EQ(cameras[0]["problem"], nullptr);
+    ASSERT_EQ(cameras[0]["formats"].size(), 3u);
+    EXPECT_EQ(cameras[0]["formats"][0]["pixel_format"], "yuyv");
+    EXPECT_EQ(cameras[0]["formats"][0]["sizes"][0]["width"], UsbCamera::width);
+    EXPECT_NEAR(cameras[0]["formats"][0]["sizes"][0]["rates"][0].get<double>(), 30, 0.01);
+    EXPECT_TRUE(cameras[0]["controls"].empty()) << "they cannot be read while the kernel's driver has the camera";
+    EXPECT_EQ(kernel_driven(), 2) << "a listing does not take the camera from the kernel's driver";
+}
+
+TEST_F(UvcCamera, IsListedWithControlsIfNoDriverUsesIt) {
+    const fs::path driver = "/sys/bus/usb/drivers/uvcvideo";
+    for (const fs::path &entry : std::vector<fs::path>(fs::directory_iterator(driver), {}))
+        if (entry.filename().string().find(':') != std::string::npos)
+            std::ofstream(driver / "unbind") << entry.filename().string();
+    ASSERT_EQ(kernel_driven(), 0);
+    const nlohmann::json controls = listed_cameras().at(0)["controls"];
+    const auto focus =
+        std::ranges::find_if(controls, [](const auto &control) { return control["name"] == "focus_absolute"; });
+    ASSERT_NE(focus, controls.end()) << controls;
+    EXPECT_EQ((*focus)["minimum"], 0);
+    EXPECT_EQ((*focus)["maximum"], 250);
+    EXPECT_EQ((*focus)["step"], 5);
+}
+
+TEST_F(UvcCamera, IsListedWithTheReasonWhyItCannotBeOpened) {
+    const nlohmann::json cameras = listed_cameras(1000);
+    ASSERT_EQ(cameras.size(), 1u) << cameras;
+    EXPECT_THAT(cameras[0]["problem"], HasSubstr("only the user 'root' may open it"));
+    EXPECT_EQ(cameras[0]["formats"].size(), 3u) << "the descriptors can be read by everyone";
+}
+
+TEST_F(UvcCamera, IsListedWhileItCaptures) {
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
+    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    const nlohmann::json cameras = listed_cameras();
+    ASSERT_EQ(cameras.size(), 1u) << cameras;
+    EXPECT_THAT(cameras[0]["problem"], HasSubstr("in use by "));
+    EXPECT_EQ(source_.read(1).status, ARHOST_STATUS_OK);
 }
 
 // ---- The kernel's driver with the same camera ------------------------------------------------------

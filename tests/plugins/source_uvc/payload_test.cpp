@@ -118,9 +118,7 @@ TEST_F(Assembly, DamagedFramesAreMarkedWithTheFirstCause) {
     Losses losses;
     for (const Seen &frame : frames_)
         losses.count(frame.damage);
-    EXPECT_EQ(losses.text(),
-              "1 marked as damaged by the camera, 1 damaged on the USB bus, 1 with malformed payloads, "
-              "1 truncated, 1 larger than announced");
+    EXPECT_EQ(losses, (Losses{.marked = 1, .lost_packet = 1, .malformed = 1, .truncated = 1, .oversized = 1}));
 }
 
 TEST_F(Assembly, FaultsBetweenFramesDamageNone) {

@@ -28,6 +28,8 @@ public:
                 {.index = 1, .kind = ARHOST_DEVICE_CPU, .is_default = true, .name = "Ten fingers"}};
     }
 
+    std::vector<arhost::CounterValue> counters() const { return {{"delivered", delivered_}, {"never", 0}}; }
+
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
         fps_ = setup.fps > 0 ? setup.fps : 30;
         paced_ = setup.paced;
@@ -80,13 +82,14 @@ public:
             info.capture_ns = std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count() +
                               (now ? static_cast<std::int64_t>(1e6 * ahead_ms_) : 0);
         }
+        ++delivered_;
         return ARHOST_STATUS_OK;
     }
 
 private:
     Host host_;
     test::Faults faults_;
-    std::uint64_t frames_, first_ = 0;
+    std::uint64_t frames_, first_ = 0, delivered_ = 0;
     std::uint32_t width_, height_;
     bool writes_later_;
     std::uint8_t *last_ = nullptr; // buffer of the previous frame

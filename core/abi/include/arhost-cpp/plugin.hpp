@@ -183,6 +183,13 @@ struct Device {
     double rate = 0;                       // displays
 };
 
+// A counter of arhost/counters.h. A plugin class supports the extension if it has a member function
+// `std::vector<arhost::CounterValue> counters()`.
+struct CounterValue {
+    const char *name;
+    std::uint64_t value;
+};
+
 namespace detail {
 
 // The object behind an arhost_instance pointer, for a plugin class T.
@@ -313,6 +320,20 @@ inline constexpr arhost_set_option set_option_functions = {
         return with<T>(i, [&](T &p) { return p.set(Options(option, 1)), ARHOST_STATUS_OK; });
     }};
 
+template <class T>
+concept Counts = requires(T &plugin) {
+    { plugin.counters() } -> std::convertible_to<std::vector<CounterValue>>;
+};
+template <Counts T>
+inline constexpr arhost_counters counters_functions = {
+    sizeof(arhost_counters), [](arhost_instance *i, arhost_take_counter take, void *context) {
+        with<T>(i, [&](T &p) {
+            for (const CounterValue &counter : p.counters())
+                take(context, counter.name, counter.value);
+            return ARHOST_STATUS_OK;
+        });
+    }};
+
 // `stop` and `get_extension` are optional members of the plugin class.
 template <class T> void stop(T &plugin) {
     if constexpr (requires { plugin.stop(); })
@@ -328,6 +349,9 @@ template <class T> const void *get_extension(const char *id) {
     if constexpr (AcceptsChanges<T>)
         if (std::string_view(id) == ARHOST_SET_OPTION_EXTENSION)
             return &set_option_functions<T>;
+    if constexpr (Counts<T>)
+        if (std::string_view(id) == ARHOST_COUNTERS_EXTENSION)
+            return &counters_functions<T>;
     if constexpr (requires { T::get_extension(id); })
         return T::get_extension(id);
     else

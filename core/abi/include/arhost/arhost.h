@@ -4,6 +4,7 @@
 #define ARHOST_ARHOST_H
 #include "camera.h"
 #include "control.h"
+#include "counters.h"
 #include "devices.h"
 #include "frame.h"
 #include "plugin.h"

@@ -280,6 +280,21 @@ pub struct arhost_set_option {
 const _: () = assert!(size_of::<arhost_set_option>() == 24);
 unsafe impl Sync for arhost_set_option {} // a plugin's statics are immutable
 
+// ---- arhost/counters.h ----
+
+pub const ARHOST_COUNTERS_EXTENSION: &[u8] = b"arhost.counters/1\0";
+pub const ARHOST_MAX_COUNTERS: usize = 32;
+pub const ARHOST_MAX_COUNTER_NAME: usize = 63;
+pub type arhost_take_counter = Option<unsafe extern "C" fn(*mut c_void, *const c_char, u64)>;
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_counters {
+    pub struct_size: u32,
+    pub list: Option<unsafe extern "C" fn(*mut arhost_instance, arhost_take_counter, *mut c_void)>,
+}
+const _: () = assert!(size_of::<arhost_counters>() == 16);
+unsafe impl Sync for arhost_counters {} // a plugin's statics are immutable
+
 // ---- arhost/frame.h ----
 
 pub type arhost_pixel_format = i32;

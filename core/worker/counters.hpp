@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Reads the counters of a plugin (arhost/counters.h).
+#pragma once
+
+#include "ipc/messages.hpp"
+
+namespace arhost::worker {
+
+// Returns nothing if the plugin does not have the extension. Throws std::runtime_error if the plugin violates its
+// contract.
+ipc::Counters list_counters(const arhost_plugin &plugin, arhost_instance *instance);
+
+} // namespace arhost::worker

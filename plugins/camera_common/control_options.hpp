@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The options of a source that set the controls of its camera, at the start and while it runs. `Controls` below is
+// the plugin's class for the controls of its API. It has these functions; those that fail throw Failure:
+//   find(handle)                  the control with this handle or with this name, or nullptr
+//   values_of(control)            the ControlValues that it accepts
+//   set(control, text, key)       sets it; returns a warning if the camera sets another value, else ""
+//   fail(key, what)               throws "KEY: the camera … WHAT"
+//   fail_missing(name, key)       throws that the camera has no such control
+#pragma once
+
+#include "camera_common/control_values.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <algorithm>
+#include <array>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace arhost {
+
+// A control that has an automatic mode. `Handle`: how the API identifies a control.
+template <class Handle> struct AutomaticControl {
+    std::string_view key; // of the option
+    Handle value, mode;   // mode: the control that switches the automatic mode on or off
+};
+
+inline constexpr arhost_option_descriptor exposure_option =
+    option(ARHOST_OPTION_TEXT, "exposure", "", "Exposure time in units of 100 µs, or auto; not set: unchanged.");
+inline constexpr arhost_option_descriptor gain_option =
+    option(ARHOST_OPTION_TEXT, "gain", "", "Gain in units of the camera, or auto if it can; not set: unchanged.");
+inline constexpr arhost_option_descriptor focus_option =
+    option(ARHOST_OPTION_TEXT, "focus", "", "Focus in units of the camera, or auto; not set: unchanged.");
+inline constexpr arhost_option_descriptor white_balance_option =
+    option(ARHOST_OPTION_TEXT, "white_balance", "", "Colour temperature in K, or auto; not set: unchanged.");
+inline constexpr arhost_option_descriptor power_line_frequency_option =
+    option(ARHOST_OPTION_TEXT, "power_line_frequency", "",
+           "Frequency of the lamps, to avoid flicker: disabled, 50_hz, 60_hz or auto; not set: unchanged.");
+inline constexpr arhost_option_descriptor controls_option =
+    option(ARHOST_OPTION_TEXT, "controls", "",
+           "Further controls by the names that arhost devices lists: 'sharpness=3, backlight_compensation=1'.");
+
+// Sets a control to a number, which disables its automatic mode, or to "auto". Returns warnings.
+template <class Controls, class Handle>
+std::vector<std::string> set_automatic_control(const Controls &controls, const AutomaticControl<Handle> &control,
+                                               const std::string &text) {
+    // Values of the mode, in the order of preference. Those of exposure are V4L2's: 0 automatic, 1 manual, 2 priority
+    // of the shutter, 3 priority of the aperture.
+    static constexpr std::array<std::int64_t, 2> exposure_automatic = {0, 3}, exposure_manual = {1, 2};
+    static constexpr std::array<std::int64_t, 1> on = {1}, off = {0};
+    const std::string key(control.key);
+    const bool is_automatic = text == "auto", is_exposure = key == "exposure";
+    std::vector<std::string> warnings;
+    if (const auto *mode = controls.find(control.mode)) {
+        const std::span<const std::int64_t> values =
+            is_automatic  ? is_exposure ? std::span<const std::int64_t>(exposure_automatic) : on
+            : is_exposure ? std::span<const std::int64_t>(exposure_manual)
+                          : off;
+        const ControlValues accepted = controls.values_of(*mode);
+        // The last value is an error of set() if the camera has none of them.
+        const auto value = std::find_if(values.begin(), values.end() - 1, [&](std::int64_t candidate) {
+            return accepted.items.empty() || accepted.items.contains(candidate);
+        });
+        warnings.push_back(controls.set(*mode, std::to_string(*value), key));
+    } else if (is_automatic) {
+        controls.fail_missing("auto " + key, key);
+    }
+    if (!is_automatic) {
+        const auto *found = controls.find(control.value);
+        if (!found)
+            controls.fail_missing(key, key);
+        warnings.push_back(controls.set(*found, text, key));
+    }
+    return warnings;
+}
+
+// Sets controls as listed by a user: "gain=20, auto_exposure=manual_mode", in this order. Returns warnings.
+template <class Controls>
+std::vector<std::string> set_listed_controls(const Controls &controls, std::string_view list,
+                                             const std::string &key) {
+    std::vector<std::string> warnings;
+    for (const ControlSetting &setting : split_settings(list)) {
+        if (!setting.value || setting.name.empty())
+            controls.fail(key, "cannot be set up: '" + setting.text + "' is not of the form NAME=VALUE");
+        const auto *control = controls.find(std::string_view(setting.name));
+        if (!control)
+            controls.fail_missing(setting.name, key);
+        warnings.push_back(controls.set(*control, *setting.value, key));
+    }
+    return warnings;
+}
+
+inline void show_warnings(const Host &host, const std::vector<std::string> &warnings) {
+    for (const std::string &warning : warnings)
+        if (!warning.empty())
+            host.warn(warning);
+}
+
+// Returns the keys and values of those of the options `keys` that `options` contains and that are not "".
+inline std::vector<std::pair<std::string, std::string>> given_options(const Options &options,
+                                                                      const char *const *keys) {
+    std::vector<std::pair<std::string, std::string>> given;
+    for (; *keys; ++keys)
+        if (std::string text = options.contains(*keys) ? options.text(*keys) : ""; !text.empty())
+            given.emplace_back(*keys, std::move(text));
+    return given;
+}
+
+} // namespace arhost
