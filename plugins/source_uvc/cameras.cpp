@@ -5,8 +5,6 @@
 #include "usb.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 
 namespace arhost::uvc {
 namespace {
@@ -59,9 +57,8 @@ std::vector<DeviceControl> controls_of(const UsbDevice &device, const VideoFunct
 void describe(UsbDevice::Connected &camera, const VideoFunction &function, Device &device) {
     device.formats = formats_of(function);
     if (!camera.device) {
-        const bool is_forbidden = camera.error == EACCES || camera.error == EPERM;
-        device.state = is_forbidden ? ARHOST_DEVICE_STATE_FORBIDDEN : ARHOST_DEVICE_STATE_UNUSABLE;
-        device.problem = camera.error != 0 ? std::strerror(camera.error) : camera.problem;
+        device.state = ARHOST_DEVICE_STATE_UNUSABLE;
+        device.problem = camera.problem;
         return;
     }
     const UsbDevice::Driver driver = camera.device->driver_of(function.control_interface);

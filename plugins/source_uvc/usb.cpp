@@ -93,6 +93,11 @@ struct UsbDevice::Node {
     std::uint8_t serial_index() const { return descriptors[16]; }
     bool is_camera() const { return !find_configuration(Bytes(descriptors).subspan(18), 0).functions.empty(); }
     std::string text() const { return id_text(vendor(), product()) + " (" + path + ")"; }
+    std::string why_not_opened() const {
+        return std::string("cannot be opened: ") + std::strerror(error) +
+               "; a udev rule can permit it: SUBSYSTEM==\"usb\", ATTR{idVendor}==\"" +
+               id_text(vendor(), 0).substr(0, 4) + "\", MODE=\"0660\", GROUP=\"video\"";
+    }
 };
 
 std::vector<UsbDevice::Node> UsbDevice::list_nodes() {
@@ -156,10 +161,7 @@ UsbDevice UsbDevice::open(const std::optional<UsbIdentity> &identity) {
     }
     if (forbidden)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      "usb: the camera " + forbidden->text() +
-                          " cannot be opened: " + std::strerror(forbidden->error) +
-                          "; a udev rule can permit it: SUBSYSTEM==\"usb\", ATTR{idVendor}==\"" +
-                          id_text(forbidden->vendor(), 0).substr(0, 4) + "\", MODE=\"0660\", GROUP=\"video\"");
+                      "usb: the camera " + forbidden->text() + " " + forbidden->why_not_opened());
     const std::string others = cameras.empty() ? "; no USB camera is visible" : "; visible: " + cameras;
     if (!identity)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
@@ -181,9 +183,10 @@ std::vector<UsbDevice::Connected> UsbDevice::list() {
         camera.node = node.path;
         camera.id = id_text(node.vendor(), node.product());
         camera.configuration = find_configuration(Bytes(node.descriptors).subspan(18), 0);
-        camera.error = node.error;
-        if (node.error != 0)
+        if (node.error != 0) {
+            camera.problem = "it " + node.why_not_opened();
             continue;
+        }
         try {
             camera.device = open_node(node, "");
             camera.configuration = camera.device->configuration();

@@ -81,8 +81,7 @@ struct UsbDevice::Connected {
     std::string product, serial;
     Configuration configuration;
     std::optional<UsbDevice> device;
-    int error = 0; // errno of open()
-    std::string problem;
+    std::string problem; // why there is no `device`
 };
 
 // bRequest
