@@ -74,13 +74,19 @@ void lift_deadlines(run_config::Configuration &configuration) {
         base::Limits &limits = component.limits;
         limits.start = limits.frame = limits.stop = limits.start_total = limits.stop_total = std::chrono::hours(1000);
     };
+    const auto lift_all = [&](auto &components) { std::for_each(components.begin(), components.end(), lift); };
     if (configuration.source)
         lift(*configuration.source);
     if (configuration.tracker)
         lift(*configuration.tracker);
     if (configuration.raytracer)
         lift(*configuration.raytracer);
-    std::for_each(configuration.outputs.begin(), configuration.outputs.end(), lift);
+    lift_all(configuration.trackers);
+    lift_all(configuration.raytracers);
+    lift_all(configuration.outputs);
+    for (auto *output : {&configuration.snapshot, &configuration.record})
+        if (*output)
+            lift(**output);
 }
 
 // Throws if an output would overwrite one of arhost's own programs, libraries and plugins.
@@ -93,6 +99,34 @@ void protect_programs(const run_config::FilesInUse &files) {
          entry.increment(ignored))
         if (entry->is_regular_file(ignored))
             files.protect(base::identity_of(entry->path()));
+}
+
+// Throws if a plugin may change the configuration or a scene: with `--watch`, it could grant itself permissions.
+void expect_watchable(const run_config::Configuration &configuration) {
+    std::vector<fs::path> files{fs::absolute(configuration.node.file())};
+    for (const run_config::Scene &scene : configuration.scenes)
+        files.push_back(scene.file);
+    const auto expect_unwritable = [&](const run_config::ComponentConfiguration &component) {
+        if (component.policy.mode == sandbox::Mode::none)
+            return;
+        for (const fs::path &folder : component.policy.writable)
+            for (const fs::path &file : files)
+                if (sandbox::contains(base::real_path(folder), base::real_path(file)))
+                    component.node.fail("may write to the folder of '" + file.string() +
+                                        "', so with '--watch' it could change what runs; let it write to another "
+                                        "folder, or remove '--watch'");
+    };
+    const auto expect_all_unwritable = [&](const auto &components) {
+        std::for_each(components.begin(), components.end(), expect_unwritable);
+    };
+    if (configuration.source)
+        expect_unwritable(*configuration.source);
+    expect_all_unwritable(configuration.trackers);
+    expect_all_unwritable(configuration.raytracers);
+    expect_all_unwritable(configuration.outputs);
+    for (const auto *output : {&configuration.snapshot, &configuration.record})
+        if (*output)
+            expect_unwritable(**output);
 }
 
 run_config::Configuration parse_configuration(yaml::Node &root, const Arguments &arguments) {
@@ -112,6 +146,8 @@ run_config::Configuration parse_configuration(yaml::Node &root, const Arguments 
     if (arguments.in_process)
         lift_deadlines(configuration);
     protect_programs(configuration.files);
+    if (arguments.watch)
+        expect_watchable(configuration);
     return configuration;
 }
 
@@ -291,6 +327,8 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     Pipeline pipeline(configuration, make_context(reactor, launcher, console),
                       [&](const Progress &progress) { console.show(progress, running->statistics()); });
     running = &pipeline;
+    if (arguments.watch)
+        pipeline.watch([&arguments] { return read_configuration(arguments); });
     bool stopped_by_signal = false;
     auto first_signal = std::chrono::steady_clock::time_point::min();
     const auto watch = reactor.watch(signal_fd.get(), [&] {
@@ -398,12 +436,12 @@ void check_scene(const run_config::Configuration &configuration, supervise::Cont
     std::uint32_t needed = 0;
     const SceneLoading loading(context, configuration.raytracer->scene, configuration.sandbox,
                                configuration.raytracer->limits, configuration.files,
-                               {[&](const ipc::SharedMemory &arena) {
+                               {[&](const ipc::SharedMemory &arena, const auto &) {
                                     needed = scene::needed_capabilities(
                                         arena.map(ipc::Access::read_only).as<const arhost_scene>());
                                     outcome = "";
                                 },
-                                [&](const std::string &reason) { outcome = reason; }});
+                                [&](const std::string &reason, const auto &) { outcome = reason; }});
     while (!outcome)
         context.reactor.run_once();
     if (!outcome->empty())

@@ -15,15 +15,12 @@ using supervise::Component;
 
 Pipeline::Pipeline(const run_config::Configuration &configuration, supervise::Context context,
                    std::function<void(const Progress &)> on_progress)
-    : configuration_(configuration), context_(std::move(context)), on_progress_(std::move(on_progress)),
-      live_(configuration.mode == run_config::Mode::live) {
+    : configuration_(configuration), latest_(std::shared_ptr<void>(), &configuration), context_(std::move(context)),
+      on_progress_(std::move(on_progress)), live_(configuration.mode == run_config::Mode::live) {
     statistics_.contract_checks = ContractChecks([this](const std::string &name, const std::string &violation) {
         context_.log(ARHOST_SEVERITY_WARNING, name.substr(0, name.find('.')),
                      "violates the contract: " + name + ": " + violation);
     });
-    if (configuration.tracker)
-        for (const arhost_marker_config &marker : configuration.tracker->markers)
-            marker_ids_.insert(marker.id);
 }
 
 bool Pipeline::run() {
@@ -129,6 +126,7 @@ void Pipeline::pump() {
         while (finish_swaps() || read() || track() || render() || compose()) {
         }
         remove_ended();
+        apply_edits();
         bool sinks_empty = true;
         for (const auto &sink : sinks_) {
             sink->pump();
@@ -158,11 +156,11 @@ void Pipeline::advance_phase() {
     const auto is_ready = [](const auto &part) { return !part || part->running(); };
     if (phase_ == Phase::source && is_ready(source_) && !scene_loading_ && (!configuration_.raytracer || scene_)) {
         if (configuration_.tracker) {
-            tracker_ = make_tracker(*configuration_.tracker);
+            tracker_ = make_tracker(shared(*configuration_.tracker));
             tracker_->component->start();
         }
         if (configuration_.raytracer) {
-            raytracer_ = make_raytracer(*configuration_.raytracer, scene_);
+            raytracer_ = make_raytracer(shared(*configuration_.raytracer), scene_);
             raytracer_->component->start();
         }
         phase_ = Phase::stages;

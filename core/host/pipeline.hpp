@@ -9,10 +9,11 @@
 // is still waiting, and frames skip a stage whose worker is down.
 //
 // pipeline.cpp has the phases of a run, pipeline_components.cpp creates the components, pipeline_frames.cpp moves
-// frames through the stages.
+// frames through the stages, pipeline_control.cpp executes commands, pipeline_edits.cpp applies edited files.
 #pragma once
 
 #include "base/listening_socket.hpp"
+#include "host/file_watch.hpp"
 #include "host/frames.hpp"
 #include "host/scene_loading.hpp"
 #include "host/sink_queue.hpp"
@@ -47,6 +48,11 @@ public:
     // Describes the started components, one per line, for the user.
     std::vector<std::string> findings() const;
 
+    // Applies edits of the configuration's file and of the scene's files while the run lasts: exchanges the tracker,
+    // the ray tracer and the scene that they change. `read` parses the configuration again and throws yaml::Error.
+    // To be called before run().
+    void watch(std::function<run_config::Configuration()> read);
+
     const std::string &failure() const { return failure_; }
     bool failure_was_logged() const { return failure_was_logged_; }
     std::string looked_for() const { return tracker_ ? tracker_->looked_for : ""; }
@@ -66,9 +72,13 @@ private:
 
     void make_source();
     void make_black_frames();
-    std::unique_ptr<TrackerStage> make_tracker(const run_config::TrackerConfiguration &configuration);
-    std::unique_ptr<RaytracerStage> make_raytracer(const run_config::RaytracerConfiguration &configuration,
+    using TrackerPointer = std::shared_ptr<const run_config::TrackerConfiguration>;
+    using RaytracerPointer = std::shared_ptr<const run_config::RaytracerConfiguration>;
+    std::unique_ptr<TrackerStage> make_tracker(TrackerPointer configuration);
+    std::unique_ptr<RaytracerStage> make_raytracer(RaytracerPointer configuration,
                                                    std::shared_ptr<LoadedScene> scene);
+    // Returns a pointer to a part of the latest configuration, which keeps this configuration alive.
+    template <class Part> std::shared_ptr<const Part> shared(const Part &part) const { return {latest_, &part}; }
     void make_outputs();
     SinkQueue &make_sink(const run_config::ComponentConfiguration &output, const std::string &name,
                          const std::string &path = "");
@@ -77,7 +87,10 @@ private:
     void expect_distinct_files(const run_config::ComponentConfiguration &output,
                                const ipc::PluginDescription &plugin);
     void load_scene();
-    std::shared_ptr<LoadedScene> use_scene(ipc::SharedMemory arena, const run_config::Scene &scene) const;
+    std::unique_ptr<SceneLoading> load(const run_config::Scene &scene,
+                                       const run_config::RaytracerConfiguration &raytracer,
+                                       std::function<void(std::shared_ptr<LoadedScene>)> on_loaded,
+                                       std::function<void(const std::string &reason)> on_failed);
     supervise::Component::Callbacks common_callbacks(const std::string &name, const yaml::Node &node);
 
     void on_request(SinkQueue &sink, const ipc::messages::Request &request);
@@ -90,8 +103,15 @@ private:
     void execute(const control::Set &command, const control::Done &done);
     void execute(const control::Status &command, const control::Done &done);
     static void expect_no_swap(bool in_progress, const char *component);
-    void start_next_raytracer(const run_config::RaytracerConfiguration &configuration,
-                              std::shared_ptr<LoadedScene> scene, const control::Done &done);
+    bool raytracer_swap_in_progress() const { return next_raytracer_ || next_scene_loading_; }
+    void start_next_tracker(TrackerPointer configuration, const control::Done &done);
+    void start_next_raytracer(RaytracerPointer configuration, std::shared_ptr<LoadedScene> scene,
+                              const control::Done &done);
+    void load_next_scene(const run_config::Scene &scene, RaytracerPointer raytracer, const control::Done &done);
+    void watch_files(const FileWatch::Files &files);
+    void apply_edits();
+    void apply(const run_config::Configuration &edited, const run_config::Configuration &previous,
+               bool scene_changed);
     bool finish_swaps();
     void abandon_swap(std::unique_ptr<Stage> next, const std::string &reason);
     void retire(std::unique_ptr<Stage> stage);
@@ -100,9 +120,8 @@ private:
     SinkQueue &start_output(const run_config::ComponentConfiguration &output, const std::string &name,
                             const control::Done &done);
     std::filesystem::path free_path(const std::filesystem::path &pattern) const;
-    const run_config::ComponentConfiguration &configuration_of(const supervise::Component &component) const;
-    std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
-                                              const run_config::ComponentConfiguration &component,
+    std::vector<ipc::OptionValue> options_for(const supervise::Component &component, arhost_kind kind,
+                                              const run_config::ComponentConfiguration &configuration,
                                               std::size_t candidate);
     nlohmann::ordered_json status() const;
     nlohmann::ordered_json status_of(const supervise::Component &component) const;
@@ -168,6 +187,8 @@ private:
                      bool is_configuration_error);
 
     const run_config::Configuration &configuration_;
+    // What commands choose from: `configuration_`, or its last edit.
+    std::shared_ptr<const run_config::Configuration> latest_;
     supervise::Context context_;
     std::function<void(const Progress &)> on_progress_;
     const bool live_;
@@ -191,7 +212,6 @@ private:
     std::optional<arhost_frame_format> format_;
     std::uint64_t frame_count_ = 0;
     arhost_intrinsics intrinsics_{};
-    std::set<std::int32_t> marker_ids_;
 
     std::deque<Lease> reads_; // slots of the pending read commands, oldest first
     std::uint64_t next_read_ = 0;
@@ -211,7 +231,10 @@ private:
         std::vector<ipc::OptionValue> values;
         std::set<std::string> changed; // the keys that the command `set` has changed
     };
-    std::map<const run_config::ComponentConfiguration *, OptionsInUse> options_;
+    std::map<const supervise::Component *, OptionsInUse> options_;
+    std::function<run_config::Configuration()> read_configuration_; // empty unless edits are applied
+    std::optional<FileWatch> file_watch_;
+    FileWatch::Files edited_files_;                                      // to be applied
     std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // with the number of its frame
 
     std::optional<TimeCodes> time_codes_; // only for `arhost latency`

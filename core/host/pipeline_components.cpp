@@ -46,12 +46,12 @@ Component::Callbacks Pipeline::common_callbacks(const std::string &name, const y
 void Pipeline::make_source() {
     const run_config::SourceConfiguration &source = *configuration_.source;
     Component::Callbacks callbacks = common_callbacks("source", source.node);
-    callbacks.hello = [this, &source, last = std::size_t{0}](const PluginDescription &plugin,
+    callbacks.hello = [this, &source, last = std::size_t{0}](const PluginDescription &,
                                                              std::size_t candidate) mutable {
         if (std::exchange(last, candidate) != candidate)
             source_checks_.reset(); // the checks apply to one plugin; this is a different one
         return Component::Create{
-            {options_for(plugin, ARHOST_KIND_SOURCE, source, candidate),
+            {options_for(*source_, ARHOST_KIND_SOURCE, source, candidate),
              messages::SourceSetup{next_read_ + skipped_, source.fps, live_, configuration_.camera}},
             {}};
     };
@@ -122,40 +122,56 @@ void Pipeline::make_black_frames() {
 }
 
 void Pipeline::load_scene() {
-    const run_config::RaytracerConfiguration &raytracer = *configuration_.raytracer;
-    SceneLoading::Callbacks callbacks;
-    callbacks.loaded = [this](SharedMemory arena) {
-        scene_ = use_scene(std::move(arena), configuration_.scenes.front());
-        scene_loading_.reset();
-    };
-    callbacks.failed = [this](const std::string &reason) {
-        fail(reason, true);
-        scene_loading_.reset();
-    };
-    scene_loading_ = std::make_unique<SceneLoading>(context_, raytracer.scene, configuration_.sandbox,
-                                                    raytracer.limits, configuration_.files, std::move(callbacks));
+    scene_loading_ = load(
+        configuration_.scenes.front(), *configuration_.raytracer,
+        [this](std::shared_ptr<LoadedScene> scene) {
+            scene_ = std::move(scene);
+            scene_loading_.reset();
+        },
+        [this](const std::string &reason) {
+            fail(reason, true);
+            scene_loading_.reset();
+        });
 }
 
-std::shared_ptr<LoadedScene> Pipeline::use_scene(SharedMemory arena, const run_config::Scene &source) const {
-    const Mapping mapping = arena.map(Access::read_only);
-    const auto &scene = mapping.as<const arhost_scene>();
+// Starts to load a scene. Calls one of the two functions, which may destroy the returned object.
+std::unique_ptr<SceneLoading> Pipeline::load(const run_config::Scene &scene,
+                                             const run_config::RaytracerConfiguration &raytracer,
+                                             std::function<void(std::shared_ptr<LoadedScene>)> on_loaded,
+                                             std::function<void(const std::string &reason)> on_failed) {
     auto loaded = std::make_shared<LoadedScene>();
-    loaded->name = source.name;
-    loaded->coordinates = configuration_.coordinates.value_or(camera::default_for(scene.axes));
-    if (configuration_.raytracer->conform)
-        loaded->overlay_checks.emplace(scene);
-    loaded->arena = std::move(arena);
-    return loaded;
+    loaded->source = scene;
+    SceneLoading::Callbacks callbacks;
+    callbacks.loaded = [this, loaded, conform = raytracer.conform, on_loaded](SharedMemory arena,
+                                                                              const FileWatch::Files &files) {
+        const Mapping mapping = arena.map(Access::read_only);
+        const auto &content = mapping.as<const arhost_scene>();
+        loaded->files = files;
+        loaded->coordinates = latest_->coordinates.value_or(camera::default_for(content.axes));
+        if (conform)
+            loaded->overlay_checks.emplace(content);
+        loaded->arena = std::move(arena);
+        watch_files(files);
+        on_loaded(loaded);
+    };
+    callbacks.failed = [this, on_failed](const std::string &reason, const FileWatch::Files &files) {
+        watch_files(files);
+        on_failed(reason);
+    };
+    watch_files({scene.file, base::real_path(scene.file)});
+    return std::make_unique<SceneLoading>(context_, scene.file, configuration_.sandbox, raytracer.limits,
+                                          configuration_.files, std::move(callbacks));
 }
 
-std::unique_ptr<TrackerStage> Pipeline::make_tracker(const run_config::TrackerConfiguration &configuration) {
+std::unique_ptr<TrackerStage> Pipeline::make_tracker(TrackerPointer configuration) {
     auto tracker = std::make_unique<TrackerStage>();
     TrackerStage *stage = tracker.get();
-    stage->configuration = &configuration;
-    Component::Callbacks callbacks = common_callbacks("tracker", configuration.node);
+    for (const arhost_marker_config &marker : configuration->markers)
+        stage->marker_ids.insert(marker.id);
+    Component::Callbacks callbacks = common_callbacks("tracker", configuration->node);
     callbacks.hello = [this, stage](const PluginDescription &plugin, std::size_t candidate) {
         const run_config::TrackerConfiguration &own = *stage->configuration;
-        std::vector<OptionValue> options = options_for(plugin, ARHOST_KIND_TRACKER, own, candidate);
+        std::vector<OptionValue> options = options_for(*stage->component, ARHOST_KIND_TRACKER, own, candidate);
         stage->looked_for = describe_targets(own.markers, plugin, options);
         return Component::Create{{std::move(options), messages::TrackerSetup{*format_, intrinsics_, own.markers}},
                                  {}};
@@ -173,21 +189,21 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(const run_config::TrackerCo
     callbacks.lost = [this, stage](const std::vector<Command> &unanswered) {
         on_stage_lost(*stage, unanswered, Frame::Stage::to_track);
     };
-    stage->component = std::make_unique<Component>(context_, "tracker", configuration.plugins, configuration.limits,
-                                                   configuration.policy, std::move(callbacks));
+    stage->component = std::make_unique<Component>(context_, "tracker", configuration->plugins, configuration->limits,
+                                                   configuration->policy, std::move(callbacks));
+    stage->configuration = std::move(configuration);
     return tracker;
 }
 
-std::unique_ptr<RaytracerStage> Pipeline::make_raytracer(const run_config::RaytracerConfiguration &configuration,
+std::unique_ptr<RaytracerStage> Pipeline::make_raytracer(RaytracerPointer configuration,
                                                          std::shared_ptr<LoadedScene> scene) {
     auto raytracer = std::make_unique<RaytracerStage>();
     RaytracerStage *stage = raytracer.get();
-    stage->configuration = &configuration;
     stage->scene = std::move(scene);
-    Component::Callbacks callbacks = common_callbacks("raytracer", configuration.node);
+    Component::Callbacks callbacks = common_callbacks("raytracer", configuration->node);
     callbacks.hello = [this, stage](const PluginDescription &plugin, std::size_t candidate) {
         std::vector<OptionValue> options =
-            options_for(plugin, ARHOST_KIND_RAYTRACER, *stage->configuration, candidate);
+            options_for(*stage->component, ARHOST_KIND_RAYTRACER, *stage->configuration, candidate);
         if (intrinsics_.distortion != ARHOST_DISTORTION_NONE &&
             !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION))
             stage->component->log(
@@ -214,8 +230,10 @@ std::unique_ptr<RaytracerStage> Pipeline::make_raytracer(const run_config::Raytr
     callbacks.lost = [this, stage](const std::vector<Command> &unanswered) {
         on_stage_lost(*stage, unanswered, Frame::Stage::to_render);
     };
-    stage->component = std::make_unique<Component>(context_, "raytracer", configuration.plugins, configuration.limits,
-                                                   configuration.policy, std::move(callbacks));
+    stage->component =
+        std::make_unique<Component>(context_, "raytracer", configuration->plugins, configuration->limits,
+                                    configuration->policy, std::move(callbacks));
+    stage->configuration = std::move(configuration);
     return raytracer;
 }
 
@@ -252,7 +270,7 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
             setup.fps = configuration_.source->fps;
         if (intrinsics_.width > 0)
             setup.intrinsics = intrinsics_;
-        std::vector<OptionValue> options = options_for(plugin, ARHOST_KIND_SINK, output, candidate);
+        std::vector<OptionValue> options = options_for(*sink->component, ARHOST_KIND_SINK, output, candidate);
         expect_distinct_files(output, plugin);
         for (OptionValue &option : options)
             if (check_scratch_ && option.type == ARHOST_OPTION_OUTPUT_PATH && !option.text.empty() &&

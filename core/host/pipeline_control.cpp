@@ -26,8 +26,8 @@ template <class Choice> const Choice &find_choice(const std::vector<Choice> &cho
         return *found;
     std::string names;
     for (const Choice &choice : choices)
-        names += (names.empty() ? "" : ", ") + choice.name;
-    throw control::Error("there is no '" + base::printable(name, 100) + "'; choose one of: " + names);
+        names += (names.empty() ? "; choose one of: " : ", ") + choice.name;
+    throw control::Error("there is no '" + base::printable(name, 100) + "'" + names);
 }
 
 } // namespace
@@ -67,32 +67,33 @@ void Pipeline::execute(const control::Status &command, const control::Done &done
 void Pipeline::execute(const control::Swap &swap, const control::Done &done) {
     if (swap.component == "tracker") {
         expect_no_swap(next_tracker_ != nullptr, "tracker");
-        const auto &chosen = find_choice(configuration_.trackers, swap.plugin);
-        next_tracker_ = make_tracker(chosen);
-        next_tracker_->swapped = done;
-        next_tracker_->component->start();
+        start_next_tracker(shared(find_choice(latest_->trackers, swap.plugin)), done);
     } else {
-        expect_no_swap(next_raytracer_ || next_scene_loading_, "ray tracer");
-        start_next_raytracer(find_choice(configuration_.raytracers, swap.plugin), raytracer_->scene, done);
+        expect_no_swap(raytracer_swap_in_progress(), "ray tracer");
+        RaytracerPointer chosen = shared(find_choice(latest_->raytracers, swap.plugin));
+        start_next_raytracer(std::move(chosen), raytracer_->scene, done);
     }
 }
 
 void Pipeline::execute(const control::LoadScene &command, const control::Done &done) {
-    expect_no_swap(next_raytracer_ || next_scene_loading_, "ray tracer");
-    const run_config::Scene &chosen = find_choice(configuration_.scenes, command.scene);
-    SceneLoading::Callbacks callbacks;
-    callbacks.loaded = [this, done, &chosen](SharedMemory arena) {
-        next_scene_loading_.reset();
-        start_next_raytracer(*raytracer_->configuration, use_scene(std::move(arena), chosen), done);
-    };
-    callbacks.failed = [this, done](const std::string &reason) {
-        context_.log(ARHOST_SEVERITY_WARNING, "arhost", reason + "; the previous scene stays");
-        done(reason, {});
-        next_scene_loading_.reset();
-    };
-    next_scene_loading_ =
-        std::make_unique<SceneLoading>(context_, chosen.file, configuration_.sandbox,
-                                       raytracer_->configuration->limits, configuration_.files, std::move(callbacks));
+    expect_no_swap(raytracer_swap_in_progress(), "ray tracer");
+    const run_config::Scene &chosen = find_choice(latest_->scenes, command.scene);
+    load_next_scene(chosen, raytracer_->configuration, done);
+}
+
+void Pipeline::load_next_scene(const run_config::Scene &scene, RaytracerPointer raytracer,
+                               const control::Done &done) {
+    next_scene_loading_ = load(
+        scene, *raytracer,
+        [this, raytracer, done](std::shared_ptr<LoadedScene> loaded) {
+            next_scene_loading_.reset();
+            start_next_raytracer(raytracer, std::move(loaded), done);
+        },
+        [this, done](const std::string &reason) {
+            context_.log(ARHOST_SEVERITY_WARNING, "arhost", reason + "; the previous scene stays");
+            done(reason, {});
+            next_scene_loading_.reset();
+        });
 }
 
 void Pipeline::expect_no_swap(bool in_progress, const char *component) {
@@ -100,9 +101,15 @@ void Pipeline::expect_no_swap(bool in_progress, const char *component) {
         throw control::Error(std::string("the ") + component + " is being replaced; retry when this has ended");
 }
 
-void Pipeline::start_next_raytracer(const run_config::RaytracerConfiguration &configuration,
-                                    std::shared_ptr<LoadedScene> scene, const control::Done &done) {
-    next_raytracer_ = make_raytracer(configuration, std::move(scene));
+void Pipeline::start_next_tracker(TrackerPointer configuration, const control::Done &done) {
+    next_tracker_ = make_tracker(std::move(configuration));
+    next_tracker_->swapped = done;
+    next_tracker_->component->start();
+}
+
+void Pipeline::start_next_raytracer(RaytracerPointer configuration, std::shared_ptr<LoadedScene> scene,
+                                    const control::Done &done) {
+    next_raytracer_ = make_raytracer(std::move(configuration), std::move(scene));
     next_raytracer_->swapped = done;
     next_raytracer_->component->start();
 }
@@ -113,11 +120,13 @@ bool Pipeline::finish_swaps() {
         if (!next || !next->running() || current->component->in_flight() > 0)
             return false;
         retire(std::exchange(current, std::exchange(next, nullptr)));
-        context_.log(ARHOST_SEVERITY_INFO, "arhost",
-                     current->component->name() + " is now " + current->configuration->name);
+        std::string text = current->component->name() + " is now " + current->configuration->name;
         nlohmann::ordered_json members = {{"plugin", current->configuration->name}};
-        if constexpr (requires { current->scene; })
-            members["scene"] = current->scene->name;
+        if constexpr (requires { current->scene; }) {
+            members["scene"] = current->scene->source.name;
+            text += " with the scene " + current->scene->source.name;
+        }
+        context_.log(ARHOST_SEVERITY_INFO, "arhost", text);
         current->swapped("", members);
         return true;
     };
@@ -162,8 +171,10 @@ void Pipeline::remove_ended() {
     const auto take_if_ended = [this](const Component &component) {
         const bool ended =
             component.state() == Component::State::stopped || component.state() == Component::State::disabled;
-        if (ended)
+        if (ended) {
             statistics_.ended.add(component);
+            options_.erase(&component);
+        }
         return ended;
     };
     std::erase_if(retired_, [&](const auto &stage) { return take_if_ended(*stage->component); });
@@ -246,7 +257,7 @@ void Pipeline::execute(const control::Set &set, const control::Done &done) {
     } catch (const yaml::Error &error) {
         throw control::Error(error.what());
     }
-    OptionsInUse &options = options_[&configuration_of(**component)];
+    OptionsInUse &options = options_[*component];
     (*component)->set_option(value, [this, &options, value, done](const std::string &error) {
         if (const auto old = std::ranges::find(options.values, value.key, &OptionValue::key);
             error.empty() && old != options.values.end()) {
@@ -259,22 +270,12 @@ void Pipeline::execute(const control::Set &set, const control::Done &done) {
     });
 }
 
-const run_config::ComponentConfiguration &Pipeline::configuration_of(const Component &component) const {
-    if (tracker_ && &component == tracker_->component.get())
-        return *tracker_->configuration;
-    if (raytracer_ && &component == raytracer_->component.get())
-        return *raytracer_->configuration;
-    for (const auto &sink : sinks_)
-        if (&component == sink->component.get())
-            return *sink->configuration;
-    return *configuration_.source;
-}
-
 // Returns the options for creating a plugin: the configured ones, except for those that `set` has changed.
-std::vector<OptionValue> Pipeline::options_for(const PluginDescription &plugin, arhost_kind kind,
-                                               const run_config::ComponentConfiguration &component,
+std::vector<OptionValue> Pipeline::options_for(const Component &component, arhost_kind kind,
+                                               const run_config::ComponentConfiguration &configuration,
                                                std::size_t candidate) {
-    std::vector<OptionValue> values = run_config::options_for(plugin, kind, component, candidate);
+    std::vector<OptionValue> values =
+        run_config::options_for(component.description(), kind, configuration, candidate);
     OptionsInUse &in_use = options_[&component];
     if (candidate > 0)
         in_use.changed.clear();

@@ -195,7 +195,7 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
         return;
     Frame &frame = *accepted;
     frame.attempts = 0;
-    const char *problem = accept_tracker_result(frame.result.bytes(), marker_ids_, frame.record);
+    const char *problem = accept_tracker_result(frame.result.bytes(), tracker_->marker_ids, frame.record);
     frame.result = Lease();
     if (problem) {
         skip(frame, "tracker");

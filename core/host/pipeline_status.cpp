@@ -100,7 +100,7 @@ Json Pipeline::status_of(const Component &component) const {
                  {"restarts", component.restarts()}, {"sandbox", component.sandbox_level()},
                  {"counters", component.counters()}};
     json["missing_device"] = component.missing_device().empty() ? Json() : Json(component.missing_device());
-    const auto options = options_.find(&configuration_of(component));
+    const auto options = options_.find(&component);
     json["options"] = options == options_.end() ? Json::array() : changeable_options(plugin, options->second.values);
     return json;
 }
@@ -121,12 +121,12 @@ Json Pipeline::status() const {
     if (tracker_) {
         components.push_back(status_of(*tracker_->component));
         components.back().update(
-            {{"choice", tracker_->configuration->name}, {"choices", names_of(configuration_.trackers)}});
+            {{"choice", tracker_->configuration->name}, {"choices", names_of(latest_->trackers)}});
     }
     if (raytracer_) {
         components.push_back(status_of(*raytracer_->component));
         components.back().update(
-            {{"choice", raytracer_->configuration->name}, {"choices", names_of(configuration_.raytracers)}});
+            {{"choice", raytracer_->configuration->name}, {"choices", names_of(latest_->raytracers)}});
     }
     Json recording = nullptr;
     for (const auto &sink : sinks_) {
@@ -150,8 +150,8 @@ Json Pipeline::status() const {
             {"quality", quality_json(statistics_)},
             {"targets", std::move(targets)},
             {"components", std::move(components)},
-            {"scene", raytracer_ ? Json(raytracer_->scene->name) : Json(nullptr)},
-            {"scenes", names_of(configuration_.scenes)},
+            {"scene", raytracer_ ? Json(raytracer_->scene->source.name) : Json(nullptr)},
+            {"scenes", names_of(latest_->scenes)},
             {"recording", std::move(recording)}};
 }
 

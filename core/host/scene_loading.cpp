@@ -9,6 +9,8 @@ using namespace ipc;
 
 namespace {
 
+constexpr std::size_t max_files_read = 4096; // of which `loaded` and `failed` report; the loader is not trusted
+
 // Returns the sandbox policy of the scene loader. Which files a scene and its meshes refer to is known only after
 // parsing, so the loader may read everything except /proc, /sys and devices. Its only output is the arena.
 sandbox::Policy policy_of(sandbox::Mode mode) {
@@ -63,6 +65,8 @@ void SceneLoading::restart_deadline() {
 }
 
 void SceneLoading::check_read(const base::FileIdentity &file) {
+    if (files_read_.size() < max_files_read && std::filesystem::path(file.path).is_absolute())
+        files_read_.insert(file.path);
     try {
         files_.check_read(file);
     } catch (const yaml::Error &error) {
@@ -80,18 +84,21 @@ void SceneLoading::on_died(const supervise::Death &death) {
     deadline_.cancel();
     total_deadline_.cancel();
     const Callbacks callbacks = std::move(callbacks_);
+    const std::set<std::filesystem::path> files = std::move(files_read_);
     if (!failure_.empty() || !death.clean || !arena_)
-        return callbacks.failed(failure_.empty() ? scene_ + ": the scene loader failed: " + death.how : failure_);
+        return callbacks.failed(
+            failure_.empty() ? scene_ + ": the scene loader failed: " + death.how : std::string(failure_), files);
     try {
         // The loader has exited, so no writable mapping of the arena should exist. adopt_and_freeze throws if one
         // does.
         SharedMemory arena = SharedMemory::adopt_and_freeze(std::move(arena_));
         const Mapping mapping = arena.map(Access::read_only);
         if (const std::string fault = scene::validate(mapping.bytes()); !fault.empty())
-            return callbacks.failed(scene_ + ": the loaded scene is invalid, which is a bug in arhost: " + fault);
-        callbacks.loaded(std::move(arena));
+            return callbacks.failed(scene_ + ": the loaded scene is invalid, which is a bug in arhost: " + fault,
+                                    files);
+        callbacks.loaded(std::move(arena), files);
     } catch (const std::exception &error) {
-        callbacks.failed(std::string("the scene loader's memory cannot be used: ") + error.what());
+        callbacks.failed(std::string("the scene loader's memory cannot be used: ") + error.what(), files);
     }
 }
 

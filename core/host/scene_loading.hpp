@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <set>
 
 namespace arhost::host {
 
@@ -21,8 +22,9 @@ class SceneLoading {
 public:
     // The reactor calls exactly one of these callbacks, which may destroy the SceneLoading.
     struct Callbacks {
-        std::function<void(ipc::SharedMemory arena)> loaded; // `arena` is frozen and validated
-        std::function<void(const std::string &reason)> failed;
+        using Files = std::set<std::filesystem::path>; // that the loader says to have read; they are not checked
+        std::function<void(ipc::SharedMemory arena, const Files &files)> loaded; // `arena` is frozen and validated
+        std::function<void(const std::string &reason, const Files &files)> failed;
     };
     // `limits.start` is the maximum time between two messages of the loader, `limits.start_total` the maximum time of
     // loading. Loading fails if the scene refers to a file that the run writes, according to `files`.
@@ -39,6 +41,7 @@ private:
     supervise::Context &context_;
     Callbacks callbacks_;
     run_config::FilesInUse files_;
+    std::set<std::filesystem::path> files_read_;
     std::string scene_, failure_;
     base::UniqueFd arena_;
     std::chrono::milliseconds timeout_;

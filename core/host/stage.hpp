@@ -11,8 +11,10 @@
 #include "host/slots.hpp"
 #include "run_config/configuration.hpp"
 
+#include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 
 namespace arhost::host {
@@ -28,19 +30,21 @@ struct Stage {
 };
 
 struct TrackerStage : Stage {
-    const run_config::TrackerConfiguration *configuration = nullptr;
+    std::shared_ptr<const run_config::TrackerConfiguration> configuration;
+    std::set<std::int32_t> marker_ids;
     std::string looked_for; // the markers and dictionary, for messages
 };
 
 struct LoadedScene {
-    std::string name;
+    run_config::Scene source;
+    std::set<std::filesystem::path> files; // the files that the loader has read
     ipc::SharedMemory arena;
     camera::Coordinates coordinates;             // from the configuration or from the scene's axes
     std::optional<OverlayChecks> overlay_checks; // only for `conform: true`
 };
 
 struct RaytracerStage : Stage {
-    const run_config::RaytracerConfiguration *configuration = nullptr;
+    std::shared_ptr<const run_config::RaytracerConfiguration> configuration;
     std::shared_ptr<LoadedScene> scene;
     std::optional<QualityController> quality; // only with `live.target_fps`
     std::uint32_t samples_in_use = 0;         // the option of the current worker

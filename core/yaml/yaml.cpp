@@ -200,6 +200,10 @@ std::string nearest(std::string_view word, std::span<const std::string_view> can
     return std::string(best);
 }
 
+std::string Node::content() const {
+    return YAML::Dump(node_);
+}
+
 Node Node::load(const std::filesystem::path &file) {
     std::error_code ignored;
     if (std::filesystem::is_directory(file, ignored))

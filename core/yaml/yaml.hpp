@@ -67,6 +67,7 @@ public:
     bool is_overridden() const { return !option().empty(); } // this node or an ancestor
     const std::string &path() const { return path_; }        // key path from the root; "" for the root itself
     std::filesystem::path file() const;
+    std::string content() const;                              // as YAML, without comments
     std::string where() const;                                // "file:line:column"
     [[noreturn]] void fail(const std::string &message) const; // throws Error with where() and path()
 

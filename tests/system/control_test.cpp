@@ -253,6 +253,18 @@ TEST(Control, KeepsTheOldPluginIfTheNewOneDoesNotStart) {
     expect_all_frames_with_their_overlays(run);
 }
 
+TEST(Control, RejectsSwapsOfAComponentThatTheRunLacks) {
+    ControlledRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 1000000, delay_ms: 5}}\n"
+                      "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
+                      "alternatives: {tracker: [{name: second, plugin: tracker_counter}]}\n"
+                      "outputs: [{plugin: sink_counter, path: counted.txt}, "
+                      "{plugin: sink_control, allow: [listen], control: [quit, swap, status]}]\n");
+    run.start_and_connect();
+    EXPECT_EQ(run.error_of(swap("raytracer", "second")), "there is no 'second'");
+    run.succeed(swap("tracker", "second"));
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
 TEST(Control, ReplacesAHungRayTracer) {
     ControlledRun run(controlled("live"));
     run.start_and_connect();

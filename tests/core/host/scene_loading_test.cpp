@@ -43,9 +43,9 @@ struct SceneLoadingTest : testing::Test {
         for (const char *name : {"a.mp4", "b.mp4"})
             files.write(yaml::Node::parse("{path: '" + (folder / name).string() + "'}", "run.yaml").require("path"));
         std::string failure;
-        host::SceneLoading loading(
-            context, folder / "scene.yaml", sandbox::Mode::permissive, limits, files,
-            {[&](const SharedMemory &) { failure = "none"; }, [&](const std::string &reason) { failure = reason; }});
+        host::SceneLoading loading(context, folder / "scene.yaml", sandbox::Mode::permissive, limits, files,
+                                   {[&](const SharedMemory &, const auto &) { failure = "none"; },
+                                    [&](const std::string &reason, const auto &) { failure = reason; }});
         for (const Json &message : messages)
             loader.channel.send(message);
         ::eventfd_write(loader.death.get(), 1);
@@ -85,9 +85,9 @@ TEST_F(SceneLoadingTest, EndsALoaderThatReportsProgressForever) {
     limits.start = std::chrono::hours(1);
     limits.start_total = std::chrono::milliseconds(30);
     std::string failure;
-    host::SceneLoading loading(
-        context, folder / "scene.yaml", sandbox::Mode::permissive, limits, {},
-        {[&](const SharedMemory &) { failure = "none"; }, [&](const std::string &reason) { failure = reason; }});
+    host::SceneLoading loading(context, folder / "scene.yaml", sandbox::Mode::permissive, limits, {},
+                               {[&](const SharedMemory &, const auto &) { failure = "none"; },
+                                [&](const std::string &reason, const auto &) { failure = reason; }});
     const Json progress = encode(messages::Progress{0.5, "still busy"});
     Reactor::Registration next;
     const std::function<void()> report = [&] {

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/file_watch.hpp"
+
+#include <cerrno>
+#include <cstring>
+#include <sys/inotify.h>
+#include <system_error>
+#include <unistd.h>
+
+namespace arhost::host {
+
+namespace {
+
+constexpr std::chrono::milliseconds quiet_time{200};
+
+} // namespace
+
+FileWatch::FileWatch(ipc::Reactor &reactor, std::function<void(const Files &)> changed)
+    : reactor_(reactor), changed_(std::move(changed)),
+      inotify_(base::checked(::inotify_init1(IN_CLOEXEC | IN_NONBLOCK), "inotify_init1")),
+      events_(reactor.watch(inotify_.get(), [this] { on_events(); })) {}
+
+void FileWatch::add(const Files &files) {
+    for (const std::filesystem::path &file : files) {
+        if (!files_.insert(file).second)
+            continue;
+        const std::filesystem::path folder = file.parent_path();
+        // Returns the existing descriptor if the folder is already watched.
+        const int watch = ::inotify_add_watch(inotify_.get(), folder.c_str(), IN_CLOSE_WRITE | IN_MOVED_TO);
+        if (watch < 0 && errno != ENOENT && errno != EACCES)
+            throw std::system_error(errno, std::generic_category(), "cannot watch the folder " + folder.string());
+        if (watch >= 0)
+            folders_[watch] = folder;
+    }
+}
+
+void FileWatch::on_events() {
+    alignas(inotify_event) char buffer[4096];
+    ssize_t size = 0;
+    while ((size = ::read(inotify_.get(), buffer, sizeof buffer)) > 0) {
+        for (ssize_t at = 0; at < size;) {
+            inotify_event event;
+            std::memcpy(&event, buffer + at, sizeof event);
+            const char *const name = buffer + at + sizeof event;
+            at += static_cast<ssize_t>(sizeof event + event.len);
+            const auto folder = folders_.find(event.wd);
+            if (event.len == 0 || folder == folders_.end())
+                continue;
+            if (const auto file = folder->second / name; files_.contains(file))
+                pending_.insert(file);
+        }
+    }
+    if (!pending_.empty())
+        quiet_ =
+            reactor_.at(ipc::Reactor::Clock::now() + quiet_time, [this] { changed_(std::exchange(pending_, {})); });
+}
+
+} // namespace arhost::host

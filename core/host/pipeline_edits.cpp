@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Applies edits of the configuration's file and of the scene's files while the video runs (`--watch`).
+#include "host/pipeline.hpp"
+
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/fmt/ranges.h>
+
+#include <algorithm>
+
+namespace arhost::host {
+
+namespace {
+
+// The keys whose edits take effect while the video runs.
+constexpr std::array<std::string_view, 5> applied_keys = {"tracker", "raytracer", "scenes", "alternatives",
+                                                          "coordinates"};
+
+std::string content_of(const yaml::Node &root, std::string_view key) {
+    const auto node = root.find(key);
+    return node ? node->content() : "";
+}
+
+// Returns the keys whose edits take effect only in the next run.
+std::vector<std::string> unapplied_edits(const run_config::Configuration &edited,
+                                         const run_config::Configuration &previous) {
+    std::set<std::string> keys;
+    for (const auto *configuration : {&edited, &previous})
+        for (const auto &[key, node] : configuration->node.entries())
+            keys.insert(key);
+    std::vector<std::string> unapplied;
+    for (const std::string &key : keys) {
+        const bool is_applied = std::ranges::find(applied_keys, key) != applied_keys.end() &&
+                                edited.tracker.has_value() == previous.tracker.has_value() &&
+                                edited.raytracer.has_value() == previous.raytracer.has_value();
+        if (!is_applied && content_of(edited.node, key) != content_of(previous.node, key))
+            unapplied.push_back(key);
+    }
+    return unapplied;
+}
+
+// Returns the file and the target of its symbolic links.
+FileWatch::Files paths_to(const std::filesystem::path &file) {
+    return {file, base::real_path(file)};
+}
+
+void log_only(const std::string &, const nlohmann::ordered_json &) {} // the run logs the outcome of a swap
+
+} // namespace
+
+void Pipeline::watch(std::function<run_config::Configuration()> read) {
+    read_configuration_ = std::move(read);
+    file_watch_.emplace(context_.reactor,
+                        [this](const FileWatch::Files &files) { edited_files_.insert(files.begin(), files.end()); });
+    watch_files(paths_to(std::filesystem::absolute(configuration_.node.file())));
+}
+
+// `files` may be names from the scene loader, which is not trusted: only their folders are opened.
+void Pipeline::watch_files(const FileWatch::Files &files) {
+    if (!file_watch_)
+        return;
+    try {
+        file_watch_->add(files);
+    } catch (const std::system_error &error) {
+        context_.log(ARHOST_SEVERITY_WARNING, "arhost", std::string(error.what()) + "; edits there have no effect");
+    }
+}
+
+// Waits for the swaps in progress, so that the last edit is the one that stays.
+void Pipeline::apply_edits() {
+    if (edited_files_.empty() || next_tracker_ || raytracer_swap_in_progress())
+        return;
+    const FileWatch::Files files = std::exchange(edited_files_, {});
+    const auto is_edited = [&](const std::filesystem::path &file) { return files.contains(file); };
+    const std::shared_ptr<const run_config::Configuration> previous = latest_;
+    if (std::ranges::any_of(paths_to(std::filesystem::absolute(configuration_.node.file())), is_edited)) {
+        try {
+            latest_ = std::make_shared<const run_config::Configuration>(read_configuration_());
+        } catch (const std::exception &error) {
+            context_.log(ARHOST_SEVERITY_WARNING, "arhost",
+                         std::string(error.what()) + "; the run continues with the previous configuration");
+        }
+    }
+    const bool scene_changed =
+        raytracer_ && std::ranges::any_of(files, [&](const auto &each) {
+            return each == raytracer_->scene->source.file || raytracer_->scene->files.contains(each);
+        });
+    apply(*latest_, *previous, scene_changed);
+}
+
+void Pipeline::apply(const run_config::Configuration &edited, const run_config::Configuration &previous,
+                     bool scene_changed) {
+    if (const auto keys = unapplied_edits(edited, previous); !keys.empty())
+        context_.log(ARHOST_SEVERITY_WARNING, "arhost",
+                     fmt::format("the edit of '{}' takes effect in the next run", fmt::join(keys, "', '")));
+    const auto differs = [&](std::string_view key) {
+        return content_of(edited.node, key) != content_of(previous.node, key);
+    };
+    if (tracker_ && edited.tracker && differs("tracker"))
+        start_next_tracker(shared(edited.trackers.front()), log_only);
+    if (!raytracer_ || !edited.raytracer)
+        return;
+    const bool raytracer_changed = differs("raytracer");
+    const RaytracerPointer raytracer =
+        raytracer_changed ? shared(edited.raytracers.front()) : raytracer_->configuration;
+    const bool other_scene = edited.raytracer->scene != previous.raytracer->scene;
+    const run_config::Scene scene = other_scene ? edited.scenes.front() : raytracer_->scene->source;
+    if (scene_changed || other_scene || differs("coordinates"))
+        load_next_scene(scene, raytracer, log_only);
+    else if (raytracer_changed)
+        start_next_raytracer(raytracer, raytracer_->scene, log_only);
+}
+
+} // namespace arhost::host

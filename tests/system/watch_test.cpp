@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Tests of `arhost --watch`, which applies edits while the video runs (docs/control.md).
+#include "arhost_run.hpp"
+
+#include <gmock/gmock.h>
+
+using namespace arhost::test;
+using testing::HasSubstr;
+using testing::Not;
+
+namespace {
+
+constexpr const char *source =
+    "source: {plugin: source_synthetic, fps: 100, options: {frames: 0, id: 0, side_mm: 80, "
+    "width: 160, height: 120}}\n";
+constexpr const char *tracker = "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n";
+constexpr const char *raytracer = "raytracer: {plugin: rt_embree, scene: scene.yaml}\n";
+
+// A sphere of a colour, or an object of a mesh file.
+std::string scene_with(const std::string &object) {
+    return "version: 1\naxes: z-up\nmaterials: {m: {model: diffuse, diffuse: [0, 0.5, 0]}}\n"
+           "objects: [{" +
+           object + ", material: m}]\n";
+}
+const std::string small_sphere = scene_with("sphere: {centre: [0, 0, 10], radius: 10}");
+const std::string large_sphere = scene_with("sphere: {centre: [0, 0, 30], radius: 30}");
+
+class WatchedRun : public ArhostRun {
+public:
+    explicit WatchedRun(const std::string &scene = small_sphere) {
+        write("scene.yaml", scene);
+        write("run.yaml", configuration());
+    }
+    static std::string configuration(const std::string &tracker_line = tracker,
+                                     const std::string &raytracer_line = raytracer, const std::string &more = "") {
+        return std::string("version: 1\n") + source + tracker_line + raytracer_line +
+               "outputs: [{plugin: sink_images, path: out/%06d.png}]\n" + more;
+    }
+    void start_watching() {
+        start({"run.yaml", "--watch"});
+        while (!exists("out/000002.png") && running())
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    // Waits until the log contains `text` for the `count`th time.
+    void wait_for(const std::string &text, int count = 1) {
+        const auto found = [&] {
+            const std::string log = output();
+            int times = 0;
+            for (std::size_t at = 0; (at = log.find(text, at)) != std::string::npos; ++at)
+                ++times;
+            return times >= count;
+        };
+        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
+        while (!found()) {
+            if (!running() || std::chrono::steady_clock::now() > end)
+                throw std::runtime_error("the log lacks '" + text + "': " + output());
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        }
+    }
+    // Replaces a file as most editors do.
+    void replace(const std::string &name, const std::string &text) const {
+        write(name + "~", text);
+        std::filesystem::rename(path(name + "~"), path(name));
+    }
+    // Interrupts the run after some more frames.
+    int interrupt() {
+        for (const int goal = std::stoi(last_picture()) + 4; std::stoi(last_picture()) < goal && running();)
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        send_signal(pid(), SIGINT);
+        return wait();
+    }
+    std::string last_picture() const {
+        std::vector<std::string> names;
+        for (const auto &entry : std::filesystem::directory_iterator(path("out")))
+            names.push_back(entry.path().filename());
+        return *std::ranges::max_element(names);
+    }
+};
+
+// The picture that a run of the same files, without edits, writes under this name.
+std::string picture_of_a_fresh_run(const WatchedRun &edited, const std::string &name) {
+    ArhostRun run(edited.read("run.yaml"));
+    for (const char *file : {"scene.yaml", "mesh.obj"})
+        if (edited.exists(file))
+            run.write(file, edited.read(file));
+    EXPECT_EQ(run.run({"run.yaml", "--frames", std::to_string(std::stoi(name) + 1)}), 0) << run.output();
+    return run.read("out/" + name);
+}
+
+} // namespace
+
+TEST(Watch, AnEditedSceneReplacesTheScene) {
+    WatchedRun run;
+    run.start_watching();
+    run.write("scene.yaml", large_sphere);
+    run.wait_for("raytracer is now rt_embree with the scene scene");
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+    EXPECT_EQ(run.read("out/" + run.last_picture()), picture_of_a_fresh_run(run, run.last_picture()));
+    EXPECT_NE(run.read("out/000000.png"), picture_of_a_fresh_run(run, "000000.png"));
+}
+
+TEST(Watch, AnEditedMeshReplacesTheScene) {
+    const auto triangle = [](const std::string &height) {
+        return "v -20 -20 1\nv 20 -20 1\nv 0 20 " + height + "\nf 1 2 3\n";
+    };
+    WatchedRun run(scene_with("mesh: mesh.obj"));
+    run.write("mesh.obj", triangle("1"));
+    run.start_watching();
+    run.replace("mesh.obj", triangle("30"));
+    run.wait_for("raytracer is now rt_embree with the scene scene");
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+    EXPECT_EQ(run.read("out/" + run.last_picture()), picture_of_a_fresh_run(run, run.last_picture()));
+}
+
+TEST(Watch, EditedComponentsReplaceTheRunningOnes) {
+    WatchedRun run;
+    run.start_watching();
+    run.replace("run.yaml", WatchedRun::configuration(
+                                "tracker: {plugin: tracker_apriltag, markers: [{id: 0, side_mm: 40}]}\n",
+                                "raytracer: {plugin: rt_embree, scene: scene.yaml, options: {samples: 4}}\n"));
+    run.wait_for("tracker is now tracker_apriltag");
+    run.wait_for("raytracer is now rt_embree");
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+    EXPECT_EQ(run.read("out/" + run.last_picture()), picture_of_a_fresh_run(run, run.last_picture()));
+    EXPECT_THAT(run.output(), Not(HasSubstr("takes effect in the next run")));
+}
+
+TEST(Watch, EditedCoordinatesApplyToTheNextFrames) {
+    WatchedRun run;
+    run.start_watching();
+    run.replace("run.yaml", WatchedRun::configuration(
+                                tracker, raytracer,
+                                "coordinates: {ar: 1, rt: 2, rotations: [{degrees: 90, axis: [1, 0, 0]}]}\n"));
+    run.wait_for("raytracer is now rt_embree");
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+    EXPECT_EQ(run.read("out/" + run.last_picture()), picture_of_a_fresh_run(run, run.last_picture()));
+}
+
+TEST(Watch, AnInvalidEditLeavesTheRunAsItWas) {
+    WatchedRun run;
+    run.start_watching();
+    run.replace("run.yaml", WatchedRun::configuration(tracker, "raytracer: {plugin: rt_embre, scene: scene.yaml}\n"));
+    run.wait_for("run.yaml:4:21: raytracer.plugin: ");
+    run.wait_for("the run continues with the previous configuration");
+    run.replace("scene.yaml", scene_with("sphere: {centre: [0, 0, 30], radius: -30}"));
+    run.wait_for("scene.yaml:4:");
+    run.wait_for("the previous scene stays");
+    run.replace("run.yaml",
+                WatchedRun::configuration(
+                    tracker, "raytracer: {plugin: rt_embree, scene: scene.yaml, options: {samples: -1}}\n"));
+    run.wait_for("the previous raytracer stays");
+    run.replace("run.yaml", WatchedRun::configuration());
+    run.replace("scene.yaml", large_sphere);
+    run.wait_for("raytracer is now rt_embree with the scene scene");
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+    EXPECT_EQ(run.read("out/" + run.last_picture()), picture_of_a_fresh_run(run, run.last_picture()));
+}
+
+TEST(Watch, NamesTheKeysWhoseEditsNeedANewRun) {
+    WatchedRun run;
+    run.start_watching();
+    run.replace("run.yaml", WatchedRun::configuration(tracker, raytracer, "stats: out/stats.json\nframes: 100000\n"));
+    run.wait_for("the edit of 'frames', 'stats' takes effect in the next run");
+    run.replace("run.yaml", WatchedRun::configuration("", raytracer, "trajectory: none.jsonl\n"));
+    run.wait_for("none.jsonl");
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+    EXPECT_THAT(run.output(), Not(HasSubstr(" is now ")));
+}
+
+TEST(Watch, EditsWithoutTheOptionHaveNoEffect) {
+    WatchedRun run;
+    run.start({"run.yaml", "--frames", "100"});
+    while (!run.exists("out/000002.png") && run.running())
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    run.write("scene.yaml", large_sphere);
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    EXPECT_THAT(run.output(), Not(HasSubstr(" is now ")));
+}
+
+TEST(WatchConfiguration, RejectsAPluginThatCouldEditTheConfiguration) {
+    ArhostRun run(std::string("version: 1\n") + source + tracker + raytracer +
+                  "outputs:\n  - {plugin: sink_video, path: take.mkv}\n");
+    run.write("scene.yaml", small_sphere);
+    EXPECT_EQ(run.run({"run.yaml", "--watch"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("run.yaml:6:5: outputs[0]: may write to the folder of '"));
+    EXPECT_EQ(run.run({"run.yaml", "--frames", "3"}), 0) << run.output();
+}
+
+TEST(WatchConfiguration, RejectsAnEditAfterWhichAPluginCouldEditTheConfiguration) {
+    WatchedRun run;
+    run.start_watching();
+    run.replace("run.yaml",
+                WatchedRun::configuration(tracker, raytracer, "record: {plugin: sink_video, path: t.mkv}\n"));
+    run.wait_for("record: may write to the folder of");
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+}
