@@ -138,6 +138,7 @@ private:
     bool read_from_trajectory();
     bool track();
     bool render();
+    bool is_early(const Frame &frame);
     bool compose();
     void compose(Frame &frame, std::span<std::byte> slot);
     void exchange_time_code(const arhost_record &record, const OutputView &out);
@@ -224,6 +225,9 @@ private:
     std::map<std::uint64_t, std::unique_ptr<Frame>> frames_;
     std::vector<arhost_marker> last_markers_;          // of the last composited frame
     bool video_input_ = false, overlay_input_ = false; // whether a sink reads the video frame and the overlay
+    bool has_window_ = false;
+    std::optional<std::chrono::steady_clock::time_point> media_begin_; // when the media time 0 was shown, if paced
+    ipc::Reactor::Registration due_;
     bool frozen_ = false;
     std::vector<std::uint8_t> enlarged_; // the overlay of a frame that was rendered smaller
     OutputFramePointer last_output_;     // for the command `snapshot`

@@ -279,6 +279,7 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
                     check_folder(*check_scratch_, index_of(output)) / std::filesystem::path(option.text).filename();
             else if (option.key == "path" && !sink->path.empty())
                 option.text = sink->path;
+        has_window_ |= std::ranges::count(plugin.needs, "display") > 0;
         video_input_ |= (plugin.capabilities & ARHOST_CAPABILITY_VIDEO_INPUT) != 0;
         overlay_input_ |= (plugin.capabilities & ARHOST_CAPABILITY_OVERLAY_INPUT) != 0;
         std::vector<int> sockets = open_sockets(output, options);

@@ -21,6 +21,7 @@ using Clock = std::chrono::steady_clock;
 namespace {
 
 constexpr std::size_t max_reads_in_flight = 2;
+constexpr std::chrono::milliseconds max_lateness{100}; // of a paced run that catches up
 constexpr std::uint32_t max_attempts = 2; // per frame and stage, if the worker dies while processing the frame
 
 // Returns the first marker that is not lost, or null. Trackers report markers in the order of the configuration.
@@ -291,7 +292,7 @@ void Pipeline::start_quality(RaytracerStage &stage) {
     if (supports(ARHOST_CAPABILITY_SCALED_IMAGES) &&
         (supports(ARHOST_CAPABILITY_LENS_DISTORTION) || intrinsics_.distortion == ARHOST_DISTORTION_NONE))
         limits.min_scale = configuration_.min_scale;
-    const std::vector<OptionValue> &options = options_[stage.configuration].values;
+    const std::vector<OptionValue> &options = options_[stage.component.get()].values;
     const auto samples = std::ranges::find(options, "samples", &OptionValue::key);
     if (samples != options.end() && samples->type == ARHOST_OPTION_INTEGER && samples->integer > 0 &&
         std::ranges::count(plugin.changeable, "samples"))
@@ -445,6 +446,22 @@ Frame *Pipeline::next_waiting(Frame::Stage stage) {
     return nullptr;
 }
 
+// Whether a frame of a film must wait because the run is paced. A run that is too slow for the film shows the
+// following frames later, instead of faster.
+bool Pipeline::is_early(const Frame &frame) {
+    if (live_ || interrupted_ || !configuration_.paced.value_or(has_window_) ||
+        frame.record.clock != ARHOST_CLOCK_MEDIA)
+        return false;
+    const Clock::time_point now = Clock::now();
+    const std::chrono::nanoseconds media_time(frame.record.capture_ns);
+    if (!media_begin_ || now - *media_begin_ - media_time > max_lateness)
+        media_begin_ = now - media_time;
+    const Clock::time_point due = *media_begin_ + media_time;
+    if (due > now)
+        due_ = context_.reactor.at(due, [] {}); // wakes the pipeline
+    return due > now;
+}
+
 bool Pipeline::compose() {
     // Selects the oldest frame; in mode live, the newest frame that is done.
     auto ready = frames_.begin();
@@ -452,7 +469,7 @@ bool Pipeline::compose() {
         for (auto it = frames_.begin(); it != frames_.end(); ++it)
             if (it->second->stage == Frame::Stage::done)
                 ready = it;
-    if (ready == frames_.end() || ready->second->stage != Frame::Stage::done)
+    if (ready == frames_.end() || ready->second->stage != Frame::Stage::done || is_early(*ready->second))
         return false;
     const bool has_sink = std::any_of(sinks_.begin(), sinks_.end(), [](const auto &sink) { return !sink->closed; });
     bool is_shown = true;

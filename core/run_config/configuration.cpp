@@ -311,6 +311,8 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
         root.require("mode").fail(
             "mode live needs a 'source', which sets the frame rate; without a source, a trajectory "
             "can only be rendered in mode lockstep");
+    if (const auto node = root.find("paced"))
+        configuration.paced = node->boolean();
     configuration.frames =
         static_cast<std::uint64_t>(integer_or_default(root, "frames", 0, std::numeric_limits<std::int64_t>::max()));
     if (const auto node = root.find("camera")) {

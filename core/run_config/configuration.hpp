@@ -66,6 +66,7 @@ struct Configuration {
     yaml::Node node;
     Mode mode = Mode::lockstep;
     sandbox::Mode sandbox = sandbox::Mode::standard;
+    std::optional<bool> paced{};                    // mode lockstep: composite at the rate of the time stamps
     std::uint64_t frames = 0;                       // maximum number of frames; 0: no limit
     std::optional<SourceConfiguration> source{};    // nullopt only with a trajectory; the frames are then black
     std::optional<camera::Trajectory> trajectory{}; // camera poses to use instead of the tracker's

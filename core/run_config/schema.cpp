@@ -68,6 +68,8 @@ std::vector<Key> make_table() {
          "supports. "
          "`strict`: all layers; the run fails if one is missing. `none`: no sandbox, for debuggers.",
          {"standard", "permissive", "strict", "none"}},
+        {"paced", boolean, false, "if there is a window",
+         "Mode `lockstep`: show a film at its own rate instead of as fast as possible."},
         {"frames", integer, false, "0", "Stop after this many frames; 0: stop at the end of the source."},
         {"plugin_path", list, false, "", "Folders to search for plugins before the folder of built-in plugins."},
     };

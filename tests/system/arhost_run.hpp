@@ -184,4 +184,15 @@ inline std::vector<CountedLine> counted(const ArhostRun &run, const std::string 
     return lines;
 }
 
+// The column shown_s of a timeline.
+inline std::vector<double> shown_seconds(const std::string &csv) {
+    std::istringstream text(csv);
+    std::vector<double> seconds;
+    std::string line;
+    std::getline(text, line); // the names of the columns
+    while (std::getline(text, line))
+        seconds.push_back(std::stod(line.substr(line.find(',') + 1)));
+    return seconds;
+}
+
 } // namespace arhost::test

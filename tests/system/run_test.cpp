@@ -84,6 +84,26 @@ TEST(Run, WritesATimeline) {
     EXPECT_NEAR(run.stats()["stages"]["device"]["max_ms"], 2e-6, 1e-12);
 }
 
+TEST(Run, ShowsAFilmAtItsOwnRateIfPaced) {
+    ArhostRun run(counting("lockstep", "frames: 10", "", "", "paced: true\ntimeline: times.csv\n"));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run({"run.yaml", "--set", "source.fps=20"}), 0) << run.output();
+    const std::vector<double> shown = shown_seconds(run.read("times.csv"));
+    ASSERT_EQ(shown.size(), 10u);
+    for (std::size_t i = 1; i < shown.size(); ++i)
+        EXPECT_GE(shown[i] - shown[0], static_cast<double>(i) / 20 - 1e-3);
+}
+
+TEST(Run, DoesNotWaitForADistantFrameOfAPacedFilmOnCtrlC) {
+    ArhostRun run(counting("lockstep", "frames: 10", "", "", "paced: true\n"));
+    run.write("scene.yaml", small_scene);
+    run.start({"run.yaml", "--set", "source.fps=0.001"});
+    while (counted(run).empty() && run.running())
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    send_signal(run.pid(), SIGINT);
+    EXPECT_EQ(run.wait(), 130) << run.output();
+}
+
 TEST(Run, OmitsImplausibleDeviceTimes) {
     for (const char *ns : {"0", "-1", "9223372036854775807"}) {
         ArhostRun run(counting("lockstep", "frames: 5", "", std::string("device_time_ns: ") + ns));

@@ -39,12 +39,15 @@ protected:
         run_.write("run.yaml", yaml);
         run_.write("scene.yaml", small_scene);
         run_.write("other.yaml", small_scene);
-        run_.start({"--config", "run.yaml"}, [this] {
-            setenv("DISPLAY", server_->name().c_str(), 1);
-            setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
-        });
+        run_.start({"--config", "run.yaml"}, environment());
         observer_.emplace(server_->name());
         ASSERT_TRUE(becomes([this] { return has_frame(screen()); })) << run_.output();
+    }
+    std::function<void()> environment() const {
+        return [this] {
+            setenv("DISPLAY", server_->name().c_str(), 1);
+            setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
+        };
     }
     // Returns false after 30 seconds.
     static bool becomes(const std::function<bool()> &done) {
@@ -142,4 +145,18 @@ TEST_F(WindowRun, ACommandThatIsNotGrantedShowsTheReason) {
     EXPECT_TRUE(becomes([this] { return count(red) > 100; })) << "the names of scenes are unknown";
     observer_->press(XK_q);
     EXPECT_EQ(run_.wait(), 0) << run_.output();
+}
+
+TEST_F(WindowRun, ShowsAFilmAtItsOwnRateInLockstep) {
+    std::string yaml = counting("lockstep", "frames: 10", "", "", "timeline: times.csv\n");
+    const std::string counter = "{plugin: sink_counter, path: counted.txt}";
+    run_.write("run.yaml",
+               yaml.replace(yaml.find(counter), counter.size(), "{plugin: sink_window, allow: [display]}"));
+    run_.write("scene.yaml", small_scene);
+    run_.start({"--config", "run.yaml", "--set", "source.fps=20"}, environment());
+    ASSERT_EQ(run_.wait(), 0) << run_.output();
+    const std::vector<double> shown = shown_seconds(run_.read("times.csv"));
+    ASSERT_EQ(shown.size(), 10u);
+    for (std::size_t i = 1; i < shown.size(); ++i)
+        EXPECT_GE(shown[i] - shown[0], static_cast<double>(i) / 20 - 1e-3);
 }

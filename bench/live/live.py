@@ -1,0 +1,276 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""Long live runs: live.py [soak] [swaps] [--quick]
+
+soak   30 minutes at 30 frames per second, 640x480, scene optix-cs, a window (on Xvfb) and a web page with two viewers.
+       Targets: no frame lost, p99 of the latency at most two frame times, and no process that grows: the growth of its
+       resident memory over the last 20 minutes, from a linear fit, is below the fit's uncertainty or 64 KiB.
+swaps  tracker and ray tracer are replaced every second for 10 minutes at 30 frames per second; first by arhost's plugins,
+       then by plugins whose overlays contain the number of their frame. Targets: no frame lost, no frame without overlay,
+       no overlay of another frame, no growth of the host.
+
+--quick: a minute, as a smoke test. Writes build/live/."""
+import contextlib
+import json
+import os
+import pathlib
+import shutil
+import signal
+import socket
+import statistics
+import subprocess
+import sys
+import threading
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BUILD = ROOT / "build/release"
+OUT = ROOT / "build/live"
+QUICK = "--quick" in sys.argv
+FPS = 30
+missed = []
+
+
+def check(what, value, target):
+    print(f"  {what}: {value:.4g} (target {target:.4g})")
+    if value > target:
+        missed.append(what)
+
+
+def children(pid):
+    return [int(word) for word in pathlib.Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()]
+
+
+def name_of(pid):
+    return pathlib.Path(f"/proc/{pid}/comm").read_text(encoding="utf-8").strip()
+
+
+def resident_kib(pid):
+    for line in pathlib.Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines():
+        if line.startswith("VmRSS:"):
+            return int(line.split()[1])
+    return 0
+
+
+class Run:
+    """A running arhost in its own folder, with the output sink_control."""
+
+    def __init__(self, name, configuration, environment=None):
+        self.folder = OUT / name
+        shutil.rmtree(self.folder, ignore_errors=True)
+        self.folder.mkdir(parents=True)
+        (self.folder / "run.yaml").write_text(configuration, encoding="utf-8")
+        runtime = self.folder / "runtime"
+        runtime.mkdir()
+        self.log = open(self.folder / "log.txt", "w", encoding="utf-8")
+        self.process = subprocess.Popen(
+            [BUILD / "bin/arhost", "run.yaml"], cwd=self.folder, stderr=self.log,
+            env=os.environ | {"XDG_RUNTIME_DIR": str(runtime), "ARHOST_PLUGIN_PATH": str(BUILD / "tests/plugins")} | (environment or {}))
+        path = str(runtime / "arhost/arhost.sock")
+        while True:
+            self.expect_running()
+            self.socket = socket.socket(socket.AF_UNIX)
+            try:
+                # The path may be longer than an address can be.
+                with contextlib.chdir(runtime):
+                    self.socket.connect(os.path.relpath(path, runtime))
+                break
+            except OSError:
+                self.socket.close()
+                time.sleep(0.05)
+        self.answers = self.socket.makefile(encoding="utf-8")
+
+    def expect_running(self):
+        if self.process.poll() is not None:
+            raise SystemExit(f"arhost has ended: {(self.folder / 'log.txt').read_text(encoding='utf-8')}")
+
+    def command(self, **command):
+        self.socket.sendall(json.dumps(command).encode() + b"\n")
+        answer = json.loads(self.answers.readline())
+        if not answer["ok"]:
+            raise SystemExit(f"{command}: {answer['error']}")
+        return answer
+
+    def processes(self):
+        """The pids of host, launcher and workers, by name."""
+        found = {"arhost": self.process.pid}
+        for launcher in children(self.process.pid):
+            found["launcher"] = launcher
+            for worker in children(launcher):
+                name = name_of(worker)
+                if name == "arhost-init":  # the first process of a worker's PID namespace
+                    continue
+                found[name] = worker
+        return found
+
+    def end(self):
+        self.process.send_signal(signal.SIGINT)
+        self.process.wait(timeout=60)
+        self.log.close()
+        return json.loads((self.folder / "stats.json").read_text(encoding="utf-8"))
+
+
+class Viewer(threading.Thread):
+    """Reads the web page's stream as a browser does."""
+
+    def __init__(self, port):
+        super().__init__(daemon=True)
+        self.frames = 0
+        self.socket = socket.create_connection(("127.0.0.1", port))
+        self.socket.sendall(f"GET /stream.mjpg HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n\r\n".encode())
+        self.start()
+
+    def run(self):
+        tail = b""
+        while data := self.socket.recv(1 << 20):
+            self.frames += (tail + data).count(b"\xff\xd8\xff")  # the first bytes of a JPEG file
+            tail = data[-2:]
+
+
+def growth_kib(samples, seconds):
+    """Growth over the last `seconds`, from a linear fit, and the fit's uncertainty (two standard errors), in KiB."""
+    last = [(at, kib) for at, kib in samples if at >= samples[-1][0] - seconds]
+    slope, begin = statistics.linear_regression(*zip(*last))
+    mean = statistics.fmean(at for at, _ in last)
+    residuals = sum((kib - begin - slope * at) ** 2 for at, kib in last)
+    error = (residuals / (len(last) - 2) / sum((at - mean) ** 2 for at, _ in last)) ** 0.5
+    return slope * seconds, 2 * error * seconds
+
+
+def lost(stats, *outputs):
+    """The number of frames that were dropped before compositing, and by these outputs."""
+    return sum(count for what, count in stats["frames"]["dropped"].items()
+               if what in ("source", "tracker", "raytracer", "late", "output", *outputs))
+
+
+@contextlib.contextmanager
+def x_server():
+    read, write = os.pipe()
+    server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "800x600x24", "-nolisten", "tcp"],
+                              pass_fds=[write], stderr=subprocess.DEVNULL)
+    os.close(write)
+    try:
+        yield ":" + os.read(read, 16).decode().strip()
+    finally:
+        server.kill()
+        server.wait()
+
+
+def soak():
+    seconds, settled = (60, 40) if QUICK else (1800, 1200)
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    configuration = f"""version: 1
+mode: live
+source: {{plugin: source_synthetic, fps: {FPS}, options: {{frames: 0, id: 0, side_mm: 80, width: 640, height: 480}}}}
+tracker: {{plugin: tracker_aruco, markers: [{{id: 0, side_mm: 80}}]}}
+raytracer: {{plugin: rt_embree, scene: optix-cs}}
+outputs:
+  - {{plugin: sink_window, allow: [display], control: [status]}}
+  - {{plugin: sink_web, allow: [listen], options: {{listen: "127.0.0.1:{port}"}}, control: [status]}}
+  - {{plugin: sink_control, allow: [listen], control: [status]}}
+stats: stats.json
+"""
+    with x_server() as display:
+        run = Run("soak", configuration, {"DISPLAY": display, "LIBGL_ALWAYS_SOFTWARE": "1"})
+        while run.command(command="status")["status"]["frames"]["composited"] == 0:
+            time.sleep(0.1)
+        viewers = [Viewer(port), Viewer(port)]
+        processes = run.processes()
+        memory = {name: [] for name in processes}
+        begin = time.monotonic()
+        while (now := time.monotonic() - begin) < seconds:
+            run.expect_running()
+            for name, pid in processes.items():
+                memory[name].append((now, resident_kib(pid)))
+            if sys.stderr.isatty():
+                print(f"\r{now / 60:.1f} of {seconds / 60:.0f} min", end="", file=sys.stderr, flush=True)
+            time.sleep(2 if QUICK else 10)
+        stats = run.end()
+    print(f"\nsoak: {seconds / 60:.0f} minutes, 640x480 at {FPS} fps, optix-cs, window and web page with two viewers")
+    frames = stats["frames"]
+    print(f"  {frames['in']} frames in, {frames['composited']} composited, {frames['augmented']} with overlay; "
+          f"the viewers got {[viewer.frames for viewer in viewers]}; restarts {stats['restarts']}")
+    check("frames lost", lost(stats, "sink_window", "sink_web"), 0)
+    check("frames without overlay", frames["composited"] - frames["augmented"], 0)
+    check("p99 of the latency until composited, ms", stats["stages"]["latency"]["p99_ms"], 2000 / FPS)
+    for output in ("sink_window", "sink_web"):
+        check(f"p99 of the latency until {output} has the frame, ms", stats["latency"]["outputs"][output]["p99_ms"], 2000 / FPS)
+    for name, samples in memory.items():
+        growth, uncertainty = growth_kib(samples, settled)
+        check(f"growth of {name} ({samples[-1][1] / 1024:.1f} MiB), KiB", growth, max(uncertainty, 64))
+    (OUT / "soak/memory.json").write_text(json.dumps(memory), encoding="utf-8")
+
+
+def swap_run(name, configuration, choices, seconds):
+    """Replaces tracker and ray tracer every second. Returns the statistics."""
+    run = Run(name, configuration)
+    while run.command(command="status")["status"]["frames"]["composited"] < FPS:
+        time.sleep(0.1)
+    samples, descriptors = [], []
+    begin = time.monotonic()
+    for second in range(seconds):
+        for component in ("tracker", "raytracer"):
+            run.command(command="swap", component=component, plugin=choices[component][second % 2])
+        samples.append((time.monotonic() - begin, resident_kib(run.process.pid)))
+        descriptors.append(len(os.listdir(f"/proc/{run.process.pid}/fd")))
+        time.sleep(max(0, begin + second + 1 - time.monotonic()))
+    time.sleep(2)  # until the replaced workers have ended
+    processes = len(run.processes())
+    stats = run.end()
+    print(f"  {name}: {2 * seconds} swaps in {seconds} s, {stats['frames']['in']} frames")
+    check("frames lost", lost(stats), 0)
+    check("frames without overlay", stats["frames"]["composited"] - stats["frames"]["augmented"], 0)
+    growth, uncertainty = growth_kib(samples, seconds * 2 / 3)
+    check("growth of the host, KiB", growth, max(uncertainty, 64))
+    half = len(descriptors) // 2
+    check("additional descriptors of the host in the second half", max(descriptors[half:]) - max(descriptors[:half]), 0)
+    check("processes at the end", processes, 7)
+    return run
+
+
+def swaps():
+    seconds = 30 if QUICK else 600
+    print(f"swaps: tracker and ray tracer every second, {FPS} fps")
+    swap_run("own plugins", f"""version: 1
+mode: live
+source: {{plugin: source_synthetic, fps: {FPS}, options: {{frames: 0, id: 0, side_mm: 80, width: 640, height: 480}}}}
+tracker: {{plugin: tracker_aruco, markers: [{{id: 0, side_mm: 80}}]}}
+raytracer: {{plugin: rt_embree, scene: optix-cs}}
+alternatives:
+  tracker: [{{plugin: tracker_apriltag}}]
+  raytracer: [{{name: bright, plugin: rt_embree}}]
+outputs:
+  - {{plugin: sink_null}}
+  - {{plugin: sink_control, allow: [listen], control: [status, swap]}}
+stats: stats.json
+""", {"tracker": ("tracker_apriltag", "tracker_aruco"), "raytracer": ("bright", "rt_embree")}, seconds)
+    run = swap_run("counting plugins", f"""version: 1
+mode: live
+source: {{plugin: source_counter, fps: {FPS}, options: {{frames: 1000000}}}}
+tracker: {{plugin: tracker_counter, markers: [{{id: 3, side_mm: 80}}]}}
+raytracer: {{plugin: rt_counter, scene: optix-cs}}
+alternatives:
+  tracker: [{{name: second, plugin: tracker_counter}}]
+  raytracer: [{{name: second, plugin: rt_counter}}]
+outputs:
+  - {{plugin: sink_counter, path: counted.txt}}
+  - {{plugin: sink_control, allow: [listen], control: [status, swap]}}
+stats: stats.json
+""", {"tracker": ("second", "tracker_counter"), "raytracer": ("second", "rt_counter")}, seconds)
+    lines = [line.split() for line in (run.folder / "counted.txt").read_text(encoding="utf-8").splitlines()]
+    check("overlays of another frame", sum(not frame == video == overlay for frame, video, overlay, _ in lines), 0)
+
+
+def main():
+    names = [word for word in sys.argv[1:] if word != "--quick"]
+    runs = {"soak": soak, "swaps": swaps}
+    if any(name not in runs for name in names):
+        raise SystemExit(__doc__)
+    for name in names or runs:
+        runs[name]()
+    if missed:
+        raise SystemExit("missed: " + "; ".join(missed))
+
+
+main()
