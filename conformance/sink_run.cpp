@@ -136,8 +136,17 @@ arhost_status SinkRun::try_start(std::uint64_t first_sequence, const Size &size)
         create();
     const arhost_intrinsics intrinsics = lens(size);
     const arhost_frame_format format = video_format(size);
-    const arhost_sink_setup setup{sizeof setup, size.width,     size.height, 0,
-                                  fps,          first_sequence, &intrinsics, &format};
+    const bool describes = (library_.plugin().descriptor->capabilities & ARHOST_CAPABILITY_RUN_DESCRIPTION) != 0;
+    const arhost_sink_setup setup{sizeof setup,
+                                  size.width,
+                                  size.height,
+                                  0,
+                                  fps,
+                                  first_sequence,
+                                  &intrinsics,
+                                  &format,
+                                  describes ? R"({"format": "arhost-session", "version": 1, "id": "conform"})"
+                                            : nullptr};
     const arhost_status status =
         in_call(library_.calls(), Call::start, [&] { return functions_.start(instance_->get(), &setup); });
     started_ = status == ARHOST_STATUS_OK;

@@ -50,21 +50,6 @@ std::vector<Line> lines_of(const std::filesystem::path &file, std::string_view t
     return lines;
 }
 
-// Returns "" if ray tracers can use the view, otherwise a description of the problem.
-std::string problem_with(const View &view) {
-    const glm::dvec3 eye = glm::make_vec3(view.eye_mm), up = glm::make_vec3(view.up);
-    const glm::dvec3 backwards = eye - glm::make_vec3(view.look_at_mm);
-    if (!(glm::length(backwards) > 0))
-        return "look_at must differ from eye";
-    constexpr double limit_mm = 1e9; // the same limit as for scenes
-    for (const double number : {eye.x, eye.y, eye.z, view.look_at_mm[0], view.look_at_mm[1], view.look_at_mm[2]})
-        if (!(std::abs(number) <= limit_mm))
-            return "the coordinates of eye and look_at must be between -1e9 and 1e9 mm";
-    if (!(glm::length(glm::cross(up, backwards)) > 1e-9 * glm::length(up) * glm::length(backwards)))
-        return "up must not be 0 or parallel to the line of sight";
-    return "";
-}
-
 // ---- arhost's format -------------------------------------------------------------------------------
 
 // A member of the JSON object in a line. Error messages contain the position of the member.
@@ -231,6 +216,20 @@ Trajectory read_dissertation(const std::vector<Line> &lines) {
 }
 
 } // namespace
+
+std::string problem_with(const View &view) {
+    const glm::dvec3 eye = glm::make_vec3(view.eye_mm), up = glm::make_vec3(view.up);
+    const glm::dvec3 backwards = eye - glm::make_vec3(view.look_at_mm);
+    if (!(glm::length(backwards) > 0))
+        return "look_at must differ from eye";
+    constexpr double limit_mm = 1e9; // the same limit as for scenes
+    for (const double number : {eye.x, eye.y, eye.z, view.look_at_mm[0], view.look_at_mm[1], view.look_at_mm[2]})
+        if (!(std::abs(number) <= limit_mm))
+            return "the coordinates of eye and look_at must be between -1e9 and 1e9 mm";
+    if (!(glm::length(glm::cross(up, backwards)) > 1e-9 * glm::length(up) * glm::length(backwards)))
+        return "up must not be 0 or parallel to the line of sight";
+    return "";
+}
 
 const TrajectoryFrame *Trajectory::at_or_after(std::uint64_t frame) const {
     const auto found = std::ranges::lower_bound(frames, frame, {}, &TrajectoryFrame::frame);

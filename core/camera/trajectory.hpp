@@ -21,6 +21,9 @@ struct View {
     double eye_mm[3], look_at_mm[3], up[3];
 };
 
+// Returns "" if ray tracers can use the view, otherwise a description of the problem.
+std::string problem_with(const View &view);
+
 struct TrajectoryFrame {
     std::uint64_t frame; // frame number in the run
     std::int64_t capture_ns;

@@ -170,6 +170,107 @@ std::string sink_for(const fs::path &file) {
     return "sink_video"; // sink_video itself rejects extensions that it does not support
 }
 
+void override_output(yaml::Node &root, const ReplayArguments &replay) {
+    if (replay.output.empty() || replay.output == "none")
+        return root.override_value("outputs", "[]", "arhost replay");
+    root.override_value("outputs", "[{plugin: " + sink_for(replay.output) + "}]", "--output");
+    root.override_text("outputs[0].path", replay.output, "--output");
+}
+
+// Sets the plugin of `component` and discards the settings of the recorded one that other plugins do not have.
+void override_plugin(yaml::Node &root, const char *component, const std::string &plugin, const std::string &option) {
+    if (plugin.empty())
+        return;
+    root.override_text(std::string(component) + ".plugin", plugin, option);
+    const auto node = root.find(component);
+    for (const char *key : {"options", "fallback", "allow"})
+        yaml::Node(*node).remove(key);
+}
+
+// Returns the parts of a configuration that determine poses and images.
+std::string rendering_of(const yaml::Node &root) {
+    std::string text;
+    for (const char *key : {"tracker", "raytracer", "camera", "coordinates", "trajectory"})
+        if (const auto node = root.find(key))
+            text += std::string(key) + ": " + node->to_yaml() + "\n";
+    return text;
+}
+
+// Chooses the alternative and the scene that were in use when the recording began.
+void choose_recorded(run_config::Configuration &configuration, const yaml::Node &description) {
+    const yaml::Node plugins = description.require("plugins");
+    const auto choose = [&](const char *kind, auto &chosen, const auto &all) {
+        const auto plugin = plugins.find(kind);
+        if (!chosen || !plugin)
+            return;
+        const std::string name = plugin->require("name").text();
+        const auto found = std::ranges::find_if(all, [&](const auto &each) { return each.name == name; });
+        if (found != all.end())
+            chosen = *found;
+    };
+    choose("tracker", configuration.tracker, configuration.trackers);
+    choose("raytracer", configuration.raytracer, configuration.raytracers);
+    const auto scene = description.find("scene");
+    if (!scene || !configuration.raytracer)
+        return;
+    const auto found = std::ranges::find(configuration.scenes, scene->text(), &run_config::Scene::name);
+    if (found == configuration.scenes.end())
+        return;
+    configuration.raytracer->scene = found->file;
+    std::iter_swap(configuration.scenes.begin(), found);
+}
+
+// Returns a configuration that plays the video of a session in the pipeline of the recorded run, or in that of
+// `arguments.file`.
+run_config::Configuration session_configuration(const Arguments &arguments, const ReplayArguments &replay) {
+    if (replay.with_pipeline || replay.width || replay.height)
+        throw yaml::Error("--with-pipeline, --width and --height are for trajectories; remove them");
+    run_config::Session session = run_config::read_session(replay.session);
+    yaml::Node root = arguments.file.empty() ? session.configuration : yaml::Node::load(arguments.file);
+    for (const char *key : {"record", "snapshot", "stats", "timeline", "frames"})
+        root.remove(key);
+    root.override_value("mode", "lockstep", "arhost replay");
+    root.override_value("source", "{plugin: source_file}", "arhost replay");
+    root.override_text("source.path", session.video().string(), "arhost replay");
+    if (const double fps = session.description.require("fps").real(0); fps > 0)
+        root.override_text("source.fps", session.description.require("fps").text(), "arhost replay");
+    const yaml::Node camera = session.description.require("camera");
+    if (!camera.is_null() && (arguments.file.empty() || !root.find("camera")))
+        root.override_value("camera", camera.to_yaml(), "arhost replay");
+    const yaml::Node changed = session.description.require("changed_options");
+    for (const auto &[path, value] : arguments.file.empty() ? changed.entries() : decltype(changed.entries())())
+        root.override_value(path, value.text(), "arhost replay");
+    const std::string recorded = arguments.file.empty() ? rendering_of(root) : "";
+    override_plugin(root, "tracker", replay.tracker, "--tracker");
+    override_plugin(root, "raytracer", replay.raytracer, "--raytracer");
+    if (!replay.scene.empty())
+        root.override_text("raytracer.scene", replay.scene, "--scene");
+    override_output(root, replay);
+    if (!replay.stats.empty())
+        root.override_text("stats", replay.stats, "--stats");
+    if (!replay.timeline.empty())
+        root.override_text("timeline", replay.timeline, "--timeline");
+    run_config::Configuration configuration = parse_configuration(root, arguments);
+    session.recording.repeats_decisions = rendering_of(root) == recorded;
+    if (session.recording.repeats_decisions) {
+        choose_recorded(configuration, session.description);
+        for (const std::string &change : session.changed_scene_files())
+            configuration.warnings.push_back(change);
+    }
+    if (const yaml::Node version = session.description.require("arhost"); version.text() != ARHOST_VERSION)
+        configuration.warnings.push_back(version.where() + ": the session was recorded with arhost " +
+                                         version.text() +
+                                         "; poses and images of this version, " ARHOST_VERSION ", may differ");
+    if (!session.warning.empty())
+        configuration.warnings.push_back(session.warning);
+    for (const char *file : {"", "session.json", "frames.jsonl"})
+        configuration.files.read((session.folder / file).lexically_normal());
+    const std::uint64_t count = session.recording.frames.size();
+    configuration.frames = configuration.frames ? std::min(configuration.frames, count) : count;
+    configuration.recording = std::move(session.recording);
+    return configuration;
+}
+
 // Returns a configuration that plays the trajectory in the pipeline of `arguments.file`, or in a default pipeline.
 // The file's outputs are ignored because they may be the outputs of the recorded run.
 run_config::Configuration replay_configuration(const Arguments &arguments, const ReplayArguments &replay) {
@@ -186,9 +287,10 @@ run_config::Configuration replay_configuration(const Arguments &arguments, const
     if (arguments.file.empty() && replay.scene.empty())
         throw yaml::Error("--scene is missing: the scene to render, as in --scene optix-cs");
     root.override_text("trajectory", replay.trajectory, "--trajectory");
-    root.override_value("outputs", "[]", "arhost replay");
     if (!replay.scene.empty())
         root.override_text("raytracer.scene", replay.scene, "--scene");
+    if (!replay.tracker.empty())
+        root.override_text("tracker.plugin", replay.tracker, "--tracker");
     if (!replay.raytracer.empty())
         root.override_text("raytracer.plugin", replay.raytracer, "--raytracer");
     if (replay.width.has_value() != replay.height.has_value())
@@ -198,12 +300,9 @@ run_config::Configuration replay_configuration(const Arguments &arguments, const
                             "{width: " + std::to_string(*replay.width) +
                                 ", height: " + std::to_string(*replay.height) + ", vertical_fov_degrees: 45}",
                             "--width, --height");
-    if (!replay.output.empty() && replay.output != "none") {
-        root.override_value("outputs", "[{plugin: " + sink_for(replay.output) + "}]", "--output");
-        root.override_text("outputs[0].path", replay.output, "--output");
-    } else if (replay.with_pipeline) {
+    override_output(root, replay);
+    if ((replay.output.empty() || replay.output == "none") && replay.with_pipeline)
         root.override_value("outputs", "[{plugin: sink_null}]", "arhost replay");
-    }
     if (!replay.stats.empty())
         root.override_text("stats", replay.stats, "--stats");
     if (!replay.timeline.empty())
@@ -592,7 +691,13 @@ int latency(Arguments arguments, supervise::Starter &launcher) {
 }
 
 int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Starter &launcher) {
-    return run(replay_configuration(arguments, replay), arguments, launcher);
+    if (replay.session.empty() == replay.trajectory.empty())
+        throw yaml::Error(replay.session.empty()
+                              ? "name the folder of a session, or a trajectory with --trajectory FILE"
+                              : "a session and --trajectory exclude each other; remove one of them");
+    return run(replay.session.empty() ? replay_configuration(arguments, replay)
+                                      : session_configuration(arguments, replay),
+               arguments, launcher);
 }
 
 int check(const Arguments &arguments, bool open, supervise::Starter &launcher) {

@@ -31,8 +31,8 @@ struct Arguments {
 
 // Command-line options of `arhost replay`.
 struct ReplayArguments {
-    std::string trajectory, scene, raytracer, output, stats, timeline; // "" if not given
-    std::optional<std::uint32_t> width, height;                        // px
+    std::string session, trajectory, scene, tracker, raytracer, output, stats, timeline; // "" if not given
+    std::optional<std::uint32_t> width, height;                                          // px
     bool with_pipeline = false;
 };
 

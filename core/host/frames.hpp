@@ -7,6 +7,7 @@
 #include "host/quality.hpp"
 #include "host/slots.hpp"
 #include "host/statistics.hpp"
+#include "run_config/session.hpp"
 
 #include <arhost/sink.h>
 
@@ -35,8 +36,9 @@ struct Frame {
     }
 
     Stage stage = Stage::to_track;
-    bool overtaken = false;     // mode live: a newer frame was shown; this one is dropped when its worker returns it
-    bool held = false;          // uses the camera of an earlier frame
+    bool overtaken = false; // mode live: a newer frame was shown; this one is dropped when its worker returns it
+    const run_config::RecordedFrame *recorded = nullptr; // of a session that is replayed
+    bool held = false;                                   // uses the camera of an earlier frame
     std::uint32_t attempts = 0; // how often the worker died while processing this frame in the current stage
     Lease pixels;               // slot in the source's memory
     Lease result;               // slot in the tracker's memory, while tracking

@@ -66,16 +66,24 @@ int main(int argc, char **argv) {
     axes.option("--z2", arguments.axis2[2], "Axis of the second rotation: z");
 
     ReplayArguments replay_arguments;
-    CommandLine replay_command = app.subcommand("replay", "Render a recorded trajectory (docs/trajectories.md)");
-    replay_command.option("--trajectory", replay_arguments.trajectory, "The recorded camera poses")
-        .type_name("FILE")
-        .required();
+    CommandLine replay_command = app.subcommand(
+        "replay", "Repeat a recorded session (docs/sessions.md), or render a trajectory (docs/trajectories.md)");
+    replay_command.option("SESSION", replay_arguments.session, "The folder of a session that sink_session recorded");
+    replay_command.option("--trajectory", replay_arguments.trajectory, "Recorded camera poses, instead of a session")
+        .type_name("FILE");
     replay_command.option("--scene", replay_arguments.scene, "The scene to render").type_name("FILE");
-    replay_command.option("--raytracer", replay_arguments.raytracer, "The ray tracer (default rt_embree)")
+    replay_command.option("--tracker", replay_arguments.tracker, "The tracker, instead of the recorded one")
         .type_name("PLUGIN");
-    replay_command.flag("--with-pipeline", replay_arguments.with_pipeline, "Also run source, tracker and compositor");
     replay_command
-        .option("--config", arguments.file, "Configuration for components and scene; its outputs are ignored")
+        .option("--raytracer", replay_arguments.raytracer,
+                "The ray tracer, instead of the recorded one (for a trajectory, default rt_embree)")
+        .type_name("PLUGIN");
+    replay_command.flag("--with-pipeline", replay_arguments.with_pipeline,
+                        "For a trajectory: also run source, tracker and compositor");
+    replay_command
+        .option("--config", arguments.file,
+                "Configuration for components and scene; its outputs are ignored. For a session, replaces the "
+                "recorded one")
         .type_name("FILE");
     replay_command
         .option("--width", replay_arguments.width, "Image width in px, if the trajectory has none (default 800)")

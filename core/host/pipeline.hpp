@@ -9,7 +9,8 @@
 // is still waiting, and frames skip a stage whose worker is down.
 //
 // pipeline.cpp has the phases of a run, pipeline_components.cpp creates the components, pipeline_frames.cpp moves
-// frames through the stages, pipeline_control.cpp executes commands, pipeline_edits.cpp applies edited files.
+// frames through the stages, pipeline_control.cpp executes commands, pipeline_edits.cpp applies edited files,
+// pipeline_description.cpp describes the run for the sinks that record it.
 #pragma once
 
 #include "base/listening_socket.hpp"
@@ -123,6 +124,7 @@ private:
     std::vector<ipc::OptionValue> options_for(const supervise::Component &component, arhost_kind kind,
                                               const run_config::ComponentConfiguration &configuration,
                                               std::size_t candidate);
+    std::string run_description(const std::string &id) const;
     nlohmann::ordered_json status() const;
     nlohmann::ordered_json status_of(const supervise::Component &component) const;
     std::size_t index_of(const run_config::ComponentConfiguration &output) const {
@@ -160,6 +162,9 @@ private:
 
     void on_read(const ipc::Command &command, const ipc::Result &result);
     void start_frame(std::unique_ptr<Frame> frame);
+    void repeat_record(Frame &frame, const run_config::RecordedFrame &recorded) const;
+    bool repeats_decisions(const Frame &frame) const;
+    void set_recorded_camera(Frame &frame) const;
     void set_camera_from_markers(Frame &frame);
     void set_camera_from_trajectory(Frame &frame) const;
     void on_camera_known(Frame &frame);
@@ -232,6 +237,7 @@ private:
     std::vector<std::uint8_t> enlarged_; // the overlay of a frame that was rendered smaller
     OutputFramePointer last_output_;     // for the command `snapshot`
     struct OptionsInUse {
+        std::string path; // of the component in the configuration
         std::vector<ipc::OptionValue> values;
         std::set<std::string> changed; // the keys that the command `set` has changed
     };

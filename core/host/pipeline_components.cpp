@@ -9,7 +9,10 @@
 #include "host/outcome.hpp"
 #include "run_config/access.hpp"
 
+#include <spdlog/fmt/fmt.h>
+
 #include <algorithm>
+#include <random>
 
 namespace arhost::host {
 
@@ -20,6 +23,11 @@ namespace {
 
 constexpr std::uint32_t source_slot_count = 8, stage_slot_count = 4;
 constexpr std::size_t live_sink_depth = 3;
+
+std::string random_id() {
+    std::random_device random;
+    return fmt::format("{:08x}{:08x}", random(), random());
+}
 
 std::shared_ptr<SlotPool> pool_of(const Component &component) {
     return component.output() ? std::make_shared<SlotPool>(component.output()) : nullptr;
@@ -260,6 +268,7 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
     sinks_.push_back(std::make_unique<SinkQueue>(statistics_));
     SinkQueue *sink = sinks_.back().get();
     sink->configuration = &output;
+    sink->id = random_id();
     sink->max_waiting = live_ ? live_sink_depth : 0;
     Component::Callbacks callbacks = common_callbacks(name, output.node);
     callbacks.hello = [this, &output, sink](const PluginDescription &plugin, std::size_t candidate) {
@@ -270,6 +279,8 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
             setup.fps = configuration_.source->fps;
         if (intrinsics_.width > 0)
             setup.intrinsics = intrinsics_;
+        if (plugin.capabilities & ARHOST_CAPABILITY_RUN_DESCRIPTION)
+            setup.run_description = run_description(sink->id);
         std::vector<OptionValue> options = options_for(*sink->component, ARHOST_KIND_SINK, output, candidate);
         expect_distinct_files(output, plugin);
         for (OptionValue &option : options)
@@ -280,6 +291,10 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
             else if (option.key == "path" && !sink->path.empty())
                 option.text = sink->path;
         has_window_ |= std::ranges::count(plugin.needs, "display") > 0;
+        // Frames that were composited before the host knew the plugin lack its inputs.
+        if ((plugin.capabilities & ARHOST_CAPABILITY_VIDEO_INPUT && !video_input_) ||
+            (plugin.capabilities & ARHOST_CAPABILITY_OVERLAY_INPUT && !overlay_input_))
+            sink->clear();
         video_input_ |= (plugin.capabilities & ARHOST_CAPABILITY_VIDEO_INPUT) != 0;
         overlay_input_ |= (plugin.capabilities & ARHOST_CAPABILITY_OVERLAY_INPUT) != 0;
         std::vector<int> sockets = open_sockets(output, options);

@@ -277,6 +277,7 @@ std::vector<OptionValue> Pipeline::options_for(const Component &component, arhos
     std::vector<OptionValue> values =
         run_config::options_for(component.description(), kind, configuration, candidate);
     OptionsInUse &in_use = options_[&component];
+    in_use.path = configuration.node.path();
     if (candidate > 0)
         in_use.changed.clear();
     for (OptionValue &value : values)

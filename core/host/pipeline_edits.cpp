@@ -18,7 +18,7 @@ constexpr std::array<std::string_view, 5> applied_keys = {"tracker", "raytracer"
 
 std::string content_of(const yaml::Node &root, std::string_view key) {
     const auto node = root.find(key);
-    return node ? node->content() : "";
+    return node ? node->to_yaml() : "";
 }
 
 // Returns the keys whose edits take effect only in the next run.

@@ -99,13 +99,17 @@ void Pipeline::on_read(const Command &command, const Result &result) {
         next_read_ = command.sequence; // reads this frame again after the restart
         return source_->end_process(std::string("read failed: ") + status_text(result.status));
     }
-    auto frame = std::make_unique<Frame>(command.sequence);
+    const run_config::RecordedFrame *const recorded =
+        configuration_.recording ? &configuration_.recording->frames[command.sequence] : nullptr;
+    auto frame = std::make_unique<Frame>(recorded ? recorded->number : command.sequence);
     const std::int64_t arrival_ns = monotonic_ns();
     if (const char *problem = accept_frame_info(result.frame, last_capture_ns_, arrival_ns, frame->record)) {
         next_read_ = command.sequence;
         return source_->end_process(std::string("contract violation: ") + problem);
     }
     last_capture_ns_ = result.frame.capture_ns;
+    if (recorded)
+        repeat_record(*frame, *recorded);
     frame->pixels = std::move(pixels);
     if (configuration_.source->conform) {
         source_checks_->check(statistics_.contract_checks, frame->record, result.frame.skipped, arrival_ns);
@@ -134,10 +138,40 @@ void Pipeline::start_frame(std::unique_ptr<Frame> frame) {
         set_camera_from_trajectory(added);
     if (live_ && is_behind())
         skip(added, "latency");
-    else if (tracker_)
+    else if (tracker_ && !(repeats_decisions(added) && !added.recorded->has_markers))
         enqueue(added, Frame::Stage::to_track);
     else
         on_camera_known(added);
+}
+
+// Sets what the video of a session does not contain. If the recorded decisions are repeated, the tracker processes
+// only the frames in which it has found markers: in the others, the recorded run has skipped it, or the result is
+// known.
+void Pipeline::repeat_record(Frame &frame, const run_config::RecordedFrame &recorded) const {
+    frame.recorded = &recorded;
+    frame.record.clock = recorded.clock;
+    frame.record.capture_ns = recorded.capture_ns;
+    frame.record.has_truth = recorded.truth.has_value();
+    if (recorded.truth) {
+        frame.record.truth_id = recorded.truth->first;
+        std::ranges::copy(recorded.truth->second, frame.record.true_mt);
+    }
+    if (repeats_decisions(frame) && !recorded.has_markers)
+        set_recorded_camera(frame);
+}
+
+bool Pipeline::repeats_decisions(const Frame &frame) const {
+    return frame.recorded && configuration_.recording->repeats_decisions;
+}
+
+// Sets the camera of a frame in which no marker is visible. It is that of an earlier frame, which the recorded run
+// may have dropped.
+void Pipeline::set_recorded_camera(Frame &frame) const {
+    if (!frame.recorded->view || configuration_.trajectory)
+        return;
+    frame.held = frame.recorded->overlay == ARHOST_OVERLAY_HELD;
+    frame.record.camera = camera::camera_of(*frame.recorded->view, intrinsics_);
+    frame.record.has_camera = 1;
 }
 
 bool Pipeline::track() {
@@ -214,6 +248,8 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
 void Pipeline::set_camera_from_markers(Frame &frame) {
     if (configuration_.trajectory)
         return;
+    if (repeats_decisions(frame) && !anchor_of(frame.record))
+        return set_recorded_camera(frame);
     const std::uint64_t sequence = frame.record.sequence;
     if (const arhost_marker *anchor = anchor_of(frame.record))
         last_camera_ = {sequence, *camera::camera_from_marker(anchor->mt, coordinates(), intrinsics_)};
@@ -242,7 +278,8 @@ void Pipeline::set_camera_from_trajectory(Frame &frame) const {
 }
 
 void Pipeline::on_camera_known(Frame &frame) {
-    if (raytracer_ && frame.record.has_camera)
+    const bool has_overlay = !repeats_decisions(frame) || frame.recorded->overlay != ARHOST_OVERLAY_NONE;
+    if (raytracer_ && frame.record.has_camera && has_overlay)
         enqueue(frame, Frame::Stage::to_render);
     else
         frame.stage = Frame::Stage::done;
@@ -265,7 +302,10 @@ bool Pipeline::render() {
         return false;
     frame->overlay = std::move(*slot);
     frame->stage = Frame::Stage::rendering;
-    frame->quality = raytracer_->quality ? raytracer_->quality->current() : Quality();
+    if (repeats_decisions(*frame))
+        frame->quality = {frame->recorded->scale, frame->recorded->samples};
+    else
+        frame->quality = raytracer_->quality ? raytracer_->quality->current() : Quality();
     request_samples(*raytracer_, frame->quality.samples);
     Command command{};
     command.kind = CommandKind::render;
@@ -283,6 +323,7 @@ bool Pipeline::render() {
 
 // Begins to adapt the quality of images to `live.target_fps`, unless `stage` already does so within the same limits.
 void Pipeline::start_quality(RaytracerStage &stage) {
+    stage.samples_in_use = 0; // a new worker has the configured number
     if (!live_ || configuration_.target_fps == 0)
         return;
     const PluginDescription &plugin = stage.component->description();
@@ -318,7 +359,9 @@ void Pipeline::request_samples(RaytracerStage &stage, std::uint32_t samples) {
     value.type = ARHOST_OPTION_INTEGER;
     value.integer = samples;
     // If a worker dies before it answers, start_quality() is called for the next one.
-    stage.component->set_option(value, [&stage](const std::string &error) {
+    stage.component->set_option(value, [this, &stage](const std::string &error) {
+        if (!error.empty() && configuration_.recording)
+            stage.component->log(ARHOST_SEVERITY_WARNING, "the recorded number of samples cannot be set: " + error);
         if (!error.empty())
             stage.quality.reset();
     });
@@ -341,6 +384,8 @@ void Pipeline::on_rendered(const Command &command, const Result &result) {
     frame.times.raytracer = busy;
     frame.times.device = device;
     frame.record.overlay = frame.held ? ARHOST_OVERLAY_HELD : ARHOST_OVERLAY_RENDERED;
+    frame.record.overlay_scale = frame.quality.scale < 1 ? frame.quality.scale : 0;
+    frame.record.overlay_samples = frame.quality.samples;
     frame.stage = Frame::Stage::done;
     if (auto &checks = raytracer_->scene->overlay_checks; checks && frame.quality.scale == 1) {
         checks->check(statistics_.contract_checks, command.sequence, command.camera,

@@ -15,6 +15,7 @@
 #include <functional>
 #include <memory>
 #include <set>
+#include <string>
 
 namespace arhost::host {
 
@@ -22,7 +23,9 @@ class SceneLoading {
 public:
     // The reactor calls exactly one of these callbacks, which may destroy the SceneLoading.
     struct Callbacks {
-        using Files = std::set<std::filesystem::path>; // that the loader says to have read; they are not checked
+        // The files that the loader has read: the scene and those to which it refers. The loader is not trusted, so
+        // these may be any absolute paths.
+        using Files = std::set<std::filesystem::path>;
         std::function<void(ipc::SharedMemory arena, const Files &files)> loaded; // `arena` is frozen and validated
         std::function<void(const std::string &reason, const Files &files)> failed;
     };

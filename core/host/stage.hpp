@@ -37,7 +37,7 @@ struct TrackerStage : Stage {
 
 struct LoadedScene {
     run_config::Scene source;
-    std::set<std::filesystem::path> files; // the files that the loader has read
+    std::set<std::filesystem::path> files; // as in SceneLoading::Callbacks
     ipc::SharedMemory arena;
     camera::Coordinates coordinates;             // from the configuration or from the scene's axes
     std::optional<OverlayChecks> overlay_checks; // only for `conform: true`

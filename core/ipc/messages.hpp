@@ -79,7 +79,10 @@ struct SinkSetup {
     double fps = 0;
     std::uint64_t first_sequence = 0;
     std::optional<arhost_intrinsics> intrinsics;
+    std::string run_description{}; // "": none
 };
+// Maximum size of SinkSetup::run_description as a JSON string, so that the message fits into the channel.
+constexpr std::size_t max_run_description = Channel::max_message_size - 32 * 1024;
 using Setup = std::variant<SourceSetup, TrackerSetup, RaytracerSetup, SinkSetup>;
 
 // Requests the worker to create and start the plugin's instance. The descriptor of the scene's arena accompanies it

@@ -8,6 +8,8 @@
 #include "run_config/schema.hpp"
 #include "run_config/user_view.hpp"
 
+#include <nlohmann/json.hpp>
+
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -231,6 +233,19 @@ void parse_choices(Configuration &configuration, const Shared &shared,
 
 ipc::OptionValue option_value(const ipc::OptionDeclaration &declared, const std::string &text) {
     return value_of(declared, yaml::Node::scalar(text, declared.key));
+}
+
+std::string yaml_text(const ipc::OptionValue &value) {
+    switch (value.type) {
+    case ARHOST_OPTION_BOOL:
+        return value.integer ? "true" : "false";
+    case ARHOST_OPTION_INTEGER:
+        return std::to_string(value.integer);
+    case ARHOST_OPTION_REAL:
+        return nlohmann::json(value.real).dump();
+    default:
+        return nlohmann::json(value.text).dump();
+    }
 }
 
 std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,

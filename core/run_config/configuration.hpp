@@ -9,6 +9,7 @@
 #include "ipc/json_abi.hpp"
 #include "run_config/files_in_use.hpp"
 #include "run_config/plugin_path.hpp"
+#include "run_config/session.hpp"
 #include "sandbox/sandbox.hpp"
 #include "yaml/yaml.hpp"
 
@@ -70,6 +71,7 @@ struct Configuration {
     std::uint64_t frames = 0;                       // maximum number of frames; 0: no limit
     std::optional<SourceConfiguration> source{};    // nullopt only with a trajectory; the frames are then black
     std::optional<camera::Trajectory> trajectory{}; // camera poses to use instead of the tracker's
+    std::optional<Recording> recording{};           // the frames of a session, which the source plays
     std::optional<arhost_intrinsics> camera{};      // always set with a trajectory
     std::optional<yaml::Node> camera_node{};
     std::optional<TrackerConfiguration> tracker{};
@@ -104,6 +106,9 @@ std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, 
 
 // Returns the value of the declared option that `text`, in YAML syntax, represents. Throws yaml::Error.
 ipc::OptionValue option_value(const ipc::OptionDeclaration &declared, const std::string &text);
+
+// Returns the value in YAML syntax; the inverse of option_value.
+std::string yaml_text(const ipc::OptionValue &value);
 
 // Parses and checks a configuration. Throws yaml::Error at the first error. `built_in_plugins` is the folder of the
 // built-in plugins.

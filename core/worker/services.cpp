@@ -237,6 +237,7 @@ public:
         setup.first_sequence = message.first_sequence;
         setup.intrinsics = message.intrinsics ? &*message.intrinsics : nullptr;
         setup.video_format = &(video_format_ = message.video_format);
+        setup.run_description = message.run_description.empty() ? nullptr : message.run_description.c_str();
         return sink_.start(instance_, &setup);
     }
 

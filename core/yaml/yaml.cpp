@@ -46,6 +46,12 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
     return row.back();
 }
 
+// Returns whether a key path is `ancestor` or below it.
+bool is_at_or_below(const std::string &path, const std::string &ancestor) {
+    return path.starts_with(ancestor) &&
+           (path.size() == ancestor.size() || path[ancestor.size()] == '.' || path[ancestor.size()] == '[');
+}
+
 // Splits "outputs[0].path" into "outputs", "0" and "path".
 std::vector<std::string> split_path(const std::string &path) {
     std::vector<std::string> parts(1);
@@ -200,10 +206,6 @@ std::string nearest(std::string_view word, std::span<const std::string_view> can
     return std::string(best);
 }
 
-std::string Node::content() const {
-    return YAML::Dump(node_);
-}
-
 Node Node::load(const std::filesystem::path &file) {
     std::error_code ignored;
     if (std::filesystem::is_directory(file, ignored))
@@ -230,7 +232,7 @@ Node Node::load(const std::filesystem::path &file) {
 }
 
 Node Node::parse(const std::string &text, const std::string &name) {
-    auto document = std::make_shared<Document>(Document{name, {}});
+    auto document = std::make_shared<Document>(Document{.name = name});
     try {
         return Node(read(text), "", document);
     } catch (const YAML::Exception &error) {
@@ -241,7 +243,7 @@ Node Node::parse(const std::string &text, const std::string &name) {
 }
 
 Node Node::scalar(const std::string &text, const std::string &name) {
-    return Node(YAML::Node(text), "", std::make_shared<Document>(Document{name, {}}));
+    return Node(YAML::Node(text), "", std::make_shared<Document>(Document{.name = name}));
 }
 
 void Node::override_value(const std::string &path, const std::string &value, const std::string &option) {
@@ -293,11 +295,31 @@ void Node::replace(const std::string &path, const YAML::Node &value, const std::
     document_->overrides[canonical] = option;
 }
 
+void Node::remove(const std::string &key) {
+    node_.remove(key);
+}
+
+Node::Origin Node::origin() const {
+    Origin origin = document_->origin.value_or(Origin{std::filesystem::absolute(file()).parent_path(), {}});
+    for (const auto &[path, option] : document_->overrides)
+        origin.overridden[path] = std::filesystem::current_path();
+    return origin;
+}
+
+Node Node::load_copy(const std::filesystem::path &file, const Origin &origin) {
+    Node root = load(file);
+    root.document_->origin = origin;
+    return root;
+}
+
+std::string Node::to_yaml() const {
+    return YAML::Dump(node_);
+}
+
 std::string Node::option() const {
     std::string nearest_option; // of several matching paths, the longest comes last in the map
     for (const auto &[path, option] : document_->overrides)
-        if (path_.starts_with(path) &&
-            (path_.size() == path.size() || path_[path.size()] == '.' || path_[path.size()] == '['))
+        if (is_at_or_below(path_, path))
             nearest_option = option;
     return nearest_option;
 }
@@ -465,7 +487,16 @@ std::vector<double> Node::reals(std::size_t count) const {
 }
 
 std::filesystem::path Node::input_path() const {
-    return path_below(is_overridden() ? std::filesystem::path() : file().parent_path());
+    if (is_overridden())
+        return path_below({});
+    const std::optional<Origin> &origin = document_->origin;
+    if (!origin)
+        return path_below(file().parent_path());
+    std::filesystem::path folder = origin->folder; // of several matching paths, the longest comes last in the map
+    for (const auto &[path, overridden] : origin->overridden)
+        if (is_at_or_below(path_, path))
+            folder = overridden;
+    return path_below(folder);
 }
 
 std::filesystem::path Node::output_path() const {

@@ -50,6 +50,17 @@ public:
     // Parses `text`. `name` is used as the file name in error messages.
     static Node parse(const std::string &text, const std::string &name);
 
+    // The folders to which paths in a document are relative: that of its file and, by key path, those of the values
+    // that were overridden.
+    struct Origin {
+        std::filesystem::path folder;
+        std::map<std::string, std::filesystem::path> overridden;
+    };
+    Origin origin() const;
+    // Reads a copy: paths have the meaning that they had in the original.
+    static Node load_copy(const std::filesystem::path &file, const Origin &origin);
+    std::string to_yaml() const; // this value as YAML
+
     // Creates a scalar that is not from a file. `name` is used as the file name in error messages.
     static Node scalar(const std::string &text, const std::string &name);
 
@@ -60,6 +71,8 @@ public:
     // Like override_value, but `text` is used as it is and not parsed as YAML.
     void override_text(const std::string &path, const std::string &text, const std::string &option);
 
+    void remove(const std::string &key); // a key of a map, if it exists
+
     bool is_map() const { return node_.IsMap(); }
     bool is_sequence() const { return node_.IsSequence(); }
     bool is_scalar() const { return node_.IsScalar(); }
@@ -67,7 +80,6 @@ public:
     bool is_overridden() const { return !option().empty(); } // this node or an ancestor
     const std::string &path() const { return path_; }        // key path from the root; "" for the root itself
     std::filesystem::path file() const;
-    std::string content() const;                              // as YAML, without comments
     std::string where() const;                                // "file:line:column"
     [[noreturn]] void fail(const std::string &message) const; // throws Error with where() and path()
 
@@ -109,7 +121,8 @@ public:
 private:
     struct Document {
         std::string name;
-        std::map<std::string, std::string> overrides; // maps a key path to the option that set it
+        std::map<std::string, std::string> overrides{}; // maps a key path to the option that set it
+        std::optional<Origin> origin{};                 // of a copy
     };
     Node(const YAML::Node &node, std::string path, std::shared_ptr<Document> document)
         : node_(node), path_(std::move(path)), document_(std::move(document)) {}

@@ -76,6 +76,22 @@ void copy_plane(const Plane &from, std::uint8_t *to, std::size_t to_stride, std:
     }
 }
 
+// Writes planar YUV 4:2:2 as YUYV.
+void interleave(const std::array<const std::uint8_t *, ARHOST_MAX_PLANES> &data,
+                const std::array<std::ptrdiff_t, ARHOST_MAX_PLANES> &stride, const arhost_frame_buffer &buffer) {
+    for (std::uint32_t y = 0; y < buffer.format->height; ++y) {
+        std::uint8_t *to = buffer.plane[0] + std::size_t{y} * buffer.format->stride[0];
+        const std::uint8_t *luma = data[0] + y * stride[0], *u = data[1] + y * stride[1],
+                           *v = data[2] + y * stride[2];
+        for (std::uint32_t x = 0; x < buffer.format->width; x += 2, to += 4) {
+            to[0] = luma[x];
+            to[1] = u[x / 2];
+            to[2] = luma[x + 1];
+            to[3] = v[x / 2];
+        }
+    }
+}
+
 } // namespace
 
 PictureConverter::PictureConverter(const AVFrame &first, int quarter_turns)
@@ -86,6 +102,9 @@ PictureConverter::PictureConverter(const AVFrame &first, int quarter_turns)
         format_.pixel_format = ARHOST_PIXEL_FORMAT_I420;
     else if (source_ == AV_PIX_FMT_NV12 && even && matrix)
         format_.pixel_format = ARHOST_PIXEL_FORMAT_NV12;
+    else if ((source_ == AV_PIX_FMT_YUV422P || source_ == AV_PIX_FMT_YUVJ422P) && first.width % 2 == 0 &&
+             quarter_turns == 0 && matrix)
+        format_.pixel_format = ARHOST_PIXEL_FORMAT_YUYV;
     else if (is_grey(source_)) {
         format_.pixel_format = ARHOST_PIXEL_FORMAT_GREY8;
         target_ = AV_PIX_FMT_GRAY8;
@@ -133,6 +152,8 @@ void PictureConverter::convert(const AVFrame &picture, const arhost_frame_buffer
         sws_scale(scaler_.get(), picture.data, picture.linesize, 0, picture.height, to.data(), to_stride.data());
     }
 
+    if (format_.pixel_format == ARHOST_PIXEL_FORMAT_YUYV)
+        return interleave(data, stride, buffer);
     for (std::uint32_t p = 0; p < buffer.format->plane_count; ++p) {
         const std::uint32_t shrink = p == 0 ? 1 : 2;
         const std::size_t bytes = bytes_a_pixel(format_.pixel_format, p);

@@ -9,8 +9,8 @@
 
 namespace arhost {
 
-// Converts decoded pictures to one pixel format. Formats that the host supports (4:2:0 with BT.601 or BT.709, and
-// grey) remain unchanged. Others become BGR, or grey if they have no colour.
+// Converts decoded pictures to one pixel format. Formats that the host supports (4:2:0 and 4:2:2 with BT.601 or
+// BT.709, and grey) remain unchanged. Others become BGR, or grey if they have no colour.
 class PictureConverter {
 public:
     // The picture `first` determines the format of all pictures. They are rotated clockwise by `quarter_turns` × 90°.

@@ -54,6 +54,7 @@ CAPABILITY_STANDARD_OUTPUT = 4096
 CAPABILITY_VIDEO_INPUT = 8192
 CAPABILITY_OVERLAY_INPUT = 16384
 CAPABILITY_SCALED_IMAGES = 32768
+CAPABILITY_RUN_DESCRIPTION = 65536
 OFFER = _struct(12,
     ("struct_size", "u4", 0),
     ("oldest_abi_version", "u4", 4),
@@ -368,7 +369,7 @@ RENDER_INFO = _struct(32,
 OVERLAY_RENDERED = 1
 OVERLAY_HELD = 2
 OVERLAY_NONE = 3
-RECORD = _struct(24984,
+RECORD = _struct(24992,
     ("struct_size", "u4", 0),
     ("clock", "i4", 4),
     ("sequence", "u8", 8),
@@ -379,6 +380,7 @@ RECORD = _struct(24984,
     ("truth_id", "i4", 36),
     ("true_mt", ("f8", (16,)), 40),
     ("camera", CAMERA, 168),
-    ("marker_count", "u4", 400),
-    ("reserved", "u4", 404),
-    ("markers", (MARKER, (64,)), 408))
+    ("overlay_scale", "f8", 400),
+    ("overlay_samples", "u4", 408),
+    ("marker_count", "u4", 412),
+    ("markers", (MARKER, (64,)), 416))

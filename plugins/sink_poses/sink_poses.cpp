@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // sink_poses: writes the pose log, which has one line of JSON per frame.
-#include "pose_line.hpp"
 #include "sink_common/json_text.hpp"
 #include "sink_common/line_file.hpp"
+#include "sink_common/record_line.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -24,7 +24,7 @@ public:
 
     arhost_status write(const arhost_output &output) {
         line_.clear();
-        arhost::poses::append_line(line_, *output.record);
+        arhost::record::append_line(line_, *output.record);
         file_.append(line_);
         return ARHOST_STATUS_OK;
     }

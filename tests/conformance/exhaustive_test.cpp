@@ -35,6 +35,7 @@ INSTANTIATE_TEST_SUITE_P(
                     OwnPlugin{"FileLoop", "source_file", {"path=in/a.mp4", "loop=true", "frames=30"}},
                     OwnPlugin{"LastImage", "sink_images", {"path=last.jpg"}},
                     OwnPlugin{"Mpeg4", "sink_video", {"path=video.mkv", "codec=mpeg4"}},
+                    OwnPlugin{"SessionH264", "sink_session", {"path=session", "codec=h264"}},
                     OwnPlugin{"Dissertation", "sink_trajectory", {"path=run.txt", "format=dissertation"}}),
     [](const auto &info) { return info.param.name; });
 

@@ -22,9 +22,9 @@ INSTANTIATE_TEST_SUITE_P(
         OwnPlugin{"Images", "sink_images", {"path=%03d.png"}}, OwnPlugin{"Video", "sink_video", {"path=video.mp4"}},
         OwnPlugin{"Poses", "sink_poses", {"path=poses.jsonl"}},
         OwnPlugin{"Trajectory", "sink_trajectory", {"path=run.trajectory.jsonl"}}, OwnPlugin{"Null", "sink_null", {}},
-        OwnPlugin{"Window", "sink_window", {}, "display"}, OwnPlugin{"Web", "sink_web", {}, "listen"},
-        OwnPlugin{"Control", "sink_control", {}, "listen"}, OwnPlugin{"Pipe", "sink_pipe", {"path=-"}},
-        OwnPlugin{"PipePixels", "sink_pipe", {"path=-", "format=rgba"}},
+        OwnPlugin{"Session", "sink_session", {"path=session"}}, OwnPlugin{"Window", "sink_window", {}, "display"},
+        OwnPlugin{"Web", "sink_web", {}, "listen"}, OwnPlugin{"Control", "sink_control", {}, "listen"},
+        OwnPlugin{"Pipe", "sink_pipe", {"path=-"}}, OwnPlugin{"PipePixels", "sink_pipe", {"path=-", "format=rgba"}},
         OwnPlugin{"V4l2", "sink_v4l2", {"device=/dev/video10"}, "video"}),
     [](const auto &info) { return info.param.name; });
 

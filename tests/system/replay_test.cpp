@@ -318,7 +318,7 @@ TEST(Replay, RejectsBadInputWithPositionAndFix) {
         std::vector<std::string> arguments;
         const char *expected;
     } const cases[] = {
-        {{"replay", "--scene", "scene.yaml"}, "--trajectory is required"},
+        {{"replay", "--scene", "scene.yaml"}, "name the folder of a session, or a trajectory with --trajectory FILE"},
         {replay("t.txt", {}), "--scene is missing: the scene to render"},
         {replay("none.txt"), "none.txt: cannot be read: No such file or directory"},
         {replay("."), "is not a regular file"},

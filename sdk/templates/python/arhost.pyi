@@ -55,6 +55,7 @@ CAPABILITY_STANDARD_OUTPUT: int
 CAPABILITY_VIDEO_INPUT: int
 CAPABILITY_OVERLAY_INPUT: int
 CAPABILITY_SCALED_IMAGES: int
+CAPABILITY_RUN_DESCRIPTION: int
 OFFER: np.dtype[np.void]
 class Offer:
     struct_size: int
@@ -404,8 +405,9 @@ class Record:
     truth_id: int
     true_mt: np.ndarray
     camera: Camera
+    overlay_scale: float
+    overlay_samples: int
     marker_count: int
-    reserved: int
     markers: np.ndarray
 
 # The module

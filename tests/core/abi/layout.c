@@ -87,6 +87,7 @@ VALUE(ARHOST_CAPABILITY_STANDARD_OUTPUT, 4096);
 VALUE(ARHOST_CAPABILITY_VIDEO_INPUT, 8192);
 VALUE(ARHOST_CAPABILITY_OVERLAY_INPUT, 16384);
 VALUE(ARHOST_CAPABILITY_SCALED_IMAGES, 32768);
+VALUE(ARHOST_CAPABILITY_RUN_DESCRIPTION, 65536);
 
 STRUCT(arhost_descriptor, 80);
 FIELD(arhost_descriptor, struct_size, 0, 4);
@@ -598,7 +599,7 @@ FIELD(arhost_raytracer, capabilities, 32, 8);
 
 /* arhost/sink.h */
 
-STRUCT(arhost_sink_setup, 48);
+STRUCT(arhost_sink_setup, 56);
 FIELD(arhost_sink_setup, struct_size, 0, 4);
 FIELD(arhost_sink_setup, width, 4, 4);
 FIELD(arhost_sink_setup, height, 8, 4);
@@ -607,11 +608,12 @@ FIELD(arhost_sink_setup, fps, 16, 8);
 FIELD(arhost_sink_setup, first_sequence, 24, 8);
 FIELD(arhost_sink_setup, intrinsics, 32, 8);
 FIELD(arhost_sink_setup, video_format, 40, 8);
+FIELD(arhost_sink_setup, run_description, 48, 8);
 VALUE(ARHOST_OVERLAY_RENDERED, 1);
 VALUE(ARHOST_OVERLAY_HELD, 2);
 VALUE(ARHOST_OVERLAY_NONE, 3);
 
-STRUCT(arhost_record, 24984);
+STRUCT(arhost_record, 24992);
 FIELD(arhost_record, struct_size, 0, 4);
 FIELD(arhost_record, clock, 4, 4);
 FIELD(arhost_record, sequence, 8, 8);
@@ -622,9 +624,10 @@ FIELD(arhost_record, has_truth, 32, 4);
 FIELD(arhost_record, truth_id, 36, 4);
 FIELD(arhost_record, true_mt, 40, 128);
 FIELD(arhost_record, camera, 168, 232);
-FIELD(arhost_record, marker_count, 400, 4);
-FIELD(arhost_record, reserved, 404, 4);
-FIELD(arhost_record, markers, 408, 24576);
+FIELD(arhost_record, overlay_scale, 400, 8);
+FIELD(arhost_record, overlay_samples, 408, 4);
+FIELD(arhost_record, marker_count, 412, 4);
+FIELD(arhost_record, markers, 416, 24576);
 
 STRUCT(arhost_output, 72);
 FIELD(arhost_output, struct_size, 0, 4);

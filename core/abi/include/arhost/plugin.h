@@ -200,7 +200,8 @@ enum {
     ARHOST_CAPABILITY_OVERLAY_INPUT = 1 << 14, /* sink: reads arhost_output.overlay_rgba */
     /* raytracer: renders images of any size up to that of the setup. The intrinsics of a request are then those of
      * arhost::shading::scaled() (arhost/shading/lens.hpp), and arhost_image has their size. */
-    ARHOST_CAPABILITY_SCALED_IMAGES = 1 << 15
+    ARHOST_CAPABILITY_SCALED_IMAGES = 1 << 15,
+    ARHOST_CAPABILITY_RUN_DESCRIPTION = 1 << 16 /* sink: reads arhost_sink_setup.run_description */
 };
 
 /* Describes the plugin. Static storage: valid as long as the library is loaded. Each string may have up to 4,096

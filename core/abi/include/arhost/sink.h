@@ -24,6 +24,9 @@ typedef struct arhost_sink_setup {
     uint64_t first_sequence;
     const arhost_intrinsics *intrinsics;     /* the same for every camera in the records; NULL if unknown */
     const arhost_frame_format *video_format; /* format of arhost_output.video */
+    /* Description of the run, a JSON object (docs/sessions.md): configuration, versions, camera, scene files. NULL
+     * without ARHOST_CAPABILITY_RUN_DESCRIPTION, and if the host does not describe the run. */
+    const char *run_description;
 } arhost_sink_setup;
 
 /* The origin of a frame's overlay. */
@@ -46,8 +49,10 @@ typedef struct arhost_record {
     int32_t truth_id;
     double true_mt[16];
     arhost_camera camera;
+    /* The quality to which the host has adapted the overlay (`live.target_fps`). */
+    double overlay_scale;     /* size of the rendered image relative to the frame; 0: as large as the frame */
+    uint32_t overlay_samples; /* samples per pixel; 0: as configured */
     uint32_t marker_count;
-    uint32_t reserved;
     arhost_marker markers[ARHOST_MAX_MARKERS];
 } arhost_record;
 

@@ -101,6 +101,7 @@ pub const ARHOST_CAPABILITY_STANDARD_OUTPUT: u32 = 4096;
 pub const ARHOST_CAPABILITY_VIDEO_INPUT: u32 = 8192;
 pub const ARHOST_CAPABILITY_OVERLAY_INPUT: u32 = 16384;
 pub const ARHOST_CAPABILITY_SCALED_IMAGES: u32 = 32768;
+pub const ARHOST_CAPABILITY_RUN_DESCRIPTION: u32 = 65536;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_descriptor {
@@ -821,8 +822,9 @@ pub struct arhost_sink_setup {
     pub first_sequence: u64,
     pub intrinsics: *const arhost_intrinsics,
     pub video_format: *const arhost_frame_format,
+    pub run_description: *const c_char,
 }
-const _: () = assert!(size_of::<arhost_sink_setup>() == 48);
+const _: () = assert!(size_of::<arhost_sink_setup>() == 56);
 unsafe impl Sync for arhost_sink_setup {} // a plugin's statics are immutable
 pub type arhost_overlay = i32;
 pub const ARHOST_OVERLAY_RENDERED: arhost_overlay = 1;
@@ -841,11 +843,12 @@ pub struct arhost_record {
     pub truth_id: i32,
     pub true_mt: [f64; 16],
     pub camera: arhost_camera,
+    pub overlay_scale: f64,
+    pub overlay_samples: u32,
     pub marker_count: u32,
-    pub reserved: u32,
     pub markers: [arhost_marker; ARHOST_MAX_MARKERS],
 }
-const _: () = assert!(size_of::<arhost_record>() == 24984);
+const _: () = assert!(size_of::<arhost_record>() == 24992);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_output {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pose_line.hpp"
+#include "sink_common/record_line.hpp"
 
 #include "sink_common/json_text.hpp"
 
@@ -7,7 +7,7 @@
 #include <cstring>
 #include <span>
 
-namespace arhost::poses {
+namespace arhost::record {
 namespace {
 
 using json_text::append;
@@ -86,7 +86,7 @@ void append(std::string &text, const arhost_camera &camera) {
 
 } // namespace
 
-void append_line(std::string &text, const arhost_record &record) {
+void append_members(std::string &text, const arhost_record &record) {
     text += json_text::frame_start;
     append_number(text, record.sequence);
     text += ", \"capture_ns\": ";
@@ -95,7 +95,18 @@ void append_line(std::string &text, const arhost_record &record) {
     text += record.clock == ARHOST_CLOCK_MONOTONIC ? "monotonic" : "media";
     text += "\", \"overlay\": \"";
     text += name_of_overlay(record.overlay);
-    text += "\", \"markers\": [";
+    text += "\", ";
+    if (record.overlay_scale > 0) {
+        text += "\"overlay_scale\": ";
+        append(text, record.overlay_scale);
+        text += ", ";
+    }
+    if (record.overlay_samples > 0) {
+        text += "\"overlay_samples\": ";
+        append_number(text, record.overlay_samples);
+        text += ", ";
+    }
+    text += "\"markers\": [";
     const std::uint32_t markers = std::min<std::uint32_t>(record.marker_count, ARHOST_MAX_MARKERS);
     for (std::uint32_t i = 0; i < markers; ++i) {
         text += i > 0 ? ", " : "";
@@ -113,7 +124,11 @@ void append_line(std::string &text, const arhost_record &record) {
         append(text, std::span(record.true_mt));
         text += '}';
     }
+}
+
+void append_line(std::string &text, const arhost_record &record) {
+    append_members(text, record);
     text += "}\n";
 }
 
-} // namespace arhost::poses
+} // namespace arhost::record

@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_config/session.hpp"
+
+#include "base/text.hpp"
+#include "base/unique_fd.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <fstream>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace arhost::run_config {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::json;
+
+constexpr const char *description_file = "session.json", *configuration_file = "configuration.yaml";
+constexpr const char *log_file = "frames.jsonl";
+
+void expect_file(const fs::path &file, const char *advice) {
+    std::error_code error;
+    if (!fs::is_regular_file(file, error))
+        throw yaml::Error(file.string() + ": " + (fs::exists(file, error) ? "is not a file" : "is missing") + "; " +
+                          advice);
+}
+
+// A line of the log, for error messages.
+struct Line {
+    const fs::path &file;
+    std::size_t number; // counts from 1
+
+    [[noreturn]] void fail(const std::string &message, std::size_t column = 1) const {
+        throw yaml::Error(file.string() + ":" + std::to_string(number) + ":" + std::to_string(column) + ": " +
+                          message + "; to replay the frames before it, delete this line and all that follow");
+    }
+};
+
+template <std::size_t size> void read_numbers(const Json &from, double (&to)[size]) {
+    const auto numbers = from.get<std::array<double, size>>();
+    std::ranges::copy(numbers, to);
+}
+
+template <class Value>
+Value one_of(const Line &line, const Json &object, const char *key,
+             std::initializer_list<std::pair<const char *, Value>> values) {
+    const auto text = object.at(key).get<std::string>();
+    std::string names;
+    for (const auto &[name, value] : values) {
+        if (text == name)
+            return value;
+        names += (names.empty() ? "" : ", ") + std::string(name);
+    }
+    line.fail(std::string(key) + ": '" + base::printable(text, 100) + "' is not one of " + names);
+}
+
+// Throws Json::exception if a member is missing or has the wrong type.
+RecordedFrame frame_of(const Line &line, const Json &object) {
+    RecordedFrame frame{};
+    frame.number = object.at("frame").get<std::uint64_t>();
+    frame.capture_ns = object.at("capture_ns").get<std::int64_t>();
+    frame.clock = one_of<arhost_clock>(line, object, "clock",
+                                       {{"media", ARHOST_CLOCK_MEDIA}, {"monotonic", ARHOST_CLOCK_MONOTONIC}});
+    frame.overlay = one_of<arhost_overlay>(
+        line, object, "overlay",
+        {{"rendered", ARHOST_OVERLAY_RENDERED}, {"held", ARHOST_OVERLAY_HELD}, {"none", ARHOST_OVERLAY_NONE}});
+    frame.scale = object.value("overlay_scale", 1.0);
+    frame.samples = object.value("overlay_samples", std::uint32_t{0});
+    if (!(frame.scale >= 0.01 && frame.scale <= 1))
+        line.fail("overlay_scale: must be 0.01 to 1");
+    frame.has_markers = !object.at("markers").empty();
+    if (const Json &camera = object.at("camera"); !camera.is_null()) {
+        camera::View view{};
+        read_numbers(camera.at("eye"), view.eye_mm);
+        read_numbers(camera.at("look_at"), view.look_at_mm);
+        read_numbers(camera.at("up"), view.up);
+        if (const std::string problem = camera::problem_with(view); !problem.empty())
+            line.fail("camera: " + problem);
+        frame.view = view;
+    } else if (frame.overlay != ARHOST_OVERLAY_NONE) {
+        line.fail("camera: is null, but the frame has an overlay");
+    }
+    if (const auto truth = object.find("truth"); truth != object.end())
+        frame.truth.emplace(truth->at("id").get<std::int32_t>(), truth->at("mt").get<std::array<double, 16>>());
+    return frame;
+}
+
+void expect_ascending(const Line &line, const RecordedFrame &frame, const RecordedFrame &before) {
+    if (frame.number <= before.number)
+        line.fail("frame: must be greater than in the line before, " + std::to_string(before.number));
+    if (frame.capture_ns < before.capture_ns)
+        line.fail("capture_ns: must not be less than in the line before");
+}
+
+// Reads the frames that the video, of `video_bytes` bytes, contains completely.
+void read_log(Session &session, std::uint64_t video_bytes) {
+    const fs::path file = session.folder / log_file;
+    std::ifstream stream(file, std::ios::binary);
+    std::vector<RecordedFrame> &frames = session.recording.frames;
+    std::uint64_t lacking = 0, end_before = 0; // frames that the video lacks; `video_end` of the line before
+    bool is_complete = false;
+    std::string text;
+    for (Line line{file, 1}; std::getline(stream, text); ++line.number) {
+        if (stream.eof()) // no line end: the line is truncated
+            break;
+        try {
+            const Json object = Json::parse(text);
+            if (is_complete)
+                line.fail("follows the line that ends the recording");
+            if (object.is_object() && object.contains("end")) {
+                is_complete = true;
+                continue;
+            }
+            const RecordedFrame frame = frame_of(line, object);
+            if (!frames.empty())
+                expect_ascending(line, frame, frames.back());
+            const auto video_end = object.at("video_end").get<std::uint64_t>();
+            if (video_end <= end_before)
+                line.fail("video_end: must be greater than in the line before");
+            end_before = video_end;
+            if (video_end > video_bytes)
+                ++lacking;
+            else
+                frames.push_back(frame);
+        } catch (const Json::parse_error &error) {
+            line.fail("is not valid JSON", std::max<std::size_t>(error.byte, 1));
+        } catch (const Json::exception &error) {
+            line.fail(
+                std::string("is not the record of a frame: ") +
+                base::printable(std::string(error.what()).substr(std::string(error.what()).find("] ") + 2), 200));
+        }
+    }
+    if (stream.bad())
+        throw yaml::Error(file.string() + ": cannot be read: " + std::strerror(errno));
+    if (frames.empty())
+        throw yaml::Error(session.folder.string() + ": contains no complete frame; record the session again");
+    const std::string last = std::to_string(frames.back().number);
+    if (lacking > 0)
+        session.warning = session.video().string() + ": ends after frame " + last + ": the last " +
+                          std::to_string(lacking) + " frames of " + log_file + " are missing";
+    else if (!is_complete)
+        session.warning = session.folder.string() + ": the recording was interrupted; it ends after frame " + last +
+                          ", and frames that were not written then are missing";
+}
+
+} // namespace
+
+Session read_session(const fs::path &path) {
+    const fs::path folder = fs::absolute(path).lexically_normal();
+    std::error_code error;
+    if (!fs::is_directory(folder, error))
+        throw yaml::Error(path.string() + ": " + (fs::exists(folder, error) ? "is not a folder" : "does not exist") +
+                          "; name the folder of a session that sink_session has recorded");
+    constexpr const char *advice = "a session that sink_session has recorded contains it (docs/sessions.md)";
+    const fs::path description = folder / description_file, configuration = folder / configuration_file;
+    for (const fs::path &file : {description, configuration, folder / log_file, folder / "video.mkv"})
+        expect_file(file, advice);
+    yaml::Node root = yaml::Node::load(description);
+    root.require("format").choice({"arhost-session"});
+    if (const yaml::Node version = root.require("version"); version.integer() != 1)
+        version.fail("must be 1, the only version that this arhost can replay");
+    yaml::Node::Origin origin{root.require("folder").text(), {}};
+    const yaml::Node overridden = root.require("overridden");
+    for (const auto &[path, relative_to] : overridden.entries())
+        origin.overridden[path] = relative_to.text();
+    Session session{folder, root, yaml::Node::load_copy(configuration, origin), {}, ""};
+    const std::uint64_t bytes = fs::file_size(session.video(), error);
+    if (error)
+        throw yaml::Error(session.video().string() + ": cannot be read: " + error.message());
+    read_log(session, bytes);
+    return session;
+}
+
+std::vector<std::string> Session::changed_scene_files() const {
+    std::vector<std::string> changes;
+    const yaml::Node files = description.require("scene_files");
+    for (const yaml::Node &entry : files.items()) {
+        const fs::path file = entry.require("file").text();
+        const auto found = fingerprint_of(file);
+        const auto hash = entry.find("fnv1a");
+        const Fingerprint recorded{static_cast<std::uint64_t>(entry.require("bytes").integer(0)),
+                                   hash ? hash->text() : ""};
+        if (found != recorded)
+            changes.push_back("the scene file '" + file.string() + "' " +
+                              (found ? "has changed since the recording" : "of the recording cannot be read") +
+                              "; the images will differ from the recorded ones");
+    }
+    return changes;
+}
+
+std::optional<Fingerprint> fingerprint_of(const fs::path &file) {
+    constexpr std::uint64_t max_hashed = 256 << 20;
+    const base::UniqueFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+    struct stat status {};
+    if (fd.get() < 0 || ::fstat(fd.get(), &status) != 0 || !S_ISREG(status.st_mode))
+        return std::nullopt;
+    Fingerprint fingerprint{static_cast<std::uint64_t>(status.st_size), ""};
+    if (fingerprint.bytes > max_hashed)
+        return fingerprint;
+    std::uint64_t hash = 0xcbf29ce484222325; // FNV-1a: offset basis and prime for 64 bits
+    std::vector<unsigned char> buffer(1 << 16);
+    std::uint64_t left = fingerprint.bytes;
+    while (left > 0) {
+        const ssize_t got = ::read(fd.get(), buffer.data(), std::min<std::uint64_t>(left, buffer.size()));
+        if (got <= 0)
+            return std::nullopt;
+        left -= static_cast<std::uint64_t>(got);
+        for (ssize_t i = 0; i < got; ++i)
+            hash = (hash ^ buffer[static_cast<std::size_t>(i)]) * 0x100000001b3;
+    }
+    char digits[17];
+    std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash));
+    fingerprint.hash = digits;
+    return fingerprint;
+}
+
+} // namespace arhost::run_config

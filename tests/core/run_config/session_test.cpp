@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_config/session.hpp"
+
+#include "plugin_under_test.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+namespace arhost::run_config {
+namespace {
+
+using testing::HasSubstr;
+
+const std::string description =
+    R"({"format": "arhost-session", "version": 1, "fps": 30, "folder": "/lab", "overridden": {"raytracer": "/cwd"}, )"
+    R"("scene_files": []})";
+
+std::string line(int frame, const std::string &more = R"("overlay": "none", "markers": [], "camera": null)") {
+    return "{\"frame\": " + std::to_string(frame) + ", \"capture_ns\": " + std::to_string(frame * 1'000) +
+           ", \"clock\": \"media\", " + more + ", \"video_end\": " + std::to_string(100 * (frame + 1)) + "}\n";
+}
+const std::string rendered =
+    R"("overlay": "rendered", "markers": [{"id": 3}], "camera": {"eye": [1, 2, 3.5], "look_at": [1, 2, 2.5], )"
+    R"("up": [0, 1, 0]}, "truth": {"id": 7, "mt": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]})";
+const std::string end = "{\"end\": true}\n";
+
+class SessionFolder : public testing::Test {
+protected:
+    SessionFolder() {
+        std::filesystem::create_directory(folder());
+        write("session.json", description);
+        write("configuration.yaml",
+              "version: 1\nplugin_path: [plugins]\nraytracer: {plugin: rt_embree, scene: a.yaml}\n");
+        write("frames.jsonl", line(0) + line(1, rendered) + end);
+        write("video.mkv", std::string(200, 'v'));
+    }
+    std::filesystem::path folder() const { return scratch_.path() / "take"; }
+    void write(const std::string &name, const std::string &text) const {
+        std::ofstream(folder() / name, std::ios::binary | std::ios::trunc) << text;
+    }
+    // Returns the error without the folder at its start.
+    std::string error() const {
+        try {
+            (void)read_session(folder());
+        } catch (const yaml::Error &error) {
+            const std::string text = error.what(), start = folder().string() + "/";
+            return text.starts_with(start) ? text.substr(start.size()) : text;
+        }
+        return "no error";
+    }
+    std::string error_of_log(const std::string &log) const {
+        write("frames.jsonl", log);
+        return error();
+    }
+
+    test::ScratchFolder scratch_;
+};
+
+TEST_F(SessionFolder, HasTheFactsOfEachFrame) {
+    const Session session = read_session(folder());
+    EXPECT_EQ(session.warning, "");
+    ASSERT_EQ(session.recording.frames.size(), 2u);
+    const RecordedFrame &plain = session.recording.frames[0], &full = session.recording.frames[1];
+    EXPECT_EQ(plain.overlay, ARHOST_OVERLAY_NONE);
+    EXPECT_FALSE(plain.has_markers || plain.view || plain.truth);
+    EXPECT_EQ(full.number, 1u);
+    EXPECT_EQ(full.capture_ns, 1000);
+    EXPECT_EQ(full.clock, ARHOST_CLOCK_MEDIA);
+    EXPECT_EQ(full.overlay, ARHOST_OVERLAY_RENDERED);
+    EXPECT_TRUE(full.has_markers);
+    ASSERT_TRUE(full.view && full.truth);
+    EXPECT_EQ(full.view->eye_mm[2], 3.5);
+    EXPECT_EQ(full.truth->first, 7);
+    EXPECT_EQ(full.truth->second[13], 6);
+}
+
+TEST_F(SessionFolder, PathsHaveTheMeaningOfTheRecordedRun) {
+    const Session session = read_session(folder());
+    EXPECT_EQ(session.configuration.require("plugin_path").items()[0].input_path(), "/lab/plugins");
+    EXPECT_EQ(session.configuration.require("raytracer").require("scene").input_path(), "/cwd/a.yaml");
+}
+
+TEST_F(SessionFolder, FramesThatTheVideoLacksAreLeftOut) {
+    write("frames.jsonl", line(0) + line(1) + line(2) + line(3) + end);
+    write("video.mkv", std::string(299, 'v'));
+    const Session session = read_session(folder());
+    EXPECT_EQ(session.recording.frames.size(), 2u);
+    EXPECT_THAT(session.warning,
+                HasSubstr("video.mkv: ends after frame 1: the last 2 frames of frames.jsonl are missing"));
+}
+
+TEST_F(SessionFolder, AnInterruptedRecordingEndsAtItsLastCompleteLine) {
+    for (const std::string cut : {"", "{\"frame\": 2, \"capture", "{\"frame\": 2}"}) {
+        write("frames.jsonl", line(0) + line(1) + cut);
+        const Session session = read_session(folder());
+        EXPECT_EQ(session.recording.frames.size(), 2u);
+        EXPECT_THAT(session.warning, HasSubstr("take: the recording was interrupted; it ends after frame 1, and"));
+    }
+}
+
+TEST_F(SessionFolder, DamagedLinesAreReportedWithTheirPosition) {
+    EXPECT_THAT(
+        error_of_log(line(0) + "{\"frame\": 1, ]\n" + line(2)),
+        HasSubstr("frames.jsonl:2:14: is not valid JSON; to replay the frames before it, delete this line and "
+                  "all that follow"));
+    EXPECT_THAT(error_of_log(line(0) + "[]\n"), HasSubstr("frames.jsonl:2:1: is not the record of a frame: "));
+    EXPECT_THAT(error_of_log(line(0) + "\n"), HasSubstr("frames.jsonl:2:1: is not valid JSON"));
+    EXPECT_THAT(error_of_log("{\"frame\": 0}\n"), HasSubstr("frames.jsonl:1:1: is not the record of a frame: key "
+                                                            "'capture_ns' not found"));
+    EXPECT_THAT(error_of_log(line(1) + line(1)), HasSubstr("frames.jsonl:2:1: frame: must be greater than in the "
+                                                           "line before, 1"));
+    EXPECT_THAT(error_of_log(line(0, R"("overlay": "all", "markers": [], "camera": null)")),
+                HasSubstr("frames.jsonl:1:1: overlay: 'all' is not one of rendered, held, none"));
+    EXPECT_THAT(error_of_log(line(0, R"("overlay": "held", "markers": [], "camera": null)")),
+                HasSubstr("frames.jsonl:1:1: camera: is null, but the frame has an overlay"));
+    EXPECT_THAT(error_of_log(line(0, R"("overlay": "none", "markers": [], "camera": {"eye": [0, 0, 0], )"
+                                     R"("look_at": [0, 0, 0], "up": [0, 1, 0]})")),
+                HasSubstr("frames.jsonl:1:1: camera: look_at must differ from eye"));
+    EXPECT_THAT(error_of_log(line(0) + end + line(1)),
+                HasSubstr("frames.jsonl:3:1: follows the line that ends the recording"));
+    EXPECT_THAT(error_of_log(end), HasSubstr("contains no complete frame; record the session again"));
+    EXPECT_THAT(error_of_log(""), HasSubstr("contains no complete frame"));
+}
+
+TEST_F(SessionFolder, MissingPartsAreReported) {
+    for (const std::string name : {"session.json", "configuration.yaml", "frames.jsonl", "video.mkv"}) {
+        std::filesystem::rename(folder() / name, folder() / "away");
+        EXPECT_EQ(error(),
+                  name + ": is missing; a session that sink_session has recorded contains it (docs/sessions.md)");
+        std::filesystem::rename(folder() / "away", folder() / name);
+    }
+    EXPECT_EQ(error(), "no error");
+    std::filesystem::remove_all(folder());
+    EXPECT_THAT(error(), HasSubstr("take: does not exist; name the folder of a session"));
+    std::ofstream(folder()) << "file";
+    EXPECT_THAT(error(), HasSubstr("take: is not a folder"));
+}
+
+TEST_F(SessionFolder, AnotherVersionIsRejectedAtItsPosition) {
+    write("session.json", R"({"format": "arhost-session", "version": 2})");
+    EXPECT_EQ(error(), "session.json:1:41: version: must be 1, the only version that this arhost can replay");
+    write("session.json", R"({"format": "other", "version": 1})");
+    EXPECT_THAT(error(), HasSubstr("session.json:1:12: format: 'other' is not one of arhost-session"));
+    write("session.json", "{\"format\": ");
+    EXPECT_THAT(error(), HasSubstr("session.json:1:"));
+}
+
+TEST_F(SessionFolder, ChangedSceneFilesAreNamed) {
+    const std::filesystem::path scene = folder() / "scene.yaml";
+    write("scene.yaml", "foobar");
+    write("session.json", description.substr(0, description.size() - 3) + R"([{"file": ")" + scene.string() +
+                              R"(", "bytes": 6, "fnv1a": "85944171f73967e8"}]})");
+    EXPECT_TRUE(read_session(folder()).changed_scene_files().empty()) << fingerprint_of(scene)->hash;
+    write("scene.yaml", "foobaz");
+    ASSERT_EQ(read_session(folder()).changed_scene_files().size(), 1u);
+    EXPECT_THAT(read_session(folder()).changed_scene_files()[0], HasSubstr("scene.yaml' has changed since"));
+    std::filesystem::remove(scene);
+    EXPECT_THAT(read_session(folder()).changed_scene_files()[0], HasSubstr("scene.yaml' of the recording cannot be"));
+}
+
+TEST(Fingerprint, IsThatOfRegularFilesOnly) {
+    EXPECT_EQ(fingerprint_of("/dev/zero"), std::nullopt);
+    EXPECT_EQ(fingerprint_of("/"), std::nullopt);
+    EXPECT_EQ(fingerprint_of("/missing"), std::nullopt);
+}
+
+} // namespace
+} // namespace arhost::run_config
