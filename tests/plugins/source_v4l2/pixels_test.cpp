@@ -3,6 +3,8 @@
 // Copying of uncompressed pictures, with padded rows and in one or several planes of memory.
 #include "pixels.hpp"
 
+#include "camera_common/fourcc.hpp"
+
 #include "plugin_under_test.hpp"
 
 #include <gmock/gmock.h>
