@@ -193,7 +193,7 @@ private:
                      bool is_configuration_error);
 
     const run_config::Configuration &configuration_;
-    // What commands choose from: `configuration_`, or its last edit.
+    // The choices for commands: those of `configuration_`, or of its last edit.
     std::shared_ptr<const run_config::Configuration> latest_;
     supervise::Context context_;
     std::function<void(const Progress &)> on_progress_;
