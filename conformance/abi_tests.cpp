@@ -160,7 +160,7 @@ void descriptor(Context &context) {
             throw Failure(fmt::format("the descriptor's {} is empty", field));
     constexpr std::uint32_t capabilities_of_kind[] = {
         0, ARHOST_CAPABILITY_SEEK | ARHOST_CAPABILITY_LIVE, 0,
-        ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE,
+        ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE | ARHOST_CAPABILITY_SCALED_IMAGES,
         ARHOST_CAPABILITY_NUMBERED_FILES | ARHOST_CAPABILITY_REALTIME_SINK | ARHOST_CAPABILITY_STANDARD_OUTPUT |
             ARHOST_CAPABILITY_VIDEO_INPUT | ARHOST_CAPABILITY_OVERLAY_INPUT | ARHOST_CAPABILITY_RUN_DESCRIPTION};
     if (const std::uint32_t invalid = d.capabilities & ~capabilities_of_kind[d.kind])

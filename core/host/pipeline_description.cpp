@@ -93,9 +93,12 @@ std::string Pipeline::run_description(const std::string &id) const {
                         {"folder", origin.folder.string()},
                         {"overridden", std::move(overridden)},
                         {"changed_options", std::move(changed)}});
-    // URLs lose their passwords, because sessions are passed on.
+    // Any sink can read the description, and sessions are passed on: it contains neither the outputs, whose options
+    // may be secret and which a replay does not use, nor names, passwords and queries of URLs.
     description["configuration"] =
-        std::regex_replace(latest_->node.to_yaml(), std::regex("://[^/@\\s'\"]*@"), "://") + "\n";
+        std::regex_replace(latest_->node.to_yaml({"outputs", "snapshot", "record"}),
+                           std::regex(R"((://)(?:[^\s'"]*@)?([^\s'"?#]*)[^\s'"]*)"), "$1$2") +
+        "\n";
     std::string text = description.dump(-1, ' ', false, Json::error_handler_t::replace);
     if (Json(text).dump(-1, ' ', false, Json::error_handler_t::replace).size() > messages::max_run_description)
         throw std::runtime_error("the configuration is too long to be recorded in a session: more than " +

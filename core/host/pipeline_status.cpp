@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The status document of a running pipeline (docs/control.md, docs/status.schema.json).
+// The status document of a running pipeline (docs/control.md).
 #include "host/pipeline.hpp"
 
 #include <nlohmann/json.hpp>

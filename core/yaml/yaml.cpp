@@ -312,8 +312,11 @@ Node Node::load_copy(const std::filesystem::path &file, const Origin &origin) {
     return root;
 }
 
-std::string Node::to_yaml() const {
-    return YAML::Dump(node_);
+std::string Node::to_yaml(std::initializer_list<std::string_view> omitted) const {
+    YAML::Node copy = YAML::Clone(node_);
+    for (const std::string_view key : omitted)
+        copy.remove(std::string(key));
+    return YAML::Dump(copy);
 }
 
 std::string Node::option() const {

@@ -59,7 +59,8 @@ public:
     Origin origin() const;
     // Reads a copy: paths have the meaning that they had in the original.
     static Node load_copy(const std::filesystem::path &file, const Origin &origin);
-    std::string to_yaml() const; // this value as YAML
+    // This value as YAML, without comments; of a map, without these keys.
+    std::string to_yaml(std::initializer_list<std::string_view> omitted = {}) const;
 
     // Creates a scalar that is not from a file. `name` is used as the file name in error messages.
     static Node scalar(const std::string &text, const std::string &name);

@@ -44,7 +44,20 @@ inline constexpr arhost_option_descriptor controls_option =
     option(ARHOST_OPTION_TEXT, "controls", "",
            "Further controls by the names that arhost devices lists: 'sharpness=3, backlight_compensation=1'.");
 
-// Sets a control to a number, which disables its automatic mode, or to "auto". Returns warnings.
+// Returns the value that `text` represents. Throws Failure if the control does not accept it.
+template <class Controls, class Control>
+std::int64_t accepted_value(const Controls &controls, const Control &control, std::string_view text,
+                            const std::string &key) {
+    const ControlValues values = controls.values_of(control);
+    const std::optional<std::int64_t> value = parse_value(values, text);
+    if (!value)
+        controls.fail(key, "does not accept '" + std::string(text) + "' for '" + std::string(control.name) +
+                               "'; valid: " + describe_values(values));
+    return *value;
+}
+
+// Sets a control to a number, which disables its automatic mode, or to "auto". Checks the value before it
+// sets anything. Returns warnings.
 template <class Controls, class Handle>
 std::vector<std::string> set_automatic_control(const Controls &controls, const AutomaticControl<Handle> &control,
                                                const std::string &text) {
@@ -54,6 +67,12 @@ std::vector<std::string> set_automatic_control(const Controls &controls, const A
     static constexpr std::array<std::int64_t, 1> on = {1}, off = {0};
     const std::string key(control.key);
     const bool is_automatic = text == "auto", is_exposure = key == "exposure";
+    const auto *const found = controls.find(control.value);
+    if (!is_automatic) {
+        if (!found)
+            controls.fail_missing(key, key);
+        accepted_value(controls, *found, text, key);
+    }
     std::vector<std::string> warnings;
     if (const auto *mode = controls.find(control.mode)) {
         const std::span<const std::int64_t> values =
@@ -69,28 +88,28 @@ std::vector<std::string> set_automatic_control(const Controls &controls, const A
     } else if (is_automatic) {
         controls.fail_missing("auto " + key, key);
     }
-    if (!is_automatic) {
-        const auto *found = controls.find(control.value);
-        if (!found)
-            controls.fail_missing(key, key);
+    if (!is_automatic)
         warnings.push_back(controls.set(*found, text, key));
-    }
     return warnings;
 }
 
-// Sets controls as listed by a user: "gain=20, auto_exposure=manual_mode", in this order. Returns warnings.
+// Sets controls as listed by a user: "gain=20, auto_exposure=manual_mode", in this order. Checks all values before it
+// sets one. Returns warnings.
 template <class Controls>
 std::vector<std::string> set_listed_controls(const Controls &controls, std::string_view list,
                                              const std::string &key) {
-    std::vector<std::string> warnings;
-    for (const ControlSetting &setting : split_settings(list)) {
+    const std::vector<ControlSetting> settings = split_settings(list);
+    for (const ControlSetting &setting : settings) {
         if (!setting.value || setting.name.empty())
             controls.fail(key, "cannot be set up: '" + setting.text + "' is not of the form NAME=VALUE");
         const auto *control = controls.find(std::string_view(setting.name));
         if (!control)
             controls.fail_missing(setting.name, key);
-        warnings.push_back(controls.set(*control, *setting.value, key));
+        accepted_value(controls, *control, *setting.value, key);
     }
+    std::vector<std::string> warnings;
+    for (const ControlSetting &setting : settings)
+        warnings.push_back(controls.set(*controls.find(std::string_view(setting.name)), *setting.value, key));
     return warnings;
 }
 

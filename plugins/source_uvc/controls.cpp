@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controls.hpp"
 
+#include "camera_common/control_options.hpp"
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -186,15 +188,11 @@ std::optional<std::int64_t> Controls::value_of(const ControlDefinition &control)
 
 std::string Controls::set(const ControlDefinition &control, std::string_view text, const std::string &key) const {
     const std::string name(control.name);
-    const ControlValues values = values_of(control);
-    const std::optional<std::int64_t> value = parse_value(values, text);
-    if (!value)
-        device_.fail_configuration(key, "does not accept '" + std::string(text) + "' for '" + name +
-                                            "'; valid: " + describe_values(values));
-    std::int64_t encoded = *value;
+    const std::int64_t value = accepted_value(*this, control, text, key);
+    std::int64_t encoded = value;
     if (is_exposure_mode(control))
         for (const ExposureMode &mode : exposure_modes)
-            if (mode.item == *value)
+            if (mode.item == value)
                 encoded = mode.value;
     // The data may have other values, which stay as they are.
     std::vector<std::uint8_t> data = read(get_current, control);
@@ -214,10 +212,10 @@ std::string Controls::set(const ControlDefinition &control, std::string_view tex
     }
     if (sent < 0)
         device_.fail("setting '" + name + "' to " + std::string(text), sent);
-    const std::int64_t now = value_of(control).value_or(*value);
-    if (now == *value)
+    const std::int64_t now = value_of(control).value_or(value);
+    if (now == value)
         return "";
-    return "the camera has set '" + name + "' to " + std::to_string(now) + " instead of " + std::to_string(*value);
+    return "the camera has set '" + name + "' to " + std::to_string(now) + " instead of " + std::to_string(value);
 }
 
 std::vector<std::string> Controls::set_extensions(std::string_view list, const std::string &key) const {

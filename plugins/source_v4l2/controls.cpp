@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "controls.hpp"
 
+#include "camera_common/control_options.hpp"
+
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
@@ -100,14 +102,6 @@ void Controls::fail_missing(std::string_view name, const std::string &key) const
     fail(key, "has no control '" + std::string(name) + "'" + (names.empty() ? "" : "; it has: " + names));
 }
 
-std::int64_t Controls::parse(const Control &control, std::string_view text, const std::string &key) const {
-    const std::optional<std::int64_t> value = parse_value(control, text);
-    if (!value)
-        fail(key, "does not accept '" + std::string(text) + "' for '" + control.name +
-                      "'; valid: " + describe_values(control));
-    return *value;
-}
-
 std::optional<std::int64_t> Controls::value_of(const Control &control) const {
     if (control.type == V4L2_CTRL_TYPE_BUTTON || (control.flags & V4L2_CTRL_FLAG_WRITE_ONLY))
         return std::nullopt;
@@ -127,7 +121,7 @@ std::optional<std::int64_t> Controls::value_of(const Control &control) const {
 }
 
 std::string Controls::set(const Control &control, std::string_view text, const std::string &key) const {
-    const std::int64_t value = parse(control, text, key);
+    const std::int64_t value = accepted_value(*this, control, text, key);
     v4l2_ext_control wanted{};
     wanted.id = control.id;
     if (control.type == V4L2_CTRL_TYPE_INTEGER64)

@@ -42,8 +42,6 @@ public:
     [[noreturn]] void fail_missing(std::string_view name, const std::string &key) const;
 
 private:
-    std::int64_t parse(const Control &control, std::string_view text, const std::string &key) const;
-
     const CaptureDevice &device_;
     std::vector<Control> controls_;
 };

@@ -291,6 +291,7 @@ private:
             }
             if (found)
                 return found;
+            host_.progress(-1, "waiting for a picture"); // the plugin reports a silent camera itself
             if (Clock::now() > give_up)
                 throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST,
                               "the camera '" + path_ + "' (" + device_->card() +
