@@ -6,6 +6,7 @@
 #include <arhost/frame.h>
 #include <arhost/raytracer.h>
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 
@@ -29,11 +30,12 @@ struct OutputView {
     std::size_t stride = 0; // bytes
 };
 
-// Returns the region that a ray tracer reported, or the entire image if it reported none.
+// Returns the region that a ray tracer reported, clipped to the image, or the entire image if it reported none.
 constexpr Region region_of(const arhost_render_info &info, std::uint32_t width, std::uint32_t height) {
     if (!info.has_region)
         return {0, 0, width, height};
-    return {info.region_x, info.region_y, info.region_width, info.region_height};
+    const std::uint32_t x = std::min(info.region_x, width), y = std::min(info.region_y, height);
+    return {x, y, std::min(info.region_width, width - x), std::min(info.region_height, height - y)};
 }
 
 // Enlarges an image of the size `from_width` × `from_height` to that of `format`, bilinearly with premultiplied

@@ -111,7 +111,10 @@ void expect_watchable(const run_config::Configuration &configuration) {
             return;
         for (const fs::path &folder : component.policy.writable)
             for (const fs::path &file : files)
-                if (sandbox::contains(base::real_path(folder), base::real_path(file)))
+                // The plugin could also replace a symbolic link to the file.
+                if (const fs::path real = base::real_path(folder);
+                    sandbox::contains(real, base::real_path(file)) ||
+                    sandbox::contains(real, base::real_path(file.parent_path())))
                     component.node.fail("may write to the folder of '" + file.string() +
                                         "', so with '--watch' it could change what runs; let it write to another "
                                         "folder, or remove '--watch'");
@@ -220,6 +223,29 @@ void choose_recorded(run_config::Configuration &configuration, const yaml::Node 
     std::iter_swap(configuration.scenes.begin(), found);
 }
 
+// Sessions are files of plugins, which are not trusted: removes what would let a session run other programs or write
+// files.
+void remove_grants(yaml::Node &root, const ReplayArguments &replay) {
+    for (const char *key : {"sandbox", "plugin_path"})
+        root.remove(key);
+    const auto alternatives = root.find("alternatives");
+    for (const auto &[kind, chosen] : {std::pair{"tracker", &replay.tracker}, {"raytracer", &replay.raytracer}}) {
+        std::vector<yaml::Node> components;
+        if (const auto listed = alternatives ? alternatives->find(kind) : std::nullopt)
+            components = listed->items();
+        if (const auto component = root.find(kind); component && chosen->empty())
+            components.push_back(*component);
+        for (yaml::Node &component : components) {
+            for (const char *key : {"writes", "environment"})
+                component.remove(key);
+            for (const char *key : {"plugin", "fallback"})
+                if (const auto plugin = component.find(key); plugin && plugin->text().find('/') != std::string::npos)
+                    plugin->fail("is a file, which a session cannot choose; if you trust it, use --" +
+                                 std::string(kind) + " " + plugin->text());
+        }
+    }
+}
+
 // Returns a configuration that plays the video of a session in the pipeline of the recorded run, or in that of
 // `arguments.file`.
 run_config::Configuration session_configuration(const Arguments &arguments, const ReplayArguments &replay) {
@@ -229,6 +255,8 @@ run_config::Configuration session_configuration(const Arguments &arguments, cons
     yaml::Node root = arguments.file.empty() ? session.configuration : yaml::Node::load(arguments.file);
     for (const char *key : {"record", "snapshot", "stats", "timeline", "frames"})
         root.remove(key);
+    if (arguments.file.empty())
+        remove_grants(root, replay);
     root.override_value("mode", "lockstep", "arhost replay");
     root.override_value("source", "{plugin: source_file}", "arhost replay");
     root.override_text("source.path", session.video().string(), "arhost replay");

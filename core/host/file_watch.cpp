@@ -22,21 +22,21 @@ FileWatch::FileWatch(ipc::Reactor &reactor, std::function<void(const Files &)> c
 
 void FileWatch::add(const Files &files) {
     for (const std::filesystem::path &file : files) {
-        if (!files_.insert(file).second)
-            continue;
+        files_.insert(file);
         const std::filesystem::path folder = file.parent_path();
         // Returns the existing descriptor if the folder is already watched.
         const int watch = ::inotify_add_watch(inotify_.get(), folder.c_str(), IN_CLOSE_WRITE | IN_MOVED_TO);
         if (watch < 0 && errno != ENOENT && errno != EACCES)
             throw std::system_error(errno, std::generic_category(), "cannot watch the folder " + folder.string());
         if (watch >= 0)
-            folders_[watch] = folder;
+            folders_[watch].insert(folder);
     }
 }
 
 void FileWatch::on_events() {
     alignas(inotify_event) char buffer[4096];
     ssize_t size = 0;
+    bool is_new = false;
     while ((size = ::read(inotify_.get(), buffer, sizeof buffer)) > 0) {
         for (ssize_t at = 0; at < size;) {
             inotify_event event;
@@ -46,11 +46,14 @@ void FileWatch::on_events() {
             const auto folder = folders_.find(event.wd);
             if (event.len == 0 || folder == folders_.end())
                 continue;
-            if (const auto file = folder->second / name; files_.contains(file))
-                pending_.insert(file);
+            for (const std::filesystem::path &each : folder->second)
+                if (const auto file = each / name; files_.contains(file)) {
+                    pending_.insert(file);
+                    is_new = true;
+                }
         }
     }
-    if (!pending_.empty())
+    if (is_new)
         quiet_ =
             reactor_.at(ipc::Reactor::Clock::now() + quiet_time, [this] { changed_(std::exchange(pending_, {})); });
 }

@@ -30,8 +30,8 @@ private:
     ipc::Reactor &reactor_;
     std::function<void(const Files &)> changed_;
     base::UniqueFd inotify_;
-    Files files_, pending_;                        // `pending_`: changed, but not reported
-    std::map<int, std::filesystem::path> folders_; // by watch descriptor
+    Files files_, pending_;                                  // `pending_`: changed, but not reported
+    std::map<int, std::set<std::filesystem::path>> folders_; // by watch descriptor; a folder can have several names
     ipc::Reactor::Registration events_, quiet_;
 };
 

@@ -231,7 +231,12 @@ private:
     std::vector<arhost_marker> last_markers_;          // of the last composited frame
     bool video_input_ = false, overlay_input_ = false; // whether a sink reads the video frame and the overlay
     bool has_window_ = false;
-    std::optional<std::chrono::steady_clock::time_point> media_begin_; // when the media time 0 was shown, if paced
+    // The last frame of a paced run.
+    struct Paced {
+        std::int64_t media_ns;
+        std::chrono::steady_clock::time_point due;
+    };
+    std::optional<Paced> paced_;
     ipc::Reactor::Registration due_;
     bool frozen_ = false;
     std::vector<std::uint8_t> enlarged_; // the overlay of a frame that was rendered smaller
@@ -244,6 +249,7 @@ private:
     std::map<const supervise::Component *, OptionsInUse> options_;
     std::function<run_config::Configuration()> read_configuration_; // empty unless edits are applied
     std::optional<FileWatch> file_watch_;
+    bool tracker_edit_failed_ = false, raytracer_edit_failed_ = false;
     FileWatch::Files edited_files_;                                      // to be applied
     std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // with the number of its frame
 

@@ -111,6 +111,8 @@ void Pipeline::start_next_raytracer(RaytracerPointer configuration, std::shared_
                                     const control::Done &done) {
     next_raytracer_ = make_raytracer(std::move(configuration), std::move(scene));
     next_raytracer_->swapped = done;
+    if (next_raytracer_->configuration == raytracer_->configuration) // keeps what `set` has changed
+        options_[next_raytracer_->component.get()] = options_[raytracer_->component.get()];
     next_raytracer_->component->start();
 }
 
@@ -258,13 +260,13 @@ void Pipeline::execute(const control::Set &set, const control::Done &done) {
         throw control::Error(error.what());
     }
     OptionsInUse &options = options_[*component];
-    (*component)->set_option(value, [this, &options, value, done](const std::string &error) {
+    (*component)->set_option(value, [this, &options, value, done, changed = *component](const std::string &error) {
         if (const auto old = std::ranges::find(options.values, value.key, &OptionValue::key);
             error.empty() && old != options.values.end()) {
             *old = value;
             options.changed.insert(value.key);
-            if (raytracer_ && raytracer_->running()) // the new value may be the full number of samples
-                start_quality(*raytracer_);
+            if (raytracer_ && raytracer_->component.get() == changed && value.key == "samples")
+                start_quality(*raytracer_); // its limit is the new value
         }
         done(error, {});
     });

@@ -33,6 +33,9 @@ Json camera_json(const arhost_intrinsics &camera) {
             {"distortion", {{"model", model}, {"coefficients", coefficients}}}};
 }
 
+// The run waits while its files are hashed.
+constexpr std::uint64_t max_hashed_bytes = 32 << 20;
+
 Json plugin_json(const Component &component) {
     return {{"plugin", component.description().id}, {"version", component.description().version}};
 }
@@ -54,10 +57,19 @@ std::string Pipeline::run_description(const std::string &id) const {
     for (const auto &[path, folder] : origin.overridden)
         overridden[path] = folder.string();
     Json changed = Json::object(); // by the command `set`; each value in YAML syntax
-    for (const auto &[component, options] : options_)
+    const auto add_changed = [&](const Component &component) {
+        const auto found = options_.find(&component);
+        if (found == options_.end())
+            return;
+        const OptionsInUse &options = found->second;
         for (const OptionValue &value : options.values)
             if (options.changed.contains(value.key))
                 changed[options.path + ".options." + value.key] = run_config::yaml_text(value);
+    };
+    if (tracker_)
+        add_changed(*tracker_->component);
+    if (raytracer_)
+        add_changed(*raytracer_->component);
     Json description = {{"format", "arhost-session"},
                         {"version", 1},
                         {"id", id},
@@ -82,8 +94,10 @@ std::string Pipeline::run_description(const std::string &id) const {
         description["scene"] = raytracer_->scene->source.name;
         std::set<std::filesystem::path> read = raytracer_->scene->files;
         read.insert(raytracer_->scene->source.file);
+        std::uint64_t left = max_hashed_bytes;
         for (const std::filesystem::path &file : read)
-            if (const auto fingerprint = run_config::fingerprint_of(file)) {
+            if (const auto fingerprint = run_config::fingerprint_of(file, left)) {
+                left -= fingerprint->hash.empty() ? 0 : fingerprint->bytes;
                 files.push_back({{"file", file.string()}, {"bytes", fingerprint->bytes}});
                 if (!fingerprint->hash.empty())
                     files.back()["fnv1a"] = fingerprint->hash;

@@ -44,8 +44,6 @@ FileWatch::Files paths_to(const std::filesystem::path &file) {
     return {file, base::real_path(file)};
 }
 
-void log_only(const std::string &, const nlohmann::ordered_json &) {} // the run logs the outcome of a swap
-
 } // namespace
 
 void Pipeline::watch(std::function<run_config::Configuration()> read) {
@@ -85,7 +83,11 @@ void Pipeline::apply_edits() {
         raytracer_ && std::ranges::any_of(files, [&](const auto &each) {
             return each == raytracer_->scene->source.file || raytracer_->scene->files.contains(each);
         });
-    apply(*latest_, *previous, scene_changed);
+    try {
+        apply(*latest_, *previous, scene_changed);
+    } catch (const std::exception &error) {
+        context_.log(ARHOST_SEVERITY_WARNING, "arhost", std::string(error.what()) + "; the edit is not applied");
+    }
 }
 
 void Pipeline::apply(const run_config::Configuration &edited, const run_config::Configuration &previous,
@@ -96,19 +98,25 @@ void Pipeline::apply(const run_config::Configuration &edited, const run_config::
     const auto differs = [&](std::string_view key) {
         return content_of(edited.node, key) != content_of(previous.node, key);
     };
-    if (tracker_ && edited.tracker && differs("tracker"))
-        start_next_tracker(shared(edited.trackers.front()), log_only);
+    // An edit that fails is tried again with the next one. The run logs the outcome of each.
+    const auto remember = [](bool &has_failed) {
+        return
+            [&has_failed](const std::string &error, const nlohmann::ordered_json &) { has_failed = !error.empty(); };
+    };
+    if (tracker_ && edited.tracker && (differs("tracker") || std::exchange(tracker_edit_failed_, false)))
+        start_next_tracker(shared(edited.trackers.front()), remember(tracker_edit_failed_));
     if (!raytracer_ || !edited.raytracer)
         return;
-    const bool raytracer_changed = differs("raytracer");
+    const bool is_retry = std::exchange(raytracer_edit_failed_, false);
+    const bool raytracer_changed = is_retry || differs("raytracer");
     const RaytracerPointer raytracer =
         raytracer_changed ? shared(edited.raytracers.front()) : raytracer_->configuration;
-    const bool other_scene = edited.raytracer->scene != previous.raytracer->scene;
+    const bool other_scene = is_retry || edited.raytracer->scene != previous.raytracer->scene;
     const run_config::Scene scene = other_scene ? edited.scenes.front() : raytracer_->scene->source;
     if (scene_changed || other_scene || differs("coordinates"))
-        load_next_scene(scene, raytracer, log_only);
+        load_next_scene(scene, raytracer, remember(raytracer_edit_failed_));
     else if (raytracer_changed)
-        start_next_raytracer(raytracer, raytracer_->scene, log_only);
+        start_next_raytracer(raytracer, raytracer_->scene, remember(raytracer_edit_failed_));
 }
 
 } // namespace arhost::host

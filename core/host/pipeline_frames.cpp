@@ -22,6 +22,7 @@ namespace {
 
 constexpr std::size_t max_reads_in_flight = 2;
 constexpr std::chrono::milliseconds max_lateness{100}; // of a paced run that catches up
+constexpr double max_step_s = 10;                      // longer gaps in the time of a film are not waited for
 constexpr std::uint32_t max_attempts = 2; // per frame and stage, if the worker dies while processing the frame
 
 // Returns the first marker that is not lost, or null. Trackers report markers in the order of the configuration.
@@ -353,17 +354,17 @@ void Pipeline::start_quality(RaytracerStage &stage) {
 void Pipeline::request_samples(RaytracerStage &stage, std::uint32_t samples) {
     if (samples == 0 || samples == stage.samples_in_use)
         return;
-    stage.samples_in_use = samples;
+    const std::uint32_t previous = std::exchange(stage.samples_in_use, samples);
     OptionValue value;
     value.key = "samples";
     value.type = ARHOST_OPTION_INTEGER;
     value.integer = samples;
     // If a worker dies before it answers, start_quality() is called for the next one.
-    stage.component->set_option(value, [this, &stage](const std::string &error) {
+    stage.component->set_option(value, [this, &stage, previous](const std::string &error) {
         if (!error.empty() && configuration_.recording)
             stage.component->log(ARHOST_SEVERITY_WARNING, "the recorded number of samples cannot be set: " + error);
         if (!error.empty())
-            stage.quality.reset();
+            stage.samples_in_use = previous; // requested again with the next image
     });
 }
 
@@ -498,13 +499,19 @@ bool Pipeline::is_early(const Frame &frame) {
         frame.record.clock != ARHOST_CLOCK_MEDIA)
         return false;
     const Clock::time_point now = Clock::now();
-    const std::chrono::nanoseconds media_time(frame.record.capture_ns);
-    if (!media_begin_ || now - *media_begin_ - media_time > max_lateness)
-        media_begin_ = now - media_time;
-    const Clock::time_point due = *media_begin_ + media_time;
-    if (due > now)
+    Clock::time_point due = now;
+    if (paced_) {
+        const double step_s =
+            1e-9 * (static_cast<double>(frame.record.capture_ns) - static_cast<double>(paced_->media_ns));
+        if (step_s <= max_step_s)
+            due = paced_->due + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(step_s));
+    }
+    if (due > now) {
         due_ = context_.reactor.at(due, [] {}); // wakes the pipeline
-    return due > now;
+        return true;
+    }
+    paced_ = {frame.record.capture_ns, now - due > max_lateness ? now : due};
+    return false;
 }
 
 bool Pipeline::compose() {

@@ -85,7 +85,9 @@ void EndedComponents::add(const supervise::Component &component) {
     cpu_seconds[component.name()] += component.cpu_seconds();
     restarts[component.name()] += component.restarts();
     for (const auto &[name, value] : component.counters())
-        counters[component.name()][name] += value;
+        if (auto &counted = counters[component.name()];
+            counted.contains(name) || counted.size() < ARHOST_MAX_COUNTERS) // the names are the plugin's
+            counted[name] += value;
     for (const supervise::Crash &crash : component.crashes())
         crashes.push_back({component.name(), crash});
     const auto is_of_component = [&](const Crash &crash) { return crash.component == component.name(); };

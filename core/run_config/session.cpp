@@ -11,6 +11,7 @@
 #include <cstring>
 #include <fcntl.h>
 #include <fstream>
+#include <limits>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -181,8 +182,8 @@ std::vector<std::string> Session::changed_scene_files() const {
     const yaml::Node files = description.require("scene_files");
     for (const yaml::Node &entry : files.items()) {
         const fs::path file = entry.require("file").text();
-        const auto found = fingerprint_of(file);
         const auto hash = entry.find("fnv1a");
+        const auto found = fingerprint_of(file, hash ? std::numeric_limits<std::uint64_t>::max() : 0);
         const Fingerprint recorded{static_cast<std::uint64_t>(entry.require("bytes").integer(0)),
                                    hash ? hash->text() : ""};
         if (found != recorded)
@@ -193,14 +194,13 @@ std::vector<std::string> Session::changed_scene_files() const {
     return changes;
 }
 
-std::optional<Fingerprint> fingerprint_of(const fs::path &file) {
-    constexpr std::uint64_t max_hashed = 256 << 20;
+std::optional<Fingerprint> fingerprint_of(const fs::path &file, std::uint64_t max_hashed_bytes) {
     const base::UniqueFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
     struct stat status {};
     if (fd.get() < 0 || ::fstat(fd.get(), &status) != 0 || !S_ISREG(status.st_mode))
         return std::nullopt;
     Fingerprint fingerprint{static_cast<std::uint64_t>(status.st_size), ""};
-    if (fingerprint.bytes > max_hashed)
+    if (fingerprint.bytes > max_hashed_bytes)
         return fingerprint;
     std::uint64_t hash = 0xcbf29ce484222325; // FNV-1a: offset basis and prime for 64 bits
     std::vector<unsigned char> buffer(1 << 16);

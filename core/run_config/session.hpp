@@ -56,13 +56,13 @@ struct Session {
 // Throws yaml::Error, whose message names file and line, for anything else that is missing or damaged.
 Session read_session(const std::filesystem::path &folder);
 
-// Size and hash (64-bit FNV-1a, hexadecimal) of a regular file. The hash is "" for files above 256 MiB. Returns
+// Size and hash (64-bit FNV-1a, hexadecimal) of a regular file. The hash of larger files is "". Returns
 // nullopt if the file cannot be read.
 struct Fingerprint {
     std::uint64_t bytes;
     std::string hash;
     bool operator==(const Fingerprint &) const = default;
 };
-std::optional<Fingerprint> fingerprint_of(const std::filesystem::path &file);
+std::optional<Fingerprint> fingerprint_of(const std::filesystem::path &file, std::uint64_t max_hashed_bytes);
 
 } // namespace arhost::run_config

@@ -58,6 +58,7 @@ public:
     }
 
     arhost_status write(const arhost_output &output) {
+        is_complete_ = false; // if this frame cannot be written
         const arhost_record &record = *output.record;
         if (!video_->is_open())
             begin();
@@ -76,13 +77,15 @@ public:
             throw;
         }
         last_ms_ = time_ms;
+        is_complete_ = true;
         return ARHOST_STATUS_OK;
     }
 
     void stop() {
         if (!video_->is_open())
             return host_.warn("'" + folder_.string() + "' was not written, because there were no frames");
-        log_.append("{\"end\": true}\n"); // without this line, the recording was interrupted
+        if (is_complete_)
+            log_.append("{\"end\": true}\n"); // without this line, the recording was interrupted
     }
 
 private:
@@ -162,6 +165,7 @@ private:
     Host host_;
     fs::path folder_;
     bool replaces_, has_restarted_ = false;
+    bool is_complete_ = true; // the last frame was written
     files::LineFile log_;
     session::VideoSettings settings_;
     std::optional<session::VideoFile> video_;

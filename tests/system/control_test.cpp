@@ -400,6 +400,23 @@ TEST(Control, TheStatusSaysWhichCameraIsMissing) {
     EXPECT_EQ(run.quit(), 0) << run.output();
 }
 
+TEST(Control, ANewSceneKeepsAChangedOption) {
+    ControlledRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 0, id: 0, side_mm: 80}}\n"
+                      "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+                      "raytracer: {plugin: rt_embree, scene: scene.yaml}\nscenes: [other.yaml]\n"
+                      "alternatives: {raytracer: [{name: second, plugin: rt_embree}]}\n"
+                      "outputs: [{plugin: sink_control, allow: [listen], control: [quit, load_scene, set, status, "
+                      "swap]}]\n");
+    run.start_and_connect();
+    const auto samples = [&] { return run.status_of("raytracer")["options"][0]["value"]; };
+    run.succeed({{"command", "set"}, {"component", "raytracer"}, {"option", "samples"}, {"value", 4}});
+    run.succeed({{"command", "load_scene"}, {"scene", "other"}});
+    EXPECT_EQ(samples(), 4);
+    run.succeed(swap("raytracer", "second"));
+    EXPECT_EQ(samples(), 1);
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
 TEST(Control, RejectsWhatTheConfigurationDoesNotGrantOrList) {
     ControlledRun run(controlled("lockstep", "", "[quit, status, load_scene, swap]"));
     run.start_and_connect();

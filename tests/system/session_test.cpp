@@ -223,6 +223,20 @@ TEST(Sessions, AKilledSinkContinuesTheSession) {
         }
 }
 
+TEST(Sessions, AnEditedSessionGainsNoPermission) {
+    ArhostRun run(recording("lockstep", "2"));
+    ASSERT_EQ(run.run(), 0) << run.output();
+    const std::string configuration = run.read("take/configuration.yaml");
+    run.write("take/configuration.yaml", configuration + "sandbox: none\nplugin_path: [.]\n");
+    ASSERT_EQ(run.run(replaying({"-v"})), 0) << run.output();
+    EXPECT_THAT(run.output(), Not(HasSubstr("sandbox: none")));
+    std::string other = configuration;
+    other.replace(other.find("tracker_aruco"), std::string("tracker_aruco").size(), "./tracker_aruco.so");
+    run.write("take/configuration.yaml", other);
+    EXPECT_EQ(run.run(replaying()), 2);
+    EXPECT_THAT(run.output(), HasSubstr("tracker.plugin: is a file, which a session cannot choose"));
+}
+
 TEST(Sessions, AFullDiskKeepsTheFramesBefore) {
     ArhostRun run(recording("lockstep", "40"));
     std::filesystem::create_directories(run.path("full"));
@@ -246,6 +260,7 @@ TEST(Sessions, AFullDiskKeepsTheFramesBefore) {
     EXPECT_THAT(run.output(), HasSubstr("No space left on device (free some space, or choose another path)"));
     EXPECT_TRUE(run.exists("recorded/0039.png")) << "other outputs continue";
     ASSERT_EQ(run.run(replaying()), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("interrupted"));
     const auto recorded = files_in(run, "recorded"), replayed = files_in(run, "replayed");
     EXPECT_GT(replayed.size(), 5u);
     EXPECT_LT(replayed.size(), 41u);

@@ -81,7 +81,7 @@ public:
 // The picture that a run of the same files, without edits, writes under this name.
 std::string picture_of_a_fresh_run(const WatchedRun &edited, const std::string &name) {
     ArhostRun run(edited.read("run.yaml"));
-    for (const char *file : {"scene.yaml", "mesh.obj"})
+    for (const char *file : {"scene.yaml", "other.yaml", "mesh.obj"})
         if (edited.exists(file))
             run.write(file, edited.read(file));
     EXPECT_EQ(run.run({"run.yaml", "--frames", std::to_string(std::stoi(name) + 1)}), 0) << run.output();
@@ -146,15 +146,42 @@ TEST(Watch, AnInvalidEditLeavesTheRunAsItWas) {
     run.replace("scene.yaml", scene_with("sphere: {centre: [0, 0, 30], radius: -30}"));
     run.wait_for("scene.yaml:4:");
     run.wait_for("the previous scene stays");
+    run.replace("scene.yaml", large_sphere);
+    run.wait_for("raytracer is now rt_embree with the scene scene");
     run.replace("run.yaml",
                 WatchedRun::configuration(
                     tracker, "raytracer: {plugin: rt_embree, scene: scene.yaml, options: {samples: -1}}\n"));
     run.wait_for("the previous raytracer stays");
     run.replace("run.yaml", WatchedRun::configuration());
-    run.replace("scene.yaml", large_sphere);
-    run.wait_for("raytracer is now rt_embree with the scene scene");
+    run.wait_for("raytracer is now rt_embree with the scene scene", 2);
     EXPECT_EQ(run.interrupt(), 130) << run.output();
     EXPECT_EQ(run.read("out/" + run.last_picture()), picture_of_a_fresh_run(run, run.last_picture()));
+}
+
+TEST(Watch, AMendedSceneCompletesAnEditThatFailed) {
+    WatchedRun run;
+    run.write("other.yaml", scene_with("sphere: {centre: [0, 0, 30], radius: -30}"));
+    run.start_watching();
+    run.replace("run.yaml",
+                WatchedRun::configuration(
+                    tracker, "raytracer: {plugin: rt_embree, scene: other.yaml, options: {samples: 4}}\n"));
+    run.wait_for("the previous scene stays");
+    run.replace("other.yaml", large_sphere);
+    run.wait_for("raytracer is now rt_embree with the scene other");
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+    EXPECT_EQ(run.read("out/" + run.last_picture()), picture_of_a_fresh_run(run, run.last_picture()));
+}
+
+TEST(WatchConfiguration, RejectsAPluginThatCouldReplaceALinkToTheConfiguration) {
+    ArhostRun run;
+    run.write("own/run.yaml", std::string("version: 1\n") + source + tracker + raytracer +
+                                  "outputs: [{plugin: sink_video, path: out/take.mkv}]\n");
+    run.write("own/scene.yaml", small_sphere);
+    std::filesystem::create_directory(run.path("out"));
+    std::filesystem::create_symlink("../own/run.yaml", run.path("out/run.yaml"));
+    std::filesystem::create_symlink("../own/scene.yaml", run.path("out/scene.yaml"));
+    EXPECT_EQ(run.run({"out/run.yaml", "--watch"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("outputs[0]: may write to the folder of '"));
 }
 
 TEST(Watch, NamesTheKeysWhoseEditsNeedANewRun) {

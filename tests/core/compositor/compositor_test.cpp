@@ -8,6 +8,7 @@
 #include <sys/mman.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <random>
 #include <vector>
@@ -208,6 +209,20 @@ TEST(RegionOf, IsTheWholeImageUnlessTheRayTracerReportsOne) {
     EXPECT_EQ(reported.y, 6u);
     EXPECT_EQ(reported.width, 7u);
     EXPECT_EQ(reported.height, 8u);
+}
+
+TEST(RegionOf, IsClippedToTheImage) {
+    for (const auto &[x, y, width, height] :
+         std::to_array<std::array<std::uint32_t, 4>>({{0, 0, 640, 481},
+                                                      {630, 470, 0xffffffff, 0xffffffff},
+                                                      {0x80000000, 3, 5, 5},
+                                                      {640, 0, 1, 1},
+                                                      {3, 0xffffffff, 2, 2}})) {
+        const arhost_render_info info{sizeof info, 1, x, y, width, height, 0};
+        const Region region = region_of(info, 640, 480);
+        EXPECT_LE(std::uint64_t{region.x} + region.width, 640u);
+        EXPECT_LE(std::uint64_t{region.y} + region.height, 480u);
+    }
 }
 
 // An opaque rectangle on a transparent background of another colour.

@@ -151,7 +151,7 @@ TEST_F(SessionFolder, ChangedSceneFilesAreNamed) {
     write("scene.yaml", "foobar");
     write("session.json", description.substr(0, description.size() - 3) + R"([{"file": ")" + scene.string() +
                               R"(", "bytes": 6, "fnv1a": "85944171f73967e8"}]})");
-    EXPECT_TRUE(read_session(folder()).changed_scene_files().empty()) << fingerprint_of(scene)->hash;
+    EXPECT_TRUE(read_session(folder()).changed_scene_files().empty()) << fingerprint_of(scene, 1 << 20)->hash;
     write("scene.yaml", "foobaz");
     ASSERT_EQ(read_session(folder()).changed_scene_files().size(), 1u);
     EXPECT_THAT(read_session(folder()).changed_scene_files()[0], HasSubstr("scene.yaml' has changed since"));
@@ -160,9 +160,9 @@ TEST_F(SessionFolder, ChangedSceneFilesAreNamed) {
 }
 
 TEST(Fingerprint, IsThatOfRegularFilesOnly) {
-    EXPECT_EQ(fingerprint_of("/dev/zero"), std::nullopt);
-    EXPECT_EQ(fingerprint_of("/"), std::nullopt);
-    EXPECT_EQ(fingerprint_of("/missing"), std::nullopt);
+    EXPECT_EQ(fingerprint_of("/dev/zero", 1 << 20), std::nullopt);
+    EXPECT_EQ(fingerprint_of("/", 1 << 20), std::nullopt);
+    EXPECT_EQ(fingerprint_of("/missing", 1 << 20), std::nullopt);
 }
 
 } // namespace
