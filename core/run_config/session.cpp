@@ -19,7 +19,6 @@ namespace arhost::run_config {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::json;
 
 constexpr const char *description_file = "session.json", *configuration_file = "configuration.yaml";
 constexpr const char *log_file = "frames.jsonl";
@@ -42,13 +41,13 @@ struct Line {
     }
 };
 
-template <std::size_t size> void read_numbers(const Json &from, double (&to)[size]) {
+template <std::size_t size> void read_numbers(const nlohmann::json &from, double (&to)[size]) {
     const auto numbers = from.get<std::array<double, size>>();
     std::ranges::copy(numbers, to);
 }
 
 template <class Value>
-Value one_of(const Line &line, const Json &object, const char *key,
+Value one_of(const Line &line, const nlohmann::json &object, const char *key,
              std::initializer_list<std::pair<const char *, Value>> values) {
     const auto text = object.at(key).get<std::string>();
     std::string names;
@@ -60,8 +59,8 @@ Value one_of(const Line &line, const Json &object, const char *key,
     line.fail(std::string(key) + ": '" + base::printable(text, 100) + "' is not one of " + names);
 }
 
-// Throws Json::exception if a member is missing or has the wrong type.
-RecordedFrame frame_of(const Line &line, const Json &object) {
+// Throws nlohmann::json::exception if a member is missing or has the wrong type.
+RecordedFrame frame_of(const Line &line, const nlohmann::json &object) {
     RecordedFrame frame{};
     frame.number = object.at("frame").get<std::uint64_t>();
     frame.capture_ns = object.at("capture_ns").get<std::int64_t>();
@@ -75,7 +74,7 @@ RecordedFrame frame_of(const Line &line, const Json &object) {
     if (!(frame.scale >= 0.01 && frame.scale <= 1))
         line.fail("overlay_scale: must be 0.01 to 1");
     frame.has_markers = !object.at("markers").empty();
-    if (const Json &camera = object.at("camera"); !camera.is_null()) {
+    if (const nlohmann::json &camera = object.at("camera"); !camera.is_null()) {
         camera::View view{};
         read_numbers(camera.at("eye"), view.eye_mm);
         read_numbers(camera.at("look_at"), view.look_at_mm);
@@ -110,7 +109,7 @@ void read_log(Session &session, std::uint64_t video_bytes) {
         if (stream.eof()) // no line end: the line is truncated
             break;
         try {
-            const Json object = Json::parse(text);
+            const nlohmann::json object = nlohmann::json::parse(text);
             if (is_complete)
                 line.fail("follows the line that ends the recording");
             if (object.is_object() && object.contains("end")) {
@@ -128,9 +127,9 @@ void read_log(Session &session, std::uint64_t video_bytes) {
                 ++lacking;
             else
                 frames.push_back(frame);
-        } catch (const Json::parse_error &error) {
+        } catch (const nlohmann::json::parse_error &error) {
             line.fail("is not valid JSON", std::max<std::size_t>(error.byte, 1));
-        } catch (const Json::exception &error) {
+        } catch (const nlohmann::json::exception &error) {
             line.fail(
                 std::string("is not the record of a frame: ") +
                 base::printable(std::string(error.what()).substr(std::string(error.what()).find("] ") + 2), 200));

@@ -6,13 +6,13 @@
 namespace arhost::worker {
 namespace {
 
-struct Listing {
+struct CounterListing {
     ipc::Counters counters;
     bool is_invalid = false;
 };
 
 void add_counter(void *context, const char *name, std::uint64_t value) noexcept {
-    Listing &listing = *static_cast<Listing *>(context);
+    CounterListing &listing = *static_cast<CounterListing *>(context);
     try {
         if (!name || !listing.counters.try_emplace(name, value).second)
             listing.is_invalid = true;
@@ -29,7 +29,7 @@ ipc::Counters list_counters(const arhost_plugin &plugin, arhost_instance *instan
         return {};
     if (extension->struct_size < sizeof *extension || !extension->list)
         throw std::runtime_error("the extension " ARHOST_COUNTERS_EXTENSION " is too short, or its 'list' is NULL");
-    Listing listing;
+    CounterListing listing;
     extension->list(instance, add_counter, &listing);
     if (listing.is_invalid || !ipc::are_valid(listing.counters))
         throw std::runtime_error("contract violation: the counters of its extension " ARHOST_COUNTERS_EXTENSION
