@@ -119,6 +119,27 @@ inline void show_warnings(const Host &host, const std::vector<std::string> &warn
             host.warn(warning);
 }
 
+// Sets the controls of the options with these keys and values, and shows warnings. `lamps`: the control of
+// power_line_frequency.
+template <class Controls, class Handle, std::size_t count>
+void set_option_controls(const Host &host, const Controls &controls,
+                         const AutomaticControl<Handle> (&automatic)[count], const Handle &lamps,
+                         const std::vector<std::pair<std::string, std::string>> &values) {
+    const auto set = [&](const std::string &key, const std::string &text) -> std::vector<std::string> {
+        if (const auto *found = std::ranges::find(automatic, key, &AutomaticControl<Handle>::key);
+            found != std::end(automatic))
+            return set_automatic_control(controls, *found, text);
+        if (key == "controls")
+            return set_listed_controls(controls, text, key);
+        const auto *control = controls.find(lamps);
+        if (!control)
+            controls.fail_missing(key, key);
+        return {controls.set(*control, text, key)};
+    };
+    for (const auto &[key, text] : values)
+        show_warnings(host, set(key, text));
+}
+
 // Returns the keys and values of those of the options `keys` that `options` contains and that are not "".
 inline std::vector<std::pair<std::string, std::string>> given_options(const Options &options,
                                                                       const char *const *keys) {

@@ -245,24 +245,8 @@ private:
 
     void set_controls(const uvc::VideoFunction &function,
                       const std::vector<std::pair<std::string, std::string>> &values) const {
-        const uvc::Controls controls(*device_, function);
-        for (const auto &[key, text] : values)
-            arhost::show_warnings(host_, set_control(controls, key, text));
-    }
-
-    // Sets the controls of an option. Returns warnings.
-    static std::vector<std::string> set_control(const uvc::Controls &controls, const std::string &key,
-                                                const std::string &text) {
-        if (const auto *found =
-                std::ranges::find(automatic_controls, key, &arhost::AutomaticControl<std::string_view>::key);
-            found != std::end(automatic_controls))
-            return arhost::set_automatic_control(controls, *found, text);
-        if (key == "controls")
-            return arhost::set_listed_controls(controls, text, key);
-        const uvc::ControlDefinition *control = controls.find(key); // power_line_frequency
-        if (!control)
-            controls.fail_missing(key, key);
-        return {controls.set(*control, text, key)};
+        arhost::set_option_controls(host_, uvc::Controls(*device_, function), automatic_controls,
+                                    std::string_view("power_line_frequency"), values);
     }
 
     // Agrees with the camera on the mode and the nearest possible rate; fps 0: the camera's default.

@@ -187,23 +187,9 @@ private:
     }
 
     void set_controls(const std::vector<std::pair<std::string, std::string>> &values) const {
-        for (const auto &[key, text] : values)
-            arhost::show_warnings(host_, set_control(key, text));
-    }
-
-    // Sets the controls of an option. Returns warnings.
-    std::vector<std::string> set_control(const std::string &key, const std::string &text) const {
-        const arhost::Controls controls(*device_);
-        if (const auto *found =
-                std::ranges::find(automatic_controls, key, &arhost::AutomaticControl<std::uint32_t>::key);
-            found != std::end(automatic_controls))
-            return arhost::set_automatic_control(controls, *found, text);
-        if (key == "controls")
-            return arhost::set_listed_controls(controls, text, key);
-        const arhost::Control *lamps = controls.find(V4L2_CID_POWER_LINE_FREQUENCY);
-        if (!lamps)
-            controls.fail_missing(key, key);
-        return {controls.set(*lamps, text, key)};
+        if (!values.empty())
+            arhost::set_option_controls(host_, arhost::Controls(*device_), automatic_controls,
+                                        std::uint32_t{V4L2_CID_POWER_LINE_FREQUENCY}, values);
     }
 
     // Returns the formats that the camera offers and the option `format` permits, in the order of preference.
