@@ -5,11 +5,11 @@
 
 #include "run_config/session.hpp"
 
+#include <arhost-cpp/url.hpp>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <ctime>
-#include <string_view>
 
 namespace arhost::host {
 
@@ -38,24 +38,6 @@ constexpr std::uint64_t max_hashed_bytes = 32 << 20;
 
 Json plugin_json(const Component &component) {
     return {{"plugin", component.description().id}, {"version", component.description().version}};
-}
-
-// Removes names, passwords and queries from the URLs in a text.
-std::string without_credentials(const std::string &text) {
-    std::string kept;
-    for (std::size_t at = 0;;) {
-        const std::size_t scheme = text.find("://", at);
-        if (scheme == std::string::npos)
-            return kept + text.substr(at);
-        const std::size_t begin = scheme + 3, end = std::min(text.find_first_of(" \t\n'\"", begin), text.size());
-        kept.append(text, at, begin - at);
-        std::string_view url = std::string_view(text).substr(begin, end - begin);
-        // The last @, even in the path: a password may contain an unescaped slash.
-        if (const std::size_t user_end = url.rfind('@'); user_end != std::string_view::npos)
-            url.remove_prefix(user_end + 1);
-        kept.append(url.substr(0, url.find_first_of("?#")));
-        at = end;
-    }
 }
 
 std::string utc_now() {
@@ -128,7 +110,7 @@ std::string Pipeline::run_description(const std::string &id) const {
     // Any sink can read the description, and sessions are passed on: it contains neither the outputs, whose options
     // may be secret and which a replay does not use, nor names, passwords and queries of URLs.
     description["configuration"] =
-        without_credentials(latest_->node.to_yaml({"outputs", "snapshot", "record"})) + "\n";
+        without_url_credentials(latest_->node.to_yaml({"outputs", "snapshot", "record"}), "") + "\n";
     std::string text = description.dump(-1, ' ', false, Json::error_handler_t::replace);
     if (Json(text).dump(-1, ' ', false, Json::error_handler_t::replace).size() > messages::max_run_description)
         throw std::runtime_error("the configuration is too long to be recorded in a session: more than " +

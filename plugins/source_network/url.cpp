@@ -2,6 +2,7 @@
 #include "url.hpp"
 
 #include <arhost-cpp/plugin.hpp>
+#include <arhost-cpp/url.hpp>
 
 #include <algorithm>
 #include <array>
@@ -9,13 +10,6 @@
 #include <string_view>
 
 namespace arhost {
-
-namespace {
-
-// These characters end a URL in a text. RFC 3986 excludes them from URLs, except for the apostrophe.
-constexpr std::string_view delimiters = " \t\r\n\"'<>";
-
-} // namespace
 
 void check_url(const std::string &url) {
     constexpr std::size_t max_length = 2000; // far below the length of a line in LibavLog
@@ -29,8 +23,9 @@ void check_url(const std::string &url) {
         throw rejection("must begin with rtsp://, http:// or https:// (in lower case)");
     if (url.size() > max_length)
         throw rejection("is longer than " + std::to_string(max_length) + " characters");
-    const bool is_plain = std::ranges::all_of(
-        url, [](unsigned char c) { return std::isprint(c) && delimiters.find(char(c)) == std::string_view::npos; });
+    const bool is_plain = std::ranges::all_of(url, [](unsigned char c) {
+        return std::isprint(c) && url_delimiters.find(char(c)) == std::string_view::npos;
+    });
     if (!is_plain)
         throw rejection("contains a blank, quote, bracket, control or non-ASCII character; write it as %20, %27 …");
     if (url.find_first_of("/?#", scheme->size()) == scheme->size() || url.size() == scheme->size())
@@ -38,23 +33,7 @@ void check_url(const std::string &url) {
 }
 
 std::string without_credentials(const std::string &text) {
-    std::string shown;
-    for (std::size_t at = 0;;) {
-        const std::size_t scheme = text.find("://", at);
-        if (scheme == std::string::npos)
-            return shown + text.substr(at);
-        const std::size_t begin = scheme + 3, end = std::min(text.find_first_of(delimiters, begin), text.size());
-        shown.append(text, at, begin - at);
-        std::string_view url = std::string_view(text).substr(begin, end - begin);
-        // The last @, even in the path: a password may contain an unescaped slash.
-        if (const std::size_t user_end = url.rfind('@'); user_end != std::string_view::npos)
-            url.remove_prefix(user_end + 1);
-        const std::size_t query = url.find_first_of("?#");
-        shown.append(url.substr(0, query));
-        if (query != std::string_view::npos)
-            shown += "?…";
-        at = end;
-    }
+    return without_url_credentials(text, "?…");
 }
 
 } // namespace arhost
