@@ -69,24 +69,27 @@ std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
     return coordinates;
 }
 
+// Calls `function` for each component that a run can start.
+void for_each_component(auto &configuration, const auto &function) {
+    for (auto *one : {&configuration.snapshot, &configuration.record})
+        if (*one)
+            function(**one);
+    if (configuration.source)
+        function(*configuration.source);
+    if (configuration.tracker)
+        function(*configuration.tracker);
+    if (configuration.raytracer)
+        function(*configuration.raytracer);
+    std::ranges::for_each(configuration.trackers, function);
+    std::ranges::for_each(configuration.raytracers, function);
+    std::ranges::for_each(configuration.outputs, function);
+}
+
 void lift_deadlines(run_config::Configuration &configuration) {
-    const auto lift = [](run_config::ComponentConfiguration &component) {
+    for_each_component(configuration, [](run_config::ComponentConfiguration &component) {
         base::Limits &limits = component.limits;
         limits.start = limits.frame = limits.stop = limits.start_total = limits.stop_total = std::chrono::hours(1000);
-    };
-    const auto lift_all = [&](auto &components) { std::for_each(components.begin(), components.end(), lift); };
-    if (configuration.source)
-        lift(*configuration.source);
-    if (configuration.tracker)
-        lift(*configuration.tracker);
-    if (configuration.raytracer)
-        lift(*configuration.raytracer);
-    lift_all(configuration.trackers);
-    lift_all(configuration.raytracers);
-    lift_all(configuration.outputs);
-    for (auto *output : {&configuration.snapshot, &configuration.record})
-        if (*output)
-            lift(**output);
+    });
 }
 
 // Throws if an output would overwrite one of arhost's own programs, libraries and plugins.
@@ -106,7 +109,7 @@ void expect_watchable(const run_config::Configuration &configuration) {
     std::vector<fs::path> files{fs::absolute(configuration.node.file())};
     for (const run_config::Scene &scene : configuration.scenes)
         files.push_back(scene.file);
-    const auto expect_unwritable = [&](const run_config::ComponentConfiguration &component) {
+    for_each_component(configuration, [&](const run_config::ComponentConfiguration &component) {
         if (component.policy.mode == sandbox::Mode::none)
             return;
         for (const fs::path &folder : component.policy.writable)
@@ -118,18 +121,7 @@ void expect_watchable(const run_config::Configuration &configuration) {
                     component.node.fail("may write to the folder of '" + file.string() +
                                         "', so with '--watch' it could change what runs; let it write to another "
                                         "folder, or remove '--watch'");
-    };
-    const auto expect_all_unwritable = [&](const auto &components) {
-        std::for_each(components.begin(), components.end(), expect_unwritable);
-    };
-    if (configuration.source)
-        expect_unwritable(*configuration.source);
-    expect_all_unwritable(configuration.trackers);
-    expect_all_unwritable(configuration.raytracers);
-    expect_all_unwritable(configuration.outputs);
-    for (const auto *output : {&configuration.snapshot, &configuration.record})
-        if (*output)
-            expect_unwritable(**output);
+    });
 }
 
 run_config::Configuration parse_configuration(yaml::Node &root, const Arguments &arguments) {
@@ -173,7 +165,11 @@ std::string sink_for(const fs::path &file) {
     return "sink_video"; // sink_video itself rejects extensions that it does not support
 }
 
-void override_output(yaml::Node &root, const ReplayArguments &replay) {
+void override_outputs(yaml::Node &root, const ReplayArguments &replay) {
+    if (!replay.stats.empty())
+        root.override_text("stats", replay.stats, "--stats");
+    if (!replay.timeline.empty())
+        root.override_text("timeline", replay.timeline, "--timeline");
     if (replay.output.empty() || replay.output == "none")
         return root.override_value("outputs", "[]", "arhost replay");
     root.override_value("outputs", "[{plugin: " + sink_for(replay.output) + "}]", "--output");
@@ -273,11 +269,7 @@ run_config::Configuration session_configuration(const Arguments &arguments, cons
     override_plugin(root, "raytracer", replay.raytracer, "--raytracer");
     if (!replay.scene.empty())
         root.override_text("raytracer.scene", replay.scene, "--scene");
-    override_output(root, replay);
-    if (!replay.stats.empty())
-        root.override_text("stats", replay.stats, "--stats");
-    if (!replay.timeline.empty())
-        root.override_text("timeline", replay.timeline, "--timeline");
+    override_outputs(root, replay);
     run_config::Configuration configuration = parse_configuration(root, arguments);
     session.recording.repeats_decisions = rendering_of(root) == recorded;
     if (session.recording.repeats_decisions) {
@@ -328,13 +320,9 @@ run_config::Configuration replay_configuration(const Arguments &arguments, const
                             "{width: " + std::to_string(*replay.width) +
                                 ", height: " + std::to_string(*replay.height) + ", vertical_fov_degrees: 45}",
                             "--width, --height");
-    override_output(root, replay);
+    override_outputs(root, replay);
     if ((replay.output.empty() || replay.output == "none") && replay.with_pipeline)
         root.override_value("outputs", "[{plugin: sink_null}]", "arhost replay");
-    if (!replay.stats.empty())
-        root.override_text("stats", replay.stats, "--stats");
-    if (!replay.timeline.empty())
-        root.override_text("timeline", replay.timeline, "--timeline");
     run_config::Configuration configuration = parse_configuration(root, arguments);
     if (replay.width && configuration.trajectory->intrinsics)
         throw yaml::Error("--width, --height: " + replay.trajectory +
