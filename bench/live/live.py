@@ -24,6 +24,9 @@ import threading
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "bench"))
+from processes import children, name_of  # noqa: E402
+
 BUILD = ROOT / "build/release"
 OUT = ROOT / "build/live"
 QUICK = "--quick" in sys.argv
@@ -35,14 +38,6 @@ def check(what, value, target):
     print(f"  {what}: {value:.4g} (target {target:.4g})")
     if value > target:
         missed.append(what)
-
-
-def children(pid):
-    return [int(word) for word in pathlib.Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()]
-
-
-def name_of(pid):
-    return pathlib.Path(f"/proc/{pid}/comm").read_text(encoding="utf-8").strip()
 
 
 def resident_kib(pid):
