@@ -110,6 +110,14 @@ protected:
             found.push_back(Json::parse(line));
         return found;
     }
+    // Records the frames 0 to `count` - 1.
+    void record(const Frames &frames, std::uint64_t count,
+                const std::map<std::string, std::string> &options = {}) const {
+        Recorder sink(folder(), options);
+        ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK) << sink.log();
+        sink.write(0, count);
+        ASSERT_EQ(sink.stop(), ARHOST_STATUS_OK);
+    }
     // Expects that the session contains the frames 0 to `count` - 1 and the line that ends it.
     void expect_frames(std::uint64_t count, bool is_complete = true) const {
         std::vector<Json> all = lines();
@@ -157,19 +165,13 @@ TEST_F(Session, ConsistsOfDescriptionConfigurationLogAndVideo) {
 
 TEST_F(Session, Ffv1KeepsBgr) {
     const Frames frames(ARHOST_PIXEL_FORMAT_BGR8, 37, 23);
-    Recorder sink(folder());
-    ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK) << sink.log();
-    sink.write(0, 3);
-    ASSERT_EQ(sink.stop(), ARHOST_STATUS_OK);
+    ASSERT_NO_FATAL_FAILURE(record(frames, 3));
     expect_pixels(frames, 3, {37 * 3});
 }
 
 TEST_F(Session, Ffv1KeepsRgbAsBgr) {
     const Frames frames(ARHOST_PIXEL_FORMAT_RGB8, 32, 24);
-    Recorder sink(folder());
-    ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK) << sink.log();
-    sink.write(0, 1);
-    ASSERT_EQ(sink.stop(), ARHOST_STATUS_OK);
+    ASSERT_NO_FATAL_FAILURE(record(frames, 1));
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start({{"path", folder() / "video.mkv"}}), ARHOST_STATUS_OK) << source.log();
     const std::vector<std::uint8_t> rgb = frames.pixels(0, {32 * 3}), bgr = source.read(0).bytes;
@@ -183,20 +185,14 @@ TEST_F(Session, Ffv1KeepsRgbAsBgr) {
 
 TEST_F(Session, Ffv1KeepsGrey) {
     const Frames frames(ARHOST_PIXEL_FORMAT_GREY8, 37, 23);
-    Recorder sink(folder());
-    ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK) << sink.log();
-    sink.write(0, 2);
-    ASSERT_EQ(sink.stop(), ARHOST_STATUS_OK);
+    ASSERT_NO_FATAL_FAILURE(record(frames, 2));
     expect_pixels(frames, 2, {37});
 }
 
 TEST_F(Session, Ffv1KeepsYuyvOfBothRanges) {
     for (const arhost_yuv_range range : {ARHOST_YUV_RANGE_LIMITED, ARHOST_YUV_RANGE_FULL}) {
         const Frames frames(ARHOST_PIXEL_FORMAT_YUYV, 36, 23, range);
-        Recorder sink(folder(), {{"replace", "true"}});
-        ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK) << sink.log();
-        sink.write(0, 2);
-        ASSERT_EQ(sink.stop(), ARHOST_STATUS_OK);
+        ASSERT_NO_FATAL_FAILURE(record(frames, 2, {{"replace", "true"}}));
         expect_pixels(frames, 2, {72});
         SourceUnderTest source("source_file");
         ASSERT_EQ(source.start({{"path", folder() / "video.mkv"}}), ARHOST_STATUS_OK);
@@ -207,19 +203,13 @@ TEST_F(Session, Ffv1KeepsYuyvOfBothRanges) {
 
 TEST_F(Session, Ffv1KeepsI420) {
     const Frames frames(ARHOST_PIXEL_FORMAT_I420, 36, 22, ARHOST_YUV_RANGE_FULL);
-    Recorder sink(folder());
-    ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK) << sink.log();
-    sink.write(0, 2);
-    ASSERT_EQ(sink.stop(), ARHOST_STATUS_OK);
+    ASSERT_NO_FATAL_FAILURE(record(frames, 2));
     expect_pixels(frames, 2, {36, 18, 18});
 }
 
 TEST_F(Session, Ffv1KeepsTheSamplesOfNv12) {
     const Frames frames(ARHOST_PIXEL_FORMAT_NV12, 36, 22);
-    Recorder sink(folder());
-    ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK) << sink.log();
-    sink.write(0, 1);
-    ASSERT_EQ(sink.stop(), ARHOST_STATUS_OK);
+    ASSERT_NO_FATAL_FAILURE(record(frames, 1));
     SourceUnderTest source("source_file");
     ASSERT_EQ(source.start({{"path", folder() / "video.mkv"}}), ARHOST_STATUS_OK) << source.log();
     ASSERT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_I420);
@@ -238,10 +228,7 @@ TEST_F(Session, H264IsCloseToTheFrames) {
                                        {ARHOST_PIXEL_FORMAT_YUYV, {2 * 64}},
                                        {ARHOST_PIXEL_FORMAT_I420, {64, 32, 32}}}) {
         const Frames frames(pixels, 64, 48);
-        Recorder sink(folder(), {{"codec", "h264"}, {"crf", "1"}, {"replace", "true"}});
-        ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK) << sink.log();
-        sink.write(0, 3);
-        ASSERT_EQ(sink.stop(), ARHOST_STATUS_OK);
+        ASSERT_NO_FATAL_FAILURE(record(frames, 3, {{"codec", "h264"}, {"crf", "1"}, {"replace", "true"}}));
         SourceUnderTest source("source_file");
         ASSERT_EQ(source.start({{"path", folder() / "video.mkv"}}), ARHOST_STATUS_OK) << source.log();
         EXPECT_EQ(source.format().pixel_format, pixels);
@@ -294,10 +281,7 @@ TEST_F(Session, AnExistingFolderIsReplacedOnlyOnRequest) {
     EXPECT_THAT(refused.log(), HasSubstr("take' exists; choose another path, or replace the session in it with "
                                          "'replace: true'"));
     EXPECT_THAT(names_in(folder()), ElementsAre("notes.txt"));
-    Recorder sink(folder(), {{"replace", "true"}});
-    ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK) << sink.log();
-    sink.write(0, 5);
-    ASSERT_EQ(sink.stop(), ARHOST_STATUS_OK);
+    ASSERT_NO_FATAL_FAILURE(record(frames, 5, {{"replace", "true"}}));
     Recorder again(folder(), {{"replace", "true"}});
     ASSERT_EQ(again.start(frames), ARHOST_STATUS_OK) << again.log();
     again.write(0, 2);
@@ -315,10 +299,7 @@ TEST_F(Session, ASinkKilledBeforeItsFirstAnswerStartsAgain) {
     }
     Recorder other(folder());
     EXPECT_EQ(other.start(frames, 0, R"({"id": "another run"})"), ARHOST_STATUS_ERROR_CONFIGURATION);
-    Recorder sink(folder());
-    ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK) << sink.log();
-    sink.write(0, 2);
-    ASSERT_EQ(sink.stop(), ARHOST_STATUS_OK);
+    ASSERT_NO_FATAL_FAILURE(record(frames, 2));
     expect_frames(2);
 }
 
