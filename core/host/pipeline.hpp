@@ -90,8 +90,8 @@ private:
     void load_scene();
     std::unique_ptr<SceneLoading> load(const run_config::Scene &scene,
                                        const run_config::RaytracerConfiguration &raytracer,
-                                       std::function<void(std::shared_ptr<LoadedScene>)> on_loaded,
-                                       std::function<void(const std::string &reason)> on_failed);
+                                       const std::function<void(std::shared_ptr<LoadedScene>)> &on_loaded,
+                                       const std::function<void(const std::string &reason)> &on_failed);
     supervise::Component::Callbacks common_callbacks(const std::string &name, const yaml::Node &node);
 
     void on_request(SinkQueue &sink, const ipc::messages::Request &request);
@@ -108,7 +108,8 @@ private:
     void start_next_tracker(TrackerPointer configuration, const control::Done &done);
     void start_next_raytracer(RaytracerPointer configuration, std::shared_ptr<LoadedScene> scene,
                               const control::Done &done);
-    void load_next_scene(const run_config::Scene &scene, RaytracerPointer raytracer, const control::Done &done);
+    void load_next_scene(const run_config::Scene &scene, const RaytracerPointer &raytracer,
+                         const control::Done &done);
     void watch_files(const FileWatch::Files &files);
     void apply_edits();
     void apply(const run_config::Configuration &edited, const run_config::Configuration &previous,

@@ -145,8 +145,8 @@ void Pipeline::load_scene() {
 // Starts to load a scene. Calls one of the two functions, which may destroy the returned object.
 std::unique_ptr<SceneLoading> Pipeline::load(const run_config::Scene &scene,
                                              const run_config::RaytracerConfiguration &raytracer,
-                                             std::function<void(std::shared_ptr<LoadedScene>)> on_loaded,
-                                             std::function<void(const std::string &reason)> on_failed) {
+                                             const std::function<void(std::shared_ptr<LoadedScene>)> &on_loaded,
+                                             const std::function<void(const std::string &reason)> &on_failed) {
     auto loaded = std::make_shared<LoadedScene>();
     loaded->source = scene;
     SceneLoading::Callbacks callbacks;

@@ -81,7 +81,7 @@ void Pipeline::execute(const control::LoadScene &command, const control::Done &d
     load_next_scene(chosen, raytracer_->configuration, done);
 }
 
-void Pipeline::load_next_scene(const run_config::Scene &scene, RaytracerPointer raytracer,
+void Pipeline::load_next_scene(const run_config::Scene &scene, const RaytracerPointer &raytracer,
                                const control::Done &done) {
     next_scene_loading_ = load(
         scene, *raytracer,

@@ -108,6 +108,7 @@ std::vector<std::string> set_listed_controls(const Controls &controls, std::stri
         accepted_value(controls, *control, *setting.value, key);
     }
     std::vector<std::string> warnings;
+    warnings.reserve(settings.size());
     for (const ControlSetting &setting : settings)
         warnings.push_back(controls.set(*controls.find(std::string_view(setting.name)), *setting.value, key));
     return warnings;

@@ -60,7 +60,7 @@ std::int64_t decode(const ControlDefinition &control, Bytes data) {
     std::uint64_t value = 0;
     for (std::size_t i = 0; i < control.width; ++i)
         value |= std::uint64_t{data[control.offset + i]} << (8 * i);
-    const unsigned unused_bits = 64 - 8u * control.width;
+    const unsigned unused_bits = 64 - 8u * std::clamp<unsigned>(control.width, 1, 8);
     return control.is_signed ? static_cast<std::int64_t>(value << unused_bits) >> unused_bits
                              : static_cast<std::int64_t>(value);
 }
