@@ -98,14 +98,3 @@ TEST(NetworkRun, ContinuesWhenTheCameraComesBack) {
     EXPECT_EQ(run.stats()["restarts"]["source"], 0);
     EXPECT_EQ(run.stats()["counters"]["source"]["lost_connections"], 1);
 }
-
-TEST(NetworkRun, PassesTheConformanceSuite) {
-    ARHOST_REQUIRE_FFMPEG();
-    const Media media;
-    const CameraServer server("http", media);
-    ArhostRun run;
-    run.start({"conform", ARHOST_PLUGIN_DIRECTORY "/source_network.so", "--allow", "network", "--jobs", "4",
-               "--timeout-factor", "3", "--set", "url=" + server.url("mjpeg")});
-    EXPECT_EQ(run.wait(std::chrono::minutes(3)), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("pass     source.start"));
-}
