@@ -56,6 +56,7 @@ arhost_frame_format video_format(const Size &size) {
     format.width = size.width;
     format.height = size.height;
     format.fps = fps;
+    format.has_depth = 1;
     arhost_frame_layout(&format);
     return format;
 }
@@ -94,8 +95,9 @@ SealedOutput::SealedOutput(const Content &content)
     };
     fill(video_, video_format_.byte_size);
     fill(overlay_, std::size_t{ipc::overlay_stride(size.width)} * size.height);
-    output_ = {sizeof output_, stride_, size.width, size.height, bgr, &r, {}, nullptr, 0, 0};
+    output_ = {sizeof output_, stride_, size.width, size.height, bgr, &r, {}, nullptr, nullptr, 0, 0};
     output_.video[0] = reinterpret_cast<const std::uint8_t *>(video_.data());
+    output_.depth_mm = reinterpret_cast<const std::uint16_t *>(video_.data() + video_format_.depth_offset);
     output_.overlay_rgba = reinterpret_cast<const std::uint8_t *>(overlay_.data());
     output_.overlay_stride = ipc::overlay_stride(size.width);
     for (GuardedMemory *memory : {&record_, &pixels_, &video_, &overlay_})
@@ -161,9 +163,13 @@ void SinkRun::start(std::uint64_t first_sequence, const Size &size) {
 
 arhost_status SinkRun::try_write(const SealedOutput &frame) {
     arhost_output output = frame.output();
-    const std::uint32_t capabilities = library_.plugin().descriptor->capabilities;
-    if (!(capabilities & ARHOST_CAPABILITY_VIDEO_INPUT))
+    const std::uint32_t capabilities =
+        library_.plugin().descriptor->capabilities &
+        (functions_.capabilities ? functions_.capabilities(instance_->get()) : ~std::uint32_t{0});
+    if (!(capabilities & ARHOST_CAPABILITY_VIDEO_INPUT)) {
         std::fill(std::begin(output.video), std::end(output.video), nullptr);
+        output.depth_mm = nullptr;
+    }
     if (!(capabilities & ARHOST_CAPABILITY_OVERLAY_INPUT)) {
         output.overlay_rgba = nullptr;
         output.overlay_stride = 0;

@@ -11,6 +11,8 @@ namespace arhost::conformance {
 using ipc::Call;
 
 PlaneShape shape_of(const arhost_frame_format &format, std::uint32_t plane) {
+    if (plane == format.plane_count)
+        return {2 * format.width, format.has_depth ? format.height : 0};
     switch (format.pixel_format) {
     case ARHOST_PIXEL_FORMAT_RGB8:
     case ARHOST_PIXEL_FORMAT_BGR8:
@@ -33,7 +35,8 @@ std::string place_of(const arhost_frame_format &format, std::size_t index) {
         index -= std::size_t{shape.row_bytes} * shape.rows;
         shape = shape_of(format, ++plane);
     }
-    return fmt::format("plane {}, row {}, byte {}", plane, index / shape.row_bytes, index % shape.row_bytes);
+    const std::string name = plane == format.plane_count ? "the depth plane" : fmt::format("plane {}", plane);
+    return fmt::format("{}, row {}, byte {}", name, index / shape.row_bytes, index % shape.row_bytes);
 }
 
 Slot::Slot(std::size_t size) : size_(size), lines_((2 * guard_size + size + sizeof(Line) - 1) / sizeof(Line)) {
@@ -96,7 +99,8 @@ std::string SourceRun::problem() const {
                 "plane {} begins at byte {} and has a stride of {}; arhost_frame_layout gives {} and {}", plane,
                 f.offset[plane], f.stride[plane], expected.offset[plane], expected.stride[plane]);
     if (f.plane_count != expected.plane_count || f.byte_size != expected.byte_size ||
-        f.grey_offset != expected.grey_offset || f.grey_stride != expected.grey_stride)
+        f.grey_offset != expected.grey_offset || f.grey_stride != expected.grey_stride ||
+        f.depth_offset != expected.depth_offset || f.depth_stride != expected.depth_stride)
         return fmt::format("its slots have {} planes and {} bytes; arhost_frame_layout gives {} and {}",
                            f.plane_count, f.byte_size, expected.plane_count, expected.byte_size);
     const bool is_yuv = f.pixel_format >= ARHOST_PIXEL_FORMAT_YUYV;
@@ -123,6 +127,8 @@ arhost_status SourceRun::try_read(bool filled) {
     for (std::uint32_t plane = 0; plane < format().plane_count; ++plane)
         buffer.plane[plane] = slot_->data() + format().offset[plane];
     buffer.grey = slot_->data() + format().grey_offset;
+    if (format().has_depth)
+        buffer.depth_mm = reinterpret_cast<std::uint16_t *>(slot_->data() + format().depth_offset);
     buffer.sequence = next_;
     info_ = {};
     info_.struct_size = sizeof info_;
@@ -153,13 +159,13 @@ std::vector<Frame> SourceRun::read_up_to(std::size_t count) {
 
 Frame SourceRun::frame() const {
     Frame frame{{}, info_};
-    for (std::uint32_t plane = 0; plane < format().plane_count; ++plane) {
+    for (std::uint32_t plane = 0; plane <= format().plane_count; ++plane) {
         const PlaneShape shape = shape_of(format(), plane);
-        for (std::uint32_t y = 0; y < shape.rows; ++y) {
-            const std::uint8_t *row =
-                slot_->data() + format().offset[plane] + std::size_t{format().stride[plane]} * y;
+        const bool is_depth = plane == format().plane_count;
+        const std::uint8_t *row = slot_->data() + (is_depth ? format().depth_offset : format().offset[plane]);
+        const std::size_t stride = is_depth ? format().depth_stride : format().stride[plane];
+        for (std::uint32_t y = 0; y < shape.rows; ++y, row += stride)
             frame.pixels.insert(frame.pixels.end(), row, row + shape.row_bytes);
-        }
     }
     return frame;
 }

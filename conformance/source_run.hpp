@@ -12,13 +12,13 @@
 
 namespace arhost::conformance {
 
-// The rows of a plane.
+// The rows of a plane; those of the depth plane if `plane` is format.plane_count (none without depth).
 struct PlaneShape {
     std::uint32_t row_bytes, rows;
 };
 PlaneShape shape_of(const arhost_frame_format &format, std::uint32_t plane);
 
-// A frame's pixels without padding, plane by plane and row by row, and its info.
+// A frame's pixels without padding, plane by plane and row by row, the depth plane last, and its info.
 struct Frame {
     std::vector<std::uint8_t> pixels;
     arhost_frame_info info;

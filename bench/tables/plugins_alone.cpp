@@ -59,7 +59,7 @@ double source_alone(const std::string &picture, int frames) {
     require(source.start(plugin.instance(), &setup, &properties), plugin);
     const GuardedBuffer slot(properties.format.byte_size);
     const double ms = cpu_ms_of(frames, [&](int) {
-        arhost_frame_buffer buffer{sizeof buffer, 0, &properties.format, {}, nullptr, 0};
+        arhost_frame_buffer buffer{sizeof buffer, 0, &properties.format, {}, nullptr, nullptr, 0};
         for (std::uint32_t plane = 0; plane < properties.format.plane_count; ++plane)
             buffer.plane[plane] = slot.data() + properties.format.offset[plane];
         buffer.grey = slot.data() + properties.format.grey_offset;

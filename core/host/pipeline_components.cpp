@@ -68,7 +68,7 @@ void Pipeline::make_source() {
             throw ProtocolViolation("the source's 'ready' lacks the frame format");
         const arhost_frame_format &format = *ready.format;
         if (format_ && (format.pixel_format != format_->pixel_format || format.width != format_->width ||
-                        format.height != format_->height))
+                        format.height != format_->height || format.has_depth != format_->has_depth))
             throw std::runtime_error("the frame format differs after the restart");
         format_ = format;
         frame_count_ = ready.frame_count;
@@ -291,14 +291,18 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
             else if (option.key == "path" && !sink->path.empty())
                 option.text = sink->path;
         has_window_ |= std::ranges::count(plugin.needs, "display") > 0;
-        // Frames that were composited before the host knew the plugin lack its inputs.
-        if ((plugin.capabilities & ARHOST_CAPABILITY_VIDEO_INPUT && !video_input_) ||
-            (plugin.capabilities & ARHOST_CAPABILITY_OVERLAY_INPUT && !overlay_input_))
-            sink->clear();
-        video_input_ |= (plugin.capabilities & ARHOST_CAPABILITY_VIDEO_INPUT) != 0;
-        overlay_input_ |= (plugin.capabilities & ARHOST_CAPABILITY_OVERLAY_INPUT) != 0;
         std::vector<int> sockets = open_sockets(output, options);
         return Component::Create{{std::move(options), setup}, std::move(sockets)};
+    };
+    callbacks.ready = [this, sink](const messages::Ready &ready) {
+        const bool reads_video = (ready.capabilities & ARHOST_CAPABILITY_VIDEO_INPUT) != 0;
+        const bool reads_overlay = (ready.capabilities & ARHOST_CAPABILITY_OVERLAY_INPUT) != 0;
+        // Frames that were composited before the host knew the sink lack its inputs.
+        if ((reads_video && !video_input_) || (reads_overlay && !overlay_input_))
+            sink->clear();
+        video_input_ |= reads_video;
+        overlay_input_ |= reads_overlay;
+        return SlotLayout{};
     };
     callbacks.result = [this, sink, name](const Command &command, const Result &result) {
         sink->on_result(command, result);

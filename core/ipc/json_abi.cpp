@@ -163,7 +163,8 @@ arhost_intrinsics intrinsics_from_json(const Json &json) {
 
 Json to_json(const arhost_frame_format &f) {
     return {{"pixel_format", f.pixel_format}, {"width", f.width},         {"height", f.height},
-            {"yuv_matrix", f.yuv_matrix},     {"yuv_range", f.yuv_range}, {"fps", f.fps}};
+            {"yuv_matrix", f.yuv_matrix},     {"yuv_range", f.yuv_range}, {"fps", f.fps},
+            {"has_depth", f.has_depth != 0}};
 }
 
 arhost_frame_format format_from_json(const Json &json) {
@@ -175,6 +176,7 @@ arhost_frame_format format_from_json(const Json &json) {
     f.yuv_matrix = json.at("yuv_matrix").get<arhost_yuv_matrix>();
     f.yuv_range = json.at("yuv_range").get<arhost_yuv_range>();
     f.fps = finite(json, "fps");
+    f.has_depth = json.at("has_depth").get<bool>();
     const bool yuv = f.pixel_format >= ARHOST_PIXEL_FORMAT_YUYV;
     if (f.fps < 0 || f.fps > 100'000 ||
         (yuv && (f.yuv_matrix < ARHOST_YUV_MATRIX_BT601 || f.yuv_matrix > ARHOST_YUV_MATRIX_BT709 ||

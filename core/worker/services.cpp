@@ -18,6 +18,10 @@ std::uint8_t *as_pixels(std::span<std::byte> bytes) {
     return reinterpret_cast<std::uint8_t *>(bytes.data());
 }
 
+std::uint16_t *as_depth(std::span<std::byte> bytes) {
+    return reinterpret_cast<std::uint16_t *>(bytes.data());
+}
+
 void require(bool condition, const char *what) {
     if (!condition)
         throw ProtocolViolation(what);
@@ -71,6 +75,7 @@ public:
         for (std::uint32_t i = 0; i < format_.plane_count; ++i)
             buffer.plane[i] = as_pixels(slot) + format_.offset[i];
         buffer.grey = as_pixels(slot) + format_.grey_offset;
+        buffer.depth_mm = format_.has_depth ? as_depth(slot.subspan(format_.depth_offset)) : nullptr;
         buffer.sequence = next_;
         result.frame.struct_size = sizeof result.frame;
         const arhost_status status = source_.read(instance_, &buffer, &result.frame);
@@ -121,6 +126,7 @@ public:
         for (std::uint32_t i = 0; i < format_.plane_count; ++i)
             frame.plane[i] = as_pixels(input) + format_.offset[i];
         frame.grey = as_pixels(input) + format_.grey_offset;
+        frame.depth_mm = format_.has_depth ? as_depth(input.subspan(format_.depth_offset)) : nullptr;
         frame.sequence = command.sequence;
         frame.capture_ns = command.capture_ns;
         auto &result = *reinterpret_cast<arhost_tracker_result *>(output.data());
@@ -227,8 +233,12 @@ public:
         : sink_(*static_cast<const arhost_sink *>(plugin.functions)), instance_(instance),
           capabilities_(plugin.descriptor->capabilities) {}
 
-    arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &, messages::Ready &) override {
+    arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &,
+                        messages::Ready &ready) override {
         const auto &message = setup_of_kind<messages::SinkSetup>(any);
+        if (sink_.capabilities)
+            capabilities_ &= sink_.capabilities(instance_);
+        ready.capabilities = capabilities_;
         arhost_sink_setup setup{};
         setup.struct_size = sizeof setup;
         setup.width = message.video_format.width;
@@ -252,9 +262,13 @@ public:
         output.width = video_format_.width;
         output.height = video_format_.height;
         output.bgr = as_pixels(input) + OutputSlot::image_offset;
-        if (capabilities_ & ARHOST_CAPABILITY_VIDEO_INPUT)
+        if (capabilities_ & ARHOST_CAPABILITY_VIDEO_INPUT) {
+            const std::span<std::byte> video = input.subspan(slot.video_offset);
             for (std::uint32_t i = 0; i < video_format_.plane_count; ++i)
-                output.video[i] = as_pixels(input) + slot.video_offset + video_format_.offset[i];
+                output.video[i] = as_pixels(video) + video_format_.offset[i];
+            if (video_format_.has_depth)
+                output.depth_mm = as_depth(video.subspan(video_format_.depth_offset));
+        }
         if (capabilities_ & ARHOST_CAPABILITY_OVERLAY_INPUT) {
             output.overlay_rgba = as_pixels(input) + slot.overlay_offset;
             output.overlay_stride = overlay_stride(video_format_.width);

@@ -110,7 +110,7 @@ CLOCK_MONOTONIC = 1
 CLOCK_MEDIA = 2
 MAX_PLANES = 3
 MAX_IMAGE_SIDE = 16384
-FRAME_FORMAT = _struct(96,
+FRAME_FORMAT = _struct(112,
     ("struct_size", "u4", 0),
     ("pixel_format", "i4", 4),
     ("width", "u4", 8),
@@ -118,12 +118,15 @@ FRAME_FORMAT = _struct(96,
     ("yuv_matrix", "i4", 16),
     ("yuv_range", "i4", 20),
     ("fps", "f8", 24),
-    ("plane_count", "u4", 32),
-    ("stride", ("u4", (3,)), 36),
-    ("offset", ("u8", (3,)), 48),
-    ("grey_stride", "u4", 72),
-    ("grey_offset", "u8", 80),
-    ("byte_size", "u8", 88))
+    ("has_depth", "i4", 32),
+    ("plane_count", "u4", 36),
+    ("stride", ("u4", (3,)), 40),
+    ("offset", ("u8", (3,)), 56),
+    ("grey_stride", "u4", 80),
+    ("depth_stride", "u4", 84),
+    ("grey_offset", "u8", 88),
+    ("depth_offset", "u8", 96),
+    ("byte_size", "u8", 104))
 
 # arhost/camera.h
 DISTORTION_NONE = 1
@@ -151,12 +154,12 @@ CAMERA = _struct(232,
     ("intrinsics", INTRINSICS, 80))
 
 # arhost/source.h
-SOURCE_PROPERTIES = _struct(264,
+SOURCE_PROPERTIES = _struct(280,
     ("struct_size", "u4", 0),
     ("has_intrinsics", "i4", 4),
     ("format", FRAME_FORMAT, 8),
-    ("intrinsics", INTRINSICS, 104),
-    ("frame_count", "u8", 256))
+    ("intrinsics", INTRINSICS, 120),
+    ("frame_count", "u8", 272))
 FRAME_INFO = _struct(160,
     ("struct_size", "u4", 0),
     ("clock", "i4", 4),

@@ -46,6 +46,9 @@ public:
 
     void start(const arhost_sink_setup &setup) {
         settings_.format = *setup.video_format;
+        if (setup.video_format->has_depth && setup.first_sequence == 0)
+            host_.warn("a session does not contain the depth of the frames; record it with "
+                       "{plugin: sink_images, path: depth_%05d.png, options: {content: depth}}");
         settings_.fps = setup.fps;
         video_.emplace(folder_ / video_file, settings_);
         description_ = setup.run_description ? Json::parse(setup.run_description) : Json::object();

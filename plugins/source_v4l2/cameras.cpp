@@ -29,6 +29,8 @@ std::string serial_of(const std::string &node) {
 std::string option_for(std::uint32_t fourcc) {
     if (fourcc == V4L2_PIX_FMT_MJPEG || fourcc == V4L2_PIX_FMT_JPEG)
         return "mjpeg";
+    if (fourcc == V4L2_PIX_FMT_Z16)
+        return "z16"; // for the option `depth_device`
     const RawFormat *format = find_raw_format(fourcc);
     return format ? std::string(format->name) : "";
 }

@@ -32,12 +32,12 @@ std::string existing_devices() {
     return list;
 }
 
-std::string other_devices() {
+std::string other_devices(const std::string &option) {
     const std::string existing = existing_devices();
     if (existing.empty())
         return "no /dev/video* exists; connect a camera, or use 'source_synthetic' or "
                "'source_file' instead";
-    return "available: " + existing + "; set 'device' to one of them (list them with 'arhost devices')";
+    return "available: " + existing + "; set '" + option + "' to one of them (list them with 'arhost devices')";
 }
 
 double rate(const v4l2_fract &interval) {
@@ -171,13 +171,14 @@ std::string card_of(const std::string &node) {
     return card;
 }
 
-CaptureDevice::CaptureDevice(const std::string &path)
-    : path_(path), fd_(open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)) {
+CaptureDevice::CaptureDevice(const std::string &path, const std::string &option)
+    : path_(path), option_(option), fd_(open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC)) {
     if (fd_.get() < 0) {
         const int error = errno;
-        const std::string start = "device: '" + path + "' ";
+        const std::string start = option + ": '" + path + "' ";
         if (error == ENOENT || error == ENODEV || error == ENXIO || error == ENOTDIR)
-            throw CannotOpen(ARHOST_STATUS_ERROR_CONFIGURATION, start + "does not exist; " + other_devices(), error);
+            throw CannotOpen(ARHOST_STATUS_ERROR_CONFIGURATION, start + "does not exist; " + other_devices(option),
+                             error);
         if (error == EACCES || error == EPERM)
             throw CannotOpen(ARHOST_STATUS_ERROR_CONFIGURATION,
                              start + "cannot be opened by this user: cameras belong to the group 'video' ('sudo "
@@ -185,7 +186,7 @@ CaptureDevice::CaptureDevice(const std::string &path)
                              error);
         if (error == EISDIR)
             throw CannotOpen(ARHOST_STATUS_ERROR_CONFIGURATION,
-                             start + "is a folder, not a camera; " + other_devices(), error);
+                             start + "is a folder, not a camera; " + other_devices(option), error);
         const Failure failure = failure_of("opening it", error);
         throw CannotOpen(failure.status(), failure.what(), error);
     }
@@ -194,7 +195,7 @@ CaptureDevice::CaptureDevice(const std::string &path)
         fail("querying its capabilities", error);
     else if (error != 0)
         throw NotACamera(ARHOST_STATUS_ERROR_CONFIGURATION,
-                         "device: '" + path + "' is not a video device; " + other_devices());
+                         option + ": '" + path + "' is not a video device; " + other_devices(option));
     card_ = reinterpret_cast<const char *>(capability.card);
     const std::uint32_t able =
         capability.capabilities & V4L2_CAP_DEVICE_CAPS ? capability.device_caps : capability.capabilities;
@@ -202,11 +203,11 @@ CaptureDevice::CaptureDevice(const std::string &path)
         buffer_type_ = V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE;
     if (!(able & (V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_VIDEO_CAPTURE_MPLANE)) || !(able & V4L2_CAP_STREAMING))
         throw NotACamera(ARHOST_STATUS_ERROR_CONFIGURATION,
-                         "device: '" + path + "' (" + card_ + ") does not capture pictures" +
+                         option + ": '" + path + "' (" + card_ + ") does not capture pictures" +
                              (able & V4L2_CAP_META_CAPTURE ? " (it delivers metadata; the camera itself is "
                                                              "usually the node with the next lower number)"
                                                            : "") +
-                             "; " + other_devices());
+                             "; " + other_devices(option));
     formats_ = list_formats(fd_.get(), buffer_type_);
 }
 
@@ -224,7 +225,8 @@ Failure CaptureDevice::failure_of(const std::string &what, int error) const {
         return Failure(ARHOST_STATUS_ERROR_DEVICE_LOST, start + "has disappeared; was it unplugged?");
     if (error == EBUSY)
         return Failure(ARHOST_STATUS_ERROR_IO, start + "is in use by another program ('fuser " + path_ +
-                                                   "' shows which); close it, or set 'device' to another camera");
+                                                   "' shows which); close it, or set '" + option_ +
+                                                   "' to another camera");
     if (error == ENOSPC)
         return Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                        start + "gets too little bandwidth on its USB bus; choose a smaller size, 'format: mjpeg', or "

@@ -62,8 +62,9 @@ struct NotACamera : Failure {
 
 class CaptureDevice {
 public:
-    // Opens the device and checks that it captures video; throws CannotOpen or NotACamera.
-    explicit CaptureDevice(const std::string &path);
+    // Opens the device and checks that it captures video; throws CannotOpen or NotACamera. `option`: the option that
+    // names the device, for messages.
+    explicit CaptureDevice(const std::string &path, const std::string &option = "device");
 
     const std::string &path() const { return path_; }
     const std::string &card() const { return card_; } // name of the camera
@@ -90,7 +91,7 @@ public:
 private:
     v4l2_format query_format() const;
 
-    std::string path_, card_;
+    std::string path_, option_, card_;
     v4l2_buf_type buffer_type_ = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     FileDescriptor fd_;
     std::vector<CaptureFormat> formats_;

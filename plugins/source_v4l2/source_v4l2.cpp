@@ -2,7 +2,9 @@
 //
 // source_v4l2: captures frames from Video4Linux devices (USB and built-in cameras, capture cards).
 #include "cameras.hpp"
+#include "capture_clock.hpp"
 #include "controls.hpp"
+#include "depth_camera.hpp"
 #include "device.hpp"
 #include "pixels.hpp"
 
@@ -16,9 +18,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <iterator>
 #include <optional>
 #include <string>
@@ -56,18 +56,13 @@ constexpr arhost::AutomaticControl<std::uint32_t> automatic_controls[] = {
     {"white_balance", V4L2_CID_WHITE_BALANCE_TEMPERATURE, V4L2_CID_AUTO_WHITE_BALANCE},
 };
 
-std::int64_t clock_ns(clockid_t clock) {
-    timespec time{};
-    clock_gettime(clock, &time);
-    return time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec;
-}
-
 // Frames that were not delivered, by cause.
 struct Losses {
     std::uint64_t driver = 0;     // missing in the driver's sequence numbers
     std::uint64_t marked = 0;     // marked as damaged by the driver
     std::uint64_t damaged = 0;    // truncated, or impossible to decode
     std::uint64_t superseded = 0; // replaced by a newer frame in live mode
+    std::uint64_t depth = 0;      // delivered, but without depth
 };
 
 class V4l2Source {
@@ -82,7 +77,8 @@ public:
           path_(options.text("device")), configured_size_{static_cast<std::uint32_t>(options.integer("width")),
                                                           static_cast<std::uint32_t>(options.integer("height"))},
           format_option_(options.text("format")), control_values_(arhost::given_options(options, changeable)),
-          buffer_count_(static_cast<std::uint32_t>(options.integer("buffers"))) {
+          buffer_count_(static_cast<std::uint32_t>(options.integer("buffers"))),
+          depth_path_(options.text("depth_device")), depth_unit_mm_(options.real("depth_unit_mm")), clock_(host) {
         if ((configured_size_.width == 0) != (configured_size_.height == 0))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: set both or neither");
     }
@@ -102,10 +98,13 @@ public:
             if (!good) {
                 ++dropped_;
                 ++losses_.damaged;
+                host_.progress(-1, "waiting for an intact picture");
                 continue;
             }
             info.clock = ARHOST_CLOCK_MONOTONIC;
-            info.capture_ns = last_ns_ = std::max(last_ns_, capture_ns(*captured));
+            info.capture_ns = last_ns_ = std::max(last_ns_, clock_.monotonic_ns(*captured));
+            if (depth_ && !depth_->read(info.capture_ns, buffer))
+                ++losses_.depth;
             info.skipped = skipped_before(captured->sequence);
             return ARHOST_STATUS_OK;
         }
@@ -114,13 +113,17 @@ public:
     void set(const arhost::Options &changed) { set_controls(arhost::given_options(changed, changeable)); }
 
     std::vector<arhost::CounterValue> counters() const {
-        return {{"lost_by_driver", losses_.driver},
-                {"marked_damaged", losses_.marked},
-                {"undecodable", losses_.damaged},
-                {"superseded", losses_.superseded}};
+        std::vector<arhost::CounterValue> values = {{"lost_by_driver", losses_.driver},
+                                                    {"marked_damaged", losses_.marked},
+                                                    {"undecodable", losses_.damaged},
+                                                    {"superseded", losses_.superseded}};
+        if (depth_)
+            values.push_back({"without_depth", losses_.depth});
+        return values;
     }
 
     void stop() {
+        depth_.reset();
         stream_.reset();
         device_.reset();
     }
@@ -153,6 +156,9 @@ private:
                                                           Size{format.width, format.height}.text());
         }
         format.fps = fps > 0 ? fps : setup.fps;
+        if (!depth_path_.empty())
+            depth_.emplace(host_, depth_path_, size, format.fps, depth_unit_mm_);
+        format.has_depth = depth_.has_value();
         if (!arhost_frame_layout(&format))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "the camera '" + path_ + "' delivers " + mode + ", which is unsupported");
@@ -259,22 +265,8 @@ private:
             if (host_.cancelled())
                 return std::nullopt;
             std::optional<Capture> found;
-            while (auto captured = stream_->dequeue()) {
-                if (captured->flags & V4L2_BUF_FLAG_ERROR) {
-                    stream_->queue(captured->index);
-                    ++dropped_;
-                    ++losses_.marked;
-                    continue;
-                }
-                if (found) {
-                    stream_->queue(found->index);
-                    ++dropped_;
-                    ++losses_.superseded;
-                }
-                found = std::move(captured);
-                if (!newest_only_)
-                    break;
-            }
+            if (stream_->wait(poll_slice_ms))
+                found = dequeue_intact();
             if (found)
                 return found;
             host_.progress(-1, "waiting for a picture"); // the plugin reports a silent camera itself
@@ -283,32 +275,34 @@ private:
                               "the camera '" + path_ + "' (" + device_->card() +
                                   ") has delivered no intact picture for " + std::to_string(silence_limit.count()) +
                                   " s" + (fault_.empty() ? "" : "; the last picture was rejected: " + fault_));
-            stream_->wait(poll_slice_ms);
         }
+    }
+
+    std::optional<Capture> dequeue_intact() {
+        std::optional<Capture> found;
+        while (auto captured = stream_->dequeue()) {
+            if (captured->flags & V4L2_BUF_FLAG_ERROR) {
+                stream_->queue(captured->index);
+                ++dropped_;
+                ++losses_.marked;
+                continue;
+            }
+            if (found) {
+                stream_->queue(found->index);
+                ++dropped_;
+                ++losses_.superseded;
+            }
+            found = std::move(captured);
+            if (!newest_only_)
+                break;
+        }
+        return found;
     }
 
     bool copy(const std::vector<std::span<const std::uint8_t>> &planes, const arhost_frame_buffer &buffer) {
         return arhost::find_raw_format(camera_.fourcc)
                    ? arhost::copy_picture(camera_, planes, buffer, fault_)
                    : jpeg_.decode(planes.front(), *buffer.format, buffer.plane, fault_);
-    }
-
-    std::int64_t capture_ns(const Capture &captured) {
-        const std::int64_t stamp_ns =
-            captured.time.tv_sec * std::int64_t{1'000'000'000} + captured.time.tv_usec * std::int64_t{1'000};
-        const std::int64_t now_ns = clock_ns(CLOCK_MONOTONIC);
-        const auto is_recent = [](std::int64_t age_ns) { return std::abs(age_ns) < 10'000'000'000; };
-        if ((captured.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC &&
-            is_recent(now_ns - stamp_ns))
-            return std::min(stamp_ns, now_ns);
-        // Old drivers use the wall clock or do not say which clock they use.
-        const std::int64_t age_ns = clock_ns(CLOCK_REALTIME) - stamp_ns;
-        if (!clock_reported_)
-            host_.warn("the camera driver does not use CLOCK_MONOTONIC; " +
-                       std::string(is_recent(age_ns) ? "its wall-clock time stamps are converted"
-                                                     : "arrival times are used instead"));
-        clock_reported_ = true;
-        return is_recent(age_ns) ? now_ns - std::max<std::int64_t>(age_ns, 0) : now_ns;
     }
 
     // Returns the number of frames lost since the last delivered frame. The gap in the driver's sequence numbers
@@ -335,9 +329,13 @@ private:
     std::string format_option_;
     std::vector<std::pair<std::string, std::string>> control_values_; // of the options that set controls
     std::uint32_t buffer_count_;
+    std::string depth_path_; // empty: no depth
+    double depth_unit_mm_;
 
     std::optional<CaptureDevice> device_;
     std::optional<CaptureStream> stream_; // declared after device_, because it must be destroyed first
+    std::optional<arhost::DepthCamera> depth_;
+    arhost::CaptureClock clock_;
     arhost::JpegDecoder jpeg_;
     bool newest_only_ = false;
     PictureFormat camera_;
@@ -345,7 +343,6 @@ private:
     std::uint32_t dropped_ = 0; // frames dropped since the last delivered frame
     Losses losses_;
     std::int64_t last_ns_ = 0;
-    bool clock_reported_ = false;
     std::string fault_; // what was wrong with the last damaged picture
 };
 
@@ -363,6 +360,9 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "format", "auto",
            "Pixel format of the camera; auto: uncompressed if that is fast enough, otherwise mjpeg.", 0, 0, formats),
     option(ARHOST_OPTION_INTEGER, "buffers", "4", "Number of driver buffers.", 2, 32),
+    option(ARHOST_OPTION_TEXT, "depth_device", "",
+           "Device node with depth (Z16) that belongs to the colour frames; empty: no depth."),
+    option(ARHOST_OPTION_REAL, "depth_unit_mm", "1", "Unit of the depth device's values in mm.", 1e-3, 1000),
     arhost::exposure_option,
     arhost::gain_option,
     arhost::focus_option,

@@ -9,6 +9,7 @@
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
@@ -17,6 +18,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -115,14 +117,7 @@ public:
             if (found == overrides.end() && !declared.default_value)
                 throw std::runtime_error(std::string("option '") + declared.key + "' must be given");
             texts[i] = found != overrides.end() ? found->second : declared.default_value;
-            arhost_option value{sizeof value, declared.type, declared.key, 0, 0.0, texts[i].c_str()};
-            if (declared.type == ARHOST_OPTION_BOOL)
-                value.integer = texts[i] == "true";
-            else if (declared.type == ARHOST_OPTION_INTEGER)
-                value.integer = std::stoll(texts[i]);
-            else if (declared.type == ARHOST_OPTION_REAL)
-                value.real = std::stod(texts[i]);
-            options.push_back(value);
+            options.push_back(value_of(declared, texts[i]));
         }
         if (used != overrides.size())
             throw std::runtime_error("the test sets an option that the descriptor does not declare");
@@ -138,13 +133,14 @@ public:
         return *static_cast<const Functions *>(plugin_->functions);
     }
     const void *extension(const char *id) const { return plugin_->get_extension(id); }
-    // Changes an option of type TEXT while the plugin runs (arhost/control.h).
-    arhost_status set_text(const char *key, const char *text) {
+    // Changes an option while the plugin runs (arhost/control.h). `text`: the new value, as in create().
+    arhost_status set_text(const std::string &key, const std::string &text) {
         const auto *extension = static_cast<const arhost_set_option *>(this->extension(ARHOST_SET_OPTION_EXTENSION));
         if (!extension)
             throw std::runtime_error("the plugin accepts no changes");
-        const arhost_option option{sizeof option, ARHOST_OPTION_TEXT, key, 0, 0.0, text};
-        return extension->set(instance_, &option);
+        const std::span<const arhost_option_descriptor> declared(descriptor().options, descriptor().option_count);
+        const arhost_option value = value_of(*std::ranges::find(declared, key, &arhost_option_descriptor::key), text);
+        return extension->set(instance_, &value);
     }
     // Returns the values of arhost/counters.h.
     std::map<std::string, std::uint64_t> counters() const {
@@ -174,6 +170,16 @@ public:
     }
 
 private:
+    static arhost_option value_of(const arhost_option_descriptor &declared, const std::string &text) {
+        arhost_option value{sizeof value, declared.type, declared.key, 0, 0.0, text.c_str()};
+        if (declared.type == ARHOST_OPTION_BOOL)
+            value.integer = text == "true";
+        else if (declared.type == ARHOST_OPTION_INTEGER)
+            value.integer = std::stoll(text);
+        else if (declared.type == ARHOST_OPTION_REAL)
+            value.real = std::stod(text);
+        return value;
+    }
     static PluginUnderTest &self(const arhost_host *host) { return *static_cast<PluginUnderTest *>(host->context); }
     static void on_log(const arhost_host *host, arhost_severity severity, const char *text) {
         std::lock_guard lock(self(host).mutex_);

@@ -17,8 +17,6 @@
 namespace arhost::test {
 namespace {
 
-constexpr std::int64_t frame_interval_ns = 33'333'300;
-constexpr std::uint32_t frame_interval = 333333; // in units of 100 ns
 constexpr std::uint32_t clock_hz = 48'000'000;
 constexpr std::size_t bulk_payload = 16384, packet = 1024;
 enum Format : std::uint8_t { yuy2 = 1, nv12 = 2, mjpeg = 3 };
@@ -41,13 +39,19 @@ CameraControl control(int size, std::int64_t current, std::int64_t minimum, std:
     return {number(current, size), number(minimum, size), number(maximum, size), number(resolution, size)};
 }
 
+std::uint32_t interval_of(const UsbCamera::Setup &setup) { // in units of 100 ns
+    return static_cast<std::uint32_t>(setup.interval_ns / 100);
+}
+
 Octets configuration_for(const UsbCamera::Setup &setup) {
-    const std::vector<FrameRow> sizes = {{UsbCamera::width, UsbCamera::height, {frame_interval}}};
+    const std::vector<FrameRow> sizes = {{setup.frame_width, setup.frame_height, {interval_of(setup)}}};
     const AlternateRow alternate = {static_cast<std::uint16_t>(setup.is_bulk ? 512 : packet), setup.is_bulk};
     // The controls: exposure mode and time, focus, pan and tilt, automatic focus; brightness, white balance, gain,
     // power-line frequency, automatic white balance.
     FunctionRow function = {0, setup.version, clock_hz, 0x2082a, 0x1641, {UsbCamera::extension}, {}};
     function.streams = {{1, {{"YUY2", sizes}, {"NV12", sizes}, {"MJPEG", sizes}}, {alternate}}};
+    if (setup.is_depth)
+        function.streams.front().formats = {{"INVZ", sizes}};
     function.has_status_endpoint = false;
     return configuration_of({"", {function}});
 }
@@ -59,12 +63,12 @@ Octets string_descriptor(const std::string &text) {
     return bytes;
 }
 
-Octets make_jpeg(int luma) {
-    const Octets pixels(std::size_t{UsbCamera::width} * UsbCamera::height * 3, static_cast<std::uint8_t>(luma));
+Octets make_jpeg(const UsbCamera::Setup &setup, int luma) {
+    const Octets pixels(std::size_t{setup.frame_width} * setup.frame_height * 3, static_cast<std::uint8_t>(luma));
     const tjhandle handle = tjInitCompress();
     unsigned char *data = nullptr;
     unsigned long size = 0;
-    if (tjCompress2(handle, pixels.data(), UsbCamera::width, 0, UsbCamera::height, TJPF_BGR, &data, &size, TJSAMP_422,
+    if (tjCompress2(handle, pixels.data(), setup.frame_width, 0, setup.frame_height, TJPF_BGR, &data, &size, TJSAMP_422,
                     90, 0) != 0)
         throw std::runtime_error("tjCompress2");
     const Octets jpeg(data, data + size);
@@ -83,7 +87,7 @@ void put_big(Octets &bytes, std::initializer_list<std::uint32_t> values) {
 
 UsbCamera::UsbCamera(const Setup &setup) : setup_(setup), configuration_(configuration_for(setup)) {
     for (std::uint32_t i = 0; i < 16; ++i)
-        jpegs_.push_back(make_jpeg(luma_of(i)));
+        jpegs_.push_back(make_jpeg(setup, luma_of(i)));
     probe_.resize(setup.version >= 0x0150 ? 48 : setup.version >= 0x0110 ? 34 : 26);
     controls_[{terminal, 0x02}] = control(1, 8, 0, 0, 0x09); // manual or aperture priority
     controls_[{terminal, 0x04}] = control(4, 250, 3, 2047);
@@ -157,8 +161,12 @@ void UsbCamera::change(std::uint8_t unit, std::uint8_t selector, const std::func
     change(controls_.at({unit, selector}));
 }
 
-Octets UsbCamera::picture(std::uint32_t number, bool is_nv12) {
-    const std::size_t pixels = std::size_t{width} * height;
+std::int64_t UsbCamera::captured_ns(std::uint32_t number) {
+    const std::lock_guard lock(mutex_);
+    return captured_ns_.at(number);
+}
+
+Octets UsbCamera::picture(std::uint32_t number, bool is_nv12, std::size_t pixels) {
     Octets bytes(is_nv12 ? pixels * 3 / 2 : 2 * pixels);
     for (std::size_t i = 4; i < bytes.size(); ++i)
         bytes[i] = static_cast<std::uint8_t>(number + i % 251);
@@ -299,15 +307,16 @@ std::optional<Octets> UsbCamera::answer_class(const Octets &setup, const Octets 
         if (request != set_current)
             return probe_;
         std::copy_n(data.begin(), std::min(data.size(), probe_.size()), probe_.begin());
-        const std::uint8_t format = std::clamp<std::uint8_t>(probe_[2], yuy2, mjpeg);
+        const std::uint8_t format =
+            setup_.is_depth ? std::uint8_t{yuy2} : std::clamp<std::uint8_t>(probe_[2], yuy2, mjpeg);
         const auto replace = [&](std::size_t at, std::int64_t value) {
             const Octets bytes = number(value, 4);
             std::copy(bytes.begin(), bytes.end(), probe_.begin() + static_cast<std::ptrdiff_t>(at));
         };
         probe_[2] = format;
         probe_[3] = 1;
-        replace(4, frame_interval);
-        replace(18, std::int64_t{2} * width * height);
+        replace(4, interval_of(setup_));
+        replace(18, std::int64_t{2} * setup_.frame_width * setup_.frame_height);
         replace(22, static_cast<std::int64_t>(setup_.is_bulk ? bulk_payload : packet));
         if (probe_.size() >= 30)
             replace(26, clock_hz);
@@ -345,7 +354,8 @@ std::optional<Octets> UsbCamera::answer_class(const Octets &setup, const Octets 
 }
 
 Octets UsbCamera::make_frame() {
-    return format_ == mjpeg ? jpegs_[number_ % jpegs_.size()] : picture(number_, format_ == nv12);
+    return format_ == mjpeg ? jpegs_[number_ % jpegs_.size()]
+                            : picture(number_, format_ == nv12, std::size_t{setup_.frame_width} * setup_.frame_height);
 }
 
 // Returns a payload of at most `limit` bytes; an empty one if no frame is due.
@@ -360,7 +370,8 @@ Octets UsbCamera::next_payload(std::size_t limit) {
         if (offset_ == 0) {
             if (now < due_ns_ || setup_.is_silent)
                 return {};
-            due_ns_ = std::max(due_ns_ + frame_interval_ns, now - 3 * frame_interval_ns);
+            due_ns_ = std::max(due_ns_ + setup_.interval_ns, now - 3 * setup_.interval_ns);
+            captured_ns_[number_] = due_ns_ - setup_.interval_ns;
             frame_ = make_frame();
             frame_fault_ = std::exchange(fault_, Fault::none);
             if (frame_fault_ == Fault::shortened)
@@ -372,7 +383,7 @@ Octets UsbCamera::next_payload(std::size_t limit) {
     const bool is_last = offset_ + size == frame_.size();
     const unsigned error = frame_fault_ == Fault::marked ? 0x40 : 0;
     Octets payload = {header_size, static_cast<std::uint8_t>(0x8c | error | (is_last ? 2 : 0) | (frame_id_ ? 1 : 0))};
-    put_number(payload, ticks_at(due_ns_ - frame_interval_ns), 4);
+    put_number(payload, ticks_at(due_ns_ - setup_.interval_ns), 4);
     put_number(payload, ticks_at(now), 4);
     put_number(payload, 0, 2);
     if (frame_fault_ == Fault::malformed && offset_ > 0)

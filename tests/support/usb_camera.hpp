@@ -32,9 +32,12 @@ public:
 
     struct Setup {
         bool is_bulk = false;
+        std::uint16_t frame_width = width, frame_height = height; // even
         std::string serial = "0001";
         std::uint16_t version = 0x0110; // of the video class
         bool is_silent = false;         // sends no frames
+        bool is_depth = false;          // delivers depth only
+        std::int64_t interval_ns = 33'333'300;
     };
     enum class Fault { none, marked, shortened, malformed };
 
@@ -50,7 +53,9 @@ public:
     void change(std::uint8_t unit, std::uint8_t selector, const std::function<void(CameraControl &)> &change);
 
     // The picture of a frame in YUY2 or NV12. Its first four bytes have the number of the frame.
-    static Octets picture(std::uint32_t number, bool is_nv12);
+    static Octets picture(std::uint32_t number, bool is_nv12, std::size_t pixels = std::size_t{width} * height);
+    // When a frame was captured, in ns of CLOCK_MONOTONIC.
+    std::int64_t captured_ns(std::uint32_t number);
     // Mean luma of the picture of a frame in MJPEG.
     static int luma_of(std::uint32_t number) { return 40 + 10 * static_cast<int>(number % 16); }
 
@@ -91,6 +96,7 @@ private:
     std::uint8_t format_ = 1;
     Fault fault_ = Fault::none;
     std::map<Key, CameraControl> controls_;
+    std::map<std::uint32_t, std::int64_t> captured_ns_; // by number of the frame
 
     // used by the stream's thread only
     Octets frame_;

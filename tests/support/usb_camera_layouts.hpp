@@ -67,6 +67,10 @@ inline void put_descriptor(Octets &bytes, Octets body) {
 }
 inline void put_fourcc_guid(Octets &bytes, const std::string &fourcc) {
     bytes.insert(bytes.end(), fourcc.begin(), fourcc.begin() + 4);
+    if (fourcc == "INVZ") { // depth with 16 bits
+        put(bytes, {0x90, 0x2d, 0x58, 0x4a, 0x92, 0x0b, 0x77, 0x3f, 0x1f, 0x2c, 0x55, 0x6b});
+        return;
+    }
     put(bytes, {0, 0, 0x10, 0, 0x80, 0, 0, 0xaa, 0, 0x38, 0x9b, 0x71});
 }
 

@@ -121,11 +121,14 @@ class FrameFormat:
     yuv_matrix: int
     yuv_range: int
     fps: float
+    has_depth: int
     plane_count: int
     stride: np.ndarray
     offset: np.ndarray
     grey_stride: int
+    depth_stride: int
     grey_offset: int
+    depth_offset: int
     byte_size: int
 
 # arhost/camera.h

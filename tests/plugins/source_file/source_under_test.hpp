@@ -17,7 +17,8 @@ namespace arhost::test {
 struct SourceFrame {
     arhost_status status = 0;
     arhost_frame_info info{};
-    std::vector<std::uint8_t> bytes; // the planes in order, each with its rows in order
+    std::vector<std::uint8_t> bytes;     // the planes in order, each with its rows in order
+    std::vector<std::uint16_t> depth_mm; // empty without depth
 };
 
 class SourceUnderTest {
@@ -50,7 +51,13 @@ public:
 
     SourceFrame read(std::uint64_t sequence) {
         const arhost_frame_format &format = properties_.format;
-        arhost_frame_buffer buffer{sizeof buffer, 0, &format, {}, buffer_->data() + format.grey_offset, sequence};
+        arhost_frame_buffer buffer{};
+        buffer.struct_size = sizeof buffer;
+        buffer.format = &format;
+        buffer.grey = buffer_->data() + format.grey_offset;
+        buffer.sequence = sequence;
+        if (format.has_depth)
+            buffer.depth_mm = reinterpret_cast<std::uint16_t *>(buffer_->data() + format.depth_offset);
         for (std::uint32_t p = 0; p < format.plane_count; ++p)
             buffer.plane[p] = buffer_->data() + format.offset[p];
         SourceFrame frame;
@@ -65,6 +72,10 @@ public:
                 const std::uint8_t *row = buffer.plane[p] + y * format.stride[p];
                 frame.bytes.insert(frame.bytes.end(), row, row + row_bytes(p));
             }
+        }
+        for (std::size_t y = 0; format.has_depth && y < format.height; ++y) {
+            const std::uint16_t *row = buffer.depth_mm + y * format.depth_stride / 2;
+            frame.depth_mm.insert(frame.depth_mm.end(), row, row + format.width);
         }
         return frame;
     }

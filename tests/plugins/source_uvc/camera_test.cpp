@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <ctime>
 #include <fstream>
 #include <memory>
@@ -527,9 +528,9 @@ TEST_F(UvcRun, TheKernelsDriverReturnsIfArhostIsKilled) {
 
 namespace {
 
-nlohmann::json listed_cameras(uid_t user = 0) {
+nlohmann::json listed_cameras(uid_t user = 0, const char *plugin = "source_uvc") {
     arhost::test::ArhostRun run;
-    run.start({"devices", "--json", "source_uvc"}, [user] {
+    run.start({"devices", "--json", plugin}, [user] {
         if (user != 0 && (setgroups(0, nullptr) != 0 || setgid(user) != 0 || setuid(user) != 0))
             _exit(126);
     });
@@ -631,4 +632,167 @@ TEST_F(UvcCamera, IsCapturedByTheV4l2SourceToo) {
     EXPECT_EQ(v4l2.read(0).status, ARHOST_STATUS_OK);
     EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x02), Octets{8});
     EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x08), Octets{1});
+}
+
+// ---- A depth camera beside a colour camera ---------------------------------------------------------
+
+// Two cameras with the kernel's driver: colour at 30 fps, depth at 20 fps.
+class DepthBesideColour : public UvcCamera {
+protected:
+    static constexpr std::int64_t depth_interval_ns = 50'000'000;
+
+    void SetUp() override {
+        connect({});
+        connect_depth();
+        ASSERT_TRUE(eventually([] { return !node_of("0001").empty() && !node_of("0002").empty(); }));
+    }
+    void TearDown() override {
+        depth_.reset();
+        unplug();
+    }
+    void connect_depth() {
+        depth_ = std::make_unique<UsbCamera>(
+            UsbCamera::Setup{.serial = "0002", .is_depth = true, .interval_ns = depth_interval_ns});
+        ASSERT_TRUE(eventually([] { return kernel_driven() >= 4; }));
+    }
+    // The node that captures from the camera with this serial number; empty if there is none.
+    static std::string node_of(const std::string &serial) {
+        const fs::path nodes = "/sys/class/video4linux";
+        if (!fs::exists(nodes))
+            return "";
+        for (const auto &node : fs::directory_iterator(nodes)) {
+            std::string found, index;
+            std::error_code ignored;
+            std::ifstream(fs::canonical(node.path() / "device", ignored).parent_path() / "serial") >> found;
+            std::ifstream(node.path() / "index") >> index;
+            if (found == serial && index == "0")
+                return "/dev/" + node.path().filename().string();
+        }
+        return "";
+    }
+    std::map<std::string, std::string> options() const {
+        return {{"device", node_of("0001")}, {"format", "yuyv"}, {"depth_device", node_of("0002")}};
+    }
+    static std::vector<std::uint16_t> depth_picture(std::uint32_t number) {
+        const Octets bytes = UsbCamera::picture(number, false);
+        std::vector<std::uint16_t> depths(bytes.size() / 2);
+        std::memcpy(depths.data(), bytes.data(), bytes.size());
+        return depths;
+    }
+    std::int64_t difference_ns(std::uint32_t colour_number, std::uint32_t depth_number) {
+        return std::abs(camera_->captured_ns(colour_number) - depth_->captured_ns(depth_number));
+    }
+
+    std::unique_ptr<UsbCamera> depth_;
+    SourceUnderTest v4l2_{"source_v4l2"};
+};
+
+TEST_F(DepthBesideColour, EachFrameHasTheDepthThatWasCapturedNearest) {
+    for (const bool is_live : {false, true}) {
+        SCOPED_TRACE(is_live);
+        arhost_source_setup setup{};
+        setup.fps = 30;
+        setup.paced = is_live;
+        ASSERT_EQ(v4l2_.start(options(), setup), ARHOST_STATUS_OK) << v4l2_.log();
+        ASSERT_TRUE(v4l2_.format().has_depth);
+        int without_depth = 0;
+        for (std::uint64_t n = 0; n < 40; ++n) {
+            const SourceFrame frame = v4l2_.read(n);
+            ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << v4l2_.log();
+            const std::uint32_t colour = number_of(frame.bytes);
+            if (std::ranges::count(frame.depth_mm, 0) == std::ssize(frame.depth_mm)) {
+                ++without_depth;
+                continue;
+            }
+            const std::uint32_t depth = frame.depth_mm[0] | std::uint32_t{frame.depth_mm[1]} << 16;
+            EXPECT_TRUE(frame.depth_mm == depth_picture(depth)) << "frame " << colour;
+            // The kernel's time stamps differ from those of the cameras by the latency of this machine.
+            constexpr std::int64_t latency_ns = 12'000'000;
+            constexpr std::uint64_t first_on_time = 5; // the cameras send their first frames at once
+            if (n >= first_on_time) {
+                EXPECT_LE(difference_ns(colour, depth), depth_interval_ns / 2 + latency_ns) << "frame " << colour;
+            }
+        }
+        EXPECT_LE(without_depth, 8) << "only before the first depth frame, or if one was late";
+        v4l2_.stop();
+    }
+}
+
+TEST_F(DepthBesideColour, DepthIsConvertedToMillimetres) {
+    auto converting = options();
+    converting["depth_unit_mm"] = "0.125";
+    ASSERT_EQ(v4l2_.start(converting), ARHOST_STATUS_OK) << v4l2_.log();
+    for (std::uint64_t n = 0; n < 10; ++n) {
+        const SourceFrame frame = v4l2_.read(n);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+        if (frame.depth_mm.back() == 0)
+            continue;
+        // Frames 0 to 99 differ in their last value.
+        std::uint32_t number = 0;
+        const auto last = [](std::uint32_t of) { return std::lround(depth_picture(of).back() * 0.125); };
+        while (number < 100 && last(number) != frame.depth_mm.back())
+            ++number;
+        const std::vector<std::uint16_t> expected = depth_picture(number);
+        for (std::size_t i = 2; i < expected.size(); ++i)
+            ASSERT_EQ(frame.depth_mm[i], std::lround(expected[i] * 0.125)) << i;
+    }
+}
+
+TEST_F(DepthBesideColour, ALostDepthCameraIsALostDevice) {
+    arhost_source_setup setup{};
+    setup.paced = 1;
+    ASSERT_EQ(v4l2_.start(options(), setup), ARHOST_STATUS_OK) << v4l2_.log();
+    ASSERT_EQ(v4l2_.read(0).status, ARHOST_STATUS_OK);
+    depth_.reset();
+    arhost_status status = ARHOST_STATUS_OK;
+    for (std::uint64_t n = 1; n < 200 && status == ARHOST_STATUS_OK; ++n)
+        status = v4l2_.read(n).status;
+    EXPECT_EQ(status, ARHOST_STATUS_ERROR_DEVICE_LOST) << v4l2_.log();
+}
+
+TEST_F(DepthBesideColour, ASilentDepthCameraLeavesTheVideoRunning) {
+    depth_.reset();
+    ASSERT_TRUE(eventually([] { return kernel_driven() == 2; }));
+    depth_ = std::make_unique<UsbCamera>(
+        UsbCamera::Setup{.serial = "0002", .is_silent = true, .is_depth = true, .interval_ns = depth_interval_ns});
+    ASSERT_TRUE(eventually([] { return kernel_driven() >= 4 && !node_of("0002").empty(); }));
+    ASSERT_EQ(v4l2_.start(options()), ARHOST_STATUS_OK) << v4l2_.log();
+    for (std::uint64_t n = 0; n < 30; ++n) {
+        const SourceFrame frame = v4l2_.read(n);
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << v4l2_.log();
+        EXPECT_EQ(std::ranges::count(frame.depth_mm, 0), std::ssize(frame.depth_mm)) << "unknown";
+    }
+}
+
+TEST_F(DepthBesideColour, UnsuitableDepthDevicesAreRejected) {
+    const auto error_of = [&](const std::string &depth_device) {
+        auto wrong = options();
+        wrong["depth_device"] = depth_device;
+        EXPECT_EQ(v4l2_.start(wrong), ARHOST_STATUS_ERROR_CONFIGURATION);
+        const std::string text = v4l2_.log(ARHOST_SEVERITY_ERROR);
+        v4l2_.stop();
+        return text;
+    };
+    EXPECT_THAT(error_of("/dev/video99"), HasSubstr("depth_device: '/dev/video99' does not exist; available: "));
+    EXPECT_THAT(error_of(node_of("0001")), HasSubstr("offers no depth (Z16), only YUYV"));
+}
+
+TEST_F(DepthBesideColour, TheDepthCameraIsListed) {
+    const nlohmann::json cameras = listed_cameras(0, "source_v4l2");
+    const auto depth = std::ranges::find_if(cameras, [](const auto &camera) { return camera["serial"] == "0002"; });
+    ASSERT_NE(depth, cameras.end()) << cameras;
+    EXPECT_EQ((*depth)["formats"][0]["pixel_format"], "z16");
+}
+
+TEST_F(DepthBesideColour, ARunWritesDepthFromTheSandbox) {
+    arhost::test::ArhostRun run(
+        "version: 1\nmode: live\nsandbox: strict\nframes: 30\n"
+        "source: {plugin: source_v4l2, allow: [video], fps: 30, options: {device: " +
+        node_of("0001") + ", format: yuyv, depth_device: " + node_of("0002") +
+        "}}\noutputs: [{plugin: sink_images, path: out/depth_%d.png, options: {content: depth}}]\n"
+        "stats: stats.json\n");
+    EXPECT_EQ(run.run({"run.yaml"}), 0) << run.output();
+    EXPECT_TRUE(run.stats()["counters"]["source"].contains("without_depth")) << run.stats()["counters"];
+    const auto files = std::distance(fs::directory_iterator(run.path("out")), {});
+    EXPECT_GE(files, 10);
 }

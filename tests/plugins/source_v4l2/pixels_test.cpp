@@ -67,7 +67,7 @@ Copied copy(const Picture &picture, const std::vector<MemoryPlane> &expected) {
     EXPECT_EQ(defect_of(picture.format), "");
     EXPECT_TRUE(arhost_frame_layout(&copied.format));
     GuardedBuffer slot(copied.format.byte_size);
-    arhost_frame_buffer buffer{sizeof buffer, 0, &copied.format, {}, nullptr, 0};
+    arhost_frame_buffer buffer{sizeof buffer, 0, &copied.format, {}, nullptr, nullptr, 0};
     for (std::uint32_t p = 0; p < copied.format.plane_count; ++p)
         buffer.plane[p] = slot.data() + copied.format.offset[p];
     copied.good = copy_picture(picture.format, picture.planes(), buffer, copied.fault);

@@ -383,6 +383,10 @@ inline constexpr arhost_tracker tracker_functions = {
     stop_instance<T>};
 
 // `capabilities` is an optional member of the plugin class.
+template <class T> std::uint32_t capabilities_of(arhost_instance *instance) {
+    return instance_of<T>(instance).plugin.capabilities();
+}
+
 template <class T> constexpr arhost_raytracer make_raytracer_functions() {
     arhost_raytracer raytracer{};
     raytracer.struct_size = sizeof(arhost_raytracer);
@@ -395,9 +399,7 @@ template <class T> constexpr arhost_raytracer make_raytracer_functions() {
     };
     raytracer.stop = stop_instance<T>;
     if constexpr (requires(const T &p) { p.capabilities(); })
-        raytracer.capabilities = [](arhost_instance *i) -> std::uint32_t {
-            return instance_of<T>(i).plugin.capabilities();
-        };
+        raytracer.capabilities = capabilities_of<T>;
     return raytracer;
 }
 template <class T> inline constexpr arhost_raytracer raytracer_functions = make_raytracer_functions<T>();
@@ -414,6 +416,8 @@ template <class T> constexpr arhost_sink make_sink_functions() {
     if constexpr (requires(T & p) { p.idle(); })
         sink.idle = [](arhost_instance *i) { return with<T>(i, [](T &p) -> arhost_status { return p.idle(); }); };
     sink.stop = [](arhost_instance *i) { return with<T>(i, [](T &p) { return stop(p), ARHOST_STATUS_OK; }); };
+    if constexpr (requires(const T &p) { p.capabilities(); })
+        sink.capabilities = capabilities_of<T>;
     return sink;
 }
 template <class T> inline constexpr arhost_sink sink_functions = make_sink_functions<T>();

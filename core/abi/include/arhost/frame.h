@@ -47,15 +47,18 @@ typedef struct arhost_frame_format {
     uint32_t width, height; /* px, 1 to ARHOST_MAX_IMAGE_SIDE */
     arhost_yuv_matrix yuv_matrix;
     arhost_yuv_range yuv_range;
-    double fps; /* nominal frame rate, 1/s; 0: unknown */
+    double fps;        /* nominal frame rate, 1/s; 0: unknown */
+    int32_t has_depth; /* non-zero: frames have a depth plane */
 
     uint32_t plane_count;
     uint32_t stride[ARHOST_MAX_PLANES]; /* bytes per row, a multiple of 64 */
     uint64_t offset[ARHOST_MAX_PLANES]; /* bytes from the start of the slot, a multiple of 64 */
     uint32_t grey_stride;
-    uint64_t grey_offset; /* offset of the grey plane: plane 0 if that is luma, otherwise a separate plane,
+    uint32_t depth_stride; /* bytes per row, a multiple of 64; 0 without depth */
+    uint64_t grey_offset;  /* offset of the grey plane: plane 0 if that is luma, otherwise a separate plane,
                              which the worker fills once for all trackers */
-    uint64_t byte_size;   /* size of a slot */
+    uint64_t depth_offset; /* 0 without depth */
+    uint64_t byte_size;    /* size of a slot */
 } arhost_frame_format;
 
 /* Computes the fields from `plane_count` on from the fields before it. Returns 1, or 0 if the latter are invalid. */
@@ -111,6 +114,9 @@ static inline int32_t arhost_frame_layout(arhost_frame_format *format) {
         format->grey_offset = end;
         end += (uint64_t)format->grey_stride * h;
     }
+    format->depth_stride = format->has_depth ? (uint32_t)((2 * w + 63) / 64 * 64) : 0;
+    format->depth_offset = format->has_depth ? end : 0;
+    end += format->depth_stride * h;
     format->byte_size = end;
     return 1;
 }
@@ -122,6 +128,7 @@ typedef struct arhost_frame {
     const arhost_frame_format *format;
     const uint8_t *plane[ARHOST_MAX_PLANES]; /* elements from format->plane_count on are NULL */
     const uint8_t *grey;                     /* full-range luma, format->grey_stride bytes per row */
+    const uint16_t *depth_mm;                /* NULL if !format->has_depth; see arhost_frame_buffer.depth_mm */
     uint64_t sequence;                       /* frame number: 0, 1, 2, … */
     int64_t capture_ns;                      /* capture time in ns of `clock`; the middle of the exposure, if known */
 } arhost_frame;

@@ -196,7 +196,7 @@ enum {
     /* sink: accepts "-" as the option `path`, and then writes to standard output, descriptor 1. Without this
      * capability, the host rejects "-" as the path of an output. */
     ARHOST_CAPABILITY_STANDARD_OUTPUT = 1 << 12,
-    ARHOST_CAPABILITY_VIDEO_INPUT = 1 << 13,   /* sink: reads arhost_output.video */
+    ARHOST_CAPABILITY_VIDEO_INPUT = 1 << 13,   /* sink: reads arhost_output.video and depth_mm */
     ARHOST_CAPABILITY_OVERLAY_INPUT = 1 << 14, /* sink: reads arhost_output.overlay_rgba */
     /* raytracer: renders images of any size up to that of the setup. The intrinsics of a request are then those of
      * arhost::shading::scaled() (arhost/shading/lens.hpp), and arhost_image has their size. */

@@ -66,6 +66,8 @@ typedef struct arhost_output {
     /* The frame under the overlay, as the source delivered it: one pointer per plane of
      * arhost_sink_setup.video_format. NULL without ARHOST_CAPABILITY_VIDEO_INPUT. */
     const uint8_t *video[ARHOST_MAX_PLANES];
+    const uint16_t *depth_mm; /* the frame's depth plane (arhost_frame.depth_mm); NULL also without
+                                 ARHOST_CAPABILITY_VIDEO_INPUT */
     /* The overlay: R, G, B, A bytes with straight alpha, top row first, transparent where there is no overlay. NULL
      * without ARHOST_CAPABILITY_OVERLAY_INPUT. */
     const uint8_t *overlay_rgba;
@@ -97,6 +99,11 @@ typedef struct arhost_sink {
     /* [worker, started] Called once, after a successful `start`; completes the files. Returns an error if a file
      * remains incomplete. */
     arhost_status (*stop)(arhost_instance *instance);
+
+    /* [worker, created] Returns the capabilities of this instance, if they depend on its options: those of the
+     * descriptor, or without ARHOST_CAPABILITY_VIDEO_INPUT or _OVERLAY_INPUT. The host copies only what its sinks
+     * read. Optional: may be NULL. */
+    uint32_t (*capabilities)(arhost_instance *instance);
 } arhost_sink;
 
 #ifdef __cplusplus

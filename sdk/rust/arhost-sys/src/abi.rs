@@ -326,14 +326,17 @@ pub struct arhost_frame_format {
     pub yuv_matrix: arhost_yuv_matrix,
     pub yuv_range: arhost_yuv_range,
     pub fps: f64,
+    pub has_depth: i32,
     pub plane_count: u32,
     pub stride: [u32; ARHOST_MAX_PLANES],
     pub offset: [u64; ARHOST_MAX_PLANES],
     pub grey_stride: u32,
+    pub depth_stride: u32,
     pub grey_offset: u64,
+    pub depth_offset: u64,
     pub byte_size: u64,
 }
-const _: () = assert!(size_of::<arhost_frame_format>() == 96);
+const _: () = assert!(size_of::<arhost_frame_format>() == 112);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_frame {
@@ -342,10 +345,11 @@ pub struct arhost_frame {
     pub format: *const arhost_frame_format,
     pub plane: [*const u8; ARHOST_MAX_PLANES],
     pub grey: *const u8,
+    pub depth_mm: *const u16,
     pub sequence: u64,
     pub capture_ns: i64,
 }
-const _: () = assert!(size_of::<arhost_frame>() == 64);
+const _: () = assert!(size_of::<arhost_frame>() == 72);
 unsafe impl Sync for arhost_frame {} // a plugin's statics are immutable
 
 // ---- arhost/camera.h ----
@@ -406,7 +410,7 @@ pub struct arhost_source_properties {
     pub intrinsics: arhost_intrinsics,
     pub frame_count: u64,
 }
-const _: () = assert!(size_of::<arhost_source_properties>() == 264);
+const _: () = assert!(size_of::<arhost_source_properties>() == 280);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_frame_buffer {
@@ -415,9 +419,10 @@ pub struct arhost_frame_buffer {
     pub format: *const arhost_frame_format,
     pub plane: [*mut u8; ARHOST_MAX_PLANES],
     pub grey: *mut u8,
+    pub depth_mm: *mut u16,
     pub sequence: u64,
 }
-const _: () = assert!(size_of::<arhost_frame_buffer>() == 56);
+const _: () = assert!(size_of::<arhost_frame_buffer>() == 64);
 unsafe impl Sync for arhost_frame_buffer {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -859,11 +864,12 @@ pub struct arhost_output {
     pub bgr: *const u8,
     pub record: *const arhost_record,
     pub video: [*const u8; ARHOST_MAX_PLANES],
+    pub depth_mm: *const u16,
     pub overlay_rgba: *const u8,
     pub overlay_stride: u32,
     pub reserved: u32,
 }
-const _: () = assert!(size_of::<arhost_output>() == 72);
+const _: () = assert!(size_of::<arhost_output>() == 80);
 unsafe impl Sync for arhost_output {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -873,6 +879,7 @@ pub struct arhost_sink {
     pub write: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_output) -> arhost_status>,
     pub idle: Option<unsafe extern "C" fn(*mut arhost_instance) -> arhost_status>,
     pub stop: Option<unsafe extern "C" fn(*mut arhost_instance) -> arhost_status>,
+    pub capabilities: Option<unsafe extern "C" fn(*mut arhost_instance) -> u32>,
 }
-const _: () = assert!(size_of::<arhost_sink>() == 40);
+const _: () = assert!(size_of::<arhost_sink>() == 48);
 unsafe impl Sync for arhost_sink {} // a plugin's statics are immutable

@@ -588,6 +588,7 @@ pub const fn sink<T: Sink>() -> arhost_sink {
         write: Some(write::<T>),
         idle: None,
         stop: Some(stop_sink::<T>),
+        capabilities: None,
     }
 }
 

@@ -218,7 +218,10 @@ impl arhost_frame_format {
             self.grey_offset = end;
             end += stride_of(w) * h;
         }
-        self.byte_size = end;
+        let depth_stride = if self.has_depth != 0 { stride_of(2 * w) } else { 0 };
+        self.depth_stride = depth_stride as u32;
+        self.depth_offset = if self.has_depth != 0 { end } else { 0 };
+        self.byte_size = end + depth_stride * h;
         true
     }
 }

@@ -34,14 +34,17 @@ fn frame_layouts_match_the_headers() {
             format.pixel_format = pixel_format;
             format.width = width;
             format.height = height;
+            format.has_depth = (width % 2) as i32;
             expected.push(if format.lay_out() {
                 format!(
-                    "{} {:?} {:?} {} {} {}",
+                    "{} {:?} {:?} {} {} {} {} {}",
                     format.plane_count,
                     format.stride,
                     format.offset,
                     format.grey_stride,
                     format.grey_offset,
+                    format.depth_stride,
+                    format.depth_offset,
                     format.byte_size
                 )
             } else {
@@ -50,11 +53,12 @@ fn frame_layouts_match_the_headers() {
             writeln!(
                 program,
                 "{{ arhost_frame_format f; memset(&f, 0, sizeof f); f.pixel_format = {}; f.width = {}; f.height = {};
+                f.has_depth = f.width % 2;
                 if (arhost_frame_layout(&f))
-                    printf(\"%u [%u, %u, %u] [%llu, %llu, %llu] %u %llu %llu\\n\", f.plane_count, f.stride[0],
+                    printf(\"%u [%u, %u, %u] [%llu, %llu, %llu] %u %llu %u %llu %llu\\n\", f.plane_count, f.stride[0],
                         f.stride[1], f.stride[2], (unsigned long long)f.offset[0], (unsigned long long)f.offset[1],
                         (unsigned long long)f.offset[2], f.grey_stride, (unsigned long long)f.grey_offset,
-                        (unsigned long long)f.byte_size);
+                        f.depth_stride, (unsigned long long)f.depth_offset, (unsigned long long)f.byte_size);
                 else puts(\"invalid\"); }}",
                 pixel_format, width, height
             )

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "device.hpp"
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <cstdint>
+
+namespace arhost {
+
+// Converts a driver's time stamps to CLOCK_MONOTONIC.
+class CaptureClock {
+public:
+    explicit CaptureClock(const Host &host) : host_(host) {}
+
+    // Returns the capture time in ns of CLOCK_MONOTONIC, at most the current time. Reports once if the driver uses
+    // another clock.
+    std::int64_t monotonic_ns(const Capture &captured);
+
+private:
+    Host host_;
+    bool reported_ = false;
+};
+
+} // namespace arhost
