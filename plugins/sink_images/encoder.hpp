@@ -8,12 +8,20 @@
 
 namespace arhost::images {
 
-// An image in BGR8. The top row is first.
+enum class PixelFormat { bgr8, rgba8, depth16 }; // depth16: grey with 16 bits in the byte order of the machine
+
+constexpr std::size_t bytes_per_pixel(PixelFormat format) {
+    return format == PixelFormat::bgr8 ? 3 : format == PixelFormat::rgba8 ? 4 : 2;
+}
+
+// The top row is first.
 struct Image {
     std::uint32_t width, height;
     std::size_t stride; // bytes per row
-    const std::uint8_t *bgr;
-    const std::uint8_t *row(std::uint32_t y) const { return bgr + y * stride; }
+    const std::uint8_t *pixels;
+    PixelFormat format = PixelFormat::bgr8;
+    const std::uint8_t *row(std::uint32_t y) const { return pixels + y * stride; }
+    std::size_t row_bytes() const { return bytes_per_pixel(format) * width; }
 };
 
 // Encodes images in a file format. The same image always gives the same bytes.
@@ -24,6 +32,6 @@ public:
 };
 
 std::unique_ptr<Encoder> make_png_encoder(int compression); // 1 (fast) to 12 (small)
-std::unique_ptr<Encoder> make_jpeg_encoder(int quality);    // 1 to 100
+std::unique_ptr<Encoder> make_jpeg_encoder(int quality);    // 1 to 100; only for bgr8
 
 } // namespace arhost::images

@@ -24,8 +24,8 @@ public:
         file_.resize(tjBufSize(width, height, subsampling));
         unsigned char *bytes = file_.data();
         unsigned long size = file_.size();
-        if (tjCompress2(compressor_.get(), image.bgr, width, static_cast<int>(image.stride), height, TJPF_BGR, &bytes,
-                        &size, subsampling, quality_, TJFLAG_NOREALLOC | TJFLAG_ACCURATEDCT) != 0)
+        if (tjCompress2(compressor_.get(), image.pixels, width, static_cast<int>(image.stride), height, TJPF_BGR,
+                        &bytes, &size, subsampling, quality_, TJFLAG_NOREALLOC | TJFLAG_ACCURATEDCT) != 0)
             throw Failure(ARHOST_STATUS_ERROR_INTERNAL,
                           std::string("cannot encode the JPEG image: ") + tjGetErrorStr2(compressor_.get()));
         return std::span(file_).first(size);

@@ -7,9 +7,10 @@
 namespace arhost::images {
 
 // The file has the pixels of slot 0, the pixels of slot 1, and the marks of both slots.
-LastFrame::LastFrame(const std::filesystem::path &file, std::uint32_t width, std::uint32_t height,
+LastFrame::LastFrame(const std::filesystem::path &file, std::uint32_t width, std::uint32_t height, PixelFormat format,
                      std::uint64_t first_sequence)
-    : file_(file, O_RDWR | O_CREAT), width_(width), height_(height), slot_size_(3ull * width * height) {
+    : file_(file, O_RDWR | O_CREAT), width_(width), height_(height), format_(format),
+      slot_size_(std::uint64_t{bytes_per_pixel(format)} * width * height) {
     if (file_.size() == 2 * slot_size_ + sizeof marks_)
         file_.read_at(2 * slot_size_, {reinterpret_cast<std::uint8_t *>(marks_.data()), sizeof marks_});
     for (std::uint64_t &mark : marks_)
@@ -23,7 +24,7 @@ std::size_t LastFrame::newest_slot() const {
 }
 
 void LastFrame::keep(const Image &image, std::uint64_t sequence) {
-    const std::size_t slot = 1 - newest_slot(), row_size = 3 * std::size_t{width_};
+    const std::size_t slot = 1 - newest_slot(), row_size = image.row_bytes();
     pixels_.resize(slot_size_);
     for (std::uint32_t y = 0; y < height_; ++y)
         std::memcpy(pixels_.data() + y * row_size, image.row(y), row_size);
@@ -40,7 +41,7 @@ std::optional<Image> LastFrame::newest() {
         return std::nullopt;
     pixels_.resize(slot_size_);
     file_.read_at(slot * slot_size_, pixels_);
-    return Image{width_, height_, 3 * std::size_t{width_}, pixels_.data()};
+    return Image{width_, height_, bytes_per_pixel(format_) * width_, pixels_.data(), format_};
 }
 
 void LastFrame::write_marks() {

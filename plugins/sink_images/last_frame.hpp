@@ -19,7 +19,7 @@ namespace arhost::images {
 class LastFrame {
 public:
     // Discards kept frames whose number is `first_sequence` or higher.
-    LastFrame(const std::filesystem::path &file, std::uint32_t width, std::uint32_t height,
+    LastFrame(const std::filesystem::path &file, std::uint32_t width, std::uint32_t height, PixelFormat format,
               std::uint64_t first_sequence);
 
     void keep(const Image &image, std::uint64_t sequence);
@@ -31,6 +31,7 @@ private:
 
     files::File file_;
     std::uint32_t width_, height_;
+    PixelFormat format_;
     std::uint64_t slot_size_;
     std::array<std::uint64_t, 2>
         marks_{}; // for each slot: the frame's sequence number + 1, or 0 if the slot is empty

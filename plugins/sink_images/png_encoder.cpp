@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Encodes 8-bit RGB as PNG (ISO/IEC 15948). With libdeflate and a single filter, this takes a third of the time that
+// Encodes images as PNG (ISO/IEC 15948). With libdeflate and a single filter, this takes a third of the time that
 // libpng and zlib take at their fastest setting.
 #include "encoder.hpp"
 
@@ -9,6 +9,7 @@
 #include <libdeflate.h>
 
 #include <array>
+#include <cstring>
 #include <string_view>
 #include <vector>
 
@@ -49,36 +50,56 @@ public:
         Bytes header;
         append(header, big_endian(image.width));
         append(header, big_endian(image.height));
-        constexpr std::uint8_t bits = 8, rgb = 2, deflate = 0, adaptive_filters = 0, not_interlaced = 0;
-        append(header, std::array{bits, rgb, deflate, adaptive_filters, not_interlaced});
+        constexpr std::uint8_t grey = 0, rgb = 2, rgba = 6, deflate = 0, adaptive_filters = 0, not_interlaced = 0;
+        const bool is_depth = image.format == PixelFormat::depth16;
+        const std::uint8_t bits = is_depth ? 16 : 8;
+        const std::uint8_t colour_type = is_depth ? grey : image.format == PixelFormat::bgr8 ? rgb : rgba;
+        append(header, std::array{bits, colour_type, deflate, adaptive_filters, not_interlaced});
         file_.assign({0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'});
         append_chunk(file_, "IHDR", header);
-        append_chunk(file_, "sRGB", std::array<std::uint8_t, 1>{0}); // rendering intent: perceptual
+        if (!is_depth)
+            append_chunk(file_, "sRGB", std::array<std::uint8_t, 1>{0}); // rendering intent: perceptual
         append_chunk(file_, "IDAT", std::span(compressed_).first(size));
         append_chunk(file_, "IEND", {});
         return file_;
     }
 
 private:
+    // Converts a row to the byte order of PNG: R G B (A), and the more significant byte of depth first.
+    static void reorder(const std::uint8_t *from, std::size_t row_size, PixelFormat format, std::uint8_t *to) {
+        if (format == PixelFormat::rgba8) {
+            std::memcpy(to, from, row_size);
+        } else if (format == PixelFormat::bgr8) {
+            for (std::size_t i = 0; i < row_size; i += 3) {
+                to[i] = from[i + 2];
+                to[i + 1] = from[i + 1];
+                to[i + 2] = from[i];
+            }
+        } else {
+            for (std::size_t i = 0; i < row_size; i += 2) {
+                std::uint16_t value = 0;
+                std::memcpy(&value, from + i, sizeof value);
+                to[i] = static_cast<std::uint8_t>(value >> 8);
+                to[i + 1] = static_cast<std::uint8_t>(value);
+            }
+        }
+    }
+
     // Applies filter 3 (average): subtracts from each byte the mean of its left and upper neighbours. For camera
     // images, only the Paeth filter compresses better, but it is slower.
     void filter(const Image &image) {
         constexpr std::uint8_t average = 3;
-        const std::size_t row_size = 3 * std::size_t{image.width};
+        const std::size_t row_size = image.row_bytes(), pixel_size = bytes_per_pixel(image.format);
         filtered_.resize(image.height * (row_size + 1));
-        above_.assign(row_size + 3, 0);
-        row_.assign(row_size + 3, 0); // begins with a black pixel, which is the left neighbour of the first pixel
+        above_.assign(row_size + pixel_size, 0);
+        // Begins with a pixel of zeros, which is the left neighbour of the first pixel.
+        row_.assign(row_size + pixel_size, 0);
         std::uint8_t *out = filtered_.data();
         for (std::uint32_t y = 0; y < image.height; ++y) {
-            const std::uint8_t *bgr = image.row(y);
-            for (std::size_t i = 0; i < row_size; i += 3) {
-                row_[i + 3] = bgr[i + 2];
-                row_[i + 4] = bgr[i + 1];
-                row_[i + 5] = bgr[i];
-            }
+            reorder(image.row(y), row_size, image.format, row_.data() + pixel_size);
             *out++ = average;
             for (std::size_t i = 0; i < row_size; ++i)
-                out[i] = static_cast<std::uint8_t>(row_[i + 3] - ((row_[i] + above_[i + 3]) >> 1));
+                out[i] = static_cast<std::uint8_t>(row_[i + pixel_size] - ((row_[i] + above_[i + pixel_size]) >> 1));
             out += row_size;
             row_.swap(above_);
         }

@@ -21,6 +21,11 @@ namespace {
 namespace fs = std::filesystem;
 using namespace arhost;
 using images::Image;
+using images::PixelFormat;
+
+PixelFormat format_of(const std::string &content) {
+    return content == "overlay" ? PixelFormat::rgba8 : content == "depth" ? PixelFormat::depth16 : PixelFormat::bgr8;
+}
 
 std::unique_ptr<images::Encoder> make_encoder(const fs::path &path, const Options &options) {
     std::string extension = path.extension().string();
@@ -46,7 +51,10 @@ public:
         : host_(host), path_(options.text("path")), scratch_(files::hidden_sibling(path_, ".partial")),
           kept_path_(files::hidden_sibling(path_, ".last")), pattern_(numbered_name_of(path_)),
           encoder_(make_encoder(path_, options)), frame_(options.integer("frame")),
-          every_(static_cast<std::uint64_t>(options.integer("every"))) {
+          every_(static_cast<std::uint64_t>(options.integer("every"))), format_(format_of(options.text("content"))) {
+        if (format_ != PixelFormat::bgr8 && path_.extension() != ".png")
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          "content: JPEG stores neither transparent pixels nor depth; let 'path' end in .png");
         if (pattern_ && frame_ >= 0)
             throw Failure(
                 ARHOST_STATUS_ERROR_CONFIGURATION,
@@ -56,7 +64,19 @@ public:
                           "every: is only allowed if 'path' is numbered, such as out/frame_%05d.png");
     }
 
+    std::uint32_t capabilities() const {
+        std::uint32_t capabilities = ARHOST_CAPABILITY_NUMBERED_FILES;
+        if (format_ == PixelFormat::rgba8)
+            capabilities |= ARHOST_CAPABILITY_OVERLAY_INPUT;
+        if (format_ == PixelFormat::depth16)
+            capabilities |= ARHOST_CAPABILITY_VIDEO_INPUT;
+        return capabilities;
+    }
+
     void start(const arhost_sink_setup &setup) {
+        if (format_ == PixelFormat::depth16 && !setup.video_format->has_depth)
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "content: the source delivers no depth");
+        depth_stride_ = setup.video_format->depth_stride;
         files::make_parent_folders(path_);
         files::check_can_write(scratch_); // reports an error now, not only at the first frame
         if (pattern_) {
@@ -75,7 +95,7 @@ public:
     }
 
     arhost_status write(const arhost_output &output) {
-        const Image image{output.width, output.height, output.stride, output.bgr};
+        const Image image = image_of(output);
         const std::uint64_t sequence = output.record->sequence;
         // Delete an older image when the first frame arrives, not in start(), because the run may still fail before.
         // From then on, also after a restart, the file exists only if this run wrote it.
@@ -107,7 +127,19 @@ public:
     }
 
 private:
-    void begin_keeping() { kept_.emplace(kept_path_, setup_.width, setup_.height, setup_.first_sequence); }
+    Image image_of(const arhost_output &output) const {
+        switch (format_) {
+        case PixelFormat::rgba8:
+            return {output.width, output.height, output.overlay_stride, output.overlay_rgba, format_};
+        case PixelFormat::depth16:
+            return {output.width, output.height, depth_stride_,
+                    reinterpret_cast<const std::uint8_t *>(output.depth_mm), format_};
+        default:
+            return {output.width, output.height, output.stride, output.bgr, format_};
+        }
+    }
+
+    void begin_keeping() { kept_.emplace(kept_path_, setup_.width, setup_.height, format_, setup_.first_sequence); }
 
     std::uint64_t frame_number() const { return static_cast<std::uint64_t>(frame_); }
 
@@ -132,11 +164,14 @@ private:
     std::unique_ptr<images::Encoder> encoder_;
     std::int64_t frame_;  // for a single image: the frame to write, or -1 for the last
     std::uint64_t every_; // for numbered images
+    PixelFormat format_;
+    std::uint32_t depth_stride_ = 0;
     arhost_sink_setup setup_{};
     std::optional<images::LastFrame> kept_;
     bool may_be_older_ = false; // the file at `path_` may be from an earlier run
 };
 
+constexpr const char *contents[] = {"frame", "overlay", "depth", nullptr};
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr,
            "PNG or JPEG files to write: one per frame (out/frame_%05d.png), or a single image (out/demo.png)."),
@@ -144,6 +179,9 @@ constexpr arhost_option_descriptor options[] = {
            "For a single image: number of the frame to write; -1: the last frame.", -1, 9e15),
     option(ARHOST_OPTION_INTEGER, "every", "1",
            "For a numbered path: write only the frames whose number is a multiple of this.", 1, 1e9),
+    option(ARHOST_OPTION_TEXT, "content", "frame",
+           "frame, the overlay alone with straight alpha (PNG), or the depth of the real scene in mm (16-bit PNG).",
+           0, 0, contents),
     option(ARHOST_OPTION_INTEGER, "compression", "1", "PNG compression: 1 (fast) to 12 (small); lossless.", 1, 12),
     option(ARHOST_OPTION_INTEGER, "quality", "95", "JPEG quality: 1 to 100; from 90 on, chroma is not subsampled.", 1,
            100),
@@ -158,7 +196,7 @@ constexpr arhost_descriptor descriptor = {
     "arhost",
     "Apache-2.0",
     "Writes frames as numbered PNG or JPEG files, or one frame as a single file.",
-    ARHOST_CAPABILITY_NUMBERED_FILES,
+    ARHOST_CAPABILITY_NUMBERED_FILES | ARHOST_CAPABILITY_VIDEO_INPUT | ARHOST_CAPABILITY_OVERLAY_INPUT,
     std::size(options),
     options,
     nullptr,

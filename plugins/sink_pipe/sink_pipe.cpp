@@ -43,10 +43,19 @@ class PipeSink {
 public:
     PipeSink(const Host &host, const Options &options)
         : host_(host), stream_(host, options.text("path")), format_(format_of(options.text("format"))),
-          matrix_(options.text("matrix")), reopen_(options.boolean("reopen")) {
+          matrix_(options.text("matrix")), writes_overlay_(options.text("content") == "overlay"),
+          reopen_(options.boolean("reopen")) {
         if (reopen_ && stream_.is_standard_output())
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "reopen: standard output cannot be opened again; name a FIFO as 'path'");
+        if (writes_overlay_ && format_.name.size() != 4)
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          "content: an overlay has transparent pixels, so it needs 'format: rgba' or 'format: bgra'");
+    }
+
+    std::uint32_t capabilities() const {
+        return ARHOST_CAPABILITY_STANDARD_OUTPUT |
+               (writes_overlay_ ? std::uint32_t{ARHOST_CAPABILITY_OVERLAY_INPUT} : 0);
     }
 
     void start(const arhost_sink_setup &setup) {
@@ -123,16 +132,18 @@ private:
 
     // Without swscale, which converts BGR to RGBA through YUV, with a loss.
     void pack_pixels(const arhost_output &output) {
-        const std::size_t channels = format_.name.size();
+        const std::size_t channels = format_.name.size(), input_channels = writes_overlay_ ? 4 : 3;
+        const std::string_view input_names = writes_overlay_ ? "rgba" : "bgr";
+        const std::uint8_t *const input = writes_overlay_ ? output.overlay_rgba : output.bgr;
+        const std::size_t stride = writes_overlay_ ? output.overlay_stride : output.stride;
         frame_.resize(channels * output.width * output.height);
         for (std::size_t channel = 0; channel < channels; ++channel) {
-            const char name = format_.name[channel];
-            const std::size_t source = name == 'b' ? 0 : name == 'g' ? 1 : 2;
+            const std::size_t source = input_names.find(format_.name[channel]); // npos: the alpha of an opaque frame
             std::uint8_t *to = frame_.data() + channel;
             for (std::size_t y = 0; y < output.height; ++y) {
-                const std::uint8_t *row = output.bgr + y * output.stride + source;
+                const std::uint8_t *row = input + y * stride;
                 for (std::size_t x = 0; x < output.width; ++x, to += channels)
-                    *to = name == 'a' ? 255 : row[3 * x];
+                    *to = source == std::string_view::npos ? 255 : row[input_channels * x + source];
             }
         }
     }
@@ -141,7 +152,7 @@ private:
     Stream stream_;
     const Format &format_;
     std::string matrix_;
-    bool reopen_;
+    bool writes_overlay_, reopen_;
     int width_ = 0, height_ = 0;
     std::string header_;                    // of the stream
     std::optional<BgrConverter> converter_; // only for Y4M
@@ -150,12 +161,15 @@ private:
 };
 
 constexpr const char *format_names[] = {"y4m", "y4m444", "rgba", "bgra", "rgb", "bgr", nullptr};
+constexpr const char *contents[] = {"frame", "overlay", nullptr};
 constexpr const char *matrices[] = {"auto", "bt601", "bt709", nullptr};
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_OUTPUT_PATH, "path", nullptr, "Existing FIFO (mkfifo), or '-' for standard output."),
     option(ARHOST_OPTION_TEXT, "format", "y4m",
            "Y4M with YUV 4:2:0 (y4m) or 4:4:4 (y4m444), or pixels without headers: rgba, bgra, rgb or bgr.", 0, 0,
            format_names),
+    option(ARHOST_OPTION_TEXT, "content", "frame",
+           "frame, or the overlay alone with straight alpha (format rgba or bgra).", 0, 0, contents),
     option(ARHOST_OPTION_TEXT, "matrix", "auto",
            "YUV matrix of Y4M: bt601, bt709, or auto (bt601 up to 576 rows, otherwise bt709).", 0, 0, matrices),
     option(ARHOST_OPTION_BOOL, "reopen", "false",
@@ -171,7 +185,7 @@ constexpr arhost_descriptor descriptor = {
     "arhost",
     "Apache-2.0",
     "Writes uncompressed video (Y4M or pixels) to a FIFO or standard output, for other programs.",
-    ARHOST_CAPABILITY_STANDARD_OUTPUT,
+    ARHOST_CAPABILITY_STANDARD_OUTPUT | ARHOST_CAPABILITY_OVERLAY_INPUT,
     std::size(options),
     options,
     nullptr,

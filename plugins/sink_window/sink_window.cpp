@@ -54,8 +54,13 @@ public:
 
     WindowSink(const Host &host, const Options &options)
         : title_(options.text("title")), scale_(options.real("scale")), vsync_(options.boolean("vsync")),
-          status_line_(options.boolean("status_line")),
+          status_line_(options.boolean("status_line")), shows_overlay_(options.text("content") == "overlay"),
           controls_(host, [this](const std::string &text, bool is_error) { show(text, is_error); }) {}
+
+    std::uint32_t capabilities() const {
+        return ARHOST_CAPABILITY_REALTIME_SINK |
+               (shows_overlay_ ? std::uint32_t{ARHOST_CAPABILITY_OVERLAY_INPUT} : 0);
+    }
 
     void start(const arhost_sink_setup &setup) {
         width_ = static_cast<int>(setup.width);
@@ -65,7 +70,7 @@ public:
             focal_length_px_ = setup.intrinsics->fx;
         }
         window_.emplace(width_, height_, scale_, vsync_, title_, [this](char key) { on_key(key); });
-        picture_.emplace(width_, height_);
+        picture_.emplace(width_, height_, shows_overlay_);
         draw();
     }
 
@@ -211,7 +216,7 @@ private:
 
     std::string title_;
     double scale_;
-    bool vsync_, status_line_;
+    bool vsync_, status_line_, shows_overlay_;
     int width_ = 0, height_ = 0; // frame size in px
     std::optional<shading::Lens> lens_;
     double focal_length_px_ = 0;
@@ -225,10 +230,13 @@ private:
     std::optional<Message> message_;
 };
 
+constexpr const char *contents[] = {"frame", "overlay", nullptr};
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "title", "arhost", "Window title."),
     option(ARHOST_OPTION_REAL, "scale", "1", "Initial window size as a multiple of the frame size.", 0.05, 16),
     option(ARHOST_OPTION_BOOL, "vsync", "true", "Synchronize with the display, which avoids tearing."),
+    option(ARHOST_OPTION_TEXT, "content", "frame",
+           "frame, or the overlay alone over black, for see-through displays.", 0, 0, contents),
     option(ARHOST_OPTION_BOOL, "status_line", "true", "Show frame rate, latency, targets and restarts."),
 };
 
@@ -243,7 +251,7 @@ constexpr arhost_descriptor descriptor = {
     "arhost",
     "Apache-2.0",
     "Shows frames in a window.",
-    ARHOST_CAPABILITY_REALTIME_SINK,
+    ARHOST_CAPABILITY_REALTIME_SINK | ARHOST_CAPABILITY_OVERLAY_INPUT,
     std::size(options),
     options,
     needs,

@@ -113,6 +113,22 @@ inline arhost_intrinsics make_intrinsics(int width, int height) {
     return intrinsics;
 }
 
+// An overlay whose rows end with padding. Its alpha covers all values.
+class OverlayPicture {
+public:
+    OverlayPicture(std::uint32_t width, std::uint32_t height)
+        : stride((4 * width + 63) / 64 * 64 + 64), rgba(std::size_t{stride} * height, 0xee) {
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t x = 0; x < width; ++x)
+                for (std::uint32_t channel = 0; channel < 4; ++channel)
+                    pixel(x, y)[channel] = static_cast<std::uint8_t>(3 * x + (5 + channel) * y + 60 * channel);
+    }
+    std::uint8_t *pixel(std::uint32_t x, std::uint32_t y) { return rgba.data() + std::size_t{y} * stride + 4 * x; }
+
+    std::uint32_t stride;
+    std::vector<std::uint8_t> rgba;
+};
+
 // A sink plugin under test. Destroying it without calling `stop` simulates that its worker was killed.
 class SinkUnderTest {
 public:
@@ -121,6 +137,7 @@ public:
     }
 
     bool knows_camera = true; // whether start() passes the intrinsics to the sink
+    bool has_depth = false;   // whether the source delivers depth
 
     arhost_status created() const { return created_; }
     arhost_status start(int width, int height, std::uint64_t first_sequence = 0, double fps = 30) {
@@ -137,10 +154,29 @@ public:
         setup.first_sequence = first_sequence;
         const arhost_intrinsics intrinsics = make_intrinsics(width, height);
         setup.intrinsics = knows_camera ? &intrinsics : nullptr;
+        format_ = {};
+        format_.struct_size = sizeof format_;
+        format_.pixel_format = ARHOST_PIXEL_FORMAT_BGR8;
+        format_.width = setup.width;
+        format_.height = setup.height;
+        format_.has_depth = has_depth;
+        if (!arhost_frame_layout(&format_))
+            throw std::invalid_argument("the size of the frames");
+        setup.video_format = &format_;
         return functions().start(plugin_.instance(), &setup);
     }
-    arhost_status write(const Picture &picture, const arhost_record &record) {
+    const arhost_frame_format &video_format() const { return format_; }
+    std::uint32_t capabilities() const {
+        return functions().capabilities ? functions().capabilities(plugin_.instance()) : descriptor().capabilities;
+    }
+    arhost_status write(const Picture &picture, const arhost_record &record, const OverlayPicture *overlay = nullptr,
+                        const std::uint16_t *depth_mm = nullptr) {
         arhost_output output{};
+        if (overlay) {
+            output.overlay_rgba = overlay->rgba.data();
+            output.overlay_stride = overlay->stride;
+        }
+        output.depth_mm = depth_mm;
         output.struct_size = sizeof output;
         output.stride = static_cast<std::uint32_t>(picture.stride());
         output.width = static_cast<std::uint32_t>(picture.width());
@@ -171,6 +207,7 @@ private:
     arhost_status created_;
     int width_ = 0, height_ = 0;
     double fps_ = 30;
+    arhost_frame_format format_{};
 };
 
 // Runs a sink in a child process, beginning at frame `first_sequence`, and kills the process after the sink has

@@ -56,6 +56,61 @@ protected:
 
 } // namespace
 
+// ---- Other contents --------------------------------------------------------------------------------
+
+TEST_F(SinkImages, AnOverlayKeepsItsAlpha) {
+    OverlayPicture overlay(width, height);
+    for (const std::string name : {"%d.png", "last.png"}) { // written at once; kept until the end
+        SinkUnderTest s = sink(name, {{"content", "overlay"}});
+        EXPECT_EQ(s.capabilities(), ARHOST_CAPABILITY_NUMBERED_FILES | ARHOST_CAPABILITY_OVERLAY_INPUT);
+        ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK) << s.log();
+        ASSERT_EQ(s.write(Picture(width, height, 0), make_record(0), &overlay), ARHOST_STATUS_OK) << s.log();
+        ASSERT_EQ(s.stop(), ARHOST_STATUS_OK) << s.log();
+    }
+    for (const char *name : {"0.png", "last.png"}) {
+        const cv::Mat image = cv::imread(path(name).string(), cv::IMREAD_UNCHANGED);
+        ASSERT_EQ(image.type(), CV_8UC4) << name;
+        ASSERT_EQ(image.size(), cv::Size(width, height));
+        for (int y = 0; y < height; ++y)
+            for (int x = 0; x < width; ++x) {
+                const std::uint8_t *p = overlay.pixel(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
+                ASSERT_EQ(image.at<cv::Vec4b>(y, x), cv::Vec4b(p[2], p[1], p[0], p[3])) << x << ", " << y;
+            }
+    }
+}
+
+TEST_F(SinkImages, DepthIsWrittenWith16Bits) {
+    SinkUnderTest s = sink("depth_%d.png", {{"content", "depth"}});
+    EXPECT_EQ(s.capabilities(), ARHOST_CAPABILITY_NUMBERED_FILES | ARHOST_CAPABILITY_VIDEO_INPUT);
+    s.has_depth = true;
+    ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK) << s.log();
+    const std::size_t stride = s.video_format().depth_stride / 2;
+    std::vector<std::uint16_t> depth_mm(stride * height, 0xdead);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+            depth_mm[static_cast<std::size_t>(y) * stride + static_cast<std::size_t>(x)] =
+                static_cast<std::uint16_t>(400 * x + 7 * y);
+    ASSERT_EQ(s.write(Picture(width, height, 0), make_record(0), nullptr, depth_mm.data()), ARHOST_STATUS_OK);
+    const cv::Mat image = cv::imread(path("depth_0.png").string(), cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(image.type(), CV_16UC1);
+    for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+            ASSERT_EQ(image.at<std::uint16_t>(y, x), static_cast<std::uint16_t>(400 * x + 7 * y)) << x << ", " << y;
+}
+
+TEST_F(SinkImages, ContentsThatCannotBeWrittenAreRejected) {
+    const SinkUnderTest jpeg = sink("%d.jpg", {{"content", "overlay"}});
+    EXPECT_EQ(jpeg.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(jpeg.log(), HasSubstr("content: JPEG stores neither transparent pixels nor depth"));
+    SinkUnderTest depth = sink("%d.png", {{"content", "depth"}});
+    EXPECT_EQ(depth.start(width, height), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(depth.log(), HasSubstr("content: the source delivers no depth"));
+}
+
+TEST_F(SinkImages, FramesNeedNoFurtherInputs) {
+    EXPECT_EQ(sink("%d.png").capabilities(), ARHOST_CAPABILITY_NUMBERED_FILES);
+}
+
 // ---- Numbered images -------------------------------------------------------------------------------
 
 TEST_F(SinkImages, EveryFrameBecomesANumberedPngOfTheSamePixels) {

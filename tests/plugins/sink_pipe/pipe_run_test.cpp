@@ -64,6 +64,35 @@ TEST(PipeRun, StandardOutputHasOnlyTheVideo) {
     }
 }
 
+TEST(PipeRun, TheOverlayAloneMatchesTheComposite) {
+    ArhostRun run("version: 1\nframes: 3\n"
+                  "source: {plugin: source_synthetic, options: {width: 160, height: 120, id: 0, side_mm: 80}}\n"
+                  "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+                  "raytracer: {plugin: rt_embree, scene: demo}\n"
+                  "outputs:\n"
+                  "  - {plugin: sink_pipe, path: out/frame, options: {format: rgba}}\n"
+                  "  - {plugin: sink_pipe, path: out/overlay, options: {format: rgba, content: overlay}}\n");
+    const auto read_all = [](const fs::path &fifo) {
+        return std::async(std::launch::async, [fifo] { return FifoReader(fifo).read_all(); });
+    };
+    auto frames = read_all(make_fifo(run.path("out/frame"))), overlays = read_all(make_fifo(run.path("out/overlay")));
+    ASSERT_EQ(run.run(), 0) << run.output();
+    const std::string frame = frames.get(), overlay = overlays.get();
+    ASSERT_EQ(frame.size(), 3u * 160 * 120 * 4);
+    ASSERT_EQ(overlay.size(), frame.size());
+    std::size_t opaque = 0, partial = 0, clear = 0;
+    for (std::size_t i = 0; i < overlay.size(); i += 4) {
+        const auto alpha = static_cast<std::uint8_t>(overlay[i + 3]);
+        ++(alpha == 255 ? opaque : alpha == 0 ? clear : partial);
+        if (alpha == 255) {
+            ASSERT_EQ(overlay.compare(i, 3, frame, i, 3), 0) << "pixel " << i / 4;
+        }
+    }
+    EXPECT_GT(opaque, 500u);
+    EXPECT_GT(partial, 100u) << "shadows";
+    EXPECT_GT(clear, 10'000u);
+}
+
 TEST(PipeRun, AClosedReaderOfStandardOutputEndsTheRun) {
     int ends[2];
     ASSERT_EQ(::pipe2(ends, O_CLOEXEC), 0);

@@ -11,6 +11,7 @@
 namespace fs = std::filesystem;
 using arhost::test::FifoReader;
 using arhost::test::make_fifo;
+using arhost::test::OverlayPicture;
 using arhost::test::Picture;
 using arhost::test::SinkUnderTest;
 using testing::HasSubstr;
@@ -82,6 +83,32 @@ TEST_F(SinkPipe, WritesPixelsExactly) {
         const std::string received = stream(format, 13, 7, 2);
         EXPECT_EQ(received.size(), 2 * expected.size()) << format;
         EXPECT_TRUE(received.ends_with(expected)) << format;
+    }
+}
+
+TEST_F(SinkPipe, WritesTheOverlayAloneWithItsAlpha) {
+    OverlayPicture overlay(13, 7);
+    for (const auto &[format, order] : {std::pair{"rgba", "0123"}, std::pair{"bgra", "2103"}}) {
+        std::string expected;
+        for (std::uint32_t y = 0; y < 7; ++y)
+            for (std::uint32_t x = 0; x < 13; ++x)
+                for (const char *c = order; *c; ++c)
+                    expected += static_cast<char>(overlay.pixel(x, y)[*c - '0']);
+        std::future<std::string> received = read_all(fifo);
+        SinkUnderTest sink("sink_pipe", {{"path", path}, {"format", format}, {"content", "overlay"}});
+        EXPECT_EQ(sink.capabilities(), ARHOST_CAPABILITY_STANDARD_OUTPUT | ARHOST_CAPABILITY_OVERLAY_INPUT);
+        ASSERT_EQ(sink.start(13, 7), ARHOST_STATUS_OK) << sink.log();
+        EXPECT_EQ(sink.write(Picture(13, 7, 0), arhost::test::make_record(0), &overlay), ARHOST_STATUS_OK);
+        EXPECT_EQ(sink.stop(), ARHOST_STATUS_OK);
+        EXPECT_TRUE(received.get() == expected) << format;
+    }
+}
+
+TEST_F(SinkPipe, AnOverlayNeedsAFormatWithAlpha) {
+    for (const char *format : {"y4m", "y4m444", "rgb", "bgr"}) {
+        const SinkUnderTest sink("sink_pipe", {{"path", path}, {"format", format}, {"content", "overlay"}});
+        EXPECT_EQ(sink.created(), ARHOST_STATUS_ERROR_CONFIGURATION) << format;
+        EXPECT_THAT(sink.log(), HasSubstr("needs 'format: rgba' or 'format: bgra'"));
     }
 }
 

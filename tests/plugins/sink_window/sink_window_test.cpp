@@ -175,6 +175,29 @@ TEST_F(SinkWindow, ShowsEachFramePixelForPixel) {
     EXPECT_EQ(sink.stop(), ARHOST_STATUS_OK);
 }
 
+TEST_F(SinkWindow, ShowsTheOverlayAloneOverBlack) {
+    constexpr std::uint32_t width = 120, height = 90;
+    SinkUnderTest &sink = start(width, height, {{"content", "overlay"}});
+    EXPECT_EQ(sink.capabilities(), ARHOST_CAPABILITY_REALTIME_SINK | ARHOST_CAPABILITY_OVERLAY_INPUT);
+    OverlayPicture overlay(width, height);
+    ASSERT_EQ(sink.write(Picture(width, height, 0), make_record(0), &overlay), ARHOST_STATUS_OK) << sink.log();
+    double worst = 255;
+    becomes([&] {
+        const Screenshot shot = observer_->window();
+        worst = 0;
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t x = 0; x < width; ++x)
+                for (int channel = 0; channel < 3; ++channel) {
+                    const std::uint8_t *const rgba = overlay.pixel(x, y);
+                    const double expected = rgba[2 - channel] * rgba[3] / 255.0;
+                    const int actual = shot.pixel(static_cast<int>(x), static_cast<int>(y))[channel];
+                    worst = std::max(worst, std::abs(actual - expected));
+                }
+        return worst <= 2;
+    });
+    EXPECT_LE(worst, 2);
+}
+
 TEST_F(SinkWindow, AcceptsOddSizesAndPaddedRows) {
     for (const auto &[width, height] : {std::pair{131, 97}, {130, 33}}) {
         SinkUnderTest &sink = start(width, height);
@@ -439,6 +462,7 @@ TEST(SinkWindowWithoutScreen, NamesWhatIsMissingAndWhatToTry) {
 
 TEST(SinkWindowWithoutScreen, DeclaresDisplayNeedsAndRealtimeCapability) {
     const SinkUnderTest sink("sink_window", {});
-    EXPECT_EQ(sink.descriptor().capabilities, std::uint32_t{ARHOST_CAPABILITY_REALTIME_SINK});
+    EXPECT_EQ(sink.descriptor().capabilities, ARHOST_CAPABILITY_REALTIME_SINK | ARHOST_CAPABILITY_OVERLAY_INPUT);
+    EXPECT_EQ(sink.capabilities(), std::uint32_t{ARHOST_CAPABILITY_REALTIME_SINK}) << "a frame needs no overlay";
     EXPECT_NE(sink.functions().idle, nullptr);
 }
