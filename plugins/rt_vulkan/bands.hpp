@@ -22,6 +22,8 @@ public:
     std::uint32_t rows() const { return rows_; }
     // Records that a band of `rows` took `time`, including other work in the same submission.
     void record(std::uint32_t rows, Milliseconds time);
+    // Forgets the duration of earlier bands.
+    void restart() { rows_ = unit; }
 
 private:
     std::uint32_t image_rows_;

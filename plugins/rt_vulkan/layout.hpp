@@ -99,7 +99,7 @@ struct Frame {
     std::uint32_t environment_texture;
     float environment_intensity;
     float environment_from_world[3][4];
-    std::uint32_t environment_rows, environment_columns, unused[2];
+    std::uint32_t environment_rows, environment_columns, has_slopes, unused;
     float samples[max_samples][4];
 };
 
@@ -132,7 +132,7 @@ enum Binding : std::uint32_t {
 struct Specialization {
     std::int32_t stack_capacity;
     std::uint32_t has_glass, has_catchers, has_holes; // 0 or 1
-    std::uint32_t ray_dimensions, has_slopes, has_textures, has_area_lights;
+    std::uint32_t ray_dimensions, has_textures, has_area_lights;
 };
 
 } // namespace rt_vulkan

@@ -95,6 +95,14 @@ public:
             info.device_time_ns = renderer_->last_gpu_ns();
     }
 
+    static constexpr const char *changeable[] = {"samples", "light_samples", nullptr};
+    void set(const arhost::Options &changed) {
+        if (changed.contains("samples"))
+            renderer_->set_samples(static_cast<std::uint32_t>(changed.integer("samples")));
+        else
+            renderer_->set_light_samples(static_cast<std::uint32_t>(changed.integer("light_samples")));
+    }
+
     void stop() {
         if (const std::uint64_t count = renderer_->image_count(); count && renderer_->gpu_ms() > 0) {
             char text[128];

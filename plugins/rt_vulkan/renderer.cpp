@@ -50,6 +50,12 @@ const char *contents_of(Binding binding) {
     }
 }
 
+VkDescriptorType descriptor_type(std::uint32_t binding) {
+    return binding == frame_binding       ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER
+           : binding == top_level_binding ? VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR
+                                          : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+}
+
 PhysicalDevice checked(const PhysicalDevice &device) {
     if (const std::string why = missing_requirement(device); !why.empty())
         throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
@@ -95,7 +101,13 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
       scene_(*setup.scene, shaders.path == Path::plain, host),
       samples_(arhost::raytracer_common::sample_positions(settings.samples)),
       bands_(intrinsics_.height, settings.max_band_time.value_or(max_band_time(physical))) {
-    make_buffers(intrinsics_, shaders.path);
+    frame_ = scene_.frame();
+    frame_.width = intrinsics_.width;
+    frame_.height = intrinsics_.height;
+    frame_.light_samples = settings.light_samples;
+    frame_.single_path = settings.single_path;
+    frame_.accumulates = settings.accumulate;
+    make_buffers(shaders.path);
     if (shaders.path != Path::plain) {
         const Heartbeat heartbeat(host_, "building acceleration structures");
         structures_.emplace(device_, submission_, *setup.scene, scene_.objects(), buffers_[indices_binding], stage_,
@@ -118,13 +130,26 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
                                                 timestamps_.get(), begun);
         submission_.end(start_timestamps_);
     }
-    frame_ = scene_.frame();
-    frame_.width = intrinsics_.width;
-    frame_.height = intrinsics_.height;
-    frame_.light_samples = settings.light_samples;
-    frame_.single_path = settings.single_path;
-    frame_.accumulates = settings.accumulate;
     scene_.release_static_parts();
+}
+
+void Renderer::set_samples(std::uint32_t samples) {
+    if (samples > 1 && !frame_.has_slopes) {
+        make_rays(true);
+        write_descriptor_set();
+        for (Target &target : targets_)
+            target.recorded = {}; // the update of the descriptor set invalidates the commands
+    }
+    settings_.samples = samples;
+    samples_ = arhost::raytracer_common::sample_positions(samples);
+    bands_.restart(); // the next image may take much longer than the last one
+    history_camera_.reset();
+}
+
+void Renderer::set_light_samples(std::uint32_t samples) {
+    frame_.light_samples = samples;
+    bands_.restart();
+    history_camera_.reset();
 }
 
 Buffer Renderer::make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t min_size,
@@ -147,9 +172,16 @@ Buffer Renderer::make_buffer(Binding binding, std::span<const Bytes> parts, std:
     return buffer;
 }
 
-void Renderer::make_buffers(const arhost_intrinsics &intrinsics, Path path) {
-    const bool has_slopes = settings_.samples > 1 || settings_.accumulate;
-    const std::size_t pixels = std::size_t{intrinsics.width} * intrinsics.height;
+void Renderer::make_rays(bool has_slopes) {
+    const RayTable table = make_ray_table(intrinsics_, has_slopes);
+    const Bytes part = std::as_bytes(std::span(table.values));
+    buffers_[rays_binding] = make_buffer(rays_binding, {&part, 1}, 0);
+    ray_dimensions_ = table.dimensions;
+    frame_.has_slopes = has_slopes;
+}
+
+void Renderer::make_buffers(Path path) {
+    const std::size_t pixels = std::size_t{intrinsics_.width} * intrinsics_.height;
     std::size_t moving_size = 0;
     for (std::uint32_t i = objects_binding; i <= tables_binding; ++i) {
         const auto binding = static_cast<Binding>(i);
@@ -157,12 +189,7 @@ void Renderer::make_buffers(const arhost_intrinsics &intrinsics, Path path) {
                                         binding == indices_binding && path != Path::plain ? build_input_usage : 0);
         moving_size += scene_.moving_size(binding);
     }
-    {
-        const RayTable table = make_ray_table(intrinsics, has_slopes);
-        ray_dimensions_ = table.dimensions;
-        const Bytes part = std::as_bytes(std::span(table.values));
-        buffers_[rays_binding] = make_buffer(rays_binding, {&part, 1}, 0);
-    }
+    make_rays(settings_.samples > 1 || settings_.accumulate);
     buffers_[history_binding] = make_buffer(history_binding, {}, settings_.accumulate ? sizeof(Sums) * pixels : 0);
     buffers_[image_binding] = make_buffer(image_binding, {}, 4 * pixels);
     buffers_[drawn_binding] = make_buffer(drawn_binding, {}, drawn_size);
@@ -176,15 +203,10 @@ void Renderer::make_buffers(const arhost_intrinsics &intrinsics, Path path) {
 void Renderer::make_descriptor_set(const Shaders &shaders) {
     const VolkDeviceTable &vk = device_.functions();
     constexpr const char *what = "creating the descriptor set";
-    // The top-level acceleration structure, if any, comes last.
-    const std::uint32_t count = binding_count + (structures_ ? 1 : 0);
+    const std::uint32_t count = descriptor_count();
     std::array<VkDescriptorSetLayoutBinding, binding_count + 1> bindings{};
-    for (std::uint32_t i = 0; i < count; ++i) {
-        const VkDescriptorType type = i == frame_binding       ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER
-                                      : i == top_level_binding ? VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR
-                                                               : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-        bindings[i] = {i, type, 1, shaders.stage_flags(), nullptr};
-    }
+    for (std::uint32_t i = 0; i < count; ++i)
+        bindings[i] = {i, descriptor_type(i), 1, shaders.stage_flags(), nullptr};
     const VkDescriptorSetLayoutCreateInfo set_info{.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
                                                    .bindingCount = count,
                                                    .pBindings = bindings.data()};
@@ -203,6 +225,19 @@ void Renderer::make_descriptor_set(const Shaders &shaders) {
                                                  .descriptorSetCount = 1,
                                                  .pSetLayouts = &layout};
     check(vk.vkAllocateDescriptorSets(device_.handle(), &allocation, &set_), what);
+    write_descriptor_set();
+
+    const VkPushConstantRange push_constants{shaders.stage_flags(), 0, push_constants_size};
+    const VkPipelineLayoutCreateInfo layout_info{.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
+                                                 .setLayoutCount = 1,
+                                                 .pSetLayouts = &layout,
+                                                 .pushConstantRangeCount = 1,
+                                                 .pPushConstantRanges = &push_constants};
+    layout_ = {device_, vk.vkCreatePipelineLayout, layout_info, what};
+}
+
+void Renderer::write_descriptor_set() {
+    const std::uint32_t count = descriptor_count();
     std::array<VkDescriptorBufferInfo, binding_count> infos{};
     std::array<VkWriteDescriptorSet, binding_count + 1> writes{};
     const VkAccelerationStructureKHR top_level = structures_ ? structures_->top_level() : VK_NULL_HANDLE;
@@ -216,21 +251,13 @@ void Renderer::make_descriptor_set(const Shaders &shaders) {
                      .dstSet = set_,
                      .dstBinding = i,
                      .descriptorCount = 1,
-                     .descriptorType = bindings[i].descriptorType};
+                     .descriptorType = descriptor_type(i)};
         if (i != top_level_binding) {
             infos[i] = {buffers_[i].get(), 0, VK_WHOLE_SIZE};
             writes[i].pBufferInfo = &infos[i];
         }
     }
-    vk.vkUpdateDescriptorSets(device_.handle(), count, writes.data(), 0, nullptr);
-
-    const VkPushConstantRange push_constants{shaders.stage_flags(), 0, push_constants_size};
-    const VkPipelineLayoutCreateInfo layout_info{.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
-                                                 .setLayoutCount = 1,
-                                                 .pSetLayouts = &layout,
-                                                 .pushConstantRangeCount = 1,
-                                                 .pPushConstantRanges = &push_constants};
-    layout_ = {device_, vk.vkCreatePipelineLayout, layout_info, what};
+    device_.functions().vkUpdateDescriptorSets(device_.handle(), count, writes.data(), 0, nullptr);
 }
 
 void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
@@ -241,7 +268,6 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
                                    scene_.has_catchers(),
                                    scene_.has_holes(),
                                    ray_dimensions_,
-                                   settings_.samples > 1 || settings_.accumulate,
                                    scene_.has_textures(),
                                    scene_.has_area_lights()};
     const Heartbeat heartbeat(host_, "compiling the shader");

@@ -37,6 +37,10 @@ public:
     // NULL if nothing has moved since the last call.
     Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr);
 
+    // Both change the images of later calls as if the renderer had been created with this setting.
+    void set_samples(std::uint32_t samples);
+    void set_light_samples(std::uint32_t samples);
+
     const SceneData &scene() const { return scene_; }
     // Whether the device wrote the last image directly into the caller's memory.
     bool wrote_in_place() const { return wrote_in_place_; }
@@ -61,10 +65,14 @@ private:
         VkCommandBuffer commands = VK_NULL_HANDLE;
         Rows recorded{}; // the rows that `commands` trace
     };
-    void make_buffers(const arhost_intrinsics &intrinsics, Path path);
+    void make_rays(bool has_slopes);
+    void make_buffers(Path path);
     Buffer make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t min_size,
                        VkBufferUsageFlags more_usage = 0);
+    // The top-level acceleration structure, if any, is the last descriptor.
+    std::uint32_t descriptor_count() const { return binding_count + (structures_ ? 1 : 0); }
     void make_descriptor_set(const Shaders &shaders);
+    void write_descriptor_set();
     void make_pipeline(const Shaders &shaders, std::uint32_t max_depth);
     Target &target_for(const arhost_image &image);
     void record(Target &target, Rows rows) const;

@@ -113,14 +113,36 @@ const FamilyType &family_type(const std::string &name) {
 class AprilTagTracker {
 public:
     AprilTagTracker(const arhost::Host &, const arhost::Options &options)
-        : type_(family_type(options.text("family"))), fit_edges_(options.text("corner_refinement") == "edges"),
-          decimate_(options.real("quad_decimate")), sigma_(options.real("quad_sigma")),
-          refine_edges_(options.boolean("refine_edges")), sharpening_(options.real("decode_sharpening")),
-          max_hamming_(static_cast<int>(options.integer("max_hamming"))),
-          min_margin_(options.real("min_decision_margin")), threads_(static_cast<int>(options.integer("threads"))) {
+        : type_(family_type(options.text("family"))), threads_(static_cast<int>(options.integer("threads"))) {
+        set(options);
+    }
+
+    static constexpr const char *changeable[] = {
+        "corner_refinement", "quad_decimate", "quad_sigma",          "refine_edges",
+        "decode_sharpening", "max_hamming",   "min_decision_margin", nullptr};
+    // Takes the options that `changed` contains.
+    void set(const arhost::Options &changed) {
+        const auto take_real = [&](const char *key, double &value) {
+            if (changed.contains(key))
+                value = changed.real(key);
+        };
+        double decimate = decimate_;
+        take_real("quad_decimate", decimate);
         // For other factors, the library would decimate by the integer part but scale the corners by the full factor.
-        if (decimate_ != 1.5 && decimate_ != std::floor(decimate_))
+        if (decimate != 1.5 && decimate != std::floor(decimate))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "quad_decimate: must be 1, 1.5 or an integer");
+        decimate_ = decimate;
+        take_real("quad_sigma", sigma_);
+        take_real("decode_sharpening", sharpening_);
+        take_real("min_decision_margin", min_margin_);
+        if (changed.contains("corner_refinement"))
+            fit_edges_ = changed.text("corner_refinement") == "edges";
+        if (changed.contains("refine_edges"))
+            refine_edges_ = changed.boolean("refine_edges");
+        if (changed.contains("max_hamming"))
+            max_hamming_ = static_cast<int>(changed.integer("max_hamming"));
+        if (detector_)
+            configure_detector();
     }
 
     void start(const arhost_tracker_setup &setup) {
@@ -129,12 +151,8 @@ public:
         report_.emplace(setup, type_.name, whole->ncodes);
         family_.emplace(type_, report_->ids());
         detector_.reset(apriltag_detector_create());
-        detector_->quad_decimate = static_cast<float>(decimate_);
-        detector_->quad_sigma = static_cast<float>(sigma_);
-        detector_->refine_edges = refine_edges_;
-        detector_->decode_sharpening = sharpening_;
         detector_->nthreads = threads_;
-        apriltag_detector_add_family_bits(detector_.get(), family_->get(), max_hamming_);
+        configure_detector();
         // In older releases of the library, new threads take tasks while the task list may still be reallocated
         // (AprilRobotics/apriltag, pull request 339). Process a small frame with few tasks first: after it, the
         // threads wait for a signal before they take tasks.
@@ -171,6 +189,15 @@ public:
     }
 
 private:
+    void configure_detector() {
+        detector_->quad_decimate = static_cast<float>(decimate_);
+        detector_->quad_sigma = static_cast<float>(sigma_);
+        detector_->refine_edges = refine_edges_;
+        detector_->decode_sharpening = sharpening_;
+        apriltag_detector_clear_families(detector_.get());
+        apriltag_detector_add_family_bits(detector_.get(), family_->get(), max_hamming_);
+    }
+
     // The library reads out of bounds in images smaller than one of its 4×4 px tiles.
     int min_image_side() const { return static_cast<int>(8 * decimate_); }
 
@@ -185,13 +212,13 @@ private:
     }
 
     const FamilyType &type_;
-    bool fit_edges_;
-    double decimate_, sigma_;
-    bool refine_edges_;
-    double sharpening_;
-    int max_hamming_;
-    double min_margin_;
-    int threads_;
+    const int threads_;
+    bool fit_edges_ = true;
+    double decimate_ = 1.5, sigma_ = 0;
+    bool refine_edges_ = true;
+    double sharpening_ = 0.25;
+    int max_hamming_ = 2;
+    double min_margin_ = 0;
 
     std::optional<MarkerReport> report_;
     std::optional<ListedFamily> family_;

@@ -75,10 +75,10 @@ vec3 stored_ray(uint first, float z) {
 // Computes the ray direction, in world space, at the offset `within` from a pixel's centre. Returns false if the
 // pixel is outside the field of view of the lens.
 bool direction_of(uint pixel, vec2 within, out vec3 direction) {
-    uint first = pixel * ray_dimensions * (has_slopes ? 3u : 1u);
+    uint first = pixel * ray_dimensions * (frame.has_slopes != 0u ? 3u : 1u);
     direction = stored_ray(first, 1.0);
     bool is_visible = abs(direction.x) < 1e29;
-    if (has_slopes)
+    if (frame.has_slopes != 0u)
         direction += stored_ray(first + ray_dimensions, 0.0) * within.x +
                      stored_ray(first + 2u * ray_dimensions, 0.0) * within.y;
     mat3 m = frame.world_from_camera;

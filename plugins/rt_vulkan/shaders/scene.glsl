@@ -24,9 +24,8 @@ layout(constant_id = 1) const bool has_glass = true;
 layout(constant_id = 2) const bool has_catchers = true;
 layout(constant_id = 3) const bool has_holes = true; // whether any object has holes
 layout(constant_id = 4) const uint ray_dimensions = 2u;
-layout(constant_id = 5) const bool has_slopes = false;
-layout(constant_id = 6) const bool has_textures = true; // whether the scene has textures
-layout(constant_id = 7) const bool has_area_lights = true;
+layout(constant_id = 5) const bool has_textures = true; // whether the scene has textures
+layout(constant_id = 6) const bool has_area_lights = true;
 
 struct Object {
     mat4x3 object_from_world;
@@ -113,8 +112,9 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     uint environment_texture;
     float environment_intensity;
     mat3 environment_from_world;
-    uint environment_rows, environment_columns, unused, unused_2; // indices into `tables`
-    vec4 samples[256];                                            // x, y: offset from the pixel's centre in px, −½ to ½
+    uint environment_rows, environment_columns; // indices into `tables`
+    uint has_slopes, unused;
+    vec4 samples[256]; // x, y: offset from the pixel's centre in px, −½ to ½
 }
 frame;
 

@@ -95,6 +95,7 @@ public:
 
     arhost_status created() const { return created_; }
     std::string log() const { return plugin_.log(); }
+    arhost_status set(const char *key, const char *text) { return plugin_.set_text(key, text); }
 
     arhost_status start(const arhost_intrinsics &camera, const std::vector<Listed> &listed) {
         stop();

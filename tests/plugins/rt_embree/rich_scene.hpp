@@ -127,4 +127,22 @@ inline ArenaBuilder rich_scene() {
     return builder;
 }
 
+// Checks that changed options have the same effect on a running plugin as on a new one.
+inline void expect_changed_options_apply(const std::string &plugin, const Options &options,
+                                         const arhost_intrinsics &intrinsics) {
+    const arhost_camera view = from_the_side(intrinsics);
+    Tracer tracer(rich_scene(), options, plugin);
+    ASSERT_EQ(tracer.start(intrinsics), ARHOST_STATUS_OK) << tracer.plugin().log();
+    Picture picture(intrinsics); // its memory remains the same
+    ASSERT_EQ(tracer.try_render(view, picture), ARHOST_STATUS_OK);
+    Options changed = options;
+    for (const auto &[key, value] : {std::pair{"samples", "3"}, {"light_samples", "2"}, {"samples", "1"}}) {
+        changed[key] = value;
+        ASSERT_EQ(tracer.plugin().set_text(key, value), ARHOST_STATUS_OK) << tracer.plugin().log();
+        ASSERT_EQ(tracer.try_render(view, picture), ARHOST_STATUS_OK) << tracer.plugin().log();
+        EXPECT_EQ(picture.pixels(), Tracer(rich_scene(), changed, plugin).render(view).pixels())
+            << key << " " << value;
+    }
+}
+
 } // namespace arhost::test

@@ -130,6 +130,13 @@ TEST(Silhouette, SphereBehindAFisheyeCameraIsVisible) {
     EXPECT_EQ(picture.alpha(static_cast<int>(in.cx + 60 * theta), 150), 255);
 }
 
+// ---- Changes of options ----------------------------------------------------------------------------
+
+TEST(Option, CanBeChangedWhileRunning) {
+    expect_changed_options_apply("rt_embree", {}, pinhole());
+    expect_changed_options_apply("rt_embree", {{"accumulate", "true"}}, pinhole());
+}
+
 // ---- Scaled images ---------------------------------------------------------------------------------
 
 TEST(ScaledImage, EqualsThatOfARendererOfThisSize) {

@@ -42,6 +42,13 @@ TEST(Bands, GrowToOneFromTheThirdFastImageOn) {
     EXPECT_EQ(bands_of_image(bands, fast), (std::vector<std::uint32_t>{height}));
 }
 
+TEST(Bands, RestartWithTheMinimum) {
+    Bands bands(height, max_time);
+    bands.record(height, max_time / 100);
+    bands.restart();
+    EXPECT_EQ(bands.rows(), Bands::unit);
+}
+
 TEST(Bands, StayBelowTheMaximumTimeForSlowImages) {
     Bands bands(height, max_time);
     const auto slow = [](std::uint32_t) { return 1.6; };

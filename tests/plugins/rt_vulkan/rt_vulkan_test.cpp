@@ -247,6 +247,11 @@ TEST_P(EachPath, TracesTheSamePictureInBandsAndAtOnce) {
     }
 }
 
+TEST_P(EachPath, AcceptsChangesOfOptions) {
+    expect_changed_options_apply("rt_vulkan", {{"path", GetParam()}}, small);
+    expect_changed_options_apply("rt_vulkan", {{"path", GetParam()}, {"accumulate", "true"}}, small);
+}
+
 TEST_P(EachPath, IsLogged) {
     Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK);

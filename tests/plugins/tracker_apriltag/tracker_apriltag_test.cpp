@@ -73,6 +73,50 @@ TEST(AprilTagTracker, CorrectsTheConfiguredNumberOfWrongBits) {
     }
 }
 
+TEST(AprilTagTracker, AcceptsChangesOfOptionsWhileItTracks) {
+    Print damaged = april_tag("tag36h11", 3);
+    damaged.cells(4, 4) = 255 - damaged.cells(4, 4);
+    const GreyFrame frame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}));
+    Tracker tracker("tracker_apriltag");
+    ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+    const auto corners = [&] {
+        const auto found = tracker.track(frame);
+        return found.empty() ? std::vector<double>()
+                             : std::vector<double>(&found[0].corners_px[0][0], &found[0].corners_px[0][0] + 8);
+    };
+    const auto fitted = corners();
+    EXPECT_FALSE(fitted.empty());
+    for (const auto &[key, other, initial] :
+         {std::tuple{"max_hamming", "0", "2"}, {"min_decision_margin", "255", "0"}}) {
+        EXPECT_EQ(tracker.set(key, other), ARHOST_STATUS_OK) << tracker.log();
+        EXPECT_TRUE(corners().empty()) << key;
+        EXPECT_EQ(tracker.set(key, initial), ARHOST_STATUS_OK) << tracker.log();
+        EXPECT_EQ(corners(), fitted) << key;
+    }
+    // Without arhost's refinement, the corners show a change of the detection.
+    EXPECT_EQ(tracker.set("corner_refinement", "none"), ARHOST_STATUS_OK) << tracker.log();
+    const auto library = corners();
+    EXPECT_NE(library, fitted);
+    for (const auto &[key, other, initial] :
+         {std::tuple{"quad_decimate", "4", "1.5"}, {"quad_sigma", "1.5", "0"}, {"refine_edges", "false", "true"}}) {
+        EXPECT_EQ(tracker.set(key, other), ARHOST_STATUS_OK) << tracker.log();
+        EXPECT_NE(corners(), library) << key;
+        EXPECT_EQ(tracker.set(key, initial), ARHOST_STATUS_OK) << tracker.log();
+        EXPECT_EQ(corners(), library) << key;
+    }
+    EXPECT_EQ(tracker.set("decode_sharpening", "1"), ARHOST_STATUS_OK) << tracker.log();
+    EXPECT_EQ(corners(), library);
+}
+
+TEST(AprilTagTracker, KeepsItsDecimationIfTheNewOneIsInvalid) {
+    const GreyFrame frame(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}));
+    Tracker tracker("tracker_apriltag");
+    ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+    EXPECT_EQ(tracker.set("quad_decimate", "2.5"), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(), HasSubstr("quad_decimate: must be 1, 1.5 or an integer"));
+    EXPECT_EQ(tracker.track(frame).size(), 1u);
+}
+
 TEST(AprilTagTracker, LibraryCornersUseTheSamePixelCentres) {
     Tracker tracker("tracker_apriltag", {{"corner_refinement", "none"}, {"quad_decimate", "1"}});
     ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
