@@ -99,8 +99,12 @@ TEST(JsonAbi, RejectsInvalidFormatsAndIntrinsics) {
                    {"height", 480},
                    {"yuv_matrix", ARHOST_YUV_MATRIX_BT601},
                    {"yuv_range", ARHOST_YUV_RANGE_LIMITED},
-                   {"fps", 30.0}};
-    EXPECT_EQ(format_from_json(format).stride[0], 1280u);
+                   {"fps", 30.0},
+                   {"has_depth", true}};
+    const arhost_frame_format parsed = format_from_json(format);
+    EXPECT_EQ(parsed.stride[0], 1280u);
+    EXPECT_EQ(parsed.depth_stride, 1280u);
+    EXPECT_EQ(parsed.byte_size, parsed.depth_offset + 1280u * 480);
     for (const auto &[key, value] : std::map<std::string, Json>{{"pixel_format", 99},
                                                                 {"width", 641},
                                                                 {"height", 0},
