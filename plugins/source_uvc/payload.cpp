@@ -21,10 +21,9 @@ std::optional<PayloadHeader> parse_payload_header(Bytes payload) {
     header.is_still = info & still_image;
     std::size_t at = 2;
     const auto ticks = [&] {
-        std::uint32_t value = 0;
-        for (unsigned i = 0; i < 4; ++i)
-            value |= std::uint32_t{payload[at + i]} << (8 * i);
-        return value;
+        const std::uint8_t *bytes = payload.data() + at;
+        return bytes[0] | std::uint32_t{bytes[1]} << 8 | std::uint32_t{bytes[2]} << 16 |
+               std::uint32_t{bytes[3]} << 24;
     };
     // Some cameras set the bits of fields that their header is too short for.
     if (info & has_presentation && header.size >= at + 4) {
@@ -61,6 +60,16 @@ void Losses::count(Damage damage) {
 FrameAssembler::FrameAssembler(std::size_t max_bytes, std::size_t exact_bytes, Take take)
     : max_bytes_(max_bytes), exact_bytes_(exact_bytes), take_(std::move(take)) {
     frame_.bytes.reserve(max_bytes);
+}
+
+inline void FrameAssembler::append(Bytes data) {
+    if (!in_frame_)
+        return;
+    const std::size_t space = max_bytes_ - frame_.bytes.size();
+    if (data.size() > space)
+        damage(Damage::oversized);
+    const Bytes kept = data.first(std::min(data.size(), space));
+    frame_.bytes.insert(frame_.bytes.end(), kept.begin(), kept.end());
 }
 
 void FrameAssembler::add_payload(Bytes payload, std::int64_t arrival_ns) {
@@ -115,16 +124,6 @@ void FrameAssembler::begin(Bytes payload, std::int64_t arrival_ns) {
     if (header->has_error)
         damage(Damage::marked);
     append(data);
-}
-
-void FrameAssembler::append(Bytes data) {
-    if (!in_frame_)
-        return;
-    const std::size_t space = max_bytes_ - frame_.bytes.size();
-    if (data.size() > space)
-        damage(Damage::oversized);
-    const Bytes kept = data.first(std::min(data.size(), space));
-    frame_.bytes.insert(frame_.bytes.end(), kept.begin(), kept.end());
 }
 
 void FrameAssembler::end() {

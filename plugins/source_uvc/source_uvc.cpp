@@ -27,7 +27,7 @@ using Clock = std::chrono::steady_clock;
 
 // A camera that delivers no intact frame for this long is reported as lost.
 constexpr auto silence_limit = std::chrono::seconds(5);
-constexpr auto poll_slice = std::chrono::milliseconds(50);
+constexpr auto poll_slice = std::chrono::milliseconds(100); // the ABI permits no longer wait
 
 constexpr arhost::AutomaticControl<std::string_view> automatic_controls[] = {
     {"exposure", "exposure_time_absolute", "auto_exposure"},
@@ -339,8 +339,11 @@ private:
             return jpeg_.decode(bytes, format, buffer.plane, fault_);
         const std::uint8_t *from = bytes.data(); // an intact frame has all rows, without padding
         const auto copy_rows = [&](std::uint32_t plane, std::size_t row_bytes, std::size_t rows) {
-            for (std::size_t y = 0; y < rows; ++y, from += row_bytes)
-                std::memcpy(buffer.plane[plane] + y * format.stride[plane], from, row_bytes);
+            std::uint8_t *to = buffer.plane[plane];
+            const std::size_t stride = format.stride[plane];
+            for (std::size_t y = 0; y < rows; ++y)
+                std::memcpy(to + y * stride, from + y * row_bytes, row_bytes);
+            from += rows * row_bytes;
         };
         if (encoding_ == uvc::Encoding::yuy2) {
             copy_rows(0, 2 * std::size_t{format.width}, format.height);
