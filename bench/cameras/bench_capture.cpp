@@ -2,23 +2,16 @@
 //
 // A bare capture loop with the same copies as a worker with source_v4l2: each frame is copied once, and a grey plane
 // is made of YUYV. Prints its CPU time per frame in ms:
-//   bench-capture DEVICE FORMAT WIDTH HEIGHT FPS FRAMES
-#include "pixels/grey.hpp"
+//   bench-capture DEVICE yuyv|grey WIDTH HEIGHT FPS FRAMES
+#include "bare_loop.hpp"
 
 #include <fcntl.h>
 #include <linux/videodev2.h>
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
-#include <sys/resource.h>
-#include <unistd.h>
 
-#include <array>
-#include <cstdio>
-#include <cstdlib>
-#include <cstring>
 #include <string>
-#include <vector>
 
 namespace {
 
@@ -27,13 +20,6 @@ template <class T> void request(int fd, unsigned long code, T &argument, const c
         std::perror(what);
         std::exit(1);
     }
-}
-
-double cpu_ms() {
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    const auto ms = [](const timeval &time) { return 1e3 * double(time.tv_sec) + 1e-3 * double(time.tv_usec); };
-    return ms(usage.ru_utime) + ms(usage.ru_stime);
 }
 
 } // namespace
@@ -46,7 +32,6 @@ int main(int count, char **arguments) {
     const bool is_yuyv = arguments[2] == std::string("yuyv");
     const auto width = static_cast<std::uint32_t>(std::atoi(arguments[3]));
     const auto height = static_cast<std::uint32_t>(std::atoi(arguments[4]));
-    const int frames = std::atoi(arguments[6]);
     const int fd = open(arguments[1], O_RDWR | O_NONBLOCK | O_CLOEXEC);
     v4l2_format set{};
     set.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -56,7 +41,7 @@ int main(int count, char **arguments) {
     request(fd, VIDIOC_S_FMT, set, "setting the format");
     v4l2_streamparm rate{};
     rate.type = set.type;
-    rate.parm.capture.timeperframe = {1, static_cast<std::uint32_t>(std::atoi(arguments[5]))};
+    rate.parm.capture.timeperframe = {1000, static_cast<std::uint32_t>(1000 * std::atof(arguments[5]))};
     request(fd, VIDIOC_S_PARM, rate, "setting the rate");
     v4l2_requestbuffers buffers{};
     buffers.count = 4;
@@ -76,37 +61,19 @@ int main(int count, char **arguments) {
     int type = static_cast<int>(set.type);
     request(fd, VIDIOC_STREAMON, type, "starting the stream");
 
-    arhost_frame_format format{};
-    format.struct_size = sizeof format;
-    format.pixel_format = is_yuyv ? ARHOST_PIXEL_FORMAT_YUYV : ARHOST_PIXEL_FORMAT_GREY8;
-    format.width = width;
-    format.height = height;
-    format.yuv_matrix = ARHOST_YUV_MATRIX_BT601;
-    format.yuv_range = ARHOST_YUV_RANGE_LIMITED;
-    if (!arhost_frame_layout(&format))
-        return 2;
-    constexpr std::size_t slots = 8; // as many as the host gives to a source
-    std::vector<std::vector<std::uint8_t>> memory(slots, std::vector<std::uint8_t>(format.byte_size));
-    const std::size_t row_bytes = (is_yuyv ? 2 : 1) * std::size_t{width};
-    double begin_ms = 0;
-    for (int n = -30; n < frames; ++n) { // 30 frames to warm up
-        if (n == 0)
-            begin_ms = cpu_ms();
+    arhost::bench::Slots slots(is_yuyv ? ARHOST_PIXEL_FORMAT_YUYV : ARHOST_PIXEL_FORMAT_GREY8, width, height);
+    arhost::bench::Measurement measurement(std::atoi(arguments[6]));
+    do {
         pollfd ready{fd, POLLIN, 0};
         poll(&ready, 1, -1);
         v4l2_buffer buffer{};
         buffer.type = set.type;
         buffer.memory = V4L2_MEMORY_MMAP;
         request(fd, VIDIOC_DQBUF, buffer, "capturing");
-        std::vector<std::uint8_t> &slot = memory[static_cast<std::size_t>(n + 30) % slots];
-        const auto *from = static_cast<const std::uint8_t *>(mapped[buffer.index]);
-        std::array<std::uint8_t *, ARHOST_MAX_PLANES> planes{slot.data() + format.offset[0]};
-        for (std::uint32_t y = 0; y < height; ++y)
-            std::memcpy(planes[0] + y * std::size_t{format.stride[0]}, from + y * row_bytes, row_bytes);
+        slots.copy_rows(0, static_cast<const std::uint8_t *>(mapped[buffer.index]),
+                        (is_yuyv ? 2 : 1) * std::size_t{width}, height);
         request(fd, VIDIOC_QBUF, buffer, "queueing a buffer");
-        if (is_yuyv)
-            arhost::fill_grey(format, planes.data(), slot.data() + format.grey_offset);
-    }
-    std::printf("%.6f\n", (cpu_ms() - begin_ms) / frames);
+        slots.finish();
+    } while (measurement.count_frame());
     return 0;
 }

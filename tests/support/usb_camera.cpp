@@ -68,8 +68,8 @@ Octets make_jpeg(const UsbCamera::Setup &setup, int luma) {
     const tjhandle handle = tjInitCompress();
     unsigned char *data = nullptr;
     unsigned long size = 0;
-    if (tjCompress2(handle, pixels.data(), setup.frame_width, 0, setup.frame_height, TJPF_BGR, &data, &size, TJSAMP_422,
-                    90, 0) != 0)
+    if (tjCompress2(handle, pixels.data(), setup.frame_width, 0, setup.frame_height, TJPF_BGR, &data, &size,
+                    TJSAMP_422, 90, 0) != 0)
         throw std::runtime_error("tjCompress2");
     const Octets jpeg(data, data + size);
     tjFree(data);
@@ -354,8 +354,9 @@ std::optional<Octets> UsbCamera::answer_class(const Octets &setup, const Octets 
 }
 
 Octets UsbCamera::make_frame() {
-    return format_ == mjpeg ? jpegs_[number_ % jpegs_.size()]
-                            : picture(number_, format_ == nv12, std::size_t{setup_.frame_width} * setup_.frame_height);
+    return format_ == mjpeg
+               ? jpegs_[number_ % jpegs_.size()]
+               : picture(number_, format_ == nv12, std::size_t{setup_.frame_width} * setup_.frame_height);
 }
 
 // Returns a payload of at most `limit` bytes; an empty one if no frame is due.
