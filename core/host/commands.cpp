@@ -242,6 +242,24 @@ void remove_grants(yaml::Node &root, const ReplayArguments &replay) {
     }
 }
 
+// Whether `path` is tracker.options.KEY, raytracer.options.KEY or that of an alternative.
+bool is_option_of_stage(std::string_view path) {
+    const auto skip = [&](std::string_view prefix) {
+        return path.starts_with(prefix) ? (path.remove_prefix(prefix.size()), true) : false;
+    };
+    const bool is_alternative = skip("alternatives.");
+    if (!skip("tracker") && !skip("raytracer"))
+        return false;
+    if (is_alternative) {
+        const std::size_t end = path.find(']');
+        if (!path.starts_with('[') || end == std::string_view::npos ||
+            path.substr(1, end - 1).find_first_not_of("0123456789") != std::string_view::npos)
+            return false;
+        path.remove_prefix(end + 1);
+    }
+    return skip(".options.") && path.find_first_of(".[") == std::string_view::npos;
+}
+
 // Returns a configuration that plays the video of a session in the pipeline of the recorded run, or in that of
 // `arguments.file`.
 run_config::Configuration session_configuration(const Arguments &arguments, const ReplayArguments &replay) {
@@ -262,8 +280,11 @@ run_config::Configuration session_configuration(const Arguments &arguments, cons
     if (!camera.is_null() && (arguments.file.empty() || !root.find("camera")))
         root.override_value("camera", camera.to_yaml(), "arhost replay");
     const yaml::Node changed = session.description.require("changed_options");
-    for (const auto &[path, value] : arguments.file.empty() ? changed.entries() : decltype(changed.entries())())
-        root.override_value(path, value.text(), "arhost replay");
+    for (const auto &[path, value] : arguments.file.empty() ? changed.entries() : decltype(changed.entries())()) {
+        if (!is_option_of_stage(path))
+            value.fail("'" + path + "' is not an option of the tracker or ray tracer");
+        root.override_text(path, value.text(), "arhost replay");
+    }
     const std::string recorded = arguments.file.empty() ? rendering_of(root) : "";
     override_plugin(root, "tracker", replay.tracker, "--tracker");
     override_plugin(root, "raytracer", replay.raytracer, "--raytracer");

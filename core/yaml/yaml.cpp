@@ -296,7 +296,8 @@ void Node::replace(const std::string &path, const YAML::Node &value, const std::
 }
 
 void Node::remove(const std::string &key) {
-    node_.remove(key);
+    while (node_.remove(key)) { // each call removes one of several equal keys
+    }
 }
 
 Node::Origin Node::origin() const {
@@ -315,7 +316,8 @@ Node Node::load_copy(const std::filesystem::path &file, const Origin &origin) {
 std::string Node::to_yaml(std::initializer_list<std::string_view> omitted) const {
     YAML::Node copy = YAML::Clone(node_);
     for (const std::string_view key : omitted)
-        copy.remove(std::string(key));
+        while (copy.remove(std::string(key))) {
+        }
     return YAML::Dump(copy);
 }
 

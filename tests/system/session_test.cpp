@@ -230,6 +230,20 @@ TEST(Sessions, AnEditedSessionGainsNoPermission) {
     run.write("take/configuration.yaml", configuration + "sandbox: none\nplugin_path: [.]\n");
     ASSERT_EQ(run.run(replaying({"-v"})), 0) << run.output();
     EXPECT_THAT(run.output(), Not(HasSubstr("sandbox: none")));
+    run.write("take/configuration.yaml", configuration + "sandbox: none\nsandbox: none\n");
+    EXPECT_EQ(run.run(replaying({"-v"})), 0) << run.output();
+    EXPECT_THAT(run.output(), Not(HasSubstr("sandbox: none"))) << "the key is given twice";
+    run.write("take/configuration.yaml", configuration);
+    const std::string description = run.read("take/session.json");
+    for (const char *path : {"sandbox", "tracker.plugin", "source.plugin", "stats", "tracker.options.a.b",
+                             "alternatives.tracker[0].plugin", "tracker", "outputs[0].path"}) {
+        nlohmann::json edited = nlohmann::json::parse(description);
+        edited["changed_options"][path] = "none";
+        run.write("take/session.json", edited.dump());
+        EXPECT_EQ(run.run(replaying()), 2) << path;
+        EXPECT_THAT(run.output(), HasSubstr("is not an option of the tracker or ray tracer")) << path;
+    }
+    run.write("take/session.json", description);
     std::string other = configuration;
     other.replace(other.find("tracker_aruco"), std::string("tracker_aruco").size(), "./tracker_aruco.so");
     run.write("take/configuration.yaml", other);
