@@ -75,8 +75,8 @@ Between between(std::uint32_t at, std::uint32_t from_size, std::uint32_t to_size
             static_cast<std::uint32_t>(std::lround((position - first) * one))};
 }
 
-// Returns the pixels of the large image between which and the pixels from `begin` to `end` of the small image there
-// is less than one pixel of the small image.
+// Returns the range of pixels of the large image that bilinear filtering of the small image's pixels [begin, end)
+// affects.
 std::pair<std::uint32_t, std::uint32_t> enlarged(std::uint32_t begin, std::uint32_t end, std::uint32_t from_size,
                                                  std::uint32_t to_size) {
     const double factor = static_cast<double>(to_size) / from_size;

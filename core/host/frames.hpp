@@ -65,6 +65,7 @@ struct OutputFrame {
     Lease slot;
     Frame::Clock::time_point captured; // as in Frame
     Quality quality;                   // of the overlay
+    std::uint32_t inputs;              // what `slot` has: ARHOST_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT
 };
 using OutputFramePointer = std::shared_ptr<const OutputFrame>;
 

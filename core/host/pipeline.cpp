@@ -209,6 +209,10 @@ std::chrono::milliseconds Pipeline::longest_stop_deadline() const {
     if (configuration_.raytracer)
         add(*configuration_.raytracer);
     std::for_each(configuration_.outputs.begin(), configuration_.outputs.end(), add);
+    if (configuration_.record)
+        add(*configuration_.record);
+    if (configuration_.snapshot)
+        add(*configuration_.snapshot);
     return longest;
 }
 

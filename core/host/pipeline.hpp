@@ -143,7 +143,7 @@ private:
     bool render();
     bool is_early(const Frame &frame);
     bool compose();
-    void compose(Frame &frame, std::span<std::byte> slot);
+    void compose(Frame &frame, std::uint32_t inputs, std::span<std::byte> slot);
     void exchange_time_code(const arhost_record &record, const OutputView &out);
     void start_quality(RaytracerStage &stage);
     void request_samples(RaytracerStage &stage, std::uint32_t samples);
@@ -153,7 +153,7 @@ private:
     camera::Coordinates coordinates() const {
         return raytracer_ ? raytracer_->scene->coordinates : camera::Coordinates();
     }
-    void copy_sink_inputs(const Frame &frame, const ImageView &overlay, const Region &region,
+    void copy_sink_inputs(const Frame &frame, const ImageView &overlay, const Region &region, std::uint32_t inputs,
                           std::span<std::byte> slot) const;
     void check_buffers_unmodified(const Frame &frame);
     void cancel_stages();
@@ -229,8 +229,7 @@ private:
     bool abandoned_ = false; // the run must end immediately
     ipc::Reactor::Registration interrupt_deadline_;
     std::map<std::uint64_t, std::unique_ptr<Frame>> frames_;
-    std::vector<arhost_marker> last_markers_;          // of the last composited frame
-    bool video_input_ = false, overlay_input_ = false; // whether a sink reads the video frame and the overlay
+    std::vector<arhost_marker> last_markers_; // of the last composited frame
     bool has_window_ = false;
     // The last frame of a paced run.
     struct Paced {

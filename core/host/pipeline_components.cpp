@@ -295,13 +295,7 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
         return Component::Create{{std::move(options), setup}, std::move(sockets)};
     };
     callbacks.ready = [this, sink](const messages::Ready &ready) {
-        const bool reads_video = (ready.capabilities & ARHOST_CAPABILITY_VIDEO_INPUT) != 0;
-        const bool reads_overlay = (ready.capabilities & ARHOST_CAPABILITY_OVERLAY_INPUT) != 0;
-        // Frames that were composited before the host knew the sink lack its inputs.
-        if ((reads_video && !video_input_) || (reads_overlay && !overlay_input_))
-            sink->clear();
-        video_input_ |= reads_video;
-        overlay_input_ |= reads_overlay;
+        sink->set_inputs(ready.capabilities & (ARHOST_CAPABILITY_VIDEO_INPUT | ARHOST_CAPABILITY_OVERLAY_INPUT));
         return SlotLayout{};
     };
     callbacks.result = [this, sink, name](const Command &command, const Result &result) {
@@ -327,13 +321,22 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
     callbacks.lost = [sink](const std::vector<Command> &) { sink->on_lost(); };
     callbacks.end_requested = [this, sink] { end_sink(*sink); };
     callbacks.request = [this, sink](const messages::Request &request) { on_request(*sink, request); };
-    callbacks.running = [sink] {
-        if (!sink->ending)
+    callbacks.running = [this, sink] {
+        if (sink->awaits_its_frame() && frozen_) {
+            sink->answer("the frame that is shown was composited without what this output writes; end the freeze and "
+                         "send the command again");
+            close_sink(*sink);
+            sink->component->stop();
+        } else if (!sink->ending && !sink->is_single) {
             sink->answer("");
+        }
     };
     callbacks.stopped = [sink, common = callbacks.stopped](arhost_status status, const std::string &text) {
         common(status, text);
-        sink->answer(status == ARHOST_STATUS_OK ? "" : text.empty() ? status_text(status) : text);
+        sink->answer(sink->awaits_its_frame()     ? "the run ended before the next frame"
+                     : status == ARHOST_STATUS_OK ? ""
+                     : text.empty()               ? status_text(status)
+                                                  : text);
     };
     callbacks.disabled = [this, sink, name, &output](const std::string &reason, bool is_configuration_error) {
         on_disabled(name, output.node, reason, is_configuration_error);

@@ -187,8 +187,8 @@ void Pipeline::execute(const control::Snapshot &, const control::Done &done) {
     if (!last_output_)
         throw control::Error("there is no frame yet");
     SinkQueue &sink = start_output(*configuration_.snapshot, "snapshot", done);
+    sink.is_single = true;
     sink.offer(last_output_);
-    sink.ending = true;
 }
 
 void Pipeline::execute(const control::Record &record, const control::Done &done) {
@@ -265,8 +265,10 @@ void Pipeline::execute(const control::Set &set, const control::Done &done) {
             error.empty() && old != options.values.end()) {
             *old = value;
             options.changed.insert(value.key);
-            if (raytracer_ && raytracer_->component.get() == changed && value.key == "samples")
-                start_quality(*raytracer_); // its limit is the new value
+            if (raytracer_ && raytracer_->component.get() == changed && value.key == "samples") {
+                start_quality(*raytracer_);     // its limit is the new value
+                raytracer_->samples_in_use = 0; // a reduction may have followed the new value
+            }
         }
         done(error, {});
     });

@@ -116,9 +116,10 @@ void Pipeline::on_read(const Command &command, const Result &result) {
         source_checks_->check(statistics_.contract_checks, frame->record, result.frame.skipped, arrival_ns);
         frame->pixels_sample = sample_hash(frame->pixels.bytes(), frame->record.sequence);
     }
-    statistics_.latency_from_capture = frame->record.clock == ARHOST_CLOCK_MONOTONIC;
+    // The record of a replayed frame has the time at which it was recorded.
+    statistics_.latency_from_capture = result.frame.clock == ARHOST_CLOCK_MONOTONIC;
     frame->captured = Clock::time_point(std::chrono::nanoseconds(
-        statistics_.latency_from_capture ? std::min(frame->record.capture_ns, arrival_ns) : arrival_ns));
+        statistics_.latency_from_capture ? std::min(result.frame.capture_ns, arrival_ns) : arrival_ns));
     frame->times.source = std::chrono::nanoseconds(result.busy_ns);
     skipped_ += result.frame.skipped;
     statistics_.dropped["source"] = skipped_;
@@ -496,7 +497,7 @@ Frame *Pipeline::next_waiting(Frame::Stage stage) {
 // following frames later, instead of faster.
 bool Pipeline::is_early(const Frame &frame) {
     if (live_ || interrupted_ || !configuration_.paced.value_or(has_window_) ||
-        frame.record.clock != ARHOST_CLOCK_MEDIA)
+        (frame.record.clock != ARHOST_CLOCK_MEDIA && !configuration_.recording))
         return false;
     const Clock::time_point now = Clock::now();
     Clock::time_point due = now;
@@ -531,9 +532,12 @@ bool Pipeline::compose() {
             return false; // no free slot: waits for the outputs, and the source has to wait, too
         is_shown = slot.has_value();
         if (slot) {
+            std::uint32_t inputs = 0;
+            for (const auto &sink : sinks_)
+                inputs |= sink->inputs();
             auto output = std::make_shared<OutputFrame>(
-                OutputFrame{ready->first, std::move(*slot), ready->second->captured, ready->second->quality});
-            compose(*ready->second, output->slot.bytes());
+                OutputFrame{ready->first, std::move(*slot), ready->second->captured, ready->second->quality, inputs});
+            compose(*ready->second, inputs, output->slot.bytes());
             if (configuration_.snapshot)
                 last_output_ = output;
             for (const auto &sink : sinks_)
@@ -565,7 +569,7 @@ bool Pipeline::compose() {
     return true;
 }
 
-void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
+void Pipeline::compose(Frame &frame, std::uint32_t inputs, std::span<std::byte> slot) {
     check_buffers_unmodified(frame);
     const Clock::time_point begin = Clock::now();
     const auto *pixels = reinterpret_cast<const std::uint8_t *>(frame.pixels.bytes().data());
@@ -585,7 +589,7 @@ void Pipeline::compose(Frame &frame, std::span<std::byte> slot) {
         exchange_time_code(frame.record, out);
     else
         composite(*format_, planes, overlay, region, out);
-    copy_sink_inputs(frame, overlay, region, slot);
+    copy_sink_inputs(frame, overlay, region, inputs, slot);
     frame.times.composite = Clock::now() - begin;
     statistics_.stages.add("composite", frame.times.composite);
 }
@@ -605,13 +609,13 @@ void Pipeline::exchange_time_code(const arhost_record &record, const OutputView 
     time_codes_->draw(out, format_->width, format_->height, now);
 }
 
-// Copies the video frame and the overlay for the sinks that read them.
+// Copies the video frame and the overlay if sinks read them.
 void Pipeline::copy_sink_inputs(const Frame &frame, const ImageView &overlay, const Region &region,
-                                std::span<std::byte> slot) const {
+                                std::uint32_t inputs, std::span<std::byte> slot) const {
     const OutputSlot layout(*format_);
-    if (video_input_)
+    if (inputs & ARHOST_CAPABILITY_VIDEO_INPUT)
         std::memcpy(slot.data() + layout.video_offset, frame.pixels.bytes().data(), format_->byte_size);
-    if (!overlay_input_)
+    if (!(inputs & ARHOST_CAPABILITY_OVERLAY_INPUT))
         return;
     const std::size_t stride = overlay_stride(format_->width);
     std::byte *const rgba = slot.data() + layout.overlay_offset;

@@ -21,13 +21,21 @@ std::chrono::nanoseconds latency_of(const OutputFrame &frame, const Result &resu
 } // namespace
 
 void SinkQueue::offer(OutputFramePointer frame) {
-    if (closed || ending)
+    if (closed || ending || (frame->inputs & inputs_) != inputs_)
         return;
     waiting_.push_back(std::move(frame));
+    ending = is_single;
     if (max_waiting > 0 && waiting_.size() > max_waiting) {
         waiting_.pop_front();
         ++statistics_.dropped[component->name()];
     }
+}
+
+void SinkQueue::set_inputs(std::uint32_t inputs) {
+    inputs_ = inputs;
+    std::erase_if(waiting_, [&](const OutputFramePointer &frame) { return (frame->inputs & inputs) != inputs; });
+    if (is_single && empty())
+        ending = false;
 }
 
 void SinkQueue::pump() {

@@ -21,16 +21,22 @@ public:
     // Maximum number of waiting frames; if there are more, the queue drops the oldest. 0: unlimited, the run waits
     // for the sink.
     std::size_t max_waiting = 0;
-    std::string id;        // unique, also among runs; a restarted sink recognises its files by it
-    bool closed = false;   // has failed or ended, and accepts no more frames
-    bool has_quit = false; // has ended the run; receives the remaining frames
-    bool ending = false;   // accepts no more frames, and stops once it has written those that wait
+    std::string id;         // unique, also among runs; a restarted sink recognises its files by it
+    bool closed = false;    // has failed or ended, and accepts no more frames
+    bool has_quit = false;  // has ended the run; receives the remaining frames
+    bool ending = false;    // accepts no more frames, and stops once it has written those that wait
+    bool is_single = false; // takes one frame, then ends
     // For an output that a command has started: its file, and what answers the command in progress.
     bool on_demand = false;
     std::string path;
     control::Done done;
 
     void offer(OutputFramePointer frame);
+    // Sets what the sink reads (ARHOST_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT), and removes waiting frames without
+    // it.
+    void set_inputs(std::uint32_t inputs);
+    std::uint32_t inputs() const { return closed ? 0 : inputs_; }
+    bool awaits_its_frame() const { return is_single && !ending; }
     void pump(); // submits waiting frames to the sink
     // To be called by the component's callbacks of the same names.
     void on_result(const ipc::Command &command, const ipc::Result &result);
@@ -46,6 +52,7 @@ private:
     static constexpr std::size_t max_in_flight = 2;
     Statistics &statistics_;
     std::deque<OutputFramePointer> waiting_, unconfirmed_;
+    std::uint32_t inputs_ = 0;
     std::uint64_t next_sequence_ = 0; // number of the frame that follows the last confirmed one
 };
 

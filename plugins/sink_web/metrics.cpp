@@ -64,7 +64,8 @@ void add_status(Text &text, const Json &status) {
         for (const auto &[quantile, key] : percentiles)
             text.add(timing.value(key, Json()), {{"stage", stage}, {"quantile", quantile}});
     text.begin("arhost_latency_milliseconds", "gauge",
-               "Recent percentiles of the time from the capture of a frame until an output has written it.");
+               "Recent percentiles of the time from the capture (without a camera: the arrival) of a frame until an "
+               "output has written it.");
     const Json outputs = status.value("latency", Json::object()).value("outputs", Json::object());
     for (const auto &[output, timing] : outputs.items())
         for (const auto &[quantile, key] : percentiles)

@@ -128,7 +128,7 @@ Rectangle Window::size() const {
 
 void Window::present() {
     glfwSwapBuffers(window_.get());
-    glFinish(); // waits until the picture is shown; otherwise the driver queues pictures, which adds latency
+    glFinish(); // waits for the GPU; otherwise the driver queues pictures, which adds latency
     stale_ = false;
 }
 

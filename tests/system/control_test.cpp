@@ -333,6 +333,22 @@ TEST(Control, WritesSnapshotsToFreeNames) {
     EXPECT_EQ(run.quit(), 0) << run.output();
 }
 
+TEST(Control, ASnapshotOfTheOverlayIsThatOfTheNextFrame) {
+    std::string configuration = controlled("lockstep");
+    const std::string snapshot = "path: out/snapshot-%02d.png";
+    configuration.replace(configuration.find(snapshot), snapshot.size(), snapshot + ", options: {content: overlay}");
+    ControlledRun run(configuration);
+    run.start_and_connect();
+    for (int i = 0; i < 2; ++i) {
+        const std::string file = run.succeed({{"command", "snapshot"}})["file"];
+        ASSERT_TRUE(std::filesystem::exists(file)) << file;
+        EXPECT_TRUE(read_file(file).starts_with("\x89PNG"));
+    }
+    run.succeed({{"command", "freeze"}, {"on", true}});
+    EXPECT_THAT(run.error_of({{"command", "snapshot"}}), HasSubstr("end the freeze and send the command again"));
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
 TEST(Control, RecordsFromCommandToCommand) {
     ControlledRun run(controlled("lockstep"));
     run.start_and_connect();

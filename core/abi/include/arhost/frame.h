@@ -57,7 +57,7 @@ typedef struct arhost_frame_format {
     uint32_t depth_stride; /* bytes per row, a multiple of 64; 0 without depth */
     uint64_t grey_offset;  /* offset of the grey plane: plane 0 if that is luma, otherwise a separate plane,
                              which the worker fills once for all trackers */
-    uint64_t depth_offset; /* 0 without depth */
+    uint64_t depth_offset; /* bytes from the start of the slot, a multiple of 64; 0 without depth */
     uint64_t byte_size;    /* size of a slot */
 } arhost_frame_format;
 

@@ -16,7 +16,8 @@ extern "C" {
 
 typedef struct arhost_raytracer_setup {
     uint32_t struct_size;
-    uint32_t width, height;              /* size of the images to render, px */
+    uint32_t width, height;              /* size of the images, px; with ARHOST_CAPABILITY_SCALED_IMAGES, of the
+                                            largest ones: see arhost_image */
     uint32_t reserved;                   /* 0 */
     const arhost_scene *scene;           /* read-only, valid until `stop`; validated by the host */
     const arhost_intrinsics *intrinsics; /* the same in every request, except with ARHOST_CAPABILITY_SCALED_IMAGES;

@@ -48,7 +48,7 @@ typedef struct arhost_frame_buffer {
     uint8_t *grey; /* full-range luma for trackers. After `read`, the worker computes it from the planes, unless
                       the source has set has_grey or `grey` is plane 0 */
     /* NULL if !format->has_depth. Element x of row y, rows format->depth_stride bytes apart, is the distance in mm,
-     * along the camera's optical axis, of what pixel (x, y) of the picture shows; 0: unknown. */
+     * along the camera's optical axis, of what pixel (x, y) of the picture shows; 0: unknown, 65535: this or more. */
     uint16_t *depth_mm;
     /* The requested frame, as an index into the full sequence of the source. In the first call it is first_sequence;
      * in each later call it is `sequence` + `skipped` + 1 of the previous call. A source that is late may drop
