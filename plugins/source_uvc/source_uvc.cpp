@@ -10,6 +10,7 @@
 #include "camera_common/control_options.hpp"
 #include "camera_common/frame_size.hpp"
 #include "camera_common/jpeg.hpp"
+#include "camera_common/silence.hpp"
 #include "camera_common/start_camera.hpp"
 
 #include <algorithm>
@@ -23,10 +24,7 @@ namespace {
 namespace uvc = arhost::uvc;
 using arhost::Failure;
 using Size = arhost::FrameSize;
-using Clock = std::chrono::steady_clock;
 
-// A camera that delivers no intact frame for this long is reported as lost.
-constexpr auto silence_limit = std::chrono::seconds(5);
 constexpr auto poll_slice = std::chrono::milliseconds(100); // the ABI permits no longer wait
 
 constexpr arhost::AutomaticControl<std::string_view> automatic_controls[] = {
@@ -80,9 +78,8 @@ public:
     }
 
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
-        const auto give_up = Clock::now() + silence_limit;
-        for (;;) {
-            auto frame = next(give_up);
+        for (arhost::Silence silence;;) {
+            auto frame = next(silence);
             if (!frame)
                 return ARHOST_STATUS_ERROR_CANCELLED;
             lost_ += frame->lost_before;
@@ -296,9 +293,9 @@ private:
 
     // Waits for a picture and describes its format. The chroma subsampling is known only from a picture.
     void describe_first_picture(arhost_frame_format &format) {
-        for (const auto give_up = Clock::now() + silence_limit;;) {
+        for (arhost::Silence silence;;) {
             host_.progress(-1, "waiting for the camera's first picture");
-            auto frame = next(give_up);
+            auto frame = next(silence);
             if (!frame)
                 throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "starting " + device_->name() + " was cancelled");
             const bool is_good = jpeg_.describe(frame->bytes, format);
@@ -309,9 +306,9 @@ private:
         }
     }
 
-    // Returns a frame: in live mode the newest one, otherwise the oldest one. Waits until `give_up`, then throws
-    // Failure. Returns std::nullopt if cancelled.
-    std::optional<uvc::CapturedFrame> next(Clock::time_point give_up) {
+    // Returns a frame: in live mode the newest one, otherwise the oldest one. Waits until `silence` exceeds its
+    // limit, then throws Failure. Returns std::nullopt if cancelled.
+    std::optional<uvc::CapturedFrame> next(arhost::Silence &silence) {
         for (;;) {
             if (host_.cancelled())
                 return std::nullopt;
@@ -325,10 +322,10 @@ private:
             if (found)
                 return found;
             host_.progress(-1, "waiting for a picture"); // the plugin reports a silent camera itself
-            if (Clock::now() > give_up)
+            if (silence.exceeds_limit())
                 throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST,
                               device_->name() + " has delivered no intact picture for " +
-                                  std::to_string(silence_limit.count()) + " s" +
+                                  std::to_string(arhost::Silence::limit.count()) + " s" +
                                   (fault_.empty() ? "" : "; the last picture was rejected: " + fault_));
         }
     }

@@ -11,7 +11,6 @@ namespace arhost {
 namespace {
 
 constexpr std::uint32_t buffer_count = 6; // two may be held
-constexpr std::int64_t silence_limit_ns = 5'000'000'000;
 constexpr std::int64_t default_interval_ns = 33'333'333;
 
 std::int64_t now_ns() {
@@ -42,7 +41,8 @@ DepthCamera::DepthCamera(const Host &host, const std::string &path, const FrameS
     const double rate = device_.set_fps(fps);
     interval_ns_ = rate > 0 ? std::llround(1e9 / rate) : default_interval_ns;
     stream_.emplace(device_, buffer_count);
-    host_.info("depth: " + device_.card() + " at " + path + ": " + size.text() + ", " + std::to_string(rate) + " fps");
+    host_.info("depth: " + device_.card() + " at " + path + ": " + size.text() + ", " + std::to_string(rate) +
+               " fps");
 }
 
 bool DepthCamera::read(std::int64_t colour_ns, const arhost_frame_buffer &buffer) {
@@ -63,7 +63,7 @@ bool DepthCamera::read(std::int64_t colour_ns, const arhost_frame_buffer &buffer
 void DepthCamera::wait_for_frame_near(std::int64_t colour_ns) {
     while (!host_.cancelled() && (held_.empty() || held_.back().ns < colour_ns - interval_ns_ / 2)) {
         const std::int64_t now = now_ns();
-        if (now - last_arrival_ns_ > silence_limit_ns)
+        if (silence_.exceeds_limit())
             throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST, "the depth camera '" + device_.path() + "' (" +
                                                                device_.card() +
                                                                ") has delivered no intact frame for 5 s");
@@ -86,6 +86,7 @@ void DepthCamera::dequeue_up_to(std::int64_t colour_ns) {
             continue;
         }
         last_arrival_ns_ = now_ns();
+        silence_ = Silence();
         const std::int64_t captured_ns = clock_.monotonic_ns(*captured);
         held_.push_back({std::move(*captured), captured_ns});
         release_farther_than_next(colour_ns);

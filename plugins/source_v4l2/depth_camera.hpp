@@ -5,6 +5,7 @@
 #include "device.hpp"
 
 #include "camera_common/frame_size.hpp"
+#include "camera_common/silence.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -43,8 +44,9 @@ private:
     std::uint32_t stride_ = 0;     // bytes per row of the camera
     std::int64_t interval_ns_ = 0; // from frame to frame
     std::optional<CaptureStream> stream_;
-    std::deque<Held> held_; // in the order of capture; at most two after `read`
+    std::deque<Held> held_;        // in the order of capture; at most two after `read`
     std::int64_t last_arrival_ns_; // CLOCK_MONOTONIC
+    Silence silence_;
 };
 
 } // namespace arhost

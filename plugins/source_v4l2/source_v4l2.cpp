@@ -12,11 +12,11 @@
 #include "camera_common/fourcc.hpp"
 #include "camera_common/frame_size.hpp"
 #include "camera_common/jpeg.hpp"
+#include "camera_common/silence.hpp"
 #include "camera_common/start_camera.hpp"
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <iterator>
@@ -33,10 +33,7 @@ using arhost::CaptureStream;
 using arhost::Failure;
 using Size = arhost::FrameSize;
 using arhost::PictureFormat;
-using Clock = std::chrono::steady_clock;
 
-// A camera that delivers no intact frame for this long is reported as lost.
-constexpr auto silence_limit = std::chrono::seconds(5);
 constexpr int poll_slice_ms = 50;
 
 bool offers(const CaptureFormat &format, const Size &size) {
@@ -88,9 +85,8 @@ public:
     }
 
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
-        const auto give_up = Clock::now() + silence_limit;
-        for (;;) {
-            const auto captured = next(give_up);
+        for (arhost::Silence silence;;) {
+            const auto captured = next(silence);
             if (!captured)
                 return ARHOST_STATUS_ERROR_CANCELLED;
             const bool good = copy(captured->planes, buffer);
@@ -245,9 +241,9 @@ private:
 
     // Waits for a picture and describes its format. The chroma subsampling is known only from a picture.
     void describe_first_picture(arhost_frame_format &format) {
-        for (const auto give_up = Clock::now() + silence_limit;;) {
+        for (arhost::Silence silence;;) {
             host_.progress(-1, "waiting for the camera's first picture");
-            const auto captured = next(give_up);
+            const auto captured = next(silence);
             if (!captured)
                 throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "starting the camera '" + path_ + "' was cancelled");
             const bool good = jpeg_.describe(captured->planes.front(), format);
@@ -259,8 +255,9 @@ private:
     }
 
     // Returns a frame from the driver's queue that the driver does not mark as damaged: in live mode the newest one,
-    // otherwise the oldest one. Waits until `give_up`, then throws Failure. Returns std::nullopt if cancelled.
-    std::optional<Capture> next(Clock::time_point give_up) {
+    // otherwise the oldest one. Waits until `silence` exceeds its limit, then throws Failure. Returns std::nullopt if
+    // cancelled.
+    std::optional<Capture> next(arhost::Silence &silence) {
         for (;;) {
             if (host_.cancelled())
                 return std::nullopt;
@@ -270,11 +267,12 @@ private:
             if (found)
                 return found;
             host_.progress(-1, "waiting for a picture"); // the plugin reports a silent camera itself
-            if (Clock::now() > give_up)
+            if (silence.exceeds_limit())
                 throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST,
                               "the camera '" + path_ + "' (" + device_->card() +
-                                  ") has delivered no intact picture for " + std::to_string(silence_limit.count()) +
-                                  " s" + (fault_.empty() ? "" : "; the last picture was rejected: " + fault_));
+                                  ") has delivered no intact picture for " +
+                                  std::to_string(arhost::Silence::limit.count()) + " s" +
+                                  (fault_.empty() ? "" : "; the last picture was rejected: " + fault_));
         }
     }
 

@@ -4,6 +4,7 @@
 //   tools/vm/run-in-vm -m "vivid n_devs=1 node_types=0x1" …/source_v4l2-vivid-test
 #include "../../system/arhost_run.hpp"
 #include "../../system/device_schema.hpp"
+#include "../../system/suspend.hpp"
 #include "../source_file/source_under_test.hpp"
 #include "frame_colours.hpp"
 
@@ -653,6 +654,20 @@ TEST_F(VividRun, WaitsUntilTheCameraIsPluggedInAgain) {
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     end();
     EXPECT_EQ(run.stats()["restarts"]["source"], 2);
+}
+
+TEST_F(VividRun, SurvivesASuspend) {
+    // The source waits for a frame when it is suspended and when it continues.
+    set(percentage_of_dropped_buffers, 100);
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    ASSERT_TRUE(arhost::test::suspend_processes());
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    set(percentage_of_dropped_buffers, 0);
+    EXPECT_TRUE(wait_for(frames() + 40)) << run.output();
+    end();
+    const nlohmann::json stats = run.stats();
+    for (const auto &[component, restarts] : stats["restarts"].items())
+        EXPECT_EQ(restarts, 0) << component << ":\n" << run.output();
 }
 
 TEST_F(Vivid, StopsWaitingWhenCancelled) {
