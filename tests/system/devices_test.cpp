@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <map>
@@ -170,4 +171,22 @@ TEST(Devices, OfAnUnknownPluginAreAnInvalidCommandLine) {
     ArhostRun run;
     EXPECT_EQ(run.run({"devices", "source_v5l2"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("there is no plugin 'source_v5l2'; did you mean 'source_v4l2'?"));
+}
+
+// The scratch folder is not the configuration's folder.
+TEST(Lab, SaysOnceWhatToUseWithoutACamera) {
+    if (std::filesystem::exists("/dev/video0"))
+        GTEST_SKIP() << "this machine has a camera";
+    const std::string lab = ARHOST_SOURCE_DIRECTORY "/config/lab.yaml";
+    for (const std::vector<std::string> &arguments : {std::vector{lab}, std::vector<std::string>{"check", lab}}) {
+        ArhostRun run;
+        EXPECT_EQ(run.run(arguments), 2);
+        const std::string text = run.messages();
+        EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1) << text;
+        EXPECT_THAT(text, HasSubstr("source: device: '/dev/video0' does not exist; "));
+        EXPECT_THAT(text, testing::AnyOf(HasSubstr("available: /dev/video"),
+                                         HasSubstr("connect a camera, or use 'source_synthetic' or 'source_file'")));
+    }
+    ArhostRun run;
+    EXPECT_EQ(run.run({"check", "--no-open", lab}), 0) << run.output();
 }
