@@ -635,6 +635,17 @@ TEST_P(ValidationOfPath, ReportsNothing) {
     EXPECT_THAT(tracer.plugin().log(), HasSubstr("with the validation layers"));
 }
 
+TEST_P(ValidationOfPath, ReportsNothingForChangedOptions) {
+    Tracer tracer(rich_scene(), {{"validate", "true"}, {"path", GetParam()}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
+    Picture picture(small);
+    for (const char *samples : {"1", "2", "1"}) {
+        EXPECT_EQ(tracer.plugin().set_text("samples", samples), ARHOST_STATUS_OK);
+        EXPECT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_STATUS_OK);
+    }
+    EXPECT_THAT(tracer.plugin().log(), testing::Not(HasSubstr("Vulkan validation: ")));
+}
+
 TEST_P(ValidationOfPath, ReportsNothingForMotion) {
     Tracer tracer(scene::load_scene(moving_scene), {{"validate", "true"}, {"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
