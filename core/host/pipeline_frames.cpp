@@ -23,6 +23,7 @@ namespace {
 constexpr std::size_t max_reads_in_flight = 2;
 constexpr std::chrono::milliseconds max_lateness{100}; // of a paced run that catches up
 constexpr double max_step_s = 10;                      // longer gaps in the time of a film are not waited for
+constexpr std::size_t max_waiting_for_delay = 3;       // frames in mode live, for a stage that catches up
 constexpr std::uint32_t max_attempts = 2; // per frame and stage, if the worker dies while processing the frame
 
 // Returns the first marker that is not lost, or null. Trackers report markers in the order of the configuration.
@@ -242,6 +243,7 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
     if (tracker_->configuration->conform)
         check_markers(statistics_.contract_checks, frame.record, intrinsics_, tracker_->configuration->markers);
     frame.times.tracker = std::chrono::nanoseconds(result.busy_ns);
+    tracker_->add_duration(frame.times.tracker);
     statistics_.tracked += anchor_of(frame.record) != nullptr;
     set_camera_from_markers(frame);
     on_camera_known(frame);
@@ -384,6 +386,7 @@ void Pipeline::on_rendered(const Command &command, const Result &result) {
     Frame &frame = *accepted;
     frame.render = result.render;
     frame.times.raytracer = busy;
+    raytracer_->add_duration(busy);
     frame.times.device = device;
     frame.record.overlay = frame.held ? ARHOST_OVERLAY_HELD : ARHOST_OVERLAY_RENDERED;
     frame.record.overlay_scale = frame.quality.scale < 1 ? frame.quality.scale : 0;
@@ -474,16 +477,21 @@ void Pipeline::skip(Frame &frame, const char *stage) {
     ++statistics_.skipped[stage];
 }
 
-// Lets a frame wait for a stage. In mode live, it replaces an older frame that is waiting for the same stage.
+// Lets a frame wait for a stage. In mode live, it replaces the oldest frames that wait for the same stage.
 void Pipeline::enqueue(Frame &frame, Frame::Stage stage) {
-    if (live_)
-        for (auto it = frames_.begin(); it != frames_.end();) {
-            const bool replaced = it->second->stage == stage && it->second.get() != &frame;
-            if (replaced)
-                ++statistics_.dropped[name_of_stage(stage)];
-            it = replaced ? frames_.erase(it) : std::next(it);
-        }
     frame.stage = stage;
+    if (!live_)
+        return;
+    const Stage &worker = stage == Frame::Stage::to_track ? static_cast<const Stage &>(*tracker_) : *raytracer_;
+    const auto is_other = [&](const auto &entry) {
+        return entry.second->stage == stage && entry.second.get() != &frame;
+    };
+    const auto others = static_cast<std::size_t>(std::count_if(frames_.begin(), frames_.end(), is_other));
+    const std::size_t allowed = worker.keeps_up(format_->fps) ? max_waiting_for_delay - 1 : 0;
+    for (std::size_t excess = others > allowed ? others - allowed : 0; excess > 0; --excess) {
+        ++statistics_.dropped[name_of_stage(stage)];
+        frames_.erase(std::find_if(frames_.begin(), frames_.end(), is_other));
+    }
 }
 
 Frame *Pipeline::next_waiting(Frame::Stage stage) {

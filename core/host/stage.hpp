@@ -11,6 +11,7 @@
 #include "host/slots.hpp"
 #include "run_config/configuration.hpp"
 
+#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -27,6 +28,19 @@ struct Stage {
     std::shared_ptr<SlotPool> slots; // of the current worker; null unless it is running
 
     bool running() const { return component->running(); }
+
+    // In mode live: whether the stage usually takes less than three quarters of the time from frame to frame, so that
+    // it catches up after a delay. True before the first result; false if the time from frame to frame is unknown.
+    bool keeps_up(double frames_per_second) const {
+        return frames_per_second > 0 && mean_s_.value_or(0) < 0.75 / frames_per_second;
+    }
+    void add_duration(std::chrono::nanoseconds duration) {
+        const double seconds = std::chrono::duration<double>(duration).count();
+        mean_s_ = mean_s_.value_or(seconds) + (seconds - mean_s_.value_or(seconds)) / 16;
+    }
+
+private:
+    std::optional<double> mean_s_; // exponential moving average of the durations of its calls
 };
 
 struct TrackerStage : Stage {

@@ -54,6 +54,24 @@ TEST(Live, ASlowRayTracerDropsFramesAndCountsThem) {
         EXPECT_NE(line.overlay, "none") << "a slow ray tracer must not make the overlay flicker";
 }
 
+TEST(Live, AShortDelayOfAFastTrackerCostsNoFrame) {
+    std::string yaml = counting("live", "frames: 15", "", "", "live: {max_latency_ms: 60000}\n");
+    const std::string source = "plugin: source_counter,";
+    ArhostRun run(yaml.replace(yaml.find(source), source.size(), source + " fps: 5,"));
+    run.write("scene.yaml", small_scene);
+    run.start({"--config", "run.yaml"});
+    while (run.running() && (!run.exists("counted.txt") || counted(run).size() < 4))
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    const pid_t tracker = run.worker("tracker_counter");
+    send_signal(tracker, SIGSTOP);
+    std::this_thread::sleep_for(std::chrono::milliseconds(500)); // two or three frames arrive
+    send_signal(tracker, SIGCONT);
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    expect_own_overlays_in_order(counted(run));
+    EXPECT_EQ(dropped(run.stats()), 0u) << run.stats().dump(1);
+    EXPECT_EQ(counted(run).size(), 15u);
+}
+
 TEST(Live, CancelsAnUnneededImageAtTheEnd) {
     ArhostRun run(counting("live", "frames: 40", "", "delay_ms: 600000", "live: {max_latency_ms: 100}\n",
                            std::chrono::minutes(10)));
