@@ -45,6 +45,11 @@ std::vector<ColourPlane> colour_planes(const PictureFormat &camera) {
     }
 }
 
+bool is_converted(std::uint32_t fourcc) {
+    return fourcc == V4L2_PIX_FMT_UYVY || fourcc == V4L2_PIX_FMT_Y16 || fourcc == V4L2_PIX_FMT_Y16_BE ||
+           fourcc == V4L2_PIX_FMT_Y12 || fourcc == V4L2_PIX_FMT_Y10;
+}
+
 void copy_row(std::uint32_t fourcc, const std::uint8_t *from, std::size_t bytes, std::uint8_t *to) {
     // `shift`: right shift of a sample, of which `low` is the less significant byte, to 8 bits.
     const auto reduce = [&](int low, int shift) {
@@ -134,6 +139,10 @@ bool copy_picture(const PictureFormat &camera, const std::vector<std::span<const
     for (std::size_t p = 0; p < colours.size(); ++p) {
         const ColourPlane &plane = colours[p];
         const std::uint8_t *from = planes[plane.memory].data() + plane.offset;
+        if (!is_converted(camera.fourcc) && plane.stride == buffer.format->stride[p]) {
+            std::memcpy(buffer.plane[p], from, plane.stride * (plane.rows - 1) + plane.row_bytes);
+            continue;
+        }
         for (std::size_t y = 0; y < plane.rows; ++y)
             copy_row(camera.fourcc, from + y * plane.stride, plane.row_bytes,
                      buffer.plane[p] + y * buffer.format->stride[p]);

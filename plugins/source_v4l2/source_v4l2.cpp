@@ -34,7 +34,7 @@ using arhost::Failure;
 using Size = arhost::FrameSize;
 using arhost::PictureFormat;
 
-constexpr int poll_slice_ms = 50;
+constexpr int poll_slice_ms = 100;
 
 bool offers(const CaptureFormat &format, const Size &size) {
     if (format.any_size)
