@@ -104,6 +104,16 @@ void protect_programs(const run_config::FilesInUse &files) {
             files.protect(base::identity_of(entry->path()));
 }
 
+// Whether a program that may write to `folder` can change `file`, or replace a symbolic link in its path.
+bool may_redirect(const fs::path &folder, const fs::path &file) {
+    if (sandbox::contains(folder, base::real_path(file)))
+        return true;
+    for (fs::path at = file; at.has_relative_path(); at = at.parent_path())
+        if (sandbox::contains(folder, base::real_path(at.parent_path())))
+            return true;
+    return false;
+}
+
 // Throws if a plugin may change the configuration or a scene: with `--watch`, it could grant itself permissions.
 void expect_watchable(const run_config::Configuration &configuration) {
     std::vector<fs::path> files{fs::absolute(configuration.node.file())};
@@ -114,10 +124,7 @@ void expect_watchable(const run_config::Configuration &configuration) {
             return;
         for (const fs::path &folder : component.policy.writable)
             for (const fs::path &file : files)
-                // The plugin could also replace a symbolic link to the file.
-                if (const fs::path real = base::real_path(folder);
-                    sandbox::contains(real, base::real_path(file)) ||
-                    sandbox::contains(real, base::real_path(file.parent_path())))
+                if (may_redirect(base::real_path(folder), file))
                     component.node.fail("may write to the folder of '" + file.string() +
                                         "', so with '--watch' it could change what runs; let it write to another "
                                         "folder, or remove '--watch'");

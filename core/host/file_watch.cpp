@@ -21,16 +21,23 @@ FileWatch::FileWatch(ipc::Reactor &reactor, std::function<void(const Files &)> c
       events_(reactor.watch(inotify_.get(), [this] { on_events(); })) {}
 
 void FileWatch::add(const Files &files) {
+    int error = 0;
+    std::filesystem::path unwatched;
     for (const std::filesystem::path &file : files) {
         files_.insert(file);
         const std::filesystem::path folder = file.parent_path();
         // Returns the existing descriptor if the folder is already watched.
-        const int watch = ::inotify_add_watch(inotify_.get(), folder.c_str(), IN_CLOSE_WRITE | IN_MOVED_TO);
-        if (watch < 0 && errno != ENOENT && errno != EACCES)
-            throw std::system_error(errno, std::generic_category(), "cannot watch the folder " + folder.string());
-        if (watch >= 0)
+        const int watch =
+            ::inotify_add_watch(inotify_.get(), folder.c_str(), IN_CLOSE_WRITE | IN_MOVED_TO | IN_MOVE_SELF);
+        if (watch >= 0) {
             folders_[watch].insert(folder);
+        } else if (errno == ENOSPC || errno == ENOMEM) { // otherwise, the path is not that of a readable file
+            error = errno;
+            unwatched = folder;
+        }
     }
+    if (error)
+        throw std::system_error(error, std::generic_category(), "cannot watch the folder " + unwatched.string());
 }
 
 void FileWatch::on_events() {
@@ -44,6 +51,13 @@ void FileWatch::on_events() {
             const char *const name = buffer + at + sizeof event;
             at += static_cast<ssize_t>(sizeof event + event.len);
             const auto folder = folders_.find(event.wd);
+            if (event.mask & IN_Q_OVERFLOW ||
+                (event.mask & (IN_IGNORED | IN_MOVE_SELF) && folder != folders_.end())) {
+                ::inotify_rm_watch(inotify_.get(), event.wd);
+                folders_.erase(event.wd);
+                is_incomplete_ = is_new = true;
+                continue;
+            }
             if (event.len == 0 || folder == folders_.end())
                 continue;
             for (const std::filesystem::path &each : folder->second)
@@ -54,8 +68,18 @@ void FileWatch::on_events() {
         }
     }
     if (is_new)
-        quiet_ =
-            reactor_.at(ipc::Reactor::Clock::now() + quiet_time, [this] { changed_(std::exchange(pending_, {})); });
+        quiet_ = reactor_.at(ipc::Reactor::Clock::now() + quiet_time, [this] { report(); });
+}
+
+void FileWatch::report() {
+    if (std::exchange(is_incomplete_, false)) {
+        pending_ = files_;
+        try {
+            add(pending_);
+        } catch (const std::system_error &) { // was reported when the files were added
+        }
+    }
+    changed_(std::exchange(pending_, {}));
 }
 
 } // namespace arhost::host

@@ -249,7 +249,12 @@ private:
     std::map<const supervise::Component *, OptionsInUse> options_;
     std::function<run_config::Configuration()> read_configuration_; // empty unless edits are applied
     std::optional<FileWatch> file_watch_;
-    bool tracker_edit_failed_ = false, raytracer_edit_failed_ = false;
+    struct RaytracerEdit {
+        RaytracerPointer raytracer;
+        run_config::Scene scene;
+    };
+    bool tracker_edit_failed_ = false;
+    std::optional<RaytracerEdit> failed_raytracer_edit_;
     FileWatch::Files edited_files_;                                      // to be applied
     std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // with the number of its frame
 

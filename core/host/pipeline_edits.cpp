@@ -16,6 +16,9 @@ namespace {
 constexpr std::array<std::string_view, 5> applied_keys = {"tracker", "raytracer", "scenes", "alternatives",
                                                           "coordinates"};
 
+// The keys that all components use. A part of an edit could not be applied without the edits of these.
+constexpr std::array<std::string_view, 3> shared_keys = {"sandbox", "restart", "plugin_path"};
+
 std::string content_of(const yaml::Node &root, std::string_view key) {
     const auto node = root.find(key);
     return node ? node->to_yaml() : "";
@@ -73,7 +76,11 @@ void Pipeline::apply_edits() {
     const std::shared_ptr<const run_config::Configuration> previous = latest_;
     if (std::ranges::any_of(paths_to(std::filesystem::absolute(configuration_.node.file())), is_edited)) {
         try {
-            latest_ = std::make_shared<const run_config::Configuration>(read_configuration_());
+            auto edited = std::make_shared<const run_config::Configuration>(read_configuration_());
+            for (const std::string_view key : shared_keys)
+                if (content_of(edited->node, key) != content_of(previous->node, key))
+                    throw std::runtime_error("an edit of '" + std::string(key) + "' needs a new run");
+            latest_ = std::move(edited);
         } catch (const std::exception &error) {
             context_.log(ARHOST_SEVERITY_WARNING, "arhost",
                          std::string(error.what()) + "; the run continues with the previous configuration");
@@ -99,24 +106,27 @@ void Pipeline::apply(const run_config::Configuration &edited, const run_config::
         return content_of(edited.node, key) != content_of(previous.node, key);
     };
     // An edit that fails is tried again with the next one. The run logs the outcome of each.
-    const auto remember = [](bool &has_failed) {
-        return
-            [&has_failed](const std::string &error, const nlohmann::ordered_json &) { has_failed = !error.empty(); };
-    };
     if (tracker_ && edited.tracker && (differs("tracker") || std::exchange(tracker_edit_failed_, false)))
-        start_next_tracker(shared(edited.trackers.front()), remember(tracker_edit_failed_));
+        start_next_tracker(shared(edited.trackers.front()),
+                           [this](const std::string &error, const auto &) { tracker_edit_failed_ = !error.empty(); });
     if (!raytracer_ || !edited.raytracer)
         return;
-    const bool is_retry = std::exchange(raytracer_edit_failed_, false);
-    const bool raytracer_changed = is_retry || differs("raytracer");
-    const RaytracerPointer raytracer =
-        raytracer_changed ? shared(edited.raytracers.front()) : raytracer_->configuration;
-    const bool other_scene = is_retry || edited.raytracer->scene != previous.raytracer->scene;
-    const run_config::Scene scene = other_scene ? edited.scenes.front() : raytracer_->scene->source;
-    if (scene_changed || other_scene || differs("coordinates"))
-        load_next_scene(scene, raytracer, remember(raytracer_edit_failed_));
-    else if (raytracer_changed)
-        start_next_raytracer(raytracer, raytracer_->scene, remember(raytracer_edit_failed_));
+    const auto failed = std::exchange(failed_raytracer_edit_, std::nullopt);
+    RaytracerEdit edit =
+        failed.value_or(RaytracerEdit{.raytracer = raytracer_->configuration, .scene = raytracer_->scene->source});
+    if (differs("raytracer"))
+        edit.raytracer = shared(edited.raytracers.front());
+    const bool other_scene = edited.raytracer->scene != previous.raytracer->scene;
+    if (other_scene)
+        edit.scene = edited.scenes.front();
+    const control::Done done = [this, edit](const std::string &error, const auto &) {
+        if (!error.empty())
+            failed_raytracer_edit_ = edit;
+    };
+    if (failed || scene_changed || other_scene || differs("coordinates"))
+        load_next_scene(edit.scene, edit.raytracer, done);
+    else if (differs("raytracer"))
+        start_next_raytracer(edit.raytracer, raytracer_->scene, done);
 }
 
 } // namespace arhost::host

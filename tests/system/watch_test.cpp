@@ -158,7 +158,46 @@ TEST(Watch, AnInvalidEditLeavesTheRunAsItWas) {
     EXPECT_EQ(run.read("out/" + run.last_picture()), picture_of_a_fresh_run(run, run.last_picture()));
 }
 
-TEST(Watch, AMendedSceneCompletesAnEditThatFailed) {
+TEST(Watch, ACorrectedSceneThatACommandHasLoadedStays) {
+    WatchedRun run;
+    run.write("other.yaml", large_sphere);
+    std::string yaml = WatchedRun::configuration(tracker, raytracer, "scenes: [other.yaml]\n");
+    const std::string outputs = "outputs: [";
+    yaml.replace(yaml.find(outputs), outputs.size(),
+                 outputs + "{plugin: sink_control, allow: [listen], control: [load_scene, set]}, ");
+    run.write("run.yaml", yaml);
+    std::filesystem::create_directory(run.path("runtime"));
+    ::setenv("XDG_RUNTIME_DIR", run.path("runtime").c_str(), 1);
+    run.start_watching();
+    const auto ctl = [](std::vector<std::string> words) {
+        ArhostRun command;
+        words.insert(words.begin(), "ctl");
+        EXPECT_EQ(command.run(words), 0) << command.output();
+    };
+    ctl({"load_scene", "other"});
+    run.wait_for("raytracer is now rt_embree with the scene other");
+    run.replace("other.yaml", scene_with("sphere: {centre: [0, 0, 30], radius: -30}"));
+    run.wait_for("the previous scene stays");
+    run.replace("other.yaml", small_sphere);
+    run.wait_for("raytracer is now rt_embree with the scene other", 2);
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+    EXPECT_THAT(run.output(), Not(HasSubstr("with the scene scene")));
+}
+
+TEST(Watch, AnEditOfTheSandboxNeedsANewRun) {
+    WatchedRun run;
+    run.start_watching();
+    run.replace("run.yaml",
+                WatchedRun::configuration("tracker: {plugin: tracker_apriltag, markers: [{id: 0, side_mm: 80}]}\n",
+                                          raytracer, "sandbox: none\n"));
+    run.wait_for("an edit of 'sandbox' needs a new run; the run continues with the previous configuration");
+    run.replace("run.yaml",
+                WatchedRun::configuration("tracker: {plugin: tracker_apriltag, markers: [{id: 0, side_mm: 80}]}\n"));
+    run.wait_for("tracker is now tracker_apriltag");
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+}
+
+TEST(Watch, ACorrectedSceneCompletesAnEditThatFailed) {
     WatchedRun run;
     run.write("other.yaml", scene_with("sphere: {centre: [0, 0, 30], radius: -30}"));
     run.start_watching();
@@ -181,6 +220,18 @@ TEST(WatchConfiguration, RejectsAPluginThatCouldReplaceALinkToTheConfiguration) 
     std::filesystem::create_symlink("../own/run.yaml", run.path("out/run.yaml"));
     std::filesystem::create_symlink("../own/scene.yaml", run.path("out/scene.yaml"));
     EXPECT_EQ(run.run({"out/run.yaml", "--watch"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("outputs[0]: may write to the folder of '"));
+}
+
+TEST(WatchConfiguration, RejectsAPluginThatCouldReplaceALinkInThePath) {
+    ArhostRun run;
+    run.write("own/run.yaml", std::string("version: 1\n") + source + tracker + raytracer +
+                                  "outputs: [{plugin: sink_video, path: " + run.path("project").string() +
+                                  "/take.mkv}]\n");
+    run.write("own/scene.yaml", small_sphere);
+    std::filesystem::create_directory(run.path("project"));
+    std::filesystem::create_directory_symlink("../own", run.path("project/conf"));
+    EXPECT_EQ(run.run({"project/conf/run.yaml", "--watch"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("outputs[0]: may write to the folder of '"));
 }
 

@@ -49,6 +49,28 @@ TEST_F(FileWatchTest, ReportsAFileThatDidNotExist) {
     EXPECT_THAT(next_report(), ElementsAre(path("later")));
 }
 
+TEST_F(FileWatchTest, ReportsAllFilesAfterAFolderWasReplaced) {
+    std::filesystem::create_directory(path("a"));
+    std::filesystem::create_directory(path("b"));
+    write("a/file");
+    write("b/file");
+    watch.add({path("a/file")});
+    std::filesystem::rename(path("a"), path("old"));
+    std::filesystem::rename(path("b"), path("a"));
+    EXPECT_THAT(next_report(), ElementsAre(path("a/file")));
+    write("a/file");
+    EXPECT_THAT(next_report(), ElementsAre(path("a/file"))) << "the new folder is watched";
+    std::filesystem::remove_all(path("a"));
+    EXPECT_THAT(next_report(), ElementsAre(path("a/file")));
+}
+
+TEST_F(FileWatchTest, PathsThatCannotExistDoNotPreventTheOthers) {
+    write("file");
+    watch.add({path("a/../file"), path("file/below"), path(std::string(300, 'n') + "/x"), path("z")});
+    write("z");
+    EXPECT_THAT(next_report(), ElementsAre(path("z")));
+}
+
 TEST_F(FileWatchTest, DoesNotReportOtherFilesOfTheFolder) {
     watch.add({path("watched")});
     write("other");
