@@ -104,13 +104,18 @@ void protect_programs(const run_config::FilesInUse &files) {
             files.protect(base::identity_of(entry->path()));
 }
 
-// Whether a program that may write to `folder` can change `file`, or replace a symbolic link in its path.
-bool may_redirect(const fs::path &folder, const fs::path &file) {
+// Whether a program that may write to `folder` can change `file`, or replace a symbolic link on the way to it.
+bool may_redirect(const fs::path &folder, const fs::path &file, int links = 40) {
     if (sandbox::contains(folder, base::real_path(file)))
         return true;
-    for (fs::path at = file; at.has_relative_path(); at = at.parent_path())
-        if (sandbox::contains(folder, base::real_path(at.parent_path())))
+    for (fs::path at = file; at.has_relative_path(); at = at.parent_path()) {
+        const fs::path parent = base::real_path(at.parent_path());
+        std::error_code not_a_link;
+        const fs::path target = fs::read_symlink(at, not_a_link);
+        if (sandbox::contains(folder, parent) ||
+            (!not_a_link && links > 0 && may_redirect(folder, parent / target, links - 1)))
             return true;
+    }
     return false;
 }
 

@@ -76,7 +76,7 @@ void FileWatch::report() {
         pending_ = files_;
         try {
             add(pending_);
-        } catch (const std::system_error &) { // was reported when the files were added
+        } catch (const std::system_error &) { // without watches left, the other files are still watched
         }
     }
     changed_(std::exchange(pending_, {}));

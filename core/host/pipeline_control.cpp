@@ -137,6 +137,10 @@ bool Pipeline::finish_swaps() {
     const bool raytracer = finish(raytracer_, next_raytracer_);
     if (raytracer && raytracer_->scene != scene)
         recompute_cameras();
+    // An edit that failed before is not tried again.
+    tracker_edit_failed_ = tracker_edit_failed_ && !tracker;
+    if (raytracer)
+        failed_raytracer_edit_.reset();
     return tracker || raytracer;
 }
 

@@ -119,14 +119,15 @@ void Pipeline::apply(const run_config::Configuration &edited, const run_config::
     const bool other_scene = edited.raytracer->scene != previous.raytracer->scene;
     if (other_scene)
         edit.scene = edited.scenes.front();
-    const control::Done done = [this, edit](const std::string &error, const auto &) {
-        if (!error.empty())
-            failed_raytracer_edit_ = edit;
-    };
-    if (failed || scene_changed || other_scene || differs("coordinates"))
-        load_next_scene(edit.scene, edit.raytracer, done);
-    else if (differs("raytracer"))
-        start_next_raytracer(edit.raytracer, raytracer_->scene, done);
+    const bool loads_scene = failed || scene_changed || other_scene || differs("coordinates");
+    if (!loads_scene && !differs("raytracer"))
+        return;
+    failed_raytracer_edit_ = edit; // until the ray tracer has been replaced
+    const auto ignored = [](const std::string &, const nlohmann::ordered_json &) {};
+    if (loads_scene)
+        load_next_scene(edit.scene, edit.raytracer, ignored);
+    else
+        start_next_raytracer(edit.raytracer, raytracer_->scene, ignored);
 }
 
 } // namespace arhost::host

@@ -176,12 +176,21 @@ TEST(Watch, ACorrectedSceneThatACommandHasLoadedStays) {
     };
     ctl({"load_scene", "other"});
     run.wait_for("raytracer is now rt_embree with the scene other");
+    ctl({"set", "raytracer", "samples", "2"});
     run.replace("other.yaml", scene_with("sphere: {centre: [0, 0, 30], radius: -30}"));
     run.wait_for("the previous scene stays");
     run.replace("other.yaml", small_sphere);
     run.wait_for("raytracer is now rt_embree with the scene other", 2);
-    EXPECT_EQ(run.interrupt(), 130) << run.output();
     EXPECT_THAT(run.output(), Not(HasSubstr("with the scene scene")));
+    // A command after a failed edit stays, too.
+    run.replace("other.yaml", scene_with("sphere: {centre: [0, 0, 30], radius: -30}"));
+    run.wait_for("the previous scene stays", 2);
+    ctl({"load_scene", "scene"});
+    run.wait_for("raytracer is now rt_embree with the scene scene");
+    run.replace("run.yaml", yaml + "frames: 100000\n");
+    run.wait_for("the edit of 'frames' takes effect in the next run");
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+    EXPECT_GT(run.output().rfind("with the scene scene"), run.output().rfind("with the scene other"));
 }
 
 TEST(Watch, AnEditOfTheSandboxNeedsANewRun) {
@@ -231,8 +240,11 @@ TEST(WatchConfiguration, RejectsAPluginThatCouldReplaceALinkInThePath) {
     run.write("own/scene.yaml", small_sphere);
     std::filesystem::create_directory(run.path("project"));
     std::filesystem::create_directory_symlink("../own", run.path("project/conf"));
-    EXPECT_EQ(run.run({"project/conf/run.yaml", "--watch"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("outputs[0]: may write to the folder of '"));
+    std::filesystem::create_directory_symlink("project/conf", run.path("chained"));
+    for (const char *file : {"project/conf/run.yaml", "chained/run.yaml"}) {
+        EXPECT_EQ(run.run({file, "--watch"}), 2) << file;
+        EXPECT_THAT(run.output(), HasSubstr("outputs[0]: may write to the folder of '"));
+    }
 }
 
 TEST(Watch, NamesTheKeysWhoseEditsNeedANewRun) {
