@@ -62,6 +62,10 @@ public:
     void copy_rows(std::size_t plane, const std::uint8_t *from, std::size_t row_bytes, std::size_t rows) {
         std::uint8_t *to = this->plane(plane);
         const std::size_t stride = format_.stride[plane];
+        if (stride == row_bytes) {
+            std::memcpy(to, from, rows * row_bytes);
+            return;
+        }
         for (std::size_t y = 0; y < rows; ++y)
             std::memcpy(to + y * stride, from + y * row_bytes, row_bytes);
     }

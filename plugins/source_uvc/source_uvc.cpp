@@ -8,6 +8,7 @@
 #include "usb.hpp"
 
 #include "camera_common/control_options.hpp"
+#include "camera_common/copy_rows.hpp"
 #include "camera_common/frame_size.hpp"
 #include "camera_common/jpeg.hpp"
 #include "camera_common/silence.hpp"
@@ -16,7 +17,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <iterator>
 
 namespace {
@@ -335,18 +335,15 @@ private:
         if (encoding_ == uvc::Encoding::mjpeg)
             return jpeg_.decode(bytes, format, buffer.plane, fault_);
         const std::uint8_t *from = bytes.data(); // an intact frame has all rows, without padding
-        const auto copy_rows = [&](std::uint32_t plane, std::size_t row_bytes, std::size_t rows) {
-            std::uint8_t *to = buffer.plane[plane];
-            const std::size_t stride = format.stride[plane];
-            for (std::size_t y = 0; y < rows; ++y)
-                std::memcpy(to + y * stride, from + y * row_bytes, row_bytes);
+        const auto copy_plane = [&](std::uint32_t plane, std::size_t row_bytes, std::size_t rows) {
+            arhost::copy_rows(from, row_bytes, buffer.plane[plane], format.stride[plane], row_bytes, rows);
             from += rows * row_bytes;
         };
         if (encoding_ == uvc::Encoding::yuy2) {
-            copy_rows(0, 2 * std::size_t{format.width}, format.height);
+            copy_plane(0, 2 * std::size_t{format.width}, format.height);
         } else {
-            copy_rows(0, format.width, format.height);
-            copy_rows(1, format.width, format.height / 2);
+            copy_plane(0, format.width, format.height);
+            copy_plane(1, format.width, format.height / 2);
         }
         return true;
     }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pixels.hpp"
 
+#include "camera_common/copy_rows.hpp"
+
 #include <algorithm>
-#include <cstring>
 
 namespace arhost {
 namespace {
@@ -50,19 +51,13 @@ bool is_converted(std::uint32_t fourcc) {
            fourcc == V4L2_PIX_FMT_Y12 || fourcc == V4L2_PIX_FMT_Y10;
 }
 
-void copy_row(std::uint32_t fourcc, const std::uint8_t *from, std::size_t bytes, std::uint8_t *to) {
+void convert_row(std::uint32_t fourcc, const std::uint8_t *from, std::size_t bytes, std::uint8_t *to) {
     // `shift`: right shift of a sample, of which `low` is the less significant byte, to 8 bits.
     const auto reduce = [&](int low, int shift) {
         for (std::size_t i = 0; i < bytes; i += 2)
             to[i / 2] = static_cast<std::uint8_t>(std::min((from[i + low] | from[i + 1 - low] << 8) >> shift, 255));
     };
     switch (fourcc) {
-    case V4L2_PIX_FMT_UYVY:
-        for (std::size_t i = 0; i < bytes; i += 2) {
-            to[i] = from[i + 1];
-            to[i + 1] = from[i];
-        }
-        break;
     case V4L2_PIX_FMT_Y16:
         return reduce(0, 8);
     case V4L2_PIX_FMT_Y16_BE:
@@ -71,8 +66,11 @@ void copy_row(std::uint32_t fourcc, const std::uint8_t *from, std::size_t bytes,
         return reduce(0, 4);
     case V4L2_PIX_FMT_Y10:
         return reduce(0, 2);
-    default:
-        std::memcpy(to, from, bytes);
+    default: // UYVY
+        for (std::size_t i = 0; i < bytes; i += 2) {
+            to[i] = from[i + 1];
+            to[i + 1] = from[i];
+        }
     }
 }
 
@@ -139,13 +137,13 @@ bool copy_picture(const PictureFormat &camera, const std::vector<std::span<const
     for (std::size_t p = 0; p < colours.size(); ++p) {
         const ColourPlane &plane = colours[p];
         const std::uint8_t *from = planes[plane.memory].data() + plane.offset;
-        if (!is_converted(camera.fourcc) && plane.stride == buffer.format->stride[p]) {
-            std::memcpy(buffer.plane[p], from, plane.stride * (plane.rows - 1) + plane.row_bytes);
-            continue;
-        }
-        for (std::size_t y = 0; y < plane.rows; ++y)
-            copy_row(camera.fourcc, from + y * plane.stride, plane.row_bytes,
-                     buffer.plane[p] + y * buffer.format->stride[p]);
+        std::uint8_t *const to = buffer.plane[p];
+        const std::size_t stride = buffer.format->stride[p];
+        if (!is_converted(camera.fourcc))
+            copy_rows(from, plane.stride, to, stride, plane.row_bytes, plane.rows);
+        else
+            for (std::size_t y = 0; y < plane.rows; ++y)
+                convert_row(camera.fourcc, from + y * plane.stride, plane.row_bytes, to + y * stride);
     }
     return true;
 }
