@@ -92,7 +92,7 @@ private:
     void seal_output() const {
         constexpr int control = 3;
         const auto say = [](const std::string &text) { ::send(control, text.data(), text.size(), 0); };
-        say(R"({"type": "ready", "format": null, "frame_count": 0, "intrinsics": null})");
+        say(R"({"type": "ready", "format": null, "frame_count": 0, "intrinsics": null, "capabilities": 0})");
         char text[4096];
         iovec part{text, sizeof text};
         alignas(cmsghdr) char ancillary[CMSG_SPACE(sizeof(int))];
