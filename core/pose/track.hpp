@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The pose of a target over time: which of two solutions of the planar pose problem is the true one, and where the
+// target will be in the next frame.
+#pragma once
+
+#include "pose/motion_filter.hpp"
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+namespace arhost::pose {
+
+// What is remembered of one target. Plain data without pointers, because it is kept in shared memory across restarts;
+// all zero if the target was never seen.
+struct Track {
+    std::int64_t capture_ns; // of the last frame in which the target was detected
+    std::uint32_t branches;  // 0: never seen; 2 if the last frame permitted two poses, else 1
+    std::uint32_t reserved;
+    double log_odds;  // log of P(branch[0] is the true one) / P(branch[1] is the true one), damped over time
+    Motion branch[2]; // branch[0] is the chosen one
+};
+
+// Chooses among the poses of one frame (from estimate_poses; at least one), and returns the track for the next frame
+// and the index of the chosen pose. A pose stays on its branch, which moves continuously, until the reprojection errors
+// of several frames speak for the other branch: a single frame's errors often are noise, and each switch is a visible
+// flip. The first frame takes the pose of smallest error. A track continues if at most 1 s passed since its last frame.
+struct Step {
+    Track track;
+    std::size_t chosen;
+};
+Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_t capture_ns);
+
+// Returns where the target is at `capture_ns` if it moves on at the same speed; nullopt if the track is too old.
+std::optional<Rigid> predicted_pose(const Track &track, std::int64_t capture_ns);
+
+} // namespace arhost::pose

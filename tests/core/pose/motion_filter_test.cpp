@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pose/motion_filter.hpp"
+
+#include "simulated_markers.hpp"
+
+#include <algorithm>
+
+namespace arhost::pose {
+namespace {
+
+constexpr double side_mm = 80, noise_px = 0.1, frame_s = 1 / 30.0;
+const arhost_intrinsics pinhole = intrinsics_of(ARHOST_DISTORTION_NONE, {});
+
+// The estimate that is nearest to the truth: the choice between two is not tested here.
+Estimate measure(Camera &camera, const Rigid &truth) {
+    const ObservedMarker marker = camera.observe(truth, square_corners_mm(side_mm), noise_px);
+    const auto poses = estimate_poses({&marker, 1}, camera.projection());
+    if (poses.empty())
+        throw std::runtime_error("no pose");
+    return *std::ranges::min_element(
+        poses, {}, [&](const Estimate &pose) { return degrees_between(pose.camera_from_target, truth); });
+}
+
+Eigen::Vector2d corner_px(const Camera &camera, const Rigid &pose) {
+    return *camera.projection().pixel(pose * square_corners_mm(side_mm)[1]);
+}
+
+// A marker in a hand: its corner moves by up to 6 px from frame to frame.
+Rigid in_hand(double seconds) {
+    return pose_at({60 * std::sin(3 * seconds), 40 * std::sin(4 * seconds), 800 + 60 * std::sin(2 * seconds)},
+                   35 + 15 * std::sin(2.5 * seconds), 30 * seconds, 40 * std::sin(seconds));
+}
+
+} // namespace
+
+TEST(MotionFilter, LagsLessThanAFrameBehindAHand) {
+    Camera camera(pinhole, 5);
+    Motion motion = begin_motion(measure(camera, in_hand(0)));
+    std::vector<double> lags;
+    for (int frame = 1; frame < 900; ++frame) {
+        const double now = frame * frame_s;
+        motion = corrected(predicted(motion, frame_s), measure(camera, in_hand(now)));
+        const Eigen::Vector2d found = corner_px(camera, pose_of(motion));
+        double best = 1e9, lag = 0;
+        for (double frames = 0; frames <= 3; frames += 0.1)
+            if (const double error = (found - corner_px(camera, in_hand(now - frames * frame_s))).norm(); error < best) {
+                best = error;
+                lag = frames;
+            }
+        // Where the corner hardly moves, noise decides which earlier position is the nearest.
+        if ((corner_px(camera, in_hand(now)) - corner_px(camera, in_hand(now - frame_s))).norm() > 1)
+            lags.push_back(lag);
+    }
+    ASSERT_GT(lags.size(), 300u);
+    std::ranges::sort(lags);
+    EXPECT_LE(lags[lags.size() * 95 / 100], 1);
+}
+
+TEST(MotionFilter, PredictsAtConstantVelocity) {
+    const auto pose = [](double s) { return pose_at({100 * s, 0, 1000 - 50 * s}, 30, 0, 40 * s); };
+    Estimate estimate{pose(0), 1e-6 * Matrix6d::Identity(), 0.1, 1, 0, 2};
+    Motion motion = begin_motion(estimate);
+    for (int frame = 1; frame < 60; ++frame) {
+        estimate.camera_from_target = pose(frame * frame_s);
+        motion = corrected(predicted(motion, frame_s), estimate);
+    }
+    const Rigid later = pose_of(predicted(motion, 0.1)), truth = pose(59 * frame_s + 0.1);
+    EXPECT_LT(degrees_between(later, truth), 0.05);
+    EXPECT_LT((later.translation_mm - truth.translation_mm).norm(), 0.05);
+}
+
+TEST(MotionFilter, AMeasuredRotationIsNearItsOwnMotionAndFarFromAnother) {
+    Camera camera(pinhole, 6);
+    const Rigid truth = pose_at({0, 0, 900}, 40);
+    Motion motion = begin_motion(measure(camera, truth));
+    double sum = 0;
+    constexpr int frames = 300;
+    for (int frame = 0; frame < frames; ++frame) {
+        motion = predicted(motion, frame_s);
+        const Estimate estimate = measure(camera, truth);
+        sum += rotation_distance2(motion, estimate) / frames;
+        motion = corrected(motion, estimate);
+    }
+    EXPECT_LT(sum, 4);
+    Estimate other = measure(camera, pose_at({0, 0, 900}, -40));
+    EXPECT_GT(rotation_distance2(motion, other), 100);
+}
+
+} // namespace arhost::pose
