@@ -5,8 +5,9 @@
 //
 // Host → worker: a futex on a counter in the host's page. The host increments it without blocking; the worker cannot
 // modify it, because its mapping is read-only.
-// Worker → host: a byte on a socket pair, sent with MSG_DONTWAIT. The host waits for it with epoll. No flag that
-// the worker sets on its end can make the host block. (The ends of an eventfd would share the flag O_NONBLOCK.)
+// Worker → host: a byte in a pipe. The host waits for it with epoll. The worker has only the write end: it can
+// neither take bytes out again, nor set a flag that makes the host block. (An eventfd has one end, which both would
+// share.)
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -41,8 +42,7 @@ struct DoorbellPair {
 DoorbellPair make_doorbell();
 void ring_doorbell(int worker_end);
 
-// Reads all rings of the doorbell and returns their number; -1 if the other end is closed; -2 if the worker sent file
-// descriptors, which it must not do. Reads at most 4096 per
+// Reads all rings of the doorbell and returns their number; -1 if the other end is closed. Reads at most 4096 per
 // call, which bounds the time that the host spends.
 int drain_doorbell(int host_end);
 

@@ -697,11 +697,8 @@ TEST(Sandbox, AFloodedDoorbellEndsTheWorker) {
 }
 
 TEST(Sandbox, DescriptorsForTheHostEndTheWorker) {
-    for (const char *attack : {"descriptor_in_message", "descriptor_in_doorbell"}) {
-        SCOPED_TRACE(attack);
-        HostileRun run(attack);
-        expect_ended(run, "protocol violation: it sent file descriptors");
-    }
+    HostileRun run("descriptor_in_message");
+    expect_ended(run, "protocol violation: it sent file descriptors");
 }
 
 TEST(Sandbox, AFloodOfMessagesEndsTheWorker) {

@@ -238,7 +238,7 @@ static void open_sockets(const tracker *self) {
     /* A listening socket that was shut down connects by this flag. Other sockets ignore it. */
     report(self, "a connection by sending",
            socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0 && sendto(ends[0], "x", 1, MSG_FASTOPEN, NULL, 0) == 1);
-    report(self, "a filter", setsockopt(doorbell, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program) == 0);
+    report(self, "a filter", setsockopt(control, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program) == 0);
     report(self, "the host's process", getsockopt(control, SOL_SOCKET, 77 /* SO_PEERPIDFD */, &pidfd, &size) == 0);
 }
 
@@ -572,7 +572,7 @@ static void truncate_one(const tracker *self, void *bytes, size_t size, int writ
 
 /* Makes the host check the rings now, before a response corrects the ring positions. */
 static void trigger_check(void) {
-    (void)!send(doorbell, "", 1, MSG_NOSIGNAL);
+    (void)!write(doorbell, "", 1);
     for (;;)
         pause();
 }
@@ -633,9 +633,10 @@ static void send_small_messages(void) {
 }
 
 /* Sends an open file to the host, which must release it. */
-static void send_descriptor(int socket) {
+static void send_descriptor(void) {
     char text[] = "{\"type\": \"detached\"}";
-    (void)!send_with_descriptor(socket, text, sizeof text - 1, open("/dev/null", O_RDONLY | O_CLOEXEC), MSG_NOSIGNAL);
+    (void)!send_with_descriptor(control, text, sizeof text - 1, open("/dev/null", O_RDONLY | O_CLOEXEC),
+                                MSG_NOSIGNAL);
     for (;;)
         pause();
 }
@@ -723,7 +724,7 @@ static void attack(const tracker *self) {
         change_flags(self);
     else if (!strcmp(name, "doorbell"))
         for (i = 0; i < 4000000; ++i)
-            (void)!send(doorbell, name, 1, MSG_NOSIGNAL);
+            (void)!write(doorbell, name, 1);
     else if (!strcmp(name, "deaf")) {
         for (i = 1; i < 32; ++i)
             signal((int)i, SIG_IGN);
@@ -734,9 +735,7 @@ static void attack(const tracker *self) {
     else if (!strcmp(name, "wrong_types"))
         say_text("{\"type\": \"log\", \"severity\": [], \"text\": {}}");
     else if (!strcmp(name, "descriptor_in_message"))
-        send_descriptor(control);
-    else if (!strcmp(name, "descriptor_in_doorbell"))
-        send_descriptor(doorbell);
+        send_descriptor();
     else if (!strcmp(name, "huge_type"))
         send_huge_type();
     else if (!strcmp(name, "out_of_turn"))
