@@ -15,18 +15,29 @@ std::int64_t clock_ns(clockid_t clock) {
     return time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec;
 }
 
+bool is_recent(std::int64_t age_ns) {
+    return std::abs(age_ns) < 10'000'000'000;
+}
+
+std::int64_t stamp_ns_of(const Capture &captured) {
+    return captured.time.tv_sec * std::int64_t{1'000'000'000} + captured.time.tv_usec * std::int64_t{1'000};
+}
+
 } // namespace
 
+std::optional<std::int64_t> CaptureClock::age_ns(const Capture &captured) {
+    const std::int64_t age_ns = clock_ns(CLOCK_MONOTONIC) - stamp_ns_of(captured);
+    if ((captured.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC || !is_recent(age_ns))
+        return {};
+    return std::max<std::int64_t>(age_ns, 0);
+}
+
 std::int64_t CaptureClock::monotonic_ns(const Capture &captured) {
-    const std::int64_t stamp_ns =
-        captured.time.tv_sec * std::int64_t{1'000'000'000} + captured.time.tv_usec * std::int64_t{1'000};
     const std::int64_t now_ns = clock_ns(CLOCK_MONOTONIC);
-    const auto is_recent = [](std::int64_t age_ns) { return std::abs(age_ns) < 10'000'000'000; };
-    if ((captured.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC &&
-        is_recent(now_ns - stamp_ns))
-        return std::min(stamp_ns, now_ns);
+    if (const auto age = age_ns(captured))
+        return now_ns - *age;
     // Old drivers use the wall clock or do not say which clock they use.
-    const std::int64_t age_ns = clock_ns(CLOCK_REALTIME) - stamp_ns;
+    const std::int64_t age_ns = clock_ns(CLOCK_REALTIME) - stamp_ns_of(captured);
     if (!reported_)
         host_.warn("the camera driver does not use CLOCK_MONOTONIC; " +
                    std::string(is_recent(age_ns) ? "its wall-clock time stamps are converted"

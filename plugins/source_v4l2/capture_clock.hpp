@@ -6,6 +6,7 @@
 #include <arhost-cpp/plugin.hpp>
 
 #include <cstdint>
+#include <optional>
 
 namespace arhost {
 
@@ -17,6 +18,8 @@ public:
     // Returns the capture time in ns of CLOCK_MONOTONIC, at most the current time. Reports once if the driver uses
     // another clock.
     std::int64_t monotonic_ns(const Capture &captured);
+    // Returns the time since the capture; nullopt if the driver uses another clock.
+    static std::optional<std::int64_t> age_ns(const Capture &captured);
 
 private:
     Host host_;

@@ -152,6 +152,7 @@ private:
                                                           Size{format.width, format.height}.text());
         }
         format.fps = fps > 0 ? fps : setup.fps;
+        frame_ns_ = fps > 0 ? static_cast<std::int64_t>(1e9 / fps) : 0;
         if (!depth_path_.empty())
             depth_.emplace(host_, depth_path_, size, format.fps, depth_unit_mm_);
         format.has_depth = depth_.has_value();
@@ -291,10 +292,16 @@ private:
                 ++losses_.superseded;
             }
             found = std::move(captured);
-            if (!newest_only_)
+            if (!newest_only_ || is_fresh(*found))
                 break;
         }
         return found;
+    }
+
+    // Whether the camera cannot have captured another picture since this one.
+    bool is_fresh(const Capture &captured) const {
+        const auto age_ns = arhost::CaptureClock::age_ns(captured);
+        return age_ns && *age_ns < frame_ns_ / 2;
     }
 
     bool copy(const std::vector<std::span<const std::uint8_t>> &planes, const arhost_frame_buffer &buffer) {
@@ -334,6 +341,7 @@ private:
     std::optional<CaptureStream> stream_; // declared after device_, because it must be destroyed first
     std::optional<arhost::DepthCamera> depth_;
     arhost::CaptureClock clock_;
+    std::int64_t frame_ns_ = 0; // time from frame to frame; 0: unknown
     arhost::JpegDecoder jpeg_;
     bool newest_only_ = false;
     PictureFormat camera_;
