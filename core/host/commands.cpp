@@ -507,7 +507,10 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     const bool is_accepted = problem && problem->is_missing_target && arguments.allow_no_target;
     if (problem)
         console.log(is_accepted || stopped_by_signal ? ARHOST_SEVERITY_WARNING : ARHOST_SEVERITY_ERROR,
-                    problem->component, problem->text);
+                    problem->component,
+                    problem->text + (problem->is_missing_target ? " (--allow-no-target accepts this)" : ""));
+    if (const std::string unseen = unseen_markers(configuration, statistics); completed && !unseen.empty())
+        console.log(ARHOST_SEVERITY_WARNING, "tracker", unseen);
     if (configuration.mode == run_config::Mode::live && statistics.composited > 0)
         console.log(ARHOST_SEVERITY_INFO, "arhost",
                     fmt::format("{} frames, {:.1f} fps, latency from {}, {}", statistics.composited, statistics.fps(),
@@ -621,7 +624,9 @@ private:
 
 // Starts all components once, without restarts, and prints what they report. The outputs may write only to a
 // temporary folder; messages name their own folder instead.
-void check_by_opening(run_config::Configuration configuration, supervise::Context context) {
+// Returns the exit status.
+int check_by_opening(run_config::Configuration configuration, const Arguments &arguments,
+                     supervise::Context context) {
     const TemporaryFolder scratch;
     std::vector<std::pair<std::string, std::string>> folders; // temporary folder, the output's own folder
     const auto restart_never = [](run_config::ComponentConfiguration &component) {
@@ -660,7 +665,7 @@ void check_by_opening(run_config::Configuration configuration, supervise::Contex
         log(severity, component, with_own_folders(text));
     };
     Pipeline pipeline(configuration, context, [](const Progress &) {});
-    if (!pipeline.check(scratch.path())) {
+    if (!pipeline.check(scratch.path(), arguments.frames.has_value())) {
         const std::string reason = with_own_folders(pipeline.failure());
         if (pipeline.failed_by_configuration())
             throw yaml::Error(reason);
@@ -668,6 +673,10 @@ void check_by_opening(run_config::Configuration configuration, supervise::Contex
     }
     for (const std::string &line : pipeline.findings())
         std::printf("%s\n", base::printable(line).c_str());
+    const auto problem = problem_with_run(configuration, pipeline.statistics(), pipeline.looked_for());
+    if (problem)
+        context.log(ARHOST_SEVERITY_ERROR, problem->component, problem->text);
+    return problem ? run_failed : success;
 }
 
 // Returns the files of the plugins with these names; of all plugins if there are none.
@@ -750,16 +759,20 @@ int replay(const Arguments &arguments, const ReplayArguments &replay, supervise:
 }
 
 int check(const Arguments &arguments, bool open, supervise::Starter &launcher) {
+    if (!open && arguments.frames)
+        throw yaml::Error("--run and --no-open exclude each other; remove one of them");
     Console console(arguments.verbose);
     const run_config::Configuration configuration = read_configuration(arguments);
     show_warnings(configuration, console);
     ipc::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
     const std::vector<ipc::PluginDescription> raytracers = check_plugins(configuration, context);
-    if (open)
-        check_by_opening(configuration, context);
-    else if (configuration.raytracer)
+    if (open) {
+        if (const int status = check_by_opening(configuration, arguments, context); status != success)
+            return status;
+    } else if (configuration.raytracer) {
         check_scene(configuration, context, raytracers);
+    }
     std::printf("%s: OK\n", base::printable(arguments.file).c_str());
     return success;
 }

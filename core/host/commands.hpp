@@ -53,8 +53,8 @@ int run(const Arguments &arguments, supervise::Starter &launcher);
 // Measures the time from the camera's lens to the display of the configuration's outputs.
 int latency(Arguments arguments, supervise::Starter &launcher);
 int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Starter &launcher);
-// Checks a configuration. If `open`, also starts source, tracker, ray tracer and outputs as a run does, and prints
-// what it found; outputs then write to a temporary folder.
+// Checks a configuration. If `open`, also starts source, tracker, ray tracer and outputs as a run does, processes
+// `arguments.frames` frames, if given, and prints what it found; outputs then write to a temporary folder.
 int check(const Arguments &arguments, bool open, supervise::Starter &launcher);
 int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, supervise::Starter &launcher);
 int devices(const Arguments &arguments, const DevicesArguments &options, supervise::Starter &launcher);

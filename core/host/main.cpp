@@ -113,6 +113,10 @@ int main(int argc, char **argv) {
     check_command.option("FILE", arguments.file, "The configuration").required();
     check_command.flag("--no-open", no_open,
                        "Check only the file, the plugins' options and the scene, for example without the camera");
+    check_command
+        .option("--run", arguments.frames, "Also process the first N frames and report what was found in them")
+        .type_name("N")
+        .range(1.0, 1e6);
     add_configuration_options(check_command, arguments);
 
     PluginsArguments plugins_arguments;

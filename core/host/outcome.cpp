@@ -32,7 +32,7 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
         return Problem{
             "tracker",
             fmt::format("no marker was seen in any of {} frames{}; it looked for {}; compare the numbers and the "
-                        "dictionary with the print (--allow-no-target accepts this)",
+                        "dictionary with the print",
                         statistics.tracker_results, configuration.raytracer ? ", so no frame has an overlay" : "",
                         looked_for),
             true};
@@ -46,6 +46,22 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
                    fmt::format("none of the {} frames shown has an overlay ({}); raise 'live.max_latency_ms', or "
                                "choose fewer samples or a smaller image",
                                statistics.composited, why.empty() ? "all were late" : why)};
+}
+
+std::string unseen_markers(const run_config::Configuration &configuration, const Statistics &statistics) {
+    if (!configuration.tracker || configuration.trajectory || configuration.time_codes || statistics.markers.empty())
+        return {};
+    std::string ids;
+    std::size_t count = 0;
+    for (const arhost_marker_config &listed : configuration.tracker->markers)
+        if (!statistics.markers.contains(listed.id)) {
+            ids += fmt::format("{} {}", ids.empty() ? "" : ",", listed.id);
+            ++count;
+        }
+    if (count == 0)
+        return {};
+    return fmt::format("{}{} never seen in {} frames", count == 1 ? "marker" : "markers",
+                       ids + (count == 1 ? " was" : " were"), statistics.tracker_results);
 }
 
 std::string describe_targets(const std::vector<arhost_marker_config> &markers, const ipc::PluginDescription &plugin,

@@ -21,6 +21,9 @@ struct Problem {
 std::optional<Problem> problem_with_run(const run_config::Configuration &configuration, const Statistics &statistics,
                                         const std::string &looked_for);
 
+// Names the configured markers that were never seen although others were; "" if there are none.
+std::string unseen_markers(const run_config::Configuration &configuration, const Statistics &statistics);
+
 // Describes the markers and those options of a tracker that select one of several values, which include the
 // dictionary.
 std::string describe_targets(const std::vector<arhost_marker_config> &markers, const ipc::PluginDescription &plugin,

@@ -42,8 +42,9 @@ bool Pipeline::run() {
     return failure_.empty();
 }
 
-bool Pipeline::check(const std::filesystem::path &scratch) {
+bool Pipeline::check(const std::filesystem::path &scratch, bool with_frames) {
     check_scratch_ = scratch;
+    ends_when_started_ = !with_frames;
     return run();
 }
 
@@ -75,6 +76,21 @@ std::vector<std::string> Pipeline::findings() const {
             "output: {}{}{}", sinks_[i]->component->description().id, path ? ": " + file : "",
             path && std::filesystem::is_regular_file(file, ignored) ? " (a run replaces the existing file)" : ""));
     }
+    if (statistics_.frames_in == 0)
+        return lines;
+    lines.push_back(fmt::format("{} frames: {} with a marker, {} with an overlay", statistics_.composited,
+                                statistics_.tracked, statistics_.augmented));
+    if (tracker_)
+        for (const arhost_marker_config &listed : tracker_->configuration->markers) {
+            const auto seen = statistics_.markers.find(listed.id);
+            lines.push_back(
+                seen == statistics_.markers.end()
+                    ? fmt::format("marker {}: not seen", listed.id)
+                    : fmt::format("marker {}: in {} frames, {:.0f} to {:.0f} px wide, reprojection error {:.2f} px",
+                                  listed.id, seen->second.frames, seen->second.smallest_px, seen->second.largest_px,
+                                  seen->second.mean_reprojection_px));
+        }
+    lines.push_back("ms p50/p95/p99: " + percentiles_text(statistics_.stages.all(), statistics_.latencies.all()));
     return lines;
 }
 
@@ -172,7 +188,7 @@ void Pipeline::advance_phase() {
     if (phase_ == Phase::outputs && std::all_of(sinks_.begin(), sinks_.end(), [&](const auto &sink) {
             return sink->closed || is_ready(sink->component);
         })) {
-        if (check_scratch_)
+        if (ends_when_started_)
             return kill_components();
         phase_ = Phase::running;
         end_without_sinks();

@@ -42,9 +42,10 @@ public:
     // Runs until all frames are output. Returns false if the run failed or a component was disabled; failure() then
     // returns the reason as a message for the user.
     bool run();
-    // Starts all components as run() does, but processes no frame. The outputs write to subfolders of `scratch`
-    // instead of their own folders; the permissions of their components must match. Returns as run().
-    bool check(const std::filesystem::path &scratch);
+    // Starts all components as run() does, but processes no frame, unless `with_frames`. The outputs write to
+    // subfolders of `scratch` instead of their own folders; the permissions of their components must match. Returns
+    // as run().
+    bool check(const std::filesystem::path &scratch, bool with_frames);
     static std::filesystem::path check_folder(const std::filesystem::path &scratch, std::size_t output);
     // Describes the started components, one per line, for the user.
     std::vector<std::string> findings() const;
@@ -231,6 +232,7 @@ private:
     std::map<std::uint64_t, std::unique_ptr<Frame>> frames_;
     std::vector<arhost_marker> last_markers_; // of the last composited frame
     bool has_window_ = false;
+    bool reported_missing_markers_ = false;
     // The last frame of a paced run.
     struct Paced {
         std::int64_t media_ns;
@@ -268,6 +270,7 @@ private:
     std::map<std::pair<const run_config::ComponentConfiguration *, std::string>, base::ListeningSocket>
         sockets_;                                        // by output and option
     std::optional<std::filesystem::path> check_scratch_; // set by check()
+    bool ends_when_started_ = false;                     // likewise
 };
 
 } // namespace arhost::host

@@ -21,9 +21,10 @@ using Clock = std::chrono::steady_clock;
 namespace {
 
 constexpr std::size_t max_reads_in_flight = 2;
-constexpr std::chrono::milliseconds max_lateness{100}; // of a paced run that catches up
-constexpr double max_step_s = 10;                      // longer gaps in the time of a film are not waited for
-constexpr std::size_t max_waiting_for_delay = 3;       // frames in mode live, for a stage that catches up
+constexpr std::chrono::seconds max_time_without_marker{5}; // in mode live, from the first frame
+constexpr std::chrono::milliseconds max_lateness{100};     // of a paced run that catches up
+constexpr double max_step_s = 10;                          // longer gaps in the time of a film are not waited for
+constexpr std::size_t max_waiting_for_delay = 3;           // frames in mode live, for a stage that catches up
 constexpr std::uint32_t max_attempts = 2; // per frame and stage, if the worker dies while processing the frame
 
 // Returns the first marker that is not lost, or null. Trackers report markers in the order of the configuration.
@@ -245,6 +246,16 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
     frame.times.tracker = std::chrono::nanoseconds(result.busy_ns);
     tracker_->add_duration(frame.times.tracker);
     statistics_.tracked += anchor_of(frame.record) != nullptr;
+    for (const arhost_marker &marker : std::span(frame.record.markers, frame.record.marker_count))
+        if (marker.state != ARHOST_MARKER_LOST && marker.age_frames == 0)
+            statistics_.markers[marker.id].add(marker);
+    if (live_ && statistics_.markers.empty() && !reported_missing_markers_ && !configuration_.time_codes &&
+        Clock::now() - statistics_.first_frame > max_time_without_marker) {
+        reported_missing_markers_ = true;
+        context_.log(ARHOST_SEVERITY_WARNING, "tracker",
+                     "has seen no marker yet; it looks for " + tracker_->looked_for +
+                         "; compare the numbers and the dictionary with the print");
+    }
     set_camera_from_markers(frame);
     on_camera_known(frame);
 }

@@ -17,6 +17,18 @@ namespace {
 const double log_growth = std::log(1.01);
 }
 
+void MarkerStatistics::add(const arhost_marker &marker) {
+    double side_px = 0;
+    for (int i = 0; i < 4; ++i) {
+        const double(&a)[2] = marker.corners_px[i], (&b)[2] = marker.corners_px[(i + 1) % 4];
+        side_px += std::hypot(b[0] - a[0], b[1] - a[1]) / 4;
+    }
+    smallest_px = frames == 0 ? side_px : std::min(smallest_px, side_px);
+    largest_px = std::max(largest_px, side_px);
+    ++frames;
+    mean_reprojection_px += (marker.reprojection_px - mean_reprojection_px) / static_cast<double>(frames);
+}
+
 void Timing::add(std::chrono::nanoseconds time) {
     const std::int64_t ns = std::max<std::int64_t>(time.count(), 1);
     const auto bucket = static_cast<std::size_t>(std::lround(std::log(static_cast<double>(ns)) / log_growth));

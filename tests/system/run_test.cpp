@@ -593,6 +593,48 @@ TEST(CommandLine, CheckFindsWhatWouldStopTheRun) {
         HasSubstr("run.yaml:5:30: outputs[1].path: another output, 'f-%d.png', can write a file of the same"));
 }
 
+TEST(Run, WarnsOfMarkersThatWereNeverSeen) {
+    ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 10, id: 4, side_mm: 80}}\n"
+                  "tracker: {plugin: tracker_aruco, markers: [{id: 7, side_mm: 80}, {id: 4, side_mm: 80}, {id: 5, "
+                  "side_mm: 80}]}\noutputs: [{plugin: sink_null}]\n");
+    EXPECT_EQ(run.run(), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("tracker: markers 7, 5 were never seen in 10 frames"));
+}
+
+TEST(Run, InModeLiveWarnsAfterFiveSecondsWithoutMarkers) {
+    ArhostRun run(
+        "version: 1\nmode: live\n"
+        "source: {plugin: source_synthetic, fps: 10, options: {frames: 58, id: 4, side_mm: 80}}\n"
+        "tracker: {plugin: tracker_aruco, markers: [{id: 7, side_mm: 80}]}\noutputs: [{plugin: sink_null}]\n");
+    EXPECT_EQ(run.run(), 1) << run.output();
+    const std::string warning = "has seen no marker yet; it looks for marker 7";
+    ASSERT_THAT(run.output(), HasSubstr(warning));
+    EXPECT_THAT(run.output().substr(run.output().find(warning) + 1), testing::Not(HasSubstr(warning)));
+}
+
+TEST(CommandLine, CheckRunsTheFirstFramesOnRequest) {
+    const auto yaml = [](const std::string &markers) {
+        return "version: 1\nsource: {plugin: source_synthetic, options: {frames: 0, id: 4, side_mm: 80}}\n"
+               "tracker: {plugin: tracker_aruco, markers: [" +
+               markers + "]}\noutputs: [{plugin: sink_poses, path: poses.jsonl}]\n";
+    };
+    ArhostRun run(yaml("{id: 4, side_mm: 80}, {id: 5, side_mm: 80}"));
+    EXPECT_EQ(run.run({"check", "--run", "10", "run.yaml"}), 0) << run.output();
+    EXPECT_THAT(run.output(),
+                HasSubstr("\n10 frames: 10 with a marker, 0 with an overlay\nmarker 4: in 10 frames, "));
+    EXPECT_THAT(run.output(), HasSubstr("\nmarker 5: not seen\nms p50/p95/p99: "));
+    EXPECT_THAT(run.output(), HasSubstr("\nrun.yaml: OK"));
+    EXPECT_FALSE(run.exists("poses.jsonl"));
+
+    ArhostRun wrong_id(yaml("{id: 5, side_mm: 80}"));
+    EXPECT_EQ(wrong_id.run({"check", "--run", "10", "run.yaml"}), 1) << wrong_id.output();
+    EXPECT_THAT(wrong_id.output(), HasSubstr("no marker was seen in any of 10 frames"));
+    EXPECT_THAT(wrong_id.output(), testing::Not(HasSubstr("run.yaml: OK")));
+
+    EXPECT_EQ(run.run({"check", "--run", "10", "--no-open", "run.yaml"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("--run and --no-open exclude each other"));
+}
+
 TEST(CommandLine, CheckOpensNothingOnRequest) {
     ArhostRun run("version: 1\nsource: {plugin: source_v4l2, allow: [video], options: {device: /dev/video-none}}\n");
     EXPECT_EQ(run.run({"check", "run.yaml"}), 2);
