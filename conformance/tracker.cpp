@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conformance/tracker.hpp"
 
+#include "worker/library.hpp"
+
 #include <fmt/format.h>
 #include <glm/geometric.hpp>
 #include <glm/gtc/type_ptr.hpp>
@@ -98,6 +100,10 @@ arhost_status Tracker::start_with(const arhost_tracker_setup &setup) {
         in_call(library_.calls(), Call::start, [&] { return functions_.start(instance_->get(), &setup); });
     started_ = status == ARHOST_STATUS_OK;
     sequence_ = 0;
+    state_before_.reset();
+    state_size_ = started_ ? in_call(library_.calls(), Call::start,
+                                     [&] { return worker::state_size_of(functions_, instance_->get()); })
+                           : 0;
     return status;
 }
 
@@ -115,8 +121,40 @@ arhost_status Tracker::try_track(const SealedFrame &frame, std::uint64_t sequenc
     auto *result = new (result_memory_.data()) arhost_tracker_result{};
     result->struct_size = sizeof *result;
     const arhost_frame input = frame.frame(sequence, capture_ns);
-    return in_call(library_.calls(), Call::per_frame,
-                   [&] { return functions_.track(instance_->get(), &input, result); });
+    arhost_track_request request{};
+    request.struct_size = sizeof request;
+    request.frame = &input;
+    std::unique_ptr<GuardedMemory> after;
+    if (state_size_ > 0) {
+        after = std::make_unique<GuardedMemory>(aligned_state_size());
+        std::fill_n(after->data(), aligned_state_size(), state_filler_);
+        request.state_before = state_before_ ? state_before_->data() : nullptr;
+        request.state_after = after->data();
+        request.state_size = state_size_;
+    }
+    const arhost_status status = in_call(library_.calls(), Call::per_frame,
+                                         [&] { return functions_.track(instance_->get(), &request, result); });
+    if (after && status == ARHOST_STATUS_OK) {
+        after->seal();
+        state_before_ = std::move(after);
+    }
+    return status;
+}
+
+std::vector<std::byte> Tracker::state() const {
+    if (!state_before_)
+        return {};
+    return {state_before_->data(), state_before_->data() + state_size_};
+}
+
+void Tracker::set_state(const std::vector<std::byte> &state, std::byte filler) {
+    state_filler_ = filler;
+    state_before_.reset();
+    if (state.size() != state_size_ || state.empty())
+        return;
+    state_before_ = std::make_unique<GuardedMemory>(aligned_state_size());
+    std::ranges::copy(state, state_before_->data());
+    state_before_->seal();
 }
 
 std::vector<arhost_marker> Tracker::records() const {

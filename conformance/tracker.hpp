@@ -49,7 +49,11 @@ public:
 
     arhost_status try_track(const SealedFrame &frame, std::uint64_t sequence, std::int64_t capture_ns);
     std::vector<arhost_marker> records() const; // of the last call of track
-    std::vector<arhost_marker> seen() const;    // records of markers in the frame, with measured or smoothed pose
+    // The state_after of the last successful call of track. The next call gets `state` as its state_before, or NULL
+    // if it is empty; before the call, state_after is filled with `filler`.
+    std::vector<std::byte> state() const;
+    void set_state(const std::vector<std::byte> &state, std::byte filler);
+    std::vector<arhost_marker> seen() const; // records of markers in the frame, with measured or smoothed pose
 
     // seen() in the next frame, at 30 frames/s. Throws Failure unless it succeeds.
     std::vector<arhost_marker> track(const SealedFrame &frame);
@@ -66,12 +70,16 @@ public:
 
 private:
     void create();
+    std::uint64_t aligned_state_size() const { return (state_size_ + 63) / 64 * 64; }
 
     PluginLibrary &library_;
     Settings overrides_;
     std::optional<Instance> instance_;
     const arhost_tracker &functions_;
     GuardedMemory result_memory_;
+    std::uint64_t state_size_ = 0;
+    std::byte state_filler_{0xa5};
+    std::unique_ptr<GuardedMemory> state_before_; // null: none
     bool fresh_ = true, started_ = false;
     arhost_intrinsics camera_{}; // of the last start
     std::vector<Listed> listed_;

@@ -232,6 +232,36 @@ void frames_before(Context &context) {
     expect_at(here, "with the marker back in view");
 }
 
+// A new instance that gets the state of another one continues as that one does.
+void state(Context &context) {
+    Started started(context);
+    const Grey here = started.at(started.marker.camera_from_marker),
+               near = started.at(tilted({-15, 20, -280}, 30, 70, 30)), empty = without_print();
+    std::vector<std::byte> before;
+    int number = 0;
+    for (const Grey *image : {&here, &near, &here, &empty, &empty, &near, &here}) {
+        const std::string when = fmt::format("in frame {}, with the state of the frame before it,", number + 1);
+        const auto next = [&](Started &one, std::byte filler) {
+            one.tracker.set_state(before, filler);
+            one.tracker.instance().expect_ok(
+                "track", one.tracker.try_track(SealedFrame(*image, ARHOST_PIXEL_FORMAT_GREY8),
+                                               static_cast<std::uint64_t>(number), number * frame_ns));
+            return one.tracker.records();
+        };
+        constexpr std::byte filler{0xa5}, other_filler{0x3c};
+        const std::vector<arhost_marker> expected = next(started, filler);
+        const std::vector<std::byte> after = started.tracker.state();
+        Started other(context), with_other_filler(context);
+        expect_same(next(other, filler), expected, when + " a new instance");
+        if (other.tracker.state() != after)
+            throw Failure(when + " a new instance writes another state_after");
+        expect_same(next(with_other_filler, other_filler), expected,
+                    when + " and with other initial content of state_after, a new instance");
+        before = after;
+        ++number;
+    }
+}
+
 void settles(Context &context) {
     constexpr int moving = 10, still = 60; // arhost/tracker.h
     Started started(context);
@@ -413,6 +443,8 @@ constexpr Test tests[] = {
     {"tracker.threads", "The result does not depend on the number of threads.", kind, gate, 20s, threads},
     {"tracker.frames-before", "A DETECTED record depends only on the current frame.", kind, "tracker.deterministic",
      20s, frames_before},
+    {"tracker.state", "Results and state_after depend only on the frame and state_before.", kind,
+     "tracker.frames-before", 30s, state},
     {"tracker.out-of-view", "A marker out of view is omitted, PREDICTED or LOST, with its age and a rigid pose.",
      kind, "tracker.frames-before", 20s, out_of_view},
     {"tracker.settles", "The pose of a marker at rest is correct within 60 frames, smoothed or not.", kind, gate, 30s,

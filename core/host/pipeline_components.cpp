@@ -184,8 +184,16 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(TrackerPointer configuratio
         return Component::Create{{std::move(options), messages::TrackerSetup{*format_, intrinsics_, own.markers}},
                                  {}};
     };
-    callbacks.ready = [](const messages::Ready &) {
-        return SlotLayout{sizeof(arhost_tracker_result), stage_slot_count};
+    callbacks.ready = [stage](const messages::Ready &ready) {
+        constexpr std::uint64_t max_size = 2 * std::uint64_t{ARHOST_MAX_STATE}; // of the plugin and the worker itself
+        if (ready.state_size > max_size)
+            throw ProtocolViolation("the state has " + std::to_string(ready.state_size) + " bytes; the limit is " +
+                                    std::to_string(max_size));
+        const TrackerStage::StateOwner owner{stage->component->candidate(), stage->component->description().version,
+                                             ready.state_size};
+        if (std::exchange(stage->state_owner, owner) != owner)
+            stage->state = Lease();
+        return SlotLayout{TrackerSlot::byte_size(ready.state_size), stage_slot_count};
     };
     callbacks.running = [stage] { stage->slots = pool_of(*stage->component); };
     callbacks.disabled = [this, stage](const std::string &reason, bool is_configuration_error) {

@@ -188,7 +188,8 @@ bool Pipeline::track() {
     }
     if (is_running(next_tracker_)) // finish_swaps waits until the current tracker has no frames
         return false;
-    if (!tracker_->running() || tracker_->component->in_flight() >= (live_ ? 1u : 2u))
+    // One at a time, because a frame needs the state after the previous one.
+    if (!tracker_->running() || tracker_->component->in_flight() > 0)
         return false;
     std::optional<Lease> slot = tracker_->slots->acquire();
     if (!slot)
@@ -202,7 +203,10 @@ bool Pipeline::track() {
     command.sequence = frame->record.sequence;
     command.capture_ns = frame->record.capture_ns;
     command.clock = frame->record.clock;
-    tracker_->component->submit(command, frame->pixels.region());
+    if (tracker_->state)
+        command.state_slot = tracker_->state.index();
+    tracker_->component->submit(command, frame->pixels.region(),
+                                tracker_->state ? tracker_->state.region() : nullptr);
     return true;
 }
 
@@ -235,6 +239,8 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
     Frame &frame = *accepted;
     frame.attempts = 0;
     const char *problem = accept_tracker_result(frame.result.bytes(), tracker_->marker_ids, frame.record);
+    if (!problem)
+        tracker_->state = std::move(frame.result);
     frame.result = Lease();
     if (problem) {
         skip(frame, "tracker");

@@ -44,6 +44,15 @@ private:
 };
 
 struct TrackerStage : Stage {
+    // Who can read a state: a restarted worker with the same plugin.
+    struct StateOwner {
+        std::size_t candidate = 0;
+        std::string version;
+        std::uint64_t size = 0;
+        bool operator==(const StateOwner &) const = default;
+    };
+    StateOwner state_owner; // the current worker
+    Lease state;            // what the last accepted call wrote; survives the worker
     std::shared_ptr<const run_config::TrackerConfiguration> configuration;
     std::set<std::int32_t> marker_ids;
     std::string looked_for; // the markers and dictionary, for messages

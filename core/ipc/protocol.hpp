@@ -18,8 +18,8 @@ namespace arhost::ipc {
 enum class CommandKind : std::uint32_t {
     control = 1, // receive one message from the control channel
     read = 2,    // source: read a frame into output slot `slot`
-    track = 3,   // tracker: process slot `input_slot` of input memory `input_generation`; write the result to output
-                 // slot `slot`
+    track = 3,   // tracker: process slot `input_slot` of input memory `input_generation`, with the state in slot
+                 // `state_slot` of input memory `state_generation`; write result and new state to output slot `slot`
     render = 4,  // ray tracer: render the view of `camera` into output slot `slot`
     write = 5    // sink: write the frame in slot `input_slot` of input memory `input_generation`
 };
@@ -29,6 +29,8 @@ struct Command {
     std::uint32_t slot;
     std::uint32_t input_generation;
     std::uint32_t input_slot;
+    std::uint32_t state_generation; // 0: no state
+    std::uint32_t state_slot;
     std::uint64_t ticket; // number of the command, increasing; the result contains the same number
     std::uint64_t sequence;
     std::int64_t capture_ns;
@@ -94,6 +96,14 @@ using ResultConsumer = Consumer<Result, ring_capacity>;
 inline std::uint32_t overlay_stride(std::uint32_t width) {
     return (width * 4 + 63) / 64 * 64;
 }
+
+// Layout of a slot that a tracker writes: the result, then the state of the worker and of the plugin, which only the
+// worker can read.
+class TrackerSlot {
+public:
+    static constexpr std::uint64_t state_offset = (sizeof(arhost_tracker_result) + 63) / 64 * 64;
+    static std::uint64_t byte_size(std::uint64_t state_size) { return state_offset + state_size; }
+};
 
 // Layout of a slot that sinks read: the record, the composited image, the video frame and the overlay. The host fills
 // the last two only if a sink reads them; unused pages take no memory.

@@ -35,7 +35,6 @@ RegionPointer make_host_region(const char *name, const SlotLayout &layout) {
     region->layout = layout;
     region->mapping = region->memory.map(Access::read_write);
     region->memory.seal_future_writes();
-    region->generation = 1;
     return region;
 }
 
@@ -104,18 +103,29 @@ void Component::end_process(const std::string &reason) {
         process_->end(reason);
 }
 
-void Component::submit(Command command, const RegionPointer &input) {
-    if (input && attached_inputs_.try_emplace(input->generation, input).second)
-        process_->send_ordered(messages::Attach{false, input->generation, input->layout}, {input->memory.fd()});
-    std::erase_if(attached_inputs_, [this](const auto &entry) {
-        if (!entry.second.expired())
+// Returns the generation by which the worker knows this memory.
+std::uint32_t Component::attach(const RegionPointer &input) {
+    for (const AttachedInput &attached : attached_inputs_)
+        if (attached.region.lock() == input)
+            return attached.generation;
+    attached_inputs_.push_back({input, next_generation_++});
+    process_->send_ordered(messages::Attach{false, attached_inputs_.back().generation, input->layout},
+                           {input->memory.fd()});
+    return attached_inputs_.back().generation;
+}
+
+void Component::submit(Command command, const RegionPointer &input, const RegionPointer &state) {
+    if (input)
+        command.input_generation = attach(input);
+    if (state)
+        command.state_generation = attach(state);
+    std::erase_if(attached_inputs_, [this](const AttachedInput &attached) {
+        if (!attached.region.expired())
             return false;
-        process_->send_ordered(messages::Detach{entry.first});
+        process_->send_ordered(messages::Detach{attached.generation});
         return true;
     });
     command.ticket = next_ticket_++;
-    if (input)
-        command.input_generation = input->generation;
     in_flight_.push_back(command);
     if (in_flight_.size() == 1)
         set_frame_deadline();
@@ -196,9 +206,8 @@ void Component::on_ready(const Message &message) {
     pending_output_ = std::make_shared<Region>();
     Region &region = *pending_output_;
     region.layout = layout;
-    region.generation = next_generation_++;
     region.memory = SharedMemory::create(("arhost-" + name_).c_str(), layout.byte_size());
-    process_->send_ordered(messages::Attach{true, region.generation, layout}, {region.memory.fd()});
+    process_->send_ordered(messages::Attach{true, next_generation_++, layout}, {region.memory.fd()});
 }
 
 void Component::on_attached(const messages::Attached &attached) {

@@ -18,7 +18,6 @@ struct Region {
     ipc::SharedMemory memory;
     ipc::SlotLayout layout;
     ipc::Mapping mapping; // mapping in this process
-    std::uint32_t generation = 0;
 };
 using RegionPointer = std::shared_ptr<const Region>;
 
@@ -92,6 +91,7 @@ public:
     State state() const { return state_; }
     const std::string &name() const { return name_; }
     const std::filesystem::path &plugin() const { return plugins_[candidate_]; }
+    std::size_t candidate() const { return candidate_; } // index of plugin() in the list of plugins
     const ipc::PluginDescription &description() const { return description_; }
     pid_t pid() const { return process_ ? process_->pid() : 0; }
 
@@ -99,9 +99,9 @@ public:
     const RegionPointer &output() const { return output_; }
 
     std::size_t in_flight() const { return in_flight_.size(); }
-    // Sets the ticket of the command and sends it. If the worker does not know `input` yet, attaches it first.
-    // Detaches inputs to which nothing refers any more.
-    void submit(ipc::Command command, const RegionPointer &input = nullptr);
+    // Sets the ticket and the generations of the command and sends it. If the worker does not know `input` or `state`
+    // yet, attaches them first. Detaches inputs to which nothing refers any more.
+    void submit(ipc::Command command, const RegionPointer &input = nullptr, const RegionPointer &state = nullptr);
 
     // Answers a command of the sink, unless its worker is not the one that had sent the command: `restarts` is the
     // number of restarts at that time.
@@ -121,6 +121,7 @@ public:
 
 private:
     void spawn();
+    std::uint32_t attach(const RegionPointer &input);
     void on_message(ipc::Message &message);
     void on_hello(const ipc::Message &message);
     void on_ready(const ipc::Message &message);
@@ -165,7 +166,11 @@ private:
     std::unique_ptr<Process> process_;
     std::shared_ptr<Region> pending_output_;
     RegionPointer output_;
-    std::map<std::uint32_t, std::weak_ptr<const Region>> attached_inputs_;
+    struct AttachedInput {
+        std::weak_ptr<const Region> region;
+        std::uint32_t generation; // in the worker
+    };
+    std::vector<AttachedInput> attached_inputs_;
     std::uint32_t next_generation_ = 1;
     std::deque<ipc::Command> in_flight_;
     std::deque<std::function<void(const std::string &)>> unset_options_; // the calls of set_option without a response

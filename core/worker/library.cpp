@@ -148,4 +148,14 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
     return *plugin;
 }
 
+std::uint64_t state_size_of(const arhost_tracker &tracker, arhost_instance *instance) {
+    if (tracker.struct_size < ARHOST_SIZE_UP_TO(arhost_tracker, state_size) || !tracker.state_size)
+        return 0;
+    const std::uint64_t size = tracker.state_size(instance);
+    if (size > ARHOST_MAX_STATE)
+        throw std::runtime_error("the tracker's state_size is " + std::to_string(size) + " bytes; the limit is " +
+                                 std::to_string(ARHOST_MAX_STATE));
+    return size;
+}
+
 } // namespace arhost::worker

@@ -14,4 +14,7 @@ namespace arhost::worker {
 const arhost_entry_point &open_library(const std::filesystem::path &file);
 const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_entry_point &entry);
 
+// Returns the size of a started tracker's state. Throws std::runtime_error if it exceeds ARHOST_MAX_STATE.
+std::uint64_t state_size_of(const arhost_tracker &tracker, arhost_instance *instance);
+
 } // namespace arhost::worker

@@ -4,7 +4,9 @@
 #include "pixels/grey.hpp"
 #include "scene/capabilities.hpp"
 #include "scene/motion.hpp"
+#include "worker/branches.hpp"
 #include "worker/lens_warp.hpp"
+#include "worker/library.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -101,7 +103,8 @@ public:
     TrackerService(const arhost_tracker &tracker, arhost_instance *instance)
         : tracker_(tracker), instance_(instance) {}
 
-    arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &, messages::Ready &) override {
+    arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &,
+                        messages::Ready &ready) override {
         const auto &message = setup_of_kind<messages::TrackerSetup>(any);
         format_ = message.format;
         arhost_tracker_setup setup{};
@@ -110,14 +113,26 @@ public:
         setup.format = &format_;
         setup.intrinsics = &message.intrinsics;
         setup.markers = message.markers.data();
-        return tracker_.start(instance_, &setup);
+        const arhost_status status = tracker_.start(instance_, &setup);
+        if (status != ARHOST_STATUS_OK)
+            return status;
+        try {
+            state_size_ = state_size_of(tracker_, instance_);
+        } catch (...) {
+            tracker_.stop(instance_);
+            throw;
+        }
+        branches_.emplace(message.intrinsics, message.markers);
+        plugin_offset_ = TrackerSlot::state_offset + (branches_->state_size() + 63) / 64 * 64;
+        ready.state_size = plugin_offset_ - TrackerSlot::state_offset + state_size_;
+        return status;
     }
 
     arhost_status execute(const Command &command, const Memory &memory, Result &) override {
         require(command.kind == CommandKind::track, "a tracker got a command other than track");
         const std::span<std::byte> input = memory.input(command.input_generation).slot(command.input_slot);
         const std::span<std::byte> output = memory.output.slot(command.slot);
-        require(input.size() >= format_.byte_size && output.size() >= sizeof(arhost_tracker_result),
+        require(input.size() >= format_.byte_size && output.size() >= plugin_offset_ + state_size_,
                 "the tracker's slots are too small");
         arhost_frame frame{};
         frame.struct_size = sizeof frame;
@@ -132,7 +147,25 @@ public:
         auto &result = *reinterpret_cast<arhost_tracker_result *>(output.data());
         result = {};
         result.struct_size = sizeof result;
-        return tracker_.track(instance_, &frame, &result);
+        arhost_track_request request{};
+        request.struct_size = sizeof request;
+        request.frame = &frame;
+        const std::byte *before = nullptr;
+        if (command.state_generation != 0) {
+            const std::span<std::byte> slot = memory.input(command.state_generation).slot(command.state_slot);
+            require(slot.size() == output.size(), "the slot of the tracker's state has another size");
+            before = slot.data();
+        }
+        if (state_size_ > 0) {
+            request.state_before = before ? before + plugin_offset_ : nullptr;
+            request.state_after = output.data() + plugin_offset_;
+            request.state_size = state_size_;
+        }
+        const arhost_status status = tracker_.track(instance_, &request, &result);
+        if (status == ARHOST_STATUS_OK)
+            branches_->choose(result, command.capture_ns, before ? before + TrackerSlot::state_offset : nullptr,
+                              output.data() + TrackerSlot::state_offset);
+        return status;
     }
 
     arhost_status stop() override { return tracker_.stop(instance_), ARHOST_STATUS_OK; }
@@ -141,6 +174,9 @@ private:
     const arhost_tracker &tracker_;
     arhost_instance *instance_;
     arhost_frame_format format_{};
+    std::optional<Branches> branches_;
+    std::uint64_t state_size_ = 0;    // of the plugin
+    std::uint64_t plugin_offset_ = 0; // of the plugin's state in a slot
 };
 
 class RaytracerService final : public Service {

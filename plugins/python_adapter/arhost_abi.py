@@ -173,6 +173,7 @@ FRAME_INFO = _struct(160,
 # arhost/tracker.h
 MAX_MARKERS = 64
 MAX_FAMILY = 32
+MAX_STATE = 16777216
 MARKER_CONFIG = _struct(16,
     ("struct_size", "u4", 0),
     ("id", "i4", 4),

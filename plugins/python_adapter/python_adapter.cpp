@@ -288,8 +288,9 @@ public:
         call("start_tracker", "NNN", view_of(setup.format).release(), view_of(setup.intrinsics).release(),
              view(markers.data(), markers.size() * sizeof(arhost_marker_config)).release());
     }
-    void track(const arhost_frame &frame, arhost_tracker_result &result) {
+    void track(const arhost_track_request &request, arhost_tracker_result &result) {
         const GilLock lock;
+        const arhost_frame &frame = *request.frame;
         const arhost_frame_format &format = *frame.format;
         const Answer answer = call("track", "KLiNNN", static_cast<unsigned long long>(frame.sequence),
                                    static_cast<long long>(frame.capture_ns), frame.clock,

@@ -160,7 +160,8 @@ public:
             detect(cv::Mat::zeros(min_image_side(), min_image_side(), CV_8UC1));
     }
 
-    void track(const arhost_frame &frame, arhost_tracker_result &result) {
+    void track(const arhost_track_request &request, arhost_tracker_result &result) {
+        const arhost_frame &frame = *request.frame;
         const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
                            const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
         std::vector<Detection> detections;

@@ -7,6 +7,7 @@
 
 #include <cctype>
 #include <iterator>
+#include <numeric>
 #include <random>
 #include <set>
 
@@ -375,6 +376,82 @@ TEST(Supervision, KillingWorkersDoesNotChangeTheResult) {
     EXPECT_EQ(run.read("counted.txt"), clean.read("counted.txt"));
     for (const char *component : {"source", "tracker", "raytracer", "sink_counter"})
         EXPECT_EQ(run.stats()["restarts"][component], 1) << component;
+}
+
+namespace {
+
+// The x coordinates of the marker in the frames in which it was found: tracker_counter reports how many frames it has
+// tracked before.
+std::vector<double> tracked_before(const ArhostRun &run) {
+    std::istringstream lines(run.read("poses.jsonl"));
+    std::vector<double> counts;
+    for (std::string line; std::getline(lines, line);)
+        for (const auto &marker : nlohmann::json::parse(line)["markers"])
+            counts.push_back(marker["mt"].at(12));
+    return counts;
+}
+
+std::string with_state(const std::string &source, const std::string &tracker) {
+    return "version: 1\nsource: {plugin: source_counter, options: {" + source + "}}\n" +
+           "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}], options: {" + tracker + "}}\n" +
+           "outputs: [{plugin: sink_poses, path: poses.jsonl}]\nstats: stats.json\n" +
+           "restart: {first_delay_ms: 1, quarantine_after: 2}\n";
+}
+
+std::vector<double> numbers(std::size_t count) {
+    std::vector<double> all(count);
+    std::iota(all.begin(), all.end(), 0);
+    return all;
+}
+
+} // namespace
+
+TEST(Supervision, ATrackersStateSurvivesItsWorker) {
+    constexpr std::size_t frames = 400;
+    for (const char *size : {"8", "100000"}) {
+        ArhostRun run(with_state("frames: 400, delay_ms: 1", std::string("state_size: ") + size));
+        run.start();
+        for (std::size_t lines = 0; lines < frames - 60;) {
+            const std::string log = run.exists("poses.jsonl") ? run.read("poses.jsonl") : "";
+            if (const auto now = static_cast<std::size_t>(std::ranges::count(log, '\n')); now >= lines + 20) {
+                lines = now;
+                if (const pid_t worker = run.worker("tracker_counter"))
+                    send_signal(worker, SIGKILL);
+            }
+            ASSERT_TRUE(run.running()) << run.output();
+        }
+        ASSERT_EQ(run.wait(), 0) << run.output();
+        EXPECT_EQ(tracked_before(run), numbers(frames));
+        EXPECT_GT(run.stats()["restarts"]["tracker"], 3);
+    }
+}
+
+TEST(Supervision, AFrameThatATrackerCannotProcessLeavesItsStateAsItWas) {
+    ArhostRun run(with_state("frames: 40", "state_size: 8, error_at: 20"));
+    EXPECT_EQ(run.run(), 1) << run.output();
+    EXPECT_EQ(tracked_before(run), numbers(39));
+}
+
+TEST(Supervision, AFallbackBeginsWithoutTheStateOfThePluginThatItReplaces) {
+    ArhostRun run(with_state("frames: 40", "state_size: 8, crash_at: 20"));
+    ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "tracker.fallback=tracker_counter"}), 0) << run.output();
+    // The fallback has its default options, with which it has no state.
+    std::vector<double> expected = numbers(20);
+    expected.resize(39);
+    EXPECT_EQ(tracked_before(run), expected);
+}
+
+TEST(Supervision, ARejectedResultLeavesTheStateAsItWas) {
+    ArhostRun run(with_state("frames: 40", "state_size: 8, nan_at: 20"));
+    EXPECT_EQ(run.run(), 1) << run.output();
+    EXPECT_EQ(tracked_before(run), numbers(39));
+    EXPECT_THAT(run.output(), HasSubstr("contract violation"));
+}
+
+TEST(Supervision, ATrackerWithTooMuchStateIsRejected) {
+    ArhostRun run(with_state("frames: 4", "state_size: 16777217"));
+    EXPECT_EQ(run.run(), 2) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("the tracker's state_size is 16777217 bytes; the limit is 16777216"));
 }
 
 TEST(Supervision, SurvivesRandomKillsAndStops) {

@@ -180,6 +180,7 @@ class FrameInfo:
 # arhost/tracker.h
 MAX_MARKERS: int
 MAX_FAMILY: int
+MAX_STATE: int
 MARKER_CONFIG: np.dtype[np.void]
 class MarkerConfig:
     struct_size: int

@@ -246,7 +246,8 @@ void modify_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &r
         marker.mt[14] = -distance;
     }
     const bool has_last = self.last->marker_count > 0;
-    const bool predicts = has("predicts") || has("lost_age_is_1") || has("lost_without_pose");
+    const bool predicts =
+        has("predicts") || has("lost_age_is_1") || has("lost_without_pose") || has("remembers_in_its_heap");
     if ((has("smooths") || predicts) && !markers.empty() && has_last) {
         for (int i = 12; i < 15; ++i)
             markers[0].mt[i] = (markers[0].mt[i] + self.last->markers[0].mt[i]) / 2;
@@ -341,9 +342,21 @@ arhost_status start(arhost_instance *instance, const arhost_tracker_setup *setup
     return status;
 }
 
-arhost_status track(arhost_instance *instance, const arhost_frame *input, arhost_tracker_result *result) {
+bool has_state() {
+    return has("predicts") || has("lost_age_is_1") || has("lost_without_pose") || has("never_updates_pose") ||
+           has("reads_state_after");
+}
+std::uint64_t state_size(arhost_instance *) {
+    return has_state() ? sizeof(arhost_tracker_result) : 0;
+}
+
+arhost_status track(arhost_instance *instance, const arhost_track_request *input, arhost_tracker_result *result) {
     Wrong &self = wrong(instance);
-    arhost_frame frame = *input;
+    arhost_frame frame = *input->frame;
+    arhost_track_request request = *input;
+    request.frame = &frame;
+    request.state_before = request.state_after = nullptr; // the real tracker has no state
+    request.state_size = 0;
     if (has("crash_in_track") ||
         (has("crash_on_small_frames") && std::min(frame.format->width, frame.format->height) < 8))
         crash();
@@ -381,10 +394,10 @@ arhost_status track(arhost_instance *instance, const arhost_frame *input, arhost
         frame.grey = frame.plane[0];
         format.grey_stride = format.stride[0];
     }
-    arhost_status status = real_functions().track(self.real, &frame, result);
+    arhost_status status = real_functions().track(self.real, &request, result);
     if (status == ARHOST_STATUS_OK && has("finds_mirrored_prints") && result->marker_count == 0) {
         mirror(self, frame);
-        status = real_functions().track(self.real, &frame, result);
+        status = real_functions().track(self.real, &request, result);
     }
     if (status == ARHOST_STATUS_OK && has("one_record_per_detection") && result->marker_count == 1) {
         const arhost_marker first = result->markers[0];
@@ -395,12 +408,20 @@ arhost_status track(arhost_instance *instance, const arhost_frame *input, arhost
             std::memset(copy + std::size_t{format.grey_stride} * y + std::lround(left), 140,
                         static_cast<std::size_t>(std::lround(right - left)));
         std::memset(result->markers, 0, sizeof result->markers);
-        status = real_functions().track(self.real, &frame, result);
+        status = real_functions().track(self.real, &request, result);
         result->markers[result->marker_count++] = first;
     }
     if (status != ARHOST_STATUS_OK)
         return status;
+    if (has_state() && input->state_before)
+        std::memcpy(self.last.get(), input->state_before, sizeof *self.last);
+    else if (has_state())
+        *self.last = {};
     modify_all(self, frame, *result);
+    if (has("reads_state_after") && result->marker_count > 0)
+        result->markers[0].mt[12] += 1e-9 * *static_cast<const std::uint8_t *>(input->state_after);
+    if (has_state())
+        std::memcpy(input->state_after, self.last.get(), sizeof *self.last);
     ++self.tracks;
     self.last_sequence = frame.sequence;
     self.last_capture_ns = frame.capture_ns;
@@ -418,7 +439,8 @@ const void *get_extension(const char *) {
 }
 
 const arhost_plugin &wrong_plugin() {
-    static const arhost_tracker functions = {sizeof functions, start, has("no_track") ? nullptr : track, stop};
+    static const arhost_tracker functions = {sizeof functions, start, has("no_track") ? nullptr : track, stop,
+                                             state_size};
     static arhost_descriptor descriptor = *real().descriptor;
     descriptor.id = library_name().c_str();
     static constexpr arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};

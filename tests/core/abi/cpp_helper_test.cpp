@@ -16,7 +16,7 @@ public:
             throw arhost::Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "rejected");
     }
     void start(const arhost_tracker_setup &) { throw std::runtime_error("no luck"); }
-    void track(const arhost_frame &, arhost_tracker_result &) { throw std::bad_alloc(); }
+    void track(const arhost_track_request &, arhost_tracker_result &) { throw std::bad_alloc(); }
     static std::vector<arhost::Device> devices() {
         if (no_devices)
             throw arhost::Failure(ARHOST_STATUS_ERROR_IO, "no driver");
@@ -86,9 +86,10 @@ TEST(CppHelper, ConvertsExceptionsToStatusesAndMessages) {
     const arhost_tracker_setup setup{};
     EXPECT_EQ(tracker.start(instance, &setup), ARHOST_STATUS_ERROR_INTERNAL);
     EXPECT_EQ(logged, "no luck");
-    const arhost_frame frame{};
+    const arhost_track_request request{};
     arhost_tracker_result result{};
-    EXPECT_EQ(tracker.track(instance, &frame, &result), ARHOST_STATUS_ERROR_OUT_OF_MEMORY);
+    EXPECT_EQ(tracker.state_size, nullptr);
+    EXPECT_EQ(tracker.track(instance, &request, &result), ARHOST_STATUS_ERROR_OUT_OF_MEMORY);
     tracker.stop(instance);
     answer.plugin->destroy(instance);
 

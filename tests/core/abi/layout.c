@@ -334,6 +334,7 @@ FIELD(arhost_source, stop, 24, 8);
 /* arhost/tracker.h */
 VALUE(ARHOST_MAX_MARKERS, 64);
 VALUE(ARHOST_MAX_FAMILY, 32);
+VALUE(ARHOST_MAX_STATE, 16777216);
 
 STRUCT(arhost_marker_config, 16);
 FIELD(arhost_marker_config, struct_size, 0, 4);
@@ -367,11 +368,20 @@ FIELD(arhost_tracker_result, struct_size, 0, 4);
 FIELD(arhost_tracker_result, marker_count, 4, 4);
 FIELD(arhost_tracker_result, markers, 8, 24576);
 
-STRUCT(arhost_tracker, 32);
+STRUCT(arhost_track_request, 40);
+FIELD(arhost_track_request, struct_size, 0, 4);
+FIELD(arhost_track_request, reserved, 4, 4);
+FIELD(arhost_track_request, frame, 8, 8);
+FIELD(arhost_track_request, state_before, 16, 8);
+FIELD(arhost_track_request, state_after, 24, 8);
+FIELD(arhost_track_request, state_size, 32, 8);
+
+STRUCT(arhost_tracker, 40);
 FIELD(arhost_tracker, struct_size, 0, 4);
 FIELD(arhost_tracker, start, 8, 8);
 FIELD(arhost_tracker, track, 16, 8);
 FIELD(arhost_tracker, stop, 24, 8);
+FIELD(arhost_tracker, state_size, 32, 8);
 
 /* arhost/scene.h */
 VALUE(ARHOST_SCENE_MAGIC, 0x435354534f485241);

@@ -110,7 +110,6 @@ TEST(Component, ReportsLostCommandsAndGetsNewMemoryAfterADeath) {
     ASSERT_TRUE(bench.until("lost 2")) << "the commands 0 and 1 were answered, the last two were not";
     ASSERT_TRUE(bench.until("running", 2));
     EXPECT_NE(bench.component->output(), first);
-    EXPECT_GT(bench.component->output()->generation, first->generation);
     ASSERT_EQ(bench.component->crashes().size(), 1u);
     EXPECT_EQ(bench.component->crashes()[0].frame, 2u);
 }

@@ -123,7 +123,8 @@ public:
         auto result = std::make_unique<arhost_tracker_result>();
         result->struct_size = sizeof *result;
         const arhost_frame frame = picture.frame();
-        if (functions().track(plugin_.instance(), &frame, result.get()) != ARHOST_STATUS_OK)
+        const arhost_track_request request{sizeof request, 0, &frame, nullptr, nullptr, 0};
+        if (functions().track(plugin_.instance(), &request, result.get()) != ARHOST_STATUS_OK)
             throw std::runtime_error("track failed: " + log());
         return {result->markers, result->markers + result->marker_count};
     }

@@ -792,7 +792,9 @@ static arhost_status start(arhost_instance *self, const arhost_tracker_setup *se
 }
 
 /* Like tracker_counter, reports a marker at a distance of 500 mm plus 1 mm times the frame number. */
-static arhost_status track(arhost_instance *self, const arhost_frame *frame, arhost_tracker_result *result) {
+static arhost_status track(arhost_instance *self, const arhost_track_request *request,
+                           arhost_tracker_result *result) {
+    const arhost_frame *frame = request->frame;
     const int number = frame->plane[0][0] + 256 * frame->plane[0][1];
     arhost_marker *marker = &result->markers[0];
     int i;
@@ -831,7 +833,7 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              sizeof options / sizeof *options,
                                              options,
                                              NULL};
-static const arhost_tracker functions = {sizeof(arhost_tracker), start, track, stop};
+static const arhost_tracker functions = {sizeof(arhost_tracker), start, track, stop, NULL};
 static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A tracker that reads the frame number from the pixels and fails if it is wrong. Reports the first marker (or all
-// markers) at a distance of 500 mm plus 1 mm times the frame number.
+// markers) at a distance of 500 mm plus 1 mm times the frame number. If it has state, it counts the frames that it
+// has tracked in the first 8 bytes, and reports the marker 1 mm to the right times this number.
 #include "faults.hpp"
 
 #include <algorithm>
@@ -24,7 +25,8 @@ public:
         : host_(host), faults_(options), seal_(options.text("seal")), reversed_(options.boolean("reversed")),
           crash_in_destroy_(options.boolean("crash_in_destroy")), lost_from_(options.integer("lost_from")),
           lost_to_(options.integer("lost_to")), nan_at_(options.integer("nan_at")),
-          start_steps_(options.integer("start_steps")), start_step_ms_(options.real("start_step_ms")) {}
+          start_steps_(options.integer("start_steps")), start_step_ms_(options.real("start_step_ms")),
+          state_size_(static_cast<std::uint64_t>(options.integer("state_size"))) {}
 
     ~Counter() {
         if (crash_in_destroy_) {
@@ -57,7 +59,8 @@ public:
             seal_output();
     }
 
-    void track(const arhost_frame &frame, arhost_tracker_result &result) {
+    void track(const arhost_track_request &request, arhost_tracker_result &result) {
+        const arhost_frame &frame = *request.frame;
         const std::uint64_t number = frame.plane[0][0] + 256u * frame.plane[0][1];
         if (number != (frame.sequence & 0xffff)) // the pixels encode only two bytes
             throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "the pixels contain the number of another frame");
@@ -67,11 +70,26 @@ public:
             return;
         for (const arhost_marker_config &listed : listed_)
             report(listed, 500.0 + static_cast<double>(number), result.markers[result.marker_count++]);
+        if (state_size_ > 0)
+            result.markers[0].mt[12] = static_cast<double>(count(request));
         if (signed_number == nan_at_)
             result.markers[0].mt[12] = std::numeric_limits<double>::quiet_NaN();
     }
 
+    std::uint64_t state_size() const { return state_size_; }
+
 private:
+    // Returns the number of frames tracked before this one.
+    std::uint64_t count(const arhost_track_request &request) const {
+        std::uint64_t tracked = 0;
+        if (request.state_before)
+            std::memcpy(&tracked, request.state_before, sizeof tracked);
+        std::memset(request.state_after, 0xa5, state_size_);
+        const std::uint64_t after = tracked + 1;
+        std::memcpy(request.state_after, &after, sizeof after);
+        return tracked;
+    }
+
     void report(const arhost_marker_config &listed, double distance_mm, arhost_marker &marker) const {
         marker.struct_size = sizeof marker;
         marker.id = listed.id;
@@ -92,7 +110,7 @@ private:
     void seal_output() const {
         constexpr int control = 3;
         const auto say = [](const std::string &text) { ::send(control, text.data(), text.size(), 0); };
-        say(R"({"type": "ready", "format": null, "frame_count": 0, "intrinsics": null, "capabilities": 0})");
+        say(R"({"type": "ready", "format": null, "frame_count": 0, "intrinsics": null, "capabilities": 0, "state_size": 0})");
         char text[4096];
         iovec part{text, sizeof text};
         alignas(cmsghdr) char ancillary[CMSG_SPACE(sizeof(int))];
@@ -115,6 +133,7 @@ private:
     bool reversed_, crash_in_destroy_;
     std::int64_t lost_from_, lost_to_, nan_at_, start_steps_;
     double start_step_ms_;
+    std::uint64_t state_size_;
     arhost_intrinsics lens_{};
     std::vector<arhost_marker_config> listed_;
 };
@@ -129,6 +148,7 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_INTEGER, "nan_at", "-1", "Reports a NaN for this frame; -1: never"),
     option(ARHOST_OPTION_INTEGER, "start_steps", "0", "Number of steps in start, each reported as progress"),
     option(ARHOST_OPTION_REAL, "start_step_ms", "0", "Duration of each step, in ms", 0, 60000),
+    option(ARHOST_OPTION_INTEGER, "state_size", "0", "Bytes of state: 0, or at least 8"),
     ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_TRACKER,

@@ -6,7 +6,7 @@
 //   public:
 //       Grey(const arhost::Host &host, const arhost::Options &options);
 //       void start(const arhost_tracker_setup &setup);
-//       void track(const arhost_frame &frame, arhost_tracker_result &result);
+//       void track(const arhost_track_request &request, arhost_tracker_result &result);
 //   };
 //   ARHOST_TRACKER(Grey, descriptor)
 //
@@ -371,16 +371,25 @@ inline constexpr arhost_source source_functions = {
     },
     stop_instance<T>};
 
-template <class T>
-inline constexpr arhost_tracker tracker_functions = {
-    sizeof(arhost_tracker),
-    [](arhost_instance *i, const arhost_tracker_setup *setup) {
+// `state_size` is an optional member of the plugin class.
+template <class T> std::uint64_t state_size_of(arhost_instance *instance) {
+    return instance_of<T>(instance).plugin.state_size();
+}
+template <class T> constexpr arhost_tracker make_tracker_functions() {
+    arhost_tracker tracker{};
+    tracker.struct_size = sizeof(arhost_tracker);
+    tracker.start = [](arhost_instance *i, const arhost_tracker_setup *setup) {
         return with<T>(i, [&](T &p) { return p.start(*setup), ARHOST_STATUS_OK; });
-    },
-    [](arhost_instance *i, const arhost_frame *frame, arhost_tracker_result *result) {
-        return with<T>(i, [&](T &p) { return p.track(*frame, *result), ARHOST_STATUS_OK; });
-    },
-    stop_instance<T>};
+    };
+    tracker.track = [](arhost_instance *i, const arhost_track_request *request, arhost_tracker_result *result) {
+        return with<T>(i, [&](T &p) { return p.track(*request, *result), ARHOST_STATUS_OK; });
+    };
+    tracker.stop = stop_instance<T>;
+    if constexpr (requires(const T &p) { p.state_size(); })
+        tracker.state_size = state_size_of<T>;
+    return tracker;
+}
+template <class T> inline constexpr arhost_tracker tracker_functions = make_tracker_functions<T>();
 
 // `capabilities` is an optional member of the plugin class.
 template <class T> std::uint32_t capabilities_of(arhost_instance *instance) {

@@ -452,6 +452,7 @@ unsafe impl Sync for arhost_source {} // a plugin's statics are immutable
 
 pub const ARHOST_MAX_MARKERS: usize = 64;
 pub const ARHOST_MAX_FAMILY: usize = 32;
+pub const ARHOST_MAX_STATE: usize = 16777216;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_marker_config {
@@ -500,13 +501,26 @@ pub struct arhost_tracker_result {
 const _: () = assert!(size_of::<arhost_tracker_result>() == 24584);
 #[repr(C)]
 #[derive(Clone, Copy)]
+pub struct arhost_track_request {
+    pub struct_size: u32,
+    pub reserved: u32,
+    pub frame: *const arhost_frame,
+    pub state_before: *const c_void,
+    pub state_after: *mut c_void,
+    pub state_size: u64,
+}
+const _: () = assert!(size_of::<arhost_track_request>() == 40);
+unsafe impl Sync for arhost_track_request {} // a plugin's statics are immutable
+#[repr(C)]
+#[derive(Clone, Copy)]
 pub struct arhost_tracker {
     pub struct_size: u32,
     pub start: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_tracker_setup) -> arhost_status>,
-    pub track: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_frame, *mut arhost_tracker_result) -> arhost_status>,
+    pub track: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_track_request, *mut arhost_tracker_result) -> arhost_status>,
     pub stop: Option<unsafe extern "C" fn(*mut arhost_instance)>,
+    pub state_size: Option<unsafe extern "C" fn(*mut arhost_instance) -> u64>,
 }
-const _: () = assert!(size_of::<arhost_tracker>() == 32);
+const _: () = assert!(size_of::<arhost_tracker>() == 40);
 unsafe impl Sync for arhost_tracker {} // a plugin's statics are immutable
 
 // ---- arhost/scene.h ----

@@ -178,7 +178,11 @@ pub trait Source: Plugin {
 
 pub trait Tracker: Plugin {
     fn start(&mut self, setup: &arhost_tracker_setup) -> Result<(), Failure>;
-    fn track(&mut self, frame: &Frame, result: &mut arhost_tracker_result) -> Result<(), Failure>;
+    fn track(&mut self, request: &mut TrackRequest, result: &mut arhost_tracker_result) -> Result<(), Failure>;
+    /// The size in bytes of `TrackRequest::state_before` and `state_after`.
+    fn state_size(&self) -> u64 {
+        0
+    }
 }
 
 pub trait Raytracer: Plugin {
@@ -529,10 +533,20 @@ unsafe extern "C" fn start_tracker<T: Tracker>(
 }
 unsafe extern "C" fn track<T: Tracker>(
     instance: *mut arhost_instance,
-    frame: *const arhost_frame,
+    request: *const arhost_track_request,
     result: *mut arhost_tracker_result,
 ) -> arhost_status {
-    with(instance, |plugin: &mut T| plugin.track(&Frame(&*frame), &mut *result).map(|()| ARHOST_STATUS_OK))
+    with(instance, |plugin: &mut T| {
+        plugin.track(&mut TrackRequest(&*request), &mut *result).map(|()| ARHOST_STATUS_OK)
+    })
+}
+unsafe extern "C" fn state_size<T: Tracker>(instance: *mut arhost_instance) -> u64 {
+    let mut size = 0;
+    with(instance, |plugin: &mut T| {
+        size = plugin.state_size();
+        Ok(ARHOST_STATUS_OK)
+    });
+    size
 }
 #[doc(hidden)]
 pub const fn tracker<T: Tracker>() -> arhost_tracker {
@@ -541,6 +555,7 @@ pub const fn tracker<T: Tracker>() -> arhost_tracker {
         start: Some(start_tracker::<T>),
         track: Some(track::<T>),
         stop: Some(stop::<T>),
+        state_size: Some(state_size::<T>),
     }
 }
 

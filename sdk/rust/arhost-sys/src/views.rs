@@ -26,6 +26,25 @@ impl Frame<'_> {
         unsafe { slice::from_raw_parts(self.0.plane[plane], plane_size(format, plane)) }
     }
 }
+/// The input of `Tracker::track`.
+pub struct TrackRequest<'a>(pub(crate) &'a arhost_track_request);
+
+impl TrackRequest<'_> {
+    pub fn frame(&self) -> Frame<'_> {
+        Frame(unsafe { &*self.0.frame })
+    }
+    /// What an earlier call wrote to `state_after`; `None` in the first frame.
+    pub fn state_before(&self) -> Option<&[u8]> {
+        let before = self.0.state_before.cast::<u8>();
+        unsafe { (!before.is_null()).then(|| slice::from_raw_parts(before, self.0.state_size as usize)) }
+    }
+    /// To be written completely.
+    pub fn state_after(&mut self) -> &mut [u8] {
+        let after = self.0.state_after.cast::<u8>();
+        unsafe { if after.is_null() { &mut [] } else { slice::from_raw_parts_mut(after, self.0.state_size as usize) } }
+    }
+}
+
 impl Deref for Frame<'_> {
     type Target = arhost_frame;
     fn deref(&self) -> &arhost_frame {

@@ -19,7 +19,8 @@ static arhost_status start(arhost_instance *self, const arhost_tracker_setup *se
     return ARHOST_STATUS_OK;
 }
 
-static arhost_status track(arhost_instance *self, const arhost_frame *frame, arhost_tracker_result *result) {
+static arhost_status track(arhost_instance *self, const arhost_track_request *request, arhost_tracker_result *result) {
+    const arhost_frame *frame = request->frame;
     const arhost_frame_format *format = frame->format;
     double area = 0, sum_x = 0, sum_y = 0, x, y, half, distance;
     arhost_marker *marker = &result->markers[0];
@@ -95,7 +96,7 @@ static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "threshold", "200", 1, 255, NULL,
      "Minimum grey level of a bright pixel."},
 };
-static const arhost_tracker functions = {sizeof functions, start, track, stop};
+static const arhost_tracker functions = {sizeof functions, start, track, stop, NULL};
 static const arhost_descriptor descriptor = {
     .struct_size = sizeof descriptor,
     .kind = ARHOST_KIND_TRACKER,

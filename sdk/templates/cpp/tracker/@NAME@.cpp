@@ -21,8 +21,8 @@ public:
         target_ = setup.markers[0]; // the first configured marker; this tracker ignores the others
     }
 
-    void track(const arhost_frame &frame, arhost_tracker_result &result) {
-        const auto patch = detect(frame);
+    void track(const arhost_track_request &request, arhost_tracker_result &result) {
+        const auto patch = detect(*request.frame);
         if (!patch)
             return; // no marker in this frame: not an error
         const double half = std::sqrt(patch->area) / 2;

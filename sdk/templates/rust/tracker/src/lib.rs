@@ -49,9 +49,9 @@ impl Tracker for @CLASS@ {
         Ok(())
     }
 
-    fn track(&mut self, frame: &Frame, result: &mut arhost_tracker_result) -> Result<(), Failure> {
+    fn track(&mut self, request: &mut TrackRequest, result: &mut arhost_tracker_result) -> Result<(), Failure> {
         let (lens, target) = self.setup.expect("started");
-        let patch = match self.detect(frame) {
+        let patch = match self.detect(&request.frame()) {
             Some(patch) => patch,
             None => return Ok(()), // no marker in this frame: not an error
         };
