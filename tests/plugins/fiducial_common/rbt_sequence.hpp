@@ -30,6 +30,8 @@ inline double mean(const std::vector<double> &values) {
 
 class RbtSequence {
 public:
+    static constexpr double side_mm = 95.5;
+
     using Frames =
         std::vector<std::map<int, arhost_marker>>; // for each frame, the markers that the tracker found, by id
 
@@ -52,10 +54,7 @@ public:
         std::vector<Listed> listed;
         for (int id : ids_)
             listed.push_back({id, side_mm});
-        // Intrinsics from the sequence's cam.json; the images are already undistorted.
-        const auto camera =
-            intrinsics_of({640, 480}, 607.178466796875, 607.2342529296875, 321.39129638671875, 241.91822814941406);
-        if (tracker.start(camera, listed) != ARHOST_STATUS_OK)
+        if (tracker.start(camera(), listed) != ARHOST_STATUS_OK)
             throw std::runtime_error("start failed: " + tracker.log());
         Frames frames;
         for (const GreyFrame &frame : frames_) {
@@ -114,9 +113,22 @@ public:
         return distances;
     }
 
-private:
-    static constexpr double side_mm = 95.5;
+    static arhost_intrinsics camera() { // from the sequence's cam.json; the images are already undistorted
+        return intrinsics_of({640, 480}, 607.178466796875, 607.2342529296875, 321.39129638671875, 241.91822814941406);
+    }
+    const std::vector<GreyFrame> &frames() const { return frames_; }
+    const std::vector<int> &ids() const { return ids_; }
+    // The reference pose of the board, as rows of [rotation | translation in metres] in OpenCV's camera axes.
+    const nlohmann::json &camera_from_board(std::size_t frame) const { return truth_["grid"][frame]; }
 
+    // The corners of a tag on the board, in the ABI's order; z points out of the paper. See ../shared/data/README.md
+    // for the board's layout. On the board, the tags' y axes point along −x.
+    static std::array<cv::Point2d, 4> on_board_mm(int id) {
+        const double x = 120.0 * (id / 4), y = 120.0 * (id % 4);
+        return {{{x, y}, {x, y + side_mm}, {x + side_mm, y + side_mm}, {x + side_mm, y}}};
+    }
+
+private:
     // Returns the distance from the camera to a tag's centre. See ../shared/data/README.md for the board's layout.
     static double distance_mm(const nlohmann::json &camera_from_board, int id) {
         const double x = 47.75 + 120.0 * (id / 4), y = 47.75 + 120.0 * (id % 4);

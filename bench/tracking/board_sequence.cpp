@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The pose of a board of 20 tags on a real sequence: core/pose/ with the corners of tracker_apriltag, compared with bare
+// OpenCV and bare AprilTag on the same frames.
+#include "pose/track.hpp"
+
+#include <fiducial_common/opencv_aruco.hpp>
+#include <fiducial_common/rbt_sequence.hpp>
+
+#include <apriltag.h>
+#include <apriltag_pose.h>
+#include <opencv2/calib3d.hpp>
+#include <tag36h11.h>
+
+#include <cstdio>
+#include <exception>
+#include <memory>
+#include <numbers>
+
+namespace {
+
+using namespace arhost;
+using pose::Estimate;
+using pose::ObservedMarker;
+using pose::Rigid;
+using test::RbtSequence;
+
+constexpr double degree = std::numbers::pi / 180;
+constexpr std::size_t frame_count = 40;
+
+std::array<Eigen::Vector3d, 4> on_board(int id) {
+    std::array<Eigen::Vector3d, 4> corners;
+    const auto flat = RbtSequence::on_board_mm(id);
+    std::ranges::transform(flat, corners.begin(), [](cv::Point2d p) { return Eigen::Vector3d(p.x, p.y, 0); });
+    return corners;
+}
+
+Rigid reference(const RbtSequence &sequence, std::size_t frame) {
+    const auto &rows = sequence.camera_from_board(frame);
+    Rigid pose;
+    for (int row = 0; row < 3; ++row) {
+        for (int column = 0; column < 3; ++column)
+            pose.rotation(row, column) = rows[row][column];
+        pose.translation_mm[row] = 1000 * rows[row][3].get<double>();
+    }
+    return pose;
+}
+
+// Poses of the board by frame; nothing where a method finds none.
+using Poses = std::vector<std::optional<Rigid>>;
+
+struct Results {
+    Poses poses;
+    std::vector<double> left_out_px; // reprojection error of corners that the pose was not computed from
+};
+
+std::vector<std::vector<ObservedMarker>> detect(const RbtSequence &sequence) {
+    test::Tracker tracker("tracker_apriltag", {{"quad_decimate", "1"}});
+    std::vector<std::vector<ObservedMarker>> frames;
+    for (const auto &found : sequence.run(tracker)) {
+        auto &markers = frames.emplace_back();
+        for (const auto &[id, marker] : found) {
+            ObservedMarker observed{on_board(id), {}, 0.1};
+            for (int i = 0; i < 4; ++i)
+                observed.corners_px[i] = {marker.corners_px[i][0], marker.corners_px[i][1]};
+            markers.push_back(observed);
+        }
+    }
+    return frames;
+}
+
+Results with_core_pose(const RbtSequence &sequence) {
+    const pose::Projection projection(RbtSequence::camera());
+    Results results;
+    pose::Track track{};
+    std::int64_t capture_ns = 0;
+    for (const std::vector<ObservedMarker> &markers : detect(sequence)) {
+        capture_ns += 33'333'333;
+        const auto poses = estimate_poses(markers, projection);
+        if (poses.empty()) {
+            results.poses.emplace_back();
+            continue;
+        }
+        const pose::Step step = next_step(track, poses, capture_ns);
+        track = step.track;
+        results.poses.emplace_back(poses[step.chosen].camera_from_target);
+        for (std::size_t left_out = 0; left_out < markers.size(); ++left_out) {
+            std::vector<ObservedMarker> others = markers;
+            others.erase(others.begin() + static_cast<std::ptrdiff_t>(left_out));
+            const auto without = estimate_poses(others, projection);
+            for (int i = 0; !without.empty() && i < 4; ++i)
+                results.left_out_px.push_back(
+                    (*projection.pixel(without[0].camera_from_target * markers[left_out].corners_on_target_mm[i]) -
+                     markers[left_out].corners_px[i])
+                        .norm());
+        }
+    }
+    return results;
+}
+
+cv::Matx33d camera_matrix() {
+    const arhost_intrinsics c = RbtSequence::camera();
+    return {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1};
+}
+
+cv::Mat grey(const test::GreyFrame &frame) {
+    const arhost_frame_format &format = frame.format();
+    return {static_cast<int>(format.height), static_cast<int>(format.width), CV_8UC1,
+            const_cast<std::uint8_t *>(frame.frame().grey), format.grey_stride};
+}
+
+// detectMarkers with sub-pixel corners, and solvePnP with all of them.
+Poses with_opencv(const RbtSequence &sequence) {
+    cv::aruco::DetectorParameters parameters;
+    parameters.cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
+    const aruco::Detector detector(aruco::predefined(cv::aruco::DICT_APRILTAG_36h11), parameters);
+    Poses poses;
+    for (const test::GreyFrame &frame : sequence.frames()) {
+        const aruco::DetectedMarkers found = detector.detect(grey(frame));
+        std::vector<cv::Point3d> object;
+        std::vector<cv::Point2d> image;
+        for (std::size_t m = 0; m < found.ids.size(); ++m)
+            if (std::ranges::count(sequence.ids(), found.ids[m]))
+                for (int i = 0; i < 4; ++i) {
+                    // OpenCV's prints of AprilTags are rotated by 180°.
+                    const cv::Point2d on_board = RbtSequence::on_board_mm(found.ids[m])[(i + 2) % 4];
+                    object.emplace_back(on_board.x, on_board.y, 0);
+                    image.emplace_back(found.corners[m][i]);
+                }
+        cv::Vec3d r, t;
+        if (object.empty() || !cv::solvePnP(object, image, camera_matrix(), cv::noArray(), r, t)) {
+            poses.emplace_back();
+            continue;
+        }
+        poses.emplace_back(Rigid{pose::rotation_by({r[0], r[1], r[2]}), {t[0], t[1], t[2]}});
+    }
+    return poses;
+}
+
+// estimate_tag_pose of the tag with the smallest id: the library has no boards.
+Poses with_apriltag(const RbtSequence &sequence) {
+    const std::unique_ptr<apriltag_family_t, decltype(&tag36h11_destroy)> family(tag36h11_create(), tag36h11_destroy);
+    const std::unique_ptr<apriltag_detector_t, decltype(&apriltag_detector_destroy)> detector(
+        apriltag_detector_create(), apriltag_detector_destroy);
+    detector->quad_decimate = 1;
+    apriltag_detector_add_family(detector.get(), family.get());
+    const arhost_intrinsics camera = RbtSequence::camera();
+    Poses poses;
+    for (const test::GreyFrame &frame : sequence.frames()) {
+        const cv::Mat pixels = grey(frame);
+        image_u8_t image{pixels.cols, pixels.rows, static_cast<int>(pixels.step), pixels.data};
+        const std::unique_ptr<zarray_t, decltype(&apriltag_detections_destroy)> tags(
+            apriltag_detector_detect(detector.get(), &image), apriltag_detections_destroy);
+        apriltag_detection_t *first = nullptr;
+        for (int i = 0; i < zarray_size(tags.get()); ++i) {
+            apriltag_detection_t *tag = nullptr;
+            zarray_get(tags.get(), i, &tag);
+            if (std::ranges::count(sequence.ids(), tag->id) && (!first || tag->id < first->id))
+                first = tag;
+        }
+        if (!first) {
+            poses.emplace_back();
+            continue;
+        }
+        // The library's pixel centres are at +0.5.
+        apriltag_detection_info_t info{first,     RbtSequence::side_mm, camera.fx,
+                                       camera.fy, camera.cx + 0.5,      camera.cy + 0.5};
+        apriltag_pose_t found{};
+        estimate_tag_pose(&info, &found);
+        Rigid camera_from_tag; // tag axes: x right, y down, z into the paper
+        for (int row = 0; row < 3; ++row) {
+            for (int column = 0; column < 3; ++column)
+                camera_from_tag.rotation(row, column) = matd_get(found.R, row, column);
+            camera_from_tag.translation_mm[row] = matd_get(found.t, row, 0);
+        }
+        matd_destroy(found.R);
+        matd_destroy(found.t);
+        const auto corners = on_board(first->id);
+        Rigid board_from_tag;
+        board_from_tag.rotation.col(0) = (corners[1] - corners[0]).normalized();
+        board_from_tag.rotation.col(1) = (corners[3] - corners[0]).normalized();
+        board_from_tag.rotation.col(2) = board_from_tag.rotation.col(0).cross(board_from_tag.rotation.col(1));
+        board_from_tag.translation_mm = (corners[0] + corners[2]) / 2;
+        poses.emplace_back(camera_from_tag * board_from_tag.inverse());
+    }
+    return poses;
+}
+
+struct Summary {
+    double degrees, mm;                    // median error against the reference
+    double virtual_px, virtual_p95_px;     // frame-to-frame error of a virtual point
+    int flips, missing;
+};
+
+Summary summarize(const RbtSequence &sequence, const Poses &poses) {
+    const pose::Projection projection(RbtSequence::camera());
+    const Eigen::Vector3d above_board(287.75, 227.75, 50);
+    std::vector<double> degrees, mm, steps;
+    std::optional<Eigen::Vector2d> last;
+    Summary summary{};
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+        if (!poses[k]) {
+            ++summary.missing;
+            last.reset();
+            continue;
+        }
+        const Rigid truth = reference(sequence, k);
+        degrees.push_back(angle_between_rad(poses[k]->rotation, truth.rotation) / degree);
+        mm.push_back((poses[k]->translation_mm - truth.translation_mm).norm());
+        summary.flips += degrees.back() > 20;
+        const Eigen::Vector2d error = *projection.pixel(*poses[k] * above_board) - *projection.pixel(truth * above_board);
+        if (last)
+            steps.push_back((error - *last).norm());
+        last = error;
+    }
+    summary.degrees = test::percentile(degrees, 0.5);
+    summary.mm = test::percentile(mm, 0.5);
+    summary.virtual_px = test::percentile(steps, 0.5);
+    summary.virtual_p95_px = test::percentile(steps, 0.95);
+    return summary;
+}
+
+Summary print(const char *name, const RbtSequence &sequence, const Poses &poses) {
+    const Summary s = summarize(sequence, poses);
+    std::printf("%-34s %8.2f %8.2f %10.3f %10.3f %6d %8d\n", name, s.degrees, s.mm, s.virtual_px, s.virtual_p95_px,
+                s.flips, s.missing);
+    return s;
+}
+
+} // namespace
+
+int main() try {
+    const auto folder = test::shared_data("markers/rbt_sequence");
+    if (!std::filesystem::exists(folder)) {
+        std::printf("skipped: the folder %s is missing (set ARHOST_SHARED_DATA)\n", folder.c_str());
+        return 0;
+    }
+    const RbtSequence sequence;
+    std::printf("a board of 20 tags, 40 frames 640x480: median error against the reference pose, and frame-to-frame "
+                "error of a point 50 mm above the board\n%-34s %8s %8s %10s %10s %6s %8s\n",
+                "", "degrees", "mm", "point p50", "p95, px", "flips", "missing");
+    const Results own = with_core_pose(sequence);
+    const Summary s = print("arhost: joint pose of the board", sequence, own.poses);
+    print("OpenCV: detectMarkers, solvePnP", sequence, with_opencv(sequence));
+    print("AprilTag: pose of the first tag", sequence, with_apriltag(sequence));
+    const double left_out = test::percentile(own.left_out_px, 0.5);
+    std::printf("arhost: corners of a tag that is left out reproject with a median error of %.3f px\n", left_out);
+    return s.degrees <= 0.2 && s.mm <= 1.3 && s.virtual_px <= 0.1 && s.virtual_p95_px <= 0.8 && s.flips == 0 &&
+                   s.missing == 0 && left_out <= 0.2
+               ? 0
+               : 1;
+} catch (const std::exception &error) {
+    std::fprintf(stderr, "board-sequence: %s\n", error.what());
+    return 1;
+}
