@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera/calibration.hpp"
 
+#include "camera/artoolkit.hpp"
+
 #include <arhost/frame.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <initializer_list>
 #include <numbers>
 #include <span>
 #include <sstream>
@@ -134,7 +137,13 @@ arhost_distortion model_of(const Node &root) {
     return fisheye && fisheye->integer(0, 1) ? ARHOST_DISTORTION_FISHEYE : ARHOST_DISTORTION_BROWN;
 }
 
-Size size_of(const Node &root, std::optional<Size> expected) {
+std::string problem_with_size(const Size &size, const std::optional<Size> &expected) {
+    return expected && size != *expected ? "the calibration is for images of " + text(size) + ", but " +
+                                               text(*expected) + " are requested; calibrate at that size"
+                                         : "";
+}
+
+Size size_of(const Node &root, const std::optional<Size> &expected) {
     const auto width = find(root, {"imagewidth", "width"}), height = find(root, {"imageheight", "height"});
     if (!width && !height && expected)
         return *expected;
@@ -143,10 +152,67 @@ Size size_of(const Node &root, std::optional<Size> expected) {
                   "' is missing; give the size of the calibration's images in px, "
                   "here or as width and height next to 'file' in the configuration");
     const Size size{side(*width), side(*height)};
-    if (expected && size != *expected)
-        width->fail("the calibration is for images of " + text(size) + ", but " + text(*expected) +
-                    " are requested; calibrate at that size");
+    if (const std::string problem = problem_with_size(size, expected); !problem.empty())
+        width->fail(problem);
     return size;
+}
+
+// The formats of calibrations in YAML.
+
+arhost_intrinsics read_opencv_or_ros(const Node &root, const std::optional<Size> &expected) {
+    arhost_intrinsics intrinsics = intrinsics_for(size_of(root, expected));
+    const auto matrix = find(root, {"cameramatrix", "k"});
+    if (!matrix)
+        root.fail("the key 'camera_matrix' is missing; is this a camera calibration?");
+    read_camera_matrix(intrinsics, *matrix);
+    if (const auto distortion = find(root, {"distortioncoefficients", "distcoeffs", "d"}))
+        set_distortion(intrinsics, model_of(root), numbers(*distortion), *distortion);
+    else
+        root.fail("the key 'distortion_coefficients' is missing; for a lens without distortion, write [0, 0, 0, 0]");
+    return intrinsics;
+}
+
+// Whether this is a camchain: a map of cameras.
+bool is_kalibr(const Node &root) {
+    return std::ranges::any_of(
+        root.entries(), [](const auto &entry) { return entry.second.is_map() && entry.second.find("camera_model"); });
+}
+
+arhost_intrinsics read_kalibr(const Node &root, const std::optional<Size> &expected, const std::string &name) {
+    const auto camera = root.find(name);
+    if (!camera) {
+        std::string names;
+        for (const auto &[key, value] : root.entries())
+            names += (names.empty() ? "" : ", ") + key;
+        root.fail("there is no camera '" + name + "'; set 'name' next to 'file' in the configuration to one of " +
+                  names);
+    }
+    const auto expect_supported = [&](std::string_view key, std::initializer_list<std::string_view> supported) {
+        const Node model = camera->require(key);
+        if (std::ranges::find(supported, model.text()) == supported.end())
+            model.fail("'" + model.text() +
+                       "' is not supported; calibrate again with Kalibr's option '--models pinhole-radtan' or "
+                       "'--models pinhole-equi'");
+    };
+    expect_supported("camera_model", {"pinhole"});
+    expect_supported("distortion_model", {"radtan", "equidistant", "none"});
+    const Node resolution = camera->require("resolution");
+    const std::vector<Node> sides = resolution.items();
+    if (sides.size() != 2)
+        resolution.fail("must be [width, height]");
+    const Size size{side(sides[0]), side(sides[1])};
+    if (const std::string problem = problem_with_size(size, expected); !problem.empty())
+        resolution.fail(problem);
+    arhost_intrinsics intrinsics = intrinsics_for(size);
+    const Node pinhole = camera->require("intrinsics");
+    const std::vector<double> k = pinhole.reals(4); // fx, fy, cx, cy
+    set_focal_length(intrinsics.fx, k[0], pinhole);
+    set_focal_length(intrinsics.fy, k[1], pinhole);
+    intrinsics.cx = k[2];
+    intrinsics.cy = k[3];
+    const Node coefficients = camera->require("distortion_coeffs");
+    set_distortion(intrinsics, model_of(*camera), coefficients.reals(), coefficients);
+    return intrinsics;
 }
 
 std::optional<Size> size_next_to_file(const Node &node) {
@@ -160,30 +226,40 @@ std::optional<Size> size_next_to_file(const Node &node) {
 
 } // namespace
 
-arhost_intrinsics read_calibration(const std::filesystem::path &file, std::optional<Size> expected) {
-    const Node root = Node::load(file);
+arhost_intrinsics read_calibration(const std::filesystem::path &file, std::optional<Size> expected,
+                                   const std::optional<std::string> &name) {
+    const std::string content = yaml::read_file(file);
+    const auto expect_no_name = [&] {
+        if (name)
+            throw yaml::Error(file.string() + ": has only one camera; remove 'name: " + *name +
+                              "' next to 'file' in the configuration, which is for camchain files of Kalibr");
+    };
+    if (content.find('\0') != std::string::npos) { // never in YAML
+        const arhost_intrinsics intrinsics = parse_artoolkit(content, file.string());
+        if (const std::string problem = problem_with_size({intrinsics.width, intrinsics.height}, expected);
+            !problem.empty())
+            throw yaml::Error(file.string() + ": xsize, ysize: " + problem);
+        expect_no_name();
+        return intrinsics;
+    }
+    const Node root = Node::parse(content, file.string());
     if (!root.is_map())
         root.fail("is not a calibration in YAML format; for YAML, give OpenCV's FileStorage a file name that ends in "
                   ".yaml");
-    arhost_intrinsics intrinsics = intrinsics_for(size_of(root, expected));
-    const auto matrix = find(root, {"cameramatrix", "k"});
-    if (!matrix)
-        root.fail("the key 'camera_matrix' is missing; is this a camera calibration?");
-    read_camera_matrix(intrinsics, *matrix);
-    if (const auto distortion = find(root, {"distortioncoefficients", "distcoeffs", "d"}))
-        set_distortion(intrinsics, model_of(root), numbers(*distortion), *distortion);
-    else
-        root.fail("the key 'distortion_coefficients' is missing; for a lens without distortion, write [0, 0, 0, 0]");
-    return intrinsics;
+    if (is_kalibr(root))
+        return read_kalibr(root, expected, name.value_or("cam0"));
+    expect_no_name();
+    return read_opencv_or_ros(root, expected);
 }
 
 arhost_intrinsics parse_camera(const Node &node) {
     if (const auto file = node.find("file")) {
-        node.allow_keys({"file", "width", "height"});
+        node.allow_keys({"file", "name", "width", "height"});
         const std::filesystem::path path = file->input_path();
         if (!std::filesystem::exists(path))
             file->fail("the calibration file " + path.string() + " does not exist");
-        return read_calibration(path, size_next_to_file(node));
+        const auto name = node.find("name");
+        return read_calibration(path, size_next_to_file(node), name ? std::optional(name->text()) : std::nullopt);
     }
     node.allow_keys({"file", "width", "height", "fx", "fy", "vertical_fov_degrees", "cx", "cy", "distortion"});
     arhost_intrinsics intrinsics = intrinsics_for({side(node.require("width")), side(node.require("height"))});

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 
 namespace arhost::camera {
 
@@ -19,11 +20,15 @@ struct Size {
     bool operator==(const Size &) const = default;
 };
 
-// Reads a YAML calibration as written by OpenCV's FileStorage, OpenCV's calibration programs, or ROS (camera_info).
-// If the file has an image size, it must equal `expected`; otherwise `expected` is the image size.
-arhost_intrinsics read_calibration(const std::filesystem::path &file, std::optional<Size> expected = {});
+// Reads a calibration, whose format is recognised by its content: YAML of OpenCV's FileStorage, of OpenCV's
+// calibration programs, of ROS (camera_info) or of Kalibr (camchain), or camera parameters of ARToolKit. If the file
+// has an image size, it must equal `expected`; otherwise `expected` is the image size. `name` is the camera in a
+// camchain; default: cam0.
+arhost_intrinsics read_calibration(const std::filesystem::path &file, std::optional<Size> expected = {},
+                                   const std::optional<std::string> &name = {});
 
-// Reads the configuration's `camera:` block: {file: camera.yaml}, plus width and height if the file lacks them; or
+// Reads the configuration's `camera:` block: {file: camera.yaml}, plus width and height if the file lacks them, plus
+// the name of the camera in a camchain; or
 // {width, height, fx, fy, cx, cy, distortion: {model: none|brown|fisheye, coefficients: […]}}. Defaults: fy = fx, cx
 // and cy at the image centre, no distortion. vertical_fov_degrees may replace fx and fy for an uncalibrated camera.
 arhost_intrinsics parse_camera(const yaml::Node &node);

@@ -206,7 +206,7 @@ std::string nearest(std::string_view word, std::span<const std::string_view> can
     return std::string(best);
 }
 
-Node Node::load(const std::filesystem::path &file) {
+std::string read_file(const std::filesystem::path &file) {
     std::error_code ignored;
     if (std::filesystem::is_directory(file, ignored))
         throw Error(file.string() + ": is a folder, not a YAML file");
@@ -228,7 +228,11 @@ Node Node::load(const std::filesystem::path &file) {
     } catch (const std::ios_base::failure &) {
         throw Error(file.string() + ": cannot be read: " + std::strerror(errno ? errno : EIO));
     }
-    return parse(content, file.string());
+    return content;
+}
+
+Node Node::load(const std::filesystem::path &file) {
+    return parse(read_file(file), file.string());
 }
 
 Node Node::parse(const std::string &text, const std::string &name) {

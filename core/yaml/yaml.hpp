@@ -31,6 +31,9 @@ public:
 // Larger files are rejected, because reading them would take seconds.
 constexpr std::size_t max_file_bytes = 16 << 20;
 
+// Returns the contents of a file. Throws Error if it cannot be read or is larger than max_file_bytes.
+std::string read_file(const std::filesystem::path &file);
+
 // A value in a document. Is cheap to copy and keeps the document alive.
 class Node {
 public:
@@ -45,7 +48,7 @@ public:
         return *this;
     }
 
-    // Reads a file. Throws Error if it cannot be read, is larger than max_file_bytes or has a syntax error.
+    // Parses the contents of a file. Throws Error as read_file does, and if it has a syntax error.
     static Node load(const std::filesystem::path &file);
     // Parses `text`. `name` is used as the file name in error messages.
     static Node parse(const std::string &text, const std::string &name);

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera/calibration.hpp"
 
+#include "artoolkit_bytes.hpp"
 #include "camera/coordinates.hpp"
+#include "camera/lens.hpp"
 #include "errors.hpp"
 #include "plugin_under_test.hpp"
 
 #include <gtest/gtest.h>
+#include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
 #include <fstream>
@@ -19,13 +22,14 @@ using test::error_of;
 class Calibration : public testing::Test {
 protected:
     std::filesystem::path write(const std::string &text) const {
-        std::ofstream(folder_.path() / "camera.yaml") << text;
+        std::ofstream(folder_.path() / "camera.yaml", std::ios::binary) << text;
         return folder_.path() / "camera.yaml";
     }
     // Returns the error message for a calibration file with the contents `text`, without the name of the folder.
-    std::string error_in(const std::string &text, std::optional<Size> expected = {}) const {
+    std::string error_in(const std::string &text, std::optional<Size> expected = {},
+                         const std::optional<std::string> &name = {}) const {
         const auto file = write(text);
-        const std::string message = error_of([&] { read_calibration(file, expected); });
+        const std::string message = error_of([&] { read_calibration(file, expected, name); });
         const std::string folder = folder_.path().string() + "/";
         return message.starts_with(folder) ? message.substr(folder.size()) : message;
     }
@@ -49,6 +53,51 @@ std::string with_distortion(const std::string &lines) {
 }
 
 const std::string no_distortion = "distortion_coefficients: [0, 0, 0, 0]\n";
+
+// Returns a calibration as ROS's camera_calibration writes it.
+std::string ros(const std::string &model, const std::string &coefficients) {
+    return "image_width: 640\nimage_height: 480\ncamera_name: narrow_stereo\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
+           "  data: [600.5, 0, 320, 0, 601, 240, 0, 0, 1]\ndistortion_model: " +
+           model + "\ndistortion_coefficients:\n  rows: 1\n  cols: " +
+           std::to_string(std::count(coefficients.begin(), coefficients.end(), ',') + 1) + "\n  data: [" +
+           coefficients +
+           "]\nrectification_matrix:\n  rows: 3\n  cols: 3\n  data: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n"
+           "projection_matrix:\n  rows: 3\n  cols: 4\n  data: [590, 0, 322, 0, 0, 590, 241, 0, 0, 0, 1, 0]\n";
+}
+
+// Returns one camera of a camchain as Kalibr writes it.
+std::string kalibr(const std::string &name, const std::string &model, const std::string &distortion_model,
+                   const std::string &coefficients) {
+    return name + ":\n  cam_overlaps: [1]\n  camera_model: " + model + "\n  distortion_coeffs: [" + coefficients +
+           "]\n  distortion_model: " + distortion_model +
+           "\n  intrinsics: [600.5, 601, 320, 240]\n  resolution: [640, 480]\n  rostopic: /" + name + "/image_raw\n";
+}
+
+const std::vector<cv::Point3d> points = {{0, 0, 1}, {0.5, 0.4, 1}, {-500, 300, 1000}, {0.1, -0.4, 1}, {-1, -1, 4}};
+const cv::Matx33d opencv_matrix(600.5, 0, 320, 0, 601, 240, 0, 0, 1); // of `ros` and `kalibr`
+
+void expect_projection(const std::vector<cv::Point2d> &expected, const arhost_intrinsics &intrinsics) {
+    EXPECT_EQ(intrinsics.width, 640u);
+    EXPECT_EQ(intrinsics.height, 480u);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+        const auto pixel = project(intrinsics, {points[i].x, points[i].y, points[i].z});
+        EXPECT_NEAR(pixel->x, expected[i].x, 1e-9);
+        EXPECT_NEAR(pixel->y, expected[i].y, 1e-9);
+    }
+}
+
+void expect_projects_like_opencv(const arhost_intrinsics &intrinsics, const std::vector<double> &coefficients) {
+    std::vector<cv::Point2d> expected;
+    cv::projectPoints(points, cv::Vec3d(), cv::Vec3d(), opencv_matrix, coefficients, expected);
+    expect_projection(expected, intrinsics);
+}
+
+void expect_projects_like_opencv_fisheye(const arhost_intrinsics &intrinsics,
+                                         const std::vector<double> &coefficients) {
+    std::vector<cv::Point2d> expected;
+    cv::fisheye::projectPoints(points, expected, cv::Vec3d(), cv::Vec3d(), opencv_matrix, coefficients);
+    expect_projection(expected, intrinsics);
+}
 
 } // namespace
 
@@ -104,17 +153,89 @@ TEST_F(Calibration, ReadsKeysOfOlderOpenCvReleases) {
 }
 
 TEST_F(Calibration, ReadsRosCameraInfo) {
-    const auto plumb_bob = read_calibration(
-        write("image_width: 640\nimage_height: 480\ncamera_name: usb\ncamera_matrix:\n  rows: 3\n  cols: 3\n"
-              "  data: [600, 0, 320, 0, 601, 240, 0, 0, 1]\ndistortion_model: plumb_bob\ndistortion_coefficients:\n"
-              "  rows: 1\n  cols: 5\n  data: [0.1, -0.2, 0.001, 0.002, 0]\n"));
-    EXPECT_EQ(plumb_bob.distortion, ARHOST_DISTORTION_BROWN);
-    EXPECT_EQ(plumb_bob.coefficient_count, 5u);
-    const auto equidistant = read_calibration(
-        write("width: 640\nheight: 480\nK: [600, 0, 320, 0, 601, 240, 0, 0, 1]\ndistortion_model: equidistant\n"
-              "D: [0.1, -0.2, 0.001, 0.002]\n"));
-    EXPECT_EQ(equidistant.distortion, ARHOST_DISTORTION_FISHEYE);
-    EXPECT_EQ(equidistant.coefficient_count, 4u);
+    expect_projects_like_opencv(read_calibration(write(ros("plumb_bob", "0.1, -0.2, 0.001, 0.002, 0"))),
+                                {0.1, -0.2, 0.001, 0.002, 0});
+    expect_projects_like_opencv(
+        read_calibration(write(ros("rational_polynomial", "0.1, -0.2, 0.001, 0.002, 0.05, 0.2, -0.1, 0.03"))),
+        {0.1, -0.2, 0.001, 0.002, 0.05, 0.2, -0.1, 0.03});
+    for (const char *model : {"equidistant", "fisheye"})
+        expect_projects_like_opencv_fisheye(read_calibration(write(ros(model, "0.1, -0.2, 0.001, 0.002"))),
+                                            {0.1, -0.2, 0.001, 0.002});
+    // The message camera_info, as 'rostopic echo' prints it.
+    expect_projects_like_opencv_fisheye(
+        read_calibration(
+            write("width: 640\nheight: 480\nK: [600.5, 0, 320, 0, 601, 240, 0, 0, 1]\ndistortion_model: equidistant\n"
+                  "D: [0.1, -0.2, 0.001, 0.002]\nR: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n")),
+        {0.1, -0.2, 0.001, 0.002});
+}
+
+TEST_F(Calibration, ReadsKalibrCamchains) {
+    expect_projects_like_opencv(read_calibration(write(kalibr("cam0", "pinhole", "radtan", "0.1, -0.2, 1e-3, 2e-3"))),
+                                {0.1, -0.2, 1e-3, 2e-3});
+    expect_projects_like_opencv_fisheye(
+        read_calibration(write(kalibr("cam0", "pinhole", "equidistant", "0.1, -0.2, 1e-3, 2e-3"))),
+        {0.1, -0.2, 1e-3, 2e-3});
+    const auto none = read_calibration(write(kalibr("cam0", "pinhole", "none", "")));
+    expect_projects_like_opencv(none, {});
+    EXPECT_EQ(none.distortion, ARHOST_DISTORTION_NONE);
+}
+
+TEST_F(Calibration, ReadsTheChosenCameraOfACamchain) {
+    const std::string stereo = kalibr("cam0", "pinhole", "radtan", "0.1, 0, 0, 0") +
+                               kalibr("cam1", "pinhole", "radtan", "0.2, 0, 0, 0") + "  timeshift_cam_imu: 0.01\n";
+    EXPECT_EQ(read_calibration(write(stereo)).coefficients[0], 0.1);
+    EXPECT_EQ(read_calibration(write(stereo), {}, "cam1").coefficients[0], 0.2);
+    EXPECT_EQ(error_in(stereo, {}, "cam2"),
+              "camera.yaml:1:1: there is no camera 'cam2'; set 'name' next to 'file' in the configuration to one of "
+              "cam0, cam1");
+    EXPECT_EQ(error_in(kalibr("left", "pinhole", "none", "")),
+              "camera.yaml:1:1: there is no camera 'cam0'; set 'name' next to 'file' in the configuration to one of "
+              "left");
+    const std::string other_format =
+        "camera.yaml: has only one camera; remove 'name: cam1' next to 'file' in the configuration, which is for "
+        "camchain files of Kalibr";
+    EXPECT_EQ(error_in(with_distortion(no_distortion), {}, "cam1"), other_format);
+    EXPECT_EQ(error_in(test::artoolkit_version_4().bytes(), {}, "cam1"), other_format);
+}
+
+TEST_F(Calibration, ErrorsInACamchainNameLineKeyAndFix) {
+    const std::string calibrate_again = "' is not supported; calibrate again with Kalibr's option '--models "
+                                        "pinhole-radtan' or '--models pinhole-equi'";
+    for (const std::string model : {"omni", "eucm", "ds"})
+        EXPECT_EQ(error_in(kalibr("cam0", model, "none", "")),
+                  "camera.yaml:3:17: cam0.camera_model: '" + model + calibrate_again);
+    EXPECT_EQ(error_in(kalibr("cam0", "pinhole", "fov", "0.9")),
+              "camera.yaml:5:21: cam0.distortion_model: 'fov" + calibrate_again);
+    EXPECT_EQ(
+        error_in(kalibr("cam0", "pinhole", "equidistant", "0.1")),
+        "camera.yaml:4:22: cam0.distortion_coeffs: the fisheye model needs 4 coefficients (k1 k2 k3 k4), not 1");
+    EXPECT_EQ(error_in(kalibr("cam0", "pinhole", "none", ""), Size{320, 240}),
+              "camera.yaml:7:15: cam0.resolution: the calibration is for images of 640×480 px, but 320×240 px are "
+              "requested; calibrate at that size");
+    const std::string beginning = "cam0: {camera_model: pinhole, distortion_model: none, distortion_coeffs: [], ";
+    EXPECT_EQ(error_in(beginning + "intrinsics: [600, 601, 320], resolution: [640, 480]}"),
+              "camera.yaml:1:90: cam0.intrinsics: must be a list of 4 numbers, but has 3");
+    EXPECT_EQ(error_in(beginning + "intrinsics: [600, 0, 320, 240], resolution: [640, 480]}"),
+              "camera.yaml:1:90: cam0.intrinsics: the focal length must be greater than 0 px, but is 0");
+    EXPECT_EQ(error_in(beginning + "intrinsics: [600, 601, 320, 240], resolution: [640]}"),
+              "camera.yaml:1:124: cam0.resolution: must be [width, height]");
+    EXPECT_EQ(error_in(beginning + "resolution: [640, 480]}"),
+              "camera.yaml:1:7: cam0: the key 'intrinsics' is missing");
+}
+
+// A file's name does not matter.
+TEST_F(Calibration, RecognisesArtoolkitByItsContent) {
+    const std::string bytes = test::artoolkit_version_4().bytes();
+    const auto intrinsics = read_calibration(write(bytes), Size{640, 480});
+    EXPECT_EQ(intrinsics.fy, 590);
+    EXPECT_EQ(coefficients(intrinsics), (std::vector<double>{0.0992, -0.0921, -0.0019, 0.0013}));
+    EXPECT_EQ(error_in(bytes, Size{320, 240}),
+              "camera.yaml: xsize, ysize: the calibration is for images of 640×480 px, but 320×240 px are requested; "
+              "calibrate at that size");
+    EXPECT_EQ(error_in(bytes.substr(1)),
+              "camera.yaml: is a binary file of 175 bytes, but ARToolKit's camera parameters have 136, 144, 152, 176 "
+              "or 240; if the file is truncated, copy it again; if it is YAML, save it as UTF-8 without NUL "
+              "characters");
 }
 
 TEST_F(Calibration, DetectsFisheyeByItsModelKey) {
@@ -275,6 +396,14 @@ TEST(CameraBlock, ReadsAFileRelativeToTheConfiguration) {
     EXPECT_EQ(intrinsics.height, 480u);
 }
 
+TEST(CameraBlock, ChoosesACameraOfACamchain) {
+    const test::ScratchFolder folder;
+    std::ofstream(folder.path() / "camchain.yaml")
+        << kalibr("cam0", "pinhole", "none", "") << kalibr("cam1", "pinhole", "radtan", "0.1, 0, 0, 0");
+    std::ofstream(folder.path() / "lab.yaml") << "{file: camchain.yaml, name: cam1}\n";
+    EXPECT_EQ(parse_camera(yaml::Node::load(folder.path() / "lab.yaml")).coefficients[0], 0.1);
+}
+
 TEST(CameraBlock, ErrorsNameLineKeyAndFix) {
     EXPECT_EQ(error_of([] { parsed("width: 640\nheight: 480\n"); }), "lab.yaml:1:1: the key 'fx' is missing");
     EXPECT_EQ(error_of([] { parsed("width: 640\nheight: 480\nfx: 0\n"); }),
@@ -291,7 +420,7 @@ TEST(CameraBlock, ErrorsNameLineKeyAndFix) {
               "lab.yaml:1:8: file: the calibration file " +
                   (std::filesystem::current_path() / "camera.yaml").string() + " does not exist");
     EXPECT_EQ(error_of([] { parsed("{file: camera.yaml, fx: 640}"); }),
-              "lab.yaml:1:21: fx: unknown key; known keys: file, width, height");
+              "lab.yaml:1:21: fx: unknown key; known keys: file, name, width, height");
 }
 
 TEST(CameraBlock, RequiresWidthAndHeightTogether) {
