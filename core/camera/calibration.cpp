@@ -300,6 +300,16 @@ arhost_intrinsics dissertation_camera(const Size &size) {
     return intrinsics;
 }
 
+std::string doubt_about_focal_length(const arhost_intrinsics &intrinsics) {
+    const double shortest_px = std::min(intrinsics.fx, intrinsics.fy);
+    if (shortest_px >= 100 || shortest_px >= intrinsics.width / 4.0)
+        return {};
+    std::ostringstream message;
+    message << "a focal length of " << shortest_px << " px is implausible for an image width of " << intrinsics.width
+            << " px; check the unit, which is px";
+    return message.str();
+}
+
 void check_size(const arhost_intrinsics &intrinsics, std::uint32_t width, std::uint32_t height) {
     const Size calibrated{intrinsics.width, intrinsics.height}, actual{width, height};
     if (calibrated != actual)

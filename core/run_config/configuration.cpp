@@ -114,7 +114,12 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
     return component;
 }
 
-TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared) {
+// Returns a warning, in the format of the errors of yaml::Node.
+std::string warning_at(const yaml::Node &node, const std::string &message) {
+    return node.where() + ": " + node.path() + ": " + message;
+}
+
+TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared, std::vector<std::string> &warnings) {
     TrackerConfiguration tracker{parse_component(node, "tracker", shared), {}, 0};
     const yaml::Node markers = node.require("markers");
     std::set<std::int64_t> ids;
@@ -124,8 +129,12 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared)
         const std::int64_t number = id.integer(0, std::numeric_limits<std::int32_t>::max());
         if (!ids.insert(number).second)
             id.fail("the marker " + std::to_string(number) + " is listed twice; keep one of them");
-        tracker.markers.push_back({sizeof(arhost_marker_config), static_cast<std::int32_t>(number),
-                                   marker.require("side_mm").real(0.01, 1e6)});
+        const yaml::Node side = marker.require("side_mm");
+        const double side_mm = side.real(0.01, 1e6);
+        if (side_mm < 1 || side_mm > 5000)
+            warnings.push_back(warning_at(side, "a marker with a side of " + side.text() +
+                                                    " mm is implausible; check the unit, which is mm"));
+        tracker.markers.push_back({sizeof(arhost_marker_config), static_cast<std::int32_t>(number), side_mm});
     }
     if (tracker.markers.empty() || tracker.markers.size() > ARHOST_MAX_MARKERS)
         markers.fail("must list 1 to " + std::to_string(ARHOST_MAX_MARKERS) +
@@ -343,11 +352,14 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
             configuration.camera_node = trajectory_node;
         }
     }
-    if (configuration.camera)
+    if (configuration.camera) {
         if (const std::string problem = camera::problem_with_lens(*configuration.camera); !problem.empty())
             configuration.camera_node->fail(problem);
+        if (const std::string doubt = camera::doubt_about_focal_length(*configuration.camera); !doubt.empty())
+            configuration.warnings.push_back(warning_at(*configuration.camera_node, doubt));
+    }
     if (const auto node = root.find("tracker")) {
-        configuration.tracker = parse_tracker(*node, shared);
+        configuration.tracker = parse_tracker(*node, shared, configuration.warnings);
         if (!configuration.source)
             node->fail("a tracker needs a 'source' that delivers frames");
     }

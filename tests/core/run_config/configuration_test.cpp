@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugin_under_test.hpp"
+#include "run_config/configuration.hpp"
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+using namespace arhost;
+using testing::ElementsAre;
+using testing::IsEmpty;
+namespace fs = std::filesystem;
+
+namespace {
+
+// Parses configurations; their plugins are empty files.
+struct Warnings : testing::Test {
+    Warnings() {
+        for (const char *plugin : {"source_x.so", "tracker_x.so"})
+            std::ofstream(scratch.path() / plugin) << "";
+    }
+    std::vector<std::string> of(const std::string &camera, const std::string &side_mm) const {
+        const auto root =
+            yaml::Node::parse("version: 1\nsource: {plugin: source_x}\ncamera: " + camera +
+                                  "\ntracker: {plugin: tracker_x, markers: [{id: 0, side_mm: " + side_mm + "}]}\n",
+                              (scratch.path() / "lab.yaml").string());
+        std::vector<std::string> warnings = run_config::parse(root, scratch.path()).warnings;
+        for (std::string &warning : warnings)
+            if (warning.starts_with(scratch.path().string()))
+                warning.erase(0, scratch.path().string().size() + 1);
+        return warnings;
+    }
+    test::ScratchFolder scratch;
+    const std::string camera = "{width: 640, height: 480, fx: 600}";
+};
+
+} // namespace
+
+TEST_F(Warnings, AreForImplausibleFocalLengths) {
+    EXPECT_THAT(of(camera, "80"), IsEmpty());
+    EXPECT_THAT(of("{width: 640, height: 480, fx: 100}", "80"), IsEmpty());
+    EXPECT_THAT(of("{width: 64, height: 48, fx: 60}", "80"), IsEmpty()) << "a small image";
+    EXPECT_THAT(
+        of("{width: 640, height: 480, fx: 600, fy: 35.5}", "80"),
+        ElementsAre("lab.yaml:3:9: camera: a focal length of 35.5 px is implausible for an image width of 640 "
+                    "px; check the unit, which is px"));
+    std::ofstream(scratch.path() / "camera.yaml")
+        << "{width: 640, height: 480, K: [99, 0, 320, 0, 99, 240, 0, 0, 1], D: [0, 0, 0, 0]}\n";
+    EXPECT_THAT(of("{file: camera.yaml}", "80"),
+                ElementsAre("lab.yaml:3:9: camera: a focal length of 99 px is implausible for an image width of 640 "
+                            "px; check the unit, which is px"));
+}
+
+TEST_F(Warnings, AreForImplausibleSidesOfMarkers) {
+    EXPECT_THAT(of(camera, "1"), IsEmpty());
+    EXPECT_THAT(of(camera, "5000"), IsEmpty());
+    EXPECT_THAT(of(camera, "0.08"),
+                ElementsAre("lab.yaml:4:57: tracker.markers[0].side_mm: a marker with a side of 0.08 mm is "
+                            "implausible; check the unit, which is mm"));
+    EXPECT_THAT(of(camera, "5001"),
+                ElementsAre("lab.yaml:4:57: tracker.markers[0].side_mm: a marker with a side of 5001 mm is "
+                            "implausible; check the unit, which is mm"));
+}
