@@ -94,8 +94,8 @@ void lift_deadlines(run_config::Configuration &configuration) {
 
 // Throws if an output would overwrite one of arhost's own programs, libraries and plugins.
 void protect_programs(const run_config::FilesInUse &files) {
-    for (const char *program :
-         {"arhost", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-worker", "render-scene"})
+    for (const char *program : {"arhost", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-marker",
+                                "arhost-worker", "render-scene"})
         files.protect(base::identity_of(own_folder() / program));
     std::error_code ignored;
     for (fs::recursive_directory_iterator entry(own_prefix() / "lib/arhost", ignored), end; !ignored && entry != end;
@@ -843,8 +843,8 @@ int print_schema(bool markdown) {
     return success;
 }
 
-int conform(std::vector<std::string> arguments) {
-    const std::string program = own_folder() / "arhost-conform";
+int run_program(const char *name, std::vector<std::string> arguments) {
+    const std::string program = own_folder() / name;
     arguments.insert(arguments.begin(), program);
     std::vector<char *> argv;
     argv.reserve(arguments.size() + 1);

@@ -59,8 +59,9 @@ int check(const Arguments &arguments, bool open, supervise::Starter &launcher);
 int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, supervise::Starter &launcher);
 int devices(const Arguments &arguments, const DevicesArguments &options, supervise::Starter &launcher);
 int print_schema(bool markdown);
-// Replaces this process with arhost-conform (exec), because the host process never loads a plugin itself.
-int conform(std::vector<std::string> arguments);
+// Replaces this process with another program of arhost (exec): arhost-conform, because the host process never loads a
+// plugin itself, or arhost-marker, because it links no OpenCV.
+int run_program(const char *name, std::vector<std::string> arguments);
 
 // own_folder() is the folder of this executable, which also contains the programs that arhost starts. own_prefix() is
 // the folder above it: the executable is <prefix>/bin/arhost.

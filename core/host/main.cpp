@@ -166,6 +166,8 @@ int main(int argc, char **argv) {
     new_plugin_command.option("--into", plugin.into, "Parent folder (default: current folder)").type_name("DIR");
     CommandLine conform_command =
         app.raw_subcommand("conform", "Test whether a plugin conforms to the ABI (docs/conformance.md)");
+    CommandLine marker_command =
+        app.raw_subcommand("marker", "Print markers and boards in their true size (docs/markers.md)");
     std::string helped;
     CommandLine help_command = app.subcommand("help", "Print help about arhost or a command");
     help_command.option("COMMAND", helped, "The command").one_of(app.subcommands());
@@ -173,8 +175,8 @@ int main(int argc, char **argv) {
     if (const auto status = app.parse(argc, argv))
         return checked_output(*status);
     const auto command = [&]() -> int {
-        if (help_command.selected() && helped == "conform") // its options are defined in another program
-            return conform({"--help"});
+        if (help_command.selected() && (helped == "conform" || helped == "marker")) // programs with their own options
+            return run_program(("arhost-" + helped).c_str(), {"--help"});
         if (help_command.selected()) {
             std::fputs(app.help(helped).c_str(), stdout);
             return success;
@@ -186,7 +188,9 @@ int main(int argc, char **argv) {
         if (new_plugin_command.selected())
             return new_plugin(plugin, own_prefix());
         if (conform_command.selected())
-            return conform(conform_command.arguments());
+            return run_program("arhost-conform", conform_command.arguments());
+        if (marker_command.selected())
+            return run_program("arhost-marker", marker_command.arguments());
         arhost::supervise::Launcher launcher(own_folder() / "arhost-launcher");
         if (replay_command.selected())
             return replay(arguments, replay_arguments, launcher);

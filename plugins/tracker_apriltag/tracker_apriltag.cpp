@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // tracker_apriltag: detects AprilTags with the AprilTag library, version 3.
-#include "families.hpp"
-
+#include <fiducial_common/apriltag_families.hpp>
 #include <fiducial_common/edge_refinement.hpp>
 #include <fiducial_common/marker_report.hpp>
 

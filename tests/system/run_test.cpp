@@ -436,6 +436,8 @@ TEST(CommandLine, HelpDescribesCommands) {
     EXPECT_EQ(run.run({"plugins", "--devices"}), 2) << "replaced with 'arhost devices'";
     EXPECT_EQ(run.run({"help", "conform"}), 0);
     EXPECT_THAT(run.output(), HasSubstr("Usage: arhost conform [OPTIONS] [PLUGIN]"));
+    EXPECT_EQ(run.run({"help", "marker"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("Usage: arhost marker [OPTIONS] MARKERS"));
     EXPECT_EQ(run.run({"help", "help"}), 0);
     EXPECT_THAT(run.output(), HasSubstr("Usage: arhost help [OPTIONS] [COMMAND]"));
     EXPECT_EQ(run.run({"help", "nonsense"}), 2);
@@ -480,6 +482,8 @@ TEST(CommandLine, CompletesInBash) {
     EXPECT_EQ(completed("arhost conform --timeo"), "--timeout-factor ");
     EXPECT_EQ(completed("arhost conform plugins/"), "plugins/x.so ");
     EXPECT_EQ(completed("arhost conform --reads pl"), "plugins ");
+    EXPECT_EQ(completed("arhost marker --cha"), "--charuco ");
+    EXPECT_EQ(completed("arhost marker --map la"), "lab.yaml ");
 }
 
 TEST(CommandLine, CompletesInFish) {
@@ -528,12 +532,13 @@ TEST(CommandLine, CompletesInZsh) {
     EXPECT_TRUE(completes("arhost new-plugin raytracer x --language py", "thon "));
     EXPECT_TRUE(completes("arhost help rep", "lay "));
     EXPECT_TRUE(completes("arhost conform --timeo", "ut-factor "));
+    EXPECT_TRUE(completes("arhost marker --cha", "ruco "));
 }
 
 TEST(CommandLine, HasAManPageForEachProgram) {
     const std::filesystem::path pages = ARHOST_BINARY_DIRECTORY "/pages";
-    for (const char *program :
-         {"arhost", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-worker", "render-scene"})
+    for (const char *program : {"arhost", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-marker",
+                                "arhost-worker", "render-scene"})
         EXPECT_TRUE(std::filesystem::is_regular_file(pages / (std::string(program) + ".1.gz"))) << program;
     ArhostRun run;
     EXPECT_EQ(run.run({"--generate", "man"}), 0);

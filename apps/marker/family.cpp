@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "family.hpp"
+
+#include <fiducial_common/apriltag_families.hpp>
+#include <fiducial_common/aruco_dictionaries.hpp>
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <memory>
+#include <numeric>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+namespace arhost::marker {
+namespace {
+
+Family april_tags(const apriltag::FamilyType &type) {
+    const std::shared_ptr<apriltag_family_t> family(type.create(), type.destroy);
+    // Families with a reversed border have bits outside it. The others only have their quiet zone there.
+    const int cells = family->reversed_border ? family->total_width : family->width_at_border;
+    return {
+        type.name, false, static_cast<int>(family->ncodes), cells, family->width_at_border, [family, cells](int id) {
+            const std::unique_ptr<image_u8_t, decltype(&image_u8_destroy)> image(apriltag_to_image(family.get(), id),
+                                                                                 image_u8_destroy);
+            const int quiet = (image->width - cells) / 2;
+            std::vector<bool> black;
+            for (int row = quiet; row < quiet + cells; ++row)
+                for (int column = quiet; column < quiet + cells; ++column)
+                    black.push_back(image->buf[row * image->stride + column] == 0);
+            return black;
+        }};
+}
+
+Family aruco_markers(const aruco::DictionaryType &type) {
+    const cv::aruco::Dictionary dictionary = aruco::predefined(type.name);
+    const int cells = dictionary.markerSize + 2;
+    return {type.family, true, dictionary.bytesList.rows, cells, cells, [dictionary, cells](int id) {
+                cv::Mat image;
+                aruco::draw(dictionary, id, cells, image, 1);
+                const cv::Mat_<uchar> is_black = image == 0;
+                return std::vector<bool>(is_black.begin(), is_black.end());
+            }};
+}
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+    std::vector<std::size_t> row(b.size() + 1);
+    std::iota(row.begin(), row.end(), 0);
+    for (const char in_a : a) {
+        std::size_t diagonal = row[0]++;
+        for (std::size_t i = 0; i < b.size(); ++i) {
+            const bool same = std::tolower(in_a) == std::tolower(b[i]);
+            diagonal = std::exchange(row[i + 1], std::min({row[i] + 1, row[i + 1] + 1, diagonal + !same}));
+        }
+    }
+    return row.back();
+}
+
+} // namespace
+
+std::vector<std::string> family_names() {
+    std::vector<std::string> names(apriltag::family_types.size());
+    std::ranges::transform(apriltag::family_types, names.begin(), &apriltag::FamilyType::name);
+    for (const aruco::DictionaryType &type : aruco::dictionary_types)
+        if (!type.is_april_tag())
+            names.emplace_back(type.option);
+    return names;
+}
+
+Family find_family(const std::string &name) {
+    std::string known_as = name;
+    for (const aruco::DictionaryType &type : aruco::dictionary_types)
+        if (name == type.option) {
+            if (!type.is_april_tag())
+                return aruco_markers(type);
+            known_as = type.family; // OpenCV would draw it upside down
+        }
+    for (const apriltag::FamilyType &type : apriltag::family_types)
+        if (known_as == type.name)
+            return april_tags(type);
+    std::vector<std::string> names = family_names();
+    std::ranges::stable_sort(names, {}, [&](const std::string &other) { return edit_distance(name, other); });
+    names.resize(3);
+    throw std::runtime_error(fmt::format("unknown family '{}'; similar names: {}; 'arhost marker --help' lists all",
+                                         name, fmt::join(names, ", ")));
+}
+
+} // namespace arhost::marker
