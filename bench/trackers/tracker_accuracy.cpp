@@ -2,6 +2,8 @@
 //
 // Prints the accuracy and speed of both trackers on a real sequence. The arguments are options of the two plugins:
 //   tracker-accuracy [aruco:key=value …] [apriltag:key=value …]
+#include "tracker_options.hpp"
+
 #include <fiducial_common/rbt_sequence.hpp>
 
 #include <cstdio>
@@ -34,18 +36,7 @@ Measurement measure(const RbtSequence &sequence, const std::string &plugin, cons
 } // namespace
 
 int main(int argc, char **argv) try {
-    Options aruco, april_tag;
-    for (int i = 1; i < argc; ++i) {
-        const std::string argument = argv[i];
-        const auto colon = argument.find(':'), equals = argument.find('=');
-        const std::string plugin = argument.substr(0, colon);
-        if ((plugin != "aruco" && plugin != "apriltag") || equals == std::string::npos || equals < colon) {
-            std::fprintf(stderr, "invalid argument '%s': must be aruco:key=value or apriltag:key=value\n", argv[i]);
-            return 2;
-        }
-        (plugin == "aruco" ? aruco : april_tag)[argument.substr(colon + 1, equals - colon - 1)] =
-            argument.substr(equals + 1);
-    }
+    auto options = options_of_both(argc, argv);
     const auto folder = shared_data("markers/rbt_sequence");
     if (!std::filesystem::exists(folder)) {
         std::printf("skipped: the folder %s is missing (set ARHOST_SHARED_DATA)\n", folder.c_str());
@@ -54,8 +45,8 @@ int main(int argc, char **argv) try {
     const RbtSequence sequence;
     std::printf("rbt_sequence: 40 frames 640x480, tag36h11 of 95.5 mm\n%-18s %23s %8s %8s %12s %8s\n", "tracker",
                 "found", "px mean", "px p95", "dist. p50", "ms p50");
-    const auto a = measure(sequence, "tracker_aruco", aruco);
-    const auto b = measure(sequence, "tracker_apriltag", april_tag);
+    const auto a = measure(sequence, "tracker_aruco", options["aruco"]);
+    const auto b = measure(sequence, "tracker_apriltag", options["apriltag"]);
     const double disagreement = percentile(RbtSequence::disagreement_px(a.frames, b.frames), 0.95);
     std::printf("distance between corresponding corners of the two trackers: p95 %.3f px\n", disagreement);
     return a.passed && b.passed && disagreement <= 0.5 ? 0 : 1;

@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -26,24 +27,90 @@ double sample(const cv::Mat &grey, cv::Point2d at) {
     return (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
 }
 
-// Returns the offset of the edge from `at` along the outward normal: the mean position weighted by the squared
-// gradient, as in AprilTag. Only uses gradients of the sign `sign`. Returns std::nullopt if none of them exceeds the
-// noise.
-std::optional<double> edge_offset_px(const cv::Mat &grey, cv::Point2d at, cv::Point2d outward, double sign) {
-    constexpr double step = 0.25, min_rise = 8;                                 // step in px; min_rise in grey levels
-    constexpr int search = 9, half_baseline = 3, ends = search + half_baseline; // all in steps
-    std::array<double, 2 * ends + 1> profile;
-    for (int i = -ends; i <= ends; ++i)
-        profile[i + ends] = sample(grey, at + i * step * outward);
+// Positions along an edge and the unit normals at them, which point out of the square.
+struct Edge {
+    std::vector<cv::Point2d> at_px, outward;
+};
+
+// All in steps along the normal, whose length depends on the size of the marker and on the blur.
+constexpr int search = 9, half_baseline = 3, reach = search + half_baseline;
+
+// Returns how much the grey level rises over the baseline, outwards, times `sign`: one row for each position, one
+// column for each offset from −search to search. The rise is 0 where the baseline leaves the image.
+cv::Mat_<float> rises(const cv::Mat &grey, const Edge &edge, double step_px, double sign) {
+    cv::Mat_<float> result(static_cast<int>(edge.at_px.size()), 2 * search + 1);
+    std::array<double, 2 * reach + 1> profile;
+    for (int row = 0; row < result.rows; ++row) {
+        for (int i = -reach; i <= reach; ++i)
+            profile[i + reach] = sample(grey, edge.at_px[row] + i * step_px * edge.outward[row]);
+        for (int column = 0; column < result.cols; ++column) {
+            const double rise = sign * (profile[column + 2 * half_baseline] - profile[column]);
+            result(row, column) = std::isfinite(rise) ? static_cast<float>(rise) : 0;
+        }
+    }
+    return result;
+}
+
+cv::Mat_<float> mean_of_rows(const cv::Mat_<float> &rises) {
+    cv::Mat_<float> mean;
+    cv::reduce(rises, mean, 0, cv::REDUCE_AVG);
+    return mean;
+}
+
+// The rises near an edge. `peak` and `at_rim` are the greatest mean rises at any offset and at the greatest offsets,
+// `on_line` is the mean at offset 0 with steps of the smallest size; `width_px` is the width of a slope of constant
+// rise that is as high.
+struct Slope {
+    cv::Mat_<float> rises;
+    double step_px, peak = 0, at_rim = 0, on_line = 0, width_px = 0;
+};
+
+constexpr double contained = 0.35; // greatest rise at the rim relative to the peak, if the slope ends before the rim
+
+// Doubles the steps, up to `max_step_px`, until they contain the whole slope, which blur widens.
+Slope find_slope(const cv::Mat &grey, const Edge &edge, double min_step_px, double max_step_px, double sign) {
+    constexpr int rim = 3; // columns
+    Slope slope{{}, min_step_px};
+    for (;; slope.step_px = std::min(2 * slope.step_px, max_step_px)) {
+        slope.rises = rises(grey, edge, slope.step_px, sign);
+        const cv::Mat_<float> mean = mean_of_rows(slope.rises);
+        if (slope.step_px == min_step_px)
+            slope.on_line = mean(0, search);
+        slope.peak = *std::max_element(mean.begin(), mean.end());
+        slope.at_rim = std::max(*std::max_element(mean.begin(), mean.begin() + rim),
+                                *std::max_element(mean.end() - rim, mean.end()));
+        slope.width_px = cv::sum(cv::max(mean, 0))[0] / slope.peak * slope.step_px;
+        if (slope.at_rim < contained * slope.peak || slope.step_px >= max_step_px)
+            return slope;
+    }
+}
+
+// Averages the rises of neighbouring positions until their noise is small relative to the slope.
+void reduce_noise(Slope &slope) {
+    constexpr double max_noise = 0.08; // relative to the peak
+    std::vector<float> steps; // differences between neighbours contain little of the picture, but all the noise
+    for (int row = 1; row < slope.rises.rows; ++row)
+        for (int column = 0; column < slope.rises.cols; column += half_baseline)
+            steps.push_back(std::abs(slope.rises(row, column) - slope.rises(row - 1, column)));
+    const auto median = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::nth_element(steps.begin(), median, steps.end());
+    const double noise = 1.05 * *median; // standard deviation of a rise, if it is normally distributed
+    const double ratio = noise / (max_noise * slope.peak);
+    const int averaged = static_cast<int>(std::min(ratio * ratio, slope.rises.rows / 4.0));
+    if (averaged > 1)
+        cv::blur(slope.rises, slope.rises, {1, averaged | 1});
+}
+
+// Returns the offset of the edge in px: the mean offset weighted by the squared rise, as in AprilTag. Only uses rises
+// that exceed `min_rise`; returns std::nullopt if there are none.
+std::optional<double> edge_offset_px(const Slope &slope, int row, double min_rise) {
     double weighted = 0, weights = 0;
-    for (int i = -search; i <= search; ++i) {
-        const double rise = sign * (profile[i + half_baseline + ends] - profile[i - half_baseline + ends]);
-        if (rise > min_rise) { // also false if `rise` is NaN
+    for (int i = -search; i <= search; ++i)
+        if (const double rise = slope.rises(row, i + search); rise > min_rise) {
             weighted += rise * rise * i;
             weights += rise * rise;
         }
-    }
-    return weights > 0 ? std::optional(weighted / weights * step) : std::nullopt;
+    return weights > 0 ? std::optional(weighted / weights * slope.step_px) : std::nullopt;
 }
 
 Line fit_line(const std::vector<cv::Point2f> &points) {
@@ -52,9 +119,27 @@ Line fit_line(const std::vector<cv::Point2f> &points) {
     return {cv::Point2d(line[2], line[3]), cv::Point2d(line[0], line[1])};
 }
 
+// Returns the points that are closer than `tolerance_px` to the line through two of the points that has most of them.
+std::vector<cv::Point2f> most_collinear(const std::vector<cv::Point2f> &points, double tolerance_px) {
+    constexpr std::size_t ends = 16; // the number of points that are tried as ends of the line
+    const std::size_t stride = std::max<std::size_t>(points.size() / ends, 1);
+    std::vector<cv::Point2f> best, near;
+    for (std::size_t i = 0; i < points.size(); i += stride)
+        for (std::size_t j = i + stride; j < points.size(); j += stride) {
+            const cv::Point2d along = points[j] - points[i];
+            near.clear();
+            for (const cv::Point2f &point : points)
+                if (std::abs(along.cross(point - points[i])) < tolerance_px * cv::norm(along))
+                    near.push_back(point);
+            if (near.size() > best.size())
+                best = near;
+        }
+    return best;
+}
+
 // Fits a line without outliers. `sampled` is the number of positions at which an edge was searched. Returns
-// std::nullopt if fewer than half of them remain.
-std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size_t sampled) {
+// std::nullopt if fewer than half of them remain, or if half of these are further than `max_median_px` from the line.
+std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size_t sampled, double max_median_px) {
     constexpr double min_inlier_px = 0.3;
     for (int round = 0;; ++round) {
         if (points.size() < std::max<std::size_t>(sampled / 2, 2))
@@ -73,77 +158,109 @@ std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size
             if (residuals[i] <= bound)
                 kept.push_back(points[i]);
         if (kept.size() == points.size() || round == 5)
-            return *median < 1 ? std::optional(line) : std::nullopt;
+            return *median < max_median_px ? std::optional(line) : std::nullopt;
         points = std::move(kept);
     }
 }
 
-// Fits a line in undistorted pixels to the edge between two corners.
-std::optional<Line> fit_edge(const cv::Mat &grey, cv::Point2d from, cv::Point2d to, const Lens &lens, double sign) {
+// Returns positions on the line between two corners in undistorted pixels, which are in clockwise order. Keeps
+// `margin_px` away from the corners, where the search would hit the adjacent edges.
+Edge edge_between(cv::Point2d from, cv::Point2d to, const Lens &lens, double margin_px) {
     const double length = cv::norm(to - from);
-    // Close to a corner, the search would hit the adjacent edge.
-    const double margin = std::min(3.0, length / 4) / length;
+    const double margin = std::min(margin_px, length / 4) / length;
     const std::size_t count = std::clamp<std::size_t>(static_cast<std::size_t>(length / 2), 16, 100);
-    std::vector<cv::Point2d> samples;
+    Edge edge;
     for (std::size_t i = 0; i < count; ++i)
-        samples.push_back(from + (margin + (1 - 2 * margin) * static_cast<double>(i) / (count - 1)) * (to - from));
-    samples = lens.distort(samples);
-    std::vector<cv::Point2d> found;
+        edge.at_px.push_back(from + (margin + (1 - 2 * margin) * static_cast<double>(i) / (count - 1)) * (to - from));
+    edge.at_px = lens.distort(edge.at_px);
     for (std::size_t i = 0; i < count; ++i) {
-        const cv::Point2d along = samples[std::min(i + 1, count - 1)] - samples[i > 0 ? i - 1 : 0];
-        // The corners are in clockwise order.
-        const cv::Point2d outward = cv::Point2d(along.y, -along.x) / cv::norm(along);
-        if (const auto offset = edge_offset_px(grey, samples[i], outward, sign))
-            found.push_back(samples[i] + *offset * outward);
+        const cv::Point2d along = edge.at_px[std::min(i + 1, count - 1)] - edge.at_px[i > 0 ? i - 1 : 0];
+        edge.outward.push_back(cv::Point2d(along.y, -along.x) / cv::norm(along));
     }
+    return edge;
+}
+
+// Fits a line in undistorted pixels to the slope of an edge. `from` is a corner near it.
+std::optional<Line> fit_edge(const Edge &edge, Slope &slope, cv::Point2d from, const Lens &lens) {
+    constexpr double min_peak = 1;   // grey levels
+    constexpr double min_rise = 0.2; // relative to the peak
+    constexpr double max_median_steps = 4;
+    if (!(slope.peak >= min_peak))
+        return std::nullopt;
+    reduce_noise(slope);
+    std::vector<cv::Point2d> found;
+    for (std::size_t i = 0; i < edge.at_px.size(); ++i)
+        if (const auto offset = edge_offset_px(slope, static_cast<int>(i), min_rise * slope.peak))
+            found.push_back(edge.at_px[i] + *offset * edge.outward[i]);
     const auto straight = lens.undistort(found);
     if (!straight)
         return std::nullopt;
     std::vector<cv::Point2f> relative; // relative to `from`, so the precision of float suffices
     for (const cv::Point2d &point : *straight)
         relative.push_back(point - from);
-    auto line = fit_line_robustly(std::move(relative), count);
+    const double max_median_px = max_median_steps * slope.step_px;
+    auto line = fit_line_robustly(relative, edge.at_px.size(), max_median_px);
+    if (!line)
+        line = fit_line_robustly(most_collinear(relative, max_median_px / 2), edge.at_px.size(), max_median_px);
     if (line)
         line->point += from;
     return line;
 }
 
-// Returns +1 if the square is darker than its surroundings, otherwise −1.
-double contrast_sign(const cv::Mat &grey, const Corners &corners) {
-    const cv::Point2d centre = 0.25 * (corners[0] + corners[1] + corners[2] + corners[3]);
-    double sum = 0;
-    for (int i = 0; i < 4; ++i) {
-        const cv::Point2d middle = 0.5 * (corners[i] + corners[(i + 1) % 4]);
-        const cv::Point2d outward = (middle - centre) / cv::norm(middle - centre);
-        const double rise = sample(grey, middle + 2 * outward) - sample(grey, middle - 2 * outward);
-        sum += std::isfinite(rise) ? rise : 0;
-    }
-    return sum < 0 ? -1 : 1;
-}
-
 } // namespace
 
-std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens) {
+std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens, int cells) {
     constexpr int max_passes = 8;
-    constexpr double converged_px = 0.2;
-    const double sign = contrast_sign(grey, rough_px);
+    constexpr double sharp_step_px = 0.25; // suffices for a sharp edge
+    constexpr double min_strength = 0.9;   // of the refined edges, relative to the rough ones
+    constexpr double max_blur = 0.7; // relative to the cell; a wider slope depends on the cells beside the border
     const auto rough = lens.undistort({rough_px.begin(), rough_px.end()});
     if (!rough)
         return std::nullopt;
     std::vector<cv::Point2d> corners = *rough;
-    double shortest = std::numeric_limits<double>::infinity();
-    for (int i = 0; i < 4; ++i)
-        shortest = std::min(shortest, cv::norm(corners[(i + 1) % 4] - corners[i]));
+    double shortest = std::numeric_limits<double>::infinity(), thinnest = shortest;
+    for (int i = 0; i < 4; ++i) {
+        const cv::Point2d edge = corners[(i + 1) % 4] - corners[i];
+        const double length = cv::norm(edge);
+        shortest = std::min(shortest, length);
+        for (const int other : {2, 3})
+            thinnest = std::min(thinnest, std::abs(edge.cross(corners[(i + other) % 4] - corners[i])) / length);
+    }
+    // One cell on each side of the edge is uniform: the border and the margin of the print.
+    const double cell_px = thinnest / cells, max_step_px = cell_px / reach;
+    if (!(cell_px >= 1))
+        return std::nullopt;
+    const double min_step_px = std::min(sharp_step_px, max_step_px), converged_px = 0.8 * min_step_px;
 
-    double moved = converged_px;
+    // +1 if the square is darker than its surroundings, otherwise −1
+    double sign = 0, rough_strength = 0, strength = 0, moved = converged_px, margin_px = reach * min_step_px;
+    bool too_blurred = false;
     for (int pass = 0; pass < max_passes && moved >= converged_px; ++pass) {
+        std::array<Edge, 4> edges;
+        for (int i = 0; i < 4; ++i)
+            edges[i] = edge_between(corners[i], corners[(i + 1) % 4], lens, margin_px);
+        if (pass == 0) {
+            double rise = 0;
+            for (const Edge &edge : edges)
+                rise += cv::sum(rises(grey, edge, min_step_px, 1))[0];
+            sign = rise < 0 ? -1 : 1;
+        }
         std::array<Line, 4> lines;
+        strength = margin_px = 0;
+        too_blurred = false;
         for (int i = 0; i < 4; ++i) {
-            const auto line = fit_edge(grey, corners[i], corners[(i + 1) % 4], lens, sign);
+            Slope slope = find_slope(grey, edges[i], min_step_px, max_step_px, sign);
+            const auto line = fit_edge(edges[i], slope, corners[i], lens);
             if (!line)
                 return std::nullopt;
             lines[i] = *line;
+            strength += slope.on_line;
+            margin_px = std::max(margin_px, reach * slope.step_px);
+            too_blurred |= slope.step_px > min_step_px &&
+                           (slope.at_rim > contained * slope.peak || slope.width_px > max_blur * cell_px);
         }
+        if (pass == 0)
+            rough_strength = strength;
         moved = 0;
         for (int i = 0; i < 4; ++i) {
             const Line &before = lines[(i + 3) % 4], &after = lines[i];
@@ -156,6 +273,8 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
                 return std::nullopt;
         }
     }
+    if (too_blurred || strength < min_strength * rough_strength)
+        return std::nullopt;
     const std::vector<cv::Point2d> distorted = lens.distort(corners);
     return Corners{distorted[0], distorted[1], distorted[2], distorted[3]};
 }

@@ -10,7 +10,9 @@ namespace arhost::fiducial {
 // Fits lines to the four edges of the black square (white, if the marker is inverted) near the rough corners, and
 // returns the intersections of these lines. Unlike a search for the corner itself, this method uses the whole edge,
 // has no inward bias, and tolerates a hidden corner. It fits the lines in undistorted pixels, where edges are
-// straight. Returns std::nullopt if it does not find four edges.
-std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens);
+// straight. `cells` is the side of the square in cells; the search for an edge stays within one cell of it, because
+// only the border and the margin, one cell wide each, are uniform. Returns std::nullopt if it does not find four
+// edges that fit the image at least as well as the rough ones; these are then the best that is known.
+std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens, int cells);
 
 } // namespace arhost::fiducial

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <tuple>
 
@@ -24,6 +25,15 @@ bool is_better(const Located &a, const Located &b) {
         return std::tuple(-l.detection.quality, l.pose.best.reprojection_px, corner.x, corner.y);
     };
     return key(a) < key(b);
+}
+
+// Errors of a measurement are smaller; a larger one means that no square has these corners, because something hides
+// one.
+double max_reprojection_px(const Corners &corners_px) {
+    double shortest_px = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < 4; ++i)
+        shortest_px = std::min(shortest_px, cv::norm(corners_px[(i + 1) % 4] - corners_px[i]));
+    return std::max(2.0, 0.05 * shortest_px);
 }
 
 arhost_marker record(const Located &located, int id, const std::string &family) {
@@ -72,7 +82,7 @@ void MarkerReport::write(std::span<const Detection> detections, arhost_tracker_r
     std::vector<std::optional<Located>> best(ids_.size());
     for (const Detection &detection : detections) {
         const auto pose = planar_pose(detection.corners_px, lens_, sides_mm_.at(detection.listed));
-        if (!pose)
+        if (!pose || pose->best.reprojection_px > max_reprojection_px(detection.corners_px))
             continue;
         std::optional<Located> &kept = best[detection.listed];
         const Located found{detection, *pose};

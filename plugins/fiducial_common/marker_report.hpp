@@ -26,7 +26,8 @@ public:
     const std::vector<int> &ids() const { return ids_; } // in the order of the setup
     const Lens &lens() const { return lens_; }
 
-    // Writes one record for each listed marker that was detected and has a pose, in the order of the setup. If a
+    // Writes one record for each listed marker that was detected and has a pose, in the order of the setup. Omits
+    // detections whose corners are far (2 px and 5 % of the shortest side) from those of any square. If a
     // marker was detected several times, keeps the detection of the highest quality; among equals, the one with the
     // lowest reprojection error.
     void write(std::span<const Detection> detections, arhost_tracker_result &result) const;

@@ -174,11 +174,11 @@ public:
             // AprilTag's corners begin at the bottom left and are counter-clockwise; pixel centres are at +0.5.
             for (int corner = 0; corner < 4; ++corner)
                 detection.corners_px[corner] = {tag->p[3 - corner][0] - 0.5, tag->p[3 - corner][1] - 0.5};
-            const auto corners = fit_edges_
-                                     ? arhost::fiducial::refine_edges(grey, detection.corners_px, report_->lens())
-                                     : detection.corners_px;
-            if (corners)
-                detections.push_back({detection.listed, *corners, detection.quality});
+            if (fit_edges_)
+                detection.corners_px = arhost::fiducial::refine_edges(grey, detection.corners_px, report_->lens(),
+                                                                      family_->get()->width_at_border)
+                                           .value_or(detection.corners_px);
+            detections.push_back(detection);
         }
         report_->write(detections, result);
     }

@@ -213,11 +213,12 @@ public:
                 const cv::Point2d px = found.corners[i][rotated_180_ ? (corner + 2) % 4 : corner];
                 detection.corners_px[corner] = px - cv::Point2d(centre_shift_px_, centre_shift_px_);
             }
-            const auto corners = refine_edges_
-                                     ? arhost::fiducial::refine_edges(grey, detection.corners_px, report_->lens())
-                                     : detection.corners_px;
-            if (corners)
-                detections.push_back({detection.listed, *corners});
+            if (refine_edges_)
+                detection.corners_px =
+                    arhost::fiducial::refine_edges(grey, detection.corners_px, report_->lens(),
+                                                   dictionary_.markerSize + 2 * parameters_.markerBorderBits)
+                        .value_or(detection.corners_px);
+            detections.push_back(detection);
         }
         report_->write(detections, result);
     }

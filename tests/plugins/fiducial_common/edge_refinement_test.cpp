@@ -15,6 +15,7 @@ using arhost::fiducial::refine_edges;
 
 const arhost_intrinsics camera = intrinsics_of({320, 240}, 300, 300, 159.5, 119.5);
 const arhost::fiducial::Lens lens(camera);
+constexpr int cells = 8; // of a tag36h11
 
 // Mean distance of a tag's corners from their projections before and after refinement, and mean offset afterwards.
 struct Errors {
@@ -38,7 +39,7 @@ Errors errors(bool inverted) {
         Corners rough = truth;
         for (auto &corner : rough)
             corner += cv::Point2d(offset(generator), offset(generator));
-        const Corners fine = refine_edges(picture, rough, lens).value();
+        const Corners fine = refine_edges(picture, rough, lens, cells).value();
         for (int k = 0; k < 4; ++k, ++count) {
             sum.before_px += cv::norm(rough[k] - truth[k]);
             sum.after_px += cv::norm(fine[k] - truth[k]);
@@ -66,7 +67,7 @@ TEST(EdgeRefinement, FindsAHiddenCorner) {
         cv::circle(picture, truth[2], 12, cv::Scalar(grey), cv::FILLED);
         Corners rough = truth;
         rough[2] += (truth[0] - truth[2]) / cv::norm(truth[0] - truth[2]) * 6;
-        const auto fine = refine_edges(picture, rough, lens);
+        const auto fine = refine_edges(picture, rough, lens, cells);
         ASSERT_TRUE(fine);
         for (int k = 0; k < 4; ++k)
             EXPECT_LT(cv::norm((*fine)[k] - truth[k]), 0.2) << grey << " " << k;
@@ -77,11 +78,11 @@ TEST(EdgeRefinement, ReturnsNothingWithoutEdges) {
     const Corners corners{{{100, 80}, {160, 80}, {160, 140}, {100, 140}}};
     for (const cv::Size size :
          {cv::Size(320, 240), cv::Size(130, 120), cv::Size(1, 1)}) // inside, partly and entirely outside
-        EXPECT_FALSE(refine_edges(cv::Mat(size, CV_8U, cv::Scalar(90)), corners, lens));
+        EXPECT_FALSE(refine_edges(cv::Mat(size, CV_8U, cv::Scalar(90)), corners, lens, cells));
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const cv::Mat plain(240, 320, CV_8U, cv::Scalar(90));
-    EXPECT_FALSE(refine_edges(plain, {{{100, 80}, {100, 80}, {100, 80}, {100, 80}}}, lens));
-    EXPECT_FALSE(refine_edges(plain, {{{nan, 80}, {160, 80}, {160, 140}, {100, 140}}}, lens));
+    EXPECT_FALSE(refine_edges(plain, {{{100, 80}, {100, 80}, {100, 80}, {100, 80}}}, lens, cells));
+    EXPECT_FALSE(refine_edges(plain, {{{nan, 80}, {160, 80}, {160, 140}, {100, 140}}}, lens, cells));
 }
 
 TEST(EdgeRefinement, NeverMovesACornerFar) {
@@ -93,7 +94,7 @@ TEST(EdgeRefinement, NeverMovesACornerFar) {
         Corners corners;
         for (auto &corner : corners)
             corner = {at(generator), at(generator)};
-        if (const auto refined = refine_edges(noise, corners, lens)) {
+        if (const auto refined = refine_edges(noise, corners, lens, cells)) {
             for (int k = 0; k < 4; ++k)
                 EXPECT_LT(cv::norm((*refined)[k] - corners[k]), cv::norm(corners[(k + 1) % 4] - corners[k]) / 4);
         }

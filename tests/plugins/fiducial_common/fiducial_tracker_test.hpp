@@ -4,7 +4,7 @@
 // instantiates the suite FiducialTracker with the tracker's configurations.
 #pragma once
 
-#include "prints.hpp"
+#include "tag_pictures.hpp"
 
 #include <gmock/gmock.h>
 
@@ -21,13 +21,6 @@ struct TrackerCase {
 };
 
 inline const arhost_intrinsics test_camera = intrinsics_of({480, 360}, 450, 455, 243.2, 176.9);
-
-inline double angle_degrees(const double *a, const Mt &b) {
-    double trace = 0;
-    for (int i = 0; i < 11; ++i)
-        trace += i % 4 < 3 ? a[i] * b[i] : 0;
-    return std::acos(std::clamp((trace - 1) / 2, -1.0, 1.0)) * 180 / std::numbers::pi;
-}
 
 inline cv::Mat picture_of(const std::vector<Placed> &markers) {
     cv::Mat picture = render(test_camera, markers);
@@ -51,6 +44,13 @@ protected:
         camera.height = static_cast<uint32_t>(picture.rows);
         EXPECT_EQ(tracker_.start(camera, listed), ARHOST_STATUS_OK) << tracker_.log();
         return tracker_.track(GreyFrame(picture));
+    }
+    // Shows the pictures to the tracker with arhost's refinement of the corners, and with the corners of its library.
+    std::pair<TagPictures::Outcome, TagPictures::Outcome> refined_and_plain(const TagPictures &pictures) {
+        Options options = GetParam().options;
+        options["corner_refinement"] = "none";
+        Tracker plain(GetParam().plugin, options);
+        return {pictures.show_to(tracker_), pictures.show_to(plain)};
     }
     Tracker tracker_;
 };
@@ -207,6 +207,32 @@ TEST_P(FiducialTracker, ReportsNoWrongPoseWithAHiddenCorner) {
                         << "corner " << hidden << " radius " << radius_px << " grey " << grey;
                 }
             }
+}
+
+TEST_P(FiducialTracker, RefinementKeepsEveryDetectionAtATenthOfTheExposure) {
+    const TagPictures pictures({"dark", 40, 0, 0.1, 2}, 112);
+    const auto [refined, plain] = refined_and_plain(pictures);
+    EXPECT_EQ(refined.found, plain.found);
+    EXPECT_GE(refined.found, 0.9 * pictures.shown());
+}
+
+TEST_P(FiducialTracker, RefinedCornersAreNoWorseThanThoseOfTheLibrary) {
+    for (const auto &[conditions, tags] : {std::pair{Conditions{"sharp", 13}, 1200}, // few poses are wrong
+                                           {{"sharp", 28}, 112},
+                                           {{"sharp", 60}, 60},
+                                           {{"noisy", 28, 0, 1, 10}, 112},
+                                           {{"dark", 28, 0, 0.1, 2}, 112},
+                                           {{"moved", 28, 3}, 112},
+                                           {{"moved", 110, 13}, 60}}) {
+        SCOPED_TRACE(testing::Message() << conditions.name << ", " << conditions.side_px << " px");
+        const TagPictures pictures(conditions, tags);
+        const auto [refined, plain] = refined_and_plain(pictures);
+        EXPECT_EQ(refined.found, plain.found);
+        EXPECT_LE(refined.wrong, plain.wrong);
+        if (plain.found > 0) {
+            EXPECT_LE(percentile(refined.corner_px, 0.99), percentile(plain.corner_px, 0.99));
+        }
+    }
 }
 
 TEST_P(FiducialTracker, GivesTheSameResultWithAnyNumberOfThreads) {

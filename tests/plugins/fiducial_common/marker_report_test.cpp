@@ -93,6 +93,15 @@ TEST(MarkerReport, OmitsDetectionsWithoutAPose) {
     EXPECT_EQ(write(report_of({{4}}), {flat, detection(0, 0)}).size(), 1u);
 }
 
+TEST(MarkerReport, OmitsCornersThatNoSquareHas) {
+    const MarkerReport report = report_of({{4, 100}});
+    for (const auto &[shift_px, count] : {std::pair{4, 1u}, {40, 0u}}) {
+        Detection hidden = detection(0, 0);
+        hidden.corners_px[1].x += shift_px;
+        EXPECT_EQ(write(report, {hidden}).size(), count) << shift_px;
+    }
+}
+
 TEST(MarkerReport, TruncatesALongFamilyName) {
     const arhost_marker_config marker{sizeof marker, 0, 50};
     const arhost_tracker_setup setup{sizeof setup, 1, nullptr, &camera, &marker};

@@ -12,21 +12,8 @@
 #include <chrono>
 #include <cstdio>
 #include <fstream>
-#include <numeric>
 
 namespace arhost::test {
-
-inline double percentile(std::vector<double> values, double fraction) {
-    if (values.empty())
-        throw std::runtime_error("no values");
-    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
-    std::nth_element(values.begin(), nth, values.end());
-    return *nth;
-}
-
-inline double mean(const std::vector<double> &values) {
-    return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
 
 class RbtSequence {
 public:

@@ -10,6 +10,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -59,6 +60,14 @@ inline Mt pose_of(double x_mm, double y_mm, double distance_mm, double about_x =
     mt[14] = -distance_mm;
     mt[15] = 1;
     return mt;
+}
+
+// Returns the angle between the rotations of two poses.
+inline double angle_degrees(const double *a, const Mt &b) {
+    double trace = 0;
+    for (int i = 0; i < 11; ++i)
+        trace += i % 4 < 3 ? a[i] * b[i] : 0;
+    return std::acos(std::clamp((trace - 1) / 2, -1.0, 1.0)) * 180 / std::numbers::pi;
 }
 
 // Projects a point of the marker (x to the right, y up, in mm) to a pixel, with the formulas of arhost/camera.h.

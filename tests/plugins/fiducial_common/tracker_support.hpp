@@ -8,9 +8,12 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <map>
+#include <numeric>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -135,6 +138,18 @@ private:
     arhost_status created_ = ARHOST_STATUS_ERROR_INTERNAL;
     bool started_ = false;
 };
+
+inline double percentile(std::vector<double> values, double fraction) {
+    if (values.empty())
+        throw std::runtime_error("no values");
+    const auto nth = values.begin() + static_cast<std::ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), nth, values.end());
+    return *nth;
+}
+
+inline double mean(const std::vector<double> &values) {
+    return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
 
 inline double corner_distance_px(const arhost_marker &marker, int corner, cv::Point2d expected) {
     return std::hypot(marker.corners_px[corner][0] - expected.x, marker.corners_px[corner][1] - expected.y);
