@@ -38,7 +38,7 @@ constexpr arhost_option_descriptor options[] = {
         "Corner refinement: edges (arhost fits lines to the edges), or none (corners as the library reports them).",
         0, 0, refinements),
     arhost::option(
-        ARHOST_OPTION_REAL, "quad_decimate", "1.5",
+        ARHOST_OPTION_REAL, "quad_decimate", "1",
         "Tags are detected in an image downscaled by this factor: 1, 1.5 or an integer. A larger factor is "
         "faster but misses small tags.",
         1, 8),
@@ -214,7 +214,7 @@ private:
     const FamilyType &type_;
     const int threads_;
     bool fit_edges_ = true;
-    double decimate_ = 1.5, sigma_ = 0;
+    double decimate_ = 1, sigma_ = 0;
     bool refine_edges_ = true;
     double sharpening_ = 0.25;
     int max_hamming_ = 2;

@@ -9,7 +9,7 @@ using testing::HasSubstr;
 
 const std::vector<TrackerCase> cases{
     {"Defaults", "tracker_apriltag", {}, {{"threads", "5"}}},
-    {"FullResolution", "tracker_apriltag", {{"quad_decimate", "1"}}, {{"threads", "4"}}},
+    {"TwoThirdsOfTheResolution", "tracker_apriltag", {{"quad_decimate", "1.5"}}, {{"threads", "4"}}},
     {"HalfResolution", "tracker_apriltag", {{"quad_decimate", "2"}}, {{"threads", "3"}}},
     {"BlurredFullResolution",
      "tracker_apriltag",
@@ -50,6 +50,12 @@ TEST(AprilTagTracker, RejectsADecimationThatTheLibraryMishandles) {
     Tracker tracker("tracker_apriltag", {{"quad_decimate", "2.5"}});
     EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker.log(), HasSubstr("quad_decimate: must be 1, 1.5 or an integer"));
+}
+
+TEST(AprilTagTracker, FindsEveryTagOf28PxByDefault) {
+    const TagPictures pictures({"sharp", 28}, 112);
+    Tracker tracker("tracker_apriltag");
+    EXPECT_EQ(pictures.show_to(tracker).found, pictures.shown());
 }
 
 TEST(AprilTagTracker, IgnoresTagsBelowTheDecisionMargin) {
@@ -98,7 +104,7 @@ TEST(AprilTagTracker, AcceptsChangesOfOptionsWhileItTracks) {
     const auto library = corners();
     EXPECT_NE(library, fitted);
     for (const auto &[key, other, initial] :
-         {std::tuple{"quad_decimate", "4", "1.5"}, {"quad_sigma", "1.5", "0"}, {"refine_edges", "false", "true"}}) {
+         {std::tuple{"quad_decimate", "4", "1"}, {"quad_sigma", "1.5", "0"}, {"refine_edges", "false", "true"}}) {
         EXPECT_EQ(tracker.set(key, other), ARHOST_STATUS_OK) << tracker.log();
         EXPECT_NE(corners(), library) << key;
         EXPECT_EQ(tracker.set(key, initial), ARHOST_STATUS_OK) << tracker.log();
