@@ -170,6 +170,15 @@ void grey_plane(benchmark::State &state, arhost_pixel_format pixel_format) {
 BENCHMARK_CAPTURE(grey_plane, bgr8, ARHOST_PIXEL_FORMAT_BGR8)->UseManualTime()->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(grey_plane, yuyv, ARHOST_PIXEL_FORMAT_YUYV)->UseManualTime()->Unit(benchmark::kMillisecond);
 
+void expanded_luma(benchmark::State &state) {
+    const arhost_frame_format format = frame_format(ARHOST_PIXEL_FORMAT_NV12);
+    const Pool frames(format.byte_size);
+    std::vector<std::uint8_t> grey(std::size_t(format.grey_stride) * height);
+    against_memcpy(state, 2 * grey.size(),
+                   [&](std::size_t i) { arhost::expand_luma_plane(format, frames.frame(i), grey.data()); });
+}
+BENCHMARK(expanded_luma)->UseManualTime()->Unit(benchmark::kMillisecond);
+
 } // namespace
 
 BENCHMARK_MAIN();

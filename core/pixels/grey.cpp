@@ -26,6 +26,11 @@ void fill_grey(const arhost_frame_format &format, const std::uint8_t *const plan
     }
 }
 
+void expand_luma_plane(const arhost_frame_format &format, const std::uint8_t *luma, std::uint8_t *grey) {
+    for (std::size_t y = 0; y < format.height; ++y, luma += format.grey_stride, grey += format.grey_stride)
+        rows::grey_from_limited_luma(luma, grey, format.width);
+}
+
 void fill_grey_reference(const arhost_frame_format &format, const std::uint8_t *const planes[ARHOST_MAX_PLANES],
                          std::uint8_t *grey) {
     for (std::size_t y = 0; y < format.height; ++y)

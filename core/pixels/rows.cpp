@@ -60,6 +60,10 @@ void grey_from_yuyv(Bytes yuyv, bool limited, std::uint8_t *grey, std::size_t co
     for (std::size_t i = 0; i < count; ++i)
         grey[i] = limited ? full_range(yuyv[2 * i]) : yuyv[2 * i];
 }
+void grey_from_limited_luma(Bytes luma, std::uint8_t *grey, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i)
+        grey[i] = full_range(luma[i]);
+}
 
 #else
 namespace hn = hwy::HWY_NAMESPACE;
@@ -292,6 +296,13 @@ void grey_from_yuyv(Bytes yuyv, bool limited, std::uint8_t *grey, std::size_t co
         hn::StoreU(hn::BitCast(d8, hn::Or(e, hn::ShiftLeft<8>(o))), d8, to);
     });
 }
+
+void grey_from_limited_luma(Bytes luma, std::uint8_t *grey, std::size_t count) {
+    for_each_chunk<1, 1>({luma}, {2}, grey, count, [](const auto &in, std::uint8_t *to) HWY_ATTR {
+        const V8 y = hn::LoadU(d8, in[0]);
+        hn::StoreU(hn::BitCast(d8, hn::Or(expanded(even(y)), hn::ShiftLeft<8>(expanded(odd(y))))), d8, to);
+    });
+}
 #endif
 
 } // namespace arhost::rows::HWY_NAMESPACE
@@ -309,6 +320,7 @@ HWY_EXPORT(bgr_from_i420);
 HWY_EXPORT(grey_from_bgr);
 HWY_EXPORT(grey_from_rgb);
 HWY_EXPORT(grey_from_yuyv);
+HWY_EXPORT(grey_from_limited_luma);
 
 void blend(const std::uint8_t *bgr, const std::uint8_t *rgba, std::uint8_t *out, std::size_t count) {
     HWY_DYNAMIC_DISPATCH(blend)(bgr, rgba, out, count);
@@ -338,6 +350,9 @@ void grey_from_rgb(const std::uint8_t *rgb, std::uint8_t *grey, std::size_t coun
 }
 void grey_from_yuyv(const std::uint8_t *yuyv, bool limited, std::uint8_t *grey, std::size_t count) {
     HWY_DYNAMIC_DISPATCH(grey_from_yuyv)(yuyv, limited, grey, count);
+}
+void grey_from_limited_luma(const std::uint8_t *luma, std::uint8_t *grey, std::size_t count) {
+    HWY_DYNAMIC_DISPATCH(grey_from_limited_luma)(luma, grey, count);
 }
 
 } // namespace arhost::rows

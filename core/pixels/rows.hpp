@@ -27,5 +27,6 @@ void bgr_from_i420(const std::uint8_t *y, const std::uint8_t *u, const std::uint
 void grey_from_bgr(const std::uint8_t *bgr, std::uint8_t *grey, std::size_t count);
 void grey_from_rgb(const std::uint8_t *rgb, std::uint8_t *grey, std::size_t count);
 void grey_from_yuyv(const std::uint8_t *yuyv, bool limited, std::uint8_t *grey, std::size_t count);
+void grey_from_limited_luma(const std::uint8_t *luma, std::uint8_t *grey, std::size_t count);
 
 } // namespace arhost::rows

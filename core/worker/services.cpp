@@ -107,6 +107,8 @@ public:
                         messages::Ready &ready) override {
         const auto &message = setup_of_kind<messages::TrackerSetup>(any);
         format_ = message.format;
+        if (has_limited_luma_plane(format_))
+            full_range_luma_.resize(format_.grey_stride / sizeof(Block) * format_.height);
         arhost_tracker_setup setup{};
         setup.struct_size = sizeof setup;
         setup.marker_count = static_cast<std::uint32_t>(message.markers.size());
@@ -141,6 +143,11 @@ public:
         for (std::uint32_t i = 0; i < format_.plane_count; ++i)
             frame.plane[i] = as_pixels(input) + format_.offset[i];
         frame.grey = as_pixels(input) + format_.grey_offset;
+        if (!full_range_luma_.empty()) {
+            std::uint8_t *grey = full_range_luma_.front().bytes;
+            expand_luma_plane(format_, frame.grey, grey);
+            frame.grey = grey;
+        }
         frame.depth_mm = format_.has_depth ? as_depth(input.subspan(format_.depth_offset)) : nullptr;
         frame.sequence = command.sequence;
         frame.capture_ns = command.capture_ns;
@@ -171,12 +178,17 @@ public:
     arhost_status stop() override { return tracker_.stop(instance_), ARHOST_STATUS_OK; }
 
 private:
+    struct alignas(64) Block { // the stride and the alignment of planes are multiples of it
+        std::uint8_t bytes[64];
+    };
+
     const arhost_tracker &tracker_;
     arhost_instance *instance_;
     arhost_frame_format format_{};
     std::optional<Branches> branches_;
     std::uint64_t state_size_ = 0;    // of the plugin
     std::uint64_t plugin_offset_ = 0; // of the plugin's state in a slot
+    std::vector<Block> full_range_luma_; // only for a luma plane of limited range
 };
 
 class RaytracerService final : public Service {

@@ -98,4 +98,20 @@ TEST(Grey, ExpandsLimitedRangeYuyvButNotFullRange) {
     }
 }
 
+TEST(Grey, ExpandsALumaPlaneOfLimitedRangeAndLeavesPaddingUntouched) {
+    for (const auto pixel_format : {ARHOST_PIXEL_FORMAT_NV12, ARHOST_PIXEL_FORMAT_I420}) {
+        EXPECT_FALSE(has_limited_luma_plane(layout(pixel_format, 66, 4, ARHOST_YUV_RANGE_FULL)));
+        const auto format = layout(pixel_format, 66, 4, ARHOST_YUV_RANGE_LIMITED);
+        EXPECT_TRUE(has_limited_luma_plane(format));
+        std::vector<std::uint8_t> luma(std::size_t{format.grey_stride} * format.height), grey(luma.size(), 7);
+        for (std::size_t i = 0; i < luma.size(); ++i)
+            luma[i] = static_cast<std::uint8_t>(i);
+        expand_luma_plane(format, luma.data(), grey.data());
+        for (std::size_t i = 0; i < grey.size(); ++i)
+            EXPECT_EQ(grey[i], i % format.grey_stride < format.width ? full_range(luma[i]) : 7) << i;
+    }
+    for (const auto pixel_format : {ARHOST_PIXEL_FORMAT_GREY8, ARHOST_PIXEL_FORMAT_RGB8, ARHOST_PIXEL_FORMAT_YUYV})
+        EXPECT_FALSE(has_limited_luma_plane(layout(pixel_format, 66, 4)));
+}
+
 } // namespace arhost

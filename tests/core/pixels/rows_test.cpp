@@ -124,6 +124,12 @@ std::vector<Kernel> kernels() {
          true,
          [](auto &in, auto *out, auto n) { rows::grey_from_yuyv(in[0], false, out, n); },
          each(1, [](auto &in, auto i, auto *to) { *to = in[0][2 * i]; })},
+        {"grey_from_limited_luma",
+         {2},
+         1,
+         false,
+         [](auto &in, auto *out, auto n) { rows::grey_from_limited_luma(in[0], out, n); },
+         each(1, [](auto &in, auto i, auto *to) { *to = full_range(in[0][i]); })},
     };
 }
 

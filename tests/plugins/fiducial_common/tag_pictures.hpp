@@ -14,7 +14,7 @@ namespace arhost::test {
 
 struct Conditions {
     const char *name;
-    double side_px;      // of a tag that faces the camera
+    double side_px;       // of a tag that faces the camera
     double motion_px = 0; // length of a motion blur; in addition, the lens blurs with a standard deviation of 0.6 px
     double exposure = 1;
     double noise = 1.5; // standard deviation, grey levels
