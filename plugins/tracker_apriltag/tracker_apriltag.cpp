@@ -50,7 +50,10 @@ constexpr arhost_option_descriptor options[] = {
                    "Whether the library refines the edges before it decodes the bits."),
     arhost::option(ARHOST_OPTION_REAL, "decode_sharpening", "0.25",
                    "Sharpening before the bits are decoded; helps small tags.", 0, 10),
-    arhost::option(ARHOST_OPTION_INTEGER, "max_hamming", "2", "Maximum number of bit errors to correct.", 0, 2),
+    arhost::option(ARHOST_OPTION_INTEGER, "max_hamming", "-1",
+                   "Maximum number of bit errors to correct; -1: 0 for families of up to 21 bits, 1 for tag25h9, "
+                   "otherwise 2.",
+                   -1, 2),
     arhost::option(ARHOST_OPTION_REAL, "min_decision_margin", "0",
                    "Minimum bit contrast of a tag, in grey levels from 0 to 255; tags of lower contrast are ignored.",
                    0, 255),
@@ -195,7 +198,8 @@ private:
         detector_->refine_edges = refine_edges_;
         detector_->decode_sharpening = sharpening_;
         apriltag_detector_clear_families(detector_.get());
-        apriltag_detector_add_family_bits(detector_.get(), family_->get(), max_hamming_);
+        apriltag_detector_add_family_bits(detector_.get(), family_->get(),
+                                          max_hamming_ < 0 ? type_.default_max_hamming : max_hamming_);
     }
 
     // The library reads out of bounds in images smaller than one of its 4×4 px tiles.
@@ -217,7 +221,7 @@ private:
     double decimate_ = 1, sigma_ = 0;
     bool refine_edges_ = true;
     double sharpening_ = 0.25;
-    int max_hamming_ = 2;
+    int max_hamming_ = -1; // −1: type_.default_max_hamming
     double min_margin_ = 0;
 
     std::optional<MarkerReport> report_;

@@ -63,9 +63,10 @@ constexpr arhost_option_descriptor options[] = {
         "squares only the outer one is decoded. OpenCV's default of 0.05 misses prints with a narrow white margin.",
         0.001, 0.5),
     arhost::option(
-        ARHOST_OPTION_REAL, "error_correction_rate", "0.6",
-        "Maximum number of bit errors to correct, as a fraction of the number that the dictionary can correct.", 0,
-        1),
+        ARHOST_OPTION_REAL, "error_correction_rate", "-1",
+        "Maximum number of bit errors to correct, as a fraction of the number that the dictionary can correct. "
+        "Negative: 0.6, but no errors in dictionaries of 4x4 bits, and at most one in those of 5x5 bits.",
+        -1, 1),
     arhost::option(ARHOST_OPTION_INTEGER, "border_bits", "1", "Width of the black border in cells.", 1, 8),
     arhost::option(ARHOST_OPTION_BOOL, "inverted", "false", "Also detects white-on-black markers."),
 };
@@ -109,6 +110,18 @@ bool is_dictionary(const cv::FileNode &root) {
             return false;
     }
     return true;
+}
+
+// The more errors are corrected, the more squares of random bits are taken for markers: with 50 markers of 4×4 bits,
+// 3 of 1,000 without any error and 5 of 100 with one; with 50 of 5×5 bits, 2 of 10,000 with one error.
+double default_correction_rate(const cv::aruco::Dictionary &dictionary) {
+    constexpr double rate = 0.6;
+    const int bits = dictionary.markerSize * dictionary.markerSize;
+    if (bits <= 16)
+        return 0;
+    if (bits <= 25 && dictionary.maxCorrectionBits > 0)
+        return std::min(rate, 1.5 / dictionary.maxCorrectionBits);
+    return rate;
 }
 
 cv::aruco::Dictionary read_dictionary(const std::string &file) {
@@ -184,7 +197,10 @@ public:
         take_integer("threshold_window_step_px", parameters.adaptiveThreshWinSizeStep);
         take_real("min_perimeter_rate", parameters.minMarkerPerimeterRate);
         take_real("min_distance_rate", parameters.minMarkerDistanceRate);
-        take_real("error_correction_rate", parameters.errorCorrectionRate);
+        if (changed.contains("error_correction_rate")) {
+            const double rate = changed.real("error_correction_rate");
+            parameters.errorCorrectionRate = rate < 0 ? default_correction_rate(dictionary_) : rate;
+        }
         take_integer("border_bits", parameters.markerBorderBits);
         if (changed.contains("inverted"))
             parameters.detectInvertedMarker = changed.boolean("inverted");

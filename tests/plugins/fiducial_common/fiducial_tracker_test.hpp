@@ -33,6 +33,16 @@ inline Print tag(int id) {
     return april_tag("tag36h11", id).with_margin(1);
 }
 
+// Inverts the first `count` of two cells inside the border of a tag.
+inline Print with_wrong_bits(Print print, int count) {
+    constexpr int rows[] = {3, 4}, columns[] = {3, 5};
+    for (int i = 0; i < count; ++i) {
+        uint8_t &cell = print.cells(rows[i], columns[i]);
+        cell = static_cast<uint8_t>(255 - cell);
+    }
+    return print;
+}
+
 class FiducialTracker : public testing::TestWithParam<TrackerCase> {
 protected:
     FiducialTracker() : tracker_(GetParam().plugin, GetParam().options) {

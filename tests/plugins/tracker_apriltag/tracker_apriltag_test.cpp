@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fiducial_common/clutter.hpp>
 #include <fiducial_common/fiducial_tracker_test.hpp>
 #include <fiducial_common/real_photos.hpp>
 
@@ -40,6 +41,22 @@ TEST_P(AprilTagFamily, FindsTheTagUprightWithTheSideBetweenItsCorners) {
     }
 }
 
+ClutterCounts find_tags_in_clutter(const std::string &family, Options options) {
+    options["family"] = family;
+    Tracker tracker("tracker_apriltag", options);
+    return find_in_clutter(tracker, [&](int id) { return april_tag(family, id).with_margin(1); });
+}
+
+TEST_P(AprilTagFamily, DefaultsFindTagsAndNoFalseOnesInClutter) {
+    const ClutterCounts counts = find_tags_in_clutter(GetParam(), {});
+    EXPECT_EQ(counts.false_positives, 0);
+    EXPECT_EQ(counts.found, counts.pictures);
+}
+
+TEST(AprilTagTracker, CorrectionOfBitsInASmallFamilyFindsFalseTagsInClutter) {
+    EXPECT_GT(find_tags_in_clutter("tag16h5", {{"max_hamming", "2"}}).false_positives, 20);
+}
+
 TEST_P(AprilTagFamily, NamesTheValidIdRange) {
     Tracker tracker("tracker_apriltag", {{"family", GetParam()}});
     EXPECT_EQ(tracker.start(test_camera, {{100000}}), ARHOST_STATUS_ERROR_CONFIGURATION);
@@ -79,6 +96,18 @@ TEST(AprilTagTracker, CorrectsTheConfiguredNumberOfWrongBits) {
     }
 }
 
+TEST(AprilTagTracker, CorrectsByDefaultAsManyWrongBitsAsTheFamilyAllows) {
+    for (const auto &[family, wrong_bits, count] :
+         {std::tuple{"tag16h5", 1, 0u}, {"tag25h9", 1, 1u}, {"tag25h9", 2, 0u}, {"tag36h11", 2, 1u}}) {
+        const Print damaged = with_wrong_bits(april_tag(family, 3), wrong_bits);
+        Tracker tracker("tracker_apriltag", {{"family", family}});
+        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+        EXPECT_EQ(tracker.track(GreyFrame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}))).size(),
+                  count)
+            << family << ", " << wrong_bits;
+    }
+}
+
 TEST(AprilTagTracker, AcceptsChangesOfOptionsWhileItTracks) {
     Print damaged = april_tag("tag36h11", 3);
     damaged.cells(4, 4) = 255 - damaged.cells(4, 4);
@@ -93,7 +122,7 @@ TEST(AprilTagTracker, AcceptsChangesOfOptionsWhileItTracks) {
     const auto fitted = corners();
     EXPECT_FALSE(fitted.empty());
     for (const auto &[key, other, initial] :
-         {std::tuple{"max_hamming", "0", "2"}, {"min_decision_margin", "255", "0"}}) {
+         {std::tuple{"max_hamming", "0", "-1"}, {"min_decision_margin", "255", "0"}}) {
         EXPECT_EQ(tracker.set(key, other), ARHOST_STATUS_OK) << tracker.log();
         EXPECT_TRUE(corners().empty()) << key;
         EXPECT_EQ(tracker.set(key, initial), ARHOST_STATUS_OK) << tracker.log();

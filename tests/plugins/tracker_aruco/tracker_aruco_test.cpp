@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fiducial_common/clutter.hpp>
 #include <fiducial_common/fiducial_tracker_test.hpp>
 #include <fiducial_common/real_photos.hpp>
 
@@ -43,6 +44,25 @@ TEST_P(ArucoDictionary, FindsTheMarkerUpright) {
         EXPECT_LT(angle_degrees(markers[0].mt, truth), 2);
         EXPECT_NEAR(markers[0].mt[14] / truth[14], 1, 0.005);
     }
+}
+
+ClutterCounts find_markers_in_clutter(const std::string &dictionary, Options options) {
+    const std::string family = april_tag_family(dictionary);
+    options["dictionary"] = dictionary;
+    Tracker tracker("tracker_aruco", options);
+    return find_in_clutter(tracker, [&](int id) {
+        return family.empty() ? aruco_marker(dictionary, id) : april_tag(family, id).with_margin(1);
+    });
+}
+
+TEST_P(ArucoDictionary, DefaultsFindMarkersAndNoFalseOnesInClutter) {
+    const ClutterCounts counts = find_markers_in_clutter(GetParam(), {});
+    EXPECT_EQ(counts.false_positives, 0);
+    EXPECT_EQ(counts.found, counts.pictures);
+}
+
+TEST(ArucoTracker, CorrectionOfBitsInASmallDictionaryFindsFalseMarkersInClutter) {
+    EXPECT_GT(find_markers_in_clutter("DICT_APRILTAG_16h5", {{"error_correction_rate", "1"}}).false_positives, 2);
 }
 
 struct Refinement {
@@ -164,6 +184,18 @@ TEST(ArucoTracker, CorrectsWrongBitsOfAprilTags) {
         Tracker tracker("tracker_aruco", {{"error_correction_rate", rate}});
         ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
         EXPECT_EQ(tracker.track(frame).size(), count) << rate;
+    }
+}
+
+TEST(ArucoTracker, CorrectsByDefaultAsManyWrongBitsAsTheDictionaryAllows) {
+    for (const auto &[family, wrong_bits, count] :
+         {std::tuple{"16h5", 1, 0u}, {"25h9", 1, 1u}, {"25h9", 2, 0u}, {"36h11", 2, 1u}}) {
+        const Print damaged = with_wrong_bits(april_tag("tag" + std::string(family), 3), wrong_bits);
+        Tracker tracker("tracker_aruco", {{"dictionary", "DICT_APRILTAG_" + std::string(family)}});
+        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+        EXPECT_EQ(tracker.track(GreyFrame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}))).size(),
+                  count)
+            << family << ", " << wrong_bits;
     }
 }
 
