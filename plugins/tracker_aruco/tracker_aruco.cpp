@@ -65,7 +65,7 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(
         ARHOST_OPTION_REAL, "error_correction_rate", "-1",
         "Maximum number of bit errors to correct, as a fraction of the number that the dictionary can correct. "
-        "Negative: 0.6, but no errors in dictionaries of 4x4 bits, and at most one in those of 5x5 bits.",
+        "Negative: 0.6, but at most 0 errors in dictionaries of 4x4 bits, 1 of 5x5 and 3 of 6x6.",
         -1, 1),
     arhost::option(ARHOST_OPTION_INTEGER, "border_bits", "1", "Width of the black border in cells.", 1, 8),
     arhost::option(ARHOST_OPTION_BOOL, "inverted", "false", "Also detects white-on-black markers."),
@@ -113,15 +113,15 @@ bool is_dictionary(const cv::FileNode &root) {
 }
 
 // The more errors are corrected, the more squares of random bits are taken for markers: with 50 markers of 4×4 bits,
-// 3 of 1,000 without any error and 5 of 100 with one; with 50 of 5×5 bits, 2 of 10,000 with one error.
+// 3 of 1,000 without any error and 5 of 100 with one; with 50 of 5×5 bits, 2 of 10,000 with one error; with 50 of 6×6
+// bits, 2 of 100,000 with three.
 double default_correction_rate(const cv::aruco::Dictionary &dictionary) {
     constexpr double rate = 0.6;
-    const int bits = dictionary.markerSize * dictionary.markerSize;
-    if (bits <= 16)
-        return 0;
-    if (bits <= 25 && dictionary.maxCorrectionBits > 0)
-        return std::min(rate, 1.5 / dictionary.maxCorrectionBits);
-    return rate;
+    const int size = dictionary.markerSize;
+    if (size > 6 || dictionary.maxCorrectionBits <= 0)
+        return rate;
+    const int errors = size <= 4 ? 0 : size == 5 ? 1 : 3;
+    return std::min(rate, (errors + 0.5) / dictionary.maxCorrectionBits); // OpenCV rounds the product down
 }
 
 cv::aruco::Dictionary read_dictionary(const std::string &file) {

@@ -122,6 +122,24 @@ TEST(ArucoTracker, ReadsADictionaryFile) {
     EXPECT_THAT(tracker.log(), HasSubstr("marker id 2 is not in mine, whose ids are 0 to 1"));
 }
 
+TEST(ArucoTracker, CorrectsAtMostThreeWrongBitsOf36ByDefault) {
+    const ScratchFolder scratch;
+    const auto file = scratch.path() / "mine.yml"; // like that of DICT_ARUCO_MIP_36h12, which allows 12 wrong bits
+    const std::string bits = "101100111000110101001011100110010110";
+    std::ofstream(file) << "%YAML:1.0\nnmarkers: 1\nmarkersize: 6\nmaxCorrectionBits: 12\nmarker_0: \"" << bits
+                        << "\"\n";
+    Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
+    ASSERT_EQ(tracker.start(test_camera, {{0, 100}}), ARHOST_STATUS_OK) << tracker.log();
+    for (const auto &[wrong_bits, count] : {std::pair{0, 1u}, {3, 1u}, {4, 0u}}) {
+        Print print{cv::Mat_<uint8_t>(8, 8, uint8_t{0}), 8};
+        for (int i = 0; i < 36; ++i)
+            print.cells(1 + i / 6, 1 + i % 6) = (bits[i] == '1') != (i < wrong_bits) ? 255 : 0;
+        EXPECT_EQ(tracker.track(GreyFrame(picture_of({{print.with_margin(1), 100, pose_of(0, 0, 400)}}))).size(),
+                  count)
+            << wrong_bits;
+    }
+}
+
 TEST(ArucoTracker, RejectsAFileThatIsNotADictionary) {
     const ScratchFolder scratch;
     const auto expect_rejected = [&](const std::string &text) {
