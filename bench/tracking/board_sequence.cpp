@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The pose of a board of 20 tags on a real sequence: core/pose/ with the corners of tracker_apriltag, compared with bare
-// OpenCV and bare AprilTag on the same frames.
+// The pose of a board of 20 tags on a real sequence: core/pose/ with the corners of tracker_apriltag, compared with
+// bare OpenCV and bare AprilTag on the same frames.
 #include "pose/track.hpp"
 
 #include <fiducial_common/opencv_aruco.hpp>
@@ -187,8 +187,8 @@ Poses with_apriltag(const RbtSequence &sequence) {
 }
 
 struct Summary {
-    double degrees, mm;                    // median error against the reference
-    double virtual_px, virtual_p95_px;     // frame-to-frame error of a virtual point
+    double degrees, mm;                // median error against the reference
+    double virtual_px, virtual_p95_px; // frame-to-frame error of a virtual point
     int flips, missing;
 };
 
@@ -205,10 +205,11 @@ Summary summarize(const RbtSequence &sequence, const Poses &poses) {
             continue;
         }
         const Rigid truth = reference(sequence, k);
-        degrees.push_back(angle_between_rad(poses[k]->rotation, truth.rotation) / degree);
+        degrees.push_back(pose::angle_between_rad(poses[k]->rotation, truth.rotation) / degree);
         mm.push_back((poses[k]->translation_mm - truth.translation_mm).norm());
         summary.flips += degrees.back() > 20;
-        const Eigen::Vector2d error = *projection.pixel(*poses[k] * above_board) - *projection.pixel(truth * above_board);
+        const Eigen::Vector2d error =
+            *projection.pixel(*poses[k] * above_board) - *projection.pixel(truth * above_board);
         if (last)
             steps.push_back((error - *last).norm());
         last = error;

@@ -70,7 +70,8 @@ Matrix6d cramer_rao(const Rigid &truth, const Projection &projection, double noi
 }
 
 Cell run(double side_px, double noise_px, int frames) {
-    const arhost_intrinsics in{sizeof in, 1280, 720, ARHOST_DISTORTION_NONE, focal_px, focal_px, 639.5, 359.5, 0, 0, {}};
+    const arhost_intrinsics in{sizeof in, 1280, 720, ARHOST_DISTORTION_NONE, focal_px, focal_px, 639.5, 359.5,
+                               0,         0,    {}};
     Cell cell;
     constexpr int frames_per_run = 1000;
     std::chrono::nanoseconds spent{};
@@ -90,8 +91,8 @@ Cell run(double side_px, double noise_px, int frames) {
             track = step.track;
             const Estimate &found = poses[step.chosen];
             const bool right = degrees_between(found.camera_from_target, truth) < 20;
-            const bool opencv_right =
-                angle_between_rad(opencv_rotation(marker, camera.projection().intrinsics()), truth.rotation) < 20 * radians;
+            const bool opencv_right = angle_between_rad(opencv_rotation(marker, camera.projection().intrinsics()),
+                                                        truth.rotation) < 20 * radians;
             cell.flips += was_right && !right;
             cell.opencv_flips += opencv_was_right && !opencv_right;
             cell.wrong_first += frame == 0 && !right;
@@ -106,7 +107,8 @@ Cell run(double side_px, double noise_px, int frames) {
             ++cell.counted;
             cell.covered += error.dot(found.covariance.ldlt().solve(error)) < chi2_6_95;
             cell.translation_share.push_back(error.head<3>().norm() / std::sqrt(bound.topLeftCorner<3, 3>().trace()));
-            cell.rotation_share.push_back(error.tail<3>().norm() / std::sqrt(bound.bottomRightCorner<3, 3>().trace()));
+            cell.rotation_share.push_back(error.tail<3>().norm() /
+                                          std::sqrt(bound.bottomRightCorner<3, 3>().trace()));
         }
     }
     cell.us = 1e-3 * static_cast<double>(spent.count()) / frames;
@@ -118,17 +120,19 @@ Cell run(double side_px, double noise_px, int frames) {
 int main(int argc, char **argv) {
     const bool quick = argc > 1 && std::string(argv[1]) == "--quick";
     const int frames = quick ? 1000 : 10'000;
-    std::printf("single markers in continuous motion, corner noise 0.1 px, %d frames per size; errors relative to the "
-                "Cramer-Rao bound\n%8s %8s %10s %8s %12s %8s %12s %8s %10s %8s\n",
-                frames, "side, px", "flips", "OpenCV's", "wrong 1st", "rotation p50", "p99", "translat. p50", "p99",
-                "covered", "us");
+    std::printf(
+        "single markers in continuous motion, corner noise 0.1 px, %d frames per size; errors relative to the "
+        "Cramer-Rao bound\n%8s %8s %10s %8s %12s %8s %12s %8s %10s %8s\n",
+        frames, "side, px", "flips", "OpenCV's", "wrong 1st", "rotation p50", "p99", "translat. p50", "p99",
+        "covered", "us");
     bool met = true;
     for (const double side_px : {15.0, 20.0, 25.0, 35.0, 50.0, 80.0, 120.0, 200.0}) {
         const Cell cell = run(side_px, 0.1, frames);
         const double covered = 100.0 * cell.covered / cell.counted;
-        std::printf("%8.0f %8d %10d %8d %12.2f %8.2f %12.2f %8.2f %9.1f%% %8.1f\n", side_px, cell.flips, cell.opencv_flips,
-                    cell.wrong_first, percentile(cell.rotation_share, 0.5), percentile(cell.rotation_share, 0.99),
-                    percentile(cell.translation_share, 0.5), percentile(cell.translation_share, 0.99), covered, cell.us);
+        std::printf("%8.0f %8d %10d %8d %12.2f %8.2f %12.2f %8.2f %9.1f%% %8.1f\n", side_px, cell.flips,
+                    cell.opencv_flips, cell.wrong_first, percentile(cell.rotation_share, 0.5),
+                    percentile(cell.rotation_share, 0.99), percentile(cell.translation_share, 0.5),
+                    percentile(cell.translation_share, 0.99), covered, cell.us);
         if (side_px >= 25)
             met = met && cell.flips == 0 && covered >= 90 && covered <= 98;
     }

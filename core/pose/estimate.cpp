@@ -59,7 +59,8 @@ Rigid moved(const Rigid &pose, const Vector6d &step) {
 }
 
 // The noise in units of sigma_px. For two-dimensional Gaussian errors, the median length is 1.177. The second factor
-// corrects the bias of few residuals after a fit (Rousseeuw and Leroy, Robust Regression and Outlier Detection, 1987).
+// corrects the bias of few residuals after a fit (Rousseeuw and Leroy, Robust Regression and Outlier Detection,
+// 1987).
 double noise_of(const std::vector<Residual> &residuals) {
     std::vector<double> lengths;
     lengths.reserve(residuals.size());
@@ -105,7 +106,8 @@ bool minimize(Rigid &pose, std::vector<Residual> &residuals, std::span<const Cor
         if (step.head<3>().norm() < 1e-10 * pose.translation_mm.norm() && step.tail<3>().norm() < 1e-10)
             return true;
         const Rigid next = moved(pose, step);
-        const double after = evaluate(next, points, projection, next_residuals) ? total_loss(next_residuals, loss) : infinity;
+        const double after =
+            evaluate(next, points, projection, next_residuals) ? total_loss(next_residuals, loss) : infinity;
         if (after < before) {
             const bool converged = before - after < 1e-12 * before;
             pose = next;
@@ -144,8 +146,12 @@ std::optional<Estimate> summarize(const Rigid &pose, const std::vector<Residual>
         return {};
     const double count = static_cast<double>(points.size()), freedom = 2 * count - 6;
     const double variance = (prior_freedom + squares) / (prior_freedom + freedom);
-    return Estimate{pose, variance * (scale.asDiagonal() * scaled.inverse() * scale.asDiagonal()),
-                    std::sqrt(squares_px / count), squares, 0, 2 * points.size() - 6};
+    return Estimate{pose,
+                    variance * (scale.asDiagonal() * scaled.inverse() * scale.asDiagonal()),
+                    std::sqrt(squares_px / count),
+                    squares,
+                    0,
+                    2 * points.size() - 6};
 }
 
 // The rigid transform from a marker's own frame (origin at the centre, x right, y up, z out of the print) to the
@@ -165,15 +171,14 @@ std::optional<MarkerPlane> plane_of(const std::array<Eigen::Vector3d, 4> &corner
     plane.target_from_marker.rotation << x, z.cross(x), z;
     plane.target_from_marker.translation_mm = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
     const Rigid marker_from_target = plane.target_from_marker.inverse();
-    std::ranges::transform(corners, plane.corners_mm.begin(),
-                           [&](const Eigen::Vector3d &corner) -> Eigen::Vector2d {
-                               return (marker_from_target * corner).head<2>();
-                           });
+    std::ranges::transform(corners, plane.corners_mm.begin(), [&](const Eigen::Vector3d &corner) -> Eigen::Vector2d {
+        return (marker_from_target * corner).head<2>();
+    });
     return plane;
 }
 
-// Returns whether the quadrilateral is convex, has no angle near 0° or 180°, and is clockwise in the image (y down), as
-// the front of a marker is.
+// Returns whether the quadrilateral is convex, has no angle near 0° or 180°, and is clockwise in the image (y down),
+// as the front of a marker is.
 bool is_convex_front(const std::array<Eigen::Vector2d, 4> &quad) {
     constexpr double min_sine = 1e-3;
     for (int i = 0; i < 4; ++i) {
@@ -235,7 +240,8 @@ double start_error(const Rigid &pose, std::span<const Correspondence> points, co
 }
 
 double area_px2(const ObservedMarker &marker) {
-    const Eigen::Vector2d a = marker.corners_px[2] - marker.corners_px[0], b = marker.corners_px[3] - marker.corners_px[1];
+    const Eigen::Vector2d a = marker.corners_px[2] - marker.corners_px[0],
+                          b = marker.corners_px[3] - marker.corners_px[1];
     return std::abs(a.x() * b.y() - a.y() * b.x()) / 2;
 }
 
@@ -337,7 +343,8 @@ std::vector<Estimate> estimate_poses(std::span<const ObservedMarker> markers, co
             }))
             continue;
         const auto is_same = [&](const Estimate &other) {
-            return angle_between_rad(other.camera_from_target.rotation, estimate->camera_from_target.rotation) < distinct_rad;
+            return angle_between_rad(other.camera_from_target.rotation, estimate->camera_from_target.rotation) <
+                   distinct_rad;
         };
         if (std::ranges::none_of(found, is_same))
             found.push_back(*estimate);

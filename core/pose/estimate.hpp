@@ -14,8 +14,8 @@ namespace arhost::pose {
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-// A point of a target, and the pixel at which it was observed with Gaussian noise of standard deviation sigma_px along
-// each axis.
+// A point of a target, and the pixel at which it was observed with Gaussian noise of standard deviation sigma_px
+// along each axis.
 struct Correspondence {
     Eigen::Vector3d on_target_mm;
     Eigen::Vector2d pixel_px;
@@ -32,28 +32,30 @@ struct ObservedMarker {
 
 struct Estimate {
     Rigid camera_from_target;
-    Matrix6d covariance;       // of translation (mm) and rotation (rad), in camera axes: the true pose is
-                               // {rotation_by(r)·rotation, translation_mm + t} with (t, r) from this distribution
-    double reprojection_px;    // RMS over the corners that are no outliers
-    double normalized_error;   // sum of the squared errors, each divided by its sigma_px; an outlier counts as 5 times
-                               // the noise
-    std::size_t outliers;      // corners that do not fit to the others and were left out
-    std::size_t freedom;       // degrees of freedom: coordinates of the other corners, less the 6 of the pose
+    Matrix6d covariance;     // of translation (mm) and rotation (rad), in camera axes: the true pose is
+                             // {rotation_by(r)·rotation, translation_mm + t} with (t, r) from this distribution
+    double reprojection_px;  // RMS over the corners that are no outliers
+    double normalized_error; // sum of the squared errors, each divided by its sigma_px; an outlier counts as 5 times
+                             // the noise
+    std::size_t outliers;    // corners that do not fit to the others and were left out
+    std::size_t freedom;     // degrees of freedom: coordinates of the other corners, less the 6 of the pose
 };
 
 // Minimizes the reprojection error with the Levenberg–Marquardt method, starting at `start`. With more than four
-// correspondences, finds the outliers first with Tukey's biweight loss: corners whose error exceeds 5 times the noise,
-// which is taken from the median error. Returns nullopt if a point gets behind the camera or the solution is not
-// unique. The covariance comes from sigma_px and from the residuals: the more corners, the less sigma_px counts.
-std::optional<Estimate> refine(const Rigid &start, std::span<const Correspondence> points, const Projection &projection);
+// correspondences, finds the outliers first with Tukey's biweight loss: corners whose error exceeds 5 times the
+// noise, which is taken from the median error. Returns nullopt if a point gets behind the camera or the solution is
+// not unique. The covariance comes from sigma_px and from the residuals: the more corners, the less sigma_px counts.
+std::optional<Estimate> refine(const Rigid &start, std::span<const Correspondence> points,
+                               const Projection &projection);
 
 // Returns errors and covariance of a known pose, as refine() does, without changing it.
-std::optional<Estimate> assess(const Rigid &pose, std::span<const Correspondence> points, const Projection &projection);
+std::optional<Estimate> assess(const Rigid &pose, std::span<const Correspondence> points,
+                               const Projection &projection);
 
 // Returns the pose of smallest error, and a second one if the reprojection error has another local minimum. Returns
-// nothing if no pose shows the front of a marker at its corners, for example if they are not convex, mirrored, or NaN.
-// Corners may be wrong, as long as more than half of them are right; `predicted`, if not null, is one more start for
-// the search.
+// nothing if no pose shows the front of a marker at its corners, for example if they are not convex, mirrored, or
+// NaN. Corners may be wrong, as long as more than half of them are right; `predicted`, if not null, is one more start
+// for the search.
 std::vector<Estimate> estimate_poses(std::span<const ObservedMarker> markers, const Projection &projection,
                                      const Rigid *predicted = nullptr);
 

@@ -68,13 +68,12 @@ Motion predicted(Motion motion, double seconds) {
 Motion corrected(Motion motion, const Estimate &measured) {
     Eigen::Map<Eigen::Matrix3d> rotation(motion.rotation);
     Eigen::Map<Eigen::Vector3d> translation(motion.translation_mm);
-    const Vector6d turn =
-        correct(CovarianceMap(motion.turn_covariance),
-                rotation_vector(measured.camera_from_target.rotation * rotation.transpose()),
-                rotation_covariance(measured));
+    const Vector6d turn = correct(CovarianceMap(motion.turn_covariance),
+                                  rotation_vector(measured.camera_from_target.rotation * rotation.transpose()),
+                                  rotation_covariance(measured));
     const Vector6d shift =
-        correct(CovarianceMap(motion.shift_covariance),
-                measured.camera_from_target.translation_mm - translation, translation_covariance(measured));
+        correct(CovarianceMap(motion.shift_covariance), measured.camera_from_target.translation_mm - translation,
+                translation_covariance(measured));
     rotation = orthonormal(rotation_by(turn.head<3>()) * rotation);
     Eigen::Map<Eigen::Vector3d>(motion.angular_velocity_rad_s) += turn.tail<3>();
     translation += shift.head<3>();

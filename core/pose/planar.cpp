@@ -17,7 +17,8 @@ struct Normalization {
 
     Eigen::Vector2d operator()(const Eigen::Vector2d &p) const { return scale * (p - centre); }
     Eigen::Matrix3d matrix() const {
-        return (Eigen::Matrix3d() << scale, 0, -scale * centre.x(), 0, scale, -scale * centre.y(), 0, 0, 1).finished();
+        return (Eigen::Matrix3d() << scale, 0, -scale * centre.x(), 0, scale, -scale * centre.y(), 0, 0, 1)
+            .finished();
     }
 };
 

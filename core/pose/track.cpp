@@ -51,7 +51,8 @@ Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_
     constexpr double damping = 0.9, max_evidence = 4, switch_log_odds = 14;
     // A switch between branches that are closer is hardly visible and needs less evidence.
     constexpr double distinct_rad = 30 * std::numbers::pi / 180;
-    constexpr double max_distance2 = 100; // a rotation that is farther from the predicted one is another motion
+    // Squared distances from a predicted rotation: of another branch, and of another motion.
+    constexpr double distinct_distance2 = 25, max_distance2 = 100;
 
     std::array<Motion, 2> branches{};
     std::size_t known = 0;
@@ -62,9 +63,13 @@ Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_
     Step step{{}, 0};
     step.track.capture_ns = capture_ns;
     step.track.branches = poses.size() > 1 ? 2 : 1;
-    // Whether branch[0] of the new track continues the second branch of the old one.
-    bool switches = poses.size() == 1 && known == 2 &&
-                    rotation_distance2(branches[1], poses[0]) < rotation_distance2(branches[0], poses[0]);
+    // Whether branch[0] of the new track continues the second branch of the old one. A single pose does so if it is
+    // clearly not on the first branch; where the branches meet, it is on both.
+    bool switches = false;
+    if (poses.size() == 1 && known == 2) {
+        const double from_first = rotation_distance2(branches[0], poses[0]);
+        switches = from_first > distinct_distance2 && rotation_distance2(branches[1], poses[0]) < from_first;
+    }
     if (poses.size() > 1) {
         double log_odds = 0;
         if (known > 0) {

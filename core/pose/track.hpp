@@ -12,7 +12,7 @@
 
 namespace arhost::pose {
 
-// What is remembered of one target. Plain data without pointers, because it is kept in shared memory across restarts;
+// The memory of one target. Plain data without pointers, because it is kept in shared memory across restarts;
 // all zero if the target was never seen.
 struct Track {
     std::int64_t capture_ns; // of the last frame in which the target was detected
@@ -23,9 +23,10 @@ struct Track {
 };
 
 // Chooses among the poses of one frame (from estimate_poses; at least one), and returns the track for the next frame
-// and the index of the chosen pose. A pose stays on its branch, which moves continuously, until the reprojection errors
-// of several frames speak for the other branch: a single frame's errors often are noise, and each switch is a visible
-// flip. The first frame takes the pose of smallest error. A track continues if at most 1 s passed since its last frame.
+// and the index of the chosen pose. A pose stays on its branch, which moves continuously, until the reprojection
+// errors of several frames speak for the other branch: a single frame's errors often are noise, and each switch is a
+// visible flip. The first frame takes the pose of smallest error. A track continues if at most 1 s passed since its
+// last frame.
 struct Step {
     Track track;
     std::size_t chosen;

@@ -18,7 +18,7 @@ using pose::Estimate;
 using pose::Rigid;
 using pose::Track;
 
-constexpr double corner_sigma_px = 0.1; // of a sharp, well-lit marker
+constexpr double corner_sigma_px = 0.1;   // of a sharp, well-lit marker
 constexpr double max_difference_px = 0.5; // between the reported and the actual reprojection error
 
 std::array<Correspondence, 4> corners_of(const arhost_marker &marker, double side_mm) {
@@ -29,8 +29,8 @@ std::array<Correspondence, 4> corners_of(const arhost_marker &marker, double sid
     return corners;
 }
 
-// The alternative as a minimum of the reprojection error: trackers refine only the better solution. Returns nullopt if
-// there is no minimum near it, because the error then has a single minimum, that of the better solution.
+// The alternative as a minimum of the reprojection error: trackers refine only the better solution. Returns nullopt
+// if there is no minimum near it, because the error then has a single minimum, that of the better solution.
 std::optional<Estimate> refined_alternative(const arhost_marker &marker, std::span<const Correspondence> corners,
                                             const pose::Projection &projection) {
     constexpr double same_branch_rad = 0.1, distinct_rad = 0.02;
@@ -40,7 +40,8 @@ std::optional<Estimate> refined_alternative(const arhost_marker &marker, std::sp
     const auto refined = refine(reported, corners, projection);
     if (!refined ||
         !(pose::angle_between_rad(refined->camera_from_target.rotation, reported.rotation) < same_branch_rad) ||
-        pose::angle_between_rad(refined->camera_from_target.rotation, pose::rigid_of(marker.mt).rotation) < distinct_rad)
+        pose::angle_between_rad(refined->camera_from_target.rotation, pose::rigid_of(marker.mt).rotation) <
+            distinct_rad)
         return {};
     return refined;
 }

@@ -186,8 +186,8 @@ private:
     arhost_instance *instance_;
     arhost_frame_format format_{};
     std::optional<Branches> branches_;
-    std::uint64_t state_size_ = 0;    // of the plugin
-    std::uint64_t plugin_offset_ = 0; // of the plugin's state in a slot
+    std::uint64_t state_size_ = 0;       // of the plugin
+    std::uint64_t plugin_offset_ = 0;    // of the plugin's state in a slot
     std::vector<Block> full_range_luma_; // only for a luma plane of limited range
 };
 

@@ -103,10 +103,10 @@ TEST(Estimate, IsTheMinimumOfTheReprojectionErrorThatOpenCvFinds) {
         const auto found = estimate_poses(markers, camera.projection());
         ASSERT_FALSE(found.empty());
         EXPECT_EQ(found[0].outliers, 0u);
-        expect_pose(found[0].camera_from_target,
-                    {rotation_by({rotation[0], rotation[1], rotation[2]}),
-                     {translation[0], translation[1], translation[2]}},
-                    1e-3, 1e-2);
+        expect_pose(
+            found[0].camera_from_target,
+            {rotation_by({rotation[0], rotation[1], rotation[2]}), {translation[0], translation[1], translation[2]}},
+            1e-3, 1e-2);
     }
 }
 
@@ -183,9 +183,8 @@ TEST(Estimate, CornersThatNoFrontCanShowHaveNoPose) {
     expect_none("mirrored", [](ObservedMarker &m) { std::ranges::reverse(m.corners_px); });
     expect_none("NaN", [](ObservedMarker &m) { m.corners_px[1].x() = std::nan(""); });
     expect_none("equal", [](ObservedMarker &m) { m.corners_px.fill({100, 100}); });
-    expect_none("concave", [](ObservedMarker &m) {
-        m.corners_px[0] = 0.4 * m.corners_px[0] + 0.6 * m.corners_px[2];
-    });
+    expect_none("concave",
+                [](ObservedMarker &m) { m.corners_px[0] = 0.4 * m.corners_px[0] + 0.6 * m.corners_px[2]; });
     expect_none("collinear", [](ObservedMarker &m) { m.corners_px[1] = 0.5 * (m.corners_px[0] + m.corners_px[2]); });
     expect_none("no extent on the target", [](ObservedMarker &m) { m.corners_on_target_mm.fill({1, 2, 3}); });
     EXPECT_TRUE(estimate_poses({}, camera.projection()).empty());

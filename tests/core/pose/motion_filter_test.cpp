@@ -43,7 +43,8 @@ TEST(MotionFilter, LagsLessThanAFrameBehindAHand) {
         const Eigen::Vector2d found = corner_px(camera, pose_of(motion));
         double best = 1e9, lag = 0;
         for (double frames = 0; frames <= 3; frames += 0.1)
-            if (const double error = (found - corner_px(camera, in_hand(now - frames * frame_s))).norm(); error < best) {
+            if (const double error = (found - corner_px(camera, in_hand(now - frames * frame_s))).norm();
+                error < best) {
                 best = error;
                 lag = frames;
             }

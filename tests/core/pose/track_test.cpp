@@ -108,7 +108,9 @@ TEST(Track, ARotationFarFromThePredictedOneBeginsANewMotion) {
 TEST(Track, PredictsAtConstantSpeed) {
     Track track{};
     EXPECT_FALSE(predicted_pose(track, 0));
-    const auto pose = [](double seconds) { return pose_at({100 * seconds, 0, 1000 - 50 * seconds}, 30, 0, 40 * seconds); };
+    const auto pose = [](double seconds) {
+        return pose_at({100 * seconds, 0, 1000 - 50 * seconds}, 30, 0, 40 * seconds);
+    };
     for (int frame = 0; frame < 60; ++frame) {
         const Estimate estimate = at(pose(frame / 30.0), 1);
         track = next_step(track, {&estimate, 1}, frame * frame_ns).track;
@@ -137,7 +139,8 @@ TEST(Track, DependsOnlyOnItsMemory) {
     Camera camera(pinhole, 3);
     Track track{}, resumed{};
     for (int frame = 0; frame < 100; ++frame) {
-        const ObservedMarker marker = camera.observe(on_path(frame / 30.0, 0, side_mm), square_corners_mm(side_mm), 0.1);
+        const ObservedMarker marker =
+            camera.observe(on_path(frame / 30.0, 0, side_mm), square_corners_mm(side_mm), 0.1);
         const auto poses = estimate_poses({&marker, 1}, camera.projection());
         track = next_step(track, poses, frame * frame_ns).track;
         unsigned char bytes[sizeof(Track)];

@@ -18,7 +18,7 @@ constexpr double side_mm = 80;
 constexpr std::int64_t frame_ns = 33'333'333;
 const arhost_intrinsics pinhole = intrinsics_of(ARHOST_DISTORTION_NONE, {});
 
-// What a tracker that looks at one frame reports of the marker.
+// The report of a tracker that uses only the current frame.
 arhost_marker report(Camera &camera, const Rigid &truth, double noise_px = 0.1, std::int32_t id = 5) {
     const ObservedMarker seen = camera.observe(truth, square_corners_mm(side_mm), noise_px);
     const auto poses = estimate_poses({&seen, 1}, camera.projection());
@@ -94,7 +94,8 @@ TEST_F(BranchesTest, AnExchangedRecordIsConsistent) {
         const arhost_marker reported = report(camera, on_path(frame / 30.0, 0, side_mm));
         const arhost_marker chosen = choose(reported, frame * frame_ns);
         if (std::equal(chosen.mt, chosen.mt + 16, reported.mt)) {
-            EXPECT_EQ(std::memcmp(&chosen, &reported, sizeof chosen), 0) << "a record of the right branch is untouched";
+            EXPECT_EQ(std::memcmp(&chosen, &reported, sizeof chosen), 0)
+                << "a record of the right branch is untouched";
             continue;
         }
         ++exchanged;
