@@ -59,10 +59,10 @@ cv::Mat_<float> mean_of_rows(const cv::Mat_<float> &rises) {
 
 // The rises near an edge. `peak` and `at_rim` are the greatest mean rises at any offset and at the greatest offsets,
 // `on_line` is the mean at offset 0 with steps of the smallest size; `width_px` is the width of a slope of constant
-// rise that is as high.
+// rise that is as high, `noise` the standard deviation of a rise before averaging, relative to the peak.
 struct Slope {
     cv::Mat_<float> rises;
-    double step_px, peak = 0, at_rim = 0, on_line = 0, width_px = 0;
+    double step_px, peak = 0, at_rim = 0, on_line = 0, width_px = 0, noise = 0;
 };
 
 constexpr double contained = 0.35; // greatest rise at the rim relative to the peak, if the slope ends before the rim
@@ -85,8 +85,9 @@ Slope find_slope(const cv::Mat &grey, const Edge &edge, double min_step_px, doub
     }
 }
 
-// Averages the rises of neighbouring positions until their noise is small relative to the slope.
-void reduce_noise(Slope &slope) {
+// Averages the rises of neighbouring positions until their noise is small relative to the slope. Returns the standard
+// deviation that they had, relative to the peak.
+double reduce_noise(Slope &slope) {
     constexpr double max_noise = 0.08; // relative to the peak
     std::vector<float> steps; // differences between neighbours contain little of the picture, but all the noise
     for (int row = 1; row < slope.rises.rows; ++row)
@@ -99,6 +100,7 @@ void reduce_noise(Slope &slope) {
     const int averaged = static_cast<int>(std::min(ratio * ratio, slope.rises.rows / 4.0));
     if (averaged > 1)
         cv::blur(slope.rises, slope.rises, {1, averaged | 1});
+    return noise / slope.peak;
 }
 
 // Returns the offset of the edge in px: the mean offset weighted by the squared rise, as in AprilTag. Only uses rises
@@ -187,7 +189,7 @@ std::optional<Line> fit_edge(const Edge &edge, Slope &slope, cv::Point2d from, c
     constexpr double max_median_steps = 4;
     if (!(slope.peak >= min_peak))
         return std::nullopt;
-    reduce_noise(slope);
+    slope.noise = reduce_noise(slope);
     std::vector<cv::Point2d> found;
     for (std::size_t i = 0; i < edge.at_px.size(); ++i)
         if (const auto offset = edge_offset_px(slope, static_cast<int>(i), min_rise * slope.peak))
@@ -209,10 +211,12 @@ std::optional<Line> fit_edge(const Edge &edge, Slope &slope, cv::Point2d from, c
 
 } // namespace
 
-std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens, int cells) {
+std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens, int cells,
+                                    bool is_subpixel) {
     constexpr int max_passes = 8;
     constexpr double sharp_step_px = 0.25; // suffices for a sharp edge
     constexpr double min_strength = 0.9;   // of the refined edges, relative to the rough ones
+    constexpr double max_noise = 0.12;     // relative to the peak, for tags too small to average it out
     constexpr double max_blur = 0.7; // relative to the cell; a wider slope depends on the cells beside the border
     const auto rough = lens.undistort({rough_px.begin(), rough_px.end()});
     if (!rough)
@@ -234,7 +238,7 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
 
     // +1 if the square is darker than its surroundings, otherwise −1
     double sign = 0, rough_strength = 0, strength = 0, moved = converged_px, margin_px = reach * min_step_px;
-    bool too_blurred = false;
+    bool is_unclear = false;
     for (int pass = 0; pass < max_passes && moved >= converged_px; ++pass) {
         std::array<Edge, 4> edges;
         for (int i = 0; i < 4; ++i)
@@ -247,7 +251,7 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
         }
         std::array<Line, 4> lines;
         strength = margin_px = 0;
-        too_blurred = false;
+        is_unclear = false;
         for (int i = 0; i < 4; ++i) {
             Slope slope = find_slope(grey, edges[i], min_step_px, max_step_px, sign);
             const auto line = fit_edge(edges[i], slope, corners[i], lens);
@@ -256,8 +260,9 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
             lines[i] = *line;
             strength += slope.on_line;
             margin_px = std::max(margin_px, reach * slope.step_px);
-            too_blurred |= slope.step_px > min_step_px &&
-                           (slope.at_rim > contained * slope.peak || slope.width_px > max_blur * cell_px);
+            is_unclear |= is_subpixel && min_step_px < sharp_step_px && slope.noise > max_noise;
+            is_unclear |= slope.step_px > min_step_px &&
+                          (slope.at_rim > contained * slope.peak || slope.width_px > max_blur * cell_px);
         }
         if (pass == 0)
             rough_strength = strength;
@@ -273,7 +278,7 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
                 return std::nullopt;
         }
     }
-    if (too_blurred || strength < min_strength * rough_strength)
+    if (is_unclear || strength < min_strength * rough_strength)
         return std::nullopt;
     const std::vector<cv::Point2d> distorted = lens.distort(corners);
     return Corners{distorted[0], distorted[1], distorted[2], distorted[3]};

@@ -179,7 +179,7 @@ public:
                 detection.corners_px[corner] = {tag->p[3 - corner][0] - 0.5, tag->p[3 - corner][1] - 0.5};
             if (fit_edges_)
                 detection.corners_px = arhost::fiducial::refine_edges(grey, detection.corners_px, report_->lens(),
-                                                                      family_->get()->width_at_border)
+                                                                      family_->get()->width_at_border, refine_edges_)
                                            .value_or(detection.corners_px);
             detections.push_back(detection);
         }

@@ -231,6 +231,7 @@ TEST_P(FiducialTracker, RefinedCornersAreNoWorseThanThoseOfTheLibrary) {
                                            {{"sharp", 28}, 112},
                                            {{"sharp", 60}, 60},
                                            {{"noisy", 28, 0, 1, 10}, 112},
+                                           {{"dark", 20, 0, 0.1, 2}, 200},
                                            {{"dark", 28, 0, 0.1, 2}, 112},
                                            {{"moved", 28, 3}, 112},
                                            {{"moved", 110, 13}, 60}}) {
