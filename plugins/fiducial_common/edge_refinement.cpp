@@ -260,9 +260,10 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
             lines[i] = *line;
             strength += slope.on_line;
             margin_px = std::max(margin_px, reach * slope.step_px);
-            is_unclear |= is_subpixel && min_step_px < sharp_step_px && slope.noise > max_noise;
-            is_unclear |= slope.step_px > min_step_px &&
-                          (slope.at_rim > contained * slope.peak || slope.width_px > max_blur * cell_px);
+            const bool is_noisy = min_step_px < sharp_step_px && slope.noise > max_noise;
+            const bool is_blurred = slope.step_px > min_step_px &&
+                                    (slope.at_rim > contained * slope.peak || slope.width_px > max_blur * cell_px);
+            is_unclear |= is_subpixel && (is_noisy || is_blurred);
         }
         if (pass == 0)
             rough_strength = strength;
