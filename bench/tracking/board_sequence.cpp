@@ -13,6 +13,7 @@
 #include <tag36h11.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
 #include <memory>
 #include <numbers>
@@ -60,7 +61,7 @@ std::vector<std::vector<ObservedMarker>> detect(const RbtSequence &sequence) {
     for (const auto &found : sequence.run(tracker)) {
         auto &markers = frames.emplace_back();
         for (const auto &[id, marker] : found) {
-            ObservedMarker observed{on_board(id), {}, 0.1};
+            ObservedMarker observed{on_board(id), {}, 1};
             for (int i = 0; i < 4; ++i)
                 observed.corners_px[i] = {marker.corners_px[i][0], marker.corners_px[i][1]};
             markers.push_back(observed);
@@ -170,11 +171,11 @@ Poses with_apriltag(const RbtSequence &sequence) {
         Rigid camera_from_tag; // tag axes: x right, y down, z into the paper
         for (int row = 0; row < 3; ++row) {
             for (int column = 0; column < 3; ++column)
-                camera_from_tag.rotation(row, column) = matd_get(found.R, row, column);
-            camera_from_tag.translation_mm[row] = matd_get(found.t, row, 0);
+                camera_from_tag.rotation(row, column) = MATD_EL(found.R, row, column);
+            camera_from_tag.translation_mm[row] = MATD_EL(found.t, row, 0);
         }
-        matd_destroy(found.R);
-        matd_destroy(found.t);
+        std::free(found.R); // as matd_destroy does, which Debian's library does not export
+        std::free(found.t);
         const auto corners = on_board(first->id);
         Rigid board_from_tag;
         board_from_tag.rotation.col(0) = (corners[1] - corners[0]).normalized();
@@ -196,12 +197,13 @@ Summary summarize(const RbtSequence &sequence, const Poses &poses) {
     const pose::Projection projection(RbtSequence::camera());
     const Eigen::Vector3d above_board(287.75, 227.75, 50);
     std::vector<double> degrees, mm, steps;
-    std::optional<Eigen::Vector2d> last;
+    Eigen::Vector2d last = Eigen::Vector2d::Zero();
+    bool has_last = false;
     Summary summary{};
     for (std::size_t k = 0; k < poses.size(); ++k) {
         if (!poses[k]) {
             ++summary.missing;
-            last.reset();
+            has_last = false;
             continue;
         }
         const Rigid truth = reference(sequence, k);
@@ -210,9 +212,10 @@ Summary summarize(const RbtSequence &sequence, const Poses &poses) {
         summary.flips += degrees.back() > 20;
         const Eigen::Vector2d error =
             *projection.pixel(*poses[k] * above_board) - *projection.pixel(truth * above_board);
-        if (last)
-            steps.push_back((error - *last).norm());
+        if (has_last)
+            steps.push_back((error - last).norm());
         last = error;
+        has_last = true;
     }
     summary.degrees = test::percentile(degrees, 0.5);
     summary.mm = test::percentile(mm, 0.5);

@@ -290,6 +290,8 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
         modified.back().struct_size = sizeof(arhost_option);
         if (declared.key == std::string_view("corner_refinement") && has("uses_occluder_edges"))
             modified.back().text = "none";
+        if (declared.key == std::string_view("quad_decimate") && has("uses_occluder_edges"))
+            modified.back().real = 1.5;
     }
     const arhost_status status = real().create(host, modified.data(), count, &created->real);
     if (status == ARHOST_STATUS_OK)
