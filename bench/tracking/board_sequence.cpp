@@ -27,7 +27,7 @@ using pose::Rigid;
 using test::RbtSequence;
 
 constexpr double degree = std::numbers::pi / 180;
-constexpr std::size_t frame_count = 40;
+constexpr double corner_sigma_px = 1; // includes the errors of the board's layout, which is known only roughly
 
 std::array<Eigen::Vector3d, 4> on_board(int id) {
     std::array<Eigen::Vector3d, 4> corners;
@@ -61,7 +61,7 @@ std::vector<std::vector<ObservedMarker>> detect(const RbtSequence &sequence) {
     for (const auto &found : sequence.run(tracker)) {
         auto &markers = frames.emplace_back();
         for (const auto &[id, marker] : found) {
-            ObservedMarker observed{on_board(id), {}, 1};
+            ObservedMarker observed{on_board(id), {}, corner_sigma_px};
             for (int i = 0; i < 4; ++i)
                 observed.corners_px[i] = {marker.corners_px[i][0], marker.corners_px[i][1]};
             markers.push_back(observed);
