@@ -302,7 +302,7 @@ SinkQueue &Pipeline::make_sink(const run_config::ComponentConfiguration &output,
         std::vector<int> sockets = open_sockets(output, options);
         return Component::Create{{std::move(options), setup}, std::move(sockets)};
     };
-    callbacks.ready = [this, sink](const messages::Ready &ready) {
+    callbacks.ready = [sink](const messages::Ready &ready) {
         sink->set_inputs(ready.capabilities & (ARHOST_CAPABILITY_VIDEO_INPUT | ARHOST_CAPABILITY_OVERLAY_INPUT));
         return SlotLayout{};
     };
