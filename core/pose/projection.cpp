@@ -10,7 +10,7 @@ std::optional<Eigen::Vector2d> Projection::pixel(const Eigen::Vector3d &point_mm
             return {};
         return Eigen::Vector2d(px->x, px->y);
     };
-    const auto px = project(point_mm);
+    auto px = project(point_mm);
     if (!px || !derivative)
         return px;
     if (intrinsics_.distortion == ARHOST_DISTORTION_NONE) {

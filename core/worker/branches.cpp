@@ -37,7 +37,7 @@ std::optional<Estimate> refined_alternative(const arhost_marker &marker, std::sp
     if (std::ranges::all_of(marker.mt_alternative, [](double number) { return number == 0; }))
         return {};
     const Rigid reported = pose::rigid_of(marker.mt_alternative);
-    const auto refined = refine(reported, corners, projection);
+    auto refined = refine(reported, corners, projection);
     if (!refined ||
         !(pose::angle_between_rad(refined->camera_from_target.rotation, reported.rotation) < same_branch_rad) ||
         pose::angle_between_rad(refined->camera_from_target.rotation, pose::rigid_of(marker.mt).rotation) <
