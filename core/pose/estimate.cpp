@@ -297,8 +297,7 @@ std::optional<Estimate> assess(const Rigid &pose, std::span<const Correspondence
     return summarize(pose, residuals, points);
 }
 
-std::vector<Estimate> estimate_poses(std::span<const ObservedMarker> markers, const Projection &projection,
-                                     const Rigid *predicted) {
+std::vector<Estimate> estimate_poses(std::span<const ObservedMarker> markers, const Projection &projection) {
     // The starts come from the largest markers, whose poses are the most precise.
     constexpr std::size_t max_markers_for_starts = 12, max_refined = 3;
     constexpr double distinct_rad = 0.02;
@@ -320,8 +319,6 @@ std::vector<Estimate> estimate_poses(std::span<const ObservedMarker> markers, co
     for (const ObservedMarker *marker : by_size)
         for (const Rigid &pose : poses_from(*marker, projection))
             starts.push_back({pose, start_error(pose, points, projection)});
-    if (predicted && !starts.empty())
-        starts.push_back({*predicted, start_error(*predicted, points, projection)});
     std::ranges::stable_sort(starts, {}, &Start::error);
 
     std::vector<Estimate> found;

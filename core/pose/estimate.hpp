@@ -54,10 +54,8 @@ std::optional<Estimate> assess(const Rigid &pose, std::span<const Correspondence
 
 // Returns the pose of smallest error, and a second one if the reprojection error has another local minimum. Returns
 // nothing if no pose shows the front of a marker at its corners, for example if they are not convex, mirrored, or
-// NaN. Corners may be wrong, as long as more than half of them are right; `predicted`, if not null, is one more start
-// for the search.
-std::vector<Estimate> estimate_poses(std::span<const ObservedMarker> markers, const Projection &projection,
-                                     const Rigid *predicted = nullptr);
+// NaN. Corners may be wrong, as long as more than half of them are right.
+std::vector<Estimate> estimate_poses(std::span<const ObservedMarker> markers, const Projection &projection);
 
 // The corners of a square marker in its own frame: origin at the centre, x right, y up, z out of the print.
 std::array<Eigen::Vector3d, 4> square_corners_mm(double side_mm);
