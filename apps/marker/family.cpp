@@ -8,6 +8,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
+#include <cmath>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
@@ -85,6 +87,33 @@ Family find_family(const std::string &name) {
     names.resize(3);
     throw std::runtime_error(fmt::format("unknown family '{}'; similar names: {}; 'arhost marker --help' lists all",
                                          name, fmt::join(names, ", ")));
+}
+
+std::vector<int> parse_ids(std::string_view text, const Family &family) {
+    std::vector<int> ids;
+    const auto id_in = [&](std::string_view word) {
+        double id = -1;
+        const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), id);
+        if (error != std::errc() || end != word.data() + word.size() || !(id >= 0 && id == std::floor(id)))
+            throw std::runtime_error(
+                fmt::format("ids '{}': write numbers and ranges, such as {}:7,9,12-20", text, family.name));
+        if (id >= family.count)
+            throw std::runtime_error(
+                fmt::format("{} has the ids 0 to {}, not {}", family.name, family.count - 1, word));
+        return static_cast<int>(id);
+    };
+    for (std::size_t at = 0; at <= text.size();) {
+        const std::string_view part = text.substr(at, text.find(',', at) - at);
+        const std::size_t dash = part.find('-');
+        const int first = id_in(part.substr(0, dash));
+        const int last = dash == std::string_view::npos ? first : id_in(part.substr(dash + 1));
+        if (last < first)
+            throw std::runtime_error(fmt::format("ids '{}': the range {} ends before it begins", text, part));
+        for (int id = first; id <= last; ++id)
+            ids.push_back(id);
+        at += part.size() + 1;
+    }
+    return ids;
 }
 
 } // namespace arhost::marker

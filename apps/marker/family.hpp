@@ -5,6 +5,7 @@
 
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace arhost::marker {
@@ -23,5 +24,8 @@ std::vector<std::string> family_names();
 // Also accepts OpenCV's names of AprilTag families (DICT_APRILTAG_36h11). Throws std::runtime_error, which lists
 // similar names.
 Family find_family(const std::string &name);
+
+// "7,9,12-20" → 7, 9, 12, 13, … Throws std::runtime_error if the text is no list of ids of the family.
+std::vector<int> parse_ids(std::string_view text, const Family &family);
 
 } // namespace arhost::marker

@@ -58,33 +58,6 @@ std::function<std::string(const std::string &)> length_from(double minimum_mm, d
     };
 }
 
-// "7,9,12-20" → 7, 9, 12, 13, …; all ids must be in the family.
-std::vector<int> parse_ids(std::string_view text, const Family &family) {
-    std::vector<int> ids;
-    const auto id_in = [&](std::string_view word) {
-        const double id = number_in(word);
-        if (!(id >= 0 && id == std::floor(id)))
-            throw std::runtime_error(
-                fmt::format("ids '{}': write numbers and ranges, such as {}:7,9,12-20", text, family.name));
-        if (id >= family.count)
-            throw std::runtime_error(
-                fmt::format("{} has the ids 0 to {}, not {}", family.name, family.count - 1, word));
-        return static_cast<int>(id);
-    };
-    for (std::size_t at = 0; at <= text.size();) {
-        const std::string_view part = text.substr(at, text.find(',', at) - at);
-        const std::size_t dash = part.find('-');
-        const int first = id_in(part.substr(0, dash));
-        const int last = dash == std::string_view::npos ? first : id_in(part.substr(dash + 1));
-        if (last < first)
-            throw std::runtime_error(fmt::format("ids '{}': the range {} ends before it begins", text, part));
-        for (int id = first; id <= last; ++id)
-            ids.push_back(id);
-        at += part.size() + 1;
-    }
-    return ids;
-}
-
 // The consecutive ids of a board: those given, or those that begin with the only one that is given.
 std::vector<int> board_ids(const Family &family, std::vector<int> ids, std::size_t count) {
     if (ids.size() == 1) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The pose of a board of 20 tags on a real sequence: core/pose/ with the corners of tracker_apriltag, compared with
-// bare OpenCV and bare AprilTag on the same frames.
+// The pose of a board of tags on a real sequence: core/pose/ with the corners of tracker_apriltag, compared with
+// bare OpenCV and bare AprilTag on the same frames, and the map of `arhost map` compared with the nominal layout.
+#include "map/learning.hpp"
 #include "pose/track.hpp"
 
 #include <fiducial_common/opencv_aruco.hpp>
@@ -15,6 +16,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <map>
 #include <memory>
 #include <numbers>
 
@@ -28,6 +30,11 @@ using test::RbtSequence;
 
 constexpr double degree = std::numbers::pi / 180;
 constexpr double corner_sigma_px = 1; // includes the errors of the board's layout, which is known only roughly
+
+// The frames that are evaluated.
+struct Selection {
+    std::size_t first = 0, step = 1;
+};
 
 std::array<Eigen::Vector3d, 4> on_board(int id) {
     std::array<Eigen::Vector3d, 4> corners;
@@ -55,36 +62,74 @@ struct Results {
     std::vector<double> left_out_px; // reprojection error of corners that the pose was not computed from
 };
 
-std::vector<std::vector<ObservedMarker>> detect(const RbtSequence &sequence) {
+std::vector<map::Frame> detect(const RbtSequence &sequence) {
     test::Tracker tracker("tracker_apriltag", {{"quad_decimate", "1"}});
-    std::vector<std::vector<ObservedMarker>> frames;
+    std::vector<map::Frame> frames;
     for (const auto &found : sequence.run(tracker)) {
-        auto &markers = frames.emplace_back();
+        map::Frame &frame = frames.emplace_back();
         for (const auto &[id, marker] : found) {
-            ObservedMarker observed{on_board(id), {}, corner_sigma_px};
+            map::Detection &detection = frame.detections.emplace_back();
+            detection.id = id;
             for (int i = 0; i < 4; ++i)
-                observed.corners_px[i] = {marker.corners_px[i][0], marker.corners_px[i][1]};
-            markers.push_back(observed);
+                detection.corners_px[i] = {marker.corners_px[i][0], marker.corners_px[i][1]};
         }
     }
     return frames;
 }
 
-Results with_core_pose(const RbtSequence &sequence) {
+// Corners of the tags on the board, by id.
+using Layout = std::map<int, std::array<Eigen::Vector3d, 4>>;
+
+Layout nominal_layout(const RbtSequence &sequence) {
+    Layout layout;
+    for (const int id : sequence.ids())
+        layout[id] = on_board(id);
+    return layout;
+}
+
+// Learns the layout from the even frames, and moves it without scaling to where the nominal layout is.
+Layout learned_layout(const RbtSequence &sequence, const std::vector<map::Frame> &frames) {
+    std::vector<map::Frame> even;
+    for (std::size_t k = 0; k < frames.size(); k += 2)
+        even.push_back(frames[k]);
+    map::Settings settings;
+    for (const int id : sequence.ids())
+        settings.sides_mm[id] = RbtSequence::side_mm;
+    const map::Map learned = map::learn(even, RbtSequence::camera(), settings);
+    std::printf("the map learned from the even frames: %zu tags, RMS %.3f px\n", learned.markers.size(),
+                learned.rms_px);
+    Eigen::Matrix3Xd from(3, 4 * learned.markers.size()), to(from);
+    Eigen::Index at = 0;
+    for (const map::LearnedMarker &marker : learned.markers)
+        for (int i = 0; i < 4; ++i, ++at) {
+            from.col(at) = marker.map_from_marker * pose::square_corners_mm(marker.side_mm)[i];
+            to.col(at) = on_board(marker.id)[i];
+        }
+    const Eigen::Matrix4d board_from_map = Eigen::umeyama(from, to, false);
+    Layout layout;
+    at = 0;
+    for (const map::LearnedMarker &marker : learned.markers)
+        for (int i = 0; i < 4; ++i, ++at)
+            layout[marker.id][i] = (board_from_map * from.col(at).homogeneous()).head<3>();
+    return layout;
+}
+
+Results with_core_pose(const std::vector<map::Frame> &frames, const Layout &layout, Selection selection) {
     const pose::Projection projection(RbtSequence::camera());
     Results results;
+    results.poses.resize(frames.size());
     pose::Track track{};
-    std::int64_t capture_ns = 0;
-    for (const std::vector<ObservedMarker> &markers : detect(sequence)) {
-        capture_ns += 33'333'333;
+    for (std::size_t k = selection.first; k < frames.size(); k += selection.step) {
+        std::vector<ObservedMarker> markers;
+        for (const map::Detection &detection : frames[k].detections)
+            if (const auto on_layout = layout.find(detection.id); on_layout != layout.end())
+                markers.push_back({on_layout->second, detection.corners_px, corner_sigma_px});
         const auto poses = estimate_poses(markers, projection);
-        if (poses.empty()) {
-            results.poses.emplace_back();
+        if (poses.empty())
             continue;
-        }
-        const pose::Step step = next_step(track, poses, capture_ns);
+        const pose::Step step = next_step(track, poses, 33'333'333 * static_cast<std::int64_t>(k + 1));
         track = step.track;
-        results.poses.emplace_back(poses[step.chosen].camera_from_target);
+        results.poses[k] = poses[step.chosen].camera_from_target;
         for (std::size_t left_out = 0; left_out < markers.size(); ++left_out) {
             std::vector<ObservedMarker> others = markers;
             others.erase(others.begin() + static_cast<std::ptrdiff_t>(left_out));
@@ -193,14 +238,14 @@ struct Summary {
     int flips, missing;
 };
 
-Summary summarize(const RbtSequence &sequence, const Poses &poses) {
+Summary summarize(const RbtSequence &sequence, const Poses &poses, Selection selection) {
     const pose::Projection projection(RbtSequence::camera());
     const Eigen::Vector3d above_board(287.75, 227.75, 50);
     std::vector<double> degrees, mm, steps;
     Eigen::Vector2d last = Eigen::Vector2d::Zero();
     bool has_last = false;
     Summary summary{};
-    for (std::size_t k = 0; k < poses.size(); ++k) {
+    for (std::size_t k = selection.first; k < poses.size(); k += selection.step) {
         if (!poses[k]) {
             ++summary.missing;
             has_last = false;
@@ -224,8 +269,8 @@ Summary summarize(const RbtSequence &sequence, const Poses &poses) {
     return summary;
 }
 
-Summary print(const char *name, const RbtSequence &sequence, const Poses &poses) {
-    const Summary s = summarize(sequence, poses);
+Summary print(const char *name, const RbtSequence &sequence, const Poses &poses, Selection selection = {}) {
+    const Summary s = summarize(sequence, poses, selection);
     std::printf("%-34s %8.2f %8.2f %10.3f %10.3f %6d %8d\n", name, s.degrees, s.mm, s.virtual_px, s.virtual_p95_px,
                 s.flips, s.missing);
     return s;
@@ -243,12 +288,25 @@ int main() try {
     std::printf("a board of 20 tags, 40 frames 640x480: median error against the reference pose, and frame-to-frame "
                 "error of a point 50 mm above the board\n%-34s %8s %8s %10s %10s %6s %8s\n",
                 "", "degrees", "mm", "point p50", "p95, px", "flips", "missing");
-    const Results own = with_core_pose(sequence);
+    const std::vector<map::Frame> frames = detect(sequence);
+    const Layout nominal = nominal_layout(sequence);
+    const Results own = with_core_pose(frames, nominal, {});
     const Summary s = print("arhost: joint pose of the board", sequence, own.poses);
     print("OpenCV: detectMarkers, solvePnP", sequence, with_opencv(sequence));
     print("AprilTag: pose of the first tag", sequence, with_apriltag(sequence));
-    const double left_out = test::percentile(own.left_out_px, 0.5);
-    std::printf("arhost: corners of a tag that is left out reproject with a median error of %.3f px\n", left_out);
+    const auto print_left_out = [](const char *name, const Results &results) {
+        std::printf("%s: corners of a tag that is left out reproject with an error of %.3f px (p50), %.3f px (p95)\n",
+                    name, test::percentile(results.left_out_px, 0.5), test::percentile(results.left_out_px, 0.95));
+        return test::percentile(results.left_out_px, 0.5);
+    };
+    print_left_out("arhost", own);
+    constexpr Selection odd{1, 2};
+    const Results with_nominal = with_core_pose(frames, nominal, odd),
+                  with_learned = with_core_pose(frames, learned_layout(sequence, frames), odd);
+    print("odd frames: nominal layout", sequence, with_nominal.poses, odd);
+    print("odd frames: map of the even frames", sequence, with_learned.poses, odd);
+    print_left_out("odd frames, nominal layout", with_nominal);
+    const double left_out = print_left_out("odd frames, map of the even frames", with_learned);
     return s.degrees <= 0.2 && s.mm <= 1.3 && s.virtual_px <= 0.1 && s.virtual_p95_px <= 0.8 && s.flips == 0 &&
                    s.missing == 0 && left_out <= 0.2
                ? 0

@@ -533,12 +533,13 @@ TEST(CommandLine, CompletesInZsh) {
     EXPECT_TRUE(completes("arhost help rep", "lay "));
     EXPECT_TRUE(completes("arhost conform --timeo", "ut-factor "));
     EXPECT_TRUE(completes("arhost marker --cha", "ruco "));
+    EXPECT_TRUE(completes("arhost map --skip", "-unconnected "));
 }
 
 TEST(CommandLine, HasAManPageForEachProgram) {
     const std::filesystem::path pages = ARHOST_BINARY_DIRECTORY "/pages";
-    for (const char *program : {"arhost", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-marker",
-                                "arhost-worker", "render-scene"})
+    for (const char *program : {"arhost", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-map",
+                                "arhost-marker", "arhost-worker", "render-scene"})
         EXPECT_TRUE(std::filesystem::is_regular_file(pages / (std::string(program) + ".1.gz"))) << program;
     ArhostRun run;
     EXPECT_EQ(run.run({"--generate", "man"}), 0);

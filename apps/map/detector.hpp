@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Finds markers in images with the libraries and default settings of the trackers.
+#pragma once
+
+#include "learning.hpp"
+#include "marker/family.hpp"
+
+#include <arhost/camera.h>
+
+#include <opencv2/core.hpp>
+
+#include <functional>
+#include <set>
+#include <vector>
+
+namespace arhost::map {
+
+// Returns the markers in a grey image, in the order of their ids; of a marker that is found twice, the better
+// detection.
+using Detector = std::function<std::vector<Detection>(const cv::Mat &grey)>;
+
+// `ids`: the markers to find; empty: all of the family.
+Detector detector_of(const marker::Family &family, const std::set<int> &ids, const arhost_intrinsics &camera);
+
+} // namespace arhost::map

@@ -1,0 +1,348 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// arhost-map learns maps of markers from images (docs/maps.md). `arhost map` runs it, because the host itself links
+// neither OpenCV nor Ceres.
+#include "base/atomic_file.hpp"
+#include "base/command_line.hpp"
+#include "base/text.hpp"
+#include "base/unique_fd.hpp"
+#include "base/write_all.hpp"
+#include "camera/calibration.hpp"
+#include "detector.hpp"
+#include "map_file.hpp"
+
+#include <fmt/format.h>
+#include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include <charconv>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <numbers>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+namespace {
+
+using namespace arhost::map;
+namespace base = arhost::base;
+namespace camera = arhost::camera;
+namespace fs = std::filesystem;
+using arhost::marker::Family;
+
+enum ExitStatus { success = 0, failed = 2 };
+
+struct Arguments {
+    std::vector<std::string> images, sides;
+    std::string video, camera, family, ids, layout, output;
+    std::optional<int> origin;
+    unsigned every = 1;
+    bool plane = false, skip_unconnected = false;
+};
+
+std::optional<double> length_in(std::string_view text) {
+    double mm = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), mm);
+    if (error != std::errc() || end != text.data() + text.size() || !(mm >= 1 && mm <= 10'000))
+        return {};
+    return mm;
+}
+
+// The sides of markers in mm, from --side and --layout.
+class Sides {
+public:
+    Sides(const Arguments &arguments, const Family &family, const std::vector<Marker> &layout) {
+        for (const Marker &marker : layout)
+            by_id_[marker.id] = marker.side_mm;
+        for (const std::string &text : arguments.sides) {
+            const std::size_t equals = text.find('=');
+            const auto mm = length_in(std::string_view(text).substr(equals == std::string::npos ? 0 : equals + 1));
+            if (!mm)
+                throw std::runtime_error("--side " + text +
+                                         ": write a length from 1 to 10000 mm, or IDS=MM as in 7=40");
+            if (equals == std::string::npos)
+                default_mm_ = mm;
+            else
+                for (const int id : arhost::marker::parse_ids(text.substr(0, equals), family))
+                    by_id_[id] = *mm;
+        }
+        if (!default_mm_ && by_id_.empty())
+            throw std::runtime_error("--side is missing: the side of the markers in mm, as trackers measure it");
+    }
+    std::optional<double> operator[](int id) const {
+        const auto found = by_id_.find(id);
+        return found == by_id_.end() ? default_mm_ : found->second;
+    }
+
+private:
+    std::map<int, double> by_id_;
+    std::optional<double> default_mm_;
+};
+
+struct Picture {
+    std::string name;
+    cv::Mat grey;
+};
+
+// Reads images or a video.
+class Input {
+public:
+    explicit Input(const Arguments &arguments) : arguments_(arguments) {
+        if (arguments.video.empty())
+            return;
+        if (!fs::is_regular_file(arguments.video))
+            throw std::runtime_error(arguments.video + ": there is no such file");
+        if (!video_.open(arguments.video, cv::CAP_FFMPEG))
+            throw std::runtime_error(arguments.video + ": cannot be read as a video");
+    }
+    std::optional<Picture> next() {
+        Picture picture;
+        if (arguments_.video.empty()) {
+            if (at_ == arguments_.images.size())
+                return {};
+            picture.name = arguments_.images[at_++];
+            picture.grey = cv::imread(picture.name, cv::IMREAD_GRAYSCALE);
+            if (picture.grey.empty())
+                throw std::runtime_error(picture.name + ": cannot be read as an image");
+            return picture;
+        }
+        cv::Mat colour;
+        for (unsigned skipped = at_ == 0 ? 1 : arguments_.every; skipped > 0; --skipped, ++at_)
+            if (!video_.grab())
+                return {};
+        if (!video_.retrieve(colour))
+            return {};
+        picture.name = fmt::format("frame {}", at_ - 1);
+        cv::cvtColor(colour, picture.grey, cv::COLOR_BGR2GRAY);
+        return picture;
+    }
+
+private:
+    const Arguments &arguments_;
+    cv::VideoCapture video_;
+    std::size_t at_ = 0;
+};
+
+class Progress {
+public:
+    explicit Progress(int signals) : signals_(signals) {}
+    ~Progress() { clear(); }
+    Progress(const Progress &) = delete;
+    Progress &operator=(const Progress &) = delete;
+
+    // Shows a line on a terminal. Throws base::Interrupted after a signal.
+    void show(const std::string &text) {
+        if (const int signal = base::take_signal(signals_))
+            throw base::Interrupted(signal, "interrupted");
+        if (!is_terminal_ || text.empty())
+            return;
+        std::fprintf(stderr, "\r%s\033[K", base::printable(text, 100).c_str());
+        is_shown_ = true;
+    }
+    void clear() {
+        if (is_shown_)
+            std::fputs("\r\033[K", stderr);
+        is_shown_ = false;
+    }
+
+private:
+    int signals_;
+    bool is_terminal_ = ::isatty(STDERR_FILENO) == 1, is_shown_ = false;
+};
+
+void warn(const std::string &text) {
+    std::fprintf(stderr, "warning: %s\n", base::printable(text).c_str());
+}
+
+struct Observations {
+    arhost_intrinsics camera;
+    std::vector<Frame> frames;
+    std::map<int, double> sides_mm; // of the markers that were seen
+};
+
+Observations observe(const Arguments &arguments, const Family &family, const Sides &sides, Progress &progress) {
+    std::set<int> ids;
+    if (!arguments.ids.empty())
+        for (const int id : arhost::marker::parse_ids(arguments.ids, family))
+            ids.insert(id);
+    Input input(arguments);
+    Observations result{};
+    Detector detect;
+    while (const auto picture = input.next()) {
+        const camera::Size size{static_cast<std::uint32_t>(picture->grey.cols),
+                                static_cast<std::uint32_t>(picture->grey.rows)};
+        if (!detect) {
+            result.camera = camera::read_calibration(arguments.camera, size);
+            detect = detector_of(family, ids, result.camera);
+        } else if (size != camera::Size{result.camera.width, result.camera.height}) {
+            throw std::runtime_error(fmt::format("{}: is {}×{} px, but the images before it are {}×{} px",
+                                                 picture->name, size.width, size.height, result.camera.width,
+                                                 result.camera.height));
+        }
+        Frame &frame = result.frames.emplace_back(Frame{picture->name, detect(picture->grey)});
+        for (const Detection &detection : frame.detections) {
+            const auto side = sides[detection.id];
+            if (!side)
+                throw std::runtime_error(
+                    fmt::format("{}: shows marker {}, whose side is unknown; add --side {}=MM, or "
+                                "list the markers of the map with --ids",
+                                picture->name, detection.id, detection.id));
+            result.sides_mm[detection.id] = *side;
+        }
+        progress.show(fmt::format("{} frames read, {} markers seen", result.frames.size(), result.sides_mm.size()));
+    }
+    if (result.frames.empty())
+        throw std::runtime_error(arguments.video + ": has no frames");
+    if (result.sides_mm.empty())
+        throw std::runtime_error(
+            fmt::format("none of the {} frames shows a marker of {}", result.frames.size(), family.name));
+    return result;
+}
+
+std::string table_of(const Map &map) {
+    std::string text = fmt::format("{:>6} {:>8} {:>7} {:>8} {:>8} {:>9}\n", "id", "side mm", "frames", "RMS px",
+                                   "± mm", "± degrees");
+    for (const LearnedMarker &marker : map.markers) {
+        text += fmt::format("{:>6} {:>8} {:>7} {:>8.3f}", marker.id, marker.side_mm, marker.views, marker.rms_px);
+        text += marker.id == map.origin ? fmt::format(" {:>8} {:>9}\n", "fixed", "fixed")
+                                        : fmt::format(" {:>8.3f} {:>9.3f}\n", marker.position_sigma_mm,
+                                                      marker.rotation_sigma_rad * 180 / std::numbers::pi);
+    }
+    return text;
+}
+
+void warn_about(const Map &map) {
+    for (const LearnedMarker &marker : map.markers) {
+        if (marker.misfits >= 3 && 5 * marker.misfits > marker.views + marker.misfits)
+            warn(fmt::format(
+                "marker {} is elsewhere in {} of the {} frames that show it: it was moved, or there are two "
+                "of it; the map has the place where most frames show it",
+                marker.id, marker.misfits, marker.views + marker.misfits));
+        if (marker.is_ambiguous)
+            warn(fmt::format("marker {}: the images permit two tilts; add images of it from nearer or from other "
+                             "directions",
+                             marker.id));
+    }
+    for (const std::string &name : map.misfits)
+        warn(name + ": most of its markers do not fit to the other frames; they were ignored");
+}
+
+void run(const Arguments &arguments, int signals) {
+    if (arguments.images.empty() == arguments.video.empty())
+        throw std::runtime_error("give either --images or --video");
+    if (fs::path(arguments.output).extension() != ".yaml")
+        throw std::runtime_error(arguments.output + ": the file's name must end in .yaml, such as desk.map.yaml");
+    const Family family = arhost::marker::find_family(arguments.family);
+    Settings settings;
+    if (!arguments.layout.empty())
+        settings.layout = read_map(arguments.layout, family);
+    const Sides sides(arguments, family, settings.layout);
+    base::AtomicFile output(arguments.output, signals);
+    Progress progress(signals);
+    const Observations seen = observe(arguments, family, sides, progress);
+    settings.sides_mm = seen.sides_mm;
+    settings.origin = arguments.origin;
+    settings.is_plane = arguments.plane;
+    settings.progress = [&](const std::string &text) { progress.show(text); };
+    const Map map = learn(seen.frames, seen.camera, settings);
+    progress.clear();
+    std::string refused;
+    for (const Refusal &refusal : map.refused)
+        refused += fmt::format("{}marker {} {}", refused.empty() ? "" : "; ", refusal.id, refusal.reason);
+    if (map.markers.size() < 2)
+        throw std::runtime_error("a map needs at least two markers in the same frames" +
+                                 (refused.empty() ? "" : ": " + refused));
+    if (!refused.empty() && !arguments.skip_unconnected)
+        throw std::runtime_error(refused + " (--skip-unconnected leaves such markers out)");
+    if (!refused.empty())
+        warn("left out: " + refused);
+    warn_about(map);
+    const std::string summary = fmt::format("{} markers from {} of {} frames; RMS reprojection error {:.3f} px",
+                                            map.markers.size(), map.frames, seen.frames.size(), map.rms_px);
+    const std::string frame =
+        !arguments.layout.empty() && !arguments.origin ? "as in the layout"
+        : arguments.plane ? fmt::format("z = 0 is the best plane, x as on marker {}", map.origin)
+                          : fmt::format("that of marker {}: origin at its centre, x right, y up on the print, z "
+                                        "out of the paper",
+                                        map.origin);
+    output.write(map_text(map.markers, family, fmt::format("# {}\n# Frame: {}.\n", summary, frame)));
+    std::printf("%s: %s\n%s", base::printable(arguments.output).c_str(), summary.c_str(), table_of(map).c_str());
+    if (!base::flush_stdout())
+        throw std::runtime_error("cannot write to standard output");
+}
+
+// A signalfd for SIGINT, SIGTERM and SIGHUP, except those that the parent process ignores (nohup).
+base::UniqueFd take_signals() {
+    sigset_t taken;
+    ::sigemptyset(&taken);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+        struct sigaction now {};
+        if (::sigaction(signal, nullptr, &now) == 0 && now.sa_handler != SIG_IGN)
+            ::sigaddset(&taken, signal);
+    }
+    ::sigprocmask(SIG_BLOCK, &taken, nullptr);
+    return base::UniqueFd(::signalfd(-1, &taken, SFD_CLOEXEC | SFD_NONBLOCK));
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+    std::signal(SIGPIPE, SIG_IGN); // a closed pipe or a full disk is an error, not a signal
+    std::signal(SIGXFSZ, SIG_IGN);
+    base::CommandLine app("Learns where markers are relative to each other, from images of a calibrated camera, and "
+                          "writes a map. See docs/maps.md.\n"
+                          "Exit status: 0 success; 2 failure, without any output file.",
+                          "arhost map");
+    Arguments arguments;
+    app.option("--images", arguments.images, "Images from different directions; each shows two markers or more")
+        .type_name("FILE");
+    app.option("--video", arguments.video, "A video instead of images").type_name("FILE");
+    app.option("--every", arguments.every, "Use every Nth frame of the video")
+        .type_name("N")
+        .range(1, 10'000)
+        .show_default();
+    app.option("--camera", arguments.camera, "Calibration of the camera, as in camera: {file: …}")
+        .type_name("FILE")
+        .required();
+    app.option("--family,--dictionary", arguments.family,
+               "Family or dictionary of the markers; 'arhost marker --help' lists them")
+        .type_name("NAME")
+        .required();
+    app.option("--side", arguments.sides,
+               "Side of the markers, as trackers measure it; also IDS=MM for some of them (repeatable)")
+        .type_name("MM")
+        .one_value_each();
+    app.option("--ids", arguments.ids, "The markers of the map, such as 0-19,25 (default: all that are seen)")
+        .type_name("IDS");
+    app.option("--origin", arguments.origin, "The map's frame is that of this marker (default: the smallest id)")
+        .type_name("ID");
+    app.flag("--plane", arguments.plane, "Turn the map's frame so that z = 0 is the plane of the markers");
+    app.option("--layout", arguments.layout, "Begin with the places in this map, and keep its frame and its sides")
+        .type_name("FILE");
+    app.flag("--skip-unconnected", arguments.skip_unconnected,
+             "Leave out markers that were seen too rarely or not together with the others");
+    app.option("-o,--output", arguments.output, "The map to write, such as desk.map.yaml")
+        .type_name("FILE")
+        .required();
+    if (const auto status = app.parse(argc, argv))
+        return base::flush_stdout() ? *status : failed;
+    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT); // the messages below name the file
+    const base::UniqueFd signals = take_signals();
+    try {
+        run(arguments, signals.get());
+        return success;
+    } catch (const base::Interrupted &interrupted) {
+        std::signal(interrupted.signal, SIG_DFL);
+        std::raise(interrupted.signal);
+        sigset_t all;
+        ::sigfillset(&all);
+        ::sigprocmask(SIG_UNBLOCK, &all, nullptr);
+        return failed;
+    } catch (const std::exception &error) {
+        std::fprintf(stderr, "error: %s\n", base::printable(error.what()).c_str());
+        return failed;
+    }
+}
