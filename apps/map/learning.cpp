@@ -173,11 +173,11 @@ public:
             return {{}, refused, {}, 0, 0, 0};
         grow();
         settings_.progress("adjusting all poses");
-        adjust_all();
+        adjust_all(rough);
         refuse_unfit(refused);
         anchor();
         for (int round = 0; round < 3 && revise(); ++round)
-            adjust_all();
+            adjust_all(rough);
         classify();
         while (refuse_unfit(refused))
             classify();
@@ -189,6 +189,8 @@ public:
     }
 
 private:
+    static constexpr double rough = 1e-4; // relative change of the cost in the last step of an optimization
+
     struct Variable { // of an optimization
         std::set<std::size_t> markers;
         std::vector<std::size_t> frames;
@@ -335,7 +337,7 @@ private:
     // Minimizes the reprojection error over the poses of some frames and markers. Returns half the sum of the squared
     // errors; errors beyond three times the typical ones count less. `sigmas` receives the standard deviations of the
     // markers.
-    double adjust(const Variable &variable, double typical_px, double tolerance = 1e-9,
+    double adjust(const Variable &variable, double typical_px, double tolerance,
                   std::map<std::size_t, std::pair<double, double>> *sigmas = nullptr) {
         ceres::Problem::Options ownership;
         ownership.manifold_ownership = ownership.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
@@ -423,7 +425,7 @@ private:
         std::iota(all.frames.begin(), all.frames.end(), 0);
         return all;
     }
-    void adjust_all() { adjust(everything(), std::max(typical_error_px(), 0.1)); }
+    void adjust_all(double tolerance) { adjust(everything(), std::max(typical_error_px(), 0.1), tolerance); }
 
     void pose_frame(std::size_t frame) {
         const auto markers = observed(frame);
@@ -511,7 +513,7 @@ private:
             }
             const double lost = static_cast<double>(std::ranges::count_if(
                 witnesses, [&](const Witness &witness) { return !error_px(views_[witness.view]); }));
-            finalist.cost = adjust(variable, typical_px, 1e-4) + lost * bound_px * bound_px;
+            finalist.cost = adjust(variable, typical_px, rough) + lost * bound_px * bound_px;
             finalist.map_from_marker = *marker.map_from_marker;
             frames_ = before;
         }
@@ -570,11 +572,13 @@ private:
                 continue;
             }
             for (const std::size_t view : markers_[*next].views)
-                pose_frame(views_[view].frame);
+                if (const std::size_t frame = views_[view].frame;
+                    !frames_[frame].camera_from_map || observed(frame).size() <= 4) // of more, one changes little
+                    pose_frame(frame);
             ++placed;
             settings_.progress(fmt::format("{} of {} markers placed", placed, group_.size()));
             if (5 * placed >= 6 * adjusted) { // a small map is adjusted after each marker
-                adjust_all();
+                adjust_all(rough);
                 adjusted = placed;
             }
         }
@@ -592,12 +596,11 @@ private:
                 continue;
             const Rigid before = *markers_[marker].map_from_marker;
             place(marker);
-            if (!is_placed(marker))
-                markers_[marker].map_from_marker = before;
-            else if (is_near(*markers_[marker].map_from_marker, before, tolerance_mm(markers_[marker])))
-                markers_[marker].map_from_marker = before;
-            else
+            if (is_placed(marker) &&
+                !is_near(*markers_[marker].map_from_marker, before, tolerance_mm(markers_[marker])))
                 has_changed = true;
+            else
+                markers_[marker].map_from_marker = before;
         }
         if (has_changed)
             for (std::size_t frame = 0; frame < frames_.size(); ++frame)
@@ -608,13 +611,12 @@ private:
     // Decides which views fit, and adjusts the map to these.
     void classify() {
         for (int round = 0; round < 3; ++round) {
-            adjust_all();
+            adjust_all(rough);
             const double limit_px = std::max(4 * typical_error_px(), 0.3);
             for (View &view : views_)
                 if (const auto error = error_px(view))
                     view.fits = *error <= limit_px;
         }
-        adjust_all();
     }
 
     std::size_t useful_views(std::size_t marker) const {
@@ -710,7 +712,7 @@ private:
     Map report() {
         Map map;
         std::map<std::size_t, std::pair<double, double>> sigmas;
-        adjust(everything(), typical_error_px(), 1e-9, &sigmas);
+        adjust(everything(), typical_error_px(), 1e-10, &sigmas);
         double squares = 0;
         std::size_t views = 0;
         for (const std::size_t index : group_) {

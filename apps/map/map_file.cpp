@@ -12,11 +12,9 @@
 namespace arhost::map {
 namespace {
 
-constexpr double degree = std::numbers::pi / 180;
-
 // Rotates about the fixed axes x, then y, then z.
 Eigen::Matrix3d rotation_of(const Eigen::Vector3d &degrees) {
-    const Eigen::Vector3d angles = degree * degrees;
+    const Eigen::Vector3d angles = std::numbers::pi / 180 * degrees;
     return (Eigen::AngleAxisd(angles.z(), Eigen::Vector3d::UnitZ()) *
             Eigen::AngleAxisd(angles.y(), Eigen::Vector3d::UnitY()) *
             Eigen::AngleAxisd(angles.x(), Eigen::Vector3d::UnitX()))
@@ -25,10 +23,10 @@ Eigen::Matrix3d rotation_of(const Eigen::Vector3d &degrees) {
 
 Eigen::Vector3d degrees_of(const Eigen::Matrix3d &r) {
     const double cosine = std::hypot(r(0, 0), r(1, 0));
-    const double y = std::atan2(-r(2, 0), cosine);
+    Eigen::Vector3d angles(std::atan2(r(2, 1), r(2, 2)), std::atan2(-r(2, 0), cosine), std::atan2(r(1, 0), r(0, 0)));
     if (cosine < 1e-9) // x and z turn about the same axis
-        return Eigen::Vector3d(std::atan2(-r(1, 2), r(1, 1)), y, 0) / degree;
-    return Eigen::Vector3d(std::atan2(r(2, 1), r(2, 2)), y, std::atan2(r(1, 0), r(0, 0))) / degree;
+        angles = {std::atan2(-r(1, 2), r(1, 1)), angles.y(), 0};
+    return angles * (180 / std::numbers::pi);
 }
 
 Eigen::Vector3d vector_in(const yaml::Node &node) {

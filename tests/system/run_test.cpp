@@ -436,6 +436,8 @@ TEST(CommandLine, HelpDescribesCommands) {
     EXPECT_EQ(run.run({"plugins", "--devices"}), 2) << "replaced with 'arhost devices'";
     EXPECT_EQ(run.run({"help", "conform"}), 0);
     EXPECT_THAT(run.output(), HasSubstr("Usage: arhost conform [OPTIONS] [PLUGIN]"));
+    EXPECT_EQ(run.run({"help", "map"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("Usage: arhost map [OPTIONS]"));
     EXPECT_EQ(run.run({"help", "marker"}), 0);
     EXPECT_THAT(run.output(), HasSubstr("Usage: arhost marker [OPTIONS] MARKERS"));
     EXPECT_EQ(run.run({"help", "help"}), 0);
