@@ -235,6 +235,11 @@ void run(const Arguments &arguments, int signals) {
         throw std::runtime_error("give either --images or --video");
     if (fs::path(arguments.output).extension() != ".yaml")
         throw std::runtime_error(arguments.output + ": the file's name must end in .yaml, such as desk.map.yaml");
+    if (arguments.plane && !arguments.layout.empty())
+        throw std::runtime_error("--plane and --layout exclude each other: the layout gives the map's frame");
+    for (const std::string &input : {arguments.camera, arguments.layout})
+        if (std::error_code ignored; fs::equivalent(input, arguments.output, ignored))
+            throw std::runtime_error(arguments.output + ": --output would overwrite an input");
     const Family family = arhost::marker::find_family(arguments.family);
     Settings settings;
     if (!arguments.layout.empty())
