@@ -40,7 +40,9 @@ std::optional<std::array<double, 16>> World::locate(const std::string &first, st
     }
     if (frame - last_seen_ > grace_frames)
         return {};
-    const auto is_known = [&](const auto &target) { return is_visible(target) && target_from_world_.contains(target.name); };
+    const auto is_known = [&](const auto &target) {
+        return is_visible(target) && target_from_world_.contains(target.name);
+    };
     auto other = std::ranges::find_if(
         targets, [&](const auto &target) { return is_known(target) && target.name == substitute_; });
     if (other == targets.end())

@@ -14,7 +14,7 @@ namespace arhost::ipc {
 
 struct TargetMarker {
     std::int32_t id = 0;
-    std::string family;                               // or dictionary
+    std::string family;                                // or dictionary
     std::array<std::array<double, 3>, 4> corners_mm{}; // as in arhost_marker_config
     bool operator==(const TargetMarker &) const = default;
 };

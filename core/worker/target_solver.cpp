@@ -185,8 +185,8 @@ void TargetSolver::check(const arhost_tracker_result &reported) const {
 }
 
 // If the same marker is seen several times, keeps the copy that is nearest to where the target is expected: by its
-// motion or, if it is unknown, by the target's other markers. Otherwise keeps the copy with the fewest corrected bits, or
-// that which was read most clearly.
+// motion or, if it is unknown, by the target's other markers. Otherwise keeps the copy with the fewest corrected
+// bits, or that which was read most clearly.
 std::vector<ObservedMarker> TargetSolver::without_copies(std::span<const arhost_observation> observations,
                                                          const std::optional<pose::Motion> &predicted,
                                                          double corner_sigma_px) const {

@@ -13,9 +13,9 @@
 
 namespace arhost::worker {
 
-// Each call depends only on its arguments. The memory of the targets is passed as `before` and `after`, so it survives
-// the worker (ADR 26): the motion of each target, which tells the two solutions of the planar pose problem apart
-// (pose/track.hpp).
+// Each call depends only on its arguments. The memory of the targets is passed as `before` and `after`, so it
+// survives the worker (ADR 26): the motion of each target, which tells the two solutions of the planar pose problem
+// apart (pose/track.hpp).
 class TargetSolver {
 public:
     // `full_search_every`: a tracker searches the whole frame at least once in so many frames; at least 1.

@@ -60,7 +60,8 @@ TEST(Targets, ADetectorCannotFollowABody) {
     ArhostRun run(configuration("tracker_counter", "[{name: visor, body: head}]"));
     EXPECT_EQ(run.run(), 2);
     EXPECT_THAT(run.output(), HasSubstr("run.yaml:3:"));
-    EXPECT_THAT(run.output(), HasSubstr("tracker.targets: the target 'visor' is a body, but 'tracker_counter' finds only markers"));
+    EXPECT_THAT(run.output(),
+                HasSubstr("tracker.targets: the target 'visor' is a body, but 'tracker_counter' finds only markers"));
 }
 
 TEST(Targets, ABodyThatTheTrackerDoesNotKnowIsAnErrorOfTheConfiguration) {

@@ -32,7 +32,8 @@ std::vector<arhost_target> targets(const std::vector<Visible> &visible) {
 }
 
 glm::dmat4 moved(double x, double y, double z, double degrees = 0) {
-    return glm::rotate(glm::translate(glm::dmat4(1), {x, y, z}), glm::radians(degrees), glm::dvec3(1, 2, 3) / std::sqrt(14.));
+    return glm::rotate(glm::translate(glm::dmat4(1), {x, y, z}), glm::radians(degrees),
+                       glm::dvec3(1, 2, 3) / std::sqrt(14.));
 }
 
 struct WorldTest : testing::Test {
@@ -61,7 +62,9 @@ TEST_F(WorldTest, DoesNotJumpToAnotherTarget) {
     EXPECT_FALSE(locate({{"cup", cup}}, 0)) << "the relation of the cup to the desk is not known yet";
     locate({{"desk", desk}, {"cup", cup}, {"lid", lid}}, 1);
     const glm::dmat4 camera = moved(3, -7, 20, 5); // all targets move in the same way
-    expect_near(locate({{"desk", camera * desk, ARHOST_TARGET_LOST}, {"cup", camera * cup}, {"lid", camera * lid}}, 2), camera * desk);
+    expect_near(
+        locate({{"desk", camera * desk, ARHOST_TARGET_LOST}, {"cup", camera * cup}, {"lid", camera * lid}}, 2),
+        camera * desk);
     expect_near(locate({{"lid", camera * camera * lid}}, 3), camera * camera * desk);
     expect_near(locate({{"desk", lid}}, 4), lid);
 }

@@ -47,7 +47,8 @@ const std::vector<ipc::Target> targets = {
 };
 enum Index { cup, board, box, head };
 
-arhost_observation observed(const ObservedMarker &seen, std::int32_t id, std::uint32_t family = 0, double margin = 1) {
+arhost_observation observed(const ObservedMarker &seen, std::int32_t id, std::uint32_t family = 0,
+                            double margin = 1) {
     arhost_observation observation{sizeof observation, id, family, 0, {}, margin};
     for (int i = 0; i < 4; ++i) {
         observation.corners_px[i][0] = seen.corners_px[i].x();
@@ -71,7 +72,8 @@ protected:
         return seen;
     }
     // Keeps the state for the next call.
-    void solve(std::vector<arhost_observation> seen, std::int64_t frame = 0, std::vector<arhost_body_pose> poses = {}) {
+    void solve(std::vector<arhost_observation> seen, std::int64_t frame = 0,
+               std::vector<arhost_body_pose> poses = {}) {
         arhost_tracker_result result{};
         result.observations = seen.data();
         result.observation_count = static_cast<std::uint32_t>(seen.size());
@@ -307,9 +309,9 @@ TEST_F(TargetSolverTest, ExpectsMarkersWhereTheirTargetsMove) {
             ASSERT_EQ(expected.marker, 1 + i) << "index among the markers of all targets";
             const arhost_observation marker = see(truth, 0, on_board(10 + static_cast<std::int32_t>(i)));
             for (int corner = 0; corner < 4; ++corner)
-                outside += !(std::hypot(marker.corners_px[corner][0] - expected.corners_px[corner][0],
-                                        marker.corners_px[corner][1] - expected.corners_px[corner][1]) <
-                             expected.margin_px);
+                outside +=
+                    !(std::hypot(marker.corners_px[corner][0] - expected.corners_px[corner][0],
+                                 marker.corners_px[corner][1] - expected.corners_px[corner][1]) < expected.margin_px);
             if (frame > 10) {
                 ASSERT_LT(expected.margin_px, 60);
             }
@@ -347,16 +349,19 @@ TEST_F(TargetSolverTest, RejectsAReportThatViolatesTheContract) {
     const auto altered = [](auto one, auto alter) { return alter(one), std::vector{one}; };
     constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     EXPECT_THAT(violation(altered(good, [](auto &o) { o.family = 2; })), HasSubstr("family index 2"));
-    EXPECT_THAT(violation(altered(good, [](auto &o) { o.corners_px[2][1] = nan; })), HasSubstr("marker 5 with a corner that is not finite"));
+    EXPECT_THAT(violation(altered(good, [](auto &o) { o.corners_px[2][1] = nan; })),
+                HasSubstr("marker 5 with a corner that is not finite"));
     EXPECT_THAT(violation(altered(good, [](auto &o) { o.decision_margin = -1; })), HasSubstr("decision margin"));
-    EXPECT_THAT(violation(std::vector(ARHOST_MAX_OBSERVATIONS + 1, good)), HasSubstr("1025 observations; the limit is 1024"));
+    EXPECT_THAT(violation(std::vector(ARHOST_MAX_OBSERVATIONS + 1, good)),
+                HasSubstr("1025 observations; the limit is 1024"));
     EXPECT_THAT(violation({}, {body_pose(cup)}), HasSubstr("the target 0, which is not a body"));
     EXPECT_THAT(violation({}, {body_pose(4)}), HasSubstr("the target 4, which is not a body"));
     EXPECT_THAT(violation({}, {body_pose(head), body_pose(head)}), HasSubstr("two poses of the target 3"));
     EXPECT_THAT(violation({}, std::vector(5, body_pose(head))), HasSubstr("more poses than there are targets"));
     for (const auto alter : {+[](arhost_body_pose &p) { p.mt[0] = 2; }, +[](arhost_body_pose &p) { p.mt[12] = nan; },
                              +[](arhost_body_pose &p) { p.covariance[35] = nan; }})
-        EXPECT_THAT(violation({}, altered(body_pose(head), alter)), HasSubstr("not finite, or a pose that is no rotation"));
+        EXPECT_THAT(violation({}, altered(body_pose(head), alter)),
+                    HasSubstr("not finite, or a pose that is no rotation"));
     EXPECT_THAT(violation({}, altered(body_pose(head), [](auto &p) { p.state = 0; })), HasSubstr("invalid state"));
     EXPECT_EQ(violation({good}, {body_pose(head)}), "");
 }
