@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the fiducial trackers share between arhost_tracker_setup and arhost_observation.
+// The parts of arhost_tracker_setup and arhost_observation that the fiducial trackers have in common.
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>

@@ -31,7 +31,7 @@ const char *problem_with(arhost_clock clock, std::int64_t capture_ns, std::int64
 const std::vector<ipc::Target> targets = {
     {"desk", {{23, "D", {}}}, ""}, {"cup", {{7, "D", {}}}, ""}, {"head", {}, "skull"}};
 
-// What a tracker's worker writes: "desk" was never seen, "cup" is detected, "head" is lost.
+// The result of a tracker: "desk" was never seen, "cup" is detected, "head" is lost.
 struct TrackerResult {
     TrackerResult() : bytes(layout.byte_size(0)) {
         count() = 2;
