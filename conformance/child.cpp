@@ -175,6 +175,8 @@ int run_child(const std::string &name, const Subject &subject) {
         discard_standard_output(subject.settings);
         Context context{library, subject.reference, std::mt19937_64(subject.seed)};
         context.prints = subject.prints;
+        context.family = subject.family;
+        context.body = subject.body;
         context.timeout_factor = subject.timeout_factor;
         Result result = run(test, subject, context);
         result.facts = context.facts;

@@ -24,7 +24,9 @@ struct Subject {
     double timeout_factor = 1;       // multiplies each deadline
     std::filesystem::path scratch{}; // of one test; deleted after it
     PrintFiles prints{};
-    sandbox::Policy policy{};                  // without the scratch folder
+    std::string family{};     // of the markers; empty: the first of drawn_families that the tracker knows
+    std::string body{};       // of a tracker that reports poses
+    sandbox::Policy policy{}; // without the scratch folder
     std::vector<std::string> policy_options{}; // the policy's command line options
     Settings addresses{};                      // of the options of type ARHOST_OPTION_LISTEN
     Sockets sockets{};                         // of one test

@@ -200,6 +200,19 @@ std::string reference_problem(std::span<const Test> tests, const RunSettings &se
     return {};
 }
 
+// Returns the family of the markers to test a tracker with: the first one that it knows. Empty if it only reports the
+// poses of bodies.
+std::string family_of(std::span<const Test> tests, RunSettings settings,
+                      const arhost::ipc::PluginDescription &plugin) {
+    const auto start = std::ranges::find(tests, std::string_view("tracker.start"), &Test::name);
+    for (const char *family : drawn_families) {
+        settings.subject.family = family;
+        if (run_alone(*start, settings).verdict != Verdict::fail)
+            return family;
+    }
+    return plugin.capabilities & ARHOST_CAPABILITY_REPORTS_POSES ? "" : drawn_families.front(); // tests report why
+}
+
 // Returns the addresses of the options of type ARHOST_OPTION_LISTEN, as set or by default. Tests report invalid ones.
 Settings addresses_of(const arhost::ipc::PluginDescription &plugin, const Settings &settings) {
     Settings addresses;
@@ -280,6 +293,9 @@ Report run(RunSettings settings, const std::vector<std::string> &patterns, bool 
         }
     });
     const std::string missing = missing_need(report.results.front(), settings.subject.policy);
+    const auto is_of_tracker = [](const Test &test) { return test.kind == ARHOST_KIND_TRACKER; };
+    if (settings.subject.family.empty() && missing.empty() && std::ranges::any_of(selected, is_of_tracker))
+        settings.subject.family = family_of(report.tests, settings, report.plugin->descriptor);
     for (const Test &test : selected)
         if (!missing.empty() && creates_instances(report.tests, test.name))
             set_result(test, Verdict::skip, missing);
@@ -400,9 +416,14 @@ int main(int argc, char **argv) {
     app.option("--set", option_texts, "Set an option of the plugin (repeatable)")
         .type_name("KEY=VALUE")
         .one_value_each();
-    app.option("--print", print_texts, "Draw marker ID from this PNG, instead of tag36h11 tags (repeatable)")
+    app.option("--family", settings.subject.family,
+               fmt::format("Family or dictionary of the markers (the first that the tracker knows of {})",
+                           fmt::join(drawn_families, ", ")))
+        .type_name("NAME");
+    app.option("--print", print_texts, "Draw marker ID from this PNG (repeatable)")
         .type_name("ID=FILE")
         .one_value_each();
+    app.option("--body", settings.subject.body, "A body that a tracker knows which reports poses").type_name("NAME");
     PolicyOptions policy_options;
     policy_options.add_to(app);
     app.option("--seed", settings.subject.seed, "Random seed (1)").type_name("N").check(invalid_seed);
@@ -438,6 +459,12 @@ int main(int argc, char **argv) {
             option_texts.push_back("script=" + settings.subject.plugin.string());
         settings.subject.settings = parse_settings(option_texts);
         settings.subject.prints = parse_prints(print_texts);
+        if (const std::string &family = settings.subject.family;
+            !family.empty() && settings.subject.prints.empty() && !std::ranges::count(drawn_families, family))
+            throw std::runtime_error(
+                fmt::format("--family {}: the suite draws only {}; give pictures of the markers: "
+                            "--print ID=FILE",
+                            family, fmt::join(drawn_families, ", ")));
         settings.subject.policy = policy_options.policy(settings.subject);
         settings.subject.policy_options = policy_options.texts();
         settings.subject.sockets = passed_sockets(socket_texts);

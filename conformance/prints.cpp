@@ -19,21 +19,35 @@ namespace {
 
 constexpr double min_margin = 1.0 / 8; // width of the paper's margin relative to the marker's side
 
-// '#' is ink. Same orientation as in the AprilTag library.
-struct Tag {
+struct Marker {
     int id;
-    std::array<std::string_view, 8> rows;
+    std::vector<std::string_view> rows; // '#' is ink
 };
-constexpr Tag tag36h11[] = {
-    {31, {"########", "###.#..#", "##...#.#", "#...##.#", "#.#.#.##", "###....#", "##..#.##", "########"}},
-    {7, {"########", "####.###", "####..##", "##.#.###", "#.#...##", "####...#", "##.#.###", "########"}},
-    {586, {"########", "#...#.##", "#####..#", "#.#....#", "#.##.###", "#.#..#.#", "#..##..#", "########"}},
-    {2, {"########", "#..#...#", "##.##.##", "#.######", "###.##.#", "####.###", "###...##", "########"}},
+struct DrawnFamily {
+    std::string_view name;
+    std::vector<Marker> markers; // with the orientation of the AprilTag library, or of OpenCV
+};
+const std::vector<DrawnFamily> families = {
+    {"tag36h11",
+     {{31, {"########", "###.#..#", "##...#.#", "#...##.#", "#.#.#.##", "###....#", "##..#.##", "########"}},
+      {7, {"########", "####.###", "####..##", "##.#.###", "#.#...##", "####...#", "##.#.###", "########"}},
+      {586, {"########", "#...#.##", "#####..#", "#.#....#", "#.##.###", "#.#..#.#", "#..##..#", "########"}},
+      {2, {"########", "#..#...#", "##.##.##", "#.######", "###.##.#", "####.###", "###...##", "########"}}}},
+    {"DICT_6X6_250",
+     {{31, {"########", "######.#", "#.##.#.#", "#.#....#", "#......#", "##....##", "#....#.#", "########"}},
+      {7, {"########", "#.###.##", "###.#.##", "##.#.###", "###....#", "###.#.##", "##..#.##", "########"}},
+      {203, {"########", "###....#", "###.##.#", "#.####.#", "#####..#", "#..##.##", "#.###.##", "########"}},
+      {2, {"########", "####.#.#", "##..##.#", "######.#", "#.....##", "#.#.#..#", "###..#.#", "########"}}}},
+    {"tag25h9",
+     {{31, {"#######", "#.##..#", "#..##.#", "#.#.###", "####.##", "#.#####", "#######"}},
+      {7, {"#######", "#.#####", "##..###", "#.#...#", "##..#.#", "##.#..#", "#######"}},
+      {12, {"#######", "##..#.#", "#.#...#", "#.##.##", "###.#.#", "##...##", "#######"}},
+      {2, {"#######", "#.#...#", "#.#..##", "####.##", "#..#..#", "##.####", "#######"}}}},
 };
 
-Print print_of(const Tag &tag) {
-    Print print{tag.id, static_cast<std::uint32_t>(tag.rows.size()), {}};
-    for (const std::string_view row : tag.rows)
+Print print_of(const Marker &marker) {
+    Print print{marker.id, static_cast<std::uint32_t>(marker.rows.size()), {}};
+    for (const std::string_view row : marker.rows)
         for (const char cell : row)
             print.grey.push_back(cell == '#' ? 0 : 255);
     return print;
@@ -168,11 +182,11 @@ Print Print::mirrored() const {
     return other;
 }
 
-std::vector<Print> prints_of(const PrintFiles &files) {
+std::vector<Print> prints_of(const PrintFiles &files, std::string_view family) {
     std::vector<Print> prints;
     if (files.empty())
-        for (const Tag &tag : tag36h11)
-            prints.push_back(print_of(tag));
+        for (const Marker &marker : std::ranges::find(families, family, &DrawnFamily::name)->markers)
+            prints.push_back(print_of(marker));
     for (auto file = files.rbegin(); file != files.rend(); ++file)
         prints.push_back(read_print(file->first, file->second));
     return prints;

@@ -17,6 +17,7 @@
 #include <filesystem>
 #include <map>
 #include <span>
+#include <string_view>
 #include <vector>
 
 namespace arhost::conformance {
@@ -33,8 +34,12 @@ struct Print {
 
 using PrintFiles = std::map<int, std::filesystem::path>; // by id
 
-// Four AprilTags of the family tag36h11, or the user's PNG files. At least one; ids are not in ascending order.
-std::vector<Print> prints_of(const PrintFiles &files);
+// The families whose markers the suite can draw.
+inline constexpr std::array drawn_families = {"tag36h11", "DICT_6X6_250", "tag25h9"};
+
+// Four markers of one of these families, or the user's PNG files. At least one; ids are not in ascending order, and
+// each two of these families have some in common.
+std::vector<Print> prints_of(const PrintFiles &files, std::string_view family = drawn_families.front());
 
 // A greyscale camera image.
 struct Grey {
@@ -55,7 +60,7 @@ template <class Code> Grey filled(std::uint32_t width, std::uint32_t height, Cod
     return image;
 }
 
-// Marker to camera, as in arhost_marker.mt: GL eye space, mm.
+// Marker to camera, as in arhost_target.mt: GL eye space, mm.
 using Pose = glm::dmat4;
 
 // Returns the pose of a marker that faces the camera upright, rotated by degrees about the camera's axes x, then y,

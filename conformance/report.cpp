@@ -61,6 +61,10 @@ std::string Report::command(const Result &result) const {
         text += " --set " + quoted(key + "=" + value);
     for (const auto &[id, file] : subject.prints)
         text += fmt::format(" --print {}={}", id, quoted(file.string()));
+    if (!subject.family.empty())
+        text += " --family " + quoted(subject.family);
+    if (!subject.body.empty())
+        text += " --body " + quoted(subject.body);
     for (const std::string &option : subject.policy_options)
         text += " " + quoted(option);
     if (subject.reference != default_reference())

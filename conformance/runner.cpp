@@ -126,6 +126,9 @@ public:
             arguments.insert(arguments.end(), {"--set", key + "=" + value});
         for (const auto &[id, file] : subject.prints)
             arguments.insert(arguments.end(), {"--print", std::to_string(id) + "=" + file.string()});
+        for (const auto &[option, value] : {std::pair{"--family", &subject.family}, {"--body", &subject.body}})
+            if (!value->empty())
+                arguments.insert(arguments.end(), {option, *value});
         arguments.insert(arguments.end(), subject.policy_options.begin(), subject.policy_options.end());
         ::fcntl(result_.read_end.get(), F_SETFL, O_NONBLOCK);
         ::fcntl(output_.read_end.get(), F_SETFL, O_NONBLOCK);

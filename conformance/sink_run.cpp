@@ -30,24 +30,52 @@ arhost_intrinsics lens(const Size &size) {
     return in;
 }
 
-arhost_marker marker(double z_mm) {
-    arhost_marker m{};
-    m.struct_size = sizeof m;
-    m.id = 3;
-    std::strcpy(m.family, "tag36h11");
-    m.state = ARHOST_MARKER_DETECTED;
-    for (int corner = 0; corner < 4; ++corner) {
-        m.corners_px[corner][0] = corner == 1 || corner == 2 ? 40.25 : 20.5;
-        m.corners_px[corner][1] = corner >= 2 ? 30.75 : 10;
+// Copies the elements to the end of guarded memory. Without elements, there is no accessible byte.
+template <class T>
+const T *put(std::optional<GuardedMemory> &memory, const std::vector<T> &elements, std::size_t extra) {
+    const std::size_t stride = sizeof(T) + extra;
+    std::byte *const bytes = memory.emplace(stride * elements.size()).data();
+    std::fill_n(bytes, stride * elements.size(), std::byte{0xa5});
+    for (std::size_t i = 0; i < elements.size(); ++i) {
+        T element = elements[i];
+        element.struct_size = static_cast<std::uint32_t>(stride);
+        std::memcpy(bytes + stride * i, &element, sizeof element);
     }
-    m.mt[0] = m.mt[5] = m.mt[10] = m.mt[15] = 1;
-    m.mt[14] = z_mm;
-    m.reprojection_px = 0.125;
-    m.ambiguity = 0.25;
-    return m;
+    memory->seal();
+    return reinterpret_cast<const T *>(bytes);
 }
 
 } // namespace
+
+arhost_target detected_target(const std::string &name, double z_mm, std::uint32_t first, std::uint32_t count) {
+    arhost_target t{};
+    t.struct_size = sizeof t;
+    t.state = ARHOST_TARGET_DETECTED;
+    name.copy(t.name, sizeof t.name - 1);
+    t.first_observation = first;
+    t.observation_count = count;
+    t.mt[0] = t.mt[5] = t.mt[10] = t.mt[15] = 1;
+    t.mt[14] = z_mm;
+    for (int i = 0; i < 6; ++i)
+        t.covariance[7 * i] = i < 3 ? 0.25 : 1e-4;
+    t.reprojection_px = 0.125;
+    t.ambiguity = 0.25;
+    std::copy_n(t.mt, 16, t.mt_alternative);
+    return t;
+}
+
+arhost_observation observation(int id) {
+    arhost_observation o{};
+    o.struct_size = sizeof o;
+    o.id = id;
+    o.hamming = 1;
+    o.decision_margin = 62.5;
+    for (int corner = 0; corner < 4; ++corner) {
+        o.corners_px[corner][0] = corner == 1 || corner == 2 ? 40.25 : 20.5;
+        o.corners_px[corner][1] = corner >= 2 ? 30.75 : 10;
+    }
+    return o;
+}
 
 arhost_frame_format video_format(const Size &size) {
     arhost_frame_format format{};
@@ -88,8 +116,8 @@ SealedOutput::SealedOutput(const Content &content)
     std::copy_n(look_at, 3, r.camera.look_at);
     std::copy_n(up, 3, r.camera.up);
     r.camera.intrinsics = lens(size);
-    r.marker_count = 1;
-    r.markers[0] = marker(-eye[2]);
+    std::strcpy(r.families[0], "tag36h11");
+    set_tracked({detected_target("cup", -eye[2], 0, 1)}, {observation(3)});
     const auto fill = [&](const GuardedMemory &memory, std::size_t size) {
         std::generate_n(memory.data(), size, [&] { return static_cast<std::byte>(noise() >> 24); });
     };
@@ -102,6 +130,16 @@ SealedOutput::SealedOutput(const Content &content)
     output_.overlay_stride = ipc::overlay_stride(size.width);
     for (GuardedMemory *memory : {&record_, &pixels_, &video_, &overlay_})
         memory->seal();
+}
+
+void SealedOutput::set_tracked(const std::vector<arhost_target> &targets,
+                               const std::vector<arhost_observation> &observations, std::size_t extra) {
+    change([&](arhost_record &r) {
+        r.target_count = static_cast<std::uint32_t>(targets.size());
+        r.targets = put(targets_, targets, extra);
+        r.observation_count = static_cast<std::uint32_t>(observations.size());
+        r.observations = put(observations_, observations, extra);
+    });
 }
 
 Files files_in(const fs::path &folder) {

@@ -10,6 +10,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace arhost::conformance {
 
@@ -39,6 +40,10 @@ public:
         change(record());
         record_.seal();
     }
+    // Replaces the targets and observations. The byte after the last element is inaccessible. Each element ends with
+    // `extra` bytes that a sink does not know.
+    void set_tracked(const std::vector<arhost_target> &targets, const std::vector<arhost_observation> &observations,
+                     std::size_t extra = 0);
     const arhost_output &output() const { return output_; }
 
 private:
@@ -47,8 +52,13 @@ private:
     std::uint32_t stride_;
     arhost_frame_format video_format_;
     GuardedMemory record_, pixels_, video_, overlay_;
+    std::optional<GuardedMemory> targets_, observations_;
     arhost_output output_{};
 };
+
+// A target that owns the observations [first, first + count), and an observation of marker `id` of the family 0.
+arhost_target detected_target(const std::string &name, double z_mm, std::uint32_t first, std::uint32_t count);
+arhost_observation observation(int id);
 
 // Contents of files by path within a folder.
 using Files = std::map<std::string, std::string>;

@@ -13,6 +13,7 @@
 #include <algorithm>
 #include <cmath>
 #include <csignal>
+#include <cstring>
 #include <deque>
 #include <fstream>
 #include <limits>
@@ -185,49 +186,105 @@ void records(Context &context) {
     SinkRun run(context, "out");
     run.start();
     std::uint64_t n = 0;
-    const auto write = [&](const char *description, void (*change)(arhost_record &)) {
+    const auto write = [&](const char *description, auto change) {
         SealedOutput frame({n++});
-        frame.change(change);
+        change(frame);
         run.instance().expect_ok(fmt::format("write of a frame {}", description).c_str(), run.try_write(frame));
     };
-    write("with a camera and a marker", [](arhost_record &) {});
-    write("without markers and camera", [](arhost_record &r) {
-        r.marker_count = 0;
-        r.has_camera = 0;
-        r.camera = {};
-        r.overlay = ARHOST_OVERLAY_NONE;
+    const arhost_target cup = detected_target("cup", -500.5, 0, 1);
+    arhost_target lost = detected_target("lid", -1e9, 0, 0);
+    lost.state = ARHOST_TARGET_LOST;
+    lost.age_frames = 17;
+    write("with a camera and a target", [](SealedOutput &) {});
+    write("without targets and camera", [](SealedOutput &frame) {
+        frame.set_tracked({}, {});
+        frame.change([](arhost_record &r) {
+            r.has_camera = 0;
+            r.camera = {};
+            r.overlay = ARHOST_OVERLAY_NONE;
+        });
     });
-    write("with 64 markers", [](arhost_record &r) {
-        r.marker_count = ARHOST_MAX_MARKERS;
-        for (int i = 0; i < ARHOST_MAX_MARKERS; ++i) {
-            r.markers[i] = r.markers[0];
-            r.markers[i].id = i;
+    write("with 1,024 targets and observations", [](SealedOutput &frame) {
+        std::vector<arhost_target> targets;
+        std::vector<arhost_observation> observations;
+        for (std::uint32_t i = 0; i < ARHOST_MAX_TARGETS; ++i) {
+            targets.push_back(detected_target(fmt::format("tag36h11-{}", i), -500.5, i, 1));
+            observations.push_back(observation(static_cast<int>(i)));
         }
+        static_assert(+ARHOST_MAX_TARGETS == +ARHOST_MAX_OBSERVATIONS);
+        frame.set_tracked(targets, observations);
     });
-    write("with a lost marker and a held overlay", [](arhost_record &r) {
-        r.overlay = ARHOST_OVERLAY_HELD;
-        r.markers[0].state = ARHOST_MARKER_LOST;
-        r.markers[0].age_frames = 17;
+    write("with a target of 1,024 observations", [](SealedOutput &frame) {
+        frame.set_tracked({detected_target("board", -500.5, 0, ARHOST_MAX_OBSERVATIONS)},
+                          std::vector<arhost_observation>(ARHOST_MAX_OBSERVATIONS, observation(7)));
     });
-    write("with the true pose", [](arhost_record &r) {
-        r.has_truth = 1;
-        r.truth_id = 3;
-        std::copy_n(r.markers[0].mt, 16, r.true_mt);
+    write("with a name of 63 characters", [](SealedOutput &frame) {
+        frame.set_tracked({detected_target(std::string(ARHOST_MAX_NAME - 1, 'x'), -500.5, 0, 1)}, {observation(3)});
     });
-    write("with a predicted marker and a distant lost one", [](arhost_record &r) {
-        r.marker_count = 2;
-        r.markers[0].state = ARHOST_MARKER_PREDICTED;
-        r.markers[0].age_frames = std::numeric_limits<std::uint32_t>::max();
-        r.markers[1] = r.markers[0];
-        r.markers[1].state = ARHOST_MARKER_LOST;
-        r.markers[1].mt[14] = -1e9;
+    write("with 16 families", [](SealedOutput &frame) {
+        frame.change([](arhost_record &r) {
+            for (auto &family : r.families)
+                std::strcpy(family, "tagStandard52h13");
+        });
+        arhost_observation last = observation(3);
+        last.family = ARHOST_MAX_FAMILIES - 1;
+        frame.set_tracked({detected_target("cup", -500.5, 0, 1)}, {last});
     });
-    write("with the largest finite numbers", [](arhost_record &r) {
+    write("with markers that no target lists", [](SealedOutput &frame) {
+        frame.set_tracked({}, {observation(3), observation(4)});
+    });
+    write("with a lost target and a held overlay", [&](SealedOutput &frame) {
+        frame.set_tracked({lost}, {});
+        frame.change([](arhost_record &r) { r.overlay = ARHOST_OVERLAY_HELD; });
+    });
+    write("with the true pose", [&](SealedOutput &frame) {
+        frame.change([&](arhost_record &r) {
+            r.has_truth = 1;
+            std::strcpy(r.truth_target, cup.name);
+            std::copy_n(cup.mt, 16, r.true_mt);
+        });
+    });
+    write("with detected, predicted and lost targets", [&](SealedOutput &frame) {
+        arhost_target predicted = detected_target("lamp", -300, 0, 0);
+        predicted.state = ARHOST_TARGET_PREDICTED;
+        predicted.age_frames = std::numeric_limits<std::uint32_t>::max();
+        frame.set_tracked({predicted, lost, detected_target("cup", -500.5, 0, 2)}, {observation(3), observation(4)});
+    });
+    write("with a body, which has no observations, covariance, error and ambiguity", [](SealedOutput &frame) {
+        arhost_target body = detected_target("head", -500.5, 0, 0);
+        std::fill_n(body.covariance, 36, 0.0);
+        body.reprojection_px = body.ambiguity = 0;
+        std::fill_n(body.mt_alternative, 16, 0.0);
+        frame.set_tracked({body}, {});
+    });
+    write("with the largest finite numbers", [&](SealedOutput &frame) {
         constexpr double max = std::numeric_limits<double>::max();
-        r.markers[0].reprojection_px = r.markers[0].ambiguity = max;
-        r.markers[0].corners_px[0][0] = -max;
+        arhost_target huge = cup;
+        huge.reprojection_px = huge.ambiguity = huge.covariance[1] = max;
+        arhost_observation far = observation(std::numeric_limits<std::int32_t>::max());
+        far.corners_px[0][0] = -max;
+        far.decision_margin = max;
+        far.hamming = std::numeric_limits<std::uint32_t>::max();
+        frame.set_tracked({huge}, {far});
     });
     run.stop();
+}
+
+void longer_structs(Context &context) {
+    const auto run = [&](const char *folder, std::size_t extra) {
+        SinkRun sink(context, folder);
+        sink.start();
+        for (std::uint64_t n = 0; n < 3; ++n) {
+            SealedOutput frame({n});
+            frame.set_tracked({detected_target("cup", -500.5, 0, 1), detected_target("lid", -300, 1, 2)},
+                              {observation(3), observation(4), observation(7)}, extra);
+            sink.write(frame);
+        }
+        sink.stop();
+        return sink.files();
+    };
+    const Files expected = run("a", 0);
+    expect_same(run("b", 16), expected, "with a longer struct_size of targets and observations");
 }
 
 void gaps(Context &context) {
@@ -632,7 +689,8 @@ constexpr Test tests[] = {
     {"sink.sizes",
      "It accepts frames of any size, also one pixel, one row or one column, or rejects them with an error message.",
      kind, gate, 60s, sizes},
-    {"sink.records", "It accepts records with any number of markers, without a camera, and with huge numbers.", kind,
+    {"sink.records",
+     "It accepts records with any number of targets and observations, without a camera, and with huge numbers.", kind,
      gate, 30s, records},
     {"sink.gaps", "It accepts gaps in the frames' sequence numbers.", kind, gate, 30s, gaps},
     {"sink.idle", "idle succeeds between frames.", kind, gate, 30s, idle},
@@ -646,6 +704,8 @@ constexpr Test tests[] = {
     {"sink.two-instances", "Two simultaneous instances do not mix their files.", kind, same, 30s,
      of_files<two_instances>},
     {"sink.stride", "Its files do not depend on the padding between rows.", kind, same, 30s, of_files<stride>},
+    {"sink.longer-structs", "It uses struct_size as the stride of the arrays of targets and observations.", kind,
+     same, 30s, of_files<longer_structs>},
     {"sink.every-frame", "When write returns OK, the frame is in a file.", kind, gate, 30s, of_files<every_frame>},
     {"sink.order", "Each frame is stored once and in order: within a file, or in files by the number in their names.",
      kind, same, 30s, of_files<order>},

@@ -25,7 +25,9 @@ struct Context {
     std::optional<Facts> facts{};
     std::string note{};        // measurements, reported if the test passes
     double timeout_factor = 1; // multiplies each time limit
-    PrintFiles prints{};       // markers that the tracker detects; empty: the suite's tags
+    PrintFiles prints{};       // markers that the tracker detects; empty: the suite's own
+    std::string family{};      // of these markers; empty: the tracker detects no markers
+    std::string body{};        // that the tracker reports the pose of; empty: none
 
     double uniform(double low, double high) {
         // std::uniform_real_distribution differs between standard libraries.
@@ -53,9 +55,10 @@ std::span<const Test> raytracer_image_tests();
 std::span<const Test> raytracer_life_tests();
 std::span<const Test> raytracer_light_tests();
 std::span<const Test> raytracer_scene_tests();
+std::span<const Test> tracker_body_tests();
 std::span<const Test> tracker_image_tests();
 std::span<const Test> tracker_life_tests();
-std::span<const Test> tracker_pose_tests();
+std::span<const Test> tracker_corner_tests();
 std::span<const Test> source_tests();
 std::span<const Test> sink_tests();
 
@@ -67,7 +70,7 @@ inline std::vector<Test> all_tests() {
     for (const auto part :
          {abi_tests(), raytracer_life_tests(), raytracer_alpha_tests(), raytracer_camera_tests(),
           raytracer_light_tests(), raytracer_scene_tests(), raytracer_image_tests(), tracker_life_tests(),
-          tracker_pose_tests(), tracker_image_tests(), source_tests(), sink_tests()})
+          tracker_corner_tests(), tracker_image_tests(), tracker_body_tests(), source_tests(), sink_tests()})
         all.insert(all.end(), part.begin(), part.end());
     return all;
 }

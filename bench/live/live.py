@@ -158,7 +158,7 @@ def soak():
     configuration = f"""version: 1
 mode: live
 source: {{plugin: source_synthetic, fps: {FPS}, options: {{frames: 0, id: 0, side_mm: 80, width: 640, height: 480}}}}
-tracker: {{plugin: tracker_aruco, markers: [{{id: 0, side_mm: 80}}]}}
+tracker: {{plugin: tracker_aruco, targets: [{{marker: 0, family: tag36h11, side_mm: 80}}]}}
 raytracer: {{plugin: rt_embree, scene: optix-cs}}
 outputs:
   - {{plugin: sink_window, allow: [display], control: [status]}}
@@ -230,7 +230,7 @@ def swaps():
     swap_run("own plugins", f"""version: 1
 mode: live
 source: {{plugin: source_synthetic, fps: {FPS}, options: {{frames: 0, id: 0, side_mm: 80, width: 640, height: 480}}}}
-tracker: {{plugin: tracker_aruco, markers: [{{id: 0, side_mm: 80}}]}}
+tracker: {{plugin: tracker_aruco, targets: [{{marker: 0, family: tag36h11, side_mm: 80}}]}}
 raytracer: {{plugin: rt_embree, scene: optix-cs}}
 alternatives:
   tracker: [{{plugin: tracker_apriltag}}]
@@ -243,7 +243,7 @@ stats: stats.json
     run = swap_run("counting plugins", f"""version: 1
 mode: live
 source: {{plugin: source_counter, fps: {FPS}, options: {{frames: 1000000}}}}
-tracker: {{plugin: tracker_counter, markers: [{{id: 3, side_mm: 80}}]}}
+tracker: {{plugin: tracker_counter, targets: [{{marker: 3, family: tag36h11, side_mm: 80}}]}}
 raytracer: {{plugin: rt_counter, scene: optix-cs}}
 alternatives:
   tracker: [{{name: second, plugin: tracker_counter}}]

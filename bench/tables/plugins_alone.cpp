@@ -72,7 +72,7 @@ double source_alone(const std::string &picture, int frames) {
 }
 
 double tracker_alone(const std::string &picture, const arhost_intrinsics &camera, int frames) {
-    Tracker tracker("tracker_aruco", {{"dictionary", "DICT_APRILTAG_36h11"}});
+    Tracker tracker("tracker_aruco");
     if (tracker.created() != ARHOST_STATUS_OK || tracker.start(camera, {{0, 80}}) != ARHOST_STATUS_OK)
         throw std::runtime_error(tracker.log());
     const GreyFrame frame(read_grey(picture));

@@ -12,13 +12,13 @@
 
 namespace arhost::camera {
 
-const char *problem_with(const double (&mt)[16]) {
+const char *problem_with(std::span<const double, 16> mt) {
     constexpr double tolerance = 1e-6, distance_limit_mm = 1e9;
-    if (!std::all_of(std::begin(mt), std::end(mt), [](double x) { return std::isfinite(x); }))
+    if (!std::ranges::all_of(mt, [](double x) { return std::isfinite(x); }))
         return "the pose is not finite";
     if (mt[3] != 0 || mt[7] != 0 || mt[11] != 0 || mt[15] != 1)
         return "the pose's last row is not 0 0 0 1";
-    const glm::dmat3 rotation(glm::make_mat4(mt));
+    const glm::dmat3 rotation(glm::make_mat4(mt.data()));
     for (int i = 0; i < 3; ++i)
         for (int j = i; j < 3; ++j)
             if (!(std::abs(glm::dot(rotation[i], rotation[j]) - (i == j)) <= tolerance))
@@ -30,12 +30,12 @@ const char *problem_with(const double (&mt)[16]) {
     return nullptr;
 }
 
-std::optional<arhost_camera> camera_from_marker(const double (&mt)[16], const Coordinates &coordinates,
+std::optional<arhost_camera> camera_from_marker(std::span<const double, 16> mt, const Coordinates &coordinates,
                                                 const arhost_intrinsics &intrinsics) {
     if (problem_with(mt))
         return std::nullopt;
     const glm::dmat4 cp =
-        glm::inverse(glm::make_mat4(mt) * rotation_of(coordinates));           // equation 3.2 of the dissertation
+        glm::inverse(glm::make_mat4(mt.data()) * rotation_of(coordinates));    // equation 3.2 of the dissertation
     const glm::dvec3 eye(cp[3]), look_at = eye - glm::dvec3(cp[2]), up(cp[1]); // equations 3.3 to 3.5
     arhost_camera camera{};
     camera.struct_size = sizeof camera;

@@ -8,17 +8,18 @@
 #include <arhost/camera.h>
 
 #include <optional>
+#include <span>
 
 namespace arhost::camera {
 
-// Returns nullptr if `mt` meets the requirements of arhost_marker.mt (finite; last row 0 0 0 1; right-handed
+// Returns nullptr if `mt` meets the requirements of arhost_target.mt (finite; last row 0 0 0 1; right-handed
 // rotation, orthonormal to 1e-6; at most 1e9 mm from the camera), otherwise a description of the problem.
 // camera_from_marker always calls this function, because tracker output is untrusted.
-const char *problem_with(const double (&mt)[16]);
+const char *problem_with(std::span<const double, 16> mt);
 
 // CP = (MT·R1·R2)⁻¹; eye = (c12, c13, c14), look_at = eye − (c8, c9, c10), up = (c4, c5, c6).
 // Returns nullopt if problem_with(mt) is not nullptr. `coordinates` must be valid.
-std::optional<arhost_camera> camera_from_marker(const double (&mt)[16], const Coordinates &coordinates,
+std::optional<arhost_camera> camera_from_marker(std::span<const double, 16> mt, const Coordinates &coordinates,
                                                 const arhost_intrinsics &intrinsics);
 
 } // namespace arhost::camera

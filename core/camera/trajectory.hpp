@@ -27,7 +27,7 @@ std::string problem_with(const View &view);
 struct TrajectoryFrame {
     std::uint64_t frame; // frame number in the run
     std::int64_t capture_ns;
-    std::optional<View> view; // nullopt if no marker was visible
+    std::optional<View> view; // nullopt if no target was visible
 };
 
 struct Trajectory {

@@ -307,6 +307,7 @@ run_config::Configuration session_configuration(const Arguments &arguments, cons
     session.recording.repeats_decisions = rendering_of(root) == recorded;
     if (session.recording.repeats_decisions) {
         choose_recorded(configuration, session.description);
+        configuration.tracker.reset(); // its results are in the log
         for (const std::string &change : session.changed_scene_files())
             configuration.warnings.push_back(change);
     }
@@ -331,7 +332,7 @@ run_config::Configuration replay_configuration(const Arguments &arguments, const
     constexpr const char *default_pipeline =
         "version: 1\n"
         "source: {plugin: source_synthetic, options: {frames: 0, id: 0, side_mm: 80}}\n"
-        "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+        "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
         "raytracer: {plugin: rt_embree}\n";
     yaml::Node root =
         !arguments.file.empty()
@@ -378,11 +379,12 @@ run_config::Configuration replay_configuration(const Arguments &arguments, const
 // Returns the configuration without tracker and ray tracer, with a tracker of time codes.
 run_config::Configuration latency_configuration(const Arguments &arguments) {
     yaml::Node root = yaml::Node::load(arguments.file);
-    std::string markers;
-    for (int id = 0; id < TimeCodes::count; ++id)
-        markers += fmt::format("{}{{id: {}, side_mm: 100}}", id > 0 ? ", " : "", id);
     root.override_value("mode", "live", "arhost latency");
-    root.override_value("tracker", "{plugin: tracker_apriltag, markers: [" + markers + "]}", "arhost latency");
+    root.override_value("tracker",
+                        fmt::format("{{plugin: tracker_apriltag, targets: [{{ids: 0-{}, family: tag36h11, side_mm: "
+                                    "100}}]}}",
+                                    TimeCodes::count - 1),
+                        "arhost latency");
     run_config::Configuration configuration = parse_configuration(root, arguments);
     if (!configuration.source || configuration.outputs.empty())
         throw yaml::Error(arguments.file + ": to measure latency, it needs the camera as 'source' and an output that "
@@ -502,14 +504,13 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     if (!completed && !pipeline.failure_was_logged())
         console.log(ARHOST_SEVERITY_ERROR, "arhost", pipeline.failure());
     const Statistics &statistics = pipeline.statistics();
-    const auto problem =
-        completed ? problem_with_run(configuration, statistics, pipeline.looked_for()) : std::nullopt;
+    const auto problem = completed ? problem_with_run(configuration, statistics) : std::nullopt;
     const bool is_accepted = problem && problem->is_missing_target && arguments.allow_no_target;
     if (problem)
         console.log(is_accepted || stopped_by_signal ? ARHOST_SEVERITY_WARNING : ARHOST_SEVERITY_ERROR,
                     problem->component,
                     problem->text + (problem->is_missing_target ? " (--allow-no-target accepts this)" : ""));
-    if (const std::string unseen = unseen_markers(configuration, statistics); completed && !unseen.empty())
+    if (const std::string unseen = unseen_targets(configuration, statistics); completed && !unseen.empty())
         console.log(ARHOST_SEVERITY_WARNING, "tracker", unseen);
     if (configuration.mode == run_config::Mode::live && statistics.composited > 0)
         console.log(ARHOST_SEVERITY_INFO, "arhost",
@@ -673,7 +674,7 @@ int check_by_opening(run_config::Configuration configuration, const Arguments &a
     }
     for (const std::string &line : pipeline.findings())
         std::printf("%s\n", base::printable(line).c_str());
-    const auto problem = problem_with_run(configuration, pipeline.statistics(), pipeline.looked_for());
+    const auto problem = problem_with_run(configuration, pipeline.statistics());
     if (problem)
         context.log(ARHOST_SEVERITY_ERROR, problem->component, problem->text);
     return problem ? run_failed : success;

@@ -2,13 +2,14 @@
 #include "host/contract_checks.hpp"
 
 #include "camera/lens.hpp"
-#include "camera/mapping.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <string_view>
+#include <tuple>
 
 namespace arhost::host {
 namespace {
@@ -25,63 +26,41 @@ double seconds(std::int64_t ns) {
     return 1e-9 * static_cast<double>(ns);
 }
 
-std::string name_of(const arhost_marker &marker) {
-    return fmt::format("marker {}", marker.id);
-}
-
-std::string problem_with_order(std::span<const arhost_marker> markers, std::span<const arhost_marker_config> listed) {
-    auto next = listed.begin();
-    for (const arhost_marker &marker : markers) {
-        next = std::find_if(next, listed.end(), [&](const auto &one) { return one.id == marker.id; });
-        if (next == listed.end())
-            return name_of(marker) +
-                   " is reported out of order; markers must be in the order of the configuration's list";
-    }
-    return {};
-}
-
-std::string problem_with_numbers(const arhost_marker &marker) {
-    if (!(marker.ambiguity >= 0 && marker.ambiguity <= 1))
-        return fmt::format("{} has the ambiguity {:g}, which must be 0 to 1", name_of(marker), marker.ambiguity);
-    if (!(marker.reprojection_px >= 0))
-        return fmt::format("{} has the reprojection error {:g} px, which must not be negative", name_of(marker),
-                           marker.reprojection_px);
-    if (marker.state == ARHOST_MARKER_DETECTED && marker.age_frames != 0)
-        return fmt::format("{} is detected, but its age is {} frames", name_of(marker), marker.age_frames);
-    const bool none = std::all_of(std::begin(marker.mt_alternative), std::end(marker.mt_alternative),
-                                  [](double number) { return number == 0; });
-    if (const char *problem = none ? nullptr : camera::problem_with(marker.mt_alternative))
-        return fmt::format("{}'s alternative: {}", name_of(marker), problem);
-    return {};
-}
-
-// Returns the RMS reprojection error of the marker's corners, in px; nullopt if a corner is behind the camera.
-std::optional<double> reprojection_px(const arhost_marker &marker, const arhost_intrinsics &intrinsics,
-                                      double side_mm) {
-    const double s = side_mm / 2;
-    const glm::dvec2 corners[] = {{-s, s}, {s, s}, {s, -s}, {-s, -s}}; // arhost/tracker.h
-    const double(&m)[16] = marker.mt;
-    double sum = 0;
+std::string problem_with_corners(const arhost_observation &observation) {
     for (int i = 0; i < 4; ++i) {
-        const glm::dvec2 &p = corners[i];
-        const glm::dvec3 eye_space(m[0] * p.x + m[4] * p.y + m[12], m[1] * p.x + m[5] * p.y + m[13],
-                                   m[2] * p.x + m[6] * p.y + m[14]);
-        const auto projected = camera::project(intrinsics, {eye_space.x, -eye_space.y, -eye_space.z}); // GL → OpenCV
-        if (!projected)
-            return std::nullopt;
-        sum +=
-            std::pow(projected->x - marker.corners_px[i][0], 2) + std::pow(projected->y - marker.corners_px[i][1], 2);
+        const auto corner = [&](int at) {
+            return glm::dvec2(observation.corners_px[at % 4][0], observation.corners_px[at % 4][1]);
+        };
+        const glm::dvec2 a = corner(i + 1) - corner(i), b = corner(i + 2) - corner(i + 1);
+        if (!(a.x * b.y - a.y * b.x > 0))
+            return fmt::format("the corners of marker {} are not convex and clockwise in the image", observation.id);
     }
-    return std::sqrt(sum / 4);
+    return {};
 }
 
-std::string problem_with_pose(const arhost_marker &marker, const arhost_intrinsics &intrinsics, double side_mm) {
-    const auto error_px = reprojection_px(marker, intrinsics, side_mm);
-    if (!error_px)
-        return name_of(marker) + " is detected, but its pose is behind the camera";
-    if (!(std::abs(*error_px - marker.reprojection_px) <= 0.05 + 0.02 * marker.reprojection_px)) // true also for NaN
-        return fmt::format("{}: the reported reprojection error is {:.3f} px, but the actual one is {:.3f} px",
-                           name_of(marker), marker.reprojection_px, *error_px);
+std::string problem_with_repeats(std::span<const arhost_observation> observations) {
+    const auto key = [](const arhost_observation &one) {
+        return std::tuple(one.family, one.id, one.corners_px[0][0], one.corners_px[0][1], one.corners_px[2][0],
+                          one.corners_px[2][1]);
+    };
+    std::set<decltype(key(observations.front()))> seen;
+    for (const arhost_observation &observation : observations)
+        if (!seen.insert(key(observation)).second)
+            return fmt::format("marker {} is reported twice at the same place", observation.id);
+    return {};
+}
+
+std::string problem_with_covariance(const arhost_target &target) {
+    const double(&c)[36] = target.covariance;
+    if (target.state == ARHOST_TARGET_LOST || std::ranges::all_of(c, [](double number) { return number == 0; }))
+        return {};
+    for (int row = 0; row < 6; ++row) {
+        if (!(c[7 * row] > 0))
+            return fmt::format("{} has a variance of {:g}", target.name, c[7 * row]);
+        for (int column = 0; column < row; ++column)
+            if (std::abs(c[6 * row + column] - c[6 * column + row]) > 1e-6 * std::sqrt(c[7 * row] * c[7 * column]))
+                return fmt::format("{} has a covariance that is not symmetric", target.name);
+    }
     return {};
 }
 
@@ -162,21 +141,18 @@ std::string SourceChecks::problem_with_rate(double since_first_s, double since_l
     return {};
 }
 
-void check_markers(ContractChecks &checks, const arhost_record &record, const arhost_intrinsics &intrinsics,
-                   std::span<const arhost_marker_config> listed) {
-    const std::span markers(record.markers, record.marker_count);
-    checks.add("tracker.order", record.sequence, problem_with_order(markers, listed));
-    std::string numbers, pose;
-    for (const arhost_marker &marker : markers) {
-        if (numbers.empty())
-            numbers = problem_with_numbers(marker);
-        const auto known =
-            std::find_if(listed.begin(), listed.end(), [&](const auto &one) { return one.id == marker.id; });
-        if (pose.empty() && marker.state == ARHOST_MARKER_DETECTED && known != listed.end())
-            pose = problem_with_pose(marker, intrinsics, known->side_mm);
-    }
-    checks.add("tracker.numbers", record.sequence, numbers);
-    checks.add("tracker.pose", record.sequence, pose);
+void check_tracking(ContractChecks &checks, std::uint64_t frame, std::span<const arhost_target> targets,
+                    std::span<const arhost_observation> observations) {
+    const auto first_problem = [](auto all, auto problem_with) {
+        std::string problem;
+        for (const auto &one : all)
+            if (problem.empty())
+                problem = problem_with(one);
+        return problem;
+    };
+    checks.add("tracker.corners", frame, first_problem(observations, problem_with_corners));
+    checks.add("tracker.repeats", frame, problem_with_repeats(observations));
+    checks.add("tracker.covariance", frame, first_problem(targets, problem_with_covariance));
 }
 
 std::size_t sample_hash(std::span<const std::byte> bytes, std::uint64_t frame) {

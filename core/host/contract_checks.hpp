@@ -72,11 +72,11 @@ private:
 };
 
 // Checks a tracker's result:
-// tracker.order: markers are in the order of the configuration.
-// tracker.numbers: numbers are in their ranges.
-// tracker.pose: the actual reprojection error of the pose equals the reported one.
-void check_markers(ContractChecks &checks, const arhost_record &record, const arhost_intrinsics &intrinsics,
-                   std::span<const arhost_marker_config> markers);
+// tracker.corners: the corners of each observation are clockwise in the image and form a convex quadrilateral.
+// tracker.repeats: no observation is reported twice.
+// tracker.covariance: covariances are symmetric, with positive variances.
+void check_tracking(ContractChecks &checks, std::uint64_t frame, std::span<const arhost_target> targets,
+                    std::span<const arhost_observation> observations);
 
 // Returns a hash of some of the bytes; `frame` selects which. If two calls for the same frame return different
 // values, the buffer was modified after hand-over.

@@ -17,43 +17,65 @@ template <class Range> bool all_finite(const Range &values) {
     return std::all_of(std::begin(values), std::end(values), [](double value) { return std::isfinite(value); });
 }
 
-const char *problem_with(const arhost_marker &marker) {
-    if (marker.state < ARHOST_MARKER_DETECTED || marker.state > ARHOST_MARKER_LOST)
-        return "a marker's state is out of range";
-    if (!std::memchr(marker.family, 0, sizeof marker.family))
-        return "a marker's family is not a NUL-terminated string";
-    for (const auto &corner : marker.corners_px)
+const char *problem_with(const arhost_target &target, std::uint32_t observation_count) {
+    if (target.state < ARHOST_TARGET_DETECTED || target.state > ARHOST_TARGET_LOST)
+        return "a target's state is out of range";
+    if (target.first_observation > observation_count ||
+        target.observation_count > observation_count - target.first_observation)
+        return "a target's observations are out of range";
+    if (!all_finite(target.mt_alternative) || !all_finite(target.covariance) ||
+        !std::isfinite(target.reprojection_px) || !std::isfinite(target.ambiguity))
+        return "a target's alternative pose, covariance, reprojection error or ambiguity is not finite";
+    return camera::problem_with(target.mt);
+}
+
+const char *problem_with(const arhost_observation &observation, std::size_t family_count) {
+    if (observation.family >= family_count)
+        return "an observation's family is out of range";
+    for (const auto &corner : observation.corners_px)
         if (!all_finite(corner))
-            return "a coordinate of a marker's corner is not finite";
-    if (!all_finite(marker.mt_alternative) || !std::isfinite(marker.reprojection_px) ||
-        !std::isfinite(marker.ambiguity))
-        return "a marker's alternative pose, reprojection error or ambiguity is not finite";
-    return camera::problem_with(marker.mt);
+            return "a coordinate of an observation's corner is not finite";
+    if (!std::isfinite(observation.decision_margin))
+        return "an observation's decision margin is not finite";
+    return nullptr;
+}
+
+// Copies an array from a slot to which the worker may still write, so that later checks and uses see the same bytes.
+template <class T> void copy_array(std::span<const std::byte> slot, std::uint64_t offset, std::vector<T> &copy) {
+    std::memcpy(copy.data(), slot.subspan(offset, copy.size() * sizeof(T)).data(), copy.size() * sizeof(T));
 }
 
 } // namespace
 
-const char *accept_tracker_result(std::span<const std::byte> slot, const std::set<std::int32_t> &ids,
-                                  arhost_record &record) {
-    // Reads each byte of the shared memory only once, because the worker may still write to it.
-    const auto &result = *reinterpret_cast<const volatile arhost_tracker_result *>(slot.data());
-    const std::uint32_t count = result.marker_count;
-    if (count > ARHOST_MAX_MARKERS)
-        return "the tracker reports more markers than ARHOST_MAX_MARKERS";
-    std::memcpy(record.markers, slot.data() + offsetof(arhost_tracker_result, markers),
-                count * sizeof(arhost_marker));
-    record.marker_count = 0;
-    std::set<std::int32_t> seen;
-    for (std::uint32_t i = 0; i < count; ++i) {
-        const arhost_marker &marker = record.markers[i];
-        if (!ids.contains(marker.id))
-            return "the tracker reports a marker that the configuration does not list";
-        if (!seen.insert(marker.id).second)
-            return "the tracker reports a marker twice";
-        if (const char *problem = problem_with(marker))
+const char *accept_tracker_result(std::span<const std::byte> slot, const std::vector<ipc::Target> &configured,
+                                  std::size_t family_count, Frame &frame) {
+    const ipc::TrackerSlot layout(configured.size());
+    const std::uint32_t count = *reinterpret_cast<const volatile std::uint32_t *>(slot.data());
+    if (count > ARHOST_MAX_OBSERVATIONS)
+        return "the tracker reports more observations than ARHOST_MAX_OBSERVATIONS";
+    std::vector<arhost_observation> observations(count);
+    copy_array(slot, layout.observations_offset, observations);
+    std::vector<arhost_target> targets(configured.size());
+    copy_array(slot, ipc::TrackerSlot::targets_offset, targets);
+    for (arhost_observation &observation : observations) {
+        observation.struct_size = sizeof observation;
+        if (const char *problem = problem_with(observation, family_count))
             return problem;
     }
-    record.marker_count = count;
+    for (std::size_t i = 0; i < targets.size(); ++i) {
+        arhost_target &target = targets[i];
+        if (target.state == 0) // never seen
+            continue;
+        if (const char *problem = problem_with(target, count))
+            return problem;
+        target.struct_size = sizeof target;
+        target.reserved = 0;
+        std::memset(target.name, 0, sizeof target.name);
+        configured[i].name.copy(target.name, sizeof target.name - 1);
+    }
+    std::erase_if(targets, [](const arhost_target &target) { return target.state == 0; });
+    frame.targets = std::move(targets);
+    frame.observations = std::move(observations);
     return nullptr;
 }
 
@@ -68,7 +90,8 @@ const char *accept_frame_info(const arhost_frame_info &info, std::int64_t previo
     record.clock = info.clock;
     record.capture_ns = info.capture_ns;
     record.has_truth = info.has_truth && all_finite(info.true_mt);
-    record.truth_id = info.truth_id;
+    std::ranges::copy(info.truth_target, record.truth_target);
+    record.truth_target[ARHOST_MAX_NAME - 1] = 0;
     std::copy(std::begin(info.true_mt), std::end(info.true_mt), record.true_mt);
     return nullptr;
 }

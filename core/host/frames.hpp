@@ -7,14 +7,16 @@
 #include "host/quality.hpp"
 #include "host/slots.hpp"
 #include "host/statistics.hpp"
+#include "ipc/targets.hpp"
 #include "run_config/session.hpp"
 
 #include <arhost/sink.h>
 
+#include <array>
 #include <chrono>
 #include <memory>
 #include <optional>
-#include <set>
+#include <vector>
 
 namespace arhost::host {
 
@@ -44,8 +46,11 @@ struct Frame {
     Lease result;               // slot in the tracker's memory, while tracking
     Lease overlay;              // slot in the ray tracer's memory
     arhost_render_info render{};
-    Quality quality; // of the overlay
-    arhost_record record{};
+    Quality quality;                    // of the overlay
+    arhost_record record{};             // without the pointers and counts of targets and observations
+    std::vector<arhost_target> targets; // those seen so far
+    std::vector<arhost_observation> observations;
+    std::optional<std::array<double, 16>> world;              // the pose of the scene, as arhost_target.mt
     std::optional<std::size_t> pixels_sample, overlay_sample; // hashes for the contract checks
     Clock::time_point captured; // arrival, unless the source reports capture times of CLOCK_MONOTONIC
     Clock::time_point received;
@@ -69,10 +74,10 @@ struct OutputFrame {
 };
 using OutputFramePointer = std::shared_ptr<const OutputFrame>;
 
-// Copies a tracker's result into the record and validates the copy. Returns nullptr if the copy is valid (known and
-// unique marker ids, finite numbers, valid poses), otherwise a description of the contract violation.
-const char *accept_tracker_result(std::span<const std::byte> slot, const std::set<std::int32_t> &ids,
-                                  arhost_record &record);
+// Copies a tracker's result into the frame and validates the copy. Returns nullptr if the copy is valid (finite
+// numbers, valid poses), otherwise a description of the contract violation.
+const char *accept_tracker_result(std::span<const std::byte> slot, const std::vector<ipc::Target> &configured,
+                                  std::size_t family_count, Frame &frame);
 
 // Copies and validates a source's frame info, which the host received at `now_ns` of CLOCK_MONOTONIC. Returns nullptr
 // or the contract violation. Rejects capture times far in the future, because later frames with correct times would

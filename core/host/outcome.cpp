@@ -4,9 +4,16 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <functional>
+#include <iterator>
 
 namespace arhost::host {
 namespace {
+
+std::string seen_instead(const Statistics &statistics) {
+    const std::string strangers = strangers_text(statistics);
+    return strangers.empty() ? "" : "; it saw " + strangers;
+}
 
 std::uint64_t count(const std::map<std::string, std::uint64_t> &counts, const char *stage) {
     const auto found = counts.find(stage);
@@ -15,8 +22,8 @@ std::uint64_t count(const std::map<std::string, std::uint64_t> &counts, const ch
 
 } // namespace
 
-std::optional<Problem> problem_with_run(const run_config::Configuration &configuration, const Statistics &statistics,
-                                        const std::string &looked_for) {
+std::optional<Problem> problem_with_run(const run_config::Configuration &configuration,
+                                        const Statistics &statistics) {
     if (statistics.frames_in == 0)
         return std::nullopt;
     if (configuration.time_codes)
@@ -31,10 +38,10 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
     if (poses_from_tracker && statistics.tracker_results > 0 && statistics.tracked == 0)
         return Problem{
             "tracker",
-            fmt::format("no marker was seen in any of {} frames{}; it looked for {}; compare the numbers and the "
-                        "dictionary with the print",
+            fmt::format("no target was seen in any of {} frames{}; it looked for {}{}; compare the numbers and the "
+                        "family with the print",
                         statistics.tracker_results, configuration.raytracer ? ", so no frame has an overlay" : "",
-                        looked_for),
+                        describe_targets(configuration.tracker->targets), seen_instead(statistics)),
             true};
     if (configuration.mode != run_config::Mode::live || !configuration.raytracer || statistics.composited == 0 ||
         statistics.augmented > 0)
@@ -48,32 +55,47 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
                                statistics.composited, why.empty() ? "all were late" : why)};
 }
 
-std::string unseen_markers(const run_config::Configuration &configuration, const Statistics &statistics) {
-    if (!configuration.tracker || configuration.trajectory || configuration.time_codes || statistics.markers.empty())
+std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics) {
+    if (!configuration.tracker || configuration.trajectory || configuration.time_codes || statistics.targets.empty())
         return {};
-    std::string ids;
-    std::size_t count = 0;
-    for (const arhost_marker_config &listed : configuration.tracker->markers)
-        if (!statistics.markers.contains(listed.id)) {
-            ids += fmt::format("{} {}", ids.empty() ? "" : ",", listed.id);
-            ++count;
-        }
-    if (count == 0)
+    std::vector<ipc::Target> unseen;
+    std::ranges::copy_if(configuration.tracker->targets, std::back_inserter(unseen),
+                         [&](const ipc::Target &target) { return !statistics.targets.contains(target.name); });
+    if (unseen.empty())
         return {};
-    return fmt::format("{}{} never seen in {} frames", count == 1 ? "marker" : "markers",
-                       ids + (count == 1 ? " was" : " were"), statistics.tracker_results);
+    return fmt::format("never seen in {} frames: {}{}", statistics.tracker_results, describe_targets(unseen),
+                       seen_instead(statistics));
 }
 
-std::string describe_targets(const std::vector<arhost_marker_config> &markers, const ipc::PluginDescription &plugin,
-                             const std::vector<ipc::OptionValue> &options) {
-    std::string text = markers.size() == 1 ? "marker" : "the markers";
-    for (std::size_t i = 0; i < markers.size(); ++i)
-        text += fmt::format("{} {}", i == 0 ? "" : ",", markers[i].id);
-    std::string values;
-    for (std::size_t i = 0; i < std::min(plugin.options.size(), options.size()); ++i)
-        if (!plugin.options[i].choices.empty())
-            values += fmt::format("{}{} {}", values.empty() ? "" : ", ", options[i].key, options[i].text);
-    return values.empty() ? text : text + " (" + values + ")";
+std::string describe_targets(const std::vector<ipc::Target> &targets) {
+    constexpr std::size_t max_named = 8;
+    std::string text;
+    for (std::size_t i = 0; i < std::min(targets.size(), max_named); ++i) {
+        const ipc::Target &target = targets[i];
+        text += i == 0 ? "'" : ", '";
+        text += target.name + "' ";
+        if (!target.body.empty())
+            text += "(body '" + target.body + "')";
+        else if (target.markers.size() == 1)
+            text += fmt::format("({} {})", target.markers[0].family, target.markers[0].id);
+        else
+            text += fmt::format("(map of {} markers of {})", target.markers.size(), target.markers[0].family);
+    }
+    if (targets.size() > max_named)
+        text += fmt::format(" and {} more", targets.size() - max_named);
+    return text;
+}
+
+std::string strangers_text(const Statistics &statistics) {
+    std::vector<std::pair<std::uint64_t, std::string>> most_frequent;
+    for (const auto &[name, frames] : statistics.strangers)
+        most_frequent.emplace_back(frames, name);
+    std::ranges::stable_sort(most_frequent, std::greater{}, &std::pair<std::uint64_t, std::string>::first);
+    most_frequent.resize(std::min<std::size_t>(most_frequent.size(), 5));
+    std::string text;
+    for (const auto &[frames, name] : most_frequent)
+        text += fmt::format("{}{} ({} {})", text.empty() ? "" : ", ", name, frames, frames == 1 ? "frame" : "frames");
+    return text;
 }
 
 } // namespace arhost::host

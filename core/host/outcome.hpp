@@ -14,19 +14,18 @@ namespace arhost::host {
 struct Problem {
     std::string component; // "tracker" or "raytracer"
     std::string text;
-    bool is_missing_target = false; // the tracker works, but has seen none of its markers in any frame
+    bool is_missing_target = false; // the tracker works, but has seen none of its targets in any frame
 };
 
-// `looked_for`: what the tracker looked for, such as "marker 23 with dictionary DICT_6X6_250".
-std::optional<Problem> problem_with_run(const run_config::Configuration &configuration, const Statistics &statistics,
-                                        const std::string &looked_for);
+std::optional<Problem> problem_with_run(const run_config::Configuration &configuration, const Statistics &statistics);
 
-// Names the configured markers that were never seen although others were; "" if there are none.
-std::string unseen_markers(const run_config::Configuration &configuration, const Statistics &statistics);
+// Names the configured targets that were never seen although others were; "" if there are none.
+std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics);
 
-// Describes the markers and those options of a tracker that select one of several values, which include the
-// dictionary.
-std::string describe_targets(const std::vector<arhost_marker_config> &markers, const ipc::PluginDescription &plugin,
-                             const std::vector<ipc::OptionValue> &options);
+// Describes what a tracker looks for, such as "desk (tag36h11 23), board (map of 12 markers)".
+std::string describe_targets(const std::vector<ipc::Target> &targets);
+
+// Names the most frequent markers that belong to no target, as "tag36h11 5 (30 frames)"; "" if there are none.
+std::string strangers_text(const Statistics &statistics);
 
 } // namespace arhost::host

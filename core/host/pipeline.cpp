@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/pipeline.hpp"
 
+#include "host/outcome.hpp"
 #include "run_config/access.hpp"
 
 #include <spdlog/fmt/fmt.h>
@@ -63,7 +64,8 @@ std::vector<std::string> Pipeline::findings() const {
         lines.push_back(fmt::format("camera: fx {:g} px, fy {:g} px, cx {:g} px, cy {:g} px", intrinsics_.fx,
                                     intrinsics_.fy, intrinsics_.cx, intrinsics_.cy));
     if (tracker_)
-        lines.push_back(fmt::format("tracker: {}: {}", tracker_->component->description().id, looked_for()));
+        lines.push_back(fmt::format("tracker: {}: {}", tracker_->component->description().id,
+                                    describe_targets(tracker_->configuration->targets)));
     if (raytracer_)
         lines.push_back(fmt::format("raytracer: {}: {}", raytracer_->component->description().id,
                                     configuration_.raytracer->scene.string()));
@@ -78,18 +80,20 @@ std::vector<std::string> Pipeline::findings() const {
     }
     if (statistics_.frames_in == 0)
         return lines;
-    lines.push_back(fmt::format("{} frames: {} with a marker, {} with an overlay", statistics_.composited,
+    lines.push_back(fmt::format("{} frames: {} with a target, {} with an overlay", statistics_.composited,
                                 statistics_.tracked, statistics_.augmented));
     if (tracker_)
-        for (const arhost_marker_config &listed : tracker_->configuration->markers) {
-            const auto seen = statistics_.markers.find(listed.id);
+        for (const ipc::Target &target : tracker_->configuration->targets) {
+            const auto seen = statistics_.targets.find(target.name);
             lines.push_back(
-                seen == statistics_.markers.end()
-                    ? fmt::format("marker {}: not seen", listed.id)
-                    : fmt::format("marker {}: in {} frames, {:.0f} to {:.0f} px wide, reprojection error {:.2f} px",
-                                  listed.id, seen->second.frames, seen->second.smallest_px, seen->second.largest_px,
+                seen == statistics_.targets.end()
+                    ? fmt::format("target {}: not seen", target.name)
+                    : fmt::format("target {}: in {} frames, {:.0f} to {:.0f} px wide, reprojection error {:.2f} px",
+                                  target.name, seen->second.frames, seen->second.smallest_px, seen->second.largest_px,
                                   seen->second.mean_reprojection_px));
         }
+    if (const std::string strangers = strangers_text(statistics_); !strangers.empty())
+        lines.push_back("markers of no target: " + strangers);
     lines.push_back("ms p50/p95/p99: " + percentiles_text(statistics_.stages.all(), statistics_.latencies.all()));
     return lines;
 }

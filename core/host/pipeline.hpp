@@ -21,6 +21,7 @@
 #include "host/stage.hpp"
 #include "host/statistics.hpp"
 #include "host/time_codes.hpp"
+#include "host/world.hpp"
 #include "run_config/configuration.hpp"
 
 #include <functional>
@@ -57,7 +58,6 @@ public:
 
     const std::string &failure() const { return failure_; }
     bool failure_was_logged() const { return failure_was_logged_; }
-    std::string looked_for() const { return tracker_ ? tracker_->looked_for : ""; }
     bool failed_by_configuration() const { return failed_by_configuration_; }
 
     // Handles Ctrl-C. The first call lets the frames in progress finish and then ends the run, after the longest
@@ -145,7 +145,7 @@ private:
     bool is_early(const Frame &frame);
     bool compose();
     void compose(Frame &frame, std::uint32_t inputs, std::span<std::byte> slot);
-    void exchange_time_code(const arhost_record &record, const OutputView &out);
+    void exchange_time_code(std::span<const arhost_observation> observations, const OutputView &out);
     void start_quality(RaytracerStage &stage);
     void request_samples(RaytracerStage &stage, std::uint32_t samples);
     std::pair<std::uint32_t, std::uint32_t> overlay_size(const Quality &quality) const; // width, height in px
@@ -164,10 +164,12 @@ private:
 
     void on_read(const ipc::Command &command, const ipc::Result &result);
     void start_frame(std::unique_ptr<Frame> frame);
-    void repeat_record(Frame &frame, const run_config::RecordedFrame &recorded) const;
+    void repeat_record(Frame &frame, const run_config::RecordedFrame &recorded);
     bool repeats_decisions(const Frame &frame) const;
     void set_recorded_camera(Frame &frame) const;
-    void set_camera_from_markers(Frame &frame);
+    void count_targets(const Frame &frame);
+    void count_strangers(const Frame &frame);
+    void set_camera_from_targets(Frame &frame);
     void set_camera_from_trajectory(Frame &frame) const;
     void on_camera_known(Frame &frame);
     Frame *accept_result(const ipc::Command &command, const ipc::Result &result, supervise::Component &stage);
@@ -230,9 +232,10 @@ private:
     bool abandoned_ = false; // the run must end immediately
     ipc::Reactor::Registration interrupt_deadline_;
     std::map<std::uint64_t, std::unique_ptr<Frame>> frames_;
-    std::vector<arhost_marker> last_markers_; // of the last composited frame
+    std::vector<arhost_target> last_targets_; // of the last composited frame
+    World world_;
     bool has_window_ = false;
-    bool reported_missing_markers_ = false;
+    bool reported_missing_targets_ = false;
     // The last frame of a paced run.
     struct Paced {
         std::int64_t media_ns;

@@ -6,7 +6,6 @@
 #include "camera/calibration.hpp"
 #include "camera/coordinates.hpp"
 #include "camera/lens.hpp"
-#include "host/outcome.hpp"
 #include "run_config/access.hpp"
 
 #include <spdlog/fmt/fmt.h>
@@ -80,7 +79,7 @@ void Pipeline::make_source() {
             intrinsics_ = *configuration_.camera;
         else if (ready.intrinsics)
             intrinsics_ = *ready.intrinsics;
-        else if (configuration_.time_codes) // only the ids of markers matter
+        else if (configuration_.time_codes) // only the ids of markers matter, not their poses
             intrinsics_ = camera::dissertation_camera({format.width, format.height});
         else if (configuration_.tracker)
             source.node.fail("this source does not report camera intrinsics: add 'camera: {file: calibration.yaml}' "
@@ -174,15 +173,20 @@ std::unique_ptr<SceneLoading> Pipeline::load(const run_config::Scene &scene,
 std::unique_ptr<TrackerStage> Pipeline::make_tracker(TrackerPointer configuration) {
     auto tracker = std::make_unique<TrackerStage>();
     TrackerStage *stage = tracker.get();
-    for (const arhost_marker_config &marker : configuration->markers)
-        stage->marker_ids.insert(marker.id);
+    stage->families = families_of(configuration->targets);
+    stage->targets = to_memory(configuration->targets);
     Component::Callbacks callbacks = common_callbacks("tracker", configuration->node);
     callbacks.hello = [this, stage](const PluginDescription &plugin, std::size_t candidate) {
         const run_config::TrackerConfiguration &own = *stage->configuration;
-        std::vector<OptionValue> options = options_for(*stage->component, ARHOST_KIND_TRACKER, own, candidate);
-        stage->looked_for = describe_targets(own.markers, plugin, options);
-        return Component::Create{{std::move(options), messages::TrackerSetup{*format_, intrinsics_, own.markers}},
-                                 {}};
+        if (const auto body =
+                std::ranges::find_if(own.targets, [](const auto &target) { return !target.body.empty(); });
+            body != own.targets.end() && !(plugin.capabilities & ARHOST_CAPABILITY_REPORTS_POSES))
+            own.node.require("targets").fail(
+                "the target '" + body->name + "' is a body, but '" + plugin.id +
+                "' finds only markers; choose a tracker that reports the poses of bodies");
+        return Component::Create{{options_for(*stage->component, ARHOST_KIND_TRACKER, own, candidate),
+                                  messages::TrackerSetup{*format_, intrinsics_, own.full_search_every}},
+                                 {stage->targets->fd()}};
     };
     callbacks.ready = [stage](const messages::Ready &ready) {
         constexpr std::uint64_t max_size = 2 * std::uint64_t{ARHOST_MAX_STATE}; // of the plugin and the worker itself
@@ -192,8 +196,9 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(TrackerPointer configuratio
         const TrackerStage::StateOwner owner{stage->component->candidate(), stage->component->description().version,
                                              ready.state_size};
         if (std::exchange(stage->state_owner, owner) != owner)
-            stage->state = Lease();
-        return SlotLayout{TrackerSlot::byte_size(ready.state_size), stage_slot_count};
+            stage->state_is_of_solver_only = true;
+        return SlotLayout{TrackerSlot(stage->configuration->targets.size()).byte_size(ready.state_size),
+                          stage_slot_count};
     };
     callbacks.running = [stage] { stage->slots = pool_of(*stage->component); };
     callbacks.disabled = [this, stage](const std::string &reason, bool is_configuration_error) {

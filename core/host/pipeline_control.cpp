@@ -121,6 +121,8 @@ bool Pipeline::finish_swaps() {
     const auto finish = [this](auto &current, auto &next) {
         if (!next || !next->running() || current->component->in_flight() > 0)
             return false;
+        if constexpr (requires { next->inherit_state(*current); })
+            next->inherit_state(*current);
         retire(std::exchange(current, std::exchange(next, nullptr)));
         std::string text = current->component->name() + " is now " + current->configuration->name;
         nlohmann::ordered_json members = {{"plugin", current->configuration->name}};
@@ -167,7 +169,7 @@ void Pipeline::recompute_cameras() {
         if (frame->stage != Frame::Stage::to_render)
             continue;
         frame->record.has_camera = 0;
-        set_camera_from_markers(*frame);
+        set_camera_from_targets(*frame);
         if (!frame->record.has_camera) // its camera was that of an earlier frame
             frame->stage = Frame::Stage::done;
     }

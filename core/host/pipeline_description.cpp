@@ -71,7 +71,7 @@ std::string Pipeline::run_description(const std::string &id) const {
     if (raytracer_)
         add_changed(*raytracer_->component);
     Json description = {{"format", "arhost-session"},
-                        {"version", 1},
+                        {"version", run_config::session_version},
                         {"id", id},
                         {"recorded", utc_now()},
                         {"arhost", ARHOST_VERSION},

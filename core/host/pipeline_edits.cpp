@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Applies edits of the configuration's file and of the scene's files while the video runs (`--watch`).
+// Applies edits of the configuration's file, of the maps and of the scene's files while the video runs (`--watch`).
 #include "host/pipeline.hpp"
 
 #include <spdlog/fmt/fmt.h>
@@ -47,13 +47,22 @@ FileWatch::Files paths_to(const std::filesystem::path &file) {
     return {file, base::real_path(file)};
 }
 
+// The configuration's file and the maps of the targets.
+FileWatch::Files configuration_files(const run_config::Configuration &configuration) {
+    FileWatch::Files files = paths_to(std::filesystem::absolute(configuration.node.file()));
+    if (configuration.tracker)
+        for (const std::filesystem::path &map : configuration.tracker->map_files)
+            files.merge(paths_to(map));
+    return files;
+}
+
 } // namespace
 
 void Pipeline::watch(std::function<run_config::Configuration()> read) {
     read_configuration_ = std::move(read);
     file_watch_.emplace(context_.reactor,
                         [this](const FileWatch::Files &files) { edited_files_.insert(files.begin(), files.end()); });
-    watch_files(paths_to(std::filesystem::absolute(configuration_.node.file())));
+    watch_files(configuration_files(configuration_));
 }
 
 // `files` may be names from the scene loader, which is not trusted: only their folders are opened.
@@ -74,13 +83,14 @@ void Pipeline::apply_edits() {
     const FileWatch::Files files = std::exchange(edited_files_, {});
     const auto is_edited = [&](const std::filesystem::path &file) { return files.contains(file); };
     const std::shared_ptr<const run_config::Configuration> previous = latest_;
-    if (std::ranges::any_of(paths_to(std::filesystem::absolute(configuration_.node.file())), is_edited)) {
+    if (std::ranges::any_of(configuration_files(*previous), is_edited)) {
         try {
             auto edited = std::make_shared<const run_config::Configuration>(read_configuration_());
             for (const std::string_view key : shared_keys)
                 if (content_of(edited->node, key) != content_of(previous->node, key))
                     throw std::runtime_error("an edit of '" + std::string(key) + "' needs a new run");
             latest_ = std::move(edited);
+            watch_files(configuration_files(*latest_));
         } catch (const std::exception &error) {
             context_.log(ARHOST_SEVERITY_WARNING, "arhost",
                          std::string(error.what()) + "; the run continues with the previous configuration");
@@ -106,7 +116,9 @@ void Pipeline::apply(const run_config::Configuration &edited, const run_config::
         return content_of(edited.node, key) != content_of(previous.node, key);
     };
     // An edit that fails is tried again with the next one. The run logs the outcome of each.
-    if (tracker_ && edited.tracker && (differs("tracker") || std::exchange(tracker_edit_failed_, false)))
+    if (tracker_ && edited.tracker &&
+        (differs("tracker") || edited.tracker->targets != previous.tracker->targets ||
+         std::exchange(tracker_edit_failed_, false)))
         start_next_tracker(shared(edited.trackers.front()),
                            [this](const std::string &error, const auto &) { tracker_edit_failed_ = !error.empty(); });
     if (!raytracer_ || !edited.raytracer)

@@ -4,12 +4,15 @@
 #include "host/pipeline.hpp"
 
 #include "camera/mapping.hpp"
+#include "host/outcome.hpp"
 
 #include <arhost/shading/lens.hpp>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <set>
+#include <span>
 #include <tuple>
 
 namespace arhost::host {
@@ -21,18 +24,14 @@ using Clock = std::chrono::steady_clock;
 namespace {
 
 constexpr std::size_t max_reads_in_flight = 2;
-constexpr std::chrono::seconds max_time_without_marker{5}; // in mode live, from the first frame
+constexpr std::chrono::seconds max_time_without_target{5}; // in mode live, from the first frame
 constexpr std::chrono::milliseconds max_lateness{100};     // of a paced run that catches up
 constexpr double max_step_s = 10;                          // longer gaps in the time of a film are not waited for
 constexpr std::size_t max_waiting_for_delay = 3;           // frames in mode live, for a stage that catches up
 constexpr std::uint32_t max_attempts = 2; // per frame and stage, if the worker dies while processing the frame
 
-// Returns the first marker that is not lost, or null. Trackers report markers in the order of the configuration.
-const arhost_marker *anchor_of(const arhost_record &record) {
-    const arhost_marker *const end = record.markers + record.marker_count;
-    const arhost_marker *const anchor =
-        std::find_if(record.markers, end, [](const arhost_marker &m) { return m.state != ARHOST_MARKER_LOST; });
-    return anchor == end ? nullptr : anchor;
+bool is_visible(const arhost_target &target) {
+    return target.state != ARHOST_TARGET_LOST;
 }
 
 const char *name_of_stage(Frame::Stage waiting) {
@@ -142,34 +141,35 @@ void Pipeline::start_frame(std::unique_ptr<Frame> frame) {
         set_camera_from_trajectory(added);
     if (live_ && is_behind())
         skip(added, "latency");
-    else if (tracker_ && !(repeats_decisions(added) && !added.recorded->has_markers))
+    else if (tracker_ && !repeats_decisions(added))
         enqueue(added, Frame::Stage::to_track);
     else
         on_camera_known(added);
 }
 
-// Sets what the video of a session does not contain. If the recorded decisions are repeated, the tracker processes
-// only the frames in which it has found markers: in the others, the recorded run has skipped it, or the result is
-// known.
-void Pipeline::repeat_record(Frame &frame, const run_config::RecordedFrame &recorded) const {
+// Sets what the video of a session does not contain. If the recorded decisions are repeated, that includes the
+// results of the tracker, which may depend on frames that the recorded run has dropped.
+void Pipeline::repeat_record(Frame &frame, const run_config::RecordedFrame &recorded) {
     frame.recorded = &recorded;
     frame.record.clock = recorded.clock;
     frame.record.capture_ns = recorded.capture_ns;
     frame.record.has_truth = recorded.truth.has_value();
     if (recorded.truth) {
-        frame.record.truth_id = recorded.truth->first;
+        recorded.truth->first.copy(frame.record.truth_target, ARHOST_MAX_NAME - 1);
         std::ranges::copy(recorded.truth->second, frame.record.true_mt);
     }
-    if (repeats_decisions(frame) && !recorded.has_markers)
-        set_recorded_camera(frame);
+    if (!repeats_decisions(frame))
+        return;
+    frame.targets = recorded.targets;
+    frame.observations = recorded.observations;
+    count_targets(frame);
+    set_recorded_camera(frame);
 }
 
 bool Pipeline::repeats_decisions(const Frame &frame) const {
     return frame.recorded && configuration_.recording->repeats_decisions;
 }
 
-// Sets the camera of a frame in which no marker is visible. It is that of an earlier frame, which the recorded run
-// may have dropped.
 void Pipeline::set_recorded_camera(Frame &frame) const {
     if (!frame.recorded->view || configuration_.trajectory)
         return;
@@ -205,6 +205,7 @@ bool Pipeline::track() {
     command.clock = frame->record.clock;
     if (tracker_->state)
         command.state_slot = tracker_->state.index();
+    command.state_is_of_solver_only = tracker_->state_is_of_solver_only;
     tracker_->component->submit(command, frame->pixels.region(),
                                 tracker_->state ? tracker_->state.region() : nullptr);
     return true;
@@ -238,42 +239,80 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
         return;
     Frame &frame = *accepted;
     frame.attempts = 0;
-    const char *problem = accept_tracker_result(frame.result.bytes(), tracker_->marker_ids, frame.record);
-    if (!problem)
+    const run_config::TrackerConfiguration &configuration = *tracker_->configuration;
+    const char *problem =
+        accept_tracker_result(frame.result.bytes(), configuration.targets, tracker_->families.size(), frame);
+    if (!problem) {
         tracker_->state = std::move(frame.result);
+        tracker_->state_is_of_solver_only = false;
+    }
     frame.result = Lease();
     if (problem) {
         skip(frame, "tracker");
         return tracker_->component->end_process(std::string("contract violation: ") + problem);
     }
+    for (std::size_t i = 0; i < tracker_->families.size(); ++i)
+        tracker_->families[i].copy(frame.record.families[i], ARHOST_MAX_FAMILY - 1);
     ++statistics_.tracker_results;
-    if (tracker_->configuration->conform)
-        check_markers(statistics_.contract_checks, frame.record, intrinsics_, tracker_->configuration->markers);
+    if (configuration.conform)
+        check_tracking(statistics_.contract_checks, command.sequence, frame.targets, frame.observations);
     frame.times.tracker = std::chrono::nanoseconds(result.busy_ns);
     tracker_->add_duration(frame.times.tracker);
-    statistics_.tracked += anchor_of(frame.record) != nullptr;
-    for (const arhost_marker &marker : std::span(frame.record.markers, frame.record.marker_count))
-        if (marker.state != ARHOST_MARKER_LOST && marker.age_frames == 0)
-            statistics_.markers[marker.id].add(marker);
-    if (live_ && statistics_.markers.empty() && !reported_missing_markers_ && !configuration_.time_codes &&
-        Clock::now() - statistics_.first_frame > max_time_without_marker) {
-        reported_missing_markers_ = true;
-        context_.log(ARHOST_SEVERITY_WARNING, "tracker",
-                     "has seen no marker yet; it looks for " + tracker_->looked_for +
-                         "; compare the numbers and the dictionary with the print");
-    }
-    set_camera_from_markers(frame);
+    count_targets(frame);
+    count_strangers(frame);
+    frame.world = world_.locate(configuration.targets.front().name, frame.targets, command.sequence,
+                                configuration.world_grace_frames);
+    set_camera_from_targets(frame);
     on_camera_known(frame);
 }
 
-void Pipeline::set_camera_from_markers(Frame &frame) {
+void Pipeline::count_targets(const Frame &frame) {
+    statistics_.tracked += std::ranges::any_of(frame.targets, is_visible);
+    const std::span observations(frame.observations);
+    for (const arhost_target &target : frame.targets)
+        if (is_visible(target) && target.age_frames == 0)
+            statistics_.targets[target.name].add(
+                target, observations.subspan(target.first_observation, target.observation_count));
+}
+
+// Counts the markers that no target lists, and tells the user of them if there is no target for a while.
+void Pipeline::count_strangers(const Frame &frame) {
+    std::size_t listed = 0; // the observations of targets come first
+    for (const arhost_target &target : frame.targets)
+        listed = std::max<std::size_t>(listed, target.first_observation + target.observation_count);
+    std::set<std::string> strangers;
+    for (const arhost_observation &observation : std::span(frame.observations).subspan(listed)) {
+        const std::string &family = tracker_->families[observation.family];
+        const auto is_this = [&](const ipc::TargetMarker &marker) {
+            return marker.id == observation.id && marker.family == family;
+        };
+        const auto lists_it = [&](const ipc::Target &target) { return std::ranges::any_of(target.markers, is_this); };
+        if (std::ranges::none_of(tracker_->configuration->targets, lists_it))
+            strangers.insert(family + " " + std::to_string(observation.id));
+    }
+    for (const std::string &name : strangers)
+        if (statistics_.strangers.contains(name) || statistics_.strangers.size() < Statistics::max_strangers)
+            ++statistics_.strangers[name];
+    if (live_ && statistics_.targets.empty() && !reported_missing_targets_ && !configuration_.time_codes &&
+        Clock::now() - statistics_.first_frame > max_time_without_target) {
+        reported_missing_targets_ = true;
+        const std::string seen = strangers_text(statistics_);
+        context_.log(ARHOST_SEVERITY_WARNING, "tracker",
+                     "has seen no target yet; it looks for " + describe_targets(tracker_->configuration->targets) +
+                         (seen.empty() ? "" : "; it sees " + seen) +
+                         "; compare the numbers and the family with the print");
+    }
+}
+
+void Pipeline::set_camera_from_targets(Frame &frame) {
     if (configuration_.trajectory)
         return;
-    if (repeats_decisions(frame) && !anchor_of(frame.record))
+    if (repeats_decisions(frame))
         return set_recorded_camera(frame);
     const std::uint64_t sequence = frame.record.sequence;
-    if (const arhost_marker *anchor = anchor_of(frame.record))
-        last_camera_ = {sequence, *camera::camera_from_marker(anchor->mt, coordinates(), intrinsics_)};
+    if (frame.world)
+        if (const auto camera = camera::camera_from_marker(*frame.world, coordinates(), intrinsics_))
+            last_camera_ = {sequence, *camera};
     if (!last_camera_ || sequence - last_camera_->first > tracker_->configuration->hold_frames)
         return;
     frame.held = last_camera_->first != sequence;
@@ -574,8 +613,7 @@ bool Pipeline::compose() {
         }
     }
     const std::uint64_t sequence = ready->first;
-    const arhost_record &record = ready->second->record;
-    last_markers_.assign(record.markers, record.markers + record.marker_count);
+    last_targets_ = std::move(ready->second->targets);
     statistics_.composited += is_shown;
     statistics_.augmented += is_shown && ready->second->record.overlay != ARHOST_OVERLAY_NONE;
     statistics_.last_frame = Clock::now();
@@ -605,13 +643,18 @@ void Pipeline::compose(Frame &frame, std::uint32_t inputs, std::span<std::byte> 
     Region region;
     if (frame.record.overlay != ARHOST_OVERLAY_NONE)
         std::tie(overlay, region) = full_size_overlay(frame);
-    // Copies the record only up to its last used marker.
-    const std::size_t used = offsetof(arhost_record, markers) + frame.record.marker_count * sizeof(arhost_marker);
-    std::memcpy(slot.data(), &frame.record, used);
+    frame.record.target_count = static_cast<std::uint32_t>(frame.targets.size());
+    frame.record.observation_count = static_cast<std::uint32_t>(frame.observations.size());
+    std::memcpy(slot.data(), &frame.record, sizeof frame.record);
+    const auto copy_array = [&]<class T>(const std::vector<T> &array, std::uint64_t offset) {
+        std::memcpy(slot.data() + offset, array.data(), array.size() * sizeof(T));
+    };
+    copy_array(frame.targets, OutputSlot::targets_offset);
+    copy_array(frame.observations, OutputSlot::observations_offset);
     const OutputView out{reinterpret_cast<std::uint8_t *>(slot.data()) + OutputSlot::image_offset,
                          OutputSlot::stride(format_->width)};
     if (configuration_.time_codes)
-        exchange_time_code(frame.record, out);
+        exchange_time_code(frame.observations, out);
     else
         composite(*format_, planes, overlay, region, out);
     copy_sink_inputs(frame, overlay, region, inputs, slot);
@@ -620,11 +663,11 @@ void Pipeline::compose(Frame &frame, std::uint32_t inputs, std::span<std::byte> 
 }
 
 // Measures the age of the picture that the frame shows, and draws the next one.
-void Pipeline::exchange_time_code(const arhost_record &record, const OutputView &out) {
+void Pipeline::exchange_time_code(std::span<const arhost_observation> observations, const OutputView &out) {
     const Clock::time_point now = Clock::now();
     if (!time_codes_)
         time_codes_.emplace(now);
-    if (const auto age = time_codes_->see({record.markers, record.marker_count}, now))
+    if (const auto age = time_codes_->see(observations, now))
         statistics_.stages.add("glass_to_glass", *age);
     if (time_codes_->is_overdue(std::chrono::seconds(5), now))
         context_.log(ARHOST_SEVERITY_WARNING, "latency",

@@ -30,9 +30,9 @@ const char *to_text(Component::State state) {
     return "";
 }
 
-const char *to_text(const arhost_marker &marker) {
-    return marker.state == ARHOST_MARKER_DETECTED    ? "detected"
-           : marker.state == ARHOST_MARKER_PREDICTED ? "predicted"
+const char *to_text(const arhost_target &target) {
+    return target.state == ARHOST_TARGET_DETECTED    ? "detected"
+           : target.state == ARHOST_TARGET_PREDICTED ? "predicted"
                                                      : "lost";
 }
 
@@ -107,11 +107,11 @@ Json Pipeline::status_of(const Component &component) const {
 
 Json Pipeline::status() const {
     Json targets = Json::array();
-    for (const arhost_marker &marker : last_markers_)
-        targets.push_back({{"id", marker.id},
-                           {"state", to_text(marker)},
-                           {"distance_mm", std::hypot(marker.mt[12], marker.mt[13], marker.mt[14])},
-                           {"reprojection_px", marker.reprojection_px}});
+    for (const arhost_target &target : last_targets_)
+        targets.push_back({{"name", target.name},
+                           {"state", to_text(target)},
+                           {"distance_mm", std::hypot(target.mt[12], target.mt[13], target.mt[14])},
+                           {"reprojection_px", target.reprojection_px}});
     Json stages = Json::object();
     for (const auto &[name, timing] : statistics_.stages.recent())
         stages[name] = timing.to_json();

@@ -51,11 +51,19 @@ struct TrackerStage : Stage {
         std::uint64_t size = 0;
         bool operator==(const StateOwner &) const = default;
     };
-    StateOwner state_owner; // the current worker
-    Lease state;            // what the last accepted call wrote; survives the worker
+    StateOwner state_owner;               // the current worker
+    Lease state;                          // what the last accepted call wrote; survives the worker
+    bool state_is_of_solver_only = false; // another plugin wrote the rest (ipc::Command)
     std::shared_ptr<const run_config::TrackerConfiguration> configuration;
-    std::set<std::int32_t> marker_ids;
-    std::string looked_for; // the markers and dictionary, for messages
+    // Continues with the poses of the stage that this one replaces.
+    void inherit_state(TrackerStage &previous) {
+        if (configuration->targets != previous.configuration->targets)
+            return;
+        state = std::move(previous.state);
+        state_is_of_solver_only = true;
+    }
+    std::vector<std::string> families;        // of the targets' markers
+    std::optional<ipc::SharedMemory> targets; // those of the configuration, for its workers
 };
 
 struct LoadedScene {

@@ -17,16 +17,17 @@ namespace {
 const double log_growth = std::log(1.01);
 }
 
-void MarkerStatistics::add(const arhost_marker &marker) {
+void TargetStatistics::add(const arhost_target &target, std::span<const arhost_observation> observations) {
     double side_px = 0;
-    for (int i = 0; i < 4; ++i) {
-        const double(&a)[2] = marker.corners_px[i], (&b)[2] = marker.corners_px[(i + 1) % 4];
-        side_px += std::hypot(b[0] - a[0], b[1] - a[1]) / 4;
-    }
+    for (const arhost_observation &marker : observations)
+        for (int i = 0; i < 4; ++i) {
+            const double(&a)[2] = marker.corners_px[i], (&b)[2] = marker.corners_px[(i + 1) % 4];
+            side_px += std::hypot(b[0] - a[0], b[1] - a[1]) / (4 * static_cast<double>(observations.size()));
+        }
     smallest_px = frames == 0 ? side_px : std::min(smallest_px, side_px);
     largest_px = std::max(largest_px, side_px);
     ++frames;
-    mean_reprojection_px += (marker.reprojection_px - mean_reprojection_px) / static_cast<double>(frames);
+    mean_reprojection_px += (target.reprojection_px - mean_reprojection_px) / static_cast<double>(frames);
 }
 
 void Timing::add(std::chrono::nanoseconds time) {
@@ -176,6 +177,13 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
                    {"dropped", statistics.dropped},
                    {"passed_unaugmented", statistics.skipped}}},
                  {"fps", statistics.fps()}};
+    json["targets"] = Json::object();
+    for (const auto &[name, target] : statistics.targets)
+        json["targets"][name] = {{"frames", target.frames},
+                                 {"smallest_px", target.smallest_px},
+                                 {"largest_px", target.largest_px},
+                                 {"mean_reprojection_px", target.mean_reprojection_px}};
+    json["unlisted_markers"] = statistics.strangers;
     for (const auto &[name, timing] : statistics.stages.all())
         json["stages"][name] = timing.to_json();
     json["latency"] = latency_json(statistics, statistics.latencies.all());

@@ -14,6 +14,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -76,23 +77,25 @@ struct EndedComponents {
     EndedComponents and_running(const std::vector<supervise::Component *> &components) const;
 };
 
-// The frames in which a marker was detected.
-struct MarkerStatistics {
+// The frames in which a target was detected.
+struct TargetStatistics {
     std::uint64_t frames = 0;
-    double smallest_px = 0, largest_px = 0; // mean side of the marker in the image
+    double smallest_px = 0, largest_px = 0; // mean side of its markers in the image; 0 for a body
     double mean_reprojection_px = 0;
-    void add(const arhost_marker &marker);
+    void add(const arhost_target &target, std::span<const arhost_observation> observations);
 };
 
 struct Statistics {
-    std::uint64_t frames_in = 0;                      // frames received from the source
-    std::uint64_t tracker_results = 0;                // frames for which the tracker delivered a result in time
-    std::uint64_t tracked = 0;                        // frames with at least one detected marker
-    std::uint64_t augmented = 0;                      // frames composited with an overlay
-    std::uint64_t composited = 0;                     // frames sent to the outputs, augmented or not
-    std::map<std::int32_t, MarkerStatistics> markers; // by id
-    std::map<std::string, std::uint64_t> dropped;     // number of dropped frames by stage
-    std::map<std::string, std::uint64_t> skipped;     // number of unaugmented frames by the failed stage
+    static constexpr std::size_t max_strangers = 64;
+    std::uint64_t frames_in = 0;                     // frames received from the source
+    std::uint64_t tracker_results = 0;               // frames for which the tracker delivered a result in time
+    std::uint64_t tracked = 0;                       // frames with at least one detected target
+    std::uint64_t augmented = 0;                     // frames composited with an overlay
+    std::uint64_t composited = 0;                    // frames sent to the outputs, augmented or not
+    std::map<std::string, TargetStatistics> targets; // by name
+    std::map<std::string, std::uint64_t> strangers;  // frames with a marker that no target lists, by name
+    std::map<std::string, std::uint64_t> dropped;    // number of dropped frames by stage
+    std::map<std::string, std::uint64_t> skipped;    // number of unaugmented frames by the failed stage
     StageTimings stages;
     // From the capture of a frame until an output has written it, by output; `latency` of `stages` ends when the
     // frame is composited. Both begin at the arrival of the frame if the source does not know when it was captured.

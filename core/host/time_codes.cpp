@@ -54,12 +54,12 @@ void TimeCodes::draw(const OutputView &out, std::uint32_t width, std::uint32_t h
     }
 }
 
-std::optional<std::chrono::nanoseconds> TimeCodes::see(std::span<const arhost_marker> markers,
+std::optional<std::chrono::nanoseconds> TimeCodes::see(std::span<const arhost_observation> seen,
                                                        Clock::time_point now) {
-    const auto is_seen = [](const arhost_marker &marker) { return marker.state == ARHOST_MARKER_DETECTED; };
-    const auto found = std::ranges::find_if(markers, is_seen);
+    const auto is_code = [](const arhost_observation &one) { return one.id >= 0 && one.id < count; };
+    const auto found = std::ranges::find_if(seen, is_code);
     // Two codes in one picture: the exposure began before one was replaced by the other.
-    if (found == markers.end() || std::ranges::count_if(markers, is_seen) != 1 || found->id < 0 || found->id >= count)
+    if (found == seen.end() || std::ranges::count_if(seen, is_code) != 1)
         return {};
     const auto code = static_cast<std::size_t>(found->id);
     last_seen_ = now;

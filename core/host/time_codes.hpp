@@ -21,7 +21,7 @@ namespace arhost::host {
 class TimeCodes {
 public:
     using Clock = std::chrono::steady_clock;
-    static constexpr std::int32_t count = ARHOST_MAX_MARKERS; // pictures; their ids are 0 to count − 1
+    static constexpr std::int32_t count = 64; // pictures; their ids are 0 to count − 1
 
     explicit TimeCodes(Clock::time_point now) : last_seen_(now) {}
 
@@ -29,7 +29,7 @@ public:
     void draw(const OutputView &out, std::uint32_t width, std::uint32_t height, Clock::time_point now);
     // Returns the age of the picture that a frame shows. Returns nullopt if it shows none or several, or if an
     // earlier frame has already shown it. Ages above the time of `count` frames are reported too low.
-    std::optional<std::chrono::nanoseconds> see(std::span<const arhost_marker> markers, Clock::time_point now);
+    std::optional<std::chrono::nanoseconds> see(std::span<const arhost_observation> seen, Clock::time_point now);
     // Whether no frame has shown a picture for `limit`. Returns true at most once per `limit`.
     bool is_overdue(std::chrono::nanoseconds limit, Clock::time_point now);
 

@@ -18,14 +18,6 @@ template <> struct adl_serializer<arhost_frame_format> {
     static void to_json(json &out, const arhost_frame_format &value) { out = ipc::to_json(value); }
     static void from_json(const json &in, arhost_frame_format &value) { value = ipc::format_from_json(in); }
 };
-template <> struct adl_serializer<arhost_marker_config> {
-    static void to_json(json &out, const arhost_marker_config &value) {
-        out = {{"id", value.id}, {"side_mm", value.side_mm}};
-    }
-    static void from_json(const json &in, arhost_marker_config &value) {
-        value = {sizeof value, in.at("id").get<std::int32_t>(), in.at("side_mm").get<double>()};
-    }
-};
 template <> struct adl_serializer<ipc::PluginDescription> {
     static void to_json(json &out, const ipc::PluginDescription &value) { out = ipc::to_json(value); }
     static void from_json(const json &in, ipc::PluginDescription &value) { value = ipc::description_from_json(in); }
@@ -62,7 +54,7 @@ namespace messages {
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Open, plugin, sandbox)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Load, scene, sandbox)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SourceSetup, first_sequence, fps, paced, intrinsics)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TrackerSetup, format, intrinsics, markers)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TrackerSetup, format, intrinsics, full_search_every)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RaytracerSetup, width, height, intrinsics)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SinkSetup, video_format, fps, first_sequence, intrinsics, run_description)
 

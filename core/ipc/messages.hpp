@@ -66,7 +66,7 @@ struct TrackerSetup {
     static constexpr const char *kind = "tracker";
     arhost_frame_format format{};
     arhost_intrinsics intrinsics{};
-    std::vector<arhost_marker_config> markers;
+    std::uint32_t full_search_every = 1;
 };
 struct RaytracerSetup {
     static constexpr const char *kind = "raytracer";
@@ -86,8 +86,8 @@ constexpr std::size_t max_run_description = Channel::max_message_size - 32 * 102
 using Setup = std::variant<SourceSetup, TrackerSetup, RaytracerSetup, SinkSetup>;
 
 // Requests the worker to create and start the plugin's instance. The descriptor of the scene's arena accompanies it
-// for a ray tracer. The sockets of options of type LISTEN follow; the option's `integer` is its position among the
-// descriptors.
+// for a ray tracer, that of the targets (targets.hpp) for a tracker. The sockets of options of type LISTEN follow;
+// the option's `integer` is its position among the descriptors.
 struct Create {
     static constexpr const char *type = "create";
     std::vector<OptionValue> options;
@@ -151,7 +151,7 @@ struct Ready {
     std::uint64_t frame_count = 0;               // set only by a source; 0: unknown
     std::optional<arhost_intrinsics> intrinsics; // set only by a source that knows its camera
     std::uint32_t capabilities = 0;              // of the instance; set only by a sink
-    std::uint64_t state_size = 0;                // set only by a tracker
+    std::uint64_t state_size = 0;                // set only by a tracker: of the worker and the plugin
 };
 
 struct Attached {

@@ -35,7 +35,7 @@ struct Command {
     std::uint64_t sequence;
     std::int64_t capture_ns;
     arhost_clock clock;
-    std::uint32_t reserved;
+    std::uint32_t state_is_of_solver_only; // non-zero: the plugin's part of the state is another plugin's
     double time_s;
     arhost_camera camera;
 };
@@ -97,19 +97,32 @@ inline std::uint32_t overlay_stride(std::uint32_t width) {
     return (width * 4 + 63) / 64 * 64;
 }
 
-// Layout of a slot that a tracker writes: the result, then the state of the worker and of the plugin, which only the
-// worker can read.
+// Layout of a slot that a tracker's worker writes: the number of observations (uint32), an arhost_target for each
+// configured target, the observations, then the state of the worker and of the plugin, which only the worker can
+// read.
 class TrackerSlot {
 public:
-    static constexpr std::uint64_t state_offset = (sizeof(arhost_tracker_result) + 63) / 64 * 64;
-    static std::uint64_t byte_size(std::uint64_t state_size) { return state_offset + state_size; }
+    static constexpr std::uint64_t targets_offset = 64;
+
+    explicit TrackerSlot(std::size_t target_count)
+        : observations_offset(aligned(targets_offset + target_count * sizeof(arhost_target))),
+          state_offset(aligned(observations_offset + ARHOST_MAX_OBSERVATIONS * sizeof(arhost_observation))) {}
+    const std::uint64_t observations_offset, state_offset;
+    std::uint64_t byte_size(std::uint64_t state_size) const { return state_offset + state_size; }
+
+private:
+    static std::uint64_t aligned(std::uint64_t offset) { return (offset + 63) / 64 * 64; }
 };
 
-// Layout of a slot that sinks read: the record, the composited image, the video frame and the overlay. The host fills
-// the last two only if a sink reads them; unused pages take no memory.
+// Layout of a slot that sinks read: the record, its targets and observations (the pointers in the record are not
+// set), the composited image, the video frame and the overlay. The host fills the last two only if a sink reads them;
+// unused pages take no memory.
 class OutputSlot {
 public:
-    static constexpr std::uint64_t image_offset = (sizeof(arhost_record) + 4095) / 4096 * 4096;
+    static constexpr std::uint64_t targets_offset = (sizeof(arhost_record) + 63) / 64 * 64;
+    static constexpr std::uint64_t observations_offset = targets_offset + ARHOST_MAX_TARGETS * sizeof(arhost_target);
+    static constexpr std::uint64_t image_offset =
+        (observations_offset + ARHOST_MAX_OBSERVATIONS * sizeof(arhost_observation) + 4095) / 4096 * 4096;
     static std::uint32_t stride(std::uint32_t width) { return (width * 3 + 63) / 64 * 64; }
 
     explicit OutputSlot(const arhost_frame_format &video)

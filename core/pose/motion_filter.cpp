@@ -43,6 +43,12 @@ Rigid pose_of(const Motion &motion) {
             Eigen::Map<const Eigen::Vector3d>(motion.translation_mm)};
 }
 
+Eigen::Matrix3d covariance_of(const Motion &motion, const Eigen::Vector3d &on_target_mm) {
+    const Eigen::Map<const Matrix6d> turn(motion.turn_covariance), shift(motion.shift_covariance);
+    const Eigen::Matrix3d lever = cross_matrix(Eigen::Map<const Eigen::Matrix3d>(motion.rotation) * on_target_mm);
+    return shift.topLeftCorner<3, 3>() + lever * turn.topLeftCorner<3, 3>() * lever.transpose();
+}
+
 Motion begin_motion(const Estimate &first) {
     Motion motion{};
     Eigen::Map<Eigen::Matrix3d>(motion.rotation) = first.camera_from_target.rotation;

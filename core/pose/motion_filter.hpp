@@ -30,4 +30,7 @@ double rotation_distance2(const Motion &motion, const Estimate &measured);
 
 Rigid pose_of(const Motion &motion);
 
+// The covariance, in mm², of where a point of the target is, in camera axes.
+Eigen::Matrix3d covariance_of(const Motion &motion, const Eigen::Vector3d &on_target_mm);
+
 } // namespace arhost::pose

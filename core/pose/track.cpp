@@ -96,11 +96,9 @@ Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_
     return step;
 }
 
-std::optional<Rigid> predicted_pose(const Track &track, std::int64_t capture_ns) {
+std::optional<Motion> predicted_motion(const Track &track, std::int64_t capture_ns) {
     const auto seconds = seconds_since(track, capture_ns);
-    if (!seconds)
-        return {};
-    return pose_of(predicted(track.branch[0], *seconds));
+    return seconds ? std::optional(predicted(track.branch[0], *seconds)) : std::nullopt;
 }
 
 } // namespace arhost::pose

@@ -34,6 +34,6 @@ struct Step {
 Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_t capture_ns);
 
 // Returns where the target is at `capture_ns` if it moves on at the same speed; nullopt if the track is too old.
-std::optional<Rigid> predicted_pose(const Track &track, std::int64_t capture_ns);
+std::optional<Motion> predicted_motion(const Track &track, std::int64_t capture_ns);
 
 } // namespace arhost::pose

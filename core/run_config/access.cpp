@@ -131,10 +131,14 @@ std::string warning_of_output(const yaml::Node &path, const std::string &plugin)
     const char *home = std::getenv("HOME");
     for (const fs::path &wide : {real_path(home ? home : "/"), real_path(".")})
         if (sandbox::contains(folder, wide))
-            return path.where() + ": " + path.path() + ": '" + plugin + "' may write to everything in and below '" +
-                   folder.string() + "'; give this output its own folder, as in 'path: output/" +
-                   file.filename().string() + "'";
+            return warning_at(path, "'" + plugin + "' may write to everything in and below '" + folder.string() +
+                                        "'; give this output its own folder, as in 'path: output/" +
+                                        file.filename().string() + "'");
     return "";
+}
+
+std::string warning_at(const yaml::Node &node, const std::string &message) {
+    return node.where() + ": " + node.path() + ": " + message;
 }
 
 } // namespace arhost::run_config

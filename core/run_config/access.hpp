@@ -24,4 +24,7 @@ bool is_standard_output(const yaml::Node &path);
 // "".
 std::string warning_of_output(const yaml::Node &path, const std::string &plugin);
 
+// Returns a warning, in the format of the errors of yaml::Node.
+std::string warning_at(const yaml::Node &node, const std::string &message);
+
 } // namespace arhost::run_config

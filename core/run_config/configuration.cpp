@@ -114,32 +114,17 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
     return component;
 }
 
-// Returns a warning, in the format of the errors of yaml::Node.
-std::string warning_at(const yaml::Node &node, const std::string &message) {
-    return node.where() + ": " + node.path() + ": " + message;
-}
-
 TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared, std::vector<std::string> &warnings) {
-    TrackerConfiguration tracker{parse_component(node, "tracker", shared), {}, 0};
-    const yaml::Node markers = node.require("markers");
-    std::set<std::int64_t> ids;
-    for (const yaml::Node &marker : markers.items()) {
-        marker.allow_keys(keys_of("tracker.markers[]"));
-        const yaml::Node id = marker.require("id");
-        const std::int64_t number = id.integer(0, std::numeric_limits<std::int32_t>::max());
-        if (!ids.insert(number).second)
-            id.fail("the marker " + std::to_string(number) + " is listed twice; keep one of them");
-        const yaml::Node side = marker.require("side_mm");
-        const double side_mm = side.real(0.01, 1e6);
-        if (side_mm < 1 || side_mm > 5000)
-            warnings.push_back(warning_at(side, "a marker with a side of " + side.text() +
-                                                    " mm is implausible; check the unit, which is mm"));
-        tracker.markers.push_back({sizeof(arhost_marker_config), static_cast<std::int32_t>(number), side_mm});
-    }
-    if (tracker.markers.empty() || tracker.markers.size() > ARHOST_MAX_MARKERS)
-        markers.fail("must list 1 to " + std::to_string(ARHOST_MAX_MARKERS) +
-                     " markers, as in [{id: 0, side_mm: 80}]");
-    tracker.hold_frames = static_cast<std::uint32_t>(integer_or_default(node, "tracker.hold_frames", 0, 1'000'000));
+    reject_markers(node);
+    TrackerConfiguration tracker{parse_component(node, "tracker", shared), {}};
+    reject_family_option(node);
+    tracker.targets = parse_targets(node.require("targets"), tracker.map_files, warnings);
+    const auto frames = [&](const char *path, std::int64_t minimum) {
+        return static_cast<std::uint32_t>(integer_or_default(node, path, minimum, 1'000'000));
+    };
+    tracker.hold_frames = frames("tracker.hold_frames", 0);
+    tracker.world_grace_frames = frames("tracker.world_grace_frames", 0);
+    tracker.full_search_every = frames("tracker.full_search_every", 1);
     return tracker;
 }
 
@@ -161,6 +146,8 @@ FilesInUse files_read_by(const Configuration &configuration) {
             files.read_numbered(path->input_path()); // for a numbered file name, also registers the matching files
     }
     std::for_each(configuration.trackers.begin(), configuration.trackers.end(), read_all_of);
+    if (configuration.tracker)
+        std::ranges::for_each(configuration.tracker->map_files, [&](const auto &file) { files.read(file); });
     std::for_each(configuration.raytracers.begin(), configuration.raytracers.end(), read_all_of);
     for (const Scene &scene : configuration.scenes)
         files.read(scene.file);
@@ -214,6 +201,7 @@ void parse_choices(Configuration &configuration, const Shared &shared,
             auto alternative = *configured;
             static_cast<ComponentConfiguration &>(alternative) =
                 parse_component(node, std::string("alternatives.") + kind + "[]", shared);
+            reject_family_option(node);
             expect_new_name(node, alternative.name, all);
             all.push_back(std::move(alternative));
         }

@@ -10,11 +10,11 @@
 #include "run_config/files_in_use.hpp"
 #include "run_config/plugin_path.hpp"
 #include "run_config/session.hpp"
+#include "run_config/targets.hpp"
 #include "sandbox/sandbox.hpp"
 #include "yaml/yaml.hpp"
 
 #include <arhost/camera.h>
-#include <arhost/tracker.h>
 
 #include <array>
 #include <filesystem>
@@ -49,8 +49,10 @@ struct SourceConfiguration : ComponentConfiguration {
 };
 
 struct TrackerConfiguration : ComponentConfiguration {
-    std::vector<arhost_marker_config> markers;
+    std::vector<Target> targets;
+    std::vector<std::filesystem::path> map_files{};
     std::uint32_t hold_frames = 0;
+    std::uint32_t world_grace_frames = 90, full_search_every = 10;
 };
 
 struct RaytracerConfiguration : ComponentConfiguration {

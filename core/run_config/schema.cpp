@@ -107,11 +107,28 @@ std::vector<Key> make_table() {
          {"camera.distortion.coefficients", reals, false, "",
           "Coefficients in OpenCV's order: k1 k2 p1 p2 k3 …; for `fisheye`: k1 k2 k3 k4."}});
     add_component(
-        keys, {"tracker", map, false, "no tracking", "Finds the markers."}, "tracker_aruco",
-        {{"markers", list, true, "", "The markers; the first visible one anchors the scene."},
-         {"markers[].id", integer, true, "", "ID of the marker in its dictionary."},
-         {"markers[].side_mm", real, true, "", "Side of the black square, in mm."},
-         {"hold_frames", integer, false, "0", "Frames for which the last pose is kept after the markers are lost."},
+        keys, {"tracker", map, false, "no tracking", "Finds the targets."}, "tracker_aruco",
+        {{"targets", list, true, "",
+          "The targets, each with one of `marker`, `ids`, `map` and `body`. The first one is the world, the frame of "
+          "the scene."},
+         {"targets[].name", text, false, "FAMILY-ID",
+          "Name of the target, required with `map` and `body`: up to 63 letters, digits, `_`, `.` and `-`."},
+         {"targets[].marker", integer, false, "", "ID of a single marker in its family."},
+         {"targets[].ids", text, false, "",
+          "IDs of several single markers, such as `0-35` or `[0-3, 7]`: a target for each, named FAMILY-ID."},
+         {"targets[].family", text, false, "",
+          "Family of `marker` or `ids`, such as `tag36h11`; `dictionary` means the same."},
+         {"targets[].dictionary", text, false, "", "Dictionary of `marker` or `ids`, such as `DICT_6X6_250`."},
+         {"targets[].side_mm", real, false, "", "Side of the black square of `marker` or `ids`, in mm."},
+         {"targets[].map", input_path, false, "", "File with the places of several markers (docs/markers.md)."},
+         {"targets[].body", text, false, "",
+          "Name of a body, for trackers that report the poses of bodies, such as motion capture."},
+         {"hold_frames", integer, false, "0", "Frames for which the last pose is kept after the targets are lost."},
+         {"world_grace_frames", integer, false, "90",
+          "Frames for which other targets tell where the world is, after the first target was last seen."},
+         {"full_search_every", integer, false, "10",
+          "A tracker searches the whole frame at least every so many frames; in the others, it may search only where "
+          "markers are expected. 1: always."},
          fallback,
          conform});
     add_component(keys, {"raytracer", map, false, "no overlay", "Renders the virtual objects."}, "rt_embree",
@@ -142,7 +159,7 @@ std::vector<Key> make_table() {
           "Scenes from which the command `load_scene` chooses, besides `raytracer.scene`."},
          {"alternatives", map, false, "", "Components from which the command `swap` chooses."}});
     add_component(keys,
-                  {"alternatives.tracker", list, false, "", "Alternatives to the tracker; they use its markers."},
+                  {"alternatives.tracker", list, false, "", "Alternatives to the tracker; they use its targets."},
                   "tracker_apriltag", {name, fallback, conform});
     add_component(keys,
                   {"alternatives.raytracer", list, false, "", "Alternatives to the ray tracer; they use its scene."},
@@ -258,6 +275,8 @@ Json json_schema_of(const Key &key) {
         json["enum"] = key.choices;
     if (key.path == "version")
         json["const"] = 1;
+    if (key.path == "tracker.targets[].ids")
+        json["type"] = {"string", "integer", "array"};
     json["description"] = key.meaning;
     return json;
 }

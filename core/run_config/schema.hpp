@@ -14,7 +14,7 @@ namespace arhost::run_config {
 enum class Type { map, list, text, input_path, output_path, integer, real, boolean, reals, free_map };
 
 struct Key {
-    std::string path; // "tracker.markers[].id": "[]" stands for each element of a list
+    std::string path; // "tracker.targets[].name": "[]" stands for each element of a list
     Type type;
     bool required;                  // whether the key is required if its parent map is present
     std::string_view default_value; // "" if there is no default

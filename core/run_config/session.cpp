@@ -59,6 +59,41 @@ Value one_of(const Line &line, const nlohmann::json &object, const char *key,
     line.fail(std::string(key) + ": '" + base::printable(text, 100) + "' is not one of " + names);
 }
 
+// Appends a target and its observations to the frame.
+void read_target(const Line &line, const nlohmann::json &object, RecordedFrame &frame) {
+    arhost_target &target = frame.targets.emplace_back();
+    target.struct_size = sizeof target;
+    const auto name = object.at("name").get<std::string>();
+    if (name.empty() || name.size() >= sizeof target.name)
+        line.fail("name: must have 1 to 63 bytes");
+    name.copy(target.name, sizeof target.name - 1);
+    target.state = one_of<arhost_target_state>(
+        line, object, "state",
+        {{"detected", ARHOST_TARGET_DETECTED}, {"predicted", ARHOST_TARGET_PREDICTED}, {"lost", ARHOST_TARGET_LOST}});
+    target.age_frames = object.at("age_frames").get<std::uint32_t>();
+    read_numbers(object.at("mt"), target.mt);
+    if (object.contains("mt_alternative"))
+        read_numbers(object.at("mt_alternative"), target.mt_alternative);
+    if (object.contains("covariance"))
+        read_numbers(object.at("covariance"), target.covariance);
+    target.reprojection_px = object.value("reprojection_px", 0.0);
+    target.ambiguity = object.value("ambiguity", 0.0);
+    target.first_observation = static_cast<std::uint32_t>(frame.observations.size());
+    for (const nlohmann::json &seen : object.value("observations", nlohmann::json::array())) {
+        arhost_observation &observation = frame.observations.emplace_back();
+        observation.struct_size = sizeof observation;
+        observation.id = seen.at("id").get<std::int32_t>();
+        observation.hamming = seen.at("hamming").get<std::uint32_t>();
+        observation.decision_margin = seen.at("decision_margin").get<double>();
+        const auto corners = seen.at("corners_px").get<std::array<std::array<double, 2>, 4>>();
+        for (std::size_t i = 0; i < 4; ++i)
+            std::ranges::copy(corners[i], observation.corners_px[i]);
+        ++target.observation_count;
+    }
+    if (frame.targets.size() > ARHOST_MAX_TARGETS || frame.observations.size() > ARHOST_MAX_OBSERVATIONS)
+        line.fail("targets: has more targets or observations than a frame can have");
+}
+
 // Throws nlohmann::json::exception if a member is missing or has the wrong type.
 RecordedFrame frame_of(const Line &line, const nlohmann::json &object) {
     RecordedFrame frame{};
@@ -73,7 +108,8 @@ RecordedFrame frame_of(const Line &line, const nlohmann::json &object) {
     frame.samples = object.value("overlay_samples", std::uint32_t{0});
     if (!(frame.scale >= 0.01 && frame.scale <= 1))
         line.fail("overlay_scale: must be 0.01 to 1");
-    frame.has_markers = !object.at("markers").empty();
+    for (const nlohmann::json &target : object.at("targets"))
+        read_target(line, target, frame);
     if (const nlohmann::json &camera = object.at("camera"); !camera.is_null()) {
         camera::View view{};
         read_numbers(camera.at("eye"), view.eye_mm);
@@ -86,7 +122,7 @@ RecordedFrame frame_of(const Line &line, const nlohmann::json &object) {
         line.fail("camera: is null, but the frame has an overlay");
     }
     if (const auto truth = object.find("truth"); truth != object.end())
-        frame.truth.emplace(truth->at("id").get<std::int32_t>(), truth->at("mt").get<std::array<double, 16>>());
+        frame.truth.emplace(truth->at("target").get<std::string>(), truth->at("mt").get<std::array<double, 16>>());
     return frame;
 }
 
@@ -162,8 +198,10 @@ Session read_session(const fs::path &path) {
         expect_file(file, advice);
     yaml::Node root = yaml::Node::load(description);
     root.require("format").choice({"arhost-session"});
-    if (const yaml::Node version = root.require("version"); version.integer() != 1)
-        version.fail("must be 1, the only version that this arhost can replay");
+    if (const yaml::Node version = root.require("version"); version.integer() != session_version)
+        version.fail("must be " + std::to_string(session_version) +
+                     ", the only version that this arhost can replay; record the session again, or replay it with "
+                     "the arhost that has recorded it");
     yaml::Node::Origin origin{root.require("folder").text(), {}};
     const yaml::Node overridden = root.require("overridden");
     for (const auto &[path, relative_to] : overridden.entries())

@@ -18,6 +18,9 @@
 
 namespace arhost::run_config {
 
+// The member `version` of session.json. Logs of version 1 have markers instead of targets.
+constexpr int session_version = 2;
+
 // The record of a frame in a session's log: data that the video does not contain, and the decisions of the recorded
 // run.
 struct RecordedFrame {
@@ -27,16 +30,17 @@ struct RecordedFrame {
     arhost_overlay overlay;
     double scale;          // quality of the overlay, as in host::Quality
     std::uint32_t samples; // likewise
-    bool has_markers;      // the tracker has reported markers, lost ones included
+    std::vector<arhost_target> targets;
+    std::vector<arhost_observation> observations; // of the targets
     std::optional<camera::View> view;
-    std::optional<std::pair<std::int32_t, std::array<double, 16>>> truth; // id and true_mt of arhost_record
+    std::optional<std::pair<std::string, std::array<double, 16>>> truth; // truth_target and true_mt of arhost_record
 };
 
 // The frames of a session that a run repeats. Frame i of the source is frames[i].
 struct Recording {
     std::vector<RecordedFrame> frames;
-    // Whether frames get an overlay exactly where the recorded run has one. Otherwise every frame is tracked and
-    // rendered as in any other run.
+    // Whether frames have the recorded poses, and an overlay exactly where the recorded run has one. Otherwise every
+    // frame is tracked and rendered as in any other run.
     bool repeats_decisions = true;
 };
 

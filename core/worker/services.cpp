@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/services.hpp"
 
+#include "ipc/targets.hpp"
 #include "pixels/grey.hpp"
 #include "scene/capabilities.hpp"
 #include "scene/motion.hpp"
-#include "worker/branches.hpp"
 #include "worker/lens_warp.hpp"
 #include "worker/library.hpp"
+#include "worker/target_solver.hpp"
 
 #include <algorithm>
 #include <optional>
@@ -98,23 +99,65 @@ private:
     std::uint64_t next_ = 0; // arhost_frame_buffer.sequence of the next call, which counts skipped frames
 };
 
+// The arrays of an arhost_tracker_setup.
+struct TrackerSetup {
+    explicit TrackerSetup(const std::vector<Target> &targets) : families(families_of(targets)) {
+        for (const Target &target : targets) {
+            for (const TargetMarker &marker : target.markers) {
+                const auto family = std::ranges::find(families, marker.family) - families.begin();
+                arhost_marker_config config{sizeof config,
+                                            marker.id,
+                                            static_cast<std::uint32_t>(family),
+                                            static_cast<std::uint32_t>(configs.size()),
+                                            {}};
+                for (std::size_t corner = 0; corner < 4; ++corner)
+                    std::ranges::copy(marker.corners_mm[corner], config.corners_mm[corner]);
+                markers.push_back(config);
+            }
+            configs.push_back({sizeof(arhost_target_config), 0, target.name.c_str(),
+                               target.body.empty() ? nullptr : target.body.c_str()});
+        }
+        for (const std::string &family : families)
+            family_names.push_back(family.c_str());
+    }
+    const std::vector<std::string> families;
+    std::vector<arhost_target_config> configs;
+    std::vector<arhost_marker_config> markers;
+    std::vector<const char *> family_names;
+};
+
+// Returns an array for a plugin to fill.
+template <class T> std::vector<T> elements(std::size_t count) {
+    T element{};
+    element.struct_size = sizeof element;
+    return std::vector<T>(count, element);
+}
+
 class TrackerService final : public Service {
 public:
     TrackerService(const arhost_tracker &tracker, arhost_instance *instance)
         : tracker_(tracker), instance_(instance) {}
 
-    arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &,
+    arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &fds,
                         messages::Ready &ready) override {
         const auto &message = setup_of_kind<messages::TrackerSetup>(any);
+        require(!fds.empty(), "'create' was sent without the descriptor of the targets");
+        const std::vector<Target> targets =
+            targets_from(SharedMemory::adopt(base::UniqueFd(::dup(fds[0].get()))).map(Access::read_only));
         format_ = message.format;
         if (has_limited_luma_plane(format_))
             full_range_luma_.resize(format_.grey_stride / sizeof(Block) * format_.height);
+        const TrackerSetup arrays(targets);
         arhost_tracker_setup setup{};
         setup.struct_size = sizeof setup;
-        setup.marker_count = static_cast<std::uint32_t>(message.markers.size());
+        setup.target_count = static_cast<std::uint32_t>(arrays.configs.size());
         setup.format = &format_;
         setup.intrinsics = &message.intrinsics;
-        setup.markers = message.markers.data();
+        setup.targets = arrays.configs.data();
+        setup.markers = arrays.markers.data();
+        setup.marker_count = static_cast<std::uint32_t>(arrays.markers.size());
+        setup.family_count = static_cast<std::uint32_t>(arrays.family_names.size());
+        setup.families = arrays.family_names.data();
         const arhost_status status = tracker_.start(instance_, &setup);
         if (status != ARHOST_STATUS_OK)
             return status;
@@ -124,9 +167,11 @@ public:
             tracker_.stop(instance_);
             throw;
         }
-        branches_.emplace(message.intrinsics, message.markers);
-        plugin_offset_ = TrackerSlot::state_offset + (branches_->state_size() + 63) / 64 * 64;
-        ready.state_size = plugin_offset_ - TrackerSlot::state_offset + state_size_;
+        solver_.emplace(message.intrinsics, targets, message.full_search_every);
+        layout_.emplace(targets.size());
+        poses_ = elements<arhost_body_pose>(targets.size());
+        plugin_offset_ = layout_->state_offset + (solver_->state_size() + 63) / 64 * 64;
+        ready.state_size = plugin_offset_ - layout_->state_offset + state_size_;
         return status;
     }
 
@@ -151,27 +196,41 @@ public:
         frame.depth_mm = format_.has_depth ? as_depth(input.subspan(format_.depth_offset)) : nullptr;
         frame.sequence = command.sequence;
         frame.capture_ns = command.capture_ns;
-        auto &result = *reinterpret_cast<arhost_tracker_result *>(output.data());
-        result = {};
-        result.struct_size = sizeof result;
         arhost_track_request request{};
         request.struct_size = sizeof request;
         request.frame = &frame;
         const std::byte *before = nullptr;
         if (command.state_generation != 0) {
             const std::span<std::byte> slot = memory.input(command.state_generation).slot(command.state_slot);
-            require(slot.size() == output.size(), "the slot of the tracker's state has another size");
+            require(command.state_is_of_solver_only ? slot.size() >= plugin_offset_ : slot.size() == output.size(),
+                    "the slot of the tracker's state has another size");
             before = slot.data();
         }
         if (state_size_ > 0) {
-            request.state_before = before ? before + plugin_offset_ : nullptr;
+            request.state_before = before && !command.state_is_of_solver_only ? before + plugin_offset_ : nullptr;
             request.state_after = output.data() + plugin_offset_;
             request.state_size = state_size_;
         }
+        const std::byte *solver_before = before ? before + layout_->state_offset : nullptr;
+        const TargetSolver::Expectation expectation = solver_->expect(command.capture_ns, solver_before);
+        request.search_everywhere = expectation.search_everywhere;
+        request.expected = expectation.markers.data();
+        request.expected_count = static_cast<std::uint32_t>(expectation.markers.size());
+        arhost_tracker_result result{};
+        result.struct_size = sizeof result;
+        result.observations = observations_.data();
+        result.poses = poses_.data();
         const arhost_status status = tracker_.track(instance_, &request, &result);
-        if (status == ARHOST_STATUS_OK)
-            branches_->choose(result, command.capture_ns, before ? before + TrackerSlot::state_offset : nullptr,
-                              output.data() + TrackerSlot::state_offset);
+        if (status != ARHOST_STATUS_OK)
+            return status;
+        result.observations = observations_.data(); // a plugin may have changed the pointers
+        result.poses = poses_.data();
+        auto *targets = reinterpret_cast<arhost_target *>(output.data() + TrackerSlot::targets_offset);
+        auto *observations = reinterpret_cast<arhost_observation *>(output.data() + layout_->observations_offset);
+        solver_->solve(result, expectation.search_everywhere, command.capture_ns, solver_before,
+                       output.data() + layout_->state_offset,
+                       {{targets, poses_.size()}, {observations, observations_.size()}});
+        *reinterpret_cast<std::uint32_t *>(output.data()) = result.observation_count;
         return status;
     }
 
@@ -185,7 +244,10 @@ private:
     const arhost_tracker &tracker_;
     arhost_instance *instance_;
     arhost_frame_format format_{};
-    std::optional<Branches> branches_;
+    std::optional<TargetSolver> solver_;
+    std::optional<TrackerSlot> layout_;
+    std::vector<arhost_observation> observations_ = elements<arhost_observation>(ARHOST_MAX_OBSERVATIONS);
+    std::vector<arhost_body_pose> poses_;
     std::uint64_t state_size_ = 0;       // of the plugin
     std::uint64_t plugin_offset_ = 0;    // of the plugin's state in a slot
     std::vector<Block> full_range_luma_; // only for a luma plane of limited range
@@ -321,7 +383,11 @@ public:
             output.overlay_rgba = as_pixels(input) + slot.overlay_offset;
             output.overlay_stride = overlay_stride(video_format_.width);
         }
-        output.record = reinterpret_cast<const arhost_record *>(input.data());
+        arhost_record record = *reinterpret_cast<const arhost_record *>(input.data());
+        record.targets = reinterpret_cast<const arhost_target *>(input.data() + OutputSlot::targets_offset);
+        record.observations =
+            reinterpret_cast<const arhost_observation *>(input.data() + OutputSlot::observations_offset);
+        output.record = &record;
         return sink_.write(instance_, &output);
     }
 

@@ -272,7 +272,7 @@ void Node::replace(const std::string &path, const YAML::Node &value, const std::
         const bool last = i + 1 == parts.size();
         const auto reject = [&](const std::string &why) { throw Error(option + " " + path + ": " + why); };
         if (parts[i].empty())
-            reject("a key is empty; write it as in tracker.options.dictionary=DICT_4X4_50");
+            reject("a key is empty; write it as in tracker.options.border_bits=2");
         canonical = at.IsSequence() ? canonical + "[" + parts[i] + "]" : child_path(canonical, parts[i]);
         YAML::Node next;
         if (at.IsSequence()) {

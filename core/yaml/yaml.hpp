@@ -22,7 +22,7 @@
 
 namespace arhost::yaml {
 
-// what() is one line for the user: "lab.yaml:12:5: tracker.markers[0].side_mm: must be …".
+// what() is one line for the user: "lab.yaml:12:5: tracker.targets[0].side_mm: must be …".
 class Error : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
@@ -68,7 +68,7 @@ public:
     // Creates a scalar that is not from a file. `name` is used as the file name in error messages.
     static Node scalar(const std::string &text, const std::string &name);
 
-    // Replaces or adds the value at a key path ("tracker.options.dictionary", "outputs[0].path"). Implements `--set`
+    // Replaces or adds the value at a key path ("tracker.options.border_bits", "outputs[0].path"). Implements `--set`
     // and other options. Error messages about this value name the option instead of a line. Must be called on the
     // root.
     void override_value(const std::string &path, const std::string &value, const std::string &option = "--set");

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 namespace arhost::fiducial {
@@ -166,15 +167,19 @@ std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size
 }
 
 // Returns positions on the line between two corners in undistorted pixels, which are in clockwise order. Keeps
-// `margin_px` away from the corners, where the search would hit the adjacent edges.
-Edge edge_between(cv::Point2d from, cv::Point2d to, const Lens &lens, double margin_px) {
+// `margin_px` away from the corners, where the search would hit the adjacent edges. Returns std::nullopt if the lens
+// does not see the edge.
+std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &lens, double margin_px) {
     const double length = cv::norm(to - from);
     const double margin = std::min(margin_px, length / 4) / length;
     const std::size_t count = std::clamp<std::size_t>(static_cast<std::size_t>(length / 2), 16, 100);
-    Edge edge;
+    std::vector<cv::Point2d> straight;
     for (std::size_t i = 0; i < count; ++i)
-        edge.at_px.push_back(from + (margin + (1 - 2 * margin) * static_cast<double>(i) / (count - 1)) * (to - from));
-    edge.at_px = lens.distort(edge.at_px);
+        straight.push_back(from + (margin + (1 - 2 * margin) * static_cast<double>(i) / (count - 1)) * (to - from));
+    const auto bent = lens.distort(straight);
+    if (!bent)
+        return std::nullopt;
+    Edge edge{*bent, {}};
     for (std::size_t i = 0; i < count; ++i) {
         const cv::Point2d along = edge.at_px[std::min(i + 1, count - 1)] - edge.at_px[i > 0 ? i - 1 : 0];
         edge.outward.push_back(cv::Point2d(along.y, -along.x) / cv::norm(along));
@@ -241,8 +246,12 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
     bool is_unclear = false;
     for (int pass = 0; pass < max_passes && moved >= converged_px; ++pass) {
         std::array<Edge, 4> edges;
-        for (int i = 0; i < 4; ++i)
-            edges[i] = edge_between(corners[i], corners[(i + 1) % 4], lens, margin_px);
+        for (int i = 0; i < 4; ++i) {
+            auto edge = edge_between(corners[i], corners[(i + 1) % 4], lens, margin_px);
+            if (!edge)
+                return std::nullopt;
+            edges[i] = std::move(*edge);
+        }
         if (pass == 0) {
             double rise = 0;
             for (const Edge &edge : edges)
@@ -281,8 +290,10 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
     }
     if (is_unclear || strength < min_strength * rough_strength)
         return std::nullopt;
-    const std::vector<cv::Point2d> distorted = lens.distort(corners);
-    return Corners{distorted[0], distorted[1], distorted[2], distorted[3]};
+    const auto distorted = lens.distort(corners);
+    if (!distorted)
+        return std::nullopt;
+    return Corners{(*distorted)[0], (*distorted)[1], (*distorted)[2], (*distorted)[3]};
 }
 
 } // namespace arhost::fiducial

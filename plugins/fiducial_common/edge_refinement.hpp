@@ -3,7 +3,8 @@
 // Subpixel refinement of a marker's corners.
 #pragma once
 
-#include "planar_pose.hpp"
+#include "lens.hpp"
+#include "observations.hpp"
 
 namespace arhost::fiducial {
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The module `arhost` for scripts of source_python, tracker_python, rt_python and sink_python.
 
-Constants and structs have the names of the C headers without the prefix ARHOST_: arhost.STATUS_OK, arhost.MARKER.
-Pixels and markers are numpy views of arhost's memory, valid until the method that received them returns; copy what you
-keep (`array.copy()`). The methods of a class are listed in plugins/python_adapter/README.md, the rules in docs/abi.md
+Constants and structs have the names of the C headers without the prefix ARHOST_: arhost.STATUS_OK, arhost.TARGET.
+Pixels are numpy views of arhost's memory, valid until the method that received them returns; copy what you keep
+(`array.copy()`). The methods of a class are listed in plugins/python_adapter/README.md, the rules in docs/abi.md
 and the C headers.
 """
 import importlib.util
@@ -43,8 +43,20 @@ class Fields:
     def __init__(self, record=None, /, **more):
         for name in record.dtype.names if record is not None else ():
             value = record[name]
-            setattr(self, name, Fields(value) if isinstance(value, np.void) else value)
+            setattr(self, name, Fields(value) if isinstance(value, np.void) else
+                    value.decode() if isinstance(value, bytes) else value)
         self.__dict__.update(more)
+
+
+class Observation:
+    """A marker seen in a frame, with the fields of arhost_observation. `corners_px`: 4 × (x, y)."""
+
+    def __init__(self, id, corners_px, family=0, hamming=0, decision_margin=0.0):
+        corners = np.array(corners_px, float)
+        if corners.size != 8:
+            raise ValueError("corners_px must be four corners (x, y)")
+        self.id, self.corners_px, self.family = id, corners.reshape(4, 2), family
+        self.hamming, self.decision_margin = hamming, decision_margin
 
 
 class Scene(Fields):
@@ -74,6 +86,12 @@ def _record(memory, dtype):
     return np.frombuffer(bytes(memory), dtype)[0]  # small structs are copied
 
 
+def _elements(memory, dtype):
+    """Returns a view of an array of structs, whose stride is the `struct_size` of its first element."""
+    stride = int.from_bytes(memory[:4], sys.byteorder) or dtype.itemsize
+    return np.ndarray(len(memory) // stride, dtype, memory, 0, stride)
+
+
 def _pixels(memory, height, width, channels, stride):
     shape, strides = ((height, width, channels), (stride, channels, 1)) if channels > 1 else \
         ((height, width), (stride, 1))
@@ -98,7 +116,7 @@ class _Adapter:
     def __init__(self, method, log, progress, cancelled):
         self.method = method  # the per-frame method of this kind
         self.host = Host(log, progress, cancelled)
-        self.warned = False
+        self.warned = self.overflowed = False
 
     def load(self, script, class_name, arguments):
         def load():
@@ -212,26 +230,41 @@ class _Adapter:
 
     # ---- trackers ----
 
-    def start_tracker(self, format, intrinsics, markers):
+    def start_tracker(self, format, intrinsics, targets, markers, families):
         def start():
             self.format = Fields(_record(format, FRAME_FORMAT))
             self.plugin.start(Fields(format=self.format, intrinsics=Fields(_record(intrinsics, INTRINSICS)),
-                                     markers=[Fields(m) for m in np.frombuffer(bytes(markers), MARKER_CONFIG)]))
+                                     targets=[Fields(name=name, body=body) for name, body in targets],
+                                     markers=[Fields(m) for m in _elements(bytes(markers), MARKER_CONFIG)],
+                                     families=list(families)))
             return STATUS_OK
 
         return self._guarded(start)
 
-    def track(self, sequence, capture_ns, clock, planes, grey, markers):
+    def track(self, sequence, capture_ns, clock, planes, grey, search_everywhere, expected, observations):
         def track():
             f = self.format
             frame = Fields(format=f, sequence=sequence, capture_ns=capture_ns, clock=clock, planes=_planes(f, planes),
-                           grey=_pixels(grey, int(f.height), int(f.width), 1, int(f.grey_stride)))
-            out = np.ndarray(MAX_MARKERS, MARKER, markers)
-            count = int(self.plugin.track(frame, out) or 0)
-            out["struct_size"][:count] = MARKER.itemsize
+                           grey=_pixels(grey, int(f.height), int(f.width), 1, int(f.grey_stride)),
+                           search_everywhere=search_everywhere,
+                           expected=[Fields(marker) for marker in _elements(bytes(expected), EXPECTED_MARKER)])
+            out, count = _elements(observations, OBSERVATION), 0
+            result = self.plugin.track(frame)
+            if not hasattr(result, "__iter__") and result is not None:
+                raise Failure("'track' must return a list of arhost.Observation, or None", STATUS_ERROR_INTERNAL)
+            for seen in result or ():
+                if count == len(out):
+                    if not self.overflowed:
+                        self.host.warn(f"'track' reported more than {count} observations; the others are ignored")
+                    self.overflowed = True
+                    break
+                to = out[count]
+                to["id"], to["family"], to["hamming"] = seen.id, seen.family, seen.hamming
+                to["corners_px"], to["decision_margin"] = seen.corners_px, seen.decision_margin
+                count += 1
             return STATUS_OK, count
 
-        return self._with_memory([*planes, grey, markers], track)
+        return self._with_memory([*planes, grey], track)
 
     # ---- ray tracers ----
 
@@ -271,10 +304,15 @@ class _Adapter:
 
         return self._guarded(start)
 
-    def write(self, bgr, height, width, stride, record):
+    def write(self, bgr, height, width, stride, record, targets, observations):
         def write():
+            fields = Fields(_record(record, RECORD))
+            fields.targets = [Fields(t) for t in _elements(bytes(targets), TARGET)]
+            fields.observations = [Observation(o["id"], o["corners_px"], o["family"], o["hamming"], o["decision_margin"])
+                                   for o in _elements(bytes(observations), OBSERVATION)]
+            fields.families = [name.decode() for name in fields.families if name]
             more = self.plugin.write(Fields(bgr=_pixels(bgr, height, width, 3, stride), height=height, width=width,
-                                            record=np.ndarray(1, RECORD, record).view(np.recarray)[0]))
+                                            record=fields))
             return STATUS_OK if more is None or more else STATUS_END
 
-        return self._with_memory([bgr, record], write)
+        return self._with_memory([bgr], write)

@@ -55,6 +55,7 @@ CAPABILITY_VIDEO_INPUT = 8192
 CAPABILITY_OVERLAY_INPUT = 16384
 CAPABILITY_SCALED_IMAGES = 32768
 CAPABILITY_RUN_DESCRIPTION = 65536
+CAPABILITY_REPORTS_POSES = 131072
 OFFER = _struct(12,
     ("struct_size", "u4", 0),
     ("oldest_abi_version", "u4", 4),
@@ -110,6 +111,7 @@ CLOCK_MONOTONIC = 1
 CLOCK_MEDIA = 2
 MAX_PLANES = 3
 MAX_IMAGE_SIDE = 16384
+MAX_NAME = 64
 FRAME_FORMAT = _struct(112,
     ("struct_size", "u4", 0),
     ("pixel_format", "i4", 4),
@@ -160,42 +162,65 @@ SOURCE_PROPERTIES = _struct(280,
     ("format", FRAME_FORMAT, 8),
     ("intrinsics", INTRINSICS, 120),
     ("frame_count", "u8", 272))
-FRAME_INFO = _struct(160,
+FRAME_INFO = _struct(224,
     ("struct_size", "u4", 0),
     ("clock", "i4", 4),
     ("capture_ns", "i8", 8),
     ("skipped", "u4", 16),
     ("has_grey", "i4", 20),
     ("has_truth", "i4", 24),
-    ("truth_id", "i4", 28),
-    ("true_mt", ("f8", (16,)), 32))
+    ("reserved", "u4", 28),
+    ("truth_target", "S64", 32),
+    ("true_mt", ("f8", (16,)), 96))
 
 # arhost/tracker.h
-MAX_MARKERS = 64
+MAX_TARGETS = 1024
+MAX_MARKERS = 1024
+MAX_OBSERVATIONS = 1024
+MAX_FAMILIES = 16
 MAX_FAMILY = 32
 MAX_STATE = 16777216
-MARKER_CONFIG = _struct(16,
+MARKER_CONFIG = _struct(112,
     ("struct_size", "u4", 0),
     ("id", "i4", 4),
-    ("side_mm", "f8", 8))
-MARKER_DETECTED = 1
-MARKER_PREDICTED = 2
-MARKER_LOST = 3
-MARKER = _struct(384,
+    ("family", "u4", 8),
+    ("target", "u4", 12),
+    ("corners_mm", ("f8", (4, 3)), 16))
+OBSERVATION = _struct(88,
     ("struct_size", "u4", 0),
     ("id", "i4", 4),
-    ("family", "S32", 8),
-    ("state", "i4", 40),
-    ("age_frames", "u4", 44),
-    ("corners_px", ("f8", (4, 2)), 48),
-    ("mt", ("f8", (16,)), 112),
-    ("mt_alternative", ("f8", (16,)), 240),
-    ("reprojection_px", "f8", 368),
-    ("ambiguity", "f8", 376))
-TRACKER_RESULT = _struct(24584,
+    ("family", "u4", 8),
+    ("hamming", "u4", 12),
+    ("corners_px", ("f8", (4, 2)), 16),
+    ("decision_margin", "f8", 80))
+TARGET_DETECTED = 1
+TARGET_PREDICTED = 2
+TARGET_LOST = 3
+BODY_POSE = _struct(432,
     ("struct_size", "u4", 0),
-    ("marker_count", "u4", 4),
-    ("markers", (MARKER, (64,)), 8))
+    ("target", "u4", 4),
+    ("state", "i4", 8),
+    ("age_frames", "u4", 12),
+    ("mt", ("f8", (16,)), 16),
+    ("covariance", ("f8", (36,)), 144))
+TARGET = _struct(648,
+    ("struct_size", "u4", 0),
+    ("state", "i4", 4),
+    ("name", "S64", 8),
+    ("age_frames", "u4", 72),
+    ("first_observation", "u4", 76),
+    ("observation_count", "u4", 80),
+    ("reserved", "u4", 84),
+    ("mt", ("f8", (16,)), 88),
+    ("mt_alternative", ("f8", (16,)), 216),
+    ("covariance", ("f8", (36,)), 344),
+    ("reprojection_px", "f8", 632),
+    ("ambiguity", "f8", 640))
+EXPECTED_MARKER = _struct(80,
+    ("struct_size", "u4", 0),
+    ("marker", "u4", 4),
+    ("corners_px", ("f8", (4, 2)), 8),
+    ("margin_px", "f8", 72))
 
 # arhost/scene.h
 SCENE_MAGIC = 0x435354534f485241
@@ -373,7 +398,7 @@ RENDER_INFO = _struct(32,
 OVERLAY_RENDERED = 1
 OVERLAY_HELD = 2
 OVERLAY_NONE = 3
-RECORD = _struct(24992,
+RECORD = _struct(1008,
     ("struct_size", "u4", 0),
     ("clock", "i4", 4),
     ("sequence", "u8", 8),
@@ -381,10 +406,13 @@ RECORD = _struct(24992,
     ("overlay", "i4", 24),
     ("has_camera", "i4", 28),
     ("has_truth", "i4", 32),
-    ("truth_id", "i4", 36),
-    ("true_mt", ("f8", (16,)), 40),
-    ("camera", CAMERA, 168),
-    ("overlay_scale", "f8", 400),
-    ("overlay_samples", "u4", 408),
-    ("marker_count", "u4", 412),
-    ("markers", (MARKER, (64,)), 416))
+    ("target_count", "u4", 36),
+    ("truth_target", "S64", 40),
+    ("true_mt", ("f8", (16,)), 104),
+    ("camera", CAMERA, 232),
+    ("overlay_scale", "f8", 464),
+    ("overlay_samples", "u4", 472),
+    ("observation_count", "u4", 476),
+    ("targets", "u8", 480),
+    ("observations", "u8", 488),
+    ("families", ("S32", (16,)), 496))

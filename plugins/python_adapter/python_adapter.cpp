@@ -98,6 +98,10 @@ Object view(const void *bytes, std::size_t size, int flag = PyBUF_READ) {
 template <class T> Object view_of(const T *object) {
     return object ? view(object, sizeof *object) : Object(Py_NewRef(Py_None));
 }
+template <class T> Object view_of_elements(T *first, std::uint32_t count) {
+    return view(first, count ? std::size_t(count) * first->struct_size : 0,
+                std::is_const_v<T> ? PyBUF_READ : PyBUF_WRITE);
+}
 
 Object tuple_of(std::vector<Object> &&objects) {
     Object tuple = checked(PyTuple_New(static_cast<Py_ssize_t>(objects.size())));
@@ -282,26 +286,27 @@ public:
     // trackers
     void start(const arhost_tracker_setup &setup) {
         const GilLock lock;
-        std::vector<arhost_marker_config> markers;
-        for (std::uint32_t i = 0; i < setup.marker_count; ++i)
-            markers.push_back(listed_marker(setup, i));
-        call("start_tracker", "NNN", view_of(setup.format).release(), view_of(setup.intrinsics).release(),
-             view(markers.data(), markers.size() * sizeof(arhost_marker_config)).release());
+        std::vector<Object> targets, families;
+        for (const arhost_target_config &target : elements(setup.targets, setup.target_count))
+            targets.push_back(checked(Py_BuildValue("sz", target.name, target.body)));
+        for (std::uint32_t i = 0; i < setup.family_count; ++i)
+            families.push_back(checked(PyUnicode_FromString(setup.families[i])));
+        call("start_tracker", "NNNNN", view_of(setup.format).release(), view_of(setup.intrinsics).release(),
+             tuple_of(std::move(targets)).release(), view_of_elements(setup.markers, setup.marker_count).release(),
+             tuple_of(std::move(families)).release());
     }
     void track(const arhost_track_request &request, arhost_tracker_result &result) {
         const GilLock lock;
         const arhost_frame &frame = *request.frame;
         const arhost_frame_format &format = *frame.format;
-        const Answer answer = call("track", "KLiNNN", static_cast<unsigned long long>(frame.sequence),
+        const Answer answer = call("track", "KLiNNNNN", static_cast<unsigned long long>(frame.sequence),
                                    static_cast<long long>(frame.capture_ns), frame.clock,
                                    views_of_planes(format, frame.plane, PyBUF_READ).release(),
                                    view(frame.grey, std::size_t(format.grey_stride) * format.height).release(),
-                                   view(result.markers, sizeof result.markers, PyBUF_WRITE).release());
-        const long count = PyLong_AsLong(answer.value.get());
-        if (count < 0 || count > ARHOST_MAX_MARKERS)
-            throw Failure(ARHOST_STATUS_ERROR_INTERNAL,
-                          "track must return the number of markers it filled in, 0 to 64");
-        result.marker_count = static_cast<std::uint32_t>(count);
+                                   PyBool_FromLong(request.search_everywhere),
+                                   view_of_elements(request.expected, request.expected_count).release(),
+                                   view_of_elements(result.observations, ARHOST_MAX_OBSERVATIONS).release());
+        result.observation_count = static_cast<std::uint32_t>(PyLong_AsUnsignedLong(answer.value.get()));
     }
 
     // ray tracers
@@ -352,10 +357,13 @@ public:
     }
     arhost_status write(const arhost_output &output) {
         const GilLock lock;
-        return call("write", "NIIIN",
+        const arhost_record &record = *output.record;
+        return call("write", "NIIINNN",
                     view(output.bgr, std::size_t(output.stride) * (output.height - 1) + std::size_t(3) * output.width)
                         .release(),
-                    output.height, output.width, output.stride, view_of(output.record).release())
+                    output.height, output.width, output.stride, view_of(&record).release(),
+                    view_of_elements(record.targets, record.target_count).release(),
+                    view_of_elements(record.observations, record.observation_count).release())
             .status;
     }
 

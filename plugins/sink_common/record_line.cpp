@@ -3,9 +3,13 @@
 
 #include "sink_common/json_text.hpp"
 
+#include <arhost-cpp/plugin.hpp>
+
 #include <algorithm>
 #include <cstring>
 #include <span>
+#include <string_view>
+#include <utility>
 
 namespace arhost::record {
 namespace {
@@ -13,11 +17,11 @@ namespace {
 using json_text::append;
 using json_text::append_number;
 
-// Appends a JSON string and replaces all bytes that are not printable ASCII with '?'. Family names are ASCII; other
-// bytes can only come from a defective tracker.
-void append_text(std::string &text, std::string_view value) {
+// Appends a JSON string and replaces all bytes that are not printable ASCII with '?'. The host's names are ASCII;
+// other bytes can only come from a defective one.
+template <std::size_t size> void append_text(std::string &text, const char (&value)[size]) {
     text += '"';
-    for (const char c : value) {
+    for (const char c : std::string_view(value, ::strnlen(value, size))) {
         if (c == '"' || c == '\\')
             text += '\\';
         text += c >= ' ' && c <= '~' ? c : '?';
@@ -25,11 +29,11 @@ void append_text(std::string &text, std::string_view value) {
     text += '"';
 }
 
-const char *name_of_state(arhost_marker_state state) {
+const char *name_of_state(arhost_target_state state) {
     switch (state) {
-    case ARHOST_MARKER_DETECTED:
+    case ARHOST_TARGET_DETECTED:
         return "detected";
-    case ARHOST_MARKER_PREDICTED:
+    case ARHOST_TARGET_PREDICTED:
         return "predicted";
     default:
         return "lost";
@@ -47,30 +51,54 @@ const char *name_of_overlay(arhost_overlay overlay) {
     }
 }
 
-void append(std::string &text, const arhost_marker &marker) {
-    text += "{\"family\": ";
-    append_text(text, {marker.family, ::strnlen(marker.family, sizeof marker.family)});
-    text += ", \"id\": ";
-    append_number(text, marker.id);
-    text += ", \"state\": \"";
-    text += name_of_state(marker.state);
-    text += "\", \"age_frames\": ";
-    append_number(text, marker.age_frames);
+// Appends an array that is all 0 if it is unknown.
+void append_if_known(std::string &text, const char *key, std::span<const double> numbers) {
+    if (std::ranges::all_of(numbers, [](double x) { return x == 0; }))
+        return;
+    text += key;
+    append(text, numbers);
+}
+
+void append(std::string &text, const arhost_observation &observation) {
+    text += "{\"id\": ";
+    append_number(text, observation.id);
     text += ", \"corners_px\": [";
     for (std::size_t i = 0; i < 4; ++i) {
         text += i > 0 ? ", " : "";
-        append(text, std::span(marker.corners_px[i]));
+        append(text, std::span(observation.corners_px[i]));
     }
-    text += "], \"mt\": ";
-    append(text, std::span(marker.mt));
-    if (!std::ranges::all_of(marker.mt_alternative, [](double x) { return x == 0; })) {
-        text += ", \"mt_alternative\": ";
-        append(text, std::span(marker.mt_alternative));
+    text += "], \"decision_margin\": ";
+    append(text, observation.decision_margin);
+    text += ", \"hamming\": ";
+    append_number(text, observation.hamming);
+    text += '}';
+}
+
+void append(std::string &text, const arhost_target &target, const arhost_record &record) {
+    text += "{\"name\": ";
+    append_text(text, target.name);
+    text += ", \"state\": \"";
+    text += name_of_state(target.state);
+    text += "\", \"age_frames\": ";
+    append_number(text, target.age_frames);
+    text += ", \"mt\": ";
+    append(text, std::span(target.mt));
+    if (target.state == ARHOST_TARGET_DETECTED || target.state == ARHOST_TARGET_PREDICTED) {
+        append_if_known(text, ", \"mt_alternative\": ", target.mt_alternative);
+        append_if_known(text, ", \"covariance\": ", target.covariance);
+        text += ", \"reprojection_px\": ";
+        append(text, target.reprojection_px);
+        text += ", \"ambiguity\": ";
+        append(text, target.ambiguity);
+        text += ", \"observations\": [";
+        const char *separator = "";
+        for (const arhost_observation &observation : arhost::elements(record.observations, record.observation_count)
+                                                         .part(target.first_observation, target.observation_count)) {
+            text += std::exchange(separator, ", ");
+            append(text, observation);
+        }
+        text += ']';
     }
-    text += ", \"reprojection_px\": ";
-    append(text, marker.reprojection_px);
-    text += ", \"ambiguity\": ";
-    append(text, marker.ambiguity);
     text += '}';
 }
 
@@ -106,11 +134,12 @@ void append_members(std::string &text, const arhost_record &record) {
         append_number(text, record.overlay_samples);
         text += ", ";
     }
-    text += "\"markers\": [";
-    const std::uint32_t markers = std::min<std::uint32_t>(record.marker_count, ARHOST_MAX_MARKERS);
-    for (std::uint32_t i = 0; i < markers; ++i) {
-        text += i > 0 ? ", " : "";
-        append(text, record.markers[i]);
+    text += "\"targets\": [";
+    const char *separator = "";
+    for (const arhost_target &target : arhost::elements(record.targets, record.target_count)) {
+        text += separator;
+        append(text, target, record);
+        separator = ", ";
     }
     text += "], \"camera\": ";
     if (record.has_camera)
@@ -118,8 +147,8 @@ void append_members(std::string &text, const arhost_record &record) {
     else
         text += "null";
     if (record.has_truth) {
-        text += ", \"truth\": {\"id\": ";
-        append_number(text, record.truth_id);
+        text += ", \"truth\": {\"target\": ";
+        append_text(text, record.truth_target);
         text += ", \"mt\": ";
         append(text, std::span(record.true_mt));
         text += '}';

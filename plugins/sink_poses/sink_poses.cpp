@@ -46,7 +46,7 @@ constexpr arhost_descriptor descriptor = {
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "Writes the markers, poses and camera of each frame as one line of JSON.",
+    "Writes the targets, poses and camera of each frame as one line of JSON.",
     0,
     std::size(options),
     options,

@@ -8,6 +8,7 @@
 #include <arhost/shading/lens.hpp>
 #include <arhost/sink.h>
 
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,8 +17,13 @@ namespace sink_window {
 
 using Timings = std::vector<std::pair<std::string, std::string>>; // name of a stage or output, percentiles
 
-// Draws the outlines, the ids and, if the lens is known, the axes of the markers (x red, y green, z blue), and their
-// numbers and the times of the stages in a box at the top. Returns the height of the box in px.
+inline std::string count_of(std::int64_t number, const std::string &noun) {
+    return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
+}
+
+// Draws the outlines of the markers and the names, states and, if the lens is known, axes of the targets (x red, y
+// green, z blue), and their numbers and the times of the stages in a box at the top. Returns the height of the box in
+// px.
 double draw_debug_view(const Overlay &overlay, const View &view, const arhost_record &record,
                        const arhost::shading::Lens *lens, double focal_length_px, const Timings &timings);
 

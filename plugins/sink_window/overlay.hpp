@@ -14,7 +14,7 @@ struct Colour {
     std::uint8_t red, green, blue;
 };
 inline constexpr Colour white{255, 255, 255}, grey{170, 170, 170}, red{255, 96, 80}, green{90, 230, 110},
-    blue{90, 160, 255}, yellow{255, 210, 60};
+    blue{90, 160, 255}, yellow{255, 210, 60}, pink{255, 120, 220};
 
 // A line of text. Boxes align the texts of their rows, after the longest label.
 struct Row {

@@ -16,7 +16,6 @@
 #include <deque>
 #include <memory>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -43,10 +42,6 @@ public:
 private:
     std::deque<Clock::time_point> times_;
 };
-
-std::string count_of(int number, const char *noun) {
-    return fmt::format("{} {}{}", number, noun, number == 1 ? "" : "s");
-}
 
 class WindowSink {
 public:
@@ -76,7 +71,7 @@ public:
 
     arhost_status write(const arhost_output &output) {
         const Clock::time_point now = Clock::now();
-        record_ = *output.record;
+        keep(*output.record);
         rate_.add(now);
         if (record_->clock == ARHOST_CLOCK_MONOTONIC)
             latency_ms_ = std::chrono::duration<double, std::milli>(
@@ -102,6 +97,20 @@ private:
         Colour colour;
         Clock::time_point end;
     };
+
+    // Copies the record and its arrays, which are valid only during `write`.
+    void keep(const arhost_record &record) {
+        const auto copy = []<class T>(std::vector<T> &to, const T *from, std::uint32_t count) {
+            const auto range = elements(from, count);
+            to.assign(range.begin(), range.end());
+            for (T &element : to)
+                element.struct_size = sizeof(T);
+            return to.data();
+        };
+        record_ = record;
+        record_->targets = copy(targets_, record.targets, record.target_count);
+        record_->observations = copy(observations_, record.observations, record.observation_count);
+    }
 
     void show(const std::string &text, bool is_error) {
         message_ = {text, is_error ? red : white, Clock::now() + std::chrono::seconds(is_error ? 6 : 3)};
@@ -183,13 +192,10 @@ private:
             text += "   " + numbers->latency;
         else if (latency_ms_)
             text += fmt::format("   {:.0f} ms", *latency_ms_);
-        const auto markers = std::span(record_->markers, record_->marker_count);
+        const auto is_visible = [](const arhost_target &target) { return target.state != ARHOST_TARGET_LOST; };
         text += "   " + count_of(numbers ? numbers->targets
-                                         : static_cast<int>(std::ranges::count_if(markers,
-                                                                                  [](const arhost_marker &marker) {
-                                                                                      return marker.state !=
-                                                                                             ARHOST_MARKER_LOST;
-                                                                                  })),
+                                         : std::ranges::count_if(elements(record_->targets, record_->target_count),
+                                                                 is_visible),
                                  "target");
         if (numbers)
             text += "   " + count_of(numbers->restarts, "restart");
@@ -224,6 +230,8 @@ private:
     std::optional<Window> window_;
     std::optional<Picture> picture_;
     std::optional<arhost_record> record_; // of the frame in the window
+    std::vector<arhost_target> targets_;  // of the record
+    std::vector<arhost_observation> observations_;
     Rate rate_;
     std::optional<double> latency_ms_; // from the capture of a frame to its arrival here
     bool help_ = false, debug_ = false, mirrored_ = false, stale_ = false;

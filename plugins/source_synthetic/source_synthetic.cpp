@@ -69,6 +69,14 @@ public:
         sheet_.family = options.text("family");
         sheet_.id = static_cast<int>(options.integer("id"));
         sheet_.cells = marker_cells(sheet_.family, options.integer("id"));
+        target_ = options.text("target");
+        if (target_.empty()) // as the host names a target without a name
+            target_ = sheet_.family + "-" + std::to_string(sheet_.id);
+        if (target_.size() >= ARHOST_MAX_NAME)
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "target: has " + std::to_string(target_.size()) +
+                                                                 " characters; the name of a target has at "
+                                                                 "most " +
+                                                                 std::to_string(ARHOST_MAX_NAME - 1));
         sheet_.side_mm = options.real("side_mm");
         sensor_ = {options.real("blur_px"), options.real("noise"), options.real("exposure_ev"),
                    static_cast<std::uint64_t>(options.integer("seed"))};
@@ -132,7 +140,7 @@ public:
         info.clock = ARHOST_CLOCK_MEDIA;
         info.capture_ns = time_ns(frame);
         info.has_truth = 1;
-        info.truth_id = sheet_.id;
+        target_.copy(info.truth_target, ARHOST_MAX_NAME - 1);
         std::ranges::copy(pose_at(static_cast<double>(frame), unit_mm), info.true_mt);
         return ARHOST_STATUS_OK;
     }
@@ -190,6 +198,7 @@ private:
     int threads_;
     PathKind path_;
     MarkerSheet sheet_;
+    std::string target_; // the name of the marker in the configuration
     Sensor sensor_;
 
     arhost_intrinsics camera_{};
@@ -205,6 +214,8 @@ const arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "family", "tag36h11", "Marker family: an AprilTag family or an OpenCV dictionary.", 0,
            0, marker_families().data()),
     option(ARHOST_OPTION_INTEGER, "id", "0", "Marker id.", 0, 100'000),
+    option(ARHOST_OPTION_TEXT, "target", "",
+           "Name of the target whose true pose is reported; empty: the marker's default name, FAMILY-ID."),
     option(ARHOST_OPTION_REAL, "side_mm", "80",
            "Outer side of the black square in mm; the whole scene scales with it.", 0.001, 100'000),
     option(ARHOST_OPTION_TEXT, "path", "orbit",

@@ -3,7 +3,8 @@
 // tracker_apriltag: detects AprilTags with the AprilTag library, version 3.
 #include <fiducial_common/apriltag_families.hpp>
 #include <fiducial_common/edge_refinement.hpp>
-#include <fiducial_common/marker_report.hpp>
+#include <fiducial_common/lens.hpp>
+#include <fiducial_common/observations.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -13,6 +14,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -20,19 +22,12 @@ namespace {
 using arhost::Failure;
 using arhost::apriltag::family_types;
 using arhost::apriltag::FamilyType;
-using arhost::fiducial::Detection;
-using arhost::fiducial::MarkerReport;
-
-constexpr auto family_names = [] {
-    std::array<const char *, family_types.size() + 1> names{};
-    std::ranges::transform(family_types, names.begin(), &FamilyType::name);
-    return names;
-}();
+using arhost::fiducial::Corners;
+using arhost::fiducial::Family;
 
 constexpr const char *refinements[] = {"edges", "none", nullptr};
 
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_TEXT, "family", "tag36h11", "Family of the tags.", 0, 0, family_names.data()),
     arhost::option(
         ARHOST_OPTION_TEXT, "corner_refinement", "edges",
         "Corner refinement: edges (arhost fits lines to the edges), or none (corners as the library reports them).",
@@ -50,10 +45,11 @@ constexpr arhost_option_descriptor options[] = {
                    "Whether the library refines the edges before it decodes the bits."),
     arhost::option(ARHOST_OPTION_REAL, "decode_sharpening", "0.25",
                    "Sharpening before the bits are decoded; helps small tags.", 0, 10),
-    arhost::option(ARHOST_OPTION_INTEGER, "max_hamming", "-1",
-                   "Maximum number of bit errors to correct; -1: 0 for families of up to 21 bits, 1 for tag25h9, "
-                   "otherwise 2.",
-                   -1, 2),
+    arhost::option(
+        ARHOST_OPTION_INTEGER, "max_hamming", "-1",
+        "Maximum number of bit errors to correct in listed tags; -1: 0 for families of up to 21 bits, 1 for "
+        "tag25h9, otherwise 2.",
+        -1, 2),
     arhost::option(ARHOST_OPTION_REAL, "min_decision_margin", "0",
                    "Minimum bit contrast of a tag, in grey levels from 0 to 255; tags of lower contrast are ignored.",
                    0, 255),
@@ -69,7 +65,7 @@ constexpr arhost_descriptor descriptor = {
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "Detects AprilTags of one family with the AprilTag library.",
+    "Detects AprilTags with the AprilTag library.",
     0,
     std::size(options),
     options,
@@ -79,43 +75,69 @@ constexpr arhost_descriptor descriptor = {
 using Detector = std::unique_ptr<apriltag_detector_t, decltype(&apriltag_detector_destroy)>;
 using Detections = std::unique_ptr<zarray_t, decltype(&apriltag_detections_destroy)>;
 
-// A copy of a tag family that has only the listed tags. Other tags are not reported, and the decoding table, which
-// would take gigabytes for the larger families, stays small. The id of a detection is an index in `ids`.
-class ListedFamily {
+// A copy of a tag family that has only its listed tags, or only the others. The others are detected only if all of
+// their bits are right: the decoding table has an entry for each tag and each combination of corrected bits, which
+// would be gigabytes for the larger families.
+class PartOfFamily {
 public:
-    ListedFamily(const FamilyType &type, const std::vector<int> &ids)
-        : destroy_(type.destroy), family_(type.create()), library_codes_(family_->codes) {
-        for (int id : ids)
-            codes_.push_back(library_codes_[id]);
-        family_->codes = codes_.data(); // a copy, because the library's table is static and must not change
-        family_->ncodes = static_cast<std::uint32_t>(codes_.size());
+    PartOfFamily(const Family &family, const FamilyType &type, bool is_listed)
+        : family_(family), type_(type), is_listed_(is_listed), tags_(type.create()), library_codes_(tags_->codes) {
+        for (int id = 0; id < family.id_count; ++id)
+            if (family.lists(id) == is_listed) {
+                ids_.push_back(id);
+                codes_.push_back(library_codes_[id]);
+            }
+        tags_->codes = codes_.data(); // a copy, because the library's table is static and must not change
+        tags_->ncodes = static_cast<std::uint32_t>(codes_.size());
     }
-    ~ListedFamily() {
-        family_->codes = library_codes_;
-        destroy_(family_);
+    ~PartOfFamily() {
+        tags_->codes = library_codes_;
+        type_.destroy(tags_);
     }
-    ListedFamily(const ListedFamily &) = delete;
-    ListedFamily &operator=(const ListedFamily &) = delete;
-    apriltag_family_t *get() const { return family_; }
+    PartOfFamily(const PartOfFamily &) = delete;
+    PartOfFamily &operator=(const PartOfFamily &) = delete;
+
+    const Family &family() const { return family_; }
+    bool is_listed() const { return is_listed_; }
+    apriltag_family_t *tags() const { return tags_; }
+    int id(int index) const { return ids_[index]; } // of the tag that the library numbers so
+
+    // `configured`: −1 for the family's default.
+    int max_hamming(int configured) const {
+        return !is_listed_ ? 0 : configured < 0 ? type_.default_max_hamming : configured;
+    }
 
 private:
-    void (*destroy_)(apriltag_family_t *);
-    apriltag_family_t *family_;
+    const Family &family_;
+    const FamilyType &type_;
+    bool is_listed_;
+    apriltag_family_t *tags_;
     std::uint64_t *library_codes_;
+    std::vector<int> ids_;
     std::vector<std::uint64_t> codes_;
 };
 
 const FamilyType &family_type(const std::string &name) {
-    for (const FamilyType &type : family_types)
+    std::string names;
+    for (const FamilyType &type : family_types) {
         if (name == type.name)
             return type;
-    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "family: unknown family '" + name + "'");
+        names += std::string(names.empty() ? "" : ", ") + type.name;
+    }
+    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                  "unknown family '" + name + "': tracker_apriltag has " + names +
+                      (name.starts_with("DICT_") ? "; tracker_aruco has OpenCV's dictionaries" : ""));
+}
+
+int tag_count(const FamilyType &type) {
+    const std::unique_ptr<apriltag_family_t, decltype(type.destroy)> whole(type.create(), type.destroy);
+    return static_cast<int>(whole->ncodes);
 }
 
 class AprilTagTracker {
 public:
     AprilTagTracker(const arhost::Host &, const arhost::Options &options)
-        : type_(family_type(options.text("family"))), threads_(static_cast<int>(options.integer("threads"))) {
+        : threads_(static_cast<int>(options.integer("threads"))) {
         set(options);
     }
 
@@ -149,9 +171,15 @@ public:
 
     void start(const arhost_tracker_setup &setup) {
         stop();
-        const std::unique_ptr<apriltag_family_t, decltype(type_.destroy)> whole(type_.create(), type_.destroy);
-        report_.emplace(setup, type_.name, whole->ncodes);
-        family_.emplace(type_, report_->ids());
+        lens_.emplace(*setup.intrinsics);
+        families_ = arhost::fiducial::families_of(
+            setup, [](const std::string &name) { return tag_count(family_type(name)); });
+        for (const Family &family : families_)
+            for (const bool is_listed : {true, false}) {
+                auto part = std::make_unique<PartOfFamily>(family, family_type(family.name), is_listed);
+                if (part->tags()->ncodes > 0) // the library divides by the number of tags
+                    parts_.push_back(std::move(part));
+            }
         detector_.reset(apriltag_detector_create());
         detector_->nthreads = threads_;
         configure_detector();
@@ -162,33 +190,37 @@ public:
             detect(cv::Mat::zeros(min_image_side(), min_image_side(), CV_8UC1));
     }
 
-    void track(const arhost_track_request &request, arhost_tracker_result &result) {
+    void track(const arhost_track_request &request, arhost::Observations &observations) {
         const arhost_frame &frame = *request.frame;
         const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
                            const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
-        std::vector<Detection> detections;
+        std::vector<arhost_observation> seen;
         const Detections tags = detect(grey);
         for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
             apriltag_detection_t *tag = nullptr;
             zarray_get(tags.get(), i, &tag);
             if (tag->decision_margin < min_margin_)
                 continue;
-            Detection detection{static_cast<std::size_t>(tag->id), {}, tag->decision_margin - 256.0 * tag->hamming};
+            const PartOfFamily &part =
+                **std::ranges::find(parts_, tag->family, [](const auto &one) { return one->tags(); });
+            Corners corners_px;
             // AprilTag's corners begin at the bottom left and are counter-clockwise; pixel centres are at +0.5.
             for (int corner = 0; corner < 4; ++corner)
-                detection.corners_px[corner] = {tag->p[3 - corner][0] - 0.5, tag->p[3 - corner][1] - 0.5};
-            if (fit_edges_)
-                detection.corners_px = arhost::fiducial::refine_edges(grey, detection.corners_px, report_->lens(),
-                                                                      family_->get()->width_at_border, refine_edges_)
-                                           .value_or(detection.corners_px);
-            detections.push_back(detection);
+                corners_px[corner] = {tag->p[3 - corner][0] - 0.5, tag->p[3 - corner][1] - 0.5};
+            if (fit_edges_ && part.is_listed())
+                corners_px = arhost::fiducial::refine_edges(grey, corners_px, *lens_, tag->family->width_at_border,
+                                                            refine_edges_)
+                                 .value_or(corners_px);
+            arhost_observation &one = seen.emplace_back(part.family().observation(part.id(tag->id), corners_px));
+            one.hamming = static_cast<std::uint32_t>(tag->hamming);
+            one.decision_margin = tag->decision_margin;
         }
-        report_->write(detections, result);
+        arhost::fiducial::report(std::move(seen), observations);
     }
 
     void stop() {
         detector_.reset();
-        family_.reset();
+        parts_.clear();
     }
 
 private:
@@ -198,8 +230,8 @@ private:
         detector_->refine_edges = refine_edges_;
         detector_->decode_sharpening = sharpening_;
         apriltag_detector_clear_families(detector_.get());
-        apriltag_detector_add_family_bits(detector_.get(), family_->get(),
-                                          max_hamming_ < 0 ? type_.default_max_hamming : max_hamming_);
+        for (const auto &part : parts_)
+            apriltag_detector_add_family_bits(detector_.get(), part->tags(), part->max_hamming(max_hamming_));
     }
 
     // The library reads out of bounds in images smaller than one of its 4×4 px tiles.
@@ -215,19 +247,19 @@ private:
         return {apriltag_detector_detect(detector_.get(), &image), apriltag_detections_destroy};
     }
 
-    const FamilyType &type_;
     const int threads_;
     bool fit_edges_ = true;
     double decimate_ = 1, sigma_ = 0;
     bool refine_edges_ = true;
     double sharpening_ = 0.25;
-    int max_hamming_ = -1; // −1: type_.default_max_hamming
+    int max_hamming_ = -1; // −1: that of each family
     double min_margin_ = 0;
 
-    std::optional<MarkerReport> report_;
-    std::optional<ListedFamily> family_;
+    std::optional<arhost::fiducial::Lens> lens_;
+    std::vector<Family> families_;
+    std::vector<std::unique_ptr<PartOfFamily>> parts_;
     Detector detector_{
-        nullptr, apriltag_detector_destroy}; // declared last, because it must be destroyed before the family it uses
+        nullptr, apriltag_detector_destroy}; // declared last, because it must be destroyed before the parts it uses
 };
 
 } // namespace

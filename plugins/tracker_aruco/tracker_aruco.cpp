@@ -3,20 +3,21 @@
 // tracker_aruco: detects ArUco markers and AprilTags with OpenCV.
 #include <fiducial_common/aruco_dictionaries.hpp>
 #include <fiducial_common/edge_refinement.hpp>
-#include <fiducial_common/marker_report.hpp>
+#include <fiducial_common/lens.hpp>
+#include <fiducial_common/observations.hpp>
 #include <fiducial_common/opencv_aruco.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 
-#include <opencv2/core/utility.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -24,21 +25,15 @@ namespace {
 using arhost::Failure;
 using arhost::aruco::dictionary_types;
 using arhost::aruco::DictionaryType;
-using arhost::fiducial::Detection;
-using arhost::fiducial::MarkerReport;
+using arhost::fiducial::Corners;
+using arhost::fiducial::Family;
 
-constexpr auto dictionary_names = [] {
-    std::array<const char *, dictionary_types.size() + 1> names{};
-    std::ranges::transform(dictionary_types, names.begin(), &DictionaryType::option);
-    return names;
-}();
 constexpr const char *refinements[] = {"edges", "none", "subpix", "contour", "apriltag", nullptr};
 
 constexpr arhost_option_descriptor options[] = {
-    arhost::option(ARHOST_OPTION_TEXT, "dictionary", "DICT_APRILTAG_36h11", "Predefined dictionary of the markers.",
-                   0, 0, dictionary_names.data()),
     arhost::option(ARHOST_OPTION_INPUT_PATH, "dictionary_file", "",
-                   "Path of a custom dictionary in OpenCV's YAML format; replaces `dictionary`."),
+                   "Path of a custom dictionary in OpenCV's YAML format. Targets name it by the file's name without "
+                   "extension."),
     arhost::option(
         ARHOST_OPTION_TEXT, "corner_refinement", "edges",
         "Corner refinement: edges (arhost fits lines to the edges), or a method of OpenCV: none, subpix, contour, or "
@@ -79,19 +74,12 @@ constexpr arhost_descriptor descriptor = {
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "Detects ArUco markers and AprilTags of one dictionary with OpenCV.",
+    "Detects ArUco markers and AprilTags with OpenCV.",
     0,
     std::size(options),
     options,
     nullptr,
 };
-
-const DictionaryType &dictionary_type(const std::string &name) {
-    for (const DictionaryType &type : dictionary_types)
-        if (name == type.option)
-            return type;
-    throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "dictionary: unknown dictionary '" + name + "'");
-}
 
 // Returns whether `root` is a valid dictionary. OpenCV does not check this and reads past the end of strings that are
 // too short.
@@ -145,19 +133,48 @@ cv::aruco::Dictionary read_dictionary(const std::string &file) {
                   "string of markersize² digits 0 or 1");
 }
 
+struct Reading {
+    std::uint32_t wrong_bits;
+    double contrast; // half of the difference between the mean grey levels of white and of black cells
+};
+
+// Reads the bits of a detected marker once more, because OpenCV does not tell how many of them it has corrected.
+Reading read(const cv::Mat &grey, const Corners &corners_px, const cv::aruco::Dictionary &dictionary, int id,
+             int border_bits) {
+    const int cells = dictionary.markerSize + 2 * border_bits;
+    const float first = -0.5F, last = static_cast<float>(cells) - 0.5F;
+    const cv::Point2f square[] = {{first, first}, {last, first}, {last, last}, {first, last}};
+    cv::Point2f corners[4];
+    std::ranges::copy(corners_px, corners);
+    cv::Mat levels, white; // one pixel for each cell
+    cv::warpPerspective(grey, levels, cv::getPerspectiveTransform(corners, square), {cells, cells}, cv::INTER_LINEAR,
+                        cv::BORDER_REPLICATE);
+    cv::threshold(levels, white, 0, 1, cv::THRESH_BINARY | cv::THRESH_OTSU);
+    const cv::Mat black = 1 - white;
+    const cv::Rect code(border_bits, border_bits, dictionary.markerSize, dictionary.markerSize);
+    const int wrong_bits = std::min(dictionary.getDistanceToId(white(code), id),
+                                    dictionary.getDistanceToId(black(code), id)); // of an inverted marker
+    return {static_cast<std::uint32_t>(wrong_bits), (cv::mean(levels, white)[0] - cv::mean(levels, black)[0]) / 2};
+}
+
+struct Dictionary {
+    cv::aruco::Dictionary table;
+    bool rotated_180 = false; // relative to AprilTag's own library
+};
+
+// The markers of a family and their detector.
+struct Detectable {
+    Family family;
+    Dictionary dictionary;
+    std::optional<arhost::aruco::Detector> detector;
+};
+
 class ArucoTracker {
 public:
     ArucoTracker(const arhost::Host &, const arhost::Options &options) {
         if (const std::string file = options.text("dictionary_file"); !file.empty()) {
-            dictionary_ = read_dictionary(file);
-            family_ = std::filesystem::path(file).stem().string();
-        } else {
-            const DictionaryType &type = dictionary_type(options.text("dictionary"));
-            dictionary_ = arhost::aruco::predefined(type.name);
-            family_ = type.family;
-            rotated_180_ = type.is_april_tag();
-            if (rotated_180_)
-                dictionary_.maxCorrectionBits = type.april_tag_bits;
+            file_table_ = read_dictionary(file);
+            file_name_ = arhost::fiducial::april_tag_name(std::filesystem::path(file).stem().string());
         }
         const std::string refinement = options.text("corner_refinement");
         refine_edges_ = refinement == "edges";
@@ -197,10 +214,8 @@ public:
         take_integer("threshold_window_step_px", parameters.adaptiveThreshWinSizeStep);
         take_real("min_perimeter_rate", parameters.minMarkerPerimeterRate);
         take_real("min_distance_rate", parameters.minMarkerDistanceRate);
-        if (changed.contains("error_correction_rate")) {
-            const double rate = changed.real("error_correction_rate");
-            parameters.errorCorrectionRate = rate < 0 ? default_correction_rate(dictionary_) : rate;
-        }
+        double rate = correction_rate_;
+        take_real("error_correction_rate", rate);
         take_integer("border_bits", parameters.markerBorderBits);
         if (changed.contains("inverted"))
             parameters.detectInvertedMarker = changed.boolean("inverted");
@@ -208,57 +223,91 @@ public:
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "threshold_window_max_px: must not be less than threshold_window_min_px");
         parameters_ = parameters;
-        if (detector_)
-            make_detector();
+        correction_rate_ = rate;
+        make_detectors();
     }
 
     void start(const arhost_tracker_setup &setup) {
-        report_.emplace(setup, family_, static_cast<std::size_t>(dictionary_.bytesList.rows));
-        make_detector();
+        stop();
+        lens_.emplace(*setup.intrinsics);
+        for (Family &family : arhost::fiducial::families_of(
+                 setup, [&](const std::string &name) { return dictionary_of(name).table.bytesList.rows; })) {
+            Dictionary dictionary = dictionary_of(family.name);
+            detectables_.push_back({std::move(family), std::move(dictionary), std::nullopt});
+        }
+        make_detectors();
     }
 
-    void track(const arhost_track_request &request, arhost_tracker_result &result) {
+    void track(const arhost_track_request &request, arhost::Observations &observations) {
         const arhost_frame &frame = *request.frame;
         const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
                            const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
-        const arhost::aruco::DetectedMarkers found = detector_->detect(grey);
-        std::vector<Detection> detections;
-        for (std::size_t i = 0; i < found.ids.size(); ++i) {
-            Detection detection{static_cast<std::size_t>(found.ids[i]), {}};
-            for (int corner = 0; corner < 4; ++corner) {
-                const cv::Point2d px = found.corners[i][rotated_180_ ? (corner + 2) % 4 : corner];
-                detection.corners_px[corner] = px - cv::Point2d(centre_shift_px_, centre_shift_px_);
+        std::vector<arhost_observation> seen;
+        for (const Detectable &detectable : detectables_) {
+            const cv::aruco::Dictionary &table = detectable.dictionary.table;
+            const arhost::aruco::DetectedMarkers found = detectable.detector->detect(grey);
+            for (std::size_t i = 0; i < found.ids.size(); ++i) {
+                const bool is_listed = detectable.family.lists(found.ids[i]);
+                Corners corners_px;
+                for (int corner = 0; corner < 4; ++corner)
+                    corners_px[corner] =
+                        cv::Point2d(found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner]) -
+                        cv::Point2d(centre_shift_px_, centre_shift_px_);
+                if (refine_edges_ && is_listed)
+                    corners_px = arhost::fiducial::refine_edges(grey, corners_px, *lens_,
+                                                                table.markerSize + 2 * parameters_.markerBorderBits)
+                                     .value_or(corners_px);
+                const Reading reading = read(grey, corners_px, table, found.ids[i], parameters_.markerBorderBits);
+                if (!is_listed && reading.wrong_bits > 0) // in large dictionaries, it may be anything
+                    continue;
+                arhost_observation &one = seen.emplace_back(detectable.family.observation(found.ids[i], corners_px));
+                one.hamming = reading.wrong_bits;
+                one.decision_margin = reading.contrast;
             }
-            if (refine_edges_)
-                detection.corners_px =
-                    arhost::fiducial::refine_edges(grey, detection.corners_px, report_->lens(),
-                                                   dictionary_.markerSize + 2 * parameters_.markerBorderBits)
-                        .value_or(detection.corners_px);
-            detections.push_back(detection);
         }
-        report_->write(detections, result);
+        arhost::fiducial::report(std::move(seen), observations);
     }
 
-    void stop() { detector_.reset(); }
+    void stop() { detectables_.clear(); }
 
 private:
-    void make_detector() {
-        // Use a dictionary of only the listed markers, which is faster and gives fewer false positives.
-        cv::Mat listed;
-        for (int id : report_->ids())
-            listed.push_back(dictionary_.bytesList.row(id));
-        detector_.emplace(cv::aruco::Dictionary(listed, dictionary_.markerSize, dictionary_.maxCorrectionBits),
-                          parameters_);
+    Dictionary dictionary_of(const std::string &name) const {
+        if (!file_name_.empty() && name == file_name_)
+            return {file_table_};
+        std::string names;
+        for (const DictionaryType &type : dictionary_types) {
+            if (name == type.family) {
+                Dictionary dictionary{arhost::aruco::predefined(type.name), type.is_april_tag()};
+                if (type.is_april_tag())
+                    dictionary.table.maxCorrectionBits = type.april_tag_bits;
+                return dictionary;
+            }
+            names += std::string(names.empty() ? "" : ", ") + type.family;
+        }
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                      "unknown dictionary '" + name + "': tracker_aruco has " +
+                          (file_name_.empty() ? "" : file_name_ + " (dictionary_file), ") + names +
+                          (name.starts_with("tag") ? "; tracker_apriltag has more families of AprilTag" : ""));
     }
 
-    cv::aruco::Dictionary dictionary_;
-    std::string family_;
-    bool rotated_180_ = false, refine_edges_ = false;
+    void make_detectors() {
+        for (Detectable &detectable : detectables_) {
+            cv::aruco::DetectorParameters parameters = parameters_;
+            parameters.errorCorrectionRate =
+                correction_rate_ < 0 ? default_correction_rate(detectable.dictionary.table) : correction_rate_;
+            detectable.detector.emplace(detectable.dictionary.table, parameters);
+        }
+    }
+
+    cv::aruco::Dictionary file_table_;
+    std::string file_name_; // the name of file_table_; empty: there is none
+    bool refine_edges_ = false;
     cv::aruco::DetectorParameters parameters_;
+    double correction_rate_ = -1;
     double centre_shift_px_ = 0; // for CORNER_REFINE_APRILTAG, whose pixel centres are at +0.5
 
-    std::optional<MarkerReport> report_;
-    std::optional<arhost::aruco::Detector> detector_;
+    std::optional<arhost::fiducial::Lens> lens_;
+    std::vector<Detectable> detectables_;
 };
 
 } // namespace

@@ -411,7 +411,7 @@ protected:
 const std::string idle_tracker = "class T:\n"
                                  "    def __init__(self, host): pass\n"
                                  "    def start(self, setup): pass\n"
-                                 "    def track(self, frame, markers): return 0\n";
+                                 "    def track(self, frame): return []\n";
 const std::string idle_sink = "class S:\n"
                               "    def __init__(self, host): pass\n"
                               "    def start(self, setup): pass\n"
@@ -552,9 +552,52 @@ TEST(Conform, DrawsTheUsersMarkers) {
     EXPECT_EQ(run.run({tracker, "--print", "0=" + tag, "--only", "tracker.several"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("the test needs three prints"));
     EXPECT_EQ(run.run({tracker, "--print", "5=" + tag, "--only", "tracker.track"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("it reports 0 markers instead of 1"));
+    EXPECT_THAT(run.output(), HasSubstr("it reports marker 0 instead of 5"));
     EXPECT_THAT(run.output(),
                 HasSubstr("to repeat: arhost conform " + tracker + " --only tracker.track --seed 1 --print 5="));
+}
+
+TEST(Conform, DrawsMarkersOfTheFamilyThatTheTrackerKnows) {
+    ConformRun run;
+    const std::string aruco = ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so",
+                      apriltag = ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so";
+    for (const char *family : {"tag36h11", "DICT_6X6_250"}) {
+        EXPECT_EQ(run.run({aruco, "--family", family, "--only", "tracker.start,tracker.corners"}), 0) << run.output();
+        EXPECT_THAT(run.output(), HasSubstr(std::string("with a marker of ") + family));
+    }
+    EXPECT_EQ(run.run({apriltag, "--only", "tracker.start"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("with a marker of tag36h11"));
+    EXPECT_EQ(run.run({apriltag, "--family", "DICT_6X6_250", "--only", "tracker.start"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr(" --seed 1 --family DICT_6X6_250"));
+    EXPECT_EQ(run.run({apriltag, "--family", "tag16h5", "--only", "tracker.start"}), 2);
+    EXPECT_THAT(run.output(),
+                HasSubstr("--family tag16h5: the suite draws only tag36h11, DICT_6X6_250, tag25h9; give "
+                          "pictures of the markers: --print ID=FILE"));
+}
+
+TEST(Conform, TestsATrackerOfBodies) {
+    ConformRun run;
+    const std::string tracker = ARHOST_TEST_PLUGIN_DIRECTORY "/tracker_body.so";
+    EXPECT_EQ(run.run({tracker, "--body", "head", "--only", "tracker.*"}), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("pass     tracker.body-pose"));
+    EXPECT_THAT(run.output(), HasSubstr("skip     tracker.start"));
+    EXPECT_EQ(run.run({tracker, "--body", "foot", "--only", "tracker.*"}), 1);
+    EXPECT_THAT(run.output(), HasSubstr("there is no body 'foot'; known: head hand"));
+    EXPECT_EQ(run.run({tracker, "--only", "tracker.*"}), 1);
+    EXPECT_THAT(run.output(),
+                HasSubstr("it starts with no marker, and no body is named: give --family NAME or --body "
+                          "NAME"));
+}
+
+TEST(Conform, ReportsTheOrderOfCornersAndTheirOffset) {
+    ConformRun run;
+    EXPECT_EQ(run.run({run.link_wrong("corners_from_bottom_left", "tracker").string(), "--only", "tracker.*corner*"}),
+              1);
+    EXPECT_THAT(run.output(), HasSubstr("the corners begin at the bottom left corner of the upright print and run "
+                                        "clockwise; expected top left, top right, bottom right, bottom left"));
+    EXPECT_EQ(run.run({run.link_wrong("corners_at_half", "tracker").string(), "--only", "tracker.corners"}), 1);
+    EXPECT_THAT(run.output(), testing::ContainsRegex("mean error of the four corners is .0\\.[45]., 0\\.[45].*: "
+                                                     "pixel centres are at integers"));
 }
 
 TEST(Conform, FailsIfAMarkersPictureCannotBeRead) {

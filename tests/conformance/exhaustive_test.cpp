@@ -20,6 +20,7 @@ TEST_P(MatrixExhaustive, FailsExactlyTheListedTests) {
 const auto defect = [](const auto &info) { return info.param.defect; };
 INSTANTIATE_TEST_SUITE_P(RayTracer, MatrixExhaustive, testing::ValuesIn(wrong_plugins), defect);
 INSTANTIATE_TEST_SUITE_P(Tracker, MatrixExhaustive, testing::ValuesIn(wrong_trackers), defect);
+INSTANTIATE_TEST_SUITE_P(Body, MatrixExhaustive, testing::ValuesIn(wrong_bodies), defect);
 INSTANTIATE_TEST_SUITE_P(Source, MatrixExhaustive, testing::ValuesIn(wrong_sources), defect);
 INSTANTIATE_TEST_SUITE_P(Sink, MatrixExhaustive, testing::ValuesIn(wrong_sinks), defect);
 

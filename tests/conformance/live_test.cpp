@@ -38,7 +38,8 @@ objects: [{sphere: {centre: [0, 0, 0], radius: 300}, material: grey}]
 struct Parts {
     std::string source = "{plugin: source_synthetic, fps: 30, options: {frames: 40}, conform: true}";
     std::string camera = "{width: 320, height: 240, fx: 300}";
-    std::string tracker = "{plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], conform: true}";
+    std::string tracker =
+        "{plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}], conform: true}";
     std::string raytracer = "{plugin: rt_embree, scene: scene.yaml, conform: true}"; // "": none
     std::string output = "{plugin: sink_null}";
     std::string more = "mode: lockstep\n";
@@ -64,7 +65,7 @@ Parts with_raytracer(const std::string &defect) {
 }
 Parts with_tracker(const std::string &defect) {
     Parts parts;
-    parts.tracker = wrong("tracker", defect, "markers: [{id: 0, side_mm: 80}]");
+    parts.tracker = wrong("tracker", defect, "targets: [{marker: 0, family: tag36h11, side_mm: 80}]");
     parts.raytracer.clear();
     return parts;
 }
@@ -75,8 +76,8 @@ Parts with_counters(const std::string &source_options, const std::string &tracke
     parts.source = "{plugin: source_counter, options: {frames: 40, width: 320, height: 240, " + source_options +
                    "}, conform: true}";
     parts.tracker = "{plugin: tracker_counter, options: {" + tracker_options +
-                    "}, markers: [{id: 3, side_mm: 80}, {id: 5, "
-                    "side_mm: 40}], conform: true}";
+                    "}, targets: [{marker: 3, family: tag36h11, side_mm: 80}, "
+                    "{marker: 5, family: tag36h11, side_mm: 40}], conform: true}";
     parts.raytracer = "{plugin: rt_counter, options: {" + raytracer_options + "}, scene: scene.yaml, conform: true}";
     parts.scene = scene_of_one_big_ball;
     return parts;
@@ -86,8 +87,8 @@ class LiveRun : public ArhostRun {
 public:
     explicit LiveRun(const Parts &parts) : ArhostRun(parts.text()) {
         write("scene.yaml", parts.scene);
-        for (const auto &[kind, file] :
-             {std::pair("rt", "wrong"), std::pair("tracker", "wrong_tracker"), std::pair("source", "wrong_source")}) {
+        for (const auto &[kind, file] : {std::pair("rt", "wrong"), std::pair("tracker", "wrong_tracker"),
+                                         std::pair("body", "wrong_body"), std::pair("source", "wrong_source")}) {
             const std::string text = parts.text(), begin = std::string("./") + kind + "_";
             if (const std::size_t at = text.find(begin); at != std::string::npos)
                 std::filesystem::create_symlink(std::string(ARHOST_WRONG_PLUGIN_DIRECTORY "/") + file + ".so",
@@ -107,7 +108,8 @@ public:
 void expect_violations(const Parts &parts, const std::set<std::string> &checks) {
     SCOPED_TRACE(parts.text());
     LiveRun run(parts);
-    ASSERT_EQ(run.run(), 0) << run.output(); // violations are reported, and the run continues
+    // Violations are reported, and the run continues. The wrong corners are those of no target.
+    ASSERT_EQ(run.run({"--config", "run.yaml", "--allow-no-target"}), 0) << run.output();
     EXPECT_EQ(run.checks(true), checks) << run.output();
     for (const std::string &check : checks) {
         const std::string component = check.substr(0, check.find('.'));
@@ -120,8 +122,8 @@ void expect_violations(const Parts &parts, const std::set<std::string> &checks) 
 const std::set<std::string> source_checks = {"source.clock", "source.capture-time", "source.rate",
                                              "source.frame-stays"};
 const std::set<std::string> all_checks = {
-    "source.clock",    "source.capture-time", "source.rate",      "source.frame-stays", "tracker.order",
-    "tracker.numbers", "tracker.pose",        "raytracer.region", "raytracer.place",    "raytracer.image-stays"};
+    "source.clock",    "source.capture-time", "source.rate",      "source.frame-stays", "tracker.corners",
+    "tracker.repeats", "tracker.covariance",  "raytracer.region", "raytracer.place",    "raytracer.image-stays"};
 
 void expect_no_violations(const Parts &parts, const std::set<std::string> &checks = all_checks) {
     SCOPED_TRACE(parts.text());
@@ -165,10 +167,12 @@ TEST(LiveConformance, ReportsSourceViolations) {
 }
 
 TEST(LiveConformance, ReportsTrackerViolations) {
-    expect_violations(with_tracker("age_counts_frames"), {"tracker.numbers"});
-    expect_violations(with_tracker("metres"), {"tracker.pose"});
-    expect_violations(with_tracker("corners_at_half"), {"tracker.pose"});
-    expect_violations(with_counters("", "reversed: true", ""), {"tracker.order"});
+    expect_violations(with_tracker("corners_counter_clockwise"), {"tracker.corners"});
+    expect_violations(with_tracker("each_marker_twice"), {"tracker.repeats"});
+    Parts body;
+    body.tracker = wrong("body", "asymmetric_covariance", "targets: [{name: head, body: head}]");
+    body.raytracer.clear();
+    expect_violations(body, {"tracker.covariance"});
 }
 
 TEST(LiveConformance, ReportsRayTracerViolations) {
@@ -200,7 +204,8 @@ TEST(LiveConformance, ChecksThePlaceWithLensDistortion) {
 TEST(LiveConformance, ChecksImagesThatTheWorkerWarpsToTheLens) {
     Parts parts = with_counters("", "", "");
     parts.camera = lens;
-    parts.tracker = "{plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}"; // ignores the lens
+    parts.tracker =
+        "{plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}"; // ignores the lens
     std::set<std::string> checks = source_checks;
     checks.merge(std::set<std::string>{"raytracer.region", "raytracer.place", "raytracer.image-stays"});
     expect_no_violations(parts, checks);
@@ -215,16 +220,17 @@ TEST(LiveConformance, ReportsTheSameInModeLive) {
     parts = with_raytracer("opaque_background");
     parts.more = "mode: live\n";
     expect_violations(parts, {"raytracer.place", "raytracer.region"});
-    parts = with_tracker("corners_at_half");
+    parts = with_tracker("corners_counter_clockwise");
     parts.more = "mode: live\n";
-    expect_violations(parts, {"tracker.pose"});
+    expect_violations(parts, {"tracker.corners"});
 }
 
 TEST(LiveConformance, AcceptsAHeldPose) {
     Parts parts;
     parts.source =
         "{plugin: source_synthetic, options: {frames: 30, occlude_from: 10, occlude_to: 20}, conform: true}";
-    parts.tracker = "{plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], hold_frames: 5, conform: true}";
+    parts.tracker = "{plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}], hold_frames: 5, "
+                    "conform: true}";
     parts.output = "{plugin: sink_poses, path: poses.jsonl}";
     LiveRun run(parts);
     ASSERT_EQ(run.run(), 0) << run.output();

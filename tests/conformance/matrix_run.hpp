@@ -12,7 +12,7 @@ namespace arhost::test {
 
 // The value of --only for every test of a wrong plugin's kind. Tests of abi.* run only on ray tracers.
 inline std::string whole_suite(const WrongPlugin &wrong) {
-    return wrong.kind == "rt" ? "*" : wrong.kind + ".*";
+    return wrong.kind == "rt" ? "*" : wrong.kind == "body" ? "tracker.*" : wrong.kind + ".*";
 }
 
 // Runs `tests`, of which exactly those in wrong.found_by must fail, with wrong.verdict.
@@ -20,8 +20,12 @@ inline void expect_found(const WrongPlugin &wrong, const std::string &tests) {
     ConformRun run;
     const std::filesystem::path plugin = run.link_wrong(wrong.defect, wrong.kind);
     const bool hangs = wrong.verdict == "timeout"; // a plugin that hangs gets a short timeout
-    const int status = run.run({plugin.string(), "--only", tests, "--jobs", "1", "--timeout-factor",
-                                hangs ? "0.3" : "3", "--json", "results.json"});
+    std::vector<std::string> arguments = {
+        plugin.string(),     "--only", tests,         "--jobs", "1", "--timeout-factor",
+        hangs ? "0.3" : "3", "--json", "results.json"};
+    if (wrong.kind == "body")
+        arguments.insert(arguments.end(), {"--body", "head"});
+    const int status = run.run(arguments);
     std::vector<std::string> found_by;
     const nlohmann::json report = run.json("results.json");
     for (const nlohmann::json &result : report.at("results"))

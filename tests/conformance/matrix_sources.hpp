@@ -94,8 +94,9 @@ inline const std::vector<WrongPlugin> wrong_sources = of_kind(
         {"no_principal_point", "intrinsics with a NaN principal point", "fail", {"source.intrinsics"}},
         {"seven_coefficients", "a lens with 7 coefficients", "fail", {"source.intrinsics"}},
         {"row_major_truth", "row-major true poses", "fail", {"source.truth"}},
-        {"scaled_truth", "true poses that stretch the marker", "fail", {"source.truth"}},
+        {"scaled_truth", "true poses that stretch the target", "fail", {"source.truth"}},
         {"truth_behind_camera", "true poses behind the camera", "fail", {"source.truth"}},
+        {"truth_without_target", "true poses without the name of a target", "fail", {"source.truth"}},
         {"slow", "takes 120 ms per frame", "warn", {"source.speed"}},
     });
 

@@ -46,10 +46,12 @@ const auto defect = [](const auto &info) { return info.param.defect; };
 
 INSTANTIATE_TEST_SUITE_P(RayTracer, MatrixTargeted, testing::ValuesIn(failing(wrong_plugins)), defect);
 INSTANTIATE_TEST_SUITE_P(Tracker, MatrixTargeted, testing::ValuesIn(failing(wrong_trackers)), defect);
+INSTANTIATE_TEST_SUITE_P(Body, MatrixTargeted, testing::ValuesIn(failing(wrong_bodies)), defect);
 INSTANTIATE_TEST_SUITE_P(Source, MatrixTargeted, testing::ValuesIn(failing(wrong_sources)), defect);
 INSTANTIATE_TEST_SUITE_P(Sink, MatrixTargeted, testing::ValuesIn(failing(wrong_sinks)), defect);
 INSTANTIATE_TEST_SUITE_P(RayTracer, MatrixWhole, testing::ValuesIn(sample(wrong_plugins)), defect);
 INSTANTIATE_TEST_SUITE_P(Tracker, MatrixWhole, testing::ValuesIn(sample(wrong_trackers)), defect);
+INSTANTIATE_TEST_SUITE_P(Body, MatrixWhole, testing::ValuesIn(sample(wrong_bodies)), defect);
 INSTANTIATE_TEST_SUITE_P(Source, MatrixWhole, testing::ValuesIn(sample(wrong_sources)), defect);
 INSTANTIATE_TEST_SUITE_P(Sink, MatrixWhole, testing::ValuesIn(sample(wrong_sinks)), defect);
 
@@ -59,6 +61,7 @@ struct Table {
 };
 const std::vector<Table> tables = {{"wrong.cpp", wrong_plugins},
                                    {"wrong_tracker.cpp", wrong_trackers},
+                                   {"wrong_body.cpp", wrong_bodies},
                                    {"wrong_source.cpp", wrong_sources},
                                    {"wrong_sink.cpp", wrong_sinks}};
 

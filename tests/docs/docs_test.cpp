@@ -64,7 +64,7 @@ TEST(Documentation, DemonstrationOpensAndIsDescribed) {
     const std::string demo = (root / "config/demo.yaml").string();
     EXPECT_EQ(run.run({"check", demo, "--set", "tracker.plugin=tracker_apriltag"}), 0) << run.output();
     for (const char *line : {"source: source_synthetic: 1280 x 720 px, 30 fps, 150 frames\n", "\ncamera: fx ",
-                             "\ntracker: tracker_apriltag: marker 0 (family tag36h11, ", "\nraytracer: rt_embree: /",
+                             "\ntracker: tracker_apriltag: 'tag36h11-0' (tag36h11 0)\n", "\nraytracer: rt_embree: /",
                              "\noutput: sink_video: /", "out/demo.mp4\n", "demo.yaml: OK\n"})
         EXPECT_THAT(run.output(), testing::HasSubstr(line));
     EXPECT_FALSE(run.exists("out"));

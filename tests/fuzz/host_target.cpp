@@ -30,7 +30,7 @@ using namespace ipc;
 constexpr const char *configuration_text = R"(version: 1
 plugin_path: [plugins]
 source: {plugin: source, conform: true, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
-tracker: {plugin: tracker, fallback: tracker2, markers: [{id: 0, side_mm: 80}, {id: 1, side_mm: 80}], hold_frames: 1,
+tracker: {plugin: tracker, fallback: tracker2, targets: [{ids: 0-1, family: tag36h11, side_mm: 80}], hold_frames: 1,
           conform: true, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
 raytracer: {plugin: rt, scene: scene.yaml, conform: true, deadline_ms: 3600000, start_deadline_ms: 3600000,
             stop_deadline_ms: 3600000}
@@ -229,13 +229,15 @@ private:
         result.frame.capture_ns = static_cast<std::int64_t>(command.sequence) * 1000;
         if (kind_ == ARHOST_KIND_TRACKER && output_memory_) {
             const auto slot = layout_.slot(output_memory_, command.slot);
-            auto &found = *reinterpret_cast<arhost_tracker_result *>(slot.data());
-            found.marker_count = 1;
-            found.markers[0].state = ARHOST_MARKER_DETECTED;
+            const TrackerSlot layout(2);
+            *reinterpret_cast<std::uint32_t *>(slot.data()) = 1;
+            auto &found = *reinterpret_cast<arhost_target *>(slot.data() + TrackerSlot::targets_offset);
+            found.state = ARHOST_TARGET_DETECTED;
+            found.observation_count = 1;
             for (const int diagonal : {0, 5, 10, 15})
-                found.markers[0].mt[diagonal] = 1;
-            found.markers[0].mt[14] = -500;
-            input.corrupt(slot.first(sizeof(arhost_marker) + offsetof(arhost_tracker_result, markers)));
+                found.mt[diagonal] = 1;
+            found.mt[14] = -500;
+            input.corrupt(slot.first(layout.observations_offset + sizeof(arhost_observation)));
         }
         input.corrupt(std::as_writable_bytes(std::span(&result, 1)));
         results_->push(result);

@@ -25,32 +25,30 @@ void require(bool condition, const char *message) {
         throw std::logic_error(message);
 }
 
-arhost_tracker_result valid_result() {
-    arhost_tracker_result result{};
-    result.marker_count = 2;
-    for (int i = 0; i < 2; ++i) {
-        arhost_marker &marker = result.markers[i];
-        marker.struct_size = sizeof marker;
-        marker.id = i;
-        marker.state = ARHOST_MARKER_DETECTED;
-        for (const int diagonal : {0, 5, 10, 15})
-            marker.mt[diagonal] = 1;
-        marker.mt[14] = -500;
-    }
-    return result;
-}
-
 void take_result(Input &input) {
-    const auto slot = std::make_unique<arhost_tracker_result>(valid_result());
-    const auto bytes = std::as_writable_bytes(std::span(slot.get(), 1));
-    input.corrupt(bytes);
-    const auto record = std::make_unique<arhost_record>();
-    if (host::accept_tracker_result(bytes, {0, 1}, *record))
+    const std::vector<ipc::Target> configured(2, {"target", {}, ""});
+    const ipc::TrackerSlot layout(configured.size());
+    std::vector<std::byte> slot(layout.byte_size(0));
+    *reinterpret_cast<std::uint32_t *>(slot.data()) = 2;
+    auto *targets = reinterpret_cast<arhost_target *>(slot.data() + ipc::TrackerSlot::targets_offset);
+    for (std::uint32_t i = 0; i < 2; ++i) {
+        targets[i].state = ARHOST_TARGET_DETECTED;
+        targets[i].first_observation = i;
+        targets[i].observation_count = 1;
+        for (const int diagonal : {0, 5, 10, 15})
+            targets[i].mt[diagonal] = 1;
+        targets[i].mt[14] = -500;
+    }
+    input.corrupt(std::span(slot).first(layout.observations_offset + 2 * sizeof(arhost_observation)));
+    host::Frame frame(0);
+    if (host::accept_tracker_result(slot, configured, 1, frame))
         return;
-    require(record->marker_count <= 2, "more markers than expected");
-    for (std::uint32_t i = 0; i < record->marker_count; ++i)
-        for (const double number : record->markers[i].mt)
+    for (const arhost_target &target : frame.targets) {
+        require(target.first_observation + std::uint64_t{target.observation_count} <= frame.observations.size(),
+                "observations are out of range");
+        for (const double number : target.mt)
             require(std::isfinite(number), "a pose is not finite");
+    }
 }
 
 void overlay(const arhost_render_info &info) {

@@ -43,6 +43,9 @@ void make_folder() {
                   bytes_of("image_width: 64\nimage_height: 48\ncamera_matrix: {rows: 3, cols: 3, data: "
                            "[60, 0, 31.5, 0, 60, 23.5, 0, 0, 1]}\ndistortion_coefficients: [0, 0, 0, 0]\n"));
     write_scratch("cameras.txt", bytes_of("0 0 10 0 0 0 0 1 0\n"));
+    write_scratch("board.map.yaml",
+                  bytes_of("version: 1\nfamily: tag16h5\nmarkers:\n- {id: 0, side_mm: 8, position_mm: [0, 0, 0]}\n"
+                           "- {id: 1, corners_mm: [[9, 8, 0], [17, 8, 0], [17, 0, 0], [9, 0, 0]]}\n"));
 }
 
 } // namespace

@@ -72,7 +72,7 @@ bool succeeds(ArhostRun &run, const char *command) {
 
 std::string pipeline_with(const std::string &tracker) {
     return "version: 1\nframes: 3\nsource: {plugin: source_synthetic}\ntracker: {" + tracker +
-           ", markers: [{id: 0, side_mm: 80}]}\noutputs: [{plugin: sink_null}]\n";
+           ", targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\noutputs: [{plugin: sink_null}]\n";
 }
 
 struct Case {
@@ -100,20 +100,22 @@ TEST_P(AllowList, ContainsTheCallsOf) {
     EXPECT_THAT(blocked_calls(run), testing::IsEmpty());
 }
 
-INSTANTIATE_TEST_SUITE_P(Plugins, AllowList,
-                         testing::Values(Case{"SyntheticArucoEmbreeVideo",
-                                              "source: {plugin: source_synthetic}\n"
-                                              "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
-                                              "raytracer: {plugin: rt_embree, scene: scene.yaml}\n"
-                                              "outputs: [{plugin: sink_video, path: out/video.mkv}, "
-                                              "{plugin: sink_poses, path: out/poses.jsonl}, {plugin: sink_null}]\n"},
-                                         Case{"FileAprilTagImages",
-                                              "source: {plugin: source_file, path: in/video.mp4}\n"
-                                              "camera: {width: 1280, height: 720, fx: 900}\n"
-                                              "tracker: {plugin: tracker_apriltag, markers: [{id: 0, side_mm: 80}]}\n"
-                                              "outputs: [{plugin: sink_images, path: out/frame-%04d.png}, "
-                                              "{plugin: sink_trajectory, path: out/path.txt}]\n"}),
-                         [](const auto &info) { return info.param.name; });
+INSTANTIATE_TEST_SUITE_P(
+    Plugins, AllowList,
+    testing::Values(Case{"SyntheticArucoEmbreeVideo",
+                         "source: {plugin: source_synthetic}\n"
+                         "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
+                         "raytracer: {plugin: rt_embree, scene: scene.yaml}\n"
+                         "outputs: [{plugin: sink_video, path: out/video.mkv}, "
+                         "{plugin: sink_poses, path: out/poses.jsonl}, {plugin: sink_null}]\n"},
+                    Case{
+                        "FileAprilTagImages",
+                        "source: {plugin: source_file, path: in/video.mp4}\n"
+                        "camera: {width: 1280, height: 720, fx: 900}\n"
+                        "tracker: {plugin: tracker_apriltag, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
+                        "outputs: [{plugin: sink_images, path: out/frame-%04d.png}, "
+                        "{plugin: sink_trajectory, path: out/path.txt}]\n"}),
+    [](const auto &info) { return info.param.name; });
 
 TEST(AllowListOfOthers, ContainsTheCallsOfPython) {
     REQUIRE_TRACE();
@@ -151,8 +153,8 @@ class Tracker:
             assert client.recv(1) == b"1"
     def start(self, setup):
         pass
-    def track(self, frame, markers):
-        return 0
+    def track(self, frame):
+        return []
 )");
     EXPECT_THAT(blocked_calls(run), testing::IsEmpty());
 }

@@ -164,9 +164,10 @@ inline std::string counting(const std::string &mode, const std::string &source, 
                             std::chrono::milliseconds deadline = counting_deadline) {
     const std::string deadline_ms = "deadline_ms: " + std::to_string(deadline.count());
     return "version: 1\nmode: " + mode + "\nsource: {plugin: source_counter, options: {" + source + "}}\n" +
-           "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}], options: {" + tracker + "}, " +
-           deadline_ms + "}\n" + "raytracer: {plugin: rt_counter, scene: scene.yaml, options: {" + raytracer + "}, " +
-           deadline_ms + "}\n" + "outputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n" + more;
+           "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}], options: {" +
+           tracker + "}, " + deadline_ms + "}\n" + "raytracer: {plugin: rt_counter, scene: scene.yaml, options: {" +
+           raytracer + "}, " + deadline_ms + "}\n" +
+           "outputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n" + more;
 }
 inline const char *const small_scene = "version: 1\naxes: z-up\nmaterials: {m: {model: diffuse, diffuse: 0.5}}\n"
                                        "objects: [{sphere: {centre: [0, 0, 10], radius: 10}, material: m}]\n";

@@ -168,7 +168,7 @@ TEST(Control, StatusDescribesTheRun) {
     EXPECT_GT(status["fps"], 0);
     EXPECT_GT(status["stages"]["latency"]["count"], 0);
     EXPECT_EQ(status["latency"]["from"], "arrival");
-    EXPECT_EQ(status["targets"][0]["id"], 3);
+    EXPECT_EQ(status["targets"][0]["name"], "tag36h11-3");
     const Json tracker = run.status_of("tracker");
     EXPECT_EQ(tracker["plugin"], "tracker_counter");
     EXPECT_EQ(tracker["state"], "running");
@@ -255,7 +255,7 @@ TEST(Control, KeepsTheOldPluginIfTheNewOneDoesNotStart) {
 
 TEST(Control, RejectsSwapsOfAComponentThatTheRunLacks) {
     ControlledRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 1000000, delay_ms: 5}}\n"
-                      "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
+                      "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"
                       "alternatives: {tracker: [{name: second, plugin: tracker_counter}]}\n"
                       "outputs: [{plugin: sink_counter, path: counted.txt}, "
                       "{plugin: sink_control, allow: [listen], control: [quit, swap, status]}]\n");
@@ -279,7 +279,7 @@ TEST(Control, LoadsAScene) {
     ControlledRun run(
         "version: 1\nsource: {plugin: source_synthetic, options: {frames: 0, id: 0, side_mm: 80, width: "
         "160, height: 120}}\n"
-        "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+        "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
         "raytracer: {plugin: rt_embree, scene: scene.yaml}\nscenes: [other.yaml]\n"
         "outputs: [{plugin: sink_images, path: out/%06d.png}, "
         "{plugin: sink_control, allow: [listen], control: [quit, load_scene, status]}]\n");
@@ -299,7 +299,7 @@ TEST(Control, LoadsAScene) {
     ArhostRun reference("version: 1\nframes: " + std::to_string(frames.size()) +
                         "\nsource: {plugin: source_synthetic, options: {frames: 0, id: 0, side_mm: 80, width: 160, "
                         "height: 120}}\n"
-                        "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+                        "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
                         "raytracer: {plugin: rt_embree, scene: other.yaml}\n"
                         "outputs: [{plugin: sink_images, path: out/%06d.png}]\n");
     reference.write("other.yaml", run.read("other.yaml"));
@@ -378,7 +378,7 @@ TEST(Control, RecordsFromCommandToCommand) {
 
 TEST(Control, ChangesAnOptionAlsoForARestartedPlugin) {
     ControlledRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 0, id: 0, side_mm: 80}}\n"
-                      "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+                      "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
                       "raytracer: {plugin: rt_embree, scene: scene.yaml}\n"
                       "outputs: [{plugin: sink_control, allow: [listen], control: [quit, set, status]}]\n");
     run.start_and_connect();
@@ -418,7 +418,7 @@ TEST(Control, TheStatusSaysWhichCameraIsMissing) {
 
 TEST(Control, ANewSceneKeepsAChangedOption) {
     ControlledRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 0, id: 0, side_mm: 80}}\n"
-                      "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+                      "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
                       "raytracer: {plugin: rt_embree, scene: scene.yaml}\nscenes: [other.yaml]\n"
                       "alternatives: {raytracer: [{name: second, plugin: rt_embree}]}\n"
                       "outputs: [{plugin: sink_control, allow: [listen], control: [quit, load_scene, set, status, "
@@ -551,11 +551,11 @@ INSTANTIATE_TEST_SUITE_P(
         BadChoice{"AlternativesWithoutTracker", "alternatives: {tracker: [{plugin: tracker_aruco}]}\n",
                   "alternatives.tracker: there is no 'tracker' to which these are alternatives"},
         BadChoice{"SameNameTwice",
-                  "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
+                  "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"
                   "alternatives: {tracker: [{plugin: tracker_counter}]}\n",
                   "alternatives.tracker[0]: there are two with the name 'tracker_counter'; give each its own 'name'"},
         BadChoice{"MissingScene",
-                  "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
+                  "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"
                   "raytracer: {plugin: rt_counter, scene: scene.yaml}\nscenes: [missing.yaml]\n",
                   "run.yaml:5:10: scenes[0]: there is no scene file"},
         BadChoice{"RecordingOverAnInput", "record: {plugin: sink_poses, path: run.yaml}\n",
@@ -565,8 +565,9 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto &info) { return info.param.name; });
 
 TEST(Control, CheckCoversAlternativesAndOutputsOfCommands) {
-    const std::string base = "version: 1\nsource: {plugin: source_counter}\n"
-                             "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n";
+    const std::string base =
+        "version: 1\nsource: {plugin: source_counter}\n"
+        "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n";
     for (const auto &[yaml, message] :
          {std::pair<std::string, const char *>{"alternatives: {tracker: [{name: a, plugin: rt_counter}]}\n",
                                                "'rt_counter' is a raytracer, not a tracker"},

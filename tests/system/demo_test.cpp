@@ -50,7 +50,7 @@ TEST(Demo, WritesItsFourFiles) {
     std::istringstream poses(run.read("out/demo.poses.jsonl"));
     int lines = 0;
     for (std::string line; std::getline(poses, line); ++lines)
-        EXPECT_EQ(nlohmann::json::parse(line)["markers"][0]["id"], 0) << line;
+        EXPECT_EQ(nlohmann::json::parse(line)["targets"][0]["name"], "tag36h11-0") << line;
     EXPECT_EQ(lines, 42);
     const auto stats = nlohmann::json::parse(run.read("out/demo.stats.json"));
     EXPECT_EQ(stats["frames"]["augmented"], 42);
@@ -88,7 +88,7 @@ TEST(Film, ShowsTheFramesOfALiveRunAtTheirCaptureTimes) {
 TEST(Motion, IsRenderedAtTheFramesTime) {
     const std::string yaml =
         "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 31, width: 320, height: 180}}\n"
-        "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: "
+        "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: "
         "80}]}\n"
         "raytracer: {plugin: rt_embree, scene: scene.yaml}\noutputs: [{plugin: sink_images, path: \"%04d.png\"}]\n";
     const auto scene = [](const std::string &object) {

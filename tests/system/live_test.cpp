@@ -93,7 +93,7 @@ TEST(Live, ShownFramesEqualThoseOfLockstep) {
 #endif
     const std::string yaml =
         "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 45, width: 320, height: 180}}\n"
-        "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: "
+        "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: "
         "80}]}\n"
         "raytracer: {plugin: rt_embree, scene: " ARHOST_SOURCE_DIRECTORY
         "/config/scenes/demo.yaml, options: {samples: 64}, deadline_ms: 60000}\n"

@@ -17,7 +17,7 @@ const std::string scene = ARHOST_SOURCE_DIRECTORY "/config/scenes/optix-cs.yaml"
 std::string recording(const std::string &frames = "40") {
     return "version: 1\nsource: {plugin: source_synthetic, options: {width: 320, height: 240, frames: " + frames +
            ", occlude_from: 12, occlude_to: 22}}\n"
-           "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: [{id: 0, side_mm: "
+           "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: "
            "80}]}\n"
            "raytracer: {plugin: rt_embree, scene: " +
            scene +
@@ -98,7 +98,7 @@ TEST(Replay, PipelineOptionRunsTheTrackerButUsesTheRecordedPoses) {
     for (std::size_t i = 0; i < 40; ++i) {
         EXPECT_EQ(replayed[i]["camera"], recorded[i]["camera"]) << i;
         EXPECT_EQ(replayed[i]["capture_ns"], recorded[i]["capture_ns"]) << i;
-        EXPECT_EQ(replayed[i]["markers"].size(), 1u) << i;
+        EXPECT_EQ(replayed[i]["targets"].size(), 1u) << i;
     }
     const auto stats = run.stats();
     EXPECT_EQ(stats["stages"]["tracker"]["count"], 40);
@@ -197,7 +197,8 @@ TEST(Replay, ReadsTheDissertationsFormat) {
         EXPECT_EQ(lines[0]["camera"]["width"], 200);
         EXPECT_NEAR(lines[0]["camera"]["fy"], 120.710678, 1e-6); // 50 px / tan 22.5°
         EXPECT_EQ(lines[0]["camera"]["cy"], 49.5);
-        EXPECT_EQ(lines[30]["eye"], nlohmann::json::parse("[0, 0, 529]"));
+        for (const auto &[axis, expected] : {std::pair{0u, 0.0}, {1u, 0.0}, {2u, 529.0}})
+            EXPECT_NEAR(lines[30]["eye"][axis], expected, 1e-9);
         EXPECT_TRUE(lines[11]["eye"].is_null());
         EXPECT_EQ(run.stats()["frames"]["augmented"], 20);
         EXPECT_EQ(run.output().find("t.txt:31: the last line is truncated and was ignored") != std::string::npos,
@@ -303,8 +304,8 @@ TEST(Replay, RejectsBadInputWithPositionAndFix) {
     run.write("nan.txt", "1 2 nan 4 5 6 7 8 9\n");
     run.write("plain.txt", "0 0 500 0 0 499 0 1 0 \n");
     run.write("live.yaml", "version: 1\nmode: live\ntrajectory: t.txt\n");
-    run.write("tracker.yaml", "version: 1\ntrajectory: t.txt\ntracker: {plugin: tracker_counter, markers: [{id: 3, "
-                              "side_mm: 80}]}\n");
+    run.write("tracker.yaml", "version: 1\ntrajectory: t.txt\ntracker: {plugin: tracker_counter, targets: "
+                              "[{marker: 3, family: tag36h11, side_mm: 80}]}\n");
     run.write("same.yaml", "version: 1\ntrajectory: t.txt\noutputs: [{plugin: sink_trajectory, path: ./t.txt}]\n");
     run.write("stats.yaml", "version: 1\ntrajectory: t.txt\nstats: t.txt\n");
     run.write("size.yaml", "version: 1\ntrajectory: t.txt\nsource: {plugin: source_counter, options: {width: 32}}\n");

@@ -562,7 +562,7 @@ TEST(CommandLine, ChecksAConfigurationWithoutRunningIt) {
     EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("source: source_counter: 64 x 48 px, 30 fps, 5 frames\n"
                                         "camera: fx 64 px, fy 64 px, cx 31.5 px, cy 23.5 px\n"
-                                        "tracker: tracker_counter: marker 3 (seal no)\n"
+                                        "tracker: tracker_counter: 'tag36h11-3' (tag36h11 3)\n"
                                         "raytracer: rt_counter: "));
     EXPECT_THAT(run.output(),
                 HasSubstr("\noutput: sink_counter: " + run.path("counted.txt").string() + "\nrun.yaml: OK"));
@@ -594,49 +594,52 @@ TEST(CommandLine, CheckFindsWhatWouldStopTheRun) {
                 HasSubstr("run.yaml:5:30: outputs[1].path: '"));
     EXPECT_THAT(finds(counter, film,
                       "camera: {width: 640, height: 480, fx: 600}\ntracker: {plugin: tracker_counter, "
-                      "markers: [{id: 3, side_mm: 80}]}\n"),
+                      "targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"),
                 HasSubstr("run.yaml:5:9: camera: "));
     EXPECT_THAT(
         finds(counter, "- {plugin: sink_images, path: f-%d.png}\n- {plugin: sink_poses, path: f-1.png}\n"),
         HasSubstr("run.yaml:5:30: outputs[1].path: another output, 'f-%d.png', can write a file of the same"));
 }
 
-TEST(Run, WarnsOfMarkersThatWereNeverSeen) {
+TEST(Run, WarnsOfTargetsThatWereNeverSeen) {
     ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 10, id: 4, side_mm: 80}}\n"
-                  "tracker: {plugin: tracker_aruco, markers: [{id: 7, side_mm: 80}, {id: 4, side_mm: 80}, {id: 5, "
-                  "side_mm: 80}]}\noutputs: [{plugin: sink_null}]\n");
+                  "tracker: {plugin: tracker_aruco, targets: [{ids: [7, 4, 5], family: tag36h11, side_mm: 80}]}\n"
+                  "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run(), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("tracker: markers 7, 5 were never seen in 10 frames"));
+    EXPECT_THAT(
+        run.output(),
+        HasSubstr("tracker: never seen in 10 frames: 'tag36h11-7' (tag36h11 7), 'tag36h11-5' (tag36h11 5)\n"));
 }
 
-TEST(Run, InModeLiveWarnsAfterFiveSecondsWithoutMarkers) {
-    ArhostRun run(
-        "version: 1\nmode: live\n"
-        "source: {plugin: source_synthetic, fps: 10, options: {frames: 58, id: 4, side_mm: 80}}\n"
-        "tracker: {plugin: tracker_aruco, markers: [{id: 7, side_mm: 80}]}\noutputs: [{plugin: sink_null}]\n");
+TEST(Run, InModeLiveWarnsAfterFiveSecondsWithoutTargets) {
+    ArhostRun run("version: 1\nmode: live\n"
+                  "source: {plugin: source_synthetic, fps: 10, options: {frames: 58, id: 4, side_mm: 80}}\n"
+                  "tracker: {plugin: tracker_aruco, targets: [{marker: 7, family: tag36h11, side_mm: 80}]}\n"
+                  "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run(), 1) << run.output();
-    const std::string warning = "has seen no marker yet; it looks for marker 7";
+    const std::string warning =
+        "has seen no target yet; it looks for 'tag36h11-7' (tag36h11 7); it sees tag36h11 4 (";
     ASSERT_THAT(run.output(), HasSubstr(warning));
     EXPECT_THAT(run.output().substr(run.output().find(warning) + 1), testing::Not(HasSubstr(warning)));
 }
 
 TEST(CommandLine, CheckRunsTheFirstFramesOnRequest) {
-    const auto yaml = [](const std::string &markers) {
+    const auto yaml = [](const std::string &ids) {
         return "version: 1\nsource: {plugin: source_synthetic, options: {frames: 0, id: 4, side_mm: 80}}\n"
-               "tracker: {plugin: tracker_aruco, markers: [" +
-               markers + "]}\noutputs: [{plugin: sink_poses, path: poses.jsonl}]\n";
+               "tracker: {plugin: tracker_aruco, targets: [{ids: " +
+               ids + ", family: tag36h11, side_mm: 80}]}\noutputs: [{plugin: sink_poses, path: poses.jsonl}]\n";
     };
-    ArhostRun run(yaml("{id: 4, side_mm: 80}, {id: 5, side_mm: 80}"));
+    ArhostRun run(yaml("4-5"));
     EXPECT_EQ(run.run({"check", "--run", "10", "run.yaml"}), 0) << run.output();
     EXPECT_THAT(run.output(),
-                HasSubstr("\n10 frames: 10 with a marker, 0 with an overlay\nmarker 4: in 10 frames, "));
-    EXPECT_THAT(run.output(), HasSubstr("\nmarker 5: not seen\nms p50/p95/p99: "));
+                HasSubstr("\n10 frames: 10 with a target, 0 with an overlay\ntarget tag36h11-4: in 10 frames, "));
+    EXPECT_THAT(run.output(), HasSubstr("\ntarget tag36h11-5: not seen\nms p50/p95/p99: "));
     EXPECT_THAT(run.output(), HasSubstr("\nrun.yaml: OK"));
     EXPECT_FALSE(run.exists("poses.jsonl"));
 
-    ArhostRun wrong_id(yaml("{id: 5, side_mm: 80}"));
+    ArhostRun wrong_id(yaml("5"));
     EXPECT_EQ(wrong_id.run({"check", "--run", "10", "run.yaml"}), 1) << wrong_id.output();
-    EXPECT_THAT(wrong_id.output(), HasSubstr("no marker was seen in any of 10 frames"));
+    EXPECT_THAT(wrong_id.output(), HasSubstr("no target was seen in any of 10 frames"));
     EXPECT_THAT(wrong_id.output(), testing::Not(HasSubstr("run.yaml: OK")));
 
     EXPECT_EQ(run.run({"check", "--run", "10", "--no-open", "run.yaml"}), 2);
@@ -650,12 +653,11 @@ TEST(CommandLine, CheckOpensNothingOnRequest) {
     EXPECT_EQ(run.run({"check", "--no-open", "run.yaml"}), 0) << run.output();
 }
 
-TEST(Run, FailsIfTheTrackerSeesNoMarker) {
+TEST(Run, FailsIfTheTrackerSeesNoTarget) {
     ArhostRun run(counting("lockstep", "frames: 5", "lost_to: 100", ""));
     run.write("scene.yaml", small_scene);
     const std::string message =
-        "no marker was seen in any of 5 frames, so no frame has an overlay; it looked for marker 3 "
-        "(seal no);";
+        "no target was seen in any of 5 frames, so no frame has an overlay; it looked for 'tag36h11-3' (tag36h11 3);";
     EXPECT_EQ(run.run(), 1);
     EXPECT_THAT(run.output(), HasSubstr("error: tracker: " + message));
     EXPECT_EQ(counted(run).size(), 5u);
@@ -665,7 +667,7 @@ TEST(Run, FailsIfTheTrackerSeesNoMarker) {
 
 TEST(Run, FailsIfTheTrackerFailsInEveryFrame) {
     ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {width: 64, height: 48, frames: 5}}\n"
-                  "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
+                  "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"
                   "outputs: [{plugin: sink_counter, path: counted.txt}]\n");
     EXPECT_EQ(run.run({"run.yaml", "--allow-no-target"}), 1);
     EXPECT_THAT(run.output(), HasSubstr("error: arhost: 5 frames have no overlay because the tracker failed"));

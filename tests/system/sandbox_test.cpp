@@ -87,7 +87,8 @@ public:
     explicit HostileRun(const std::string &attack, const std::string &more = "", const std::string &settings = "")
         : ArhostRun(
               "version: 1\nsource: {plugin: source_counter, options: {frames: 60, delay_ms: 1}}\n"
-              "tracker: {plugin: hostile, markers: [{id: 3, side_mm: 80}], deadline_ms: 2000, environment: "
+              "tracker: {plugin: hostile, targets: [{marker: 3, family: tag36h11, side_mm: 80}], deadline_ms: 2000, "
+              "environment: "
               "[HOSTILE_HOST, HOSTILE_FOLDER, HOSTILE_SHM, HOSTILE_QUEUE, HOSTILE_SEMAPHORES, HOSTILE_TERMINAL], "
               "options: {attack: " +
               attack + "}" + more +
@@ -639,16 +640,18 @@ TEST(Sandbox, CorruptRingsAndSlotsEndTheWorker) {
 
 TEST(Sandbox, ReportsATooSmallMemoryLimit) {
     REQUIRE_NO_SANITIZER();
-    ArhostRun run("version: 1\nsource: {plugin: source_synthetic}\n"
-                  "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], memory_mb: 1}\n"
-                  "outputs: [{plugin: sink_null}]\n");
+    ArhostRun run(
+        "version: 1\nsource: {plugin: source_synthetic}\n"
+        "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}], memory_mb: 1}\n"
+        "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run(), 2);
     EXPECT_THAT(run.output(), HasSubstr("'memory_mb' may be too small"));
 }
 
 TEST(Sandbox, RejectsAMemoryLimitWithAGpu) {
     ArhostRun run("version: 1\nsource: {plugin: source_synthetic}\n"
-                  "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], memory_mb: 100, allow: [gpu]}\n"
+                  "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}], "
+                  "memory_mb: 100, allow: [gpu]}\n"
                   "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run({"check", "run.yaml"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("run.yaml:3:"));
@@ -735,7 +738,7 @@ TEST(Sandbox, DeathsDoNotLogLongTextsOfTheWorker) {
 
 TEST(Sandbox, RefusesAnImplausibleLens) {
     ArhostRun run("version: 1\nsource: {plugin: hostile_source, options: {attack: lens}}\n"
-                  "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n"
+                  "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"
                   "raytracer: {plugin: rt_counter, scene: scene.yaml}\noutputs: [{plugin: sink_null}]\n");
     run.write("scene.yaml", small_scene);
     EXPECT_EQ(run.run(), 2);

@@ -25,8 +25,8 @@ std::string recording(const std::string &mode, const std::string &frames, const 
     return "version: 1\nmode: " + mode +
            "\nsource: {plugin: source_synthetic, fps: 30, options: {width: 320, height: 240, frames: " + frames +
            ", occlude_from: 12, occlude_to: 22}}\n"
-           "tracker: {plugin: tracker_aruco, hold_frames: 5, options: {dictionary: DICT_APRILTAG_36h11}, markers: "
-           "[{id: 0, side_mm: 80}]}\n"
+           "tracker: {plugin: tracker_aruco, hold_frames: 5, targets: [{marker: 0, family: tag36h11, side_mm: "
+           "80}]}\n"
            "raytracer: {plugin: rt_embree, scene: " +
            scenes + "optix-cs.yaml, options: {" + raytracer_options + "}, deadline_ms: 60000}\n" +
            "live: {max_latency_ms: 60000}\noutputs:\n- {plugin: sink_session, path: take, options: {" +
@@ -97,6 +97,9 @@ TEST(Sessions, AReplayReproducesPosesAndImagesOfLockstep) {
     EXPECT_EQ(lines.size(), 40u);
     EXPECT_EQ(count(lines, "held"), 5u);
     EXPECT_GT(count(lines, "none"), 0u);
+    // With a setting that differs, the tracker runs again.
+    ASSERT_EQ(run.run(replaying({"--set", "tracker.deadline_ms=60000"})), 0) << run.output();
+    expect_same(run);
 }
 
 // With 64 samples per pixel, the ray tracer cannot keep up on any machine. While a worker is down, frames pass
@@ -156,8 +159,8 @@ TEST(Sessions, AReplayWithAnotherTrackerAndQualityRendersEveryFrameAnew) {
     ASSERT_EQ(replayed.size(), 30u);
     EXPECT_EQ(count(recorded, "held"), 5u);
     EXPECT_EQ(count(replayed, "held"), 1u);
-    EXPECT_EQ(replayed[0]["markers"][0]["id"], 0);
-    EXPECT_NE(replayed[0]["markers"], recorded[0]["markers"]);
+    EXPECT_EQ(replayed[0]["targets"][0]["name"], "tag36h11-0");
+    EXPECT_NE(replayed[0]["targets"], recorded[0]["targets"]);
     EXPECT_EQ(replayed[7]["capture_ns"], recorded[7]["capture_ns"]);
     EXPECT_NE(run.read("replayed/0000.png"), run.read("recorded/0000.png"));
 }
@@ -166,11 +169,11 @@ TEST(Sessions, AConfigurationReplacesTheRecordedOne) {
     ArhostRun run(recording("lockstep", "10"));
     ASSERT_EQ(run.run(), 0) << run.output();
     run.write("other.yaml", "version: 1\nsource: {plugin: source_v4l2, allow: [video]}\n"
-                            "tracker: {plugin: tracker_aruco, options: {dictionary: DICT_APRILTAG_36h11}, markers: "
-                            "[{id: 0, side_mm: 80}]}\noutputs: [{plugin: sink_window}]\n");
+                            "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: "
+                            "80}]}\noutputs: [{plugin: sink_window}]\n");
     ASSERT_EQ(run.run({"replay", "take", "--config", "other.yaml", "--output", "poses.jsonl"}), 0) << run.output();
     EXPECT_EQ(lines_of(run, "poses.jsonl").size(), 10u);
-    EXPECT_EQ(lines_of(run, "poses.jsonl")[3]["markers"], lines_of(run, "recorded/poses.jsonl")[3]["markers"]);
+    EXPECT_EQ(lines_of(run, "poses.jsonl")[3]["targets"], lines_of(run, "recorded/poses.jsonl")[3]["targets"]);
 }
 
 TEST(Sessions, H264RecordsAllFramesAndPosesClosely) {
@@ -180,13 +183,13 @@ TEST(Sessions, H264RecordsAllFramesAndPosesClosely) {
     const auto recorded = lines_of(run, "recorded/poses.jsonl"), replayed = lines_of(run, "replayed/poses.jsonl");
     ASSERT_EQ(replayed.size(), 10u);
     for (std::size_t i = 0; i < 10; ++i) {
-        ASSERT_EQ(replayed[i]["markers"].size(), recorded[i]["markers"].size()) << i;
-        for (std::size_t axis = 12; axis < 15 && !recorded[i]["markers"].empty(); ++axis)
-            EXPECT_NEAR(replayed[i]["markers"][0]["mt"][axis].get<double>(),
-                        recorded[i]["markers"][0]["mt"][axis].get<double>(), 1)
+        ASSERT_EQ(replayed[i]["targets"].size(), recorded[i]["targets"].size()) << i;
+        for (std::size_t axis = 12; axis < 15 && !recorded[i]["targets"].empty(); ++axis)
+            EXPECT_NEAR(replayed[i]["targets"][0]["mt"][axis].get<double>(),
+                        recorded[i]["targets"][0]["mt"][axis].get<double>(), 1)
                 << i;
     }
-    EXPECT_EQ(recorded[0]["markers"].size(), 1u);
+    EXPECT_EQ(recorded[0]["targets"].size(), 1u);
 }
 
 TEST(Sessions, AKilledHostLosesNoFrameThatWasLogged) {

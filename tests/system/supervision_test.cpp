@@ -5,6 +5,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include <cctype>
 #include <iterator>
 #include <numeric>
@@ -331,7 +333,8 @@ TEST(Supervision, ATrackerThatReportsNanIsEnded) {
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run(), 1) << run.output();
     expect_all_frames_in_order(run, 30);
-    EXPECT_THAT(run.output(), HasSubstr("contract violation"));
+    EXPECT_THAT(run.output(),
+                HasSubstr("contract violation: the tracker reports marker 3 with a corner that is not finite"));
     EXPECT_EQ(counted(run)[15].overlay, "none");
 }
 
@@ -387,16 +390,17 @@ std::vector<double> tracked_before(const ArhostRun &run) {
     std::vector<double> counts;
     for (std::string line; std::getline(lines, line);) {
         const nlohmann::json record = nlohmann::json::parse(line);
-        for (const auto &marker : record["markers"])
-            counts.push_back(marker["mt"].at(12));
+        for (const auto &target : record["targets"])
+            if (target["age_frames"] == 0)
+                counts.push_back(std::round(target["mt"].at(12).get<double>()));
     }
     return counts;
 }
 
 std::string with_state(const std::string &source, const std::string &tracker) {
     return "version: 1\nsource: {plugin: source_counter, options: {" + source + "}}\n" +
-           "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}], options: {" + tracker + "}}\n" +
-           "outputs: [{plugin: sink_poses, path: poses.jsonl}]\nstats: stats.json\n" +
+           "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}], options: {" +
+           tracker + "}}\n" + "outputs: [{plugin: sink_poses, path: poses.jsonl}]\nstats: stats.json\n" +
            "restart: {first_delay_ms: 1, quarantine_after: 2}\n";
 }
 

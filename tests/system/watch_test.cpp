@@ -14,7 +14,8 @@ namespace {
 constexpr const char *source =
     "source: {plugin: source_synthetic, fps: 100, options: {frames: 0, id: 0, side_mm: 80, "
     "width: 160, height: 120}}\n";
-constexpr const char *tracker = "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n";
+constexpr const char *tracker =
+    "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n";
 constexpr const char *raytracer = "raytracer: {plugin: rt_embree, scene: scene.yaml}\n";
 
 // A sphere of a colour, or an object of a mesh file.
@@ -116,9 +117,10 @@ TEST(Watch, AnEditedMeshReplacesTheScene) {
 TEST(Watch, EditedComponentsReplaceTheRunningOnes) {
     WatchedRun run;
     run.start_watching();
-    run.replace("run.yaml", WatchedRun::configuration(
-                                "tracker: {plugin: tracker_apriltag, markers: [{id: 0, side_mm: 40}]}\n",
-                                "raytracer: {plugin: rt_embree, scene: scene.yaml, options: {samples: 4}}\n"));
+    run.replace("run.yaml",
+                WatchedRun::configuration(
+                    "tracker: {plugin: tracker_apriltag, targets: [{marker: 0, family: tag36h11, side_mm: 40}]}\n",
+                    "raytracer: {plugin: rt_embree, scene: scene.yaml, options: {samples: 4}}\n"));
     run.wait_for("tracker is now tracker_apriltag");
     run.wait_for("raytracer is now rt_embree");
     EXPECT_EQ(run.interrupt(), 130) << run.output();
@@ -197,11 +199,13 @@ TEST(Watch, AnEditOfTheSandboxNeedsANewRun) {
     WatchedRun run;
     run.start_watching();
     run.replace("run.yaml",
-                WatchedRun::configuration("tracker: {plugin: tracker_apriltag, markers: [{id: 0, side_mm: 80}]}\n",
-                                          raytracer, "sandbox: none\n"));
+                WatchedRun::configuration(
+                    "tracker: {plugin: tracker_apriltag, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n",
+                    raytracer, "sandbox: none\n"));
     run.wait_for("an edit of 'sandbox' needs a new run; the run continues with the previous configuration");
     run.replace("run.yaml",
-                WatchedRun::configuration("tracker: {plugin: tracker_apriltag, markers: [{id: 0, side_mm: 80}]}\n"));
+                WatchedRun::configuration(
+                    "tracker: {plugin: tracker_apriltag, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"));
     run.wait_for("tracker is now tracker_apriltag");
     EXPECT_EQ(run.interrupt(), 130) << run.output();
 }

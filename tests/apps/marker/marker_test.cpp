@@ -2,6 +2,7 @@
 //
 // Prints sheets with arhost-marker and measures them with the libraries that the trackers use.
 #include "plugin_under_test.hpp"
+#include "run_config/targets.hpp"
 
 #include <fiducial_common/apriltag_families.hpp>
 #include <fiducial_common/aruco_dictionaries.hpp>
@@ -16,7 +17,6 @@
 #include <fstream>
 #include <iterator>
 #include <map>
-#include <regex>
 #include <set>
 #include <sys/wait.h>
 
@@ -158,12 +158,13 @@ protected:
     // Positions of markers in a map, in mm; y up.
     std::map<int, cv::Point2d> positions_in(const std::string &map, double side_mm) const {
         std::map<int, cv::Point2d> positions;
-        const std::string text = read(map);
-        const std::regex line(R"(  - \{id: (\d+), side_mm: ([\d.]+), position_mm: \[(\S+), (\S+), 0\], )"
-                              R"(rotation_degrees: \[0, 0, 0\]\})");
-        for (std::sregex_iterator it(text.begin(), text.end(), line), end; it != end; ++it) {
-            EXPECT_EQ(std::stod((*it)[2]), side_mm);
-            positions[std::stoi((*it)[1])] = {std::stod((*it)[3]), std::stod((*it)[4])};
+        std::vector<std::string> warnings;
+        for (const auto &[id, family, corners] : arhost::run_config::read_map(folder() / map, warnings)) {
+            const cv::Point2d top_left(corners[0][0], corners[0][1]), bottom_right(corners[2][0], corners[2][1]);
+            EXPECT_NEAR(bottom_right.x - top_left.x, side_mm, 1e-9);
+            EXPECT_NEAR(top_left.y - bottom_right.y, side_mm, 1e-9);
+            EXPECT_EQ(corners[0][2], 0);
+            positions[id] = (top_left + bottom_right) / 2;
         }
         return positions;
     }

@@ -47,8 +47,15 @@ std::string line_of(const arhost_record &record) {
     std::ostringstream line;
     line << record.sequence << ' ' << record.capture_ns << ' ' << record.overlay << ' '
          << (record.has_camera ? record.camera.eye[2] : 0);
-    for (std::uint32_t i = 0; i < record.marker_count; ++i)
-        line << ' ' << record.markers[i].id;
+    if (has("ignores_struct_size")) {
+        for (std::uint32_t i = 0; i < record.target_count; ++i)
+            line << ' ' << record.targets[i].mt[14];
+    } else {
+        for (const arhost_target &target : elements(record.targets, record.target_count))
+            line << ' ' << target.mt[14];
+    }
+    for (const arhost_observation &seen : elements(record.observations, record.observation_count))
+        line << ' ' << seen.id;
     return line.str() + "\n";
 }
 
@@ -109,11 +116,19 @@ public:
         if (has("writes_into_the_frame"))
             const_cast<std::uint8_t *>(output.bgr)[0] = 0;
         if (has("writes_into_the_record"))
-            const_cast<arhost_record &>(record).marker_count = 0;
+            const_cast<arhost_record &>(record).target_count = 0;
+        if (has("writes_into_a_target"))
+            const_cast<arhost_target &>(record.targets[0]).age_frames = 1;
         if (has("crash_on_1x1") && output.width == 1 && output.height == 1)
             crash();
-        if (has("crash_on_64_markers") && record.marker_count == ARHOST_MAX_MARKERS)
+        if (has("crash_on_1024_targets") && record.target_count == ARHOST_MAX_TARGETS)
             crash();
+        const volatile arhost_target *const after_targets = record.targets + record.target_count;
+        if (has("reads_past_the_targets"))
+            (void)after_targets->state;
+        const volatile arhost_observation *const after_observations = record.observations + record.observation_count;
+        if (has("reads_past_the_observations"))
+            (void)after_observations->id;
         if (has("rejects_gaps") && record.sequence != next_)
             throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "a frame is missing");
         if (has("cancelled_is_internal") && host_.cancelled())

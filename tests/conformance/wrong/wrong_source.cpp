@@ -177,6 +177,8 @@ private:
             info.capture_ns += 1'700'000'000'000'000'000;
         }
         info.has_truth = 1;
+        if (!has("truth_without_target"))
+            std::memcpy(info.truth_target, "desk", 5);
         const double a = 0.1 * static_cast<double>(n), c = std::cos(a), s = std::sin(a);
         const double mt[16] = {c, s, 0, 0, -s, c, 0, 0, 0, 0, 1, 0, 5, 7, -400, 1};
         std::copy_n(mt, 16, info.true_mt);

@@ -1,19 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 // All wrong trackers: tracker_apriltag with a defect that this library's file name selects. For example, a link
-// tracker_metres.so reports metres instead of millimetres. Other names select no defect.
+// tracker_corners_at_half.so reports corners with pixel centres at ½. Other names select no defect.
 #include "defect.hpp"
 
-#include <arhost/arhost.h>
+#include <arhost-cpp/plugin.hpp>
+#include <arhost/shading/lens.hpp>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstring>
 #include <limits>
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -32,16 +36,23 @@ const arhost_tracker &real_functions() {
 
 // Shared by all instances.
 bool was_started = false;
-arhost_intrinsics first_camera{};
+std::vector<std::int32_t> first_ids; // of the markers of the first start
+
+// A tracker's observations, as its state.
+struct Seen {
+    std::uint32_t count = 0;
+    arhost_observation observations[ARHOST_MAX_OBSERVATIONS];
+};
 
 struct Wrong {
     arhost_instance *real = nullptr;
     const arhost_host *host = nullptr;
     bool start_failed = false;
-    arhost_frame_format format{};
+    arhost_intrinsics camera{};
+    std::uint32_t target_count = 0, family_count = 0;
     std::vector<arhost_marker_config> listed;
     std::int64_t threads = 0; // the option
-    std::unique_ptr<arhost_tracker_result> last = std::make_unique<arhost_tracker_result>();
+    std::unique_ptr<Seen> last = std::make_unique<Seen>();
     std::uint64_t last_sequence = 0;
     std::int64_t last_capture_ns = 0;
     unsigned tracks = 0;
@@ -54,26 +65,10 @@ Wrong &wrong(arhost_instance *instance) {
 // ---- Modified input ----------------------------------------------------------------------------------
 
 arhost_intrinsics modify(arhost_intrinsics in) {
-    if (has("pixel_centres_at_half")) {
-        in.cx += 0.5;
-        in.cy += 0.5;
-    }
-    if (has("focal_1_percent"))
-        in.fx *= 1.01, in.fy *= 1.01;
-    if (has("fx_as_fy"))
-        in.fy = in.fx;
-    if (has("centred_principal_point")) {
-        in.cx = (in.width - 1) / 2.0;
-        in.cy = (in.height - 1) / 2.0;
-    }
     if (has("no_lens") || (has("ignores_fisheye") && in.distortion == ARHOST_DISTORTION_FISHEYE)) {
         in.distortion = ARHOST_DISTORTION_NONE;
         in.coefficient_count = 0;
     }
-    if (has("tangential_swapped") && in.distortion == ARHOST_DISTORTION_BROWN)
-        std::swap(in.coefficients[2], in.coefficients[3]);
-    if (has("four_coefficients"))
-        in.coefficient_count = std::min(in.coefficient_count, 4u);
     return in;
 }
 
@@ -85,19 +80,11 @@ std::vector<arhost_marker_config> listed_in(const arhost_tracker_setup &setup) {
         all.push_back(*reinterpret_cast<const arhost_marker_config *>(bytes));
         all.back().struct_size = sizeof(arhost_marker_config);
     }
-    if (has("side_as_half_side"))
-        for (arhost_marker_config &marker : all)
-            marker.side_mm *= 2;
-    if (has("one_side_for_all_markers"))
-        for (arhost_marker_config &marker : all)
-            marker.side_mm = all[0].side_mm;
-    if (has("reports_unlisted_markers"))
-        for (const int id : {31, 7, 586, 2})
-            if (std::ranges::find(all, id, &arhost_marker_config::id) == all.end())
-                all.push_back({sizeof(arhost_marker_config), id, 80});
-    if (has("sorted_by_id"))
-        std::ranges::sort(all, {}, &arhost_marker_config::id);
     return all;
+}
+
+bool is_listed(const Wrong &self, std::int32_t id) {
+    return std::ranges::find(self.listed, id, &arhost_marker_config::id) != self.listed.end();
 }
 
 // A writable copy of the frame's grey plane.
@@ -147,133 +134,180 @@ struct Pixels {
 
 // ---- Modified output ---------------------------------------------------------------------------------
 
-double longest_side_px(const arhost_marker &marker) {
+using Corners = double (&)[4][2];
+
+double longest_side_px(Corners corners) {
     double max = 0;
     for (int k = 0; k < 4; ++k)
-        max = std::max(max, std::hypot(marker.corners_px[k][0] - marker.corners_px[(k + 1) % 4][0],
-                                       marker.corners_px[k][1] - marker.corners_px[(k + 1) % 4][1]));
+        max = std::max(max,
+                       std::hypot(corners[k][0] - corners[(k + 1) % 4][0], corners[k][1] - corners[(k + 1) % 4][1]));
     return max;
 }
 
-void modify(Wrong &self, arhost_marker &marker, const arhost_marker_config &config) {
-    double *m = marker.mt;
-    const double cosine_of_tilt = m[10];
-    const auto negate_rows = [&](std::initializer_list<int> rows) {
-        for (int row : rows)
-            for (int column = 0; column < 4; ++column)
-                m[4 * column + row] *= -1;
+// The ratio of the shorter to the longer diagonal's or side's length: smaller for tilted markers.
+double squareness(Corners corners) {
+    const auto distance = [&](int a, int b) {
+        return std::hypot(corners[a][0] - corners[b][0], corners[a][1] - corners[b][1]);
     };
-    const auto move_along = [&](double x, double y) { // the marker's axes
-        for (int row = 0; row < 3; ++row)
-            m[12 + row] += m[row] * x + m[4 + row] * y;
+    const double sides[] = {distance(0, 1), distance(1, 2), distance(2, 3), distance(3, 0)};
+    const double diagonals[] = {distance(0, 2), distance(1, 3)};
+    return std::min(*std::ranges::min_element(sides) / *std::ranges::max_element(sides),
+                    *std::ranges::min_element(diagonals) / *std::ranges::max_element(diagonals));
+}
+
+void modify(const Wrong &self, arhost_observation &seen) {
+    Corners corners = seen.corners_px;
+    const auto change_each = [&](auto &&change) {
+        for (auto &corner : corners)
+            for (double &coordinate : corner)
+                coordinate = change(coordinate);
     };
-    if (has("flipped_z"))
-        negate_rows({2});
-    if (has("opencv_axes"))
-        negate_rows({1, 2});
-    if (has("z_into_the_paper"))
-        for (int i : {4, 5, 6, 8, 9, 10})
-            m[i] *= -1;
-    if (has("transposed_rotation"))
-        std::swap(m[1], m[4]), std::swap(m[2], m[8]), std::swap(m[6], m[9]);
-    if (has("row_major"))
-        for (int i = 0; i < 4; ++i)
-            for (int j = 0; j < i; ++j)
-                std::swap(m[4 * i + j], m[4 * j + i]);
-    if (has("metres"))
-        std::for_each_n(m + 12, 3, [](double &x) { x /= 1000; });
-    if (has("origin_at_corner"))
-        move_along(-config.side_mm / 2, -config.side_mm / 2);
-    if (has("single_precision"))
-        std::for_each_n(m, 12, [](double &x) { x = static_cast<float>(x); });
-    if (has("nan_pose"))
-        m[12] = std::numeric_limits<double>::quiet_NaN();
-    if (has("nan_alternative"))
-        marker.mt_alternative[5] = std::numeric_limits<double>::quiet_NaN();
-    if (has("no_struct_size"))
-        marker.struct_size = 0;
-    if (has("unterminated_family"))
-        std::memset(marker.family, 'x', sizeof marker.family);
-    if (has("age_counts_frames"))
-        marker.age_frames = self.tracks + 1;
     if (has("corners_from_bottom_left"))
-        std::rotate(&marker.corners_px[0][0], &marker.corners_px[3][0], &marker.corners_px[3][0] + 2);
+        std::rotate(&corners[0][0], &corners[3][0], &corners[3][0] + 2);
+    if (has("corners_counter_clockwise"))
+        std::swap(corners[1], corners[3]);
     if (has("corners_at_half"))
-        for (auto &corner : marker.corners_px)
-            corner[0] += 0.5, corner[1] += 0.5;
+        change_each([](double x) { return x + 0.5; });
     if (has("rounded_corners"))
-        for (auto &corner : marker.corners_px)
-            corner[0] = std::round(corner[0]), corner[1] = std::round(corner[1]);
-    const bool has_other = marker.mt_alternative[15] != 0;
-    if (has_other && has("flips_near_frontal") && cosine_of_tilt > std::cos(0.25))
-        std::copy_n(marker.mt_alternative, 16, m);
-    if (has_other && has("flips_to_the_side") && cosine_of_tilt < std::cos(0.6))
-        std::copy_n(marker.mt_alternative, 16, m);
+        change_each([](double x) { return std::round(x); });
+    if (has("centred_principal_point")) {
+        for (auto &corner : corners) {
+            corner[0] -= self.camera.cx - (self.camera.width - 1) / 2.0;
+            corner[1] -= self.camera.cy - (self.camera.height - 1) / 2.0;
+        }
+    }
+    if (has("undistorted_corners"))
+        for (auto &corner : corners)
+            if (const auto ray = arhost::shading::Lens(self.camera).ray({corner[0], corner[1]})) {
+                corner[0] = self.camera.fx * ray->x / ray->z + self.camera.cx;
+                corner[1] = self.camera.fy * ray->y / ray->z + self.camera.cy;
+            }
+    if (has("rectifies_frontal_markers") && self.camera.distortion == ARHOST_DISTORTION_NONE &&
+        squareness(corners) > 0.935)
+        for (int axis = 0; axis < 2; ++axis) { // a parallelogram shows no perspective
+            const double excess = (corners[0][axis] - corners[1][axis] + corners[2][axis] - corners[3][axis]) / 4;
+            for (int k = 0; k < 4; ++k)
+                corners[k][axis] -= k % 2 ? -excess : excess;
+        }
+    if (has("nan_corner"))
+        corners[2][1] = std::numeric_limits<double>::quiet_NaN();
+    if (has("unknown_family_index"))
+        seen.family = self.family_count;
+    if (has("unset_hamming"))
+        seen.hamming = 0xffffffff; // as before the call
+    if (has("negative_margin"))
+        seen.decision_margin = -1;
+    if (has("infinite_margin"))
+        seen.decision_margin = std::numeric_limits<double>::infinity();
     if (has("nondeterministic"))
-        m[12] += 1e-9 * (self.tracks % 2);
+        corners[0][0] += 1e-9 * (self.tracks % 2);
     if (has("depends_on_threads"))
-        m[12] += 1e-9 * static_cast<double>(self.threads);
+        corners[0][0] += 1e-9 * static_cast<double>(self.threads);
+}
+
+// The host's observations, which may be longer than arhost_observation.
+auto observations_of(arhost_tracker_result &result) {
+    return arhost::elements(result.observations, result.observation_count);
+}
+
+Seen read(arhost_tracker_result &result) {
+    Seen seen;
+    for (const arhost_observation &one : observations_of(result))
+        seen.observations[seen.count++] = one;
+    return seen;
+}
+void write(const Seen &seen, arhost_tracker_result &result) {
+    result.observation_count = seen.count;
+    for (std::uint32_t i = 0; i < seen.count; ++i)
+        observations_of(result)[i] = seen.observations[i];
+}
+template <class Predicate> void keep(arhost_tracker_result &result, Predicate &&predicate) {
+    const Seen all = read(result);
+    Seen kept;
+    for (std::uint32_t i = 0; i < all.count; ++i)
+        if (predicate(all.observations[i]))
+            kept.observations[kept.count++] = all.observations[i];
+    write(kept, result);
+}
+
+bool has_state() {
+    return has("remembers") || has("never_updates_corners") || has("reads_state_after") ||
+           has("remembers_in_its_heap");
 }
 
 void modify_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &result) {
-    const std::span markers(result.markers, result.marker_count);
-    const auto drop_all = [&] {
-        std::memset(result.markers, 0, sizeof result.markers);
-        result.marker_count = 0;
-    };
-    for (arhost_marker &marker : markers)
-        modify(self, marker, *std::ranges::find(self.listed, marker.id, &arhost_marker_config::id));
-    if (has("swapped_ids") && markers.size() > 1)
-        std::swap(markers[0].id, markers[1].id);
-    if (has("finds_only_large_markers") && !markers.empty() && longest_side_px(markers[0]) < 60)
+    const auto drop_all = [&] { result.observation_count = 0; };
+    const auto observations = observations_of(result);
+    for (arhost_observation &seen : observations)
+        modify(self, seen);
+    if (has("keeps_its_first_markers"))
+        keep(result, [](const arhost_observation &seen) { return std::ranges::count(first_ids, seen.id) > 0; });
+    if (has("omits_unlisted_markers"))
+        keep(result, [&](const arhost_observation &seen) { return is_listed(self, seen.id); });
+    if (has("renames_unlisted_markers"))
+        for (arhost_observation &seen : observations)
+            seen.id = is_listed(self, seen.id) ? seen.id : self.listed[0].id;
+    if (has("only_first_marker_of_a_target"))
+        keep(result, [&](const arhost_observation &seen) {
+            const auto marker = std::ranges::find(self.listed, seen.id, &arhost_marker_config::id);
+            return marker == self.listed.begin() || (marker - 1)->target != marker->target;
+        });
+    if (has("one_copy_of_each_marker"))
+        keep(result,
+             [last = -1](const arhost_observation &seen) mutable { return std::exchange(last, seen.id) != seen.id; });
+    if (has("each_marker_twice")) {
+        Seen twice = read(result);
+        std::copy_n(twice.observations, twice.count, twice.observations + twice.count);
+        twice.count *= 2;
+        write(twice, result);
+    }
+    if (has("copies_in_one_place") && result.observation_count == 2 && observations[0].id == observations[1].id)
+        observations[1] = observations[0];
+    if (has("first_family_for_all"))
+        for (arhost_observation &seen : observations)
+            seen.family = 0;
+    if (has("swapped_ids") && result.observation_count > 1)
+        std::swap(observations[0].id, observations[1].id);
+    if (has("depends_on_the_list") && self.listed.size() > 1 && self.listed[0].id < self.listed.back().id)
+        keep(result, [&](const arhost_observation &seen) { return seen.id != self.listed[0].id; });
+    const bool any = result.observation_count > 0;
+    if (has("finds_only_large_markers") && any && longest_side_px(observations[0].corners_px) < 60)
         drop_all();
-    if (has("finds_nothing_when_tilted") && !markers.empty() && markers[0].mt[10] < std::cos(0.9))
+    if (has("finds_nothing_when_tilted") && any && squareness(observations[0].corners_px) < 0.5)
         drop_all();
     const Pixels pixels(frame);
     if ((has("needs_sharp_edges") && pixels.max_step() < 90 && pixels.max_code() > 200) ||
         (has("needs_clean_frames") && pixels.is_noisy() && pixels.max_code() > 200) ||
         (has("needs_good_light") && (pixels.max_code() < 100 || pixels.max_code() > 250)))
         drop_all();
-    if (has("invents_markers") && markers.empty()) {
-        const double distance = 300;
-        arhost_marker &marker = result.markers[result.marker_count++];
-        marker = {};
-        marker.struct_size = sizeof marker;
-        marker.id = self.listed[0].id;
-        std::strcpy(marker.family, "tag36h11");
-        marker.state = ARHOST_MARKER_DETECTED;
-        marker.mt[0] = marker.mt[5] = marker.mt[10] = marker.mt[15] = 1;
-        marker.mt[14] = -distance;
+    if (has("invents_markers") && result.observation_count == 0) {
+        result.observation_count = 1;
+        const double corners[4][2] = {{10, 10}, {20, 10}, {20, 20}, {10, 20}};
+        arhost_observation &invented = *result.observations;
+        invented = {invented.struct_size, self.listed[0].id, 0, 0, {}, 1};
+        std::copy_n(&corners[0][0], 8, &invented.corners_px[0][0]);
     }
-    const bool has_last = self.last->marker_count > 0;
-    const bool predicts =
-        has("predicts") || has("lost_age_is_1") || has("lost_without_pose") || has("remembers_in_its_heap");
-    if ((has("smooths") || predicts) && !markers.empty() && has_last) {
-        for (int i = 12; i < 15; ++i)
-            markers[0].mt[i] = (markers[0].mt[i] + self.last->markers[0].mt[i]) / 2;
-        if (predicts)
-            markers[0].state = ARHOST_MARKER_PREDICTED;
-    }
-    if (predicts && markers.empty() && has_last) {
-        result = *self.last;
-        arhost_marker &lost = result.markers[0];
-        lost.age_frames = has("lost_age_is_1") ? 1 : lost.age_frames + 1;
-        lost.state = lost.age_frames > 5 ? ARHOST_MARKER_LOST : ARHOST_MARKER_PREDICTED;
-        if (has("lost_without_pose") && lost.state == ARHOST_MARKER_LOST)
-            std::fill_n(lost.mt, 12, 0.0);
-    }
-    if (has("never_updates_pose") && !markers.empty()) {
-        if (!has_last)
-            *self.last = result;
-        std::copy_n(self.last->markers[0].mt, 16, markers[0].mt);
-        markers[0].state = ARHOST_MARKER_PREDICTED;
-        return;
-    }
-    const arhost_tracker_result now = result;
-    if ((has("stale_pose") || (has("reports_lost_as_detected") && result.marker_count == 0)) && has_last)
-        result = *self.last;
+    if (has("reports_a_pose"))
+        result.pose_count = 1;
+
+    const Seen now = read(result);
+    const bool has_last = self.last->count > 0;
+    const auto smooth = [&] {
+        for (int k = 0; k < 8; ++k)
+            (&result.observations->corners_px[0][0])[k] =
+                (now.observations[0].corners_px[k / 2][k % 2] + self.last->observations[0].corners_px[k / 2][k % 2]) /
+                2;
+    };
+    if ((has("smooths") || has("remembers_in_its_heap")) && now.count > 0 && has_last)
+        smooth();
+    if ((has("stale_corners") || (has("reports_lost_markers") && now.count == 0)) && has_last)
+        write(*self.last, result);
     if (has("ignores_repeated_frames") && frame.sequence == self.last_sequence && self.tracks > 0)
         drop_all();
+    if (has("never_updates_corners") && now.count > 0 && has_last) {
+        write(*self.last, result);
+        return;
+    }
     *self.last = now;
 }
 
@@ -312,44 +346,59 @@ arhost_status start(arhost_instance *instance, const arhost_tracker_setup *setup
         crash();
     if (has("leaves_a_thread"))
         std::thread(hang).detach();
-    const bool again = std::exchange(was_started, true);
-    if (has("cannot_restart") && again)
+    if (has("cannot_restart") && was_started)
         return ARHOST_STATUS_ERROR_INTERNAL;
-    if (!again)
-        first_camera = *setup->intrinsics;
-    self.format = *setup->format;
     self.tracks = 0;
-    self.last->marker_count = 0;
-    arhost_intrinsics camera = modify(has("keeps_the_first_camera") ? first_camera : *setup->intrinsics);
-    arhost_tracker_setup modified = *setup;
-    modified.intrinsics = &camera;
+    self.last->count = 0;
+    self.camera = modify(*setup->intrinsics);
+    self.listed = listed_in(*setup);
+    self.target_count = setup->target_count;
+    self.family_count = setup->family_count;
+    if (!std::exchange(was_started, true))
+        for (const arhost_marker_config &marker : self.listed)
+            first_ids.push_back(marker.id);
+    arhost_intrinsics camera = self.camera;
+    std::vector<arhost_marker_config> markers = self.listed;
+    if (has("reports_unlisted_markers") || has("renames_unlisted_markers"))
+        for (const int id : {31, 7, 586, 2})
+            if (!is_listed(self, id) && setup->family_count == 1) {
+                markers.push_back(markers[0]);
+                markers.back().id = id;
+            }
+    const char *const *families = setup->families;
+    std::uint32_t family_count = setup->family_count;
     const auto real_start = [&] {
-        modified.markers = self.listed.data();
-        modified.marker_count = static_cast<std::uint32_t>(self.listed.size());
+        arhost_tracker_setup modified = *setup;
+        modified.intrinsics = &camera;
+        modified.markers = markers.data();
+        modified.marker_count = static_cast<std::uint32_t>(markers.size());
+        modified.family_count = family_count;
+        modified.families = families;
         return real_functions().start(self.real, &modified);
     };
-    self.listed = listed_in(*setup);
     arhost_status status = real_start();
-    if (has("accepts_any_id") && status == ARHOST_STATUS_ERROR_CONFIGURATION && self.listed[0].id != 31) {
-        self.listed[0].id = 31;
+    if (has("accepts_any_id") && status == ARHOST_STATUS_ERROR_CONFIGURATION && markers[0].id != 31) {
+        markers[0].id = 31;
         status = real_start();
     }
-    if (has("accepts_any_lens") && status == ARHOST_STATUS_ERROR_CONFIGURATION && self.listed[0].id == 31) {
-        camera = first_camera;
+    if (has("accepts_any_family") && status == ARHOST_STATUS_ERROR_CONFIGURATION) {
+        static constexpr const char *known = "tag36h11";
+        families = &known;
+        family_count = 1;
+        markers.resize(1);
+        status = real_start();
+    }
+    if (has("accepts_any_lens") && status != ARHOST_STATUS_OK && markers[0].id == 31) {
         camera.distortion = ARHOST_DISTORTION_NONE;
-        camera.fx = camera.fy = 300;
+        camera.coefficient_count = 0;
         status = real_start();
     }
     self.start_failed = status != ARHOST_STATUS_OK;
     return status;
 }
 
-bool has_state() {
-    return has("predicts") || has("lost_age_is_1") || has("lost_without_pose") || has("never_updates_pose") ||
-           has("reads_state_after");
-}
 std::uint64_t state_size(arhost_instance *) {
-    return has_state() ? sizeof(arhost_tracker_result) : 0;
+    return has_state() ? sizeof(Seen) : 0;
 }
 
 arhost_status track(arhost_instance *instance, const arhost_track_request *input, arhost_tracker_result *result) {
@@ -373,8 +422,13 @@ arhost_status track(arhost_instance *instance, const arhost_track_request *input
         (void)grey[std::size_t{frame.format->grey_stride} * frame.format->height];
     if (has("reads_before_the_frame"))
         (void)grey[-1];
-    if (has("writes_past_the_result"))
-        *reinterpret_cast<std::uint8_t *>(result + 1) = 0;
+    const auto write_byte_after = [](auto *first, std::size_t count) {
+        *(reinterpret_cast<std::uint8_t *>(first) + count * first->struct_size) = 0;
+    };
+    if (has("writes_past_the_observations"))
+        write_byte_after(result->observations, ARHOST_MAX_OBSERVATIONS);
+    if (has("writes_past_the_poses"))
+        write_byte_after(result->poses, self.target_count);
     if (has("slow"))
         std::this_thread::sleep_for(std::chrono::milliseconds(frame.format->width >= 640 ? 60 : 0));
     if (has("leaks_descriptors"))
@@ -397,33 +451,34 @@ arhost_status track(arhost_instance *instance, const arhost_track_request *input
         format.grey_stride = format.stride[0];
     }
     arhost_status status = real_functions().track(self.real, &request, result);
-    if (status == ARHOST_STATUS_OK && has("finds_mirrored_prints") && result->marker_count == 0) {
+    if (status == ARHOST_STATUS_OK && has("finds_mirrored_prints") && result->observation_count == 0) {
         mirror(self, frame);
         status = real_functions().track(self.real, &request, result);
     }
-    if (status == ARHOST_STATUS_OK && has("one_record_per_detection") && result->marker_count == 1) {
-        const arhost_marker first = result->markers[0];
-        std::uint8_t *copy = copied(self, frame);
-        const auto [left, right] = std::ranges::minmax(
-            {first.corners_px[0][0], first.corners_px[1][0], first.corners_px[2][0], first.corners_px[3][0]});
-        for (std::uint32_t y = 0; y < format.height; ++y)
-            std::memset(copy + std::size_t{format.grey_stride} * y + std::lround(left), 140,
-                        static_cast<std::size_t>(std::lround(right - left)));
-        std::memset(result->markers, 0, sizeof result->markers);
-        status = real_functions().track(self.real, &request, result);
-        result->markers[result->marker_count++] = first;
-    }
     if (status != ARHOST_STATUS_OK)
         return status;
-    if (has_state() && input->state_before)
-        std::memcpy(self.last.get(), input->state_before, sizeof *self.last);
-    else if (has_state())
-        *self.last = {};
+    if (has("ignores_the_stride_of_observations")) {
+        const Seen seen = read(*result);
+        std::memcpy(static_cast<void *>(result->observations), seen.observations,
+                    seen.count * sizeof(arhost_observation));
+    }
+    if (has_state() && !has("remembers_in_its_heap")) {
+        self.last->count = 0;
+        if (input->state_before)
+            std::memcpy(self.last.get(), input->state_before, sizeof *self.last);
+    }
     modify_all(self, frame, *result);
-    if (has("reads_state_after") && result->marker_count > 0)
-        result->markers[0].mt[12] += 1e-9 * *static_cast<const std::uint8_t *>(input->state_after);
-    if (has_state())
-        std::memcpy(input->state_after, self.last.get(), sizeof *self.last);
+    if (has("reads_state_after") && result->observation_count > 0)
+        result->observations->corners_px[0][0] += 1e-9 * *static_cast<const std::uint8_t *>(input->state_after);
+    if (has("reports_too_many"))
+        result->observation_count = ARHOST_MAX_OBSERVATIONS + 1;
+    if (has("no_struct_size") && result->observation_count > 0)
+        result->observations->struct_size = 0;
+    if (has_state()) {
+        std::memset(input->state_after, 0, sizeof *self.last);
+        std::memcpy(input->state_after, self.last.get(),
+                    offsetof(Seen, observations) + self.last->count * sizeof(arhost_observation));
+    }
     ++self.tracks;
     self.last_sequence = frame.sequence;
     self.last_capture_ns = frame.capture_ns;

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <sstream>
+#include <utility>
 
 namespace {
 
@@ -221,11 +222,52 @@ TEST(CppHelper, StepsThroughExtendedOptions) {
     EXPECT_EQ(arhost_find_option(&passed[0].known, 2, "three"), nullptr);
 }
 
-TEST(CppHelper, StepsThroughExtendedMarkers) {
+TEST(CppHelper, StepsThroughExtendedElements) {
     constexpr auto size = static_cast<std::uint32_t>(sizeof(Longer<arhost_marker_config>));
-    const Longer<arhost_marker_config> listed[] = {{{size, 4, 80}}, {{size, 7, 40}}};
-    const arhost_tracker_setup setup{sizeof setup, 2, nullptr, nullptr, &listed[0].known};
-    EXPECT_EQ(arhost::listed_marker(setup, 0).id, 4);
-    EXPECT_EQ(arhost::listed_marker(setup, 1).id, 7);
-    EXPECT_EQ(arhost::listed_marker(setup, 1).side_mm, 40);
+    Longer<arhost_marker_config> listed[] = {{{size, 4, 0, 0, {}}}, {{size, 7, 0, 1, {}}}};
+    std::vector<std::int32_t> ids;
+    for (const arhost_marker_config &marker : arhost::elements(&std::as_const(listed[0].known), 2))
+        ids.push_back(marker.id);
+    EXPECT_EQ(ids, (std::vector<std::int32_t>{4, 7}));
+    EXPECT_EQ(arhost::elements(&listed[0].known, 2)[1].target, 1u);
+    arhost::elements(&listed[0].known, 2)[1].id = 9;
+    EXPECT_EQ(listed[1].known.id, 9);
+    EXPECT_TRUE(arhost::elements<const arhost_target>(nullptr, 0).empty());
+}
+
+namespace {
+
+struct Detector {
+    Detector(const arhost::Host &, const arhost::Options &) {}
+    void start(const arhost_tracker_setup &) {}
+    void track(const arhost_track_request &, arhost::Observations &observations) {
+        accepted = 0;
+        for (arhost_observation seen{}; seen.id < to_report; ++seen.id)
+            accepted += observations.add(seen);
+    }
+    static inline int to_report = 0, accepted = 0;
+};
+
+} // namespace
+
+TEST(CppHelper, IgnoresObservationsBeyondTheCapacity) {
+    constexpr auto size = static_cast<std::uint32_t>(sizeof(Longer<arhost_observation>));
+    constexpr int capacity = ARHOST_MAX_OBSERVATIONS;
+    std::vector<Longer<arhost_observation>> buffer(capacity + 1, {{size, -1, 0, 0, {}, 0}});
+    const arhost_tracker &tracker = arhost::detail::tracker_functions<Detector>;
+    arhost::detail::Instance<Detector> object(&host, arhost::Options(nullptr, 0));
+    for (const int reported : {0, 2, capacity, capacity + 3}) {
+        Detector::to_report = reported;
+        const int expected = std::min(reported, capacity);
+        const arhost_track_request request{};
+        arhost_tracker_result result{sizeof result, 0, &buffer[0].known, nullptr, 0, 0};
+        EXPECT_EQ(tracker.track(reinterpret_cast<arhost_instance *>(&object), &request, &result), ARHOST_STATUS_OK);
+        EXPECT_EQ(Detector::accepted, expected);
+        EXPECT_EQ(result.observation_count, static_cast<std::uint32_t>(expected));
+    }
+    for (int i = 0; i <= capacity; ++i) {
+        EXPECT_EQ(buffer[i].known.struct_size, size);
+        EXPECT_EQ(buffer[i].known.id, i < capacity ? i : -1);
+        EXPECT_EQ(buffer[i].unknown[0], Longer<arhost_observation>{}.unknown[0]);
+    }
 }

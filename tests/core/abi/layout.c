@@ -88,6 +88,7 @@ VALUE(ARHOST_CAPABILITY_VIDEO_INPUT, 8192);
 VALUE(ARHOST_CAPABILITY_OVERLAY_INPUT, 16384);
 VALUE(ARHOST_CAPABILITY_SCALED_IMAGES, 32768);
 VALUE(ARHOST_CAPABILITY_RUN_DESCRIPTION, 65536);
+VALUE(ARHOST_CAPABILITY_REPORTS_POSES, 131072);
 
 STRUCT(arhost_descriptor, 80);
 FIELD(arhost_descriptor, struct_size, 0, 4);
@@ -233,6 +234,7 @@ VALUE(ARHOST_CLOCK_MONOTONIC, 1);
 VALUE(ARHOST_CLOCK_MEDIA, 2);
 VALUE(ARHOST_MAX_PLANES, 3);
 VALUE(ARHOST_MAX_IMAGE_SIDE, 16384);
+VALUE(ARHOST_MAX_NAME, 64);
 
 STRUCT(arhost_frame_format, 112);
 FIELD(arhost_frame_format, struct_size, 0, 4);
@@ -315,15 +317,16 @@ FIELD(arhost_frame_buffer, grey, 40, 8);
 FIELD(arhost_frame_buffer, depth_mm, 48, 8);
 FIELD(arhost_frame_buffer, sequence, 56, 8);
 
-STRUCT(arhost_frame_info, 160);
+STRUCT(arhost_frame_info, 224);
 FIELD(arhost_frame_info, struct_size, 0, 4);
 FIELD(arhost_frame_info, clock, 4, 4);
 FIELD(arhost_frame_info, capture_ns, 8, 8);
 FIELD(arhost_frame_info, skipped, 16, 4);
 FIELD(arhost_frame_info, has_grey, 20, 4);
 FIELD(arhost_frame_info, has_truth, 24, 4);
-FIELD(arhost_frame_info, truth_id, 28, 4);
-FIELD(arhost_frame_info, true_mt, 32, 128);
+FIELD(arhost_frame_info, reserved, 28, 4);
+FIELD(arhost_frame_info, truth_target, 32, 64);
+FIELD(arhost_frame_info, true_mt, 96, 128);
 
 STRUCT(arhost_source, 32);
 FIELD(arhost_source, struct_size, 0, 4);
@@ -332,49 +335,94 @@ FIELD(arhost_source, read, 16, 8);
 FIELD(arhost_source, stop, 24, 8);
 
 /* arhost/tracker.h */
-VALUE(ARHOST_MAX_MARKERS, 64);
+VALUE(ARHOST_MAX_TARGETS, 1024);
+VALUE(ARHOST_MAX_MARKERS, 1024);
+VALUE(ARHOST_MAX_OBSERVATIONS, 1024);
+VALUE(ARHOST_MAX_FAMILIES, 16);
 VALUE(ARHOST_MAX_FAMILY, 32);
 VALUE(ARHOST_MAX_STATE, 16777216);
 
-STRUCT(arhost_marker_config, 16);
+STRUCT(arhost_target_config, 24);
+FIELD(arhost_target_config, struct_size, 0, 4);
+FIELD(arhost_target_config, reserved, 4, 4);
+FIELD(arhost_target_config, name, 8, 8);
+FIELD(arhost_target_config, body, 16, 8);
+
+STRUCT(arhost_marker_config, 112);
 FIELD(arhost_marker_config, struct_size, 0, 4);
 FIELD(arhost_marker_config, id, 4, 4);
-FIELD(arhost_marker_config, side_mm, 8, 8);
-VALUE(ARHOST_MARKER_DETECTED, 1);
-VALUE(ARHOST_MARKER_PREDICTED, 2);
-VALUE(ARHOST_MARKER_LOST, 3);
+FIELD(arhost_marker_config, family, 8, 4);
+FIELD(arhost_marker_config, target, 12, 4);
+FIELD(arhost_marker_config, corners_mm, 16, 96);
 
-STRUCT(arhost_marker, 384);
-FIELD(arhost_marker, struct_size, 0, 4);
-FIELD(arhost_marker, id, 4, 4);
-FIELD(arhost_marker, family, 8, 32);
-FIELD(arhost_marker, state, 40, 4);
-FIELD(arhost_marker, age_frames, 44, 4);
-FIELD(arhost_marker, corners_px, 48, 64);
-FIELD(arhost_marker, mt, 112, 128);
-FIELD(arhost_marker, mt_alternative, 240, 128);
-FIELD(arhost_marker, reprojection_px, 368, 8);
-FIELD(arhost_marker, ambiguity, 376, 8);
-
-STRUCT(arhost_tracker_setup, 32);
+STRUCT(arhost_tracker_setup, 56);
 FIELD(arhost_tracker_setup, struct_size, 0, 4);
-FIELD(arhost_tracker_setup, marker_count, 4, 4);
+FIELD(arhost_tracker_setup, target_count, 4, 4);
 FIELD(arhost_tracker_setup, format, 8, 8);
 FIELD(arhost_tracker_setup, intrinsics, 16, 8);
-FIELD(arhost_tracker_setup, markers, 24, 8);
+FIELD(arhost_tracker_setup, targets, 24, 8);
+FIELD(arhost_tracker_setup, markers, 32, 8);
+FIELD(arhost_tracker_setup, marker_count, 40, 4);
+FIELD(arhost_tracker_setup, family_count, 44, 4);
+FIELD(arhost_tracker_setup, families, 48, 8);
 
-STRUCT(arhost_tracker_result, 24584);
+STRUCT(arhost_observation, 88);
+FIELD(arhost_observation, struct_size, 0, 4);
+FIELD(arhost_observation, id, 4, 4);
+FIELD(arhost_observation, family, 8, 4);
+FIELD(arhost_observation, hamming, 12, 4);
+FIELD(arhost_observation, corners_px, 16, 64);
+FIELD(arhost_observation, decision_margin, 80, 8);
+VALUE(ARHOST_TARGET_DETECTED, 1);
+VALUE(ARHOST_TARGET_PREDICTED, 2);
+VALUE(ARHOST_TARGET_LOST, 3);
+
+STRUCT(arhost_body_pose, 432);
+FIELD(arhost_body_pose, struct_size, 0, 4);
+FIELD(arhost_body_pose, target, 4, 4);
+FIELD(arhost_body_pose, state, 8, 4);
+FIELD(arhost_body_pose, age_frames, 12, 4);
+FIELD(arhost_body_pose, mt, 16, 128);
+FIELD(arhost_body_pose, covariance, 144, 288);
+
+STRUCT(arhost_tracker_result, 32);
 FIELD(arhost_tracker_result, struct_size, 0, 4);
-FIELD(arhost_tracker_result, marker_count, 4, 4);
-FIELD(arhost_tracker_result, markers, 8, 24576);
+FIELD(arhost_tracker_result, observation_count, 4, 4);
+FIELD(arhost_tracker_result, observations, 8, 8);
+FIELD(arhost_tracker_result, poses, 16, 8);
+FIELD(arhost_tracker_result, pose_count, 24, 4);
+FIELD(arhost_tracker_result, reserved, 28, 4);
 
-STRUCT(arhost_track_request, 40);
+STRUCT(arhost_target, 648);
+FIELD(arhost_target, struct_size, 0, 4);
+FIELD(arhost_target, state, 4, 4);
+FIELD(arhost_target, name, 8, 64);
+FIELD(arhost_target, age_frames, 72, 4);
+FIELD(arhost_target, first_observation, 76, 4);
+FIELD(arhost_target, observation_count, 80, 4);
+FIELD(arhost_target, reserved, 84, 4);
+FIELD(arhost_target, mt, 88, 128);
+FIELD(arhost_target, mt_alternative, 216, 128);
+FIELD(arhost_target, covariance, 344, 288);
+FIELD(arhost_target, reprojection_px, 632, 8);
+FIELD(arhost_target, ambiguity, 640, 8);
+
+STRUCT(arhost_expected_marker, 80);
+FIELD(arhost_expected_marker, struct_size, 0, 4);
+FIELD(arhost_expected_marker, marker, 4, 4);
+FIELD(arhost_expected_marker, corners_px, 8, 64);
+FIELD(arhost_expected_marker, margin_px, 72, 8);
+
+STRUCT(arhost_track_request, 56);
 FIELD(arhost_track_request, struct_size, 0, 4);
-FIELD(arhost_track_request, reserved, 4, 4);
+FIELD(arhost_track_request, search_everywhere, 4, 4);
 FIELD(arhost_track_request, frame, 8, 8);
 FIELD(arhost_track_request, state_before, 16, 8);
 FIELD(arhost_track_request, state_after, 24, 8);
 FIELD(arhost_track_request, state_size, 32, 8);
+FIELD(arhost_track_request, expected, 40, 8);
+FIELD(arhost_track_request, expected_count, 48, 4);
+FIELD(arhost_track_request, reserved, 52, 4);
 
 STRUCT(arhost_tracker, 40);
 FIELD(arhost_tracker, struct_size, 0, 4);
@@ -628,7 +676,7 @@ VALUE(ARHOST_OVERLAY_RENDERED, 1);
 VALUE(ARHOST_OVERLAY_HELD, 2);
 VALUE(ARHOST_OVERLAY_NONE, 3);
 
-STRUCT(arhost_record, 24992);
+STRUCT(arhost_record, 1008);
 FIELD(arhost_record, struct_size, 0, 4);
 FIELD(arhost_record, clock, 4, 4);
 FIELD(arhost_record, sequence, 8, 8);
@@ -636,13 +684,16 @@ FIELD(arhost_record, capture_ns, 16, 8);
 FIELD(arhost_record, overlay, 24, 4);
 FIELD(arhost_record, has_camera, 28, 4);
 FIELD(arhost_record, has_truth, 32, 4);
-FIELD(arhost_record, truth_id, 36, 4);
-FIELD(arhost_record, true_mt, 40, 128);
-FIELD(arhost_record, camera, 168, 232);
-FIELD(arhost_record, overlay_scale, 400, 8);
-FIELD(arhost_record, overlay_samples, 408, 4);
-FIELD(arhost_record, marker_count, 412, 4);
-FIELD(arhost_record, markers, 416, 24576);
+FIELD(arhost_record, target_count, 36, 4);
+FIELD(arhost_record, truth_target, 40, 64);
+FIELD(arhost_record, true_mt, 104, 128);
+FIELD(arhost_record, camera, 232, 232);
+FIELD(arhost_record, overlay_scale, 464, 8);
+FIELD(arhost_record, overlay_samples, 472, 4);
+FIELD(arhost_record, observation_count, 476, 4);
+FIELD(arhost_record, targets, 480, 8);
+FIELD(arhost_record, observations, 488, 8);
+FIELD(arhost_record, families, 496, 512);
 
 STRUCT(arhost_output, 80);
 FIELD(arhost_output, struct_size, 0, 4);

@@ -17,32 +17,22 @@ namespace {
 
 constexpr arhost_intrinsics lens{
     sizeof(arhost_intrinsics), 640, 480, ARHOST_DISTORTION_NONE, 600, 610, 330, 235, 0, 0, {}};
-constexpr arhost_marker_config listed[] = {{sizeof(arhost_marker_config), 4, 80},
-                                           {sizeof(arhost_marker_config), 7, 40}};
-
-// Returns a marker that faces the camera at a distance of half a metre.
-arhost_marker marker(int id, double side_mm) {
-    arhost_marker m{};
-    m.id = id;
-    m.state = ARHOST_MARKER_DETECTED;
-    m.mt[0] = m.mt[5] = m.mt[10] = m.mt[15] = 1;
-    m.mt[12] = 20;
-    m.mt[14] = -500;
-    const double s = side_mm / 2, corners[4][2] = {{-s, s}, {s, s}, {s, -s}, {-s, -s}};
-    for (int i = 0; i < 4; ++i) {
-        const auto at = camera::project(lens, {corners[i][0] + 20, -corners[i][1], 500});
-        m.corners_px[i][0] = at->x;
-        m.corners_px[i][1] = at->y;
-    }
-    return m;
+arhost_observation observation(std::int32_t id, double left_px = 100) {
+    return {sizeof(arhost_observation),
+            id,
+            0,
+            0,
+            {{left_px, 50}, {left_px + 40, 52}, {left_px + 38, 90}, {left_px, 92}},
+            1};
 }
 
-arhost_record record(std::initializer_list<arhost_marker> markers) {
-    arhost_record r{};
-    r.sequence = 12;
-    for (const arhost_marker &m : markers)
-        r.markers[r.marker_count++] = m;
-    return r;
+arhost_target target(const char *name) {
+    arhost_target t{};
+    std::strcpy(t.name, name);
+    t.state = ARHOST_TARGET_DETECTED;
+    for (int i = 0; i < 36; i += 7)
+        t.covariance[i] = 0.25;
+    return t;
 }
 
 std::string violations(const ContractChecks &checks) {
@@ -53,9 +43,10 @@ std::string violations(const ContractChecks &checks) {
     return text;
 }
 
-std::string violations_of(std::initializer_list<arhost_marker> markers) {
+std::string violations_of(const std::vector<arhost_observation> &observations,
+                          const std::vector<arhost_target> &targets = {}) {
     ContractChecks checks;
-    check_markers(checks, record(markers), lens, listed);
+    check_tracking(checks, 12, targets, observations);
     return violations(checks);
 }
 
@@ -78,12 +69,6 @@ std::string violations_of_times(const SourceChecks::Rate &rate, arhost_clock clo
         ++r.sequence;
     }
     return violations(checks);
-}
-
-arhost_marker altered(void (*alter)(arhost_marker &)) {
-    arhost_marker m = marker(4, 80);
-    alter(m);
-    return m;
 }
 
 // A scene with a ball of 10 mm radius at the origin; the camera is 200 mm in front of the ball.
@@ -128,47 +113,32 @@ TEST(ContractChecks, CountFramesAndReportTheFirstViolation) {
     EXPECT_THAT(reported, testing::ElementsAre("a.b frame 2: is wrong"));
 }
 
-TEST(MarkerChecks, PassForACorrectTracker) {
+TEST(TrackingChecks, PassForACorrectTracker) {
     EXPECT_EQ(violations_of({}), "");
-    EXPECT_EQ(violations_of({marker(4, 80), marker(7, 40)}), "");
-    EXPECT_EQ(violations_of({marker(7, 40)}), "");
-    // A marker with an error of 0.1 px that reports this error correctly.
-    EXPECT_EQ(violations_of({altered([](arhost_marker &m) {
-                  m.corners_px[0][0] += 0.2;
-                  m.reprojection_px = 0.1;
-              })}),
-              "");
-    // A predicted marker has no detected corners, so its reprojection error is not checked.
-    EXPECT_EQ(violations_of({altered([](arhost_marker &m) {
-                  m.state = ARHOST_MARKER_PREDICTED;
-                  m.age_frames = 2;
-                  m.mt[12] += 100;
-              })}),
-              "");
+    EXPECT_EQ(violations_of({observation(4), observation(7), observation(4, 300)}, {target("cup"), target("desk")}),
+              "")
+        << "two copies of marker 4 are in view";
+    arhost_target body = target("head");
+    std::ranges::fill(body.covariance, 0);
+    EXPECT_EQ(violations_of({}, {body}), "") << "its covariance is unknown";
 }
 
-TEST(MarkerChecks, FailForAWrongTracker) {
-    EXPECT_EQ(violations_of({marker(7, 40), marker(4, 80)}),
-              "tracker.order: frame 12: marker 4 is reported out of order; markers must be in the order of the "
-              "configuration's list");
-    const auto expect = [](void (*alter)(arhost_marker &), const char *expected) {
-        EXPECT_THAT(violations_of({altered(alter)}), HasSubstr(expected));
-    };
-    expect([](arhost_marker &m) { m.ambiguity = 1.5; }, "tracker.numbers: frame 12: marker 4 has the ambiguity 1.5");
-    expect([](arhost_marker &m) { m.reprojection_px = -1; }, "which must not be negative");
-    expect([](arhost_marker &m) { m.age_frames = 3; }, "marker 4 is detected, but its age is 3 frames");
-    expect([](arhost_marker &m) { m.mt_alternative[0] = 2; }, "marker 4's alternative: the pose's last row");
-    expect([](arhost_marker &m) { m.mt[14] = -0.5; },
-           "tracker.pose: frame 12: marker 4: the reported reprojection error is 0.000 px"); // the pose is in metres
-                                                                                             // instead of mm
-    expect([](arhost_marker &m) { m.mt[14] = 500; }, "its pose is behind the camera");
-    expect([](arhost_marker &m) { m.reprojection_px = 1; },
-           "the reported reprojection error is 1.000 px, but the actual one is 0.000 px");
-    expect([](arhost_marker &m) { m.corners_px[1][0] = 1e200; },
-           "the reported reprojection error is 0.000 px, but the actual one is inf px");
-    EXPECT_THAT(violations_of({marker(4, 40)}),
-                HasSubstr("the reported reprojection error is 0.000 px, but the actual one is "))
-        << "the marker's side is half as long as configured";
+TEST(TrackingChecks, FailForAWrongTracker) {
+    arhost_observation mirrored = observation(4), crossed = observation(4);
+    std::swap(mirrored.corners_px[1], mirrored.corners_px[3]);
+    std::swap(crossed.corners_px[0], crossed.corners_px[1]);
+    for (const arhost_observation &wrong : {mirrored, crossed})
+        EXPECT_EQ(violations_of({observation(7), wrong}),
+                  "tracker.corners: frame 12: the corners of marker 4 are not convex and clockwise in the image");
+    EXPECT_EQ(violations_of({observation(4), observation(7), observation(4)}),
+              "tracker.repeats: frame 12: marker 4 is reported twice at the same place");
+    arhost_target negative = target("cup"), asymmetric = target("cup");
+    negative.covariance[14] = -1;
+    asymmetric.covariance[3] = 0.1;
+    EXPECT_EQ(violations_of({}, {target("desk"), negative}),
+              "tracker.covariance: frame 12: cup has a variance of -1");
+    EXPECT_EQ(violations_of({}, {asymmetric}),
+              "tracker.covariance: frame 12: cup has a covariance that is not symmetric");
 }
 
 TEST(SourceChecks, RequireCaptureTimesBeforeArrivalAndNotNegative) {
@@ -189,7 +159,8 @@ TEST(SourceChecks, RequireASingleClock) {
     SourceChecks source({}, 0);
     ContractChecks checks;
     for (const arhost_clock clock : {ARHOST_CLOCK_MEDIA, ARHOST_CLOCK_MONOTONIC, ARHOST_CLOCK_MEDIA}) {
-        arhost_record r = record({});
+        arhost_record r{};
+        r.sequence = 12;
         r.clock = clock;
         source.check(checks, r, 0, 0);
     }

@@ -1,8 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/frames.hpp"
 
+#include "ipc/protocol.hpp"
+
 #include <gmock/gmock.h>
 
+#include <cstring>
+#include <limits>
+
+using namespace arhost;
 using namespace arhost::host;
 
 namespace {
@@ -22,7 +28,84 @@ const char *problem_with(arhost_clock clock, std::int64_t capture_ns, std::int64
     return problem;
 }
 
+const std::vector<ipc::Target> targets = {
+    {"desk", {{23, "D", {}}}, ""}, {"cup", {{7, "D", {}}}, ""}, {"head", {}, "skull"}};
+
+// The result of a tracker: "desk" was never seen, "cup" is detected, "head" is lost.
+struct TrackerResult {
+    TrackerResult() : bytes(layout.byte_size(0)) {
+        count() = 2;
+        for (const int index : {1, 2}) {
+            target(index).state = index == 1 ? ARHOST_TARGET_DETECTED : ARHOST_TARGET_LOST;
+            for (const int diagonal : {0, 5, 10, 15})
+                target(index).mt[diagonal] = 1;
+            target(index).mt[14] = -500;
+        }
+        target(1).observation_count = 1;
+        observation(0).id = 7;
+        observation(1).id = 99;
+    }
+    std::uint32_t &count() { return *reinterpret_cast<std::uint32_t *>(bytes.data()); }
+    arhost_target &target(int index) {
+        return reinterpret_cast<arhost_target *>(bytes.data() + ipc::TrackerSlot::targets_offset)[index];
+    }
+    arhost_observation &observation(int index) {
+        return reinterpret_cast<arhost_observation *>(bytes.data() + layout.observations_offset)[index];
+    }
+    const char *problem() { return accept_tracker_result(bytes, targets, 1, frame); }
+
+    const ipc::TrackerSlot layout{targets.size()};
+    std::vector<std::byte> bytes;
+    Frame frame{0};
+};
+
 } // namespace
+
+TEST(TrackerResult, IsCopiedWithTheConfiguredNamesOfTheTargets) {
+    TrackerResult result;
+    std::strcpy(result.target(1).name, "a name from the worker");
+    ASSERT_EQ(result.problem(), nullptr);
+    ASSERT_EQ(result.frame.targets.size(), 2u) << "'desk' was never seen";
+    EXPECT_STREQ(result.frame.targets[0].name, "cup");
+    EXPECT_EQ(result.frame.targets[0].state, ARHOST_TARGET_DETECTED);
+    EXPECT_EQ(result.frame.targets[0].struct_size, sizeof(arhost_target));
+    EXPECT_STREQ(result.frame.targets[1].name, "head");
+    ASSERT_EQ(result.frame.observations.size(), 2u);
+    EXPECT_EQ(result.frame.observations[1].id, 99);
+    EXPECT_EQ(result.frame.observations[1].struct_size, sizeof(arhost_observation));
+}
+
+TEST(TrackerResult, IsRejectedIfItsNumbersAreInvalid) {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    const auto expect = [](void (*alter)(TrackerResult &), const char *problem) {
+        TrackerResult result;
+        alter(result);
+        EXPECT_STREQ(result.problem(), problem);
+        EXPECT_TRUE(result.frame.targets.empty());
+        EXPECT_TRUE(result.frame.observations.empty());
+    };
+    expect([](TrackerResult &r) { r.count() = ARHOST_MAX_OBSERVATIONS + 1; },
+           "the tracker reports more observations than ARHOST_MAX_OBSERVATIONS");
+    expect([](TrackerResult &r) { r.target(1).state = 4; }, "a target's state is out of range");
+    expect([](TrackerResult &r) { r.target(0).state = -1; }, "a target's state is out of range");
+    for (const auto alter : {+[](TrackerResult &r) { r.target(1).first_observation = 3; },
+                             +[](TrackerResult &r) { r.target(1).observation_count = 3; },
+                             +[](TrackerResult &r) { r.target(1).first_observation = 2; },
+                             +[](TrackerResult &r) { r.target(1).observation_count = UINT32_MAX; }})
+        expect(alter, "a target's observations are out of range");
+    for (const auto alter : {+[](TrackerResult &r) { r.target(1).covariance[35] = nan; },
+                             +[](TrackerResult &r) { r.target(1).ambiguity = nan; },
+                             +[](TrackerResult &r) { r.target(1).mt_alternative[15] = nan; },
+                             +[](TrackerResult &r) { r.target(1).reprojection_px = nan; }})
+        expect(alter, "a target's alternative pose, covariance, reprojection error or ambiguity is not finite");
+    expect([](TrackerResult &r) { r.target(2).mt[0] = nan; }, "the pose is not finite");
+    expect([](TrackerResult &r) { r.target(2).mt[0] = 2; }, "the pose's rotation is not orthonormal");
+    expect([](TrackerResult &r) { r.observation(1).family = 1; }, "an observation's family is out of range");
+    expect([](TrackerResult &r) { r.observation(1).corners_px[3][1] = nan; },
+           "a coordinate of an observation's corner is not finite");
+    expect([](TrackerResult &r) { r.observation(0).decision_margin = nan; },
+           "an observation's decision margin is not finite");
+}
 
 TEST(DeviceTime, IsIgnoredIfLongerThanTheRenderCall) {
     using namespace std::chrono_literals;

@@ -13,15 +13,14 @@ struct Outcome : testing::Test {
     Outcome() {
         const yaml::Node node = yaml::Node::parse("{}", "run.yaml");
         configuration.emplace(run_config::Configuration{.node = node});
-        configuration->tracker = run_config::TrackerConfiguration{{node, {}, {}, {}, {}, {}, false}, {}, 0};
+        configuration->tracker = run_config::TrackerConfiguration{
+            {node, {}, {}, {}, {}, {}, false}, {{"desk", {{23, "D", {}}}, ""}, {"cup", {{7, "D", {}}}, ""}}};
         configuration->raytracer =
             run_config::RaytracerConfiguration{{node, {}, {}, {}, {}, {}, false}, "scene.yaml", node};
         statistics.frames_in = statistics.composited = statistics.tracker_results = 30;
         statistics.tracked = statistics.augmented = 20;
     }
-    std::optional<Problem> problem() const {
-        return problem_with_run(*configuration, statistics, "marker 23 (dictionary D)");
-    }
+    std::optional<Problem> problem() const { return problem_with_run(*configuration, statistics); }
     std::optional<run_config::Configuration> configuration;
     Statistics statistics;
 };
@@ -43,8 +42,8 @@ TEST_F(Outcome, ReportsATargetThatWasNeverSeen) {
         ASSERT_TRUE(problem());
         EXPECT_TRUE(problem()->is_missing_target);
         EXPECT_EQ(problem()->component, "tracker");
-        EXPECT_THAT(problem()->text, HasSubstr("no marker was seen in any of 30 frames"));
-        EXPECT_THAT(problem()->text, HasSubstr("it looked for marker 23 (dictionary D);"));
+        EXPECT_THAT(problem()->text, HasSubstr("no target was seen in any of 30 frames"));
+        EXPECT_THAT(problem()->text, HasSubstr("it looked for 'desk' (D 23), 'cup' (D 7);"));
     }
     EXPECT_THAT(problem()->text, HasSubstr("30 frames, so no frame has an overlay; it looked"));
     configuration->raytracer.reset();
@@ -80,15 +79,30 @@ TEST_F(Outcome, ReportsThatEveryOverlayWasLateInModeLive) {
     EXPECT_FALSE(problem()) << "no overlay was requested";
 }
 
-TEST(Targets, AreDescribedByNumbersAndDictionary) {
-    ipc::PluginDescription plugin;
-    plugin.options = {{"dictionary", ARHOST_OPTION_TEXT, "D", 0, 0, {"D", "E"}, ""},
-                      {"threads", ARHOST_OPTION_INTEGER, "2", 1, 8, {}, ""}};
-    const std::vector<ipc::OptionValue> options = {{"dictionary", ARHOST_OPTION_TEXT, 0, 0, "E"},
-                                                   {"threads", ARHOST_OPTION_INTEGER, 2, 0, ""}};
-    EXPECT_EQ(describe_targets({{sizeof(arhost_marker_config), 23, 80}}, plugin, options),
-              "marker 23 (dictionary E)");
-    EXPECT_EQ(
-        describe_targets({{sizeof(arhost_marker_config), 2, 80}, {sizeof(arhost_marker_config), 7, 80}}, {}, {}),
-        "the markers 2, 7");
+TEST_F(Outcome, NamesTheMarkersThatWereSeenInsteadOfATarget) {
+    statistics.tracked = statistics.augmented = 0;
+    statistics.strangers = {{"D 5", 1}, {"D 24", 29}};
+    ASSERT_TRUE(problem());
+    EXPECT_THAT(problem()->text, HasSubstr("'cup' (D 7); it saw D 24 (29 frames), D 5 (1 frame); compare"));
+}
+
+TEST_F(Outcome, NamesTargetsThatWereNeverSeenAlthoughOthersWere) {
+    EXPECT_EQ(unseen_targets(*configuration, statistics), "") << "problem_with_run reports that none was seen";
+    statistics.targets["desk"].frames = 20;
+    EXPECT_EQ(unseen_targets(*configuration, statistics), "never seen in 30 frames: 'cup' (D 7)");
+    statistics.strangers = {{"D 8", 30}};
+    EXPECT_EQ(unseen_targets(*configuration, statistics),
+              "never seen in 30 frames: 'cup' (D 7); it saw D 8 (30 frames)");
+    statistics.targets["cup"].frames = 1;
+    EXPECT_EQ(unseen_targets(*configuration, statistics), "");
+}
+
+TEST(Targets, AreDescribedByTheirMarkers) {
+    const ipc::Target cup{"cup", {{7, "D", {}}}, ""}, head{"head", {}, "skull"};
+    ipc::Target board{"board", {}, ""};
+    for (int id = 0; id < 12; ++id)
+        board.markers.push_back({id, "tag36h11", {}});
+    EXPECT_EQ(describe_targets({cup, board, head}),
+              "'cup' (D 7), 'board' (map of 12 markers of tag36h11), 'head' (body 'skull')");
+    EXPECT_EQ(describe_targets(std::vector<ipc::Target>(10, head)).substr(8 * 23 - 2), " and 2 more");
 }

@@ -31,7 +31,7 @@ public:
         EXPECT_EQ(tracker_.created(), ARHOST_STATUS_OK) << tracker_.log();
         EXPECT_EQ(tracker_.start(test::plain_camera(size), listed), ARHOST_STATUS_OK) << tracker_.log();
     }
-    std::vector<arhost_marker> see(const cv::Mat &picture) {
+    std::vector<arhost_observation> see(const cv::Mat &picture) {
         cv::Mat grey;
         cv::cvtColor(picture, grey, cv::COLOR_BGR2GRAY);
         return tracker_.track(test::GreyFrame(grey));
@@ -84,9 +84,9 @@ TEST(TimeCodes, AMixtureOfTwoIsNeverMistakenForAThird) {
             cv::Mat mixed;
             cv::addWeighted(pictures[static_cast<std::size_t>(i)], share, pictures[static_cast<std::size_t>(i) + 1],
                             1 - share, 0, mixed);
-            for (const arhost_marker &marker : camera.see(distorted(mixed, i)))
-                if (marker.state == ARHOST_MARKER_DETECTED) {
-                    EXPECT_TRUE(marker.id == i || marker.id == i + 1) << i << " became " << marker.id;
+            for (const arhost_observation &seen : camera.see(distorted(mixed, i)))
+                if (seen.id < TimeCodes::count) {
+                    EXPECT_TRUE(seen.id == i || seen.id == i + 1) << i << " became " << seen.id;
                     ++recognised;
                 }
         }
@@ -96,17 +96,18 @@ TEST(TimeCodes, AMixtureOfTwoIsNeverMistakenForAThird) {
 TEST(TimeCodes, CountEachPictureOnceAndRejectSeveral) {
     TimeCodes codes(start);
     const auto marker = [](std::int32_t id) {
-        arhost_marker seen{};
+        arhost_observation seen{};
         seen.id = id;
-        seen.state = ARHOST_MARKER_DETECTED;
         return seen;
     };
     drawn(codes, start);
     drawn(codes, start + 33ms);
-    const std::vector<arhost_marker> first = {marker(0)}, both = {marker(0), marker(1)}, unknown = {marker(7)};
+    const std::vector<arhost_observation> first = {marker(0)}, both = {marker(0), marker(1)}, undrawn = {marker(7)},
+                                          no_code = {marker(TimeCodes::count)};
     EXPECT_FALSE(codes.see({}, start + 50ms));
     EXPECT_FALSE(codes.see(both, start + 50ms));
-    EXPECT_FALSE(codes.see(unknown, start + 50ms)) << "a picture that was not drawn yet";
+    EXPECT_FALSE(codes.see(undrawn, start + 50ms)) << "a picture that was not drawn yet";
+    EXPECT_FALSE(codes.see(no_code, start + 50ms));
     EXPECT_EQ(codes.see(first, start + 60ms), 60ms);
     EXPECT_FALSE(codes.see(first, start + 90ms)) << "the display holds a picture until the next one";
     for (int i = 2; i < TimeCodes::count; ++i)

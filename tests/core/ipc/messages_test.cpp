@@ -59,12 +59,11 @@ TEST(Messages, PreserveTheSetupOfEachKind) {
     EXPECT_EQ(source_setup.fps, 29.97);
     EXPECT_TRUE(source_setup.paced);
     EXPECT_EQ(source_setup.intrinsics.value().fx, 60);
-    const auto tracker =
-        sent(messages::Create{{}, messages::TrackerSetup{format(), lens(), {{sizeof(arhost_marker_config), 3, 80}}}});
+    const auto tracker = sent(messages::Create{{}, messages::TrackerSetup{format(), lens(), 7}});
     const auto &tracker_setup = std::get<messages::TrackerSetup>(tracker.setup);
     EXPECT_EQ(tracker_setup.format.byte_size, 64u * 48);
-    EXPECT_EQ(tracker_setup.markers.at(0).id, 3);
-    EXPECT_EQ(tracker_setup.markers.at(0).side_mm, 80);
+    EXPECT_EQ(tracker_setup.intrinsics.fx, 60);
+    EXPECT_EQ(tracker_setup.full_search_every, 7u);
     const auto raytracer = sent(messages::Create{{}, messages::RaytracerSetup{64, 48, lens()}});
     EXPECT_EQ(std::get<messages::RaytracerSetup>(raytracer.setup).height, 48u);
     const auto sink = sent(messages::Create{{}, messages::SinkSetup{format(), 25, 12, {}}});
@@ -74,7 +73,7 @@ TEST(Messages, PreserveTheSetupOfEachKind) {
 
 TEST(Messages, NameTheKindOfSetup) {
     EXPECT_EQ(encode(messages::Create{{}, messages::SourceSetup{}}).at("kind"), "source");
-    EXPECT_EQ(encode(messages::Create{{}, messages::TrackerSetup{format(), lens(), {}}}).at("kind"), "tracker");
+    EXPECT_EQ(encode(messages::Create{{}, messages::TrackerSetup{format(), lens()}}).at("kind"), "tracker");
     EXPECT_EQ(encode(messages::Create{{}, messages::RaytracerSetup{64, 48, lens()}}).at("kind"), "raytracer");
     EXPECT_EQ(encode(messages::Create{{}, messages::SinkSetup{}}).at("kind"), "sink");
 }

@@ -85,9 +85,9 @@ TEST(Track, KeepsItsBranchThroughAFrameWithASinglePose) {
         const Estimate only = at(single, 2);
         track = next_step(track, {&only, 1}, 20 * frame_ns).track;
         // The single pose continues its own branch, so the marker does not seem to have turned by 40° in a frame.
-        const auto predicted = predicted_pose(track, 21 * frame_ns);
+        const auto predicted = predicted_motion(track, 21 * frame_ns);
         ASSERT_TRUE(predicted);
-        EXPECT_LT(degrees_between(*predicted, single), 1);
+        EXPECT_LT(degrees_between(pose_of(*predicted), single), 1);
         const Estimate again[] = {at(wrong, 2), at(right, 2)};
         const Step step = next_step(track, again, 21 * frame_ns);
         EXPECT_LT(degrees_between(again[step.chosen].camera_from_target, single), 1);
@@ -102,12 +102,12 @@ TEST(Track, ARotationFarFromThePredictedOneBeginsANewMotion) {
     }
     const Estimate turned = at(pose_at({0, 0, 2000}, -70), 1);
     track = next_step(track, {&turned, 1}, 20 * frame_ns).track;
-    EXPECT_LT(degrees_between(*predicted_pose(track, 22 * frame_ns), turned.camera_from_target), 1);
+    EXPECT_LT(degrees_between(pose_of(*predicted_motion(track, 22 * frame_ns)), turned.camera_from_target), 1);
 }
 
 TEST(Track, PredictsAtConstantSpeed) {
     Track track{};
-    EXPECT_FALSE(predicted_pose(track, 0));
+    EXPECT_FALSE(predicted_motion(track, 0));
     const auto pose = [](double seconds) {
         return pose_at({100 * seconds, 0, 1000 - 50 * seconds}, 30, 0, 40 * seconds);
     };
@@ -115,12 +115,12 @@ TEST(Track, PredictsAtConstantSpeed) {
         const Estimate estimate = at(pose(frame / 30.0), 1);
         track = next_step(track, {&estimate, 1}, frame * frame_ns).track;
     }
-    const auto predicted = predicted_pose(track, 62 * frame_ns);
+    const auto predicted = predicted_motion(track, 62 * frame_ns);
     ASSERT_TRUE(predicted);
-    EXPECT_LT(degrees_between(*predicted, pose(62 / 30.0)), 0.05);
-    EXPECT_LT((predicted->translation_mm - pose(62 / 30.0).translation_mm).norm(), 0.05);
-    EXPECT_FALSE(predicted_pose(track, 59 * frame_ns + 1'000'000'001)) << "too old";
-    EXPECT_FALSE(predicted_pose(track, 58 * frame_ns)) << "before the last frame";
+    EXPECT_LT(degrees_between(pose_of(*predicted), pose(62 / 30.0)), 0.05);
+    EXPECT_LT((pose_of(*predicted).translation_mm - pose(62 / 30.0).translation_mm).norm(), 0.05);
+    EXPECT_FALSE(predicted_motion(track, 59 * frame_ns + 1'000'000'001)) << "too old";
+    EXPECT_FALSE(predicted_motion(track, 58 * frame_ns)) << "before the last frame";
 }
 
 TEST(Track, BeginsAgainAfterAGap) {

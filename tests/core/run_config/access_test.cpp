@@ -40,7 +40,7 @@ struct Access : testing::Test {
 } // namespace
 
 TEST_F(Access, GrantsNothingByDefault) {
-    const auto policy = of("{plugin: tracker_aruco, options: {dictionary: DICT_6X6_250, threads: 4}}", false);
+    const auto policy = of("{plugin: tracker_aruco, options: {corner_refinement: none, threads: 4}}", false);
     EXPECT_THAT(policy.readable, IsEmpty());
     EXPECT_THAT(policy.writable, IsEmpty());
     EXPECT_THAT(policy.allow, IsEmpty());

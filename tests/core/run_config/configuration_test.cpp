@@ -20,10 +20,10 @@ struct Warnings : testing::Test {
             std::ofstream(scratch.path() / plugin) << "";
     }
     std::vector<std::string> of(const std::string &camera, const std::string &side_mm) const {
-        const auto root =
-            yaml::Node::parse("version: 1\nsource: {plugin: source_x}\ncamera: " + camera +
-                                  "\ntracker: {plugin: tracker_x, markers: [{id: 0, side_mm: " + side_mm + "}]}\n",
-                              (scratch.path() / "lab.yaml").string());
+        const auto root = yaml::Node::parse(
+            "version: 1\nsource: {plugin: source_x}\ncamera: " + camera +
+                "\ntracker: {plugin: tracker_x, targets: [{marker: 0, family: t, side_mm: " + side_mm + "}]}\n",
+            (scratch.path() / "lab.yaml").string());
         std::vector<std::string> warnings = run_config::parse(root, scratch.path()).warnings;
         for (std::string &warning : warnings)
             if (warning.starts_with(scratch.path().string()))
@@ -55,9 +55,9 @@ TEST_F(Warnings, AreForImplausibleSidesOfMarkers) {
     EXPECT_THAT(of(camera, "1"), IsEmpty());
     EXPECT_THAT(of(camera, "5000"), IsEmpty());
     EXPECT_THAT(of(camera, "0.08"),
-                ElementsAre("lab.yaml:4:57: tracker.markers[0].side_mm: a marker with a side of 0.08 mm is "
+                ElementsAre("lab.yaml:4:72: tracker.targets[0].side_mm: a marker with a side of 0.08 mm is "
                             "implausible; check the unit, which is mm"));
     EXPECT_THAT(of(camera, "5001"),
-                ElementsAre("lab.yaml:4:57: tracker.markers[0].side_mm: a marker with a side of 5001 mm is "
+                ElementsAre("lab.yaml:4:72: tracker.targets[0].side_mm: a marker with a side of 5001 mm is "
                             "implausible; check the unit, which is mm"));
 }

@@ -43,5 +43,6 @@ TEST(Schema, ListsEachKeyOnceUnderAListedParent) {
             parent.resize(parent.size() - 2);
         EXPECT_TRUE(seen.contains(parent)) << key.path;
     }
-    EXPECT_THAT(keys_of("tracker.markers[]"), testing::ElementsAre("id", "side_mm"));
+    EXPECT_THAT(keys_of("tracker.targets[]"),
+                testing::ElementsAre("name", "marker", "ids", "family", "dictionary", "side_mm", "map", "body"));
 }

@@ -13,16 +13,22 @@ namespace {
 using testing::HasSubstr;
 
 const std::string description =
-    R"({"format": "arhost-session", "version": 1, "fps": 30, "folder": "/lab", "overridden": {"raytracer": "/cwd"}, )"
+    R"({"format": "arhost-session", "version": 2, "fps": 30, "folder": "/lab", "overridden": {"raytracer": "/cwd"}, )"
     R"("scene_files": []})";
 
-std::string line(int frame, const std::string &more = R"("overlay": "none", "markers": [], "camera": null)") {
+std::string line(int frame, const std::string &more = R"("overlay": "none", "targets": [], "camera": null)") {
     return "{\"frame\": " + std::to_string(frame) + ", \"capture_ns\": " + std::to_string(frame * 1'000) +
            ", \"clock\": \"media\", " + more + ", \"video_end\": " + std::to_string(100 * (frame + 1)) + "}\n";
 }
 const std::string rendered =
-    R"("overlay": "rendered", "markers": [{"id": 3}], "camera": {"eye": [1, 2, 3.5], "look_at": [1, 2, 2.5], )"
-    R"("up": [0, 1, 0]}, "truth": {"id": 7, "mt": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]})";
+    R"("overlay": "rendered", "targets": [)"
+    R"({"name": "cup", "state": "detected", "age_frames": 0, "mt": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 4, 3, 2, 1], )"
+    R"("covariance": [9, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 8], )"
+    R"("reprojection_px": 0.25, "ambiguity": 0.5, "observations": [{"id": 7, "corners_px": [[1, 2], [3, 2], [3, 4], [1, 4]], )"
+    R"("decision_margin": 60, "hamming": 1}]}, )"
+    R"({"name": "lid", "state": "lost", "age_frames": 5, "mt": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -9, 1]}], )"
+    R"("camera": {"eye": [1, 2, 3.5], "look_at": [1, 2, 2.5], )"
+    R"("up": [0, 1, 0]}, "truth": {"target": "cup", "mt": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]})";
 const std::string end = "{\"end\": true}\n";
 
 class SessionFolder : public testing::Test {
@@ -63,15 +69,32 @@ TEST_F(SessionFolder, HasTheFactsOfEachFrame) {
     ASSERT_EQ(session.recording.frames.size(), 2u);
     const RecordedFrame &plain = session.recording.frames[0], &full = session.recording.frames[1];
     EXPECT_EQ(plain.overlay, ARHOST_OVERLAY_NONE);
-    EXPECT_FALSE(plain.has_markers || plain.view || plain.truth);
+    EXPECT_TRUE(plain.targets.empty() && plain.observations.empty() && !plain.view && !plain.truth);
     EXPECT_EQ(full.number, 1u);
     EXPECT_EQ(full.capture_ns, 1000);
     EXPECT_EQ(full.clock, ARHOST_CLOCK_MEDIA);
     EXPECT_EQ(full.overlay, ARHOST_OVERLAY_RENDERED);
-    EXPECT_TRUE(full.has_markers);
+    ASSERT_EQ(full.targets.size(), 2u);
+    const arhost_target &cup = full.targets[0], &lid = full.targets[1];
+    EXPECT_STREQ(cup.name, "cup");
+    EXPECT_EQ(cup.state, ARHOST_TARGET_DETECTED);
+    EXPECT_EQ(cup.mt[13], 3);
+    EXPECT_EQ(cup.covariance[35], 8);
+    EXPECT_EQ(cup.reprojection_px, 0.25);
+    EXPECT_EQ(cup.ambiguity, 0.5);
+    EXPECT_EQ(cup.observation_count, 1u);
+    EXPECT_EQ(lid.state, ARHOST_TARGET_LOST);
+    EXPECT_EQ(lid.age_frames, 5u);
+    EXPECT_EQ(lid.mt[14], -9);
+    EXPECT_EQ(lid.first_observation, 1u);
+    ASSERT_EQ(full.observations.size(), 1u);
+    EXPECT_EQ(full.observations[0].id, 7);
+    EXPECT_EQ(full.observations[0].hamming, 1u);
+    EXPECT_EQ(full.observations[0].decision_margin, 60);
+    EXPECT_EQ(full.observations[0].corners_px[2][1], 4);
     ASSERT_TRUE(full.view && full.truth);
     EXPECT_EQ(full.view->eye_mm[2], 3.5);
-    EXPECT_EQ(full.truth->first, 7);
+    EXPECT_EQ(full.truth->first, "cup");
     EXPECT_EQ(full.truth->second[13], 6);
 }
 
@@ -108,13 +131,18 @@ TEST_F(SessionFolder, DamagedLinesAreReportedWithTheirPosition) {
     EXPECT_THAT(error_of_log(line(0) + "\n"), HasSubstr("frames.jsonl:2:1: is not valid JSON"));
     EXPECT_THAT(error_of_log("{\"frame\": 0}\n"), HasSubstr("frames.jsonl:1:1: is not the record of a frame: key "
                                                             "'capture_ns' not found"));
+    EXPECT_THAT(error_of_log(line(0, R"("overlay": "none", "targets": 3, "camera": null)")),
+                HasSubstr("frames.jsonl:1:1: is not the record of a frame: "));
+    EXPECT_THAT(error_of_log(line(0, R"("overlay": "none", "targets": [], "camera": null, "truth": {"mt": )"
+                                     "[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]}")),
+                HasSubstr("frames.jsonl:1:1: is not the record of a frame: key 'target' not found"));
     EXPECT_THAT(error_of_log(line(1) + line(1)), HasSubstr("frames.jsonl:2:1: frame: must be greater than in the "
                                                            "line before, 1"));
-    EXPECT_THAT(error_of_log(line(0, R"("overlay": "all", "markers": [], "camera": null)")),
+    EXPECT_THAT(error_of_log(line(0, R"("overlay": "all", "targets": [], "camera": null)")),
                 HasSubstr("frames.jsonl:1:1: overlay: 'all' is not one of rendered, held, none"));
-    EXPECT_THAT(error_of_log(line(0, R"("overlay": "held", "markers": [], "camera": null)")),
+    EXPECT_THAT(error_of_log(line(0, R"("overlay": "held", "targets": [], "camera": null)")),
                 HasSubstr("frames.jsonl:1:1: camera: is null, but the frame has an overlay"));
-    EXPECT_THAT(error_of_log(line(0, R"("overlay": "none", "markers": [], "camera": {"eye": [0, 0, 0], )"
+    EXPECT_THAT(error_of_log(line(0, R"("overlay": "none", "targets": [], "camera": {"eye": [0, 0, 0], )"
                                      R"("look_at": [0, 0, 0], "up": [0, 1, 0]})")),
                 HasSubstr("frames.jsonl:1:1: camera: look_at must differ from eye"));
     EXPECT_THAT(error_of_log(line(0) + end + line(1)),
@@ -138,9 +166,10 @@ TEST_F(SessionFolder, MissingPartsAreReported) {
 }
 
 TEST_F(SessionFolder, AnotherVersionIsRejectedAtItsPosition) {
-    write("session.json", R"({"format": "arhost-session", "version": 2})");
-    EXPECT_EQ(error(), "session.json:1:41: version: must be 1, the only version that this arhost can replay");
-    write("session.json", R"({"format": "other", "version": 1})");
+    write("session.json", R"({"format": "arhost-session", "version": 1})");
+    EXPECT_EQ(error(), "session.json:1:41: version: must be 2, the only version that this arhost can replay; record "
+                       "the session again, or replay it with the arhost that has recorded it");
+    write("session.json", R"({"format": "other", "version": 2})");
     EXPECT_THAT(error(), HasSubstr("session.json:1:12: format: 'other' is not one of arhost-session"));
     write("session.json", "{\"format\": ");
     EXPECT_THAT(error(), HasSubstr("session.json:1:"));

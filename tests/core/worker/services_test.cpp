@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "ipc/targets.hpp"
 #include "worker/services.hpp"
 
 #include "pixels/formulas.hpp"
@@ -64,8 +65,12 @@ void track(arhost_pixel_format pixel_format, arhost_yuv_range range) {
     plugin.functions = &tracker_functions;
     const auto service = make_service(link, host, plugin, nullptr);
     ipc::messages::Ready ready;
-    ASSERT_EQ(service->start(setup, {}, ready), ARHOST_STATUS_OK);
-    memory.output = region(ipc::TrackerSlot::byte_size(ready.state_size));
+    const std::vector<ipc::Target> targets = {{"cup", {{7, "tag36h11", {}}}, ""}};
+    const ipc::SharedMemory targets_memory = ipc::to_memory(targets);
+    std::vector<base::UniqueFd> fds;
+    fds.emplace_back(::dup(targets_memory.fd()));
+    ASSERT_EQ(service->start(setup, fds, ready), ARHOST_STATUS_OK);
+    memory.output = region(ipc::TrackerSlot(targets.size()).byte_size(ready.state_size));
     ipc::Command command{};
     command.kind = ipc::CommandKind::track;
     ipc::Result result{};

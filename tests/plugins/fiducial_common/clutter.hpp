@@ -67,24 +67,27 @@ inline cv::Mat clutter(cv::Size size, uint64_t seed) {
 }
 
 struct ClutterCounts {
-    int pictures = 0, false_positives = 0;
-    int found = 0; // markers found that were laid over the clutter, one in each picture
+    int pictures = 0;
+    int false_positives = 0, unlisted = 0; // detections where there is none: of listed and of other ids
+    int found = 0;                         // markers found that were laid over the clutter, one in each picture
 };
 
 // `print` draws a marker by its id, 0 to 29.
-inline ClutterCounts find_in_clutter(Tracker &tracker, const std::function<Print(int)> &print) {
+inline ClutterCounts find_in_clutter(Tracker &tracker, const std::string &family,
+                                     const std::function<Print(int)> &print) {
     constexpr int ids = 30;
     const auto camera = intrinsics_of({480, 360}, 450, 455, 243.2, 176.9);
     std::vector<Listed> listed;
     for (int id = 0; id < ids; ++id)
-        listed.push_back({id});
+        listed.push_back({id, 100, family});
     if (tracker.start(camera, listed) != ARHOST_STATUS_OK)
         throw std::runtime_error(tracker.log());
     ClutterCounts counts;
     for (counts.pictures = 0; counts.pictures < 40; ++counts.pictures) {
         const int i = counts.pictures, id = i % ids;
         cv::Mat picture = clutter({480, 360}, static_cast<uint64_t>(i) + 1);
-        counts.false_positives += static_cast<int>(tracker.track(GreyFrame(picture)).size());
+        for (const arhost_observation &seen : tracker.track(GreyFrame(picture)))
+            ++(seen.id < ids ? counts.false_positives : counts.unlisted);
 
         const Mt pose = pose_of(3 * i - 60, 40 - 2 * i, 900, 30 - i, i - 20, 9 * i);
         const Placed placed{print(id), 100, pose};
@@ -95,8 +98,9 @@ inline ClutterCounts find_in_clutter(Tracker &tracker, const std::function<Print
             paper.emplace_back(corner);
         cv::fillConvexPoly(mask, paper, cv::Scalar(255));
         render(camera, {placed}).copyTo(picture, mask);
-        for (const arhost_marker &marker : tracker.track(GreyFrame(picture)))
-            counts.found += marker.id == id && angle_degrees(marker.mt, pose) < 20;
+        for (const arhost_observation &seen : tracker.track(GreyFrame(picture)))
+            if (const auto solved = solved_pose(seen, camera, 100); solved && seen.id == id)
+                counts.found += angle_degrees(solved->mt, pose) < 20;
     }
     return counts;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests for every fiducial tracker, with the family tag36h11. Each tracker's test program includes this file and
-// instantiates the suite FiducialTracker with the tracker's configurations.
+// Tests for every fiducial tracker, with the families tag36h11 and tag25h9. Each tracker's test program includes this
+// file and instantiates the suite FiducialTracker with the tracker's configurations.
 #pragma once
 
 #include "tag_pictures.hpp"
@@ -48,7 +48,7 @@ protected:
     FiducialTracker() : tracker_(GetParam().plugin, GetParam().options) {
         EXPECT_EQ(tracker_.created(), ARHOST_STATUS_OK) << tracker_.log();
     }
-    std::vector<arhost_marker> track(const cv::Mat &picture, const std::vector<Listed> &listed) {
+    std::vector<arhost_observation> track(const cv::Mat &picture, const std::vector<Listed> &listed) {
         auto camera = test_camera;
         camera.width = static_cast<uint32_t>(picture.cols);
         camera.height = static_cast<uint32_t>(picture.rows);
@@ -72,49 +72,41 @@ inline std::string case_name(const testing::TestParamInfo<TrackerCase> &info) {
     return info.param.name;
 }
 
-TEST_P(FiducialTracker, RecoversTheRenderedPose) {
+TEST_P(FiducialTracker, PutsCornersWhereTheyWereRendered) {
     cv::Point2d bias;
     const std::vector<Mt> poses{pose_of(0, 0, 500), pose_of(60, 40, 450, 30, 20, 15),
                                 pose_of(-70, 30, 600, -35, 25, 90), pose_of(40, -50, 550, 20, -45, 180),
                                 pose_of(-30, -40, 700, -20, -30, -100)};
     for (const Mt &truth : poses) {
-        const auto markers = track(picture_of({{tag(17), 100, truth}}), {{17, 100}});
-        ASSERT_EQ(markers.size(), 1u);
-        const arhost_marker &found = markers[0];
-        EXPECT_EQ(found.id, 17);
-        EXPECT_STREQ(found.family, "tag36h11");
-        EXPECT_LT(angle_degrees(found.mt, truth), 0.7);
-        for (int i = 12; i < 15; ++i)
-            EXPECT_NEAR(found.mt[i], truth[i], -0.003 * truth[14]);
-        EXPECT_LT(found.reprojection_px, 0.1);
+        const auto seen = track(picture_of({{tag(17), 100, truth}}), {{17}});
+        ASSERT_EQ(seen.size(), 1u);
+        EXPECT_EQ(seen[0].id, 17);
+        EXPECT_EQ(seen[0].family, 0u);
+        EXPECT_EQ(seen[0].struct_size, sizeof(arhost_observation));
         const auto corners = corners_of(truth, test_camera, 100);
-        for (int k = 0; k < 4; ++k) {
-            EXPECT_LT(corner_distance_px(found, k, corners[k]), 0.2);
-            bias += cv::Point2d(found.corners_px[k][0], found.corners_px[k][1]) - corners[k];
-        }
+        EXPECT_LT(greatest_distance_px(seen[0], corners), 0.2);
+        for (int k = 0; k < 4; ++k)
+            bias += cv::Point2d(seen[0].corners_px[k][0], seen[0].corners_px[k][1]) - corners[k];
     }
     // Fails if the tracker does not put pixel centres at integers: the bias would then be half a pixel.
     EXPECT_LT(cv::norm(bias) / (4.0 * static_cast<double>(poses.size())), 0.03);
 }
 
-TEST_P(FiducialTracker, FacingTagHasXRightYUpAndZTowardsTheViewer) {
-    const auto upright = track(picture_of({{tag(3), 100, pose_of(20, 30, 400)}}), {{3, 100}});
+TEST_P(FiducialTracker, BeginsWithTheTopLeftCornerOfTheUprightTagAndContinuesClockwise) {
+    const auto upright = track(picture_of({{tag(3), 100, pose_of(20, 30, 400)}}), {{3}});
     ASSERT_EQ(upright.size(), 1u);
-    EXPECT_LT(angle_degrees(upright[0].mt, pose_of(0, 0, 1)), 1);
-    EXPECT_NEAR(upright[0].mt[12], 20, 1);
-    EXPECT_NEAR(upright[0].mt[13], 30, 1);
-    EXPECT_NEAR(upright[0].mt[14], -400, 2);
     EXPECT_LT(upright[0].corners_px[0][0], upright[0].corners_px[1][0]); // top-left is left of top-right
     EXPECT_LT(upright[0].corners_px[0][1], upright[0].corners_px[3][1]); // top-left is above bottom-left
 
-    for (const double turn : {90.0, 180.0, 270.0}) {
-        const auto turned = track(picture_of({{tag(3), 100, pose_of(0, 0, 400, 0, 0, turn)}}), {{3, 100}});
+    for (const double turn : {0.0, 90.0, 180.0, 270.0}) {
+        const Mt truth = pose_of(0, 0, 400, 0, 0, turn);
+        const auto turned = track(picture_of({{tag(3), 100, truth}}), {{3}});
         ASSERT_EQ(turned.size(), 1u);
-        EXPECT_LT(angle_degrees(turned[0].mt, pose_of(0, 0, 1, 0, 0, turn)), 1);
+        EXPECT_LT(greatest_distance_px(turned[0], corners_of(truth, test_camera, 100)), 0.2);
     }
 }
 
-TEST_P(FiducialTracker, CorrectsLensDistortion) {
+TEST_P(FiducialTracker, FitsTheCurvedEdgesOfADistortedTag) {
     // The distortion moves the corners by up to 10 px and bends the edges by up to 1 px.
     arhost_intrinsics lens = test_camera;
     lens.distortion = ARHOST_DISTORTION_BROWN;
@@ -134,43 +126,114 @@ TEST_P(FiducialTracker, CorrectsLensDistortion) {
     cv::Mat bent;
     cv::remap(straight, bent, source, cv::noArray(), cv::INTER_LINEAR);
 
-    ASSERT_EQ(tracker_.start(lens, {{8, 110}}), ARHOST_STATUS_OK);
-    const auto markers = tracker_.track(GreyFrame(bent));
-    ASSERT_EQ(markers.size(), 1u);
-    EXPECT_GT(corner_distance_px(markers[0], 1, corners_of(truth, test_camera, 110)[1]), 5);
-    for (int k = 0; k < 4; ++k)
-        EXPECT_LT(corner_distance_px(markers[0], k, corners_of(truth, lens, 110)[k]), 0.1);
-    EXPECT_LT(angle_degrees(markers[0].mt, truth), 0.5);
-    for (int i = 12; i < 15; ++i)
-        EXPECT_NEAR(markers[0].mt[i], truth[i], 0.002 * 450);
+    ASSERT_EQ(tracker_.start(lens, {{8}}), ARHOST_STATUS_OK);
+    const auto seen = tracker_.track(GreyFrame(bent));
+    ASSERT_EQ(seen.size(), 1u);
+    EXPECT_GT(corner_distance_px(seen[0], 1, corners_of(truth, test_camera, 110)[1]), 5);
+    EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, lens, 110)), 0.1);
 }
 
-TEST_P(FiducialTracker, ReportsOnlyListedMarkersInTheirListedOrder) {
-    const cv::Mat picture = picture_of({{tag(5), 60, pose_of(-100, 60, 500)},
-                                        {tag(2), 80, pose_of(100, 60, 500)},
-                                        {tag(586), 70, pose_of(0, -60, 500)}});
-    const auto ids = [&](const std::vector<Listed> &listed) {
-        std::vector<int> found;
-        for (const auto &marker : track(picture, listed))
-            found.push_back(marker.id);
-        return found;
+TEST_P(FiducialTracker, ReportsListedAndUnlistedMarkersByTheirIds) {
+    const std::map<int, Mt> poses{
+        {2, pose_of(100, 60, 500)}, {5, pose_of(-100, 60, 500)}, {586, pose_of(0, -60, 500, 10, 20, 30)}};
+    std::vector<Placed> placed;
+    for (const auto &[id, pose] : poses)
+        placed.push_back({tag(id), 80, pose});
+    const cv::Mat picture = picture_of(placed);
+    for (const std::vector<Listed> &listed :
+         {std::vector<Listed>{{5}, {2}, {586}}, {{586}, {7}, {2}}, {{5}}, {{7}, {9}}}) {
+        const auto seen = track(picture, listed);
+        std::vector<int> ids;
+        for (const arhost_observation &one : seen) {
+            ids.push_back(one.id);
+            EXPECT_EQ(one.family, 0u);
+            const bool is_listed = std::ranges::find(listed, one.id, &Listed::id) != listed.end();
+            EXPECT_LT(greatest_distance_px(one, corners_of(poses.at(one.id), test_camera, 80)), is_listed ? 0.2 : 2.5)
+                << one.id;
+        }
+        EXPECT_THAT(ids, testing::ElementsAre(2, 5, 586)) << "with " << listed.size() << " listed";
+    }
+}
+
+TEST_P(FiducialTracker, ReportsAllCopiesOfAMarkerByTheirPlaces) {
+    const Mt left = pose_of(-90, 20, 500), right = pose_of(90, -20, 500);
+    for (const auto &placed :
+         {std::vector<Placed>{{tag(5), 80, left}, {tag(5), 80, right}}, {{tag(5), 80, right}, {tag(5), 80, left}}}) {
+        const auto seen = track(picture_of(placed), {{5}});
+        ASSERT_EQ(seen.size(), 2u);
+        EXPECT_EQ(seen[0].id, 5);
+        EXPECT_EQ(seen[1].id, 5);
+        EXPECT_LT(greatest_distance_px(seen[0], corners_of(left, test_camera, 80)), 0.2);
+        EXPECT_LT(greatest_distance_px(seen[1], corners_of(right, test_camera, 80)), 0.2);
+    }
+}
+
+TEST_P(FiducialTracker, FindsTheMarkersOfTwoFamilies) {
+    const auto tag25 = [](int id) { return april_tag("tag25h9", id).with_margin(1); };
+    const Mt poses[] = {pose_of(-100, 60, 500), pose_of(100, 60, 500, 20, 10, 40), pose_of(-100, -60, 500, 0, 20, 80),
+                        pose_of(100, -60, 500, 10, 0, 200)};
+    const cv::Mat picture = picture_of(
+        {{tag(5), 80, poses[0]}, {tag(7), 80, poses[1]}, {tag25(5), 80, poses[2]}, {tag25(9), 80, poses[3]}});
+    struct Expected {
+        std::string family;
+        int id;
+        Mt pose;
     };
-    EXPECT_THAT(ids({{5, 60}, {2, 80}}), testing::ElementsAre(5, 2));
-    EXPECT_THAT(ids({{586, 70}, {7}, {2, 80}}), testing::ElementsAre(586, 2));
-    EXPECT_THAT(ids({{7}, {9}}), testing::IsEmpty());
-    for (const auto &marker : track(picture, {{2, 80}, {5, 60}, {586, 70}}))
-        EXPECT_NEAR(marker.mt[14], -500,
-                    2); // correct only if the tracker uses the side length listed for this marker
+    std::vector<Expected> expected{
+        {"tag36h11", 5, poses[0]}, {"tag36h11", 7, poses[1]}, {"tag25h9", 5, poses[2]}, {"tag25h9", 9, poses[3]}};
+    for (const bool swapped : {false, true}) {
+        if (swapped)
+            std::ranges::rotate(expected, expected.begin() + 2);
+        std::vector<Listed> listed;
+        for (const auto &[family, id, pose] : expected)
+            listed.push_back({id, 80, family});
+        const auto seen = track(picture, listed);
+        ASSERT_EQ(seen.size(), expected.size());
+        for (std::size_t i = 0; i < seen.size(); ++i) {
+            EXPECT_EQ(seen[i].family, i / 2);
+            EXPECT_EQ(tracker_.family(seen[i]), expected[i].family);
+            EXPECT_EQ(seen[i].id, expected[i].id);
+            EXPECT_LT(greatest_distance_px(seen[i], corners_of(expected[i].pose, test_camera, 80)), 0.2);
+        }
+    }
 }
 
-TEST_P(FiducialTracker, ReportsAMarkerOnceIfItIsSeenTwice) {
-    const cv::Mat picture = picture_of({{tag(5), 80, pose_of(-90, 20, 500)}, {tag(5), 80, pose_of(90, -20, 500)}});
-    const auto first = track(picture, {{5, 80}});
-    ASSERT_EQ(first.size(), 1u);
-    EXPECT_NEAR(std::abs(first[0].mt[12]), 90, 2);
-    const auto second = track(picture, {{5, 80}});
-    ASSERT_EQ(second.size(), 1u);
-    EXPECT_EQ(std::memcmp(first.data(), second.data(), sizeof(arhost_marker)), 0);
+TEST_P(FiducialTracker, KnowsAprilTagsFamiliesByTheirNamesInOpenCvToo) {
+    const cv::Mat picture =
+        picture_of({{tag(3), 80, pose_of(-90, 20, 500, 10, 20, 30)}, {tag(4), 80, pose_of(90, -20, 500)}});
+    const auto expected = track(picture, {{3}, {4}});
+    ASSERT_EQ(expected.size(), 2u);
+    auto seen = track(picture, {{3, 100, "DICT_APRILTAG_36h11"}, {4, 100, "DICT_APRILTAG_36h11"}});
+    ASSERT_EQ(seen.size(), 2u);
+    EXPECT_EQ(std::memcmp(seen.data(), expected.data(), 2 * sizeof(arhost_observation)), 0);
+
+    // With both names, each marker is reported once: in the family under whose name it is listed.
+    seen = track(picture, {{4}, {3, 100, "DICT_APRILTAG_36h11"}});
+    ASSERT_EQ(seen.size(), 2u);
+    EXPECT_EQ(tracker_.family(seen[0]), "tag36h11");
+    EXPECT_EQ(seen[0].id, 4);
+    EXPECT_EQ(tracker_.family(seen[1]), "DICT_APRILTAG_36h11");
+    EXPECT_EQ(seen[1].id, 3);
+    EXPECT_EQ(tracker_.start(test_camera, {{3}, {3, 100, "DICT_APRILTAG_36h11"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker_.log(), testing::HasSubstr("marker id 3 of DICT_APRILTAG_36h11 is also listed as a marker of "
+                                                   "tag36h11"));
+}
+
+TEST_P(FiducialTracker, CountsTheBitsThatItCorrects) {
+    double margin = 0;
+    for (const int wrong_bits : {2, 1, 0}) {
+        const Print print = with_wrong_bits(april_tag("tag36h11", 3), wrong_bits).with_margin(1);
+        const auto seen = track(picture_of({{print, 100, pose_of(0, 0, 400, 20, 20, 130)}}), {{3}});
+        ASSERT_EQ(seen.size(), 1u) << wrong_bits;
+        EXPECT_EQ(seen[0].hamming, static_cast<uint32_t>(wrong_bits));
+        margin = seen[0].decision_margin;
+        EXPECT_GT(margin, 30);
+    }
+    const cv::Mat pale = picture_of({{tag(3), 100, pose_of(0, 0, 400, 20, 20, 130)}}) / 2 + 60;
+    const auto seen = track(pale, {{3}});
+    ASSERT_EQ(seen.size(), 1u);
+    EXPECT_EQ(seen[0].hamming, 0u);
+    EXPECT_NEAR(seen[0].decision_margin, margin / 2, margin / 8);
 }
 
 TEST_P(FiducialTracker, RejectsAMirroredPrint) {
@@ -197,23 +260,39 @@ TEST_P(FiducialTracker, FindsNothingInEmptyImages) {
 
 TEST_P(FiducialTracker, RejectsAnIdThatIsNotInTheFamily) {
     EXPECT_EQ(tracker_.start(test_camera, {{0}, {587}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(tracker_.log(), testing::HasSubstr("marker id 587 is not in tag36h11, whose ids are 0 to 586"));
+    EXPECT_THAT(tracker_.log(), testing::HasSubstr("target 'tag36h11-587': marker id 587 is not in tag36h11, whose "
+                                                   "ids are 0 to 586"));
     EXPECT_EQ(tracker_.start(test_camera, {{0}, {586}}), ARHOST_STATUS_OK);
 }
 
-TEST_P(FiducialTracker, ReportsNoWrongPoseWithAHiddenCorner) {
+TEST_P(FiducialTracker, RejectsAFamilyThatItDoesNotKnow) {
+    EXPECT_EQ(tracker_.start(test_camera, {{0}, {0, 100, "tag99h9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker_.log(),
+                testing::AllOf(testing::ContainsRegex("unknown (family|dictionary) 'tag99h9': tracker_"),
+                               testing::HasSubstr("tag36h11, tag36h10, tag25h9, tag16h5")));
+    EXPECT_EQ(tracker_.start(test_camera, {{0, 100, ""}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker_.log(), testing::ContainsRegex("unknown (family|dictionary) ''"));
+}
+
+TEST_P(FiducialTracker, ReportsNoCornersOfAWrongSquareWithAHiddenCorner) {
     const Mt truth = pose_of(10, 5, 450, 25, -20, 30);
     const cv::Mat whole = picture_of({{tag(17), 100, truth}});
     const auto corners = corners_of(truth, test_camera, 100);
+    double shortest_px = 1e9;
+    for (int k = 0; k < 4; ++k)
+        shortest_px = std::min(shortest_px, cv::norm(corners[(k + 1) % 4] - corners[k]));
     for (int hidden = 0; hidden < 4; ++hidden)
         for (const int radius_px : {4, 8, 14, 22, 30})
             for (const int grey : {20, 120, 230}) {
                 cv::Mat picture = whole.clone();
                 cv::circle(picture, corners[hidden], radius_px, cv::Scalar(grey), cv::FILLED);
-                for (const arhost_marker &marker : track(picture, {{17, 100}})) {
-                    EXPECT_LT(angle_degrees(marker.mt, truth), 5)
+                for (const arhost_observation &seen : track(picture, {{17}})) {
+                    const auto pose = solved_pose(seen, test_camera, 100);
+                    if (!pose || pose->reprojection_px > 0.05 * shortest_px) // no square has these corners
+                        continue;
+                    EXPECT_LT(angle_degrees(pose->mt, truth), 5)
                         << "corner " << hidden << " radius " << radius_px << " grey " << grey;
-                    EXPECT_NEAR(marker.mt[14] / truth[14], 1, 0.02)
+                    EXPECT_NEAR(pose->mt[14] / truth[14], 1, 0.02)
                         << "corner " << hidden << " radius " << radius_px << " grey " << grey;
                 }
             }
@@ -266,7 +345,7 @@ TEST_P(FiducialTracker, GivesTheSameResultWithAnyNumberOfThreads) {
     for (int repetition = 0; repetition < 5; ++repetition) {
         const auto several = multithreaded.track(GreyFrame(picture));
         ASSERT_EQ(several.size(), single.size());
-        EXPECT_EQ(std::memcmp(several.data(), single.data(), single.size() * sizeof(arhost_marker)), 0);
+        EXPECT_EQ(std::memcmp(several.data(), single.data(), single.size() * sizeof(arhost_observation)), 0);
     }
     EXPECT_EQ(single.size(), 12u);
     cv::setNumThreads(threads);

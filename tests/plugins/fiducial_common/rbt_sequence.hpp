@@ -3,7 +3,7 @@
 // Measures a tracker's accuracy on a real sequence with known poses (../shared/data/markers/rbt_sequence).
 #pragma once
 
-#include "tracker_support.hpp"
+#include "solved_pose.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -20,7 +20,7 @@ public:
     static constexpr double side_mm = 95.5;
 
     using Frames =
-        std::vector<std::map<int, arhost_marker>>; // for each frame, the markers that the tracker found, by id
+        std::vector<std::map<int, arhost_observation>>; // for each frame, the markers that the tracker found, by id
 
     RbtSequence() {
         const auto folder = shared_data("markers/rbt_sequence");
@@ -51,7 +51,7 @@ public:
             if (ms)
                 ms->push_back(taken.count());
             frames.emplace_back();
-            for (const arhost_marker &marker : markers)
+            for (const arhost_observation &marker : markers)
                 frames.back()[marker.id] = marker;
         }
         return frames;
@@ -80,7 +80,7 @@ public:
                     result.corner_px.push_back(corner_distance_px(
                         marker->second, corner, {at[1].get<double>() - 0.5, at[0].get<double>() - 0.5}));
                 }
-                const double *mt = marker->second.mt;
+                const Mt mt = solved_pose(marker->second, camera(), side_mm).value().mt;
                 const double expected_mm = distance_mm(truth_["grid"][k], id);
                 result.distance.push_back(std::abs(std::hypot(mt[12], mt[13], mt[14]) / expected_mm - 1));
             }

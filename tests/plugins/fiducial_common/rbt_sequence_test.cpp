@@ -24,7 +24,7 @@ TEST(RbtSequence, BothTrackersAreAccurateAndAgree) {
         EXPECT_LE(percentile(accuracy.distance, 0.5), 0.01);
         for (const auto &frame : frames[plugin])
             for (const auto &[id, marker] : frame)
-                EXPECT_STREQ(marker.family, "tag36h11");
+                EXPECT_TRUE(std::ranges::binary_search(sequence.ids(), id)) << "found another tag, " << id;
     }
     const auto disagreement_px = RbtSequence::disagreement_px(frames["tracker_aruco"], frames["tracker_apriltag"]);
     EXPECT_GE(disagreement_px.size(), 4 * 330u);

@@ -3,7 +3,7 @@
 // Tests of trackers with photos from ../shared/data/markers that show known tag36h11 tags.
 #pragma once
 
-#include "tracker_support.hpp"
+#include "solved_pose.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,27 +13,28 @@
 
 namespace arhost::test {
 
-// Returns the markers that the tracker finds in a photo, by id.
-inline std::map<int, arhost_marker> markers_in(Tracker &tracker, const std::filesystem::path &file,
-                                               const std::vector<Listed> &listed) {
+// Returns the listed markers that the tracker finds in a photo, by id.
+inline std::map<int, arhost_observation> markers_in(Tracker &tracker, const std::filesystem::path &file,
+                                                    const std::vector<Listed> &listed) {
     const cv::Mat picture = read_grey(file);
     if (tracker.start(plain_camera(picture.size()), listed) != ARHOST_STATUS_OK)
         throw std::runtime_error(tracker.log());
-    std::map<int, arhost_marker> by_id;
-    for (const arhost_marker &marker : tracker.track(GreyFrame(picture)))
-        by_id[marker.id] = marker;
+    std::map<int, arhost_observation> by_id;
+    for (const arhost_observation &marker : tracker.track(GreyFrame(picture)))
+        if (std::ranges::find(listed, marker.id, &Listed::id) != listed.end())
+            by_id[marker.id] = marker;
     return by_id;
 }
 
-inline std::vector<Listed> ids_to(int count) {
+inline std::vector<Listed> ids_to(int count, const std::string &family = "tag36h11") {
     std::vector<Listed> listed;
     for (int id = 0; id < count; ++id)
-        listed.push_back({id});
+        listed.push_back({id, 100, family});
     return listed;
 }
 
 // Returns the pixel at the print's centre: the intersection of the diagonals.
-inline cv::Point2d centre_px(const arhost_marker &marker) {
+inline cv::Point2d centre_px(const arhost_observation &marker) {
     const auto corner = [&](int i) { return cv::Point2d(marker.corners_px[i][0], marker.corners_px[i][1]); };
     const cv::Point2d a = corner(2) - corner(0), b = corner(3) - corner(1);
     return corner(0) + (corner(1) - corner(0)).cross(b) / a.cross(b) * a;
@@ -44,15 +45,12 @@ inline cv::Point2d centre_px(const arhost_marker &marker) {
 inline void expect_april_tag_photo(Tracker &tracker) {
     const auto folder = shared_data("markers/apriltag_photo");
     const auto photo = read_grey(folder / "AprilTag.png");
-    std::vector<Listed> listed = ids_to(30);
-    for (Listed &marker : listed)
-        marker.side_mm = 53;
-    ASSERT_EQ(tracker.start(intrinsics_of(photo.size(), 615.1674805, 615.1675415, 312.1889954, 243.4373779), listed),
-              ARHOST_STATUS_OK);
+    const auto camera = intrinsics_of(photo.size(), 615.1674805, 615.1675415, 312.1889954, 243.4373779);
+    ASSERT_EQ(tracker.start(camera, ids_to(30)), ARHOST_STATUS_OK);
     const auto found = tracker.track(GreyFrame(photo));
     EXPECT_EQ(found.size(), 12u);
     std::ifstream corners(folder / "ground_truth_detection.txt"), poses(folder / "ground_truth_pose.txt");
-    for (const arhost_marker &marker : found) {
+    for (const arhost_observation &marker : found) {
         SCOPED_TRACE(marker.id);
         std::string title;
         std::getline(corners >> std::ws, title);
@@ -66,13 +64,15 @@ inline void expect_april_tag_photo(Tracker &tracker) {
         std::getline(poses >> std::ws, title);
         double t[3], u[3]; // translation in metres and rotation vector, in OpenCV's camera axes
         poses >> t[0] >> t[1] >> t[2] >> u[0] >> u[1] >> u[2];
+        const auto pose = solved_pose(marker, camera, 53);
+        ASSERT_TRUE(pose);
         const double sign[3] = {1, -1, -1};
         cv::Matx33d truth, measured;
         cv::Rodrigues(cv::Vec3d(u), truth);
         for (int row = 0; row < 3; ++row) {
-            EXPECT_NEAR(sign[row] * marker.mt[12 + row], 1000 * t[row], 5);
+            EXPECT_NEAR(sign[row] * pose->mt[12 + row], 1000 * t[row], 5);
             for (int column = 0; column < 3; ++column)
-                measured(row, column) = sign[row] * marker.mt[4 * column + row];
+                measured(row, column) = sign[row] * pose->mt[4 * column + row];
         }
         cv::Vec3d difference;
         cv::Rodrigues(truth.t() * measured, difference);

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "conformance/prints.hpp"
-#include "tracker_support.hpp"
+#include "solved_pose.hpp"
 
 #include <glm/gtc/type_ptr.hpp>
 #include <opencv2/calib3d.hpp>
@@ -36,9 +36,6 @@ struct Print {
     }
 };
 
-// A marker's pose in the convention of arhost_marker.mt: in OpenGL eye space, column-major, in mm.
-using Mt = std::array<double, 16>;
-
 // Returns the pose of a marker whose centre is at (x, y, −distance) and that is rotated about the camera's x axis,
 // then its y axis, then its z axis (in degrees). Without a rotation, the marker is upright and faces the camera.
 inline Mt pose_of(double x_mm, double y_mm, double distance_mm, double about_x = 0, double about_y = 0,
@@ -63,7 +60,7 @@ inline Mt pose_of(double x_mm, double y_mm, double distance_mm, double about_x =
 }
 
 // Returns the angle between the rotations of two poses.
-inline double angle_degrees(const double *a, const Mt &b) {
+inline double angle_degrees(const Mt &a, const Mt &b) {
     double trace = 0;
     for (int i = 0; i < 11; ++i)
         trace += i % 4 < 3 ? a[i] * b[i] : 0;

@@ -23,7 +23,7 @@ struct Conditions {
 class TagPictures {
 public:
     struct Outcome {
-        int found = 0, wrong = 0;      // wrong: rotated by more than 20° relative to the true pose
+        int found = 0, wrong = 0;      // wrong: the corners have a pose that is rotated by more than 20°, or none
         std::vector<double> corner_px; // of each tag that was found: the greatest distance of a corner
     };
 
@@ -32,7 +32,7 @@ public:
         const double distance_mm = camera_.fx * side_mm / conditions.side_px;
         const double pitch_px = 1.9 * conditions.side_px + 4 + 2 * conditions.motion_px;
         const int columns = static_cast<int>(camera_.width / pitch_px),
-                  rows = std::min(static_cast<int>(camera_.height / pitch_px), ARHOST_MAX_MARKERS / columns);
+                  rows = std::min(static_cast<int>(camera_.height / pitch_px), 64 / columns);
         std::mt19937 generator(1);
         std::uniform_real_distribution<double> tilt(-45, 45), turn(-180, 180), shift(-0.5, 0.5);
         for (std::uint64_t seed = 1; shown_ < tags; ++seed) {
@@ -69,15 +69,14 @@ public:
         if (tracker.start(camera_, listed) != ARHOST_STATUS_OK)
             throw std::runtime_error(tracker.log());
         for (const Picture &picture : pictures_)
-            for (const arhost_marker &marker : tracker.track(picture.frame)) {
-                const Mt &truth = picture.poses.at(static_cast<std::size_t>(marker.id));
-                const auto corners = corners_of(truth, camera_, side_mm);
-                double greatest_px = 0;
-                for (int k = 0; k < 4; ++k)
-                    greatest_px = std::max(greatest_px, corner_distance_px(marker, k, corners[k]));
+            for (const arhost_observation &seen : tracker.track(picture.frame)) {
+                if (static_cast<std::size_t>(seen.id) >= picture.poses.size())
+                    continue;
+                const Mt &truth = picture.poses[static_cast<std::size_t>(seen.id)];
+                const auto pose = solved_pose(seen, camera_, side_mm);
                 ++outcome.found;
-                outcome.wrong += angle_degrees(marker.mt, truth) > 20;
-                outcome.corner_px.push_back(greatest_px);
+                outcome.wrong += !pose || angle_degrees(pose->mt, truth) > 20;
+                outcome.corner_px.push_back(greatest_distance_px(seen, corners_of(truth, camera_, side_mm)));
             }
         return outcome;
     }

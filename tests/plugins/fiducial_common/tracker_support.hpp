@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <filesystem>
 #include <map>
@@ -81,9 +82,11 @@ private:
     GuardedBuffer slot_;
 };
 
+// A target that consists of one marker.
 struct Listed {
     int id;
     double side_mm = 100;
+    std::string family = "tag36h11";
 };
 
 using Options = std::map<std::string, std::string>;
@@ -102,17 +105,42 @@ public:
 
     arhost_status start(const arhost_intrinsics &camera, const std::vector<Listed> &listed) {
         stop();
+        std::vector<std::string> names;
         std::vector<arhost_marker_config> markers;
-        for (const Listed &marker : listed)
-            markers.push_back({sizeof(arhost_marker_config), marker.id, marker.side_mm});
+        families_.clear();
+        for (const Listed &marker : listed) {
+            const auto family = std::ranges::find(families_, marker.family) - families_.begin();
+            if (static_cast<std::size_t>(family) == families_.size())
+                families_.push_back(marker.family);
+            const double h = marker.side_mm / 2;
+            markers.push_back({sizeof(arhost_marker_config),
+                               marker.id,
+                               static_cast<uint32_t>(family),
+                               static_cast<uint32_t>(names.size()),
+                               {{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}});
+            names.push_back(marker.family + "-" + std::to_string(marker.id));
+        }
+        std::vector<arhost_target_config> targets;
+        for (const std::string &name : names)
+            targets.push_back({sizeof(arhost_target_config), 0, name.c_str(), nullptr});
+        std::vector<const char *> families;
+        for (const std::string &family : families_)
+            families.push_back(family.c_str());
         arhost_frame_format format{};
         format.struct_size = sizeof format;
         format.pixel_format = ARHOST_PIXEL_FORMAT_GREY8;
         format.width = camera.width;
         format.height = camera.height;
         arhost_frame_layout(&format);
-        const arhost_tracker_setup setup{sizeof setup, static_cast<uint32_t>(markers.size()), &format, &camera,
-                                         markers.data()};
+        const arhost_tracker_setup setup{sizeof setup,
+                                         static_cast<uint32_t>(targets.size()),
+                                         &format,
+                                         &camera,
+                                         targets.data(),
+                                         markers.data(),
+                                         static_cast<uint32_t>(markers.size()),
+                                         static_cast<uint32_t>(families.size()),
+                                         families.data()};
         const arhost_status status = functions().start(plugin_.instance(), &setup);
         started_ = status == ARHOST_STATUS_OK;
         return status;
@@ -122,19 +150,25 @@ public:
             functions().stop(plugin_.instance());
         started_ = false;
     }
-    std::vector<arhost_marker> track(const GreyFrame &picture) {
-        auto result = std::make_unique<arhost_tracker_result>();
-        result->struct_size = sizeof *result;
+    std::vector<arhost_observation> track(const GreyFrame &picture) {
+        arhost_observation empty{};
+        empty.struct_size = sizeof empty;
+        std::vector<arhost_observation> observations(ARHOST_MAX_OBSERVATIONS, empty);
+        arhost_tracker_result result{sizeof result, 0, observations.data(), nullptr, 0, 0};
         const arhost_frame frame = picture.frame();
-        const arhost_track_request request{sizeof request, 0, &frame, nullptr, nullptr, 0};
-        if (functions().track(plugin_.instance(), &request, result.get()) != ARHOST_STATUS_OK)
+        const arhost_track_request request{sizeof request, 1, &frame, nullptr, nullptr, 0, nullptr, 0, 0};
+        if (functions().track(plugin_.instance(), &request, &result) != ARHOST_STATUS_OK)
             throw std::runtime_error("track failed: " + log());
-        return {result->markers, result->markers + result->marker_count};
+        observations.resize(result.observation_count);
+        return observations;
     }
+    // The name under which the family of an observation was listed.
+    const std::string &family(const arhost_observation &seen) const { return families_.at(seen.family); }
 
 private:
     const arhost_tracker &functions() const { return plugin_.functions<arhost_tracker>(); }
     PluginUnderTest plugin_;
+    std::vector<std::string> families_;
     arhost_status created_ = ARHOST_STATUS_ERROR_INTERNAL;
     bool started_ = false;
 };
@@ -151,8 +185,14 @@ inline double mean(const std::vector<double> &values) {
     return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
-inline double corner_distance_px(const arhost_marker &marker, int corner, cv::Point2d expected) {
-    return std::hypot(marker.corners_px[corner][0] - expected.x, marker.corners_px[corner][1] - expected.y);
+inline double corner_distance_px(const arhost_observation &seen, int corner, cv::Point2d expected) {
+    return std::hypot(seen.corners_px[corner][0] - expected.x, seen.corners_px[corner][1] - expected.y);
+}
+inline double greatest_distance_px(const arhost_observation &seen, const std::array<cv::Point2d, 4> &expected) {
+    double greatest_px = 0;
+    for (int corner = 0; corner < 4; ++corner)
+        greatest_px = std::max(greatest_px, corner_distance_px(seen, corner, expected[corner]));
+    return greatest_px;
 }
 
 } // namespace arhost::test

@@ -30,8 +30,8 @@ std::string chain(const std::string &prefix, const std::string &replacement) {
         result += line.starts_with(prefix) ? replacement + "\n" : line + "\n";
     return result;
 }
-const std::string tracker = chain(
-    "tracker:", "tracker: {plugin: tracker_python, options: {script: script.py}, markers: [{id: 3, side_mm: 80}]}");
+const std::string tracker = chain("tracker:", "tracker: {plugin: tracker_python, options: {script: script.py}, "
+                                              "targets: [{marker: 3, family: tag36h11, side_mm: 80}]}");
 const std::string raytracer =
     chain("raytracer:", "raytracer: {plugin: rt_python, options: {script: script.py}, scene: scene.yaml}");
 const char *const sink = "version: 1\nsource: {plugin: source_counter, options: {frames: 1000}}\n"
@@ -47,34 +47,35 @@ int run_script(ArhostRun &run, const std::string &script) {
 const char *const idle_tracker = "class T:\n"
                                  "    def __init__(self, host): pass\n"
                                  "    def start(self, setup): pass\n"
-                                 "    def track(self, frame, markers): return 0\n";
+                                 "    def track(self, frame): return []\n";
 
 } // namespace
 
-TEST_F(PythonAdapter, TrackerSeesFramesAndFillsInMarkersInPlace) {
+TEST_F(PythonAdapter, TrackerSeesFramesAndReportsObservations) {
     ArhostRun run(tracker);
     EXPECT_EQ(run_script(run, R"(
 import arhost, numpy as np
 class Tracker:
     def __init__(self, host): self.host = host
     def start(self, setup):
-        self.id = setup.markers[0].id
-        assert setup.markers[0].side_mm == 80 and setup.intrinsics.width == setup.format.width
-    def track(self, frame, markers):
+        marker = setup.markers[0]
+        assert [t.name for t in setup.targets] == ["tag36h11-3"] and setup.families == ["tag36h11"]
+        assert (marker.id, marker.family, marker.target) == (3, 0, 0)
+        assert marker.corners_mm.tolist() == [[-40, 40, 0], [40, 40, 0], [40, -40, 0], [-40, -40, 0]]
+        self.lens, self.marker = setup.intrinsics, marker
+        assert self.lens.width == setup.format.width
+    def track(self, frame):
         pixels = frame.planes[0].reshape(-1)
         assert pixels[0] + 256 * int(pixels[1]) == frame.sequence
         assert frame.grey.shape == (frame.format.height, frame.format.width)
         try:
             frame.grey[0, 0] = 1
-            return 0
+            return
         except ValueError: # input frames are read-only
             pass
-        m = markers[0]
-        m["id"], m["family"], m["state"] = self.id, b"python", arhost.MARKER_DETECTED
-        mt = np.eye(4)
-        mt[2, 3] = -500 - frame.sequence
-        m["mt"] = mt.T.reshape(16)
-        return 1
+        half = 40 / (500 + frame.sequence) * np.array([self.lens.fx, self.lens.fy])
+        corners = [self.lens.cx, self.lens.cy] + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]]
+        yield arhost.Observation(self.marker.id, corners)
 )"),
               0)
         << run.output();
@@ -86,6 +87,69 @@ class Tracker:
     for (std::size_t i = 0; i < lines.size(); ++i)
         EXPECT_EQ(lines[i].overlay, std::to_string(i));
     EXPECT_THAT(run.output(), Not(HasSubstr("warning: tracker")));
+}
+
+TEST_F(PythonAdapter, TheRecordNamesTargetsAndTheirObservations) {
+    ArhostRun run("version: 1\ncamera: {width: 64, height: 48, fx: 60}\nsource: {plugin: source_python, options: "
+                  "{script: script.py}}\n"
+                  "tracker: {plugin: tracker_python, options: {script: script.py}, "
+                  "targets: [{name: cup, marker: 7, family: tag25h9, side_mm: 80}, {marker: 3, family: tag36h11, "
+                  "side_mm: 80}]}\n"
+                  "outputs: [{plugin: sink_python, path: out.txt, options: {script: script.py}}]\n");
+    EXPECT_EQ(run_script(run, R"(
+import arhost
+class Source:
+    def __init__(self, host): pass
+    def start(self, setup): return {"width": 64, "height": 48, "fps": 25}
+    def read(self, buffer): return None if buffer.sequence > 2 else 40_000_000 * buffer.sequence
+class Tracker:
+    def __init__(self, host): pass
+    def start(self, setup): assert setup.families == ["tag25h9", "tag36h11"]
+    def track(self, frame):
+        x = frame.sequence
+        yield arhost.Observation(3, [[20, 15], [40, 15], [40, 35], [20, 35]], 1, 2, 0.5)
+        yield arhost.Observation(9, [[x, 1], [x + 2, 1], [x + 2, 3], [x, 3]], 0) # no target lists it
+class Sink:
+    def __init__(self, host): pass
+    def start(self, setup): self.file = open(setup.path, "w")
+    def write(self, output):
+        r = output.record
+        assert r.families == ["tag25h9", "tag36h11"] and r.has_truth == 0 and r.truth_target == ""
+        print(r.sequence, [(t.name, round(t.mt[14]), t.state == arhost.TARGET_DETECTED, t.first_observation,
+                            t.observation_count, t.covariance.shape) for t in r.targets], file=self.file)
+        print([(o.id, o.family, o.hamming, o.decision_margin, o.corners_px[0].tolist()) for o in r.observations],
+              file=self.file)
+        self.kept = r # a copy: no warning
+    def stop(self): self.file.close()
+)"),
+              0)
+        << run.output();
+    std::string expected;
+    for (int i = 0; i < 3; ++i)
+        expected += std::to_string(i) +
+                    " [('tag36h11-3', -240, True, 0, 1, (36,))]\n[(3, 1, 2, 0.5, [20.0, 15.0]), (9, 0, 0, 0.0, [" +
+                    std::to_string(i) + ".0, 1.0])]\n";
+    EXPECT_EQ(run.read("out.txt"), expected);
+    EXPECT_THAT(run.output(), Not(HasSubstr("kept an array")));
+}
+
+TEST_F(PythonAdapter, ObservationsBeyondTheCapacityAreIgnoredAndReportedOnce) {
+    ArhostRun run(tracker);
+    EXPECT_EQ(run_script(run, R"(
+import arhost
+class Tracker:
+    def __init__(self, host): pass
+    def start(self, setup): pass
+    def track(self, frame):
+        for i in range(arhost.MAX_OBSERVATIONS + 1):
+            yield arhost.Observation(1000 + i, [[0, 0], [9, 0], [9, 9], [0, 9]])
+)"),
+              0)
+        << run.output();
+    const std::string warning = "'track' reported more than 1024 observations; the others are ignored";
+    EXPECT_THAT(run.output(), HasSubstr(warning));
+    EXPECT_EQ(run.output().find(warning), run.output().rfind(warning));
+    EXPECT_EQ(counted(run).size(), 6u);
 }
 
 TEST_F(PythonAdapter, RayTracerReadsTheSceneAndWritesTheImage) {
@@ -180,7 +244,7 @@ TEST_F(PythonAdapter, UsesThePackagesOfAVirtualEnvironment) {
 
 TEST_F(PythonAdapter, ThreadsOfAScriptRunBetweenItsCalls) {
     ArhostRun run(chain("tracker:", "tracker: {plugin: tracker_python, options: {script: script.py}, "
-                                    "markers: [{id: 3, side_mm: 80}]}") +
+                                    "targets: [{marker: 3, family: tag36h11, side_mm: 80}]}") +
                   "\n");
     EXPECT_EQ(run_script(run, R"(
 import threading
@@ -189,9 +253,7 @@ class Tracker:
         self.done = threading.Event()
         self.host = host
     def start(self, setup): threading.Thread(target=lambda: (self.host.info("from a thread"), self.done.set())).start()
-    def track(self, frame, markers):
-        assert self.done.wait(20)
-        return 0
+    def track(self, frame): assert self.done.wait(20)
 )"),
               0)
         << run.output();
@@ -203,14 +265,16 @@ TEST_F(PythonAdapter, AnExceptionSkipsItsFrameAndReportsItsLine) {
          {std::pair{"1 / 0", "script.py:6: ZeroDivisionError: division by zero"},
           {"sys.exit(3)", "the script called sys.exit(3)"},
           {"raise KeyboardInterrupt", "script.py:6: KeyboardInterrupt"},
+          {"return 1", "'track' must return a list of arhost.Observation, or None"},
+          {"return [arhost.Observation(1, [2, 3])]",
+           "script.py:6: ValueError: corners_px must be four corners (x, y)"},
           {"raise arhost.Failure('the lamp is off', arhost.STATUS_ERROR_IO)", "the lamp is off"}}) {
         ArhostRun run(tracker);
-        EXPECT_EQ(
-            run_script(run, std::string("import arhost, sys\nclass T:\n    def __init__(self, host): pass\n"
-                                        "    def start(self, setup): pass\n    def track(self, frame, markers):\n"
-                                        "        if frame.sequence == 2: ") +
-                                statement + "\n        return 0\n"),
-            1)
+        EXPECT_EQ(run_script(run, std::string("import arhost, sys\nclass T:\n    def __init__(self, host): pass\n"
+                                              "    def start(self, setup): pass\n    def track(self, frame):\n"
+                                              "        if frame.sequence == 2: ") +
+                                      statement + "\n        return []\n"),
+                  1)
             << run.output(); // frame 2 has no overlay
         EXPECT_THAT(run.output(), HasSubstr(message));
         EXPECT_EQ(counted(run).size(), 6u) << message;
@@ -221,8 +285,7 @@ TEST_F(PythonAdapter, AnExceptionSkipsItsFrameAndReportsItsLine) {
 TEST_F(PythonAdapter, WarnsIfAScriptKeepsAnArray) {
     ArhostRun run(tracker);
     EXPECT_EQ(run_script(run, "class T:\n    def __init__(self, host): pass\n    def start(self, setup): pass\n"
-                              "    def track(self, frame, markers):\n        self.last = frame.grey[10:20]\n"
-                              "        return 0\n"),
+                              "    def track(self, frame): self.last = frame.grey[10:20]\n"),
               0);
     EXPECT_THAT(run.output(), HasSubstr("'track' kept an array"));
 }
@@ -243,7 +306,7 @@ TEST_F(PythonAdapter, UnusableScriptsAreConfigurationErrors) {
     }
     const auto with_options = [](const std::string &options) {
         return chain("tracker:", "tracker: {plugin: tracker_python, options: {" + options +
-                                     "}, markers: [{id: 3, side_mm: 80}]}");
+                                     "}, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}");
     };
     for (const auto &[options, message] :
          {std::pair{"script: none.py", "script: there is no file '"},
@@ -309,12 +372,10 @@ class Tracker:
     def __init__(self, host): pass
     def start(self, setup):
         check("TrackerSetup", setup), check("Intrinsics", setup.intrinsics), check("MarkerConfig", setup.markers[0])
-    def track(self, frame, markers):
-        check("Frame", frame), check("Marker", markers)
-        m = markers[0]
-        m["id"], m["family"], m["state"] = 3, b"python", arhost.MARKER_DETECTED
-        m["mt"] = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -500, 1]
-        return 1
+        check("TargetConfig", setup.targets[0])
+    def track(self, frame):
+        check("Frame", frame), [check("ExpectedMarker", each) for each in frame.expected]
+        return [arhost.Observation(3, [[20, 15], [40, 15], [40, 35], [20, 35]])]
 class Tracer:
     def __init__(self, host): pass
     def start(self, setup): check("RaytracerSetup", setup), check("Scene", setup.scene)
@@ -322,11 +383,14 @@ class Tracer:
 class Sink:
     def __init__(self, host): pass
     def start(self, setup): check("SinkSetup", setup)
-    def write(self, output): check("Output", output), check("Record", output.record)
+    def write(self, output):
+        check("Output", output), check("Record", output.record), check("Camera", output.record.camera)
+        check("Target", output.record.targets[0]), check("Observation", output.record.observations[0])
 )";
     ArhostRun run("version: 1\nsandbox: none\ncamera: {width: 64, height: 48, fx: 60}\n"
                   "source: {plugin: source_python, options: {script: script.py}}\n"
-                  "tracker: {plugin: tracker_python, options: {script: script.py}, markers: [{id: 3, side_mm: 80}]}\n"
+                  "tracker: {plugin: tracker_python, options: {script: script.py}, targets: [{marker: 3, family: "
+                  "tag36h11, side_mm: 80}]}\n"
                   "raytracer: {plugin: rt_python, options: {script: script.py}, scene: scene.yaml}\n"
                   "outputs: [{plugin: sink_python, options: {script: script.py}}]\nstats: stats.json\n");
     EXPECT_EQ(run_script(run, check), 0) << run.output();

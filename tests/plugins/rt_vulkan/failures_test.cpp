@@ -251,7 +251,7 @@ protected:
         run_.write("run.yaml",
                    "version: 1\nsource: {plugin: source_counter, options: {frames: " + std::to_string(frames) +
                        ", width: 64, height: 48}}\n" +
-                       "tracker: {plugin: tracker_counter, markers: [{id: 3, side_mm: 80}]}\n" +
+                       "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n" +
                        "raytracer: {plugin: rt_vulkan, scene: scene.yaml, allow: [gpu], reads: ['" + layer_folder +
                        "'], environment: [ARHOST_TEST_VULKAN_FAILS]" + fallback +
                        "}\noutputs: [{plugin: sink_counter, path: out/counted.txt}]\nstats: stats.json\n" + restart);

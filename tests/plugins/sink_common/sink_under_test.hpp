@@ -212,9 +212,10 @@ private:
 // Runs a sink in a child process, beginning at frame `first_sequence`, and kills the process after the sink has
 // acknowledged at least `frames` frames. Returns the number of the first unacknowledged frame, at which the host
 // would continue.
-inline std::uint64_t write_until_killed(const std::string &id, const std::map<std::string, std::string> &options,
-                                        int width, int height, std::uint64_t first_sequence, std::uint64_t frames,
-                                        arhost_record (*record)(std::uint64_t) = make_record) {
+template <class MakeRecord = arhost_record (*)(std::uint64_t)>
+std::uint64_t write_until_killed(const std::string &id, const std::map<std::string, std::string> &options, int width,
+                                 int height, std::uint64_t first_sequence, std::uint64_t frames,
+                                 MakeRecord record = make_record) {
     int pipe_ends[2];
     if (pipe(pipe_ends) != 0)
         throw std::runtime_error("pipe");

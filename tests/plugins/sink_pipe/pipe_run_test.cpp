@@ -67,7 +67,7 @@ TEST(PipeRun, StandardOutputHasOnlyTheVideo) {
 TEST(PipeRun, TheOverlayAloneMatchesTheComposite) {
     ArhostRun run("version: 1\nframes: 3\n"
                   "source: {plugin: source_synthetic, options: {width: 160, height: 120, id: 0, side_mm: 80}}\n"
-                  "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+                  "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
                   "raytracer: {plugin: rt_embree, scene: demo}\n"
                   "outputs:\n"
                   "  - {plugin: sink_pipe, path: out/frame, options: {format: rgba}}\n"

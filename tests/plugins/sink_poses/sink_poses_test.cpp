@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sink_under_test.hpp"
+#include "tracked_record.hpp"
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
@@ -19,39 +20,39 @@ namespace {
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Returns the record of a frame with two markers, a camera and the true pose. Its numbers differ per frame and need
-// many decimal digits, to test that the sink does not round them.
-arhost_record full_record(std::uint64_t sequence) {
-    arhost_record record = make_record(sequence);
+// Returns the record of a frame with two targets, a camera and the true pose. The first target has two markers, the
+// second one an alternative pose; there is another marker. The numbers differ per frame and need many decimal digits,
+// to test that the sink does not round them.
+TrackedRecord full_record(std::uint64_t sequence) {
+    TrackedRecord record{make_record(sequence), {}, {}};
     const double seed = 1.0 / (3.0 + static_cast<double>(sequence));
-    record.overlay = ARHOST_OVERLAY_RENDERED;
-    record.has_camera = record.has_truth = 1;
-    record.truth_id = 7;
-    record.marker_count = 2;
+    record.fields.overlay = ARHOST_OVERLAY_RENDERED;
+    record.fields.has_camera = record.fields.has_truth = 1;
+    std::snprintf(record.fields.truth_target, sizeof record.fields.truth_target, "cup");
+    const double corners[4][2] = {
+        {100, 200}, {100 + seed, 200 - seed}, {100 + 2 * seed, 200 - 2 * seed}, {100 + 3 * seed, 200 - 3 * seed}};
+    record.add_target("board", ARHOST_TARGET_DETECTED, {});
+    record.add_observation(0, corners).decision_margin = 50 + seed;
+    record.add_observation(-3, corners).hamming = 2;
+    record.add_target("cup", ARHOST_TARGET_PREDICTED, {}).age_frames = 4;
+    record.add_observation(7, corners);
+    record.add_observation(99, corners, false);
     for (int i = 0; i < 16; ++i) {
-        record.true_mt[i] = seed * i;
-        for (int m = 0; m < 2; ++m)
-            record.markers[m].mt[i] = std::numbers::pi * seed * (i - 5) * (m ? 1e-17 : 1);
-        record.markers[1].mt_alternative[i] = -seed - i;
+        record.fields.true_mt[i] = seed * i;
+        for (std::size_t t = 0; t < 2; ++t)
+            record.targets[t].mt[i] = std::numbers::pi * seed * (i - 5) * (t ? 1e-17 : 1);
+        record.targets[1].mt_alternative[i] = -seed - i;
     }
-    for (int m = 0; m < 2; ++m) {
-        arhost_marker &marker = record.markers[m];
-        marker.struct_size = sizeof marker;
-        marker.id = m == 0 ? 0 : -3;
-        std::snprintf(marker.family, sizeof marker.family, "%s", m == 0 ? "tag36h11" : "DICT_6X6_250");
-        marker.state = m == 0 ? ARHOST_MARKER_DETECTED : ARHOST_MARKER_PREDICTED;
-        marker.age_frames = m == 0 ? 0 : 4;
-        for (int c = 0; c < 4; ++c) {
-            marker.corners_px[c][0] = 100 + seed * c;
-            marker.corners_px[c][1] = 200 - seed * c;
-        }
-        marker.reprojection_px = seed / 7;
-        marker.ambiguity = 0.25;
+    for (int i = 0; i < 36; ++i)
+        record.targets[0].covariance[i] = seed * (i - 17) / 1e4;
+    for (arhost_target &target : record.targets) {
+        target.reprojection_px = seed / 7;
+        target.ambiguity = 0.25;
     }
     for (int i = 0; i < 3; ++i) {
-        record.camera.eye[i] = 1e3 * seed * i;
-        record.camera.look_at[i] = -seed;
-        record.camera.up[i] = i == 1;
+        record.fields.camera.eye[i] = 1e3 * seed * i;
+        record.fields.camera.look_at[i] = -seed;
+        record.fields.camera.up[i] = i == 1;
     }
     return record;
 }
@@ -117,91 +118,153 @@ protected:
 
 } // namespace
 
-TEST_F(SinkPoses, WritesAFrameWithoutMarkersAsDocumented) {
+TEST_F(SinkPoses, WritesAFrameWithoutTargetsAsDocumented) {
     EXPECT_EQ(
         line_of(make_record(3)),
-        R"({"frame": 3, "capture_ns": 99999999, "clock": "media", "overlay": "none", "markers": [], "camera": null})");
+        R"({"frame": 3, "capture_ns": 99999999, "clock": "media", "overlay": "none", "targets": [], "camera": null})");
 }
 
 TEST_F(SinkPoses, WritesTheDocumentedKeysInTheirOrder) {
     const Json line = Json::parse(line_of(full_record(0)));
-    EXPECT_THAT(keys_of(line), ElementsAre("frame", "capture_ns", "clock", "overlay", "markers", "camera", "truth"));
-    EXPECT_THAT(keys_of(line["markers"][0]), ElementsAre("family", "id", "state", "age_frames", "corners_px", "mt",
-                                                         "reprojection_px", "ambiguity"));
-    EXPECT_THAT(keys_of(line["markers"][1]), ElementsAre("family", "id", "state", "age_frames", "corners_px", "mt",
-                                                         "mt_alternative", "reprojection_px", "ambiguity"));
+    EXPECT_THAT(keys_of(line), ElementsAre("frame", "capture_ns", "clock", "overlay", "targets", "camera", "truth"));
+    EXPECT_THAT(keys_of(line["targets"][0]), ElementsAre("name", "state", "age_frames", "mt", "covariance",
+                                                         "reprojection_px", "ambiguity", "observations"));
+    EXPECT_THAT(keys_of(line["targets"][1]), ElementsAre("name", "state", "age_frames", "mt", "mt_alternative",
+                                                         "reprojection_px", "ambiguity", "observations"));
+    EXPECT_THAT(keys_of(line["targets"][0]["observations"][0]),
+                ElementsAre("id", "corners_px", "decision_margin", "hamming"));
     EXPECT_THAT(keys_of(line["camera"]), ElementsAre("eye", "look_at", "up"));
-    EXPECT_THAT(keys_of(line["truth"]), ElementsAre("id", "mt"));
+    EXPECT_THAT(keys_of(line["truth"]), ElementsAre("target", "mt"));
 }
 
 TEST_F(SinkPoses, EveryNumberReadsBackAsTheSameDouble) {
-    const arhost_record record = full_record(4);
+    const TrackedRecord tracked = full_record(4);
+    const arhost_record record = tracked;
     const Json line = Json::parse(line_of(record));
-    for (std::size_t m = 0; m < 2; ++m) {
-        const arhost_marker &marker = record.markers[m];
-        EXPECT_EQ(line["markers"][m]["id"], marker.id);
-        EXPECT_EQ(line["markers"][m]["family"], marker.family);
-        EXPECT_EQ(line["markers"][m]["age_frames"], marker.age_frames);
-        EXPECT_EQ(line["markers"][m]["mt"], array(marker.mt));
-        EXPECT_EQ(line["markers"][m]["corners_px"], array(marker.corners_px));
-        EXPECT_EQ(line["markers"][m]["reprojection_px"], marker.reprojection_px);
-        EXPECT_EQ(line["markers"][m]["ambiguity"], marker.ambiguity);
+    for (std::size_t t = 0; t < 2; ++t) {
+        const arhost_target &target = record.targets[t];
+        EXPECT_EQ(line["targets"][t]["name"], target.name);
+        EXPECT_EQ(line["targets"][t]["age_frames"], target.age_frames);
+        EXPECT_EQ(line["targets"][t]["mt"], array(target.mt));
+        EXPECT_EQ(line["targets"][t]["reprojection_px"], target.reprojection_px);
+        EXPECT_EQ(line["targets"][t]["ambiguity"], target.ambiguity);
+        ASSERT_EQ(line["targets"][t]["observations"].size(), target.observation_count);
+        for (std::size_t i = 0; i < target.observation_count; ++i) {
+            const arhost_observation &observation = record.observations[target.first_observation + i];
+            const Json &written = line["targets"][t]["observations"][i];
+            EXPECT_EQ(written["id"], observation.id);
+            EXPECT_EQ(written["corners_px"], array(observation.corners_px));
+            EXPECT_EQ(written["decision_margin"], observation.decision_margin);
+            EXPECT_EQ(written["hamming"], observation.hamming);
+        }
     }
-    EXPECT_EQ(line["markers"][0]["state"], "detected");
-    EXPECT_EQ(line["markers"][1]["state"], "predicted");
-    EXPECT_EQ(line["markers"][1]["mt_alternative"], array(record.markers[1].mt_alternative));
+    EXPECT_EQ(line["targets"][0]["state"], "detected");
+    EXPECT_EQ(line["targets"][1]["state"], "predicted");
+    EXPECT_EQ(line["targets"][0]["covariance"], array(record.targets[0].covariance));
+    EXPECT_EQ(line["targets"][1]["mt_alternative"], array(record.targets[1].mt_alternative));
     EXPECT_EQ(line["camera"]["eye"], array(record.camera.eye));
     EXPECT_EQ(line["camera"]["look_at"], array(record.camera.look_at));
     EXPECT_EQ(line["camera"]["up"], array(record.camera.up));
-    EXPECT_EQ(line["truth"]["id"], 7);
+    EXPECT_EQ(line["truth"]["target"], "cup");
     EXPECT_EQ(line["truth"]["mt"], array(record.true_mt));
     EXPECT_EQ(line["overlay"], "rendered");
 }
 
-TEST_F(SinkPoses, NamesClockOverlayAndState) {
-    arhost_record record = full_record(0);
-    record.clock = ARHOST_CLOCK_MONOTONIC;
-    record.overlay = ARHOST_OVERLAY_HELD;
-    record.markers[0].state = ARHOST_MARKER_LOST;
+TEST_F(SinkPoses, NamesClockAndOverlay) {
+    TrackedRecord record = full_record(0);
+    record.fields.clock = ARHOST_CLOCK_MONOTONIC;
+    record.fields.overlay = ARHOST_OVERLAY_HELD;
     const Json line = Json::parse(line_of(record));
     EXPECT_EQ(line["clock"], "monotonic");
     EXPECT_EQ(line["overlay"], "held");
-    EXPECT_EQ(line["markers"][0]["state"], "lost");
+}
+
+TEST_F(SinkPoses, ALostTargetHasOnlyItsLastPoseAndItsAge) {
+    TrackedRecord record = full_record(0);
+    record.targets[1].state = ARHOST_TARGET_LOST;
+    const Json lost = Json::parse(line_of(record))["targets"][1];
+    EXPECT_THAT(keys_of(lost), ElementsAre("name", "state", "age_frames", "mt"));
+    EXPECT_EQ(lost["state"], "lost");
+    EXPECT_EQ(lost["age_frames"], 4);
+    EXPECT_EQ(lost["mt"], array(record.targets[1].mt));
 }
 
 TEST_F(SinkPoses, NonFiniteNumbersAreNull) {
-    arhost_record record = full_record(0);
-    record.markers[0].mt[3] = nan_value;
-    record.markers[0].reprojection_px = infinity;
-    record.markers[0].corners_px[2][1] = -infinity;
-    record.camera.up[0] = nan_value;
-    record.true_mt[0] = nan_value;
+    TrackedRecord record = full_record(0);
+    record.targets[0].mt[3] = nan_value;
+    record.targets[0].reprojection_px = infinity;
+    record.targets[0].covariance[35] = nan_value;
+    record.observations[0].corners_px[2][1] = -infinity;
+    record.fields.camera.up[0] = nan_value;
+    record.fields.true_mt[0] = nan_value;
     const std::string text = line_of(record);
     EXPECT_THAT(text, Not(HasSubstr("nan")));
     EXPECT_THAT(text, Not(HasSubstr("inf")));
     const Json line = Json::parse(text);
-    EXPECT_TRUE(line["markers"][0]["mt"][3].is_null());
-    EXPECT_TRUE(line["markers"][0]["reprojection_px"].is_null());
-    EXPECT_TRUE(line["markers"][0]["corners_px"][2][1].is_null());
+    EXPECT_TRUE(line["targets"][0]["mt"][3].is_null());
+    EXPECT_TRUE(line["targets"][0]["reprojection_px"].is_null());
+    EXPECT_TRUE(line["targets"][0]["covariance"][35].is_null());
+    EXPECT_TRUE(line["targets"][0]["observations"][0]["corners_px"][2][1].is_null());
     EXPECT_TRUE(line["camera"]["up"][0].is_null());
     EXPECT_TRUE(line["truth"]["mt"][0].is_null());
 }
 
-TEST_F(SinkPoses, AnInvalidFamilyNameDoesNotCorruptTheLine) {
-    arhost_record record = full_record(0);
-    std::memset(record.markers[0].family, 'x', sizeof record.markers[0].family); // without a terminating NUL
-    std::memcpy(record.markers[0].family, "a\"\\\n\xff", 5);
-    record.marker_count = 1;
-    EXPECT_EQ(Json::parse(line_of(record))["markers"][0]["family"],
-              "a\"\\??" + std::string(sizeof record.markers[0].family - 5, 'x'));
+TEST_F(SinkPoses, AnInvalidNameDoesNotCorruptTheLine) {
+    TrackedRecord record = full_record(0);
+    char(&name)[ARHOST_MAX_NAME] = record.targets[0].name;
+    std::memset(name, 'x', sizeof name); // without a terminating NUL
+    std::memcpy(name, "a\"\\\n\xff", 5);
+    std::memcpy(record.fields.truth_target, name, sizeof name);
+    const Json line = Json::parse(line_of(record));
+    EXPECT_EQ(line["targets"][0]["name"], "a\"\\??" + std::string(sizeof name - 5, 'x'));
+    EXPECT_EQ(line["truth"]["target"], line["targets"][0]["name"]);
 }
 
-TEST_F(SinkPoses, TheMaximumNumberOfMarkersIsWritten) {
-    arhost_record record = full_record(0);
-    for (arhost_marker &marker : record.markers)
-        marker = record.markers[0];
-    record.marker_count = ARHOST_MAX_MARKERS;
-    EXPECT_EQ(Json::parse(line_of(record))["markers"].size(), std::size_t{ARHOST_MAX_MARKERS});
+TEST_F(SinkPoses, ObservationsThatTheRecordLacksAreLeftOut) {
+    TrackedRecord record = full_record(0);
+    record.targets[0].first_observation = 3;
+    record.targets[0].observation_count = 0xffffffff;
+    record.targets[1].first_observation = 1000;
+    const Json line = Json::parse(line_of(record));
+    EXPECT_EQ(line["targets"][0]["observations"].size(), 1u);
+    EXPECT_EQ(line["targets"][1]["observations"].size(), 0u);
+}
+
+TEST_F(SinkPoses, TheMaximumNumberOfTargetsAndMarkersIsWritten) {
+    TrackedRecord record = full_record(0);
+    record.targets.resize(ARHOST_MAX_TARGETS, record.targets[0]);
+    record.observations.resize(ARHOST_MAX_OBSERVATIONS, record.observations[0]);
+    record.targets.back().observation_count = ARHOST_MAX_OBSERVATIONS;
+    const Json line = Json::parse(line_of(record));
+    EXPECT_EQ(line["targets"].size(), std::size_t{ARHOST_MAX_TARGETS});
+    EXPECT_EQ(line["targets"].back()["observations"].size(), std::size_t{ARHOST_MAX_OBSERVATIONS});
+}
+
+// A newer host may use larger structs.
+TEST_F(SinkPoses, ReadsTheElementsOfLongerArrays) {
+    const TrackedRecord tracked = full_record(0);
+    struct LongTarget {
+        arhost_target target;
+        std::uint64_t more = 0xffffffffffffffff;
+    };
+    struct LongObservation {
+        arhost_observation observation;
+        std::uint64_t more = 0xffffffffffffffff;
+    };
+    std::vector<LongTarget> targets;
+    for (const arhost_target &target : tracked.targets)
+        targets.push_back({target});
+    std::vector<LongObservation> observations;
+    for (const arhost_observation &observation : tracked.observations)
+        observations.push_back({observation});
+    for (LongTarget &each : targets)
+        each.target.struct_size = sizeof each;
+    for (LongObservation &each : observations)
+        each.observation.struct_size = sizeof each;
+    arhost_record record = tracked;
+    record.targets = &targets[0].target;
+    record.observations = &observations[0].observation;
+    EXPECT_EQ(line_of(record), line_of(tracked));
 }
 
 TEST_F(SinkPoses, TheLogHasWholeLinesAfterEveryFrame) {
@@ -334,11 +397,13 @@ TEST_F(SinkPoses, TheReadmeExampleHasTheSameKeys) {
         read_text(std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / "plugins/sink_poses/README.md");
     const std::size_t begin = readme.find("```json\n") + 8;
     const Json example = Json::parse(readme.substr(begin, readme.find("```", begin) - begin));
-    arhost_record record = full_record(0);
-    record.has_truth = 0;
-    record.marker_count = 1;
+    TrackedRecord record = full_record(0);
+    record.fields.has_truth = 0;
+    std::ranges::copy(record.targets[1].mt_alternative, record.targets[0].mt_alternative);
     const Json line = Json::parse(line_of(record));
     EXPECT_EQ(keys_of(example), keys_of(line));
-    EXPECT_EQ(keys_of(example["markers"][0]), keys_of(line["markers"][0]));
+    EXPECT_EQ(keys_of(example["targets"][0]), keys_of(line["targets"][0]));
+    EXPECT_EQ(keys_of(example["targets"][0]["observations"][0]), keys_of(line["targets"][0]["observations"][0]));
+    EXPECT_EQ(example["targets"][0]["covariance"].size(), 36u);
     EXPECT_EQ(keys_of(example["camera"]), keys_of(line["camera"]));
 }

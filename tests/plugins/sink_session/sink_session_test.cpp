@@ -15,7 +15,7 @@ using testing::HasSubstr;
 namespace {
 
 constexpr const char *description =
-    R"({"format": "arhost-session", "version": 1, "id": "this run", "configuration": "version: 1\n"})";
+    R"({"format": "arhost-session", "version": 2, "id": "this run", "configuration": "version: 1\n"})";
 
 // Frames of one format with pseudo-random pixels, which depend on the number of the frame.
 class Frames {
@@ -157,7 +157,7 @@ TEST_F(Session, ConsistsOfDescriptionConfigurationLogAndVideo) {
     EXPECT_EQ(read_text(folder() / "configuration.yaml"), "version: 1\n");
     EXPECT_EQ(Json::parse(read_text(folder() / "session.json")),
               Json({{"format", "arhost-session"},
-                    {"version", 1},
+                    {"version", 2},
                     {"id", "this run"},
                     {"video", {{"file", "video.mkv"}, {"codec", "ffv1"}, {"lossless", true}}}}));
     expect_frames(3);

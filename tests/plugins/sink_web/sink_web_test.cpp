@@ -25,7 +25,7 @@ const std::string token = "0123456789abcdef";
 std::string yaml(const std::string &granted, const std::string &options) {
     return "version: 1\nmode: live\n"
            "source: {plugin: source_synthetic, options: {frames: 0, id: 0, side_mm: 80, width: 160, height: 120}}\n"
-           "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+           "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
            "raytracer: {plugin: rt_embree, scene: scene.yaml}\n"
            "outputs: [{plugin: sink_web, allow: [listen], control: " +
            granted + ", options: {" + options + "}}]\nstats: stats.json\n";
@@ -159,6 +159,11 @@ TEST(SinkWeb, GivesTheStatusAndTheGrantedCommands) {
     EXPECT_EQ(answer["ok"], true);
     EXPECT_THAT(answer["granted"], ElementsAre("freeze", "quit", "status"));
     EXPECT_EQ(answer["status"]["mode"], "live");
+    Json targets = answer["status"]["targets"];
+    while (targets.empty() && run.running()) // until the tracker has started
+        targets = run.status()["status"]["targets"];
+    EXPECT_EQ(targets.at(0)["name"], "tag36h11-0");
+    EXPECT_EQ(targets.at(0)["state"], "detected");
     const HttpAnswer metrics = run.get("/metrics");
     EXPECT_EQ(metrics.status, 200);
     EXPECT_THAT(metrics.body,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sink_under_test.hpp"
+#include "tracked_record.hpp"
 #include "x_server.hpp"
 
 #include <gmock/gmock.h>
@@ -75,7 +76,8 @@ double worst_difference(const Screenshot &shot, const Picture &picture, int left
 
 // Colours of the overlay that the test picture does not contain.
 using Bgr = std::array<std::uint8_t, 3>;
-constexpr Bgr white{255, 255, 255}, yellow{60, 210, 255}, red{80, 96, 255}, axis_x = red, axis_y{110, 230, 90};
+constexpr Bgr white{255, 255, 255}, yellow{60, 210, 255}, pink{220, 120, 255}, red{80, 96, 255}, axis_x = red,
+                                                                                                 axis_y{110, 230, 90};
 
 bool is(const Screenshot &shot, const Bgr &colour, int x, int y) {
     return std::equal(colour.begin(), colour.end(), shot.pixel(x, y));
@@ -346,42 +348,48 @@ TEST_F(SinkWindow, AKeyForTheHostShowsAMessageIfTheHostTakesNoCommands) {
     }
 }
 
-TEST_F(SinkWindow, DShowsTheOutlineAndTheAxesOfAMarkerWhereTheyAre) {
+TEST_F(SinkWindow, DShowsMarkersAndAxesOfTargetsWhereTheyAre) {
     SinkUnderTest &sink = start(640, 480);
-    arhost_record record = make_record(0);
-    record.marker_count = 2;
-    arhost_marker &marker = record.markers[0];
-    marker.id = 23;
-    marker.state = ARHOST_MARKER_DETECTED;
     const double corners[4][2] = {{200, 150}, {300, 160}, {310, 260}, {190, 250}};
-    std::copy_n(&corners[0][0], 8, &marker.corners_px[0][0]);
-    // In front of the camera, at the marker's centre.
-    const arhost_intrinsics lens = make_intrinsics(640, 480);
-    const double distance = 500;
-    marker.mt[0] = marker.mt[5] = marker.mt[10] = marker.mt[15] = 1;
-    marker.mt[12] = (250 - lens.cx) / lens.fx * distance;
-    marker.mt[13] = -(205 - lens.cy) / lens.fy * distance;
-    marker.mt[14] = -distance;
-    record.markers[1] = marker;
-    record.markers[1].state = ARHOST_MARKER_LOST; // is not drawn
-    record.markers[1].corners_px[0][0] = 500;
+    const double other_corners[4][2] = {{420, 300}, {500, 300}, {500, 380}, {420, 380}};
+    // Returns the position at a distance of 500 mm that is seen at this pixel.
+    const auto seen_at = [](double x, double y) -> std::array<double, 3> {
+        const arhost_intrinsics lens = make_intrinsics(640, 480);
+        return {(x - lens.cx) / lens.fx * 500, -(y - lens.cy) / lens.fy * 500, -500};
+    };
     const Picture picture(640, 480, 5);
-    ASSERT_EQ(sink.write(picture, record), ARHOST_STATUS_OK);
+    {
+        TrackedRecord record{make_record(0), {}, {}};
+        record.add_target("cup", ARHOST_TARGET_DETECTED, seen_at(250, 205));
+        record.add_observation(23, corners);
+        record.add_target("gone", ARHOST_TARGET_LOST, seen_at(330, 350)); // is not drawn
+        record.add_target("head", ARHOST_TARGET_PREDICTED, seen_at(560, 260));
+        record.add_observation(24, other_corners, false);
+        ASSERT_EQ(sink.write(picture, record), ARHOST_STATUS_OK);
+    } // the sink must not read the record later
     ASSERT_LE(difference(picture, 0, 0, 640, 480), 2);
     EXPECT_EQ(count(yellow), 0);
     observer_->press(XK_d);
     ASSERT_TRUE(becomes([&] { return count(yellow) > 0; }));
     for (const bool mirrored : {false, true}) {
         const Screenshot shot = observer_->window();
-        const auto column = [&](double x) { return static_cast<int>(mirrored ? 639 - x : x); };
-        for (int i = 0; i < 4; ++i) { // at each corner and in the middle of each edge
-            const double *a = corners[i], *b = corners[(i + 1) % 4];
-            EXPECT_TRUE(is(shot, yellow, column(a[0]), static_cast<int>(a[1]))) << i;
-            EXPECT_TRUE(is(shot, yellow, column((a[0] + b[0]) / 2), static_cast<int>((a[1] + b[1]) / 2))) << i;
-        }
-        EXPECT_FALSE(is(shot, yellow, column(500), 150));
-        EXPECT_TRUE(is(shot, axis_x, column(265), 205)) << "x points to the right";
-        EXPECT_TRUE(is(shot, axis_y, column(250), 195)) << "y points upwards";
+        const auto shows = [&](const Bgr &colour, double x, double y) {
+            return is(shot, colour, static_cast<int>(mirrored ? 639 - x : x), static_cast<int>(y));
+        };
+        for (const bool is_listed : {true, false})
+            for (int i = 0; i < 4; ++i) { // at each corner and in the middle of each edge
+                const auto &quad = is_listed ? corners : other_corners;
+                const double *a = quad[i], *b = quad[(i + 1) % 4];
+                EXPECT_TRUE(shows(is_listed ? yellow : pink, a[0], a[1])) << i;
+                EXPECT_TRUE(shows(is_listed ? yellow : pink, (a[0] + b[0]) / 2, (a[1] + b[1]) / 2)) << i;
+            }
+        // The stroke at the first corner, from 0.4 of the first edge to 0.2 of the last one.
+        EXPECT_TRUE(shows(pink, 436, 308));
+        EXPECT_FALSE(shows(pink, 428, 316)) << "would be the mark of the opposite order";
+        EXPECT_TRUE(shows(axis_x, 265, 205)) << "x points to the right";
+        EXPECT_TRUE(shows(axis_y, 250, 195)) << "y points upwards";
+        EXPECT_TRUE(shows(axis_y, 566, 250)) << "of a target without markers, where the lens shows it";
+        EXPECT_FALSE(shows(axis_x, 345, 350)) << "of a lost target";
         if (mirrored)
             break;
         observer_->press(XK_m);

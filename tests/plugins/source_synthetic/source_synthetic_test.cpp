@@ -303,7 +303,7 @@ TEST_P(EveryLens, AprilTagLibraryFindsTheTrueCorners) {
         const auto found = find_tag36h11(frame.picture);
         ASSERT_TRUE(found) << "frame " << sequence;
         ASSERT_EQ(frame.info.has_truth, 1);
-        ASSERT_EQ(frame.info.truth_id, 0);
+        ASSERT_STREQ(frame.info.truth_target, "tag36h11-0");
         error.add(*found, line_corners(frame, GetParam().camera, 80));
         const Corners truth = true_corners(frame, GetParam().camera, 80);
         for (int i = 0; i < 4; ++i)
@@ -343,7 +343,7 @@ TEST_P(EveryAprilFamily, IsPrintedUprightAsInAprilTagsLibrary) {
     const Corners truth = true_corners(frame, quick_camera, 80);
     for (int i = 0; i < 4; ++i)
         EXPECT_LT(cv::norm((*found)[i] - truth[i]), 0.5) << "corner " << i;
-    EXPECT_EQ(frame.info.truth_id, 7);
+    EXPECT_EQ(frame.info.truth_target, std::string(GetParam().name) + "-7");
 }
 
 class EveryDictionary : public testing::TestWithParam<std::pair<const char *, arhost::aruco::PredefinedDictionary>> {
@@ -365,6 +365,12 @@ TEST_P(EveryDictionary, IsPrintedUprightAsInOpenCv) {
     const Corners truth = true_corners(frame, quick_camera, 80);
     for (int i = 0; i < 4; ++i)
         EXPECT_LT(cv::norm((*found)[i] - truth[i]), 1.5) << "corner " << i; // the detector does not refine corners
+}
+
+TEST(SourceSynthetic, NamesTheTargetOfTheTruth) {
+    const std::string longest(ARHOST_MAX_NAME - 1, 'a');
+    EXPECT_EQ(Source(Options{{"target", longest}}).read(0).info.truth_target, longest);
+    EXPECT_STREQ(Source(Options{{"family", "DICT_4X4_50"}, {"id", "3"}}).read(0).info.truth_target, "DICT_4X4_50-3");
 }
 
 TEST(SourceSynthetic, KeepsTheWholeMarkerInViewOnEveryPath) {
@@ -581,6 +587,8 @@ TEST(SourceSynthetic, RejectsInvalidOptionsByName) {
     expect_rejected({{"id", "587"}}, "id: tag36h11 has the ids 0 to 586, not 587");
     expect_rejected({{"id", "-1"}}, "id: tag36h11 has the ids 0 to 586, not -1");
     expect_rejected({{"family", "DICT_4X4_50"}, {"id", "50"}}, "id: DICT_4X4_50 has the ids 0 to 49, not 50");
+    expect_rejected({{"target", std::string(64, 'a')}},
+                    "target: has 64 characters; the name of a target has at most 63");
     expect_rejected({{"period", "0"}}, "period");
     expect_rejected({{"fps", "0"}}, "fps");
     expect_rejected({{"occlude_from", "20"}}, "occlude_to");

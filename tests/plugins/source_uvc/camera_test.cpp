@@ -398,7 +398,7 @@ protected:
     static std::string configuration(const std::string &access, const std::string &more = "") {
         return "version: 1\nmode: live\nsandbox: strict\nsource: {plugin: source_uvc, fps: 30, " + access +
                "}\ncamera: {width: 320, height: 180, fx: 300}\n"
-               "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
+               "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
                "outputs: [{plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n" +
                more;
     }

@@ -594,12 +594,13 @@ protected:
     }
 
     const fs::path link = "/dev/v4l/by-id/usb-vivid-index0";
-    arhost::test::ArhostRun run{"version: 1\nmode: live\n"
-                                "source: {plugin: source_v4l2, allow: [video], fps: 30, options: {device: " +
-                                link.string() +
-                                ", width: 320, height: 180}}\ncamera: {width: 320, height: 180, fx: 300}\n"
-                                "tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}]}\n"
-                                "outputs: [{plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n"};
+    arhost::test::ArhostRun run{
+        "version: 1\nmode: live\n"
+        "source: {plugin: source_v4l2, allow: [video], fps: 30, options: {device: " +
+        link.string() +
+        ", width: 320, height: 180}}\ncamera: {width: 320, height: 180, fx: 300}\n"
+        "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
+        "outputs: [{plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n"};
 };
 
 } // namespace

@@ -26,30 +26,63 @@ INSTANTIATE_TEST_SUITE_P(Families, AprilTagFamily,
                          [](const auto &info) { return info.param; });
 
 TEST_P(AprilTagFamily, FindsTheTagUprightWithTheSideBetweenItsCorners) {
-    Tracker tracker("tracker_apriltag", {{"family", GetParam()}});
+    Tracker tracker("tracker_apriltag");
     for (const Mt &truth : {pose_of(10, 5, 400), pose_of(-20, 10, 450, 25, -20, 160)}) {
-        ASSERT_EQ(tracker.start(test_camera, {{0, 80}, {20, 80}}), ARHOST_STATUS_OK) << tracker.log();
+        ASSERT_EQ(tracker.start(test_camera, {{0, 80, GetParam()}, {20, 80, GetParam()}}), ARHOST_STATUS_OK)
+            << tracker.log();
         const Print print = april_tag(GetParam(), 20).with_margin(1);
-        const auto markers = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
-        ASSERT_EQ(markers.size(), 1u);
-        EXPECT_EQ(markers[0].id, 20);
-        EXPECT_EQ(markers[0].family, GetParam());
-        EXPECT_LT(angle_degrees(markers[0].mt, truth), 2);
-        EXPECT_NEAR(markers[0].mt[14] / truth[14], 1, 0.01);
-        for (int k = 0; k < 4; ++k)
-            EXPECT_LT(corner_distance_px(markers[0], k, corners_of(truth, test_camera, 80)[k]), 0.3);
+        const auto seen = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
+        ASSERT_EQ(seen.size(), 1u);
+        EXPECT_EQ(seen[0].id, 20);
+        EXPECT_EQ(tracker.family(seen[0]), GetParam());
+        EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 80)), 0.3);
     }
 }
 
-ClutterCounts find_tags_in_clutter(const std::string &family, Options options) {
-    options["family"] = family;
+TEST_P(AprilTagFamily, FindsUnlistedTagsWithoutWrongBits) {
+    Tracker tracker("tracker_apriltag", {{"max_hamming", "2"}});
+    ASSERT_EQ(tracker.start(test_camera, {{0, 80, GetParam()}}), ARHOST_STATUS_OK) << tracker.log();
+    const Mt truth = pose_of(10, 5, 400, 10, -20, 160);
+    for (const auto &[wrong_bits, count] : {std::pair{0, 1u}, {1, 0u}}) {
+        const Print print = with_wrong_bits(april_tag(GetParam(), 20), wrong_bits).with_margin(1);
+        const auto seen = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
+        ASSERT_EQ(seen.size(), count) << wrong_bits;
+        if (count > 0) {
+            EXPECT_EQ(seen[0].id, 20);
+            EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 80)), 1);
+        }
+    }
+}
+
+TEST(AprilTagTracker, FindsTagsOfAllFamiliesInOneRun) {
+    std::vector<Placed> placed;
+    std::vector<Listed> listed;
+    for (const auto &type : arhost::apriltag::family_types) {
+        const int i = static_cast<int>(listed.size());
+        placed.push_back({april_tag(type.name, 20 + i).with_margin(1), 45,
+                          pose_of(150 * (i % 3 - 1), 120 * (i / 3 - 1), 500, 10, 5 * i - 20, 40 * i)});
+        listed.push_back({20 + i, 45, type.name});
+    }
+    Tracker tracker("tracker_apriltag");
+    ASSERT_EQ(tracker.start(test_camera, listed), ARHOST_STATUS_OK) << tracker.log();
+    const auto seen = tracker.track(GreyFrame(picture_of(placed)));
+    ASSERT_EQ(seen.size(), listed.size());
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+        EXPECT_EQ(seen[i].family, i);
+        EXPECT_EQ(seen[i].id, listed[i].id);
+        EXPECT_LT(greatest_distance_px(seen[i], corners_of(placed[i].mt, test_camera, 45)), 0.3) << listed[i].family;
+    }
+}
+
+ClutterCounts find_tags_in_clutter(const std::string &family, const Options &options) {
     Tracker tracker("tracker_apriltag", options);
-    return find_in_clutter(tracker, [&](int id) { return april_tag(family, id).with_margin(1); });
+    return find_in_clutter(tracker, family, [&](int id) { return april_tag(family, id).with_margin(1); });
 }
 
 TEST_P(AprilTagFamily, DefaultsFindTagsAndNoFalseOnesInClutter) {
     const ClutterCounts counts = find_tags_in_clutter(GetParam(), {});
     EXPECT_EQ(counts.false_positives, 0);
+    EXPECT_EQ(counts.unlisted, 0);
     EXPECT_EQ(counts.found, counts.pictures);
 }
 
@@ -58,9 +91,18 @@ TEST(AprilTagTracker, CorrectionOfBitsInASmallFamilyFindsFalseTagsInClutter) {
 }
 
 TEST_P(AprilTagFamily, NamesTheValidIdRange) {
-    Tracker tracker("tracker_apriltag", {{"family", GetParam()}});
-    EXPECT_EQ(tracker.start(test_camera, {{100000}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    Tracker tracker("tracker_apriltag");
+    EXPECT_EQ(tracker.start(test_camera, {{100000, 100, GetParam()}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker.log(), HasSubstr("marker id 100000 is not in " + GetParam() + ", whose ids are 0"));
+}
+
+TEST(AprilTagTracker, NamesTheTrackerThatKnowsADictionaryOfOpenCv) {
+    Tracker tracker("tracker_apriltag");
+    EXPECT_EQ(tracker.start(test_camera, {{0, 100, "tag99h9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(), testing::Not(HasSubstr("tracker_aruco")));
+    EXPECT_EQ(tracker.start(test_camera, {{0, 100, "DICT_6X6_250"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(), HasSubstr("unknown family 'DICT_6X6_250': tracker_apriltag has tag36h11, tag36h10, "));
+    EXPECT_THAT(tracker.log(), HasSubstr("tagStandard52h13; tracker_aruco has OpenCV's dictionaries"));
 }
 
 TEST(AprilTagTracker, RejectsADecimationThatTheLibraryMishandles) {
@@ -100,8 +142,8 @@ TEST(AprilTagTracker, CorrectsByDefaultAsManyWrongBitsAsTheFamilyAllows) {
     for (const auto &[family, wrong_bits, count] :
          {std::tuple{"tag16h5", 1, 0u}, {"tag25h9", 1, 1u}, {"tag25h9", 2, 0u}, {"tag36h11", 2, 1u}}) {
         const Print damaged = with_wrong_bits(april_tag(family, 3), wrong_bits);
-        Tracker tracker("tracker_apriltag", {{"family", family}});
-        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+        Tracker tracker("tracker_apriltag");
+        ASSERT_EQ(tracker.start(test_camera, {{3, 100, family}}), ARHOST_STATUS_OK);
         EXPECT_EQ(tracker.track(GreyFrame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}))).size(),
                   count)
             << family << ", " << wrong_bits;

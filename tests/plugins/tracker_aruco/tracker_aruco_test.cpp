@@ -32,25 +32,38 @@ INSTANTIATE_TEST_SUITE_P(Dictionaries, ArucoDictionary, testing::ValuesIn(dictio
 
 TEST_P(ArucoDictionary, FindsTheMarkerUpright) {
     const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
-    Tracker tracker("tracker_aruco", {{"dictionary", dictionary}});
-    ASSERT_EQ(tracker.start(test_camera, {{7, 80}, {21, 80}}), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker("tracker_aruco");
+    ASSERT_EQ(tracker.start(test_camera, {{7, 80, dictionary}, {21, 80, dictionary}}), ARHOST_STATUS_OK)
+        << tracker.log();
     // Markers of AprilTag families are drawn by the AprilTag library, other markers by OpenCV.
     const Print print = family.empty() ? aruco_marker(dictionary, 21) : april_tag(family, 21).with_margin(1);
     for (const Mt &truth : {pose_of(10, 5, 400), pose_of(-20, 10, 450, 25, -20, 110)}) {
-        const auto markers = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
-        ASSERT_EQ(markers.size(), 1u);
-        EXPECT_EQ(markers[0].id, 21);
-        EXPECT_EQ(std::string(markers[0].family), family.empty() ? dictionary : family);
-        EXPECT_LT(angle_degrees(markers[0].mt, truth), 2);
-        EXPECT_NEAR(markers[0].mt[14] / truth[14], 1, 0.005);
+        const auto seen = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
+        ASSERT_EQ(seen.size(), 1u);
+        EXPECT_EQ(seen[0].id, 21);
+        EXPECT_EQ(tracker.family(seen[0]), dictionary);
+        EXPECT_EQ(seen[0].hamming, 0u);
+        EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 80)), 0.2);
     }
 }
 
-ClutterCounts find_markers_in_clutter(const std::string &dictionary, Options options) {
+TEST_P(ArucoDictionary, FindsUnlistedMarkers) {
+    const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
+    Tracker tracker("tracker_aruco");
+    ASSERT_EQ(tracker.start(test_camera, {{7, 80, dictionary}}), ARHOST_STATUS_OK) << tracker.log();
+    const Print print = family.empty() ? aruco_marker(dictionary, 21) : april_tag(family, 21).with_margin(1);
+    const Mt truth = pose_of(10, 5, 400, 10, -20, 160);
+    const auto seen = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
+    ASSERT_EQ(seen.size(), 1u);
+    EXPECT_EQ(seen[0].id, 21);
+    EXPECT_EQ(seen[0].hamming, 0u);
+    EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 80)), 2.5);
+}
+
+ClutterCounts find_markers_in_clutter(const std::string &dictionary, const Options &options) {
     const std::string family = april_tag_family(dictionary);
-    options["dictionary"] = dictionary;
     Tracker tracker("tracker_aruco", options);
-    return find_in_clutter(tracker, [&](int id) {
+    return find_in_clutter(tracker, dictionary, [&](int id) {
         return family.empty() ? aruco_marker(dictionary, id) : april_tag(family, id).with_margin(1);
     });
 }
@@ -58,6 +71,8 @@ ClutterCounts find_markers_in_clutter(const std::string &dictionary, Options opt
 TEST_P(ArucoDictionary, DefaultsFindMarkersAndNoFalseOnesInClutter) {
     const ClutterCounts counts = find_markers_in_clutter(GetParam(), {});
     EXPECT_EQ(counts.false_positives, 0);
+    // 6 % of all patterns of 16 bits are a marker of DICT_4X4_1000.
+    EXPECT_LE(counts.unlisted, GetParam() == "DICT_4X4_1000" ? 10 : 0);
     EXPECT_EQ(counts.found, counts.pictures);
 }
 
@@ -88,12 +103,12 @@ TEST_P(ArucoRefinement, PlacesPixelCentresAtIntegers) {
     double error = 0;
     for (int i = 0; i < 6; ++i) {
         const Mt truth = pose_of(7 * i, -5 * i, 450, 10 * i - 25, 20 - 8 * i, 60 * i);
-        const auto markers = tracker.track(GreyFrame(picture_of({{tag(3), 100, truth}})));
-        ASSERT_EQ(markers.size(), 1u);
+        const auto seen = tracker.track(GreyFrame(picture_of({{tag(3), 100, truth}})));
+        ASSERT_EQ(seen.size(), 1u);
         const auto corners = corners_of(truth, test_camera, 100);
         for (int k = 0; k < 4; ++k) {
-            bias += cv::Point2d(markers[0].corners_px[k][0], markers[0].corners_px[k][1]) - corners[k];
-            error += corner_distance_px(markers[0], k, corners[k]);
+            bias += cv::Point2d(seen[0].corners_px[k][0], seen[0].corners_px[k][1]) - corners[k];
+            error += corner_distance_px(seen[0], k, corners[k]);
         }
     }
     EXPECT_LT(cv::norm(bias) / 24, GetParam().bias_px);
@@ -111,15 +126,48 @@ TEST(ArucoTracker, ReadsADictionaryFile) {
         print.cells(1 + i / 4, 1 + i % 4) = bits[i] == '1' ? 255 : 0;
     Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
     ASSERT_EQ(tracker.created(), ARHOST_STATUS_OK) << tracker.log();
-    ASSERT_EQ(tracker.start(test_camera, {{0, 80}, {1, 80}}), ARHOST_STATUS_OK) << tracker.log();
-    const Mt truth = pose_of(10, 20, 400, 20, 20, 30);
-    const auto markers = tracker.track(GreyFrame(picture_of({{print.with_margin(1), 80, truth}})));
-    ASSERT_EQ(markers.size(), 1u);
-    EXPECT_EQ(markers[0].id, 1);
-    EXPECT_STREQ(markers[0].family, "mine");
-    EXPECT_LT(angle_degrees(markers[0].mt, truth), 1);
-    EXPECT_EQ(tracker.start(test_camera, {{2, 80}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    ASSERT_EQ(tracker.start(test_camera, {{0, 80, "mine"}, {1, 80, "mine"}, {3, 60}}), ARHOST_STATUS_OK)
+        << tracker.log();
+    const Mt truth = pose_of(10, 20, 400, 20, 20, 30), other = pose_of(-110, -60, 450);
+    const auto seen = tracker.track(GreyFrame(picture_of({{print.with_margin(1), 80, truth}, {tag(3), 60, other}})));
+    ASSERT_EQ(seen.size(), 2u);
+    EXPECT_EQ(seen[0].id, 1);
+    EXPECT_EQ(tracker.family(seen[0]), "mine");
+    EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 80)), 0.2);
+    EXPECT_EQ(seen[1].id, 3);
+    EXPECT_EQ(tracker.family(seen[1]), "tag36h11");
+    EXPECT_EQ(tracker.start(test_camera, {{2, 80, "mine"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker.log(), HasSubstr("marker id 2 is not in mine, whose ids are 0 to 1"));
+    EXPECT_EQ(tracker.start(test_camera, {{2, 80, "yours"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(), HasSubstr("unknown dictionary 'yours': tracker_aruco has mine (dictionary_file), "));
+}
+
+TEST(ArucoTracker, TakesADictionaryFromTheFileOfItsName) {
+    const ScratchFolder scratch;
+    const auto file = scratch.path() / "DICT_4X4_50.yml"; // has the marker 7 of DICT_5X5_50 as its only marker
+    const auto table = arhost::aruco::predefined(cv::aruco::DICT_5X5_50);
+    const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(table.bytesList.row(7), 5);
+    std::string text;
+    for (const uint8_t bit : cv::Mat_<uint8_t>(bits))
+        text += bit ? '1' : '0';
+    std::ofstream(file) << "%YAML:1.0\nnmarkers: 1\nmarkersize: 5\nmaxCorrectionBits: 1\nmarker_0: \"" << text
+                        << "\"\n";
+    Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
+    ASSERT_EQ(tracker.start(test_camera, {{0, 80, "DICT_4X4_50"}}), ARHOST_STATUS_OK) << tracker.log();
+    const auto seen =
+        tracker.track(GreyFrame(picture_of({{aruco_marker("DICT_5X5_50", 7), 80, pose_of(0, 0, 400)}})));
+    ASSERT_EQ(seen.size(), 1u);
+    EXPECT_EQ(seen[0].id, 0);
+}
+
+TEST(ArucoTracker, NamesTheTrackerThatKnowsMoreFamiliesOfAprilTag) {
+    Tracker tracker("tracker_aruco");
+    EXPECT_EQ(tracker.start(test_camera, {{0, 100, "DICT_9X9_9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(), testing::Not(HasSubstr("tracker_apriltag")));
+    EXPECT_EQ(tracker.start(test_camera, {{0, 100, "tagStandard41h12"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(),
+                testing::AllOf(HasSubstr("unknown dictionary 'tagStandard41h12': tracker_aruco has tag36h11, "),
+                               HasSubstr("DICT_6X6_250"), HasSubstr("; tracker_apriltag has more families")));
 }
 
 TEST(ArucoTracker, CorrectsAtMostThreeWrongBitsOf36ByDefault) {
@@ -129,7 +177,7 @@ TEST(ArucoTracker, CorrectsAtMostThreeWrongBitsOf36ByDefault) {
     std::ofstream(file) << "%YAML:1.0\nnmarkers: 1\nmarkersize: 6\nmaxCorrectionBits: 12\nmarker_0: \"" << bits
                         << "\"\n";
     Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
-    ASSERT_EQ(tracker.start(test_camera, {{0, 100}}), ARHOST_STATUS_OK) << tracker.log();
+    ASSERT_EQ(tracker.start(test_camera, {{0, 100, "mine"}}), ARHOST_STATUS_OK) << tracker.log();
     for (const auto &[wrong_bits, count] : {std::pair{0, 1u}, {3, 1u}, {4, 0u}}) {
         Print print{cv::Mat_<uint8_t>(8, 8, uint8_t{0}), 8};
         for (int i = 0; i < 36; ++i)
@@ -174,23 +222,26 @@ TEST(ArucoTracker, FindsInvertedMarkersOnlyIfEnabled) {
     const GreyFrame frame(255 -
                           picture_of({{aruco_marker("DICT_5X5_50", 9).with_margin(2), 80, pose_of(0, 0, 400)}}));
     for (const auto &[inverted, count] : {std::pair{"false", 0u}, std::pair{"true", 1u}}) {
-        Tracker tracker("tracker_aruco", {{"dictionary", "DICT_5X5_50"}, {"inverted", inverted}});
-        ASSERT_EQ(tracker.start(test_camera, {{9, 80}}), ARHOST_STATUS_OK);
-        const auto markers = tracker.track(frame);
-        ASSERT_EQ(markers.size(), count) << inverted;
+        Tracker tracker("tracker_aruco", {{"inverted", inverted}});
+        ASSERT_EQ(tracker.start(test_camera, {{9, 80, "DICT_5X5_50"}}), ARHOST_STATUS_OK);
+        const auto seen = tracker.track(frame);
+        ASSERT_EQ(seen.size(), count) << inverted;
         if (count) {
-            EXPECT_NEAR(markers[0].mt[14], -400, 2);
+            EXPECT_LT(greatest_distance_px(seen[0], corners_of(pose_of(0, 0, 400), test_camera, 80)), 0.2);
+            EXPECT_EQ(seen[0].hamming, 0u);
+            EXPECT_GT(seen[0].decision_margin, 30);
         }
     }
 }
 
 TEST(ArucoTracker, ReadsMarkersWithAWideBorder) {
-    Tracker tracker("tracker_aruco", {{"dictionary", "DICT_4X4_50"}, {"border_bits", "2"}});
-    ASSERT_EQ(tracker.start(test_camera, {{9, 80}}), ARHOST_STATUS_OK);
-    const auto markers =
+    Tracker tracker("tracker_aruco", {{"border_bits", "2"}});
+    ASSERT_EQ(tracker.start(test_camera, {{9, 80, "DICT_4X4_50"}}), ARHOST_STATUS_OK);
+    const auto seen =
         tracker.track(GreyFrame(picture_of({{aruco_marker("DICT_4X4_50", 9, 2), 80, pose_of(0, 0, 400)}})));
-    ASSERT_EQ(markers.size(), 1u);
-    EXPECT_NEAR(markers[0].mt[14], -400, 2);
+    ASSERT_EQ(seen.size(), 1u);
+    EXPECT_LT(greatest_distance_px(seen[0], corners_of(pose_of(0, 0, 400), test_camera, 80)), 0.2);
+    EXPECT_EQ(seen[0].hamming, 0u);
 }
 
 TEST(ArucoTracker, CorrectsWrongBitsOfAprilTags) {
@@ -209,8 +260,8 @@ TEST(ArucoTracker, CorrectsByDefaultAsManyWrongBitsAsTheDictionaryAllows) {
     for (const auto &[family, wrong_bits, count] :
          {std::tuple{"16h5", 1, 0u}, {"25h9", 1, 1u}, {"25h9", 2, 0u}, {"36h11", 2, 1u}}) {
         const Print damaged = with_wrong_bits(april_tag("tag" + std::string(family), 3), wrong_bits);
-        Tracker tracker("tracker_aruco", {{"dictionary", "DICT_APRILTAG_" + std::string(family)}});
-        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+        Tracker tracker("tracker_aruco");
+        ASSERT_EQ(tracker.start(test_camera, {{3, 100, "tag" + std::string(family)}}), ARHOST_STATUS_OK);
         EXPECT_EQ(tracker.track(GreyFrame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}))).size(),
                   count)
             << family << ", " << wrong_bits;
@@ -224,28 +275,28 @@ TEST(ArucoTracker, FindsTheMarkerOfTheUbiquityPhotoAndItsDistance) {
     const auto &k = golden["camera"]["K"];
     const std::vector<double> d = golden["camera"]["D"];
     const auto camera = intrinsics_of({1280, 960}, k[0], k[4], k[2], k[5], ARHOST_DISTORTION_BROWN, d);
-    Tracker tracker("tracker_aruco", {{"dictionary", "DICT_5X5_1000"}, {"corner_refinement", "subpix"}});
-    ASSERT_EQ(tracker.start(camera, {{1, 145}}), ARHOST_STATUS_OK);
+    Tracker tracker("tracker_aruco", {{"corner_refinement", "subpix"}});
+    ASSERT_EQ(tracker.start(camera, {{1, 145, "DICT_5X5_1000"}}), ARHOST_STATUS_OK);
     const GreyFrame photo(read_grey(folder / "tag_01_d7_14cm.png"));
-    const auto markers = tracker.track(photo);
-    ASSERT_EQ(markers.size(), 1u);
+    const auto seen = tracker.track(photo);
+    ASSERT_EQ(seen.size(), 1u);
     const std::vector<double> expected = golden["corners"]["tag_01_d7_14cm.png"]["1"];
     for (int corner = 0; corner < 4; ++corner)
-        EXPECT_LT(corner_distance_px(markers[0], corner, {expected[2 * corner], expected[2 * corner + 1]}), 0.1);
-    EXPECT_NEAR(markers[0].mt[14], -700, 35); // "d7": 70 cm
+        EXPECT_LT(corner_distance_px(seen[0], corner, {expected[2 * corner], expected[2 * corner + 1]}), 0.1);
+    EXPECT_NEAR(solved_pose(seen[0], camera, 145).value().mt[14], -700, 35); // "d7": 70 cm
 }
 
 // Compares the corners with OpenCV's reference corners, which are unrefined and rounded to whole pixels.
-void expect_opencv_corners(const std::string &photo, Options dictionary, const std::string &refinement,
-                           double tolerance_px) {
-    dictionary["corner_refinement"] = refinement;
+void expect_opencv_corners(const std::string &photo, const std::string &dictionary, Options options,
+                           const std::string &refinement, double tolerance_px) {
+    options["corner_refinement"] = refinement;
     const auto folder = shared_data("markers/opencv_doc");
     const auto golden = nlohmann::json::parse(std::ifstream(folder / "golden.json"));
-    Tracker tracker("tracker_aruco", dictionary);
+    Tracker tracker("tracker_aruco", options);
     ASSERT_EQ(tracker.created(), ARHOST_STATUS_OK) << tracker.log();
     std::vector<Listed> listed;
     for (const auto &[id, corners] : golden[photo]["corners"].items())
-        listed.push_back({std::stoi(id)});
+        listed.push_back({std::stoi(id), 100, dictionary});
     const auto found = markers_in(tracker, folder / photo, listed);
     EXPECT_EQ(found.size(), listed.size());
     for (const auto &[id, marker] : found)
@@ -260,16 +311,16 @@ TEST(ArucoTracker, FindsTheMarkersOfOpenCvsDocumentation) {
     ARHOST_REQUIRE_SHARED_DATA("markers/opencv_doc");
     const std::string file = shared_data("markers/opencv_doc/tutorial_dict.yml");
     for (const auto &[refinement, tolerance_px] : {std::pair{"none", 1.0}, std::pair{"edges", 2.0}}) {
-        expect_opencv_corners("singlemarkersoriginal.jpg", {{"dictionary", "DICT_6X6_250"}}, refinement,
+        expect_opencv_corners("singlemarkersoriginal.jpg", "DICT_6X6_250", {}, refinement, tolerance_px);
+        expect_opencv_corners("choriginal.jpg", "DICT_6X6_250", {}, refinement, tolerance_px);
+        expect_opencv_corners("gboriginal.png", "tutorial_dict", {{"dictionary_file", file}}, refinement,
                               tolerance_px);
-        expect_opencv_corners("choriginal.jpg", {{"dictionary", "DICT_6X6_250"}}, refinement, tolerance_px);
-        expect_opencv_corners("gboriginal.png", {{"dictionary_file", file}}, refinement, tolerance_px);
     }
 
     Tracker tracker("tracker_aruco", {{"dictionary_file", file}});
     std::vector<int> ids; // several ids occur more than once
     for (const auto &[id, marker] :
-         markers_in(tracker, shared_data("markers/opencv_doc/diamondmarkers.png"), ids_to(35)))
+         markers_in(tracker, shared_data("markers/opencv_doc/diamondmarkers.png"), ids_to(35, "tutorial_dict")))
         ids.push_back(id);
     EXPECT_THAT(ids, testing::ElementsAre(2, 3, 4, 10, 11, 12));
 }

@@ -47,7 +47,9 @@ struct arhost_instance {
     const arhost_host *host;
     char attack[64], target[1024];
     int64_t at;
-    int32_t marker_id, tracked;
+    arhost_marker_config marker; /* the first of the configuration */
+    arhost_intrinsics lens;
+    int32_t tracked;
 };
 typedef struct arhost_instance tracker;
 
@@ -785,7 +787,8 @@ static const void *get_extension(const char *id) {
 }
 
 static arhost_status start(arhost_instance *self, const arhost_tracker_setup *setup) {
-    self->marker_id = setup->markers[0].id;
+    self->marker = setup->markers[0];
+    self->lens = *setup->intrinsics;
     if (!strcmp(self->attack, "second_hello"))
         say_hello();
     return ARHOST_STATUS_OK;
@@ -796,16 +799,18 @@ static arhost_status track(arhost_instance *self, const arhost_track_request *re
                            arhost_tracker_result *result) {
     const arhost_frame *frame = request->frame;
     const int number = frame->plane[0][0] + 256 * frame->plane[0][1];
-    arhost_marker *marker = &result->markers[0];
+    arhost_observation *seen = &result->observations[0];
     int i;
-    result->marker_count = 1;
-    marker->struct_size = sizeof *marker;
-    marker->id = self->marker_id;
-    strcpy(marker->family, "counter");
-    marker->state = ARHOST_MARKER_DETECTED;
-    for (i = 0; i < 16; i += 5)
-        marker->mt[i] = 1;
-    marker->mt[14] = -500.0 - number;
+    result->observation_count = 1;
+    seen->id = self->marker.id;
+    seen->family = self->marker.family;
+    seen->hamming = 0;
+    seen->decision_margin = 0;
+    for (i = 0; i < 4; ++i) {
+        const double *corner = self->marker.corners_mm[i], depth = 500 + number - corner[2];
+        seen->corners_px[i][0] = self->lens.cx + self->lens.fx * corner[0] / depth;
+        seen->corners_px[i][1] = self->lens.cy - self->lens.fy * corner[1] / depth;
+    }
     if (number == self->at || (number > self->at && self->tracked > 0 && !strcmp(self->attack, "huge_type")))
         attack(self);
     ++self->tracked;

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A tracker that reads the frame number from the pixels and fails if it is wrong. Reports the first marker (or all
-// markers) at a distance of 500 mm plus 1 mm times the frame number. If it has state, it counts the frames that it
-// has tracked in the first 8 bytes, and reports the marker 1 mm to the right times this number.
+// A tracker that reads the frame number from the pixels and fails if it is wrong. Reports the corners of the first
+// marker (or all markers) as seen from a distance of 500 mm plus 1 mm times the frame number, facing the camera. If
+// it has state, it counts the frames that it has tracked in the first 8 bytes, and reports the markers 1 mm to the
+// right times this number.
 #include "faults.hpp"
 
-#include <algorithm>
-#include <cmath>
+#include <arhost/shading/lens.hpp>
+
 #include <cstring>
 #include <fcntl.h>
 #include <limits>
+#include <optional>
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -22,7 +24,7 @@ using namespace arhost;
 class Counter {
 public:
     Counter(const Host &host, const Options &options)
-        : host_(host), faults_(options), seal_(options.text("seal")), reversed_(options.boolean("reversed")),
+        : host_(host), faults_(options), seal_(options.text("seal")), all_(options.boolean("all")),
           crash_in_destroy_(options.boolean("crash_in_destroy")), lost_from_(options.integer("lost_from")),
           lost_to_(options.integer("lost_to")), nan_at_(options.integer("nan_at")),
           start_steps_(options.integer("start_steps")), start_step_ms_(options.real("start_step_ms")),
@@ -48,18 +50,18 @@ public:
             host_.progress(static_cast<float>(step) / static_cast<float>(start_steps_), "starting");
             std::this_thread::sleep_for(std::chrono::duration<double, std::milli>(start_step_ms_));
         }
-        lens_ = *setup.intrinsics;
-        for (std::uint32_t i = 0; i < setup.marker_count; ++i)
-            listed_.push_back(listed_marker(setup, i));
-        if (reversed_)
-            std::reverse(listed_.begin(), listed_.end());
-        else
+        lens_.emplace(*setup.intrinsics);
+        for (const arhost_marker_config &marker : elements(setup.markers, setup.marker_count))
+            listed_.push_back(marker);
+        if (listed_.empty())
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "targets: there is no marker");
+        if (!all_)
             listed_.resize(1);
         if (seal_ != "no" && ::mkdir("sealed", 0700) == 0) // the folder exists after a restart
             seal_output();
     }
 
-    void track(const arhost_track_request &request, arhost_tracker_result &result) {
+    void track(const arhost_track_request &request, Observations &observations) {
         const arhost_frame &frame = *request.frame;
         const std::uint64_t number = frame.plane[0][0] + 256u * frame.plane[0][1];
         if (number != (frame.sequence & 0xffff)) // the pixels encode only two bytes
@@ -68,12 +70,13 @@ public:
         const auto signed_number = static_cast<std::int64_t>(number);
         if (signed_number >= lost_from_ && signed_number < lost_to_)
             return;
-        for (const arhost_marker_config &listed : listed_)
-            report(listed, 500.0 + static_cast<double>(number), result.markers[result.marker_count++]);
-        if (state_size_ > 0)
-            result.markers[0].mt[12] = static_cast<double>(count(request));
-        if (signed_number == nan_at_)
-            result.markers[0].mt[12] = std::numeric_limits<double>::quiet_NaN();
+        const double x_mm = state_size_ > 0 ? static_cast<double>(count(request)) : 0;
+        for (const arhost_marker_config &listed : listed_) {
+            arhost_observation seen = observed(listed, x_mm, 500.0 + static_cast<double>(number));
+            if (signed_number == nan_at_)
+                seen.corners_px[0][0] = std::numeric_limits<double>::quiet_NaN();
+            observations.add(seen);
+        }
     }
 
     std::uint64_t state_size() const { return state_size_; }
@@ -90,19 +93,20 @@ private:
         return tracked;
     }
 
-    void report(const arhost_marker_config &listed, double distance_mm, arhost_marker &marker) const {
-        marker.struct_size = sizeof marker;
-        marker.id = listed.id;
-        std::strcpy(marker.family, "counter");
-        marker.state = ARHOST_MARKER_DETECTED;
-        for (int i : {0, 5, 10, 15})
-            marker.mt[i] = 1;
-        marker.mt[14] = -distance_mm;
-        const double x_px = lens_.fx * listed.side_mm / 2 / distance_mm, y_px = x_px * lens_.fy / lens_.fx;
+    // The marker when its target is at (x, 0, −distance) in GL eye space, not rotated.
+    arhost_observation observed(const arhost_marker_config &listed, double x_mm, double distance_mm) const {
+        arhost_observation seen{};
+        seen.id = listed.id;
+        seen.family = listed.family;
         for (int i = 0; i < 4; ++i) {
-            marker.corners_px[i][0] = lens_.cx + (i == 1 || i == 2 ? x_px : -x_px);
-            marker.corners_px[i][1] = lens_.cy + (i >= 2 ? y_px : -y_px);
+            const double *corner = listed.corners_mm[i], depth_mm = distance_mm - corner[2];
+            const auto pixel = lens_->project({corner[0] + x_mm, -corner[1], depth_mm});
+            if (!pixel)
+                throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "a corner is not visible");
+            seen.corners_px[i][0] = pixel->x;
+            seen.corners_px[i][1] = pixel->y;
         }
+        return seen;
     }
 
     // Implements the worker's protocol until the plugin receives the memory for its results, and then seals this
@@ -130,22 +134,22 @@ private:
     Host host_;
     test::Faults faults_;
     std::string seal_;
-    bool reversed_, crash_in_destroy_;
+    bool all_, crash_in_destroy_;
     std::int64_t lost_from_, lost_to_, nan_at_, start_steps_;
     double start_step_ms_;
     std::uint64_t state_size_;
-    arhost_intrinsics lens_{};
+    std::optional<shading::Lens> lens_;
     std::vector<arhost_marker_config> listed_;
 };
 
 constexpr const char *seals[] = {"no", "seal", "write", nullptr};
 constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "seal", "no", "Seal to add to the plugin's shared memory", 0, 0, seals),
-    option(ARHOST_OPTION_BOOL, "reversed", "false", "Reports all markers, in the reverse order of the list"),
+    option(ARHOST_OPTION_BOOL, "all", "false", "Reports all markers instead of the first one"),
     option(ARHOST_OPTION_INTEGER, "lost_from", "0", "First frame for which no marker is reported"),
     option(ARHOST_OPTION_INTEGER, "lost_to", "0", "End of that range of frames, exclusive"),
     option(ARHOST_OPTION_BOOL, "crash_in_destroy", "false", "Crashes in destroy"),
-    option(ARHOST_OPTION_INTEGER, "nan_at", "-1", "Reports a NaN for this frame; -1: never"),
+    option(ARHOST_OPTION_INTEGER, "nan_at", "-1", "Reports a NaN as a corner in this frame; -1: never"),
     option(ARHOST_OPTION_INTEGER, "start_steps", "0", "Number of steps in start, each reported as progress"),
     option(ARHOST_OPTION_REAL, "start_step_ms", "0", "Duration of each step, in ms", 0, 60000),
     option(ARHOST_OPTION_INTEGER, "state_size", "0", "Bytes of state: 0, or at least 8"),

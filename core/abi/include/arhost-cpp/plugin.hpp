@@ -6,9 +6,11 @@
 //   public:
 //       Grey(const arhost::Host &host, const arhost::Options &options);
 //       void start(const arhost_tracker_setup &setup);
-//       void track(const arhost_track_request &request, arhost_tracker_result &result);
+//       void track(const arhost_track_request &request, arhost::Observations &observations);
 //   };
 //   ARHOST_TRACKER(Grey, descriptor)
+//
+// The second argument of `track` may also be `arhost_tracker_result &`, for trackers that report poses.
 //
 // Members report errors by throwing arhost::Failure (or any std::exception) with a message for the user. The adapters
 // in this header log the message and return a status, so no exception crosses the ABI.
@@ -20,6 +22,7 @@
 #include <chrono>
 #include <concepts>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -29,6 +32,7 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <type_traits>
 #include <vector>
 
 namespace arhost {
@@ -139,11 +143,72 @@ private:
     std::uint32_t count_;
 };
 
-// Returns element `i` of setup.markers. Steps by struct_size, because a newer host may use larger elements.
-inline const arhost_marker_config &listed_marker(const arhost_tracker_setup &setup, std::size_t i) {
-    return *reinterpret_cast<const arhost_marker_config *>(reinterpret_cast<const char *>(setup.markers) +
-                                                           i * setup.markers->struct_size);
+// A range of the elements of an array of structs: targets, markers, observations. Steps by struct_size, because a
+// newer host may use larger elements.
+template <class T> class Elements {
+public:
+    Elements(T *first, std::uint32_t count) : first_(first), count_(count) {}
+
+    class Iterator {
+    public:
+        using iterator_category = std::forward_iterator_tag;
+        using value_type = std::remove_const_t<T>;
+        using difference_type = std::ptrdiff_t;
+        using pointer = T *;
+        using reference = T &;
+        Iterator() = default;
+        Iterator(T *first, std::uint32_t index) : first_(first), index_(index) {}
+        T &operator*() const { return Elements(first_, 0)[index_]; }
+        T *operator->() const { return &**this; }
+        Iterator &operator++() { return ++index_, *this; }
+        Iterator operator++(int) { return {first_, index_++}; }
+        bool operator==(const Iterator &other) const { return index_ == other.index_; }
+
+    private:
+        T *first_ = nullptr;
+        std::uint32_t index_ = 0;
+    };
+    Iterator begin() const { return {first_, 0}; }
+    Iterator end() const { return {first_, count_}; }
+    std::uint32_t size() const { return count_; }
+    bool empty() const { return count_ == 0; }
+    // Returns the elements [first, first + count), as far as they exist.
+    Elements part(std::uint32_t first, std::uint32_t count) const {
+        if (first >= count_)
+            return {first_, 0};
+        return {&(*this)[first], count < count_ - first ? count : count_ - first};
+    }
+    T &operator[](std::size_t i) const {
+        using Byte = std::conditional_t<std::is_const_v<T>, const char, char>;
+        return *reinterpret_cast<T *>(reinterpret_cast<Byte *>(first_) + i * first_->struct_size);
+    }
+
+private:
+    T *first_;
+    std::uint32_t count_;
+};
+template <class T> Elements<T> elements(T *first, std::uint32_t count) {
+    return {first, count};
 }
+
+// Receives the markers that a detector sees in a frame.
+class Observations {
+public:
+    explicit Observations(arhost_tracker_result &result) : result_(result) {}
+    // Returns false, and ignores the observation, if there are already ARHOST_MAX_OBSERVATIONS. Sets `struct_size`.
+    bool add(const arhost_observation &seen) {
+        if (result_.observation_count >= ARHOST_MAX_OBSERVATIONS)
+            return false;
+        arhost_observation &to = elements(result_.observations, ARHOST_MAX_OBSERVATIONS)[result_.observation_count++];
+        const std::uint32_t struct_size = to.struct_size;
+        to = seen;
+        to.struct_size = struct_size;
+        return true;
+    }
+
+private:
+    arhost_tracker_result &result_;
+};
 
 // Returns an arhost_option_descriptor. Unlike in the struct, the optional fields are last and have defaults.
 constexpr arhost_option_descriptor option(arhost_option_type type, const char *key, const char *default_value,
@@ -382,7 +447,13 @@ template <class T> constexpr arhost_tracker make_tracker_functions() {
         return with<T>(i, [&](T &p) { return p.start(*setup), ARHOST_STATUS_OK; });
     };
     tracker.track = [](arhost_instance *i, const arhost_track_request *request, arhost_tracker_result *result) {
-        return with<T>(i, [&](T &p) { return p.track(*request, *result), ARHOST_STATUS_OK; });
+        return with<T>(i, [&](T &p) {
+            if constexpr (Observations seen(*result); requires { p.track(*request, seen); })
+                p.track(*request, seen);
+            else
+                p.track(*request, *result);
+            return ARHOST_STATUS_OK;
+        });
     };
     tracker.stop = stop_instance<T>;
     if constexpr (requires(const T &p) { p.state_size(); })

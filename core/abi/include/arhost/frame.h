@@ -37,7 +37,11 @@ enum {
     ARHOST_CLOCK_MEDIA = 2      /* time since the start of the file or synthetic sequence */
 };
 
-enum { ARHOST_MAX_PLANES = 3, ARHOST_MAX_IMAGE_SIDE = 16384 };
+enum {
+    ARHOST_MAX_PLANES = 3,
+    ARHOST_MAX_IMAGE_SIDE = 16384,
+    ARHOST_MAX_NAME = 64 /* bytes of the name of a target or body (arhost/tracker.h), with the terminating NUL */
+};
 
 /* The layout of all frames of a source, constant from `start` to `stop`. The source sets the fields up to `fps` and
  * calls arhost_frame_layout, which computes the fields from `plane_count` on. */

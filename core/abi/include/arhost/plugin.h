@@ -201,7 +201,8 @@ enum {
     /* raytracer: renders images of any size up to that of the setup. The intrinsics of a request are then those of
      * arhost::shading::scaled() (arhost/shading/lens.hpp), and arhost_image has their size. */
     ARHOST_CAPABILITY_SCALED_IMAGES = 1 << 15,
-    ARHOST_CAPABILITY_RUN_DESCRIPTION = 1 << 16 /* sink: reads arhost_sink_setup.run_description */
+    ARHOST_CAPABILITY_RUN_DESCRIPTION = 1 << 16, /* sink: reads arhost_sink_setup.run_description */
+    ARHOST_CAPABILITY_REPORTS_POSES = 1 << 17    /* tracker: reports the poses of bodies (arhost_body_pose) */
 };
 
 /* Describes the plugin. Static storage: valid as long as the library is loaded. Each string may have up to 4,096

@@ -34,7 +34,7 @@ typedef int32_t arhost_overlay;
 enum {
     ARHOST_OVERLAY_RENDERED = 1, /* rendered from this frame's pose */
     ARHOST_OVERLAY_HELD = 2,     /* rendered from the last known pose; used for the configured hold time */
-    ARHOST_OVERLAY_NONE = 3      /* no overlay, only video: no marker in view, or a component is not running */
+    ARHOST_OVERLAY_NONE = 3      /* no overlay, only video: no target in view, or a component is not running */
 };
 
 /* Metadata of a frame. All numbers that are set are finite. */
@@ -45,15 +45,20 @@ typedef struct arhost_record {
     int64_t capture_ns;
     arhost_overlay overlay;
     int32_t has_camera; /* non-zero: `camera` is set */
-    int32_t has_truth;  /* non-zero: `truth_id` and `true_mt` are set (arhost/source.h) */
-    int32_t truth_id;
+    int32_t has_truth;  /* non-zero: `truth_target` and `true_mt` are set (arhost/source.h) */
+    uint32_t target_count;
+    char truth_target[ARHOST_MAX_NAME];
     double true_mt[16];
     arhost_camera camera;
     /* The quality to which the host has adapted the overlay (`live.target_fps`). */
     double overlay_scale;     /* size of the rendered image relative to the frame; 0: as large as the frame */
     uint32_t overlay_samples; /* samples per pixel; 0: as configured */
-    uint32_t marker_count;
-    arhost_marker markers[ARHOST_MAX_MARKERS];
+    uint32_t observation_count;
+    /* The targets that have been seen so far, in the order of the configuration. */
+    const arhost_target *targets;
+    /* The markers seen in this frame: those of the targets, then those that no target lists. */
+    const arhost_observation *observations;
+    char families[ARHOST_MAX_FAMILIES][ARHOST_MAX_FAMILY]; /* arhost_observation.family is an index in it */
 } arhost_record;
 
 /* An augmented frame to read: B, G, R bytes, top row first, `stride` bytes per row. */

@@ -67,11 +67,12 @@ typedef struct arhost_frame_info {
      * more than 1 s ahead, the host rejects the frame and restarts the source. If format.fps is set, frames are on
      * average 1/fps apart, counting skipped frames; live sources may be slower. */
     int64_t capture_ns;
-    uint32_t skipped;   /* frames lost by the device or dropped as late since the previous frame */
-    int32_t has_grey;   /* non-zero: the source has written `grey` */
-    int32_t has_truth;  /* non-zero: `true_mt` is set */
-    int32_t truth_id;   /* id of the marker of true_mt */
-    double true_mt[16]; /* ground truth of the marker-to-camera matrix, in the form of arhost_marker.mt; set by
+    uint32_t skipped;                   /* frames lost by the device or dropped as late since the previous frame */
+    int32_t has_grey;                   /* non-zero: the source has written `grey` */
+    int32_t has_truth;                  /* non-zero: `true_mt` is set */
+    uint32_t reserved;                  /* 0 */
+    char truth_target[ARHOST_MAX_NAME]; /* name of the target of true_mt */
+    double true_mt[16]; /* ground truth of the target-to-camera matrix, in the form of arhost_target.mt; set by
                            synthetic sources */
 } arhost_frame_info;
 

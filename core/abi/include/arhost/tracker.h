@@ -1,11 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * arhost/tracker.h: a tracker detects markers in frames and estimates their poses.
+ * arhost/tracker.h: a tracker finds targets in frames.
+ *
+ * A target is a rigid thing with a name whose pose the application needs: a marker, a map of several markers (a
+ * board, a box), or a body that the tracker knows by name.
+ *
+ * Most trackers are detectors: they report observations, the markers in a frame with their corners. The worker
+ * computes the poses of the targets from them, with their covariances, and follows them from frame to frame. A
+ * tracker with ARHOST_CAPABILITY_REPORTS_POSES, such as a motion-capture client, reports the poses of bodies itself.
  *
  * Marker coordinates: origin at the centre; x right, y up on the upright print, z out of the paper; millimetres.
  * Corners are ordered top-left, top-right, bottom-right, bottom-left on the upright print; with s = half of the side
  * length, their coordinates are (−s, s, 0), (s, s, 0), (s, −s, 0), (−s, −s, 0). "Upright" is defined by the AprilTag
- * library for its families, and by OpenCV's drawing functions for ArUco dictionaries.
+ * library for its families, and by OpenCV's drawing functions for ArUco dictionaries. The coordinates of a target
+ * that consists of a single marker are those of the marker.
  */
 #ifndef ARHOST_TRACKER_H
 #define ARHOST_TRACKER_H
@@ -18,59 +26,122 @@
 extern "C" {
 #endif
 
-enum { ARHOST_MAX_MARKERS = 64, ARHOST_MAX_FAMILY = 32, ARHOST_MAX_STATE = 16777216 };
-
-/* A marker listed in the configuration. */
-typedef struct arhost_marker_config {
-    uint32_t struct_size;
-    int32_t id;
-    double side_mm; /* side of the black square, the distance between adjacent reported corners; > 0 */
-} arhost_marker_config;
-
-typedef int32_t arhost_marker_state;
 enum {
-    ARHOST_MARKER_DETECTED = 1,  /* detected in this frame; both poses computed from this frame alone */
-    ARHOST_MARKER_PREDICTED = 2, /* pose from a motion model: smoothed if the marker was detected in this
-                                    frame (age_frames 0), extrapolated otherwise */
-    ARHOST_MARKER_LOST = 3       /* not detected, pose unknown; `mt` is the last known pose */
+    ARHOST_MAX_TARGETS = 1024,
+    ARHOST_MAX_MARKERS = 1024, /* of all targets */
+    ARHOST_MAX_OBSERVATIONS = 1024,
+    ARHOST_MAX_FAMILIES = 16,
+    ARHOST_MAX_FAMILY = 32, /* name of a family, with the terminating NUL */
+    ARHOST_MAX_STATE = 16777216
 };
 
-typedef struct arhost_marker {
+/* A target listed in the configuration. */
+typedef struct arhost_target_config {
     uint32_t struct_size;
-    int32_t id;
-    char family[ARHOST_MAX_FAMILY]; /* "tag36h11", "DICT_6X6_250" */
-    arhost_marker_state state;
-    uint32_t age_frames; /* frames since the last detection; 0 if DETECTED */
-    double corners_px[4][2];
-    /* Marker-to-camera matrix, column-major, OpenGL eye space: x right, y up, looking along −z; millimetres. The
-     * rotation is orthonormal to 1e-9, the last row is 0 0 0 1. */
-    double mt[16];
-    double mt_alternative[16]; /* the second solution of the planar pose problem; all 0 if there is none. A tracker
-                                  reports the one with the smaller error as `mt`. Afterwards its worker may exchange
-                                  the two, if motion and errors of several frames speak for the other one. */
-    double reprojection_px;    /* RMS reprojection error of the corners, in pixels of the distorted frame */
-    double ambiguity; /* reprojection error of `mt` divided by that of `mt_alternative`, at most 1: 0 if `mt` is
-                         unambiguous, 1 if both are equally likely, or exchanged */
-} arhost_marker;
+    uint32_t reserved; /* 0 */
+    const char *name;  /* unique */
+    const char *body;  /* the body that a tracker with ARHOST_CAPABILITY_REPORTS_POSES has to follow; NULL: the target
+                          consists of markers */
+} arhost_target_config;
+
+/* A marker of a target. */
+typedef struct arhost_marker_config {
+    uint32_t struct_size;
+    int32_t id;              /* unique within its family */
+    uint32_t family;         /* index in arhost_tracker_setup.families */
+    uint32_t target;         /* index in arhost_tracker_setup.targets */
+    double corners_mm[4][3]; /* in the target's coordinates; they form a plane convex quadrilateral */
+} arhost_marker_config;
 
 typedef struct arhost_tracker_setup {
     uint32_t struct_size;
-    uint32_t marker_count; /* at least 1 */
+    uint32_t target_count; /* at least 1 */
     const arhost_frame_format *format;
     const arhost_intrinsics *intrinsics; /* of the camera; width and height are those of the frames */
-    const arhost_marker_config *markers; /* marker_count elements, unique ids */
+    const arhost_target_config *targets;
+    const arhost_marker_config *markers;
+    uint32_t marker_count;
+    uint32_t family_count;
+    const char *const *families; /* names of the markers' families and dictionaries: "tag36h11", "DICT_6X6_250" */
 } arhost_tracker_setup;
 
+/* A marker seen in a frame. */
+typedef struct arhost_observation {
+    uint32_t struct_size;
+    int32_t id;
+    uint32_t family;         /* index in arhost_tracker_setup.families */
+    uint32_t hamming;        /* bits of the code that were corrected */
+    double corners_px[4][2]; /* in pixels of the distorted frame */
+    double decision_margin;  /* how clearly the bits were read, >= 0: larger is better, on a scale of the tracker's
+                                own;  0: unknown */
+} arhost_observation;
+
+typedef int32_t arhost_target_state;
+enum {
+    ARHOST_TARGET_DETECTED = 1,  /* seen in this frame */
+    ARHOST_TARGET_PREDICTED = 2, /* the pose comes from a motion model: smoothed if the target was seen in this frame
+                                    (age_frames 0), extrapolated otherwise */
+    ARHOST_TARGET_LOST = 3       /* not seen, pose unknown; `mt` is the last known pose */
+};
+
+/* The pose of a body, from a tracker with ARHOST_CAPABILITY_REPORTS_POSES. The fields are those of arhost_target. */
+typedef struct arhost_body_pose {
+    uint32_t struct_size;
+    uint32_t target; /* index in arhost_tracker_setup.targets, of a target with a `body` */
+    arhost_target_state state;
+    uint32_t age_frames;
+    double mt[16];
+    double covariance[36];
+} arhost_body_pose;
+
+/* The buffers for the results of `track`. The `struct_size` of each element is set; write all other fields. */
 typedef struct arhost_tracker_result {
     uint32_t struct_size;
-    uint32_t marker_count; /* set by the tracker */
-    arhost_marker markers[ARHOST_MAX_MARKERS];
+    uint32_t observation_count;       /* 0; set by the tracker, at most ARHOST_MAX_OBSERVATIONS */
+    arhost_observation *observations; /* ARHOST_MAX_OBSERVATIONS elements */
+    arhost_body_pose *poses;          /* arhost_tracker_setup.target_count elements */
+    uint32_t pose_count;              /* 0; set by a tracker with ARHOST_CAPABILITY_REPORTS_POSES */
+    uint32_t reserved;                /* 0 */
 } arhost_tracker_result;
+
+/* What the outputs learn about a target (arhost/sink.h). */
+typedef struct arhost_target {
+    uint32_t struct_size;
+    arhost_target_state state;
+    char name[ARHOST_MAX_NAME];
+    uint32_t age_frames;        /* frames since the target was last seen; 0 if DETECTED */
+    uint32_t first_observation; /* the observations that belong to the target, in this frame: a range of */
+    uint32_t observation_count; /* arhost_record.observations */
+    uint32_t reserved;          /* 0 */
+    /* Target-to-camera matrix, column-major, OpenGL eye space: x right, y up, looking along −z; millimetres. The
+     * rotation is orthonormal to 1e-9, the last row is 0 0 0 1. */
+    double mt[16];
+    /* The second solution of the planar pose problem; all 0 if there is none. `mt` is the one that continues the
+     * motion of the earlier frames, or the one with the smaller error in the first frame. */
+    double mt_alternative[16];
+    /* Covariance of translation (mm) and rotation (rad), row-major, in the axes of `mt`: the true pose is
+     * {exp(r)·R, t + d} with (d, r) from this distribution. All 0: unknown. */
+    double covariance[36];
+    double reprojection_px; /* RMS reprojection error of the corners, in pixels of the distorted frame, without
+                               outliers; 0 for a body */
+    double ambiguity;       /* reprojection error of `mt` divided by that of `mt_alternative`, at most 1; 0 if `mt` is
+                               unambiguous */
+} arhost_target;
+
+/* Where a marker is expected in a frame. */
+typedef struct arhost_expected_marker {
+    uint32_t struct_size;
+    uint32_t marker;         /* index in arhost_tracker_setup.markers */
+    double corners_px[4][2]; /* may be outside of the frame */
+    double margin_px;        /* the corners are probably not further from these places */
+} arhost_expected_marker;
 
 /* The input of `track`. */
 typedef struct arhost_track_request {
     uint32_t struct_size;
-    uint32_t reserved;         /* 0 */
+    int32_t
+        search_everywhere; /* 0: a detector may search only where markers are expected, which takes less time. This
+                              is not 0 if no marker is expected, after a target was lost, and at regular intervals */
     const arhost_frame *frame; /* read-only */
     /* The memory of a tracker whose `state_size` is not 0; otherwise both are NULL. The host keeps it, so it survives
      * the end of the worker process. Both are aligned to 64 bytes.
@@ -81,23 +152,27 @@ typedef struct arhost_track_request {
     const void *state_before;
     void *state_after;
     uint64_t state_size; /* bytes of each; 0 if both are NULL */
+    /* The markers that are expected because of the motion of their targets in earlier frames. */
+    const arhost_expected_marker *expected;
+    uint32_t expected_count;
+    uint32_t reserved; /* 0 */
 } arhost_track_request;
 
 typedef struct arhost_tracker {
     uint32_t struct_size;
 
-    /* [worker, created] Called once. Returns ARHOST_STATUS_ERROR_CONFIGURATION if a marker id is not in the
-     * dictionary. Returns ARHOST_STATUS_ERROR_CONFIGURATION or ARHOST_STATUS_ERROR_UNSUPPORTED if the tracker does
-     * not support the lens model or its number of coefficients. */
+    /* [worker, created] Called once. Returns ARHOST_STATUS_ERROR_CONFIGURATION if it does not know a family or body,
+     * or if a family has no marker with a listed id. Returns ARHOST_STATUS_ERROR_CONFIGURATION or
+     * ARHOST_STATUS_ERROR_UNSUPPORTED if the tracker does not support the lens model or its number of
+     * coefficients. */
     arhost_status (*start)(arhost_instance *instance, const arhost_tracker_setup *setup);
 
-    /* [worker, started] Reports the markers of the setup's list that it finds, in the order of that list, and no
-     * others. `result` is zeroed except for struct_size. Returns ARHOST_STATUS_OK even if no marker is found.
-     * The result and `state_after` depend only on the frame and `state_before`, not on earlier calls or the number of
-     * threads, so a restarted tracker continues with identical results. A DETECTED record depends only on the pixels
-     * of the frame. A tracker that smooths or predicts poses reports PREDICTED records, which must converge within 60
-     * frames after a marker has come to rest. Frames may be missing or repeated, and a frame may be older than the
-     * previous one. */
+    /* [worker, started] Reports the markers of the setup's families that it sees, each once, and all copies if
+     * several markers have the same id. Markers that no target lists may be left out; if they are reported, the host
+     * can tell the user which markers are there instead of the listed ones. Returns ARHOST_STATUS_OK even if there is
+     * none. The result and `state_after` depend only on the request, not on earlier calls or the number of threads,
+     * so a restarted tracker continues with identical results. Frames may be missing or repeated, and a frame may be
+     * older than the previous one. */
     arhost_status (*track)(arhost_instance *instance, const arhost_track_request *request,
                            arhost_tracker_result *result);
 

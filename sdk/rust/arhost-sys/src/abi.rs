@@ -102,6 +102,7 @@ pub const ARHOST_CAPABILITY_VIDEO_INPUT: u32 = 8192;
 pub const ARHOST_CAPABILITY_OVERLAY_INPUT: u32 = 16384;
 pub const ARHOST_CAPABILITY_SCALED_IMAGES: u32 = 32768;
 pub const ARHOST_CAPABILITY_RUN_DESCRIPTION: u32 = 65536;
+pub const ARHOST_CAPABILITY_REPORTS_POSES: u32 = 131072;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_descriptor {
@@ -316,6 +317,7 @@ pub const ARHOST_CLOCK_MONOTONIC: arhost_clock = 1;
 pub const ARHOST_CLOCK_MEDIA: arhost_clock = 2;
 pub const ARHOST_MAX_PLANES: usize = 3;
 pub const ARHOST_MAX_IMAGE_SIDE: usize = 16384;
+pub const ARHOST_MAX_NAME: usize = 64;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_frame_format {
@@ -433,10 +435,11 @@ pub struct arhost_frame_info {
     pub skipped: u32,
     pub has_grey: i32,
     pub has_truth: i32,
-    pub truth_id: i32,
+    pub reserved: u32,
+    pub truth_target: [c_char; ARHOST_MAX_NAME],
     pub true_mt: [f64; 16],
 }
-const _: () = assert!(size_of::<arhost_frame_info>() == 160);
+const _: () = assert!(size_of::<arhost_frame_info>() == 224);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_source {
@@ -450,66 +453,125 @@ unsafe impl Sync for arhost_source {} // a plugin's statics are immutable
 
 // ---- arhost/tracker.h ----
 
-pub const ARHOST_MAX_MARKERS: usize = 64;
+pub const ARHOST_MAX_TARGETS: usize = 1024;
+pub const ARHOST_MAX_MARKERS: usize = 1024;
+pub const ARHOST_MAX_OBSERVATIONS: usize = 1024;
+pub const ARHOST_MAX_FAMILIES: usize = 16;
 pub const ARHOST_MAX_FAMILY: usize = 32;
 pub const ARHOST_MAX_STATE: usize = 16777216;
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_target_config {
+    pub struct_size: u32,
+    pub reserved: u32,
+    pub name: *const c_char,
+    pub body: *const c_char,
+}
+const _: () = assert!(size_of::<arhost_target_config>() == 24);
+unsafe impl Sync for arhost_target_config {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_marker_config {
     pub struct_size: u32,
     pub id: i32,
-    pub side_mm: f64,
+    pub family: u32,
+    pub target: u32,
+    pub corners_mm: [[f64; 3]; 4],
 }
-const _: () = assert!(size_of::<arhost_marker_config>() == 16);
-pub type arhost_marker_state = i32;
-pub const ARHOST_MARKER_DETECTED: arhost_marker_state = 1;
-pub const ARHOST_MARKER_PREDICTED: arhost_marker_state = 2;
-pub const ARHOST_MARKER_LOST: arhost_marker_state = 3;
-#[repr(C)]
-#[derive(Clone, Copy)]
-pub struct arhost_marker {
-    pub struct_size: u32,
-    pub id: i32,
-    pub family: [c_char; ARHOST_MAX_FAMILY],
-    pub state: arhost_marker_state,
-    pub age_frames: u32,
-    pub corners_px: [[f64; 2]; 4],
-    pub mt: [f64; 16],
-    pub mt_alternative: [f64; 16],
-    pub reprojection_px: f64,
-    pub ambiguity: f64,
-}
-const _: () = assert!(size_of::<arhost_marker>() == 384);
+const _: () = assert!(size_of::<arhost_marker_config>() == 112);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_tracker_setup {
     pub struct_size: u32,
-    pub marker_count: u32,
+    pub target_count: u32,
     pub format: *const arhost_frame_format,
     pub intrinsics: *const arhost_intrinsics,
+    pub targets: *const arhost_target_config,
     pub markers: *const arhost_marker_config,
+    pub marker_count: u32,
+    pub family_count: u32,
+    pub families: *const *const c_char,
 }
-const _: () = assert!(size_of::<arhost_tracker_setup>() == 32);
+const _: () = assert!(size_of::<arhost_tracker_setup>() == 56);
 unsafe impl Sync for arhost_tracker_setup {} // a plugin's statics are immutable
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_observation {
+    pub struct_size: u32,
+    pub id: i32,
+    pub family: u32,
+    pub hamming: u32,
+    pub corners_px: [[f64; 2]; 4],
+    pub decision_margin: f64,
+}
+const _: () = assert!(size_of::<arhost_observation>() == 88);
+pub type arhost_target_state = i32;
+pub const ARHOST_TARGET_DETECTED: arhost_target_state = 1;
+pub const ARHOST_TARGET_PREDICTED: arhost_target_state = 2;
+pub const ARHOST_TARGET_LOST: arhost_target_state = 3;
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_body_pose {
+    pub struct_size: u32,
+    pub target: u32,
+    pub state: arhost_target_state,
+    pub age_frames: u32,
+    pub mt: [f64; 16],
+    pub covariance: [f64; 36],
+}
+const _: () = assert!(size_of::<arhost_body_pose>() == 432);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_tracker_result {
     pub struct_size: u32,
-    pub marker_count: u32,
-    pub markers: [arhost_marker; ARHOST_MAX_MARKERS],
+    pub observation_count: u32,
+    pub observations: *mut arhost_observation,
+    pub poses: *mut arhost_body_pose,
+    pub pose_count: u32,
+    pub reserved: u32,
 }
-const _: () = assert!(size_of::<arhost_tracker_result>() == 24584);
+const _: () = assert!(size_of::<arhost_tracker_result>() == 32);
+unsafe impl Sync for arhost_tracker_result {} // a plugin's statics are immutable
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_target {
+    pub struct_size: u32,
+    pub state: arhost_target_state,
+    pub name: [c_char; ARHOST_MAX_NAME],
+    pub age_frames: u32,
+    pub first_observation: u32,
+    pub observation_count: u32,
+    pub reserved: u32,
+    pub mt: [f64; 16],
+    pub mt_alternative: [f64; 16],
+    pub covariance: [f64; 36],
+    pub reprojection_px: f64,
+    pub ambiguity: f64,
+}
+const _: () = assert!(size_of::<arhost_target>() == 648);
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_expected_marker {
+    pub struct_size: u32,
+    pub marker: u32,
+    pub corners_px: [[f64; 2]; 4],
+    pub margin_px: f64,
+}
+const _: () = assert!(size_of::<arhost_expected_marker>() == 80);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_track_request {
     pub struct_size: u32,
-    pub reserved: u32,
+    pub search_everywhere: i32,
     pub frame: *const arhost_frame,
     pub state_before: *const c_void,
     pub state_after: *mut c_void,
     pub state_size: u64,
+    pub expected: *const arhost_expected_marker,
+    pub expected_count: u32,
+    pub reserved: u32,
 }
-const _: () = assert!(size_of::<arhost_track_request>() == 40);
+const _: () = assert!(size_of::<arhost_track_request>() == 56);
 unsafe impl Sync for arhost_track_request {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -859,15 +921,19 @@ pub struct arhost_record {
     pub overlay: arhost_overlay,
     pub has_camera: i32,
     pub has_truth: i32,
-    pub truth_id: i32,
+    pub target_count: u32,
+    pub truth_target: [c_char; ARHOST_MAX_NAME],
     pub true_mt: [f64; 16],
     pub camera: arhost_camera,
     pub overlay_scale: f64,
     pub overlay_samples: u32,
-    pub marker_count: u32,
-    pub markers: [arhost_marker; ARHOST_MAX_MARKERS],
+    pub observation_count: u32,
+    pub targets: *const arhost_target,
+    pub observations: *const arhost_observation,
+    pub families: [[c_char; ARHOST_MAX_FAMILY]; ARHOST_MAX_FAMILIES],
 }
-const _: () = assert!(size_of::<arhost_record>() == 24992);
+const _: () = assert!(size_of::<arhost_record>() == 1008);
+unsafe impl Sync for arhost_record {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_output {

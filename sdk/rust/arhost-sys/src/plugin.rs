@@ -178,7 +178,7 @@ pub trait Source: Plugin {
 
 pub trait Tracker: Plugin {
     fn start(&mut self, setup: &arhost_tracker_setup) -> Result<(), Failure>;
-    fn track(&mut self, request: &mut TrackRequest, result: &mut arhost_tracker_result) -> Result<(), Failure>;
+    fn track(&mut self, request: &mut TrackRequest, result: &mut TrackResult) -> Result<(), Failure>;
     /// The size in bytes of `TrackRequest::state_before` and `state_after`.
     fn state_size(&self) -> u64 {
         0
@@ -317,6 +317,8 @@ pub mod table {
 struct Instance<T> {
     host: Host,
     plugin: T,
+    /// Trackers: of the setup.
+    target_count: u32,
 }
 
 /// Runs `call`; logs an error or a panic and converts it to a status.
@@ -365,7 +367,7 @@ unsafe extern "C" fn create<T: Plugin>(
 ) -> arhost_status {
     guarded(Host(host), || {
         let plugin = T::new(Host(host), &Options(elements(options, option_count)))?;
-        *instance = Box::into_raw(Box::new(Instance { host: Host(host), plugin })).cast();
+        *instance = Box::into_raw(Box::new(Instance { host: Host(host), plugin, target_count: 0 })).cast();
         Ok(ARHOST_STATUS_OK)
     })
 }
@@ -529,6 +531,7 @@ unsafe extern "C" fn start_tracker<T: Tracker>(
     instance: *mut arhost_instance,
     setup: *const arhost_tracker_setup,
 ) -> arhost_status {
+    (*instance.cast::<Instance<T>>()).target_count = (*setup).target_count;
     with(instance, |plugin: &mut T| plugin.start(&*setup).map(|()| ARHOST_STATUS_OK))
 }
 unsafe extern "C" fn track<T: Tracker>(
@@ -536,8 +539,10 @@ unsafe extern "C" fn track<T: Tracker>(
     request: *const arhost_track_request,
     result: *mut arhost_tracker_result,
 ) -> arhost_status {
+    let target_count = (*instance.cast::<Instance<T>>()).target_count;
     with(instance, |plugin: &mut T| {
-        plugin.track(&mut TrackRequest(&*request), &mut *result).map(|()| ARHOST_STATUS_OK)
+        let mut result = TrackResult { result: &mut *result, target_count };
+        plugin.track(&mut TrackRequest(&*request), &mut result).map(|()| ARHOST_STATUS_OK)
     })
 }
 unsafe extern "C" fn state_size<T: Tracker>(instance: *mut arhost_instance) -> u64 {
@@ -614,6 +619,7 @@ mod tests {
 
     /// A struct as extended by a newer host.
     #[repr(C)]
+    #[derive(Clone, Copy)]
     struct Longer<T>(T, [u64; 2]);
 
     #[test]
@@ -627,16 +633,85 @@ mod tests {
         let options = Options(unsafe { elements(passed.as_ptr().cast(), 3) });
         assert_eq!((options.integer("a"), options.integer("b"), options.integer("c")), (1, 2, 3));
 
-        let marker = |id, side_mm| {
+        let marker = |id, target| {
             let struct_size = size_of::<Longer<arhost_marker_config>>() as u32;
-            Longer(arhost_marker_config { struct_size, id, side_mm }, [!0; 2])
+            let corners_mm = [[f64::from(id), 1.0, 2.0]; 4];
+            Longer(arhost_marker_config { struct_size, id, family: 0, target, corners_mm }, [!0; 2])
         };
-        let listed = [marker(4, 80.0), marker(7, 40.0)];
+        let listed = [marker(4, 0), marker(7, 1)];
+        let target = |name: &'static [u8], body: Option<&'static [u8]>| {
+            let struct_size = size_of::<Longer<arhost_target_config>>() as u32;
+            let body = body.map_or(std::ptr::null(), |body| body.as_ptr().cast());
+            Longer(arhost_target_config { struct_size, reserved: 0, name: name.as_ptr().cast(), body }, [!0; 2])
+        };
+        let targets = [target(b"cup\0", None), target(b"head\0", Some(b"rig\0"))];
+        let families = [b"tag36h11\0".as_ptr().cast::<c_char>()];
         let mut setup: arhost_tracker_setup = unsafe { std::mem::zeroed() };
+        setup.target_count = 2;
+        setup.targets = targets.as_ptr().cast();
         setup.marker_count = 2;
         setup.markers = listed.as_ptr().cast();
-        let read: Vec<_> = setup.markers().iter().map(|marker| (marker.id, marker.side_mm)).collect();
-        assert_eq!(read, [(4, 80.0), (7, 40.0)]);
+        setup.family_count = 1;
+        setup.families = families.as_ptr();
+        let read: Vec<_> = setup.markers().iter().map(|m| (m.id, m.target, m.corners_mm[3][0])).collect();
+        assert_eq!(read, [(4, 0, 4.0), (7, 1, 7.0)]);
+        let read: Vec<_> = setup.targets().iter().map(|t| (t.name(), t.body())).collect();
+        assert_eq!(read, [("cup".into(), None), ("head".into(), Some("rig".into()))]);
+        assert_eq!(setup.families(), ["tag36h11"]);
+    }
+
+    #[test]
+    fn a_result_takes_no_more_than_its_capacity() {
+        let empty = Longer(arhost_observation::default(), [!0; 2]);
+        let mut observations = vec![empty; ARHOST_MAX_OBSERVATIONS + 1];
+        for each in &mut observations {
+            each.0.struct_size = size_of::<Longer<arhost_observation>>() as u32;
+        }
+        let pose = arhost_body_pose {
+            struct_size: size_of::<arhost_body_pose>() as u32,
+            target: 1,
+            state: ARHOST_TARGET_DETECTED,
+            age_frames: 0,
+            mt: [0.0; 16],
+            covariance: [0.0; 36],
+        };
+        let mut poses = [arhost_body_pose { target: 0, ..pose }; 3];
+        let mut raw: arhost_tracker_result = unsafe { std::mem::zeroed() };
+        raw.observations = observations.as_mut_ptr().cast();
+        raw.poses = poses.as_mut_ptr();
+        let mut result = TrackResult { result: &mut raw, target_count: 2 };
+        for id in 0..ARHOST_MAX_OBSERVATIONS as i32 {
+            assert!(result.observe(arhost_observation { id, family: 1, ..Default::default() }));
+        }
+        assert!(!result.observe(arhost_observation { family: 1, ..Default::default() }));
+        assert!(result.report_pose(pose) && result.report_pose(pose) && !result.report_pose(pose));
+        assert_eq!((raw.observation_count, raw.pose_count), (ARHOST_MAX_OBSERVATIONS as u32, 2));
+        let last = &observations[ARHOST_MAX_OBSERVATIONS - 1];
+        assert_eq!((last.0.id, last.0.family), (ARHOST_MAX_OBSERVATIONS as i32 - 1, 1));
+        assert_eq!(last.0.struct_size, size_of::<Longer<arhost_observation>>() as u32);
+        assert_eq!((last.1, observations[ARHOST_MAX_OBSERVATIONS].0.family), ([!0; 2], 0));
+        assert_eq!(poses.map(|p| p.target), [1, 1, 0]);
+    }
+
+    #[test]
+    fn a_record_names_targets_and_families() {
+        fn put(to: &mut [c_char], name: &[u8]) {
+            to.iter_mut().zip(name).for_each(|(to, &from)| *to = from as c_char);
+        }
+        let mut target: arhost_target = unsafe { std::mem::zeroed() };
+        target.struct_size = size_of::<arhost_target>() as u32;
+        put(&mut target.name, b"cup");
+        let seen = arhost_observation { id: 3, family: 1, ..Default::default() };
+        let mut record: arhost_record = unsafe { std::mem::zeroed() };
+        assert!(record.targets().is_empty() && record.observations().is_empty() && record.truth_target().is_none());
+        (record.target_count, record.targets) = (1, &target);
+        (record.observation_count, record.observations) = (1, &seen);
+        put(&mut record.families[1], &[b'f'; ARHOST_MAX_FAMILY]); // without a NUL
+        record.has_truth = 1;
+        put(&mut record.truth_target, b"desk");
+        assert_eq!(record.targets()[0].name(), "cup");
+        assert_eq!(record.family(record.observations()[0]), "f".repeat(ARHOST_MAX_FAMILY));
+        assert_eq!(record.truth_target().unwrap(), "desk");
     }
 
     #[test]

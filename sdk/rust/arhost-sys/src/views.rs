@@ -2,7 +2,10 @@
 //! Safe views of the arguments of a call, valid only during that call.
 
 use crate::abi::*;
+use std::borrow::Cow;
+use std::ffi::CStr;
 use std::ops::Deref;
+use std::os::raw::c_char;
 use std::slice;
 
 /// A frame to read.
@@ -33,6 +36,14 @@ impl TrackRequest<'_> {
     pub fn frame(&self) -> Frame<'_> {
         Frame(unsafe { &*self.0.frame })
     }
+    /// False: a detector may search only where markers are expected.
+    pub fn search_everywhere(&self) -> bool {
+        self.0.search_everywhere != 0
+    }
+    /// The markers that are expected because of the motion of their targets in earlier frames.
+    pub fn expected(&self) -> Vec<&arhost_expected_marker> {
+        unsafe { elements(self.0.expected, self.0.expected_count) }
+    }
     /// What an earlier call wrote to `state_after`; `None` in the first frame.
     pub fn state_before(&self) -> Option<&[u8]> {
         let before = self.0.state_before.cast::<u8>();
@@ -42,6 +53,48 @@ impl TrackRequest<'_> {
     pub fn state_after(&mut self) -> &mut [u8] {
         let after = self.0.state_after.cast::<u8>();
         unsafe { if after.is_null() { &mut [] } else { slice::from_raw_parts_mut(after, self.0.state_size as usize) } }
+    }
+}
+
+/// Receives the results of `Tracker::track`.
+pub struct TrackResult<'a> {
+    pub(crate) result: &'a mut arhost_tracker_result,
+    pub(crate) target_count: u32,
+}
+
+impl TrackResult<'_> {
+    /// Adds a marker that the tracker sees in the frame. Returns false, and ignores it, if there are already
+    /// `ARHOST_MAX_OBSERVATIONS`.
+    pub fn observe(&mut self, seen: arhost_observation) -> bool {
+        let result = &mut *self.result;
+        let count = &mut result.observation_count;
+        unsafe { append(result.observations, count, ARHOST_MAX_OBSERVATIONS as u32, seen) }
+    }
+    /// Adds the pose of a body, for trackers with `ARHOST_CAPABILITY_REPORTS_POSES`. Returns false, and ignores it, if
+    /// there are already as many as targets.
+    pub fn report_pose(&mut self, pose: arhost_body_pose) -> bool {
+        let result = &mut *self.result;
+        unsafe { append(result.poses, &mut result.pose_count, self.target_count, pose) }
+    }
+}
+
+/// Writes an element of an array whose first field is its size, which it keeps.
+unsafe fn append<T>(first: *mut T, count: &mut u32, capacity: u32, value: T) -> bool {
+    if *count >= capacity {
+        return false;
+    }
+    let struct_size = *first.cast::<u32>();
+    let element = first.cast::<u8>().add(*count as usize * struct_size as usize);
+    element.cast::<T>().write(value);
+    element.cast::<u32>().write(struct_size);
+    *count += 1;
+    true
+}
+
+impl Default for arhost_observation {
+    fn default() -> Self {
+        let struct_size = std::mem::size_of::<Self>() as u32;
+        arhost_observation { struct_size, id: 0, family: 0, hamming: 0, corners_px: [[0.0; 2]; 4], decision_margin: 0.0 }
     }
 }
 
@@ -150,13 +203,63 @@ impl Deref for Scene {
     }
 }
 
+/// The text of a pointer that is not null.
+unsafe fn text<'a>(at: *const c_char) -> Cow<'a, str> {
+    CStr::from_ptr(at).to_string_lossy()
+}
+/// The text of an array.
+fn text_in(array: &[c_char]) -> Cow<'_, str> {
+    let bytes = unsafe { slice::from_raw_parts(array.as_ptr().cast::<u8>(), array.len()) };
+    String::from_utf8_lossy(bytes.split(|&byte| byte == 0).next().unwrap_or(bytes))
+}
+
 impl arhost_tracker_setup {
-    /// The markers to detect.
+    pub fn targets(&self) -> Vec<&arhost_target_config> {
+        unsafe { elements(self.targets, self.target_count) }
+    }
+    /// The markers of all targets.
     pub fn markers(&self) -> Vec<&arhost_marker_config> {
         unsafe { elements(self.markers, self.marker_count) }
     }
+    /// The names of the markers' families and dictionaries.
+    pub fn families(&self) -> Vec<Cow<'_, str>> {
+        unsafe { array(self.families, self.family_count).iter().map(|&name| text(name)).collect() }
+    }
     pub fn intrinsics(&self) -> &arhost_intrinsics {
         unsafe { &*self.intrinsics }
+    }
+}
+
+impl arhost_target_config {
+    pub fn name(&self) -> Cow<'_, str> {
+        unsafe { text(self.name) }
+    }
+    /// `None`: the target consists of markers.
+    pub fn body(&self) -> Option<Cow<'_, str>> {
+        unsafe { (!self.body.is_null()).then(|| text(self.body)) }
+    }
+}
+
+impl arhost_target {
+    pub fn name(&self) -> Cow<'_, str> {
+        text_in(&self.name)
+    }
+}
+
+impl arhost_record {
+    pub fn targets(&self) -> Vec<&arhost_target> {
+        unsafe { elements(self.targets, self.target_count) }
+    }
+    pub fn observations(&self) -> Vec<&arhost_observation> {
+        unsafe { elements(self.observations, self.observation_count) }
+    }
+    /// The name of an observation's family. Panics if there is no such family.
+    pub fn family(&self, seen: &arhost_observation) -> Cow<'_, str> {
+        text_in(&self.families[seen.family as usize])
+    }
+    /// The target of `true_mt`.
+    pub fn truth_target(&self) -> Option<Cow<'_, str>> {
+        (self.has_truth != 0).then(|| text_in(&self.truth_target))
     }
 }
 

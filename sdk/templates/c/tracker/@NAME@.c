@@ -1,20 +1,17 @@
-/* @NAME@: a tracker for arhost. Treats the bright pixels as one white square that faces the camera: their centroid
- * gives the direction, their area the distance. */
+/* @NAME@: a tracker for arhost. Treats the bright pixels as one white square that faces the camera: their centroid is
+ * its centre, their number its area. arhost computes the pose from the corners. */
 #include <arhost/arhost.h>
 
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 struct arhost_instance {
     const arhost_host *host;
     int64_t threshold;
-    arhost_intrinsics lens;
-    arhost_marker_config marker; /* the first configured marker; this tracker ignores the others */
+    arhost_marker_config marker; /* the first configured marker; this tracker does not look for others */
 };
 
 static arhost_status start(arhost_instance *self, const arhost_tracker_setup *setup) {
-    self->lens = *setup->intrinsics;
     self->marker = setup->markers[0];
     return ARHOST_STATUS_OK;
 }
@@ -22,8 +19,8 @@ static arhost_status start(arhost_instance *self, const arhost_tracker_setup *se
 static arhost_status track(arhost_instance *self, const arhost_track_request *request, arhost_tracker_result *result) {
     const arhost_frame *frame = request->frame;
     const arhost_frame_format *format = frame->format;
-    double area = 0, sum_x = 0, sum_y = 0, x, y, half, distance;
-    arhost_marker *marker = &result->markers[0];
+    double area = 0, sum_x = 0, sum_y = 0, half;
+    arhost_observation *seen = &result->observations[0];
     uint32_t column, row;
     int i;
 
@@ -39,26 +36,17 @@ static arhost_status track(arhost_instance *self, const arhost_track_request *re
     }
     if (area < 100)
         return ARHOST_STATUS_OK; /* no marker in this frame: not an error */
-    x = sum_x / area;
-    y = sum_y / area;
     half = sqrt(area) / 2;
-    distance = self->lens.fx * self->marker.side_mm / (2 * half);
 
-    result->marker_count = 1;
-    marker->struct_size = sizeof *marker;
-    marker->id = self->marker.id;
-    strcpy(marker->family, "bright");
-    marker->state = ARHOST_MARKER_DETECTED;
+    result->observation_count = 1; /* at most ARHOST_MAX_OBSERVATIONS */
+    seen->id = self->marker.id;
+    seen->family = self->marker.family;
+    seen->hamming = 0;
+    seen->decision_margin = 0;
     for (i = 0; i < 4; ++i) { /* top left, top right, bottom right, bottom left on the upright print */
-        marker->corners_px[i][0] = x + (i == 1 || i == 2 ? half : -half);
-        marker->corners_px[i][1] = y + (i >= 2 ? half : -half);
+        seen->corners_px[i][0] = sum_x / area + (i == 1 || i == 2 ? half : -half);
+        seen->corners_px[i][1] = sum_y / area + (i >= 2 ? half : -half);
     }
-    /* Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: frontal view. */
-    for (i = 0; i < 16; i += 5)
-        marker->mt[i] = 1;
-    marker->mt[12] = distance * (x - self->lens.cx) / self->lens.fx;
-    marker->mt[13] = -distance * (y - self->lens.cy) / self->lens.fy;
-    marker->mt[14] = -distance;
     return ARHOST_STATUS_OK;
 }
 
@@ -105,7 +93,7 @@ static const arhost_descriptor descriptor = {
     .version = "0.1.0",
     .vendor = "unknown", /* FILL IN: your name */
     .licence = "NONE",   /* FILL IN: SPDX identifier, e.g. "Apache-2.0" */
-    .description = "Tracks a bright patch as the marker.",
+    .description = "Detects a bright patch as the marker.",
     .option_count = sizeof options / sizeof *options,
     .options = options,
 };

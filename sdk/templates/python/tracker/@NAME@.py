@@ -1,5 +1,5 @@
-"""@NAME@: a tracker for arhost. Treats the bright pixels as one white square that faces the camera: their centroid
-gives the direction, their area the distance."""
+"""@NAME@: a tracker for arhost. Treats the bright pixels as one white square that faces the camera: their centroid is
+its centre, their number its area. arhost computes the pose from the corners."""
 import arhost
 import numpy as np
 
@@ -11,30 +11,14 @@ class @CLASS@:
         self.threshold = threshold
 
     def start(self, setup):
-        self.lens = setup.intrinsics
-        self.target = setup.markers[0]  # the first configured marker; this tracker ignores the others
+        self.marker = setup.markers[0]  # the first configured marker; this tracker does not look for others
 
-    def detect(self, grey):
+    def track(self, frame):
         """FILL IN: your detector."""
-        rows, columns = np.nonzero(grey >= self.threshold)
-        return None if len(rows) < 100 else (columns.mean(), rows.mean(), len(rows))
-
-    def track(self, frame, markers):
-        patch = self.detect(frame.grey)
-        if patch is None:
-            return 0  # no marker in this frame: not an error
-        x, y, area = patch
-        half = np.sqrt(area) / 2
-        distance = self.lens.fx * self.target.side_mm / (2 * half)
-
-        marker = markers[0]
-        marker["id"] = self.target.id
-        marker["family"] = b"bright"
-        marker["state"] = arhost.MARKER_DETECTED
+        rows, columns = np.nonzero(frame.grey >= self.threshold)
+        if len(rows) < 100:
+            return []  # no marker in this frame: not an error
+        half = np.sqrt(len(rows)) / 2
         # Top left, top right, bottom right, bottom left on the upright print.
-        marker["corners_px"] = np.array([x, y]) + half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        # Marker to camera, column-major; camera axes x right, y up, looking along -z; mm. No rotation: frontal view.
-        mt = np.eye(4)
-        mt[:3, 3] = distance * (x - self.lens.cx) / self.lens.fx, -distance * (y - self.lens.cy) / self.lens.fy, -distance
-        marker["mt"] = mt.T.reshape(16)
-        return 1  # number of markers filled in
+        corners = [columns.mean(), rows.mean()] + half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+        return [arhost.Observation(self.marker.id, corners, self.marker.family)]

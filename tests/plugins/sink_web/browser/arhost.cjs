@@ -32,7 +32,7 @@ class Run {
     fs.writeFileSync(path.join(this.folder, "run.yaml"), `version: 1
 mode: live
 source: {plugin: source_synthetic, fps: 30, options: {frames: 0, id: 0, side_mm: 80, width: ${width}, height: ${height}}}
-tracker: {plugin: tracker_aruco, markers: [{id: 0, side_mm: 80}], hold_frames: 3}
+tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}], hold_frames: 3}
 raytracer: {plugin: rt_embree, scene: scene.yaml}
 scenes: [other.yaml]
 alternatives: {raytracer: [{name: smooth, plugin: rt_embree, options: {samples: 2}}]}

@@ -50,6 +50,12 @@ test("the picture moves", async () => {
   await close();
 });
 
+test("the targets have their names", async () => {
+  const {page, close} = await open();
+  await eventually(page, () => document.getElementById("targets").textContent.includes("tag36h11-0detected"));
+  await close();
+});
+
 test("the picture moves without JavaScript", async () => {
   const {page, close} = await open({javaScriptEnabled: false});
   await moves(page);

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The pose of the world, which belongs to the first target of the configuration.
+#pragma once
+
+#include <arhost/tracker.h>
+
+#include <glm/glm.hpp>
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+
+namespace arhost::host {
+
+// While the first target is lost, the other targets tell where it is: each keeps its relation to the world from the
+// last frame in which both were detected. So the world never jumps from one target to another.
+class World {
+public:
+    // Returns the pose of the world in a frame, as arhost_target.mt. `first`: name of the first target.
+    // `grace_frames`: for how long the relations to other targets are trusted after the first target was last seen.
+    std::optional<std::array<double, 16>> locate(const std::string &first, std::span<const arhost_target> targets,
+                                                 std::uint64_t frame, std::uint64_t grace_frames);
+
+private:
+    std::map<std::string, glm::dmat4> target_from_world_; // by name of the target
+    std::uint64_t last_seen_ = 0;                         // the frame in which the first target was last detected
+    std::string substitute_;                              // the target that was used instead in the last frame
+};
+
+} // namespace arhost::host

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The targets of a tracker, as the host passes them to its worker.
+#pragma once
+
+#include "ipc/memory.hpp"
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace arhost::ipc {
+
+struct TargetMarker {
+    std::int32_t id = 0;
+    std::string family;                                // or dictionary
+    std::array<std::array<double, 3>, 4> corners_mm{}; // as in arhost_marker_config
+    bool operator==(const TargetMarker &) const = default;
+};
+
+struct Target {
+    std::string name;
+    std::vector<TargetMarker> markers; // empty for a body
+    std::string body;                  // "" for markers
+    bool operator==(const Target &) const = default;
+};
+
+// The families of all markers, each once, in the order of their first marker. arhost_marker_config.family and
+// arhost_observation.family are indices in it.
+std::vector<std::string> families_of(const std::vector<Target> &targets);
+
+// Too many targets for a message are passed in shared memory, which accompanies the message.
+SharedMemory to_memory(const std::vector<Target> &targets);
+std::vector<Target> targets_from(const Mapping &memory); // throws ProtocolViolation
+
+} // namespace arhost::ipc

@@ -1,0 +1,436 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_config/targets.hpp"
+
+#include "base/text.hpp"
+#include "run_config/access.hpp"
+#include "run_config/schema.hpp"
+#include "run_config/user_view.hpp"
+
+#include <arhost/tracker.h>
+
+#include <glm/ext/matrix_transform.hpp>
+#include <glm/geometric.hpp>
+#include <glm/mat3x3.hpp>
+#include <glm/trigonometric.hpp>
+#include <glm/vec3.hpp>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <ranges>
+#include <set>
+#include <tuple>
+#include <utility>
+
+namespace arhost::run_config {
+namespace {
+
+namespace fs = std::filesystem;
+using Corners = std::array<glm::dvec3, 4>;
+
+constexpr std::int32_t max_id = std::numeric_limits<std::int32_t>::max();
+constexpr double min_side_mm = 0.01, max_side_mm = 1e6, max_coordinate_mm = 1e7;
+constexpr double tolerance = 0.01; // of places in a map, relative to the side
+constexpr const char *name_rule = "letters, digits, '_', '.' and '-'";
+
+bool is_name(std::string_view text, std::size_t size_with_nul) {
+    return text.size() < size_with_nul && std::ranges::all_of(text, [](unsigned char c) {
+               return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
+                      c == '.' || c == '-';
+           });
+}
+
+std::string parse_name(const yaml::Node &node, std::size_t size_with_nul) {
+    std::string name = node.text();
+    if (!is_name(name, size_with_nul))
+        node.fail("must have at most " + std::to_string(size_with_nul - 1) + " characters, only " + name_rule +
+                  ", but is '" + base::printable(name, 200) + "'");
+    return name;
+}
+
+// Bodies have the names that another program gave them.
+std::string parse_body(const yaml::Node &node) {
+    const std::string body = node.text();
+    if (body.size() >= ARHOST_MAX_NAME || base::printable(body) != body)
+        node.fail("must have at most " + std::to_string(ARHOST_MAX_NAME - 1) + " bytes of printable text");
+    return body;
+}
+
+std::string parse_family(const yaml::Node &map) {
+    const auto family = map.find("family"), dictionary = map.find("dictionary");
+    if (family && dictionary)
+        dictionary->fail("'family' and 'dictionary' mean the same; remove one of them");
+    if (!family && !dictionary)
+        map.fail("the key 'family' or 'dictionary' is missing, as in 'family: tag36h11' or 'dictionary: "
+                 "DICT_6X6_250'");
+    return parse_name(family ? *family : *dictionary, ARHOST_MAX_FAMILY);
+}
+
+// The name under which two names of a family are the same: AprilTag's families are also dictionaries of OpenCV.
+std::string canonical(const std::string &family) {
+    constexpr std::string_view prefix = "DICT_APRILTAG_";
+    return family.starts_with(prefix) ? "tag" + family.substr(prefix.size()) : family;
+}
+
+std::string marker_name(const std::string &family, std::int64_t id) {
+    return family + "-" + std::to_string(id);
+}
+
+double parse_side(const yaml::Node &node) {
+    return node.real(min_side_mm, max_side_mm);
+}
+
+// Returns whether it warns.
+bool warn_of_side(const yaml::Node &node, double side_mm, std::vector<std::string> &warnings) {
+    if (side_mm >= 1 && side_mm <= 5000)
+        return false;
+    char text[32];
+    char *const end = std::to_chars(text, std::end(text), side_mm, std::chars_format::general, 6).ptr;
+    warnings.push_back(warning_at(node, "a marker with a side of " + std::string(text, end) +
+                                            " mm is implausible; check the unit, which is mm"));
+    return true;
+}
+
+Corners square_mm(double side_mm) {
+    const double s = side_mm / 2;
+    return {{{-s, s, 0}, {s, s, 0}, {s, -s, 0}, {-s, -s, 0}}};
+}
+
+TargetMarker marker_of(std::int64_t id, const std::string &family, const Corners &corners_mm) {
+    TargetMarker marker{static_cast<std::int32_t>(id), family, {}};
+    for (std::size_t i = 0; i < corners_mm.size(); ++i)
+        marker.corners_mm[i] = {corners_mm[i].x, corners_mm[i].y, corners_mm[i].z};
+    return marker;
+}
+
+// Parses "7" and "0-3".
+std::optional<std::pair<std::int32_t, std::int32_t>> parse_range(std::string_view text) {
+    const char *const end = text.data() + text.size();
+    std::int32_t first = 0, last = 0;
+    auto at = std::from_chars(text.data(), end, first);
+    last = first;
+    if (at.ec == std::errc() && at.ptr != end && *at.ptr == '-')
+        at = std::from_chars(at.ptr + 1, end, last);
+    if (at.ec != std::errc() || at.ptr != end || first < 0 || last < first)
+        return std::nullopt;
+    return std::pair(first, last);
+}
+
+// Parses ids, which are text such as "0-3,7", or a list of such texts.
+std::vector<std::int32_t> parse_ids(const yaml::Node &node) {
+    std::vector<std::int32_t> ids;
+    for (const yaml::Node &item : node.is_sequence() ? node.items() : std::vector{node})
+        for (const auto &part : std::views::split(item.text(), ',')) {
+            std::string_view text(part.begin(), part.end());
+            text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
+            text = text.substr(0, text.find_last_not_of(' ') + 1);
+            const auto range = parse_range(text);
+            if (!range)
+                item.fail("must be ids of 0 to " + std::to_string(max_id) + " such as 0-35 or [0-3, 7], but is '" +
+                          base::printable(item.text(), 200) + "'");
+            if (const std::size_t count =
+                    static_cast<std::size_t>(range->second) - static_cast<std::size_t>(range->first) + 1;
+                ids.size() + count > ARHOST_MAX_TARGETS)
+                item.fail("there can be at most " + std::to_string(int{ARHOST_MAX_TARGETS}) + " targets");
+            for (std::int32_t id = range->first; id < range->second; ++id)
+                ids.push_back(id);
+            ids.push_back(range->second);
+        }
+    if (ids.empty())
+        node.fail("must not be empty");
+    return ids;
+}
+
+// In {ids: 0-3,7, …}, YAML takes 7 as a key.
+void expect_no_ids_as_keys(const yaml::Node &target) {
+    const auto ids = target.find("ids");
+    if (!ids || !ids->is_scalar())
+        return;
+    std::string list = ids->text();
+    for (const auto &[key, value] : target.entries())
+        if (value.is_null() && parse_range(key))
+            list += ", " + key;
+    if (list != ids->text())
+        ids->fail("in braces, YAML ends a value at a comma; write ids: [" + list + "]");
+}
+
+glm::dvec3 parse_vector(const yaml::Node &node, double limit) {
+    const std::vector<double> values = node.reals(3);
+    for (const yaml::Node &value : node.items())
+        value.real(-limit, limit);
+    return {values[0], values[1], values[2]};
+}
+
+glm::dvec3 parse_point(const yaml::Node &node) {
+    return parse_vector(node, max_coordinate_mm);
+}
+
+// Returns R = Rz·Ry·Rx.
+glm::dmat3 parse_rotation(const yaml::Node &node) {
+    const glm::dvec3 angles = glm::radians(parse_vector(node, 360));
+    glm::dmat4 rotation(1);
+    rotation = glm::rotate(rotation, angles.z, {0, 0, 1});
+    rotation = glm::rotate(rotation, angles.y, {0, 1, 0});
+    return glm::rotate(rotation, angles.x, {1, 0, 0});
+}
+
+double mean_side(const Corners &corners) {
+    double sum = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+        sum += glm::distance(corners[(i + 1) % 4], corners[i]);
+    return sum / 4;
+}
+
+glm::dvec3 centre_of(const Corners &corners) {
+    return (corners[0] + corners[1] + corners[2] + corners[3]) / 4.0;
+}
+
+// Of a marker that is seen from its front, which is where the corners are clockwise.
+glm::dvec3 normal_of(const Corners &corners) {
+    return glm::normalize(glm::cross(corners[3] - corners[1], corners[2] - corners[0]));
+}
+
+Corners parse_corners(const yaml::Node &node) {
+    const std::vector<yaml::Node> points = node.items();
+    if (points.size() != 4)
+        node.fail("must be 4 corners [x, y, z]: top left, top right, bottom right, bottom left; but has " +
+                  std::to_string(points.size()));
+    Corners corners;
+    std::ranges::transform(points, corners.begin(), parse_point);
+    for (std::size_t i = 0; i < 4; ++i)
+        if (const double side = glm::distance(corners[(i + 1) % 4], corners[i]);
+            side < min_side_mm || side > max_side_mm)
+            points[i].fail("the side to the next corner must be 0.01 to 1e+06 mm long");
+    const glm::dvec3 centre = centre_of(corners), normal = normal_of(corners);
+    for (std::size_t i = 0; i < 4; ++i) {
+        const glm::dvec3 to = glm::normalize(corners[i] - corners[(i + 3) % 4]),
+                         from = glm::normalize(corners[(i + 1) % 4] - corners[i]);
+        if (!(glm::dot(glm::cross(from, to), normal) > tolerance)) // also if the normal is not a number
+            points[i].fail("the corners must form a convex quadrilateral in the order top left, top right, bottom "
+                           "right, bottom left");
+        if (std::abs(glm::dot(corners[i] - centre, normal)) > tolerance * mean_side(corners))
+            node.fail("the corners must be in a plane to within 1 % of the side");
+    }
+    return corners;
+}
+
+struct PlacedMarker {
+    std::int64_t id;
+    Corners corners_mm;
+};
+
+PlacedMarker parse_placed_marker(const yaml::Node &node) {
+    const auto corners = node.find("corners_mm");
+    if (!corners && !node.find("side_mm"))
+        node.fail("the key 'side_mm' (with 'position_mm') or 'corners_mm' is missing");
+    for (const char *key : {"side_mm", "position_mm", "rotation_degrees"})
+        if (const auto other = corners ? node.find(key) : std::nullopt)
+            other->fail("the place is also given by 'corners_mm'; remove one of them");
+    const std::int64_t id = node.require("id").integer(0, max_id);
+    if (corners)
+        return {id, parse_corners(*corners)};
+    PlacedMarker marker{id, square_mm(parse_side(node.require("side_mm")))};
+    const glm::dvec3 position = parse_point(node.require("position_mm"));
+    const auto rotation = node.find("rotation_degrees");
+    const glm::dmat3 rotation_matrix = rotation ? parse_rotation(*rotation) : glm::dmat3(1);
+    for (glm::dvec3 &corner : marker.corners_mm)
+        corner = rotation_matrix * corner + position;
+    return marker;
+}
+
+bool are_at_the_same_place(const Corners &a, const Corners &b) {
+    const double side = mean_side(a), limit = tolerance * side;
+    return std::abs(side - mean_side(b)) < limit && glm::distance(centre_of(a), centre_of(b)) < limit &&
+           glm::dot(normal_of(a), normal_of(b)) > 0;
+}
+
+// The markers of all targets: a marker belongs to one target.
+class Owners {
+public:
+    void add(const yaml::Node &node, const Target &target) {
+        if (const auto [other, is_new] = names_.try_emplace(target.name, node.where()); !is_new)
+            node.fail("the name '" + target.name + "' is also that of another target (" + other->second +
+                      "); give each its own name");
+        for (const TargetMarker &marker : target.markers) {
+            families_.insert(marker.family);
+            if (const auto [other, is_new] = markers_.try_emplace({canonical(marker.family), marker.id}, target.name);
+                !is_new)
+                node.fail("the marker " + marker_name(marker.family, marker.id) + " also belongs to the target '" +
+                          other->second + "'; remove one of them");
+        }
+    }
+    std::size_t marker_count() const { return markers_.size(); }
+    std::size_t family_count() const { return families_.size(); }
+
+private:
+    std::map<std::string, std::string> names_; // with the places of the targets
+    std::map<std::pair<std::string, std::int32_t>, std::string> markers_;
+    std::set<std::string> families_;
+};
+
+Target parse_map_target(const yaml::Node &node, std::vector<fs::path> &map_files,
+                        std::vector<std::string> &warnings) {
+    Target target{parse_name(node.require("name"), ARHOST_MAX_NAME), {}, ""};
+    const yaml::Node map = node.require("map");
+    const fs::path file = map.input_path();
+    std::error_code ignored;
+    if (!fs::exists(file, ignored))
+        map.fail("there is no map file '" + file.string() + "'" + hint_at_similar_name(file));
+    map_files.push_back(file);
+    target.markers = read_map(file, warnings);
+    return target;
+}
+
+// Returns the targets of an element of the list; several if it is a range of ids.
+std::vector<Target> parse_target(const yaml::Node &node, std::vector<fs::path> &map_files,
+                                 std::vector<std::string> &warnings) {
+    if (!node.is_map())
+        node.fail("must be a map of keys, as in {marker: 0, family: tag36h11, side_mm: 80}");
+    expect_no_ids_as_keys(node);
+    node.allow_keys(keys_of("tracker.targets[]"));
+    std::string kind;
+    for (const char *key : {"marker", "ids", "map", "body"})
+        if (const auto found = node.find(key)) {
+            if (!kind.empty())
+                found->fail("a target has only one of the keys 'marker', 'ids', 'map' and 'body', but '" + kind +
+                            "' is there, too; make two targets of them");
+            kind = key;
+        }
+    if (kind.empty())
+        node.fail("one of the keys 'marker', 'ids', 'map' and 'body' is missing, as in {marker: 0, family: tag36h11, "
+                  "side_mm: 80}");
+    const bool has_marker = kind == "marker" || kind == "ids";
+    for (const char *key : {"family", "dictionary", "side_mm"})
+        if (const auto found = has_marker ? std::nullopt : node.find(key))
+            found->fail(kind == "map" ? "belongs in the map; remove it here"
+                                      : "does not apply to a body, which has no markers; remove it");
+    if (kind == "body")
+        return {{parse_name(node.require("name"), ARHOST_MAX_NAME), {}, parse_body(node.require("body"))}};
+    if (kind == "map")
+        return {parse_map_target(node, map_files, warnings)};
+
+    const std::string family = parse_family(node);
+    const yaml::Node side = node.require("side_mm");
+    const Corners corners_mm = square_mm(parse_side(side));
+    warn_of_side(side, parse_side(side), warnings);
+    const auto name = node.find("name");
+    if (kind == "marker") {
+        const std::int64_t id = node.require("marker").integer(0, max_id);
+        return {{name ? parse_name(*name, ARHOST_MAX_NAME) : marker_name(family, id),
+                 {marker_of(id, family, corners_mm)},
+                 ""}};
+    }
+    if (name)
+        name->fail("the targets of a range of ids are named FAMILY-ID, such as " + marker_name(family, 0) +
+                   "; remove this key, or list targets with 'marker'");
+    std::vector<Target> targets;
+    for (const std::int32_t id : parse_ids(node.require("ids")))
+        targets.push_back({marker_name(family, id), {marker_of(id, family, corners_mm)}, ""});
+    return targets;
+}
+
+// Returns the option with which earlier versions chose the family of all markers, if the tracker has it.
+std::optional<yaml::Node> family_option(const yaml::Node &tracker, const char *name) {
+    const auto options = tracker.find("options");
+    const auto option = options && options->is_map() ? options->find(name) : std::nullopt;
+    return option && option->is_scalar() ? option : std::nullopt;
+}
+
+// Returns the family in the syntax of a target, which is that of all markers of a configuration for earlier versions.
+std::string family_of_all_markers(const yaml::Node &tracker) {
+    if (const auto file = family_option(tracker, "dictionary_file"))
+        return "dictionary: " + fs::path(file->text()).stem().string();
+    for (const char *name : {"dictionary", "family"})
+        if (const auto option = family_option(tracker, name))
+            return std::string(name) + ": " + option->text();
+    return "family: tag36h11";
+}
+
+} // namespace
+
+std::vector<Target> parse_targets(const yaml::Node &list, std::vector<fs::path> &map_files,
+                                  std::vector<std::string> &warnings) {
+    std::vector<Target> targets;
+    Owners owners;
+    for (const yaml::Node &node : list.items())
+        for (Target &target : parse_target(node, map_files, warnings)) {
+            owners.add(node, target);
+            targets.push_back(std::move(target));
+            for (const auto &[count, limit, what] : {std::tuple{targets.size(), int{ARHOST_MAX_TARGETS}, "targets"},
+                                                     {owners.marker_count(), ARHOST_MAX_MARKERS, "markers"},
+                                                     {owners.family_count(), ARHOST_MAX_FAMILIES, "families"}})
+                if (count > static_cast<std::size_t>(limit))
+                    node.fail("there can be at most " + std::to_string(limit) + " " + what);
+        }
+    if (targets.empty())
+        list.fail("must list 1 to " + std::to_string(int{ARHOST_MAX_TARGETS}) +
+                  " targets, as in [{marker: 0, family: tag36h11, side_mm: 80}]");
+    return targets;
+}
+
+std::vector<TargetMarker> read_map(const fs::path &file, std::vector<std::string> &warnings) {
+    const yaml::Node root = yaml::Node::load(file);
+    root.allow_keys({"version", "family", "dictionary", "markers"});
+    if (const yaml::Node version = root.require("version"); version.integer() != 1)
+        version.fail("must be 1, the only supported version");
+    const std::string family = parse_family(root);
+    const yaml::Node list = root.require("markers");
+    const std::vector<yaml::Node> nodes = list.items();
+    if (nodes.empty() || nodes.size() > ARHOST_MAX_MARKERS)
+        list.fail("must list 1 to " + std::to_string(int{ARHOST_MAX_MARKERS}) +
+                  " markers, as in [{id: 0, side_mm: 80, position_mm: [0, 0, 0]}]");
+    std::vector<PlacedMarker> placed;
+    bool warned = false; // the unit is the same for all markers
+    for (const yaml::Node &node : nodes) {
+        node.allow_keys({"id", "side_mm", "position_mm", "rotation_degrees", "corners_mm"});
+        const PlacedMarker marker = parse_placed_marker(node);
+        for (std::size_t i = 0; i < placed.size(); ++i) {
+            const auto other = [&] { return nodes[i].path() + " (" + nodes[i].where() + ")"; };
+            if (placed[i].id == marker.id)
+                node.require("id").fail("the marker " + std::to_string(marker.id) + " is also " + other() +
+                                        "; keep one of them");
+            if (are_at_the_same_place(placed[i].corners_mm, marker.corners_mm))
+                node.fail("the marker " + std::to_string(marker.id) + " is at the place of marker " +
+                          std::to_string(placed[i].id) + ", " + other() + "; correct one of them");
+        }
+        placed.push_back(marker);
+        warned = warned || warn_of_side(node, mean_side(marker.corners_mm), warnings);
+    }
+    std::vector<TargetMarker> markers(placed.size());
+    std::ranges::transform(placed, markers.begin(), [&](const PlacedMarker &marker) {
+        return marker_of(marker.id, family, marker.corners_mm);
+    });
+    return markers;
+}
+
+void reject_markers(const yaml::Node &tracker) {
+    const auto markers = tracker.find("markers");
+    if (!markers)
+        return;
+    const std::string family = family_of_all_markers(tracker);
+    std::string targets;
+    if (markers->is_sequence())
+        for (const yaml::Node &marker : markers->items()) {
+            const auto id = marker.is_map() ? marker.find("id") : std::nullopt;
+            const auto side = marker.is_map() ? marker.find("side_mm") : std::nullopt;
+            if (id && side && id->is_scalar() && side->is_scalar())
+                targets += (targets.empty() ? "" : ", ") +
+                           ("{marker: " + id->text() + ", " + family + ", side_mm: " + side->text() + "}");
+        }
+    if (targets.empty())
+        targets = "{marker: 0, " + family + ", side_mm: 80}";
+    markers->fail("is now 'targets'; write: targets: [" + base::printable(targets) + "]");
+}
+
+void reject_family_option(const yaml::Node &tracker) {
+    for (const auto &[plugin, name] : {std::pair{"tracker_aruco", "dictionary"}, {"tracker_apriltag", "family"}})
+        if (const auto option = family_option(tracker, name);
+            option && fs::path(tracker.require("plugin").text()).stem() == plugin)
+            option->fail("belongs to each target now: remove it here and write '" + std::string(name) + ": " +
+                         base::printable(option->text(), 200) + "' in tracker.targets");
+}
+
+} // namespace arhost::run_config

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Parses the targets of a tracker: single markers, maps of markers, bodies.
+#pragma once
+
+#include "ipc/targets.hpp"
+#include "yaml/yaml.hpp"
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace arhost::run_config {
+
+using ipc::Target; // declared in core/ipc, because workers receive them
+using ipc::TargetMarker;
+
+// Parses the key `targets` of a tracker. Appends the absolute paths of the maps that it reads to `map_files`. All
+// functions throw yaml::Error and append their warnings to `warnings`.
+std::vector<Target> parse_targets(const yaml::Node &targets, std::vector<std::filesystem::path> &map_files,
+                                  std::vector<std::string> &warnings);
+
+// Reads a map of markers (docs/markers.md).
+std::vector<TargetMarker> read_map(const std::filesystem::path &file, std::vector<std::string> &warnings);
+
+// Rejects the keys and options of earlier versions, for which `targets` is the replacement, in a tracker or an
+// alternative to it.
+void reject_markers(const yaml::Node &tracker);
+void reject_family_option(const yaml::Node &tracker);
+
+} // namespace arhost::run_config

@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "worker/target_solver.hpp"
+
+#include "pose/track.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+
+namespace arhost::worker {
+
+struct TargetSolver::Header {
+    std::uint32_t frames_since_full_search, reserved;
+};
+
+// What is known about a target from earlier frames. Plain data without pointers; all zero if it was never seen.
+struct TargetSolver::Memory {
+    pose::Track track; // not of bodies
+    double mt[16];     // the last known pose
+    std::uint32_t was_seen, age_frames;
+};
+
+namespace {
+
+using pose::Correspondence;
+using pose::Estimate;
+using pose::ObservedMarker;
+using pose::Rigid;
+
+// The noise of a corner. That of a map contains the errors of its printed layout.
+constexpr double marker_sigma_px = 0.1, map_sigma_px = 0.5;
+
+[[noreturn]] void violation(const std::string &what) {
+    throw std::runtime_error("contract violation: the tracker " + what);
+}
+
+bool is_rotation(const Rigid &pose) {
+    return (pose.rotation * pose.rotation.transpose()).isIdentity(1e-6) && pose.rotation.determinant() > 0;
+}
+
+// Converts a covariance from OpenCV's camera axes to those of arhost_target.mt. Both flip y and z.
+void write_covariance(const pose::Matrix6d &covariance, double (&out)[36]) {
+    const Eigen::Matrix<double, 6, 1> flip(1, -1, -1, 1, -1, -1);
+    Eigen::Map<pose::Matrix6d>{out} = flip.asDiagonal() * covariance * flip.asDiagonal();
+}
+
+double shortest_side_px(const ObservedMarker &marker) {
+    double shortest = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < 4; ++i)
+        shortest = std::min(shortest, (marker.corners_px[(i + 1) % 4] - marker.corners_px[i]).norm());
+    return shortest;
+}
+
+Eigen::Vector2d centre_px(const arhost_observation &observation) {
+    Eigen::Vector2d sum(0, 0);
+    for (const auto &corner : observation.corners_px)
+        sum += Eigen::Vector2d(corner);
+    return sum / 4;
+}
+
+} // namespace
+
+TargetSolver::TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<ipc::Target> &targets,
+                           std::uint32_t full_search_every)
+    : projection_(intrinsics), full_search_every_(full_search_every) {
+    std::uint32_t next_index = 0;
+    const std::vector<std::string> families = families_of(targets);
+    family_count_ = static_cast<std::uint32_t>(families.size());
+    for (const ipc::Target &target : targets) {
+        for (const ipc::TargetMarker &marker : target.markers) {
+            const auto family =
+                static_cast<std::uint32_t>(std::ranges::find(families, marker.family) - families.begin());
+            Marker &added = markers_[{family, marker.id}];
+            added.index = next_index++;
+            added.target = targets_.size();
+            std::ranges::transform(marker.corners_mm, added.corners_mm.begin(),
+                                   [](const auto &corner) { return Eigen::Vector3d(corner.data()); });
+        }
+        targets_.push_back({!target.body.empty(), target.markers.size() > 1 ? map_sigma_px : marker_sigma_px});
+    }
+}
+
+std::uint64_t TargetSolver::state_size() const {
+    return sizeof(Header) + targets_.size() * sizeof(Memory);
+}
+
+TargetSolver::Header TargetSolver::header_of(const void *state) const {
+    Header header{};
+    if (state)
+        std::memcpy(&header, state, sizeof header);
+    return header;
+}
+
+TargetSolver::Memory TargetSolver::memory_of(const void *state, std::size_t target) const {
+    Memory memory{};
+    if (state)
+        std::memcpy(&memory, static_cast<const std::byte *>(state) + sizeof(Header) + target * sizeof memory,
+                    sizeof memory);
+    if (memory.was_seen && !is_rotation(pose::rigid_of(memory.mt))) // bytes that this class has not written
+        memory = {};
+    return memory;
+}
+
+TargetSolver::Expectation TargetSolver::expect(std::int64_t capture_ns, const void *before) const {
+    constexpr double sigmas = 4, min_margin_px = 4;
+    Expectation expectation{{}, !before || header_of(before).frames_since_full_search + 1 >= full_search_every_};
+    std::vector<std::optional<pose::Motion>> motions;
+    for (std::size_t target = 0; target < targets_.size(); ++target) {
+        const Memory memory = memory_of(before, target);
+        const bool is_visible = memory.was_seen && memory.age_frames == 0;
+        motions.push_back(is_visible ? predicted_motion(memory.track, capture_ns) : std::nullopt);
+        // A target that was lost in the last frame may be anywhere now.
+        expectation.search_everywhere |= memory.was_seen && memory.age_frames == 1;
+    }
+    const arhost_intrinsics &frame = projection_.intrinsics();
+    for (const auto &[key, marker] : markers_) {
+        if (!motions[marker.target])
+            continue;
+        const pose::Motion &motion = *motions[marker.target];
+        const Rigid pose = pose_of(motion);
+        arhost_expected_marker expected{sizeof expected, marker.index, {}, min_margin_px};
+        bool is_visible = true;
+        Eigen::AlignedBox2d bounds;
+        for (int i = 0; i < 4 && is_visible; ++i) {
+            pose::Jacobian23 derivative;
+            const auto pixel = projection_.pixel(pose * marker.corners_mm[i], &derivative);
+            is_visible = pixel.has_value();
+            if (!pixel)
+                continue;
+            const Eigen::Matrix2d covariance =
+                derivative * covariance_of(motion, marker.corners_mm[i]) * derivative.transpose();
+            expected.margin_px = std::max(expected.margin_px, sigmas * std::sqrt(covariance.trace()));
+            expected.corners_px[i][0] = pixel->x();
+            expected.corners_px[i][1] = pixel->y();
+            bounds.extend(*pixel);
+        }
+        const Eigen::Vector2d margin(expected.margin_px, expected.margin_px);
+        const Eigen::AlignedBox2d whole(Eigen::Vector2d(0, 0), Eigen::Vector2d(frame.width - 1, frame.height - 1)),
+            region(bounds.min() - margin, bounds.max() + margin);
+        if (is_visible && whole.intersects(region))
+            expectation.markers.push_back(expected);
+    }
+    expectation.search_everywhere |= expectation.markers.empty();
+    return expectation;
+}
+
+const TargetSolver::Marker *TargetSolver::marker_of(const arhost_observation &observation) const {
+    const auto found = markers_.find({observation.family, observation.id});
+    return found == markers_.end() ? nullptr : &found->second;
+}
+
+void TargetSolver::check(const arhost_tracker_result &reported) const {
+    if (reported.observation_count > ARHOST_MAX_OBSERVATIONS)
+        violation("reports " + std::to_string(reported.observation_count) + " observations; the limit is " +
+                  std::to_string(ARHOST_MAX_OBSERVATIONS));
+    for (const arhost_observation &observation : std::span(reported.observations, reported.observation_count)) {
+        const std::string name = "marker " + std::to_string(observation.id);
+        if (observation.family >= family_count_)
+            violation("reports " + name + " with the family index " + std::to_string(observation.family) +
+                      ", but the setup has " + std::to_string(family_count_) + " families");
+        for (const auto &corner : observation.corners_px)
+            if (!std::isfinite(corner[0]) || !std::isfinite(corner[1]))
+                violation("reports " + name + " with a corner that is not finite");
+        if (!(observation.decision_margin >= 0 && std::isfinite(observation.decision_margin)))
+            violation("reports " + name + " with an invalid decision margin");
+    }
+    if (reported.pose_count > targets_.size())
+        violation("reports more poses than there are targets");
+    std::vector<bool> has_pose(targets_.size());
+    for (const arhost_body_pose &body : std::span(reported.poses, reported.pose_count)) {
+        if (body.target >= targets_.size() || !targets_[body.target].is_body)
+            violation("reports a pose of the target " + std::to_string(body.target) + ", which is not a body");
+        if (has_pose[body.target])
+            violation("reports two poses of the target " + std::to_string(body.target));
+        has_pose[body.target] = true;
+        if (body.state < ARHOST_TARGET_DETECTED || body.state > ARHOST_TARGET_LOST)
+            violation("reports a pose with an invalid state");
+        const auto is_finite = [](double number) { return std::isfinite(number); };
+        if (!std::ranges::all_of(body.mt, is_finite) || !std::ranges::all_of(body.covariance, is_finite) ||
+            !is_rotation(pose::rigid_of(body.mt)))
+            violation("reports a pose or covariance that is not finite, or a pose that is no rotation");
+    }
+}
+
+// If the same marker is seen several times, keeps the copy that is nearest to where the target is expected: by its
+// motion or, if it is unknown, by the target's other markers. Otherwise keeps the copy with the fewest corrected
+// bits, or that which was read most clearly.
+std::vector<ObservedMarker> TargetSolver::without_copies(std::span<const arhost_observation> observations,
+                                                         const std::optional<pose::Motion> &predicted,
+                                                         double corner_sigma_px) const {
+    const auto observed = [&](const arhost_observation &observation) {
+        ObservedMarker marker{marker_of(observation)->corners_mm, {}, corner_sigma_px};
+        std::ranges::transform(observation.corners_px, marker.corners_px.begin(),
+                               [](const auto &corner) { return Eigen::Vector2d(corner); });
+        return marker;
+    };
+    std::map<std::pair<std::uint32_t, std::int32_t>, std::vector<const arhost_observation *>> by_marker;
+    for (const arhost_observation &observation : observations)
+        by_marker[{observation.family, observation.id}].push_back(&observation);
+    std::vector<ObservedMarker> markers;
+    for (const auto &[marker, copies] : by_marker)
+        if (copies.size() == 1)
+            markers.push_back(observed(*copies.front()));
+    std::vector<Estimate> poses;
+    if (!predicted && markers.size() < by_marker.size())
+        poses = estimate_poses(markers, projection_);
+    const bool is_known = predicted || !poses.empty();
+    const Rigid expected = predicted ? pose_of(*predicted) : is_known ? poses.front().camera_from_target : Rigid();
+    for (const auto &[key, copies] : by_marker) {
+        if (copies.size() == 1)
+            continue;
+        const std::array<Eigen::Vector3d, 4> &corners = markers_.at(key).corners_mm;
+        const auto centre = is_known ? projection_.pixel(expected * ((corners[0] + corners[2]) / 2)) : std::nullopt;
+        const auto cost = [&](const arhost_observation *copy) {
+            return centre ? std::pair((centre_px(*copy) - *centre).norm(), 0.0)
+                          : std::pair(static_cast<double>(copy->hamming), -copy->decision_margin);
+        };
+        markers.push_back(observed(**std::ranges::min_element(copies, {}, cost)));
+    }
+    return markers;
+}
+
+void TargetSolver::solve(const Target &target, std::span<const arhost_observation> observations,
+                         std::int64_t capture_ns, Memory &memory, arhost_target &out) const {
+    const auto markers =
+        without_copies(observations, predicted_motion(memory.track, capture_ns), target.corner_sigma_px);
+    std::vector<Estimate> poses = estimate_poses(markers, projection_);
+    // Something hides a corner of the only marker. With several markers, such corners are outliers.
+    if (markers.size() == 1)
+        std::erase_if(poses, [limit = std::max(2.0, 0.05 * shortest_side_px(markers.front()))](const Estimate &pose) {
+            return pose.reprojection_px > limit;
+        });
+    if (poses.empty())
+        return;
+    const pose::Step step = next_step(memory.track, poses, capture_ns);
+    memory.track = step.track;
+    memory.was_seen = 1;
+    memory.age_frames = 0;
+    const Estimate &chosen = poses[step.chosen];
+    std::ranges::copy(matrix_of(chosen.camera_from_target), memory.mt);
+    out.state = ARHOST_TARGET_DETECTED;
+    write_covariance(chosen.covariance, out.covariance);
+    out.reprojection_px = chosen.reprojection_px;
+    if (poses.size() == 1)
+        return;
+    const Estimate &other = poses[1 - step.chosen];
+    std::ranges::copy(matrix_of(other.camera_from_target), out.mt_alternative);
+    out.ambiguity =
+        chosen.reprojection_px < other.reprojection_px ? chosen.reprojection_px / other.reprojection_px : 1;
+}
+
+void TargetSolver::solve(const arhost_tracker_result &reported, bool searched_everywhere, std::int64_t capture_ns,
+                         const void *before, void *after, const Output &output) const {
+    check(reported);
+    const Header header{searched_everywhere ? 0 : header_of(before).frames_since_full_search + 1, 0};
+    std::memcpy(after, &header, sizeof header);
+    const std::span all(reported.observations, reported.observation_count);
+    std::vector<std::size_t> order; // of the observations: those of the first target, …, those of no target
+    std::vector<std::size_t> target_of;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        const Marker *marker = marker_of(all[i]);
+        target_of.push_back(marker ? marker->target : targets_.size());
+        order.push_back(i);
+    }
+    std::ranges::stable_sort(order, {}, [&](std::size_t i) { return target_of[i]; });
+
+    std::size_t next = 0;
+    for (std::size_t index = 0; index < targets_.size(); ++index) {
+        Memory memory = memory_of(before, index);
+        if (memory.was_seen)
+            ++memory.age_frames;
+        arhost_target &out = output.targets[index];
+        out = {};
+        out.struct_size = sizeof out;
+        out.state = memory.was_seen ? ARHOST_TARGET_LOST : 0;
+        out.first_observation = static_cast<std::uint32_t>(next);
+        for (; next < all.size() && target_of[order[next]] == index; ++next)
+            output.observations[next] = all[order[next]];
+        out.observation_count = static_cast<std::uint32_t>(next) - out.first_observation;
+        if (out.observation_count > 0)
+            solve(targets_[index], output.observations.subspan(out.first_observation, out.observation_count),
+                  capture_ns, memory, out);
+        const auto poses = std::span(reported.poses, reported.pose_count);
+        if (const auto body = std::ranges::find(poses, index, &arhost_body_pose::target); body != poses.end()) {
+            memory.was_seen = 1;
+            memory.age_frames = out.age_frames = body->age_frames;
+            std::ranges::copy(body->mt, memory.mt);
+            out.state = body->state;
+            std::ranges::copy(body->covariance, out.covariance);
+        }
+        out.age_frames = memory.age_frames;
+        std::ranges::copy(memory.mt, out.mt);
+        std::memcpy(static_cast<std::byte *>(after) + sizeof header + index * sizeof memory, &memory, sizeof memory);
+    }
+    for (; next < all.size(); ++next)
+        output.observations[next] = all[order[next]];
+}
+
+} // namespace arhost::worker

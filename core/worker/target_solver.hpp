@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Computes the poses of targets from what a tracker reports.
+#pragma once
+
+#include "ipc/targets.hpp"
+#include "pose/motion_filter.hpp"
+
+#include <arhost/tracker.h>
+
+#include <map>
+#include <span>
+
+namespace arhost::worker {
+
+// Each call depends only on its arguments. The memory of the targets is passed as `before` and `after`, so it
+// survives the worker (ADR 26): the motion of each target, which tells the two solutions of the planar pose problem
+// apart (pose/track.hpp).
+class TargetSolver {
+public:
+    // `full_search_every`: a tracker searches the whole frame at least once in so many frames; at least 1.
+    TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<ipc::Target> &targets,
+                 std::uint32_t full_search_every);
+
+    // Bytes of `before` and `after`.
+    std::uint64_t state_size() const;
+
+    // What to tell the tracker before its call.
+    struct Expectation {
+        std::vector<arhost_expected_marker> markers;
+        bool search_everywhere;
+    };
+    Expectation expect(std::int64_t capture_ns, const void *before) const;
+
+    struct Output {
+        std::span<arhost_target> targets;           // one for each target; state 0 if it was never seen
+        std::span<arhost_observation> observations; // at least as many as reported; those of the same target adjoin
+    };
+    // Throws std::runtime_error if the report violates the contract. `before`: what the last accepted call wrote to
+    // `after`; null in the first frame.
+    void solve(const arhost_tracker_result &reported, bool searched_everywhere, std::int64_t capture_ns,
+               const void *before, void *after, const Output &output) const;
+
+private:
+    struct Marker {
+        std::uint32_t index; // in arhost_tracker_setup.markers
+        std::size_t target;
+        std::array<Eigen::Vector3d, 4> corners_mm;
+    };
+    struct Target {
+        bool is_body;
+        double corner_sigma_px;
+    };
+    struct Header;
+    struct Memory;
+
+    Header header_of(const void *state) const;
+    Memory memory_of(const void *state, std::size_t target) const;
+    const Marker *marker_of(const arhost_observation &observation) const;
+    std::vector<pose::ObservedMarker> without_copies(std::span<const arhost_observation> observations,
+                                                     const std::optional<pose::Motion> &predicted,
+                                                     double corner_sigma_px) const;
+    void solve(const Target &target, std::span<const arhost_observation> observations, std::int64_t capture_ns,
+               Memory &memory, arhost_target &out) const;
+    void check(const arhost_tracker_result &reported) const;
+
+    pose::Projection projection_;
+    std::vector<Target> targets_;
+    std::map<std::pair<std::uint32_t, std::int32_t>, Marker> markers_; // by family and id
+    std::uint32_t family_count_, full_search_every_;
+};
+
+} // namespace arhost::worker

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Converts between pixels of a camera and undistorted pixels: those of a camera with the same focal lengths, the
+// principal point (0, 0) and no distortion. Pixel centres are at integers.
+#pragma once
+
+#include <arhost/shading/lens.hpp>
+
+#include <opencv2/core.hpp>
+
+#include <optional>
+#include <vector>
+
+namespace arhost::fiducial {
+
+class Lens {
+public:
+    // Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION) if the model or coefficient count is unsupported.
+    explicit Lens(const arhost_intrinsics &intrinsics);
+
+    // Both return std::nullopt if the distortion model is not one-to-one at one of the points.
+    std::optional<std::vector<cv::Point2d>> undistort(const std::vector<cv::Point2d> &pixels) const;
+    std::optional<std::vector<cv::Point2d>> distort(const std::vector<cv::Point2d> &undistorted_px) const;
+
+private:
+    double fx_, fy_;
+    shading::Lens lens_;
+};
+
+} // namespace arhost::fiducial

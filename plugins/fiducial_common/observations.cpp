@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "observations.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+namespace arhost::fiducial {
+namespace {
+
+cv::Point2d corner(const arhost_observation &seen, int i) {
+    return {seen.corners_px[i % 4][0], seen.corners_px[i % 4][1]};
+}
+
+// Returns whether the corners are clockwise in the image (y down), like those of a marker's front face, and no angle
+// is near 0° or 180°. False for NaN.
+bool is_convex_front(const arhost_observation &seen) {
+    constexpr double min_sine = 1e-3;
+    for (int i = 0; i < 4; ++i) {
+        const cv::Point2d a = corner(seen, i + 1) - corner(seen, i), b = corner(seen, i + 2) - corner(seen, i + 1);
+        if (!(a.cross(b) > min_sine * cv::norm(a) * cv::norm(b)))
+            return false;
+    }
+    return true;
+}
+
+bool contains(const arhost_observation &seen, cv::Point2d pixel) {
+    for (int i = 0; i < 4; ++i)
+        if ((corner(seen, i + 1) - corner(seen, i)).cross(pixel - corner(seen, i)) < 0)
+            return false;
+    return true;
+}
+
+bool are_of_one_print(const arhost_observation &a, const arhost_observation &b) {
+    const auto centre = [](const arhost_observation &seen) {
+        return (corner(seen, 0) + corner(seen, 1) + corner(seen, 2) + corner(seen, 3)) / 4;
+    };
+    return a.family == b.family && a.id == b.id && (contains(a, centre(b)) || contains(b, centre(a)));
+}
+
+std::array<double, 8> place(const arhost_observation &seen) {
+    std::array<double, 8> numbers;
+    std::copy_n(&seen.corners_px[0][0], numbers.size(), numbers.begin());
+    return numbers;
+}
+
+} // namespace
+
+std::string april_tag_name(std::string_view name) {
+    for (const char *size : {"16h5", "25h9", "36h10", "36h11"})
+        if (name == std::string("DICT_APRILTAG_") + size)
+            return std::string("tag") + size;
+    return std::string(name);
+}
+
+arhost_observation Family::observation(int id, const Corners &corners_px) const {
+    arhost_observation seen{};
+    seen.id = id;
+    const auto found = listed.find(id);
+    seen.family = found == listed.end() ? index : found->second;
+    for (int i = 0; i < 4; ++i) {
+        seen.corners_px[i][0] = corners_px[i].x;
+        seen.corners_px[i][1] = corners_px[i].y;
+    }
+    return seen;
+}
+
+std::vector<Family> families_of(const arhost_tracker_setup &setup,
+                                const std::function<int(const std::string &)> &id_count) {
+    std::vector<Family> families;
+    std::vector<std::size_t> positions; // in `families`, of each name
+    for (std::uint32_t i = 0; i < setup.family_count; ++i) {
+        const std::string name = april_tag_name(setup.families[i]);
+        const auto known = std::ranges::find(families, name, &Family::name);
+        positions.push_back(static_cast<std::size_t>(known - families.begin()));
+        if (known == families.end())
+            families.push_back({name, i, id_count(name), {}});
+    }
+    for (const arhost_marker_config &marker : elements(setup.markers, setup.marker_count)) {
+        Family &family = families.at(positions.at(marker.family));
+        const auto reject = [&](const std::string &reason) {
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          std::string("target '") + elements(setup.targets, setup.target_count)[marker.target].name +
+                              "': marker id " + std::to_string(marker.id) + reason);
+        };
+        if (marker.id < 0 || marker.id >= family.id_count)
+            reject(std::string(" is not in ") + setup.families[marker.family] + ", whose ids are 0 to " +
+                   std::to_string(family.id_count - 1));
+        if (const auto [twin, is_new] = family.listed.try_emplace(marker.id, marker.family); !is_new)
+            reject(std::string(" of ") + setup.families[marker.family] + " is also listed as a marker of " +
+                   setup.families[twin->second] + "; both are names of the same family");
+    }
+    return families;
+}
+
+void report(std::vector<arhost_observation> seen, Observations &observations) {
+    std::erase_if(seen, [](const arhost_observation &one) { return !is_convex_front(one); });
+    std::ranges::sort(seen, {}, [](const arhost_observation &one) {
+        return std::tuple(one.hamming, -one.decision_margin, one.family, one.id, place(one));
+    });
+    std::vector<arhost_observation> kept;
+    for (const arhost_observation &one : seen)
+        if (std::ranges::none_of(kept, [&](const auto &better) { return are_of_one_print(better, one); }))
+            kept.push_back(one);
+    std::ranges::sort(kept, {},
+                      [](const arhost_observation &one) { return std::tuple(one.family, one.id, place(one)); });
+    for (const arhost_observation &one : kept)
+        observations.add(one);
+}
+
+} // namespace arhost::fiducial

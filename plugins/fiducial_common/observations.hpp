@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The parts of arhost_tracker_setup and arhost_observation that the fiducial trackers have in common.
+#pragma once
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <opencv2/core.hpp>
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace arhost::fiducial {
+
+// Corners in px (pixel centres at integers), in the order top-left, top-right, bottom-right, bottom-left of the
+// upright print.
+using Corners = std::array<cv::Point2d, 4>;
+
+// AprilTag's name of a family: "tag36h11" for "DICT_APRILTAG_36h11". Other names remain as they are.
+std::string april_tag_name(std::string_view name);
+
+// A family in use. A setup that calls it by several names has it once.
+struct Family {
+    std::string name;                    // as april_tag_name() returns it
+    std::uint32_t index;                 // of its first name in arhost_tracker_setup.families
+    int id_count;                        // its ids are 0 … id_count − 1
+    std::map<int, std::uint32_t> listed; // listed ids and the names they are listed under, as indices in
+                                         // arhost_tracker_setup.families
+
+    bool lists(int id) const { return listed.contains(id); }
+    // Returns an observation with family, id and corners.
+    arhost_observation observation(int id, const Corners &corners_px) const;
+};
+
+// Returns the families of the setup. `id_count` returns the number of markers of a family, and throws if it is
+// unknown. Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION) if a listed id is not in its family or is listed twice.
+std::vector<Family> families_of(const arhost_tracker_setup &setup,
+                                const std::function<int(const std::string &name)> &id_count);
+
+// Reports what was seen, by family, id and place, so the order does not depend on the detector's threads. Leaves out
+// corners that are not those of a convex quadrilateral seen from the front. Detections of the same marker that
+// overlap are of the same print: reports only the one with the fewest wrong bits, then the highest decision margin.
+void report(std::vector<arhost_observation> seen, Observations &observations);
+
+} // namespace arhost::fiducial

@@ -1,0 +1,392 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pose/track.hpp"
+#include "worker/target_solver.hpp"
+
+#include "simulated_markers.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cstring>
+#include <optional>
+
+namespace arhost::worker {
+namespace {
+
+using namespace pose;
+using testing::HasSubstr;
+
+constexpr double side_mm = 80;
+constexpr std::uint32_t full_search_every = 6;
+constexpr std::int64_t frame_ns = 33'333'333;
+const arhost_intrinsics pinhole = intrinsics_of(ARHOST_DISTORTION_NONE, {});
+
+using Corners = std::array<Eigen::Vector3d, 4>;
+
+ipc::TargetMarker configured(std::int32_t id, const Corners &corners, const char *family = "tag36h11") {
+    ipc::TargetMarker marker{id, family, {}};
+    for (std::size_t i = 0; i < 4; ++i)
+        marker.corners_mm[i] = {corners[i].x(), corners[i].y(), corners[i].z()};
+    return marker;
+}
+
+// Markers 10 to 13 around the origin of the target, with gaps of half of their side.
+Corners on_board(std::int32_t id) {
+    const double x = id % 2 ? 0.75 : -0.75, y = id < 12 ? 0.75 : -0.75;
+    return square_at({Eigen::Matrix3d::Identity(), {x * side_mm, y * side_mm, 0}}, side_mm);
+}
+
+const Corners single = square_corners_mm(side_mm);
+const std::vector<ipc::Target> targets = {
+    {"cup", {configured(5, single)}, ""},
+    {"board",
+     {configured(10, on_board(10)), configured(11, on_board(11)), configured(12, on_board(12)),
+      configured(13, on_board(13))},
+     ""},
+    {"box", {configured(5, single, "DICT_4X4_50")}, ""},
+    {"head", {}, "skull"},
+};
+enum Index { cup, board, box, head };
+
+arhost_observation observed(const ObservedMarker &seen, std::int32_t id, std::uint32_t family = 0,
+                            double margin = 1) {
+    arhost_observation observation{sizeof observation, id, family, 0, {}, margin};
+    for (int i = 0; i < 4; ++i) {
+        observation.corners_px[i][0] = seen.corners_px[i].x();
+        observation.corners_px[i][1] = seen.corners_px[i].y();
+    }
+    return observation;
+}
+
+class TargetSolverTest : public testing::Test {
+protected:
+    TargetSolverTest() : solver(pinhole, targets, full_search_every), before(solver.state_size()), after(before) {}
+
+    arhost_observation see(const Rigid &truth, std::int32_t id, const Corners &corners = single, double noise_px = 0,
+                           std::uint32_t family = 0, double margin = 1) {
+        return observed(camera.observe(truth, corners, noise_px), id, family, margin);
+    }
+    std::vector<arhost_observation> see_board(const Rigid &truth, double noise_px = 0) {
+        std::vector<arhost_observation> seen;
+        for (const std::int32_t id : {10, 11, 12, 13})
+            seen.push_back(see(truth, id, on_board(id), noise_px));
+        return seen;
+    }
+    // Keeps the state for the next call.
+    void solve(std::vector<arhost_observation> seen, std::int64_t frame = 0,
+               std::vector<arhost_body_pose> poses = {}) {
+        arhost_tracker_result result{};
+        result.observations = seen.data();
+        result.observation_count = static_cast<std::uint32_t>(seen.size());
+        result.poses = poses.data();
+        result.pose_count = static_cast<std::uint32_t>(poses.size());
+        observations.assign(seen.size(), {});
+        const void *const known = is_first ? nullptr : before.data();
+        expectation = solver.expect(frame * frame_ns, known);
+        solver.solve(result, expectation.search_everywhere, frame * frame_ns, known, after.data(),
+                     {solved, observations});
+        before.swap(after);
+        is_first = false;
+    }
+    std::string violation(std::vector<arhost_observation> seen, std::vector<arhost_body_pose> poses = {}) {
+        try {
+            solve(std::move(seen), 0, std::move(poses));
+            return "";
+        } catch (const std::runtime_error &error) {
+            return error.what();
+        }
+    }
+    Rigid pose_of(Index index) const { return rigid_of(solved[index].mt); }
+
+    TargetSolver solver;
+    Camera camera{pinhole, 1};
+    std::vector<std::byte> before, after;
+    bool is_first = true;
+    std::array<arhost_target, 4> solved{};
+    TargetSolver::Expectation expectation; // before the last frame
+    std::vector<arhost_observation> observations;
+};
+
+void expect_near(const Rigid &pose, const Rigid &truth, double mm = 1e-3, double degrees = 1e-3) {
+    EXPECT_LT((pose.translation_mm - truth.translation_mm).norm(), mm);
+    EXPECT_LT(degrees_between(pose, truth), degrees);
+}
+
+arhost_body_pose body_pose(std::uint32_t target) {
+    arhost_body_pose pose{sizeof pose, target, ARHOST_TARGET_DETECTED, 0, {}, {}};
+    std::ranges::copy(matrix_of(pose_at({1, 2, 700}, 20)), pose.mt);
+    pose.covariance[0] = 4;
+    return pose;
+}
+
+} // namespace
+
+TEST_F(TargetSolverTest, ComputesThePoseOfAMarkerAndOfAMap) {
+    const Rigid cup_truth = pose_at({-100, 50, 900}, 35), board_truth = pose_at({100, -50, 1200}, 50, 30);
+    std::vector<arhost_observation> seen = see_board(board_truth);
+    seen.insert(seen.begin() + 2, see(cup_truth, 5));
+    seen.push_back(see(cup_truth, 77)); // of no target
+    solve(seen);
+    EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
+    EXPECT_EQ(solved[board].state, ARHOST_TARGET_DETECTED);
+    EXPECT_EQ(solved[box].state, 0) << "never seen";
+    expect_near(pose_of(cup), cup_truth);
+    expect_near(pose_of(board), board_truth);
+    EXPECT_LT(solved[board].reprojection_px, 1e-3);
+    // The observations of a target adjoin; those of no target are the last ones.
+    EXPECT_EQ(solved[cup].first_observation, 0u);
+    EXPECT_EQ(solved[cup].observation_count, 1u);
+    EXPECT_EQ(solved[board].first_observation, 1u);
+    EXPECT_EQ(solved[board].observation_count, 4u);
+    std::vector<std::int32_t> ids;
+    for (const arhost_observation &observation : observations)
+        ids.push_back(observation.id);
+    EXPECT_EQ(ids, (std::vector{5, 10, 11, 12, 13, 77}));
+}
+
+TEST_F(TargetSolverTest, TellsTheSameIdOfTwoFamiliesApart) {
+    const Rigid left = pose_at({-150, 0, 900}, 30), right = pose_at({150, 0, 900}, 40);
+    solve({see(left, 5, single, 0, 1), see(right, 5)});
+    expect_near(pose_of(box), left);
+    expect_near(pose_of(cup), right);
+}
+
+TEST_F(TargetSolverTest, CovariancesAreThoseOfTheErrors) {
+    const Rigid truth = pose_at({50, 20, 1000}, 40);
+    const int count = 400;
+    double mahalanobis2 = 0;
+    for (int i = 0; i < count; ++i) {
+        is_first = true;
+        solve({see(truth, 5, single, 0.1)});
+        // The difference to the truth in the axes of `mt`.
+        const Eigen::Vector3d to_gl(1, -1, -1);
+        Eigen::Matrix<double, 6, 1> error;
+        error << to_gl.cwiseProduct(truth.translation_mm - pose_of(cup).translation_mm),
+            to_gl.cwiseProduct(rotation_vector(truth.rotation * pose_of(cup).rotation.transpose()));
+        const Eigen::Map<const Matrix6d> covariance(solved[cup].covariance);
+        if (degrees_between(pose_of(cup), truth) < 20) // not the other branch
+            mahalanobis2 += error.dot(covariance.ldlt().solve(error));
+    }
+    EXPECT_NEAR(mahalanobis2 / count, 6, 1); // the mean of the chi-square distribution with 6 degrees of freedom
+}
+
+TEST_F(TargetSolverTest, APoseDoesNotFlipDuring3000FramesOfMotion) {
+    int flips = 0, flips_of_single_frames = 0;
+    for (int run = 0; run < 3; ++run) {
+        camera = Camera(pinhole, static_cast<std::uint32_t>(run + 1));
+        is_first = true;
+        bool was_right = false, single_was_right = false;
+        for (int frame = 0; frame < 1000; ++frame) {
+            const Rigid truth = on_path(frame / 30.0, 0.7 * run, side_mm);
+            const ObservedMarker seen = camera.observe(truth, single, 0.1);
+            solve({observed(seen, 5)}, frame);
+            const auto is_right = [&](const Rigid &pose) { return degrees_between(pose, truth) < 20; };
+            const bool single_is_right =
+                is_right(estimate_poses({&seen, 1}, camera.projection()).at(0).camera_from_target);
+            flips += was_right && !is_right(pose_of(cup));
+            flips_of_single_frames += single_was_right && !single_is_right;
+            was_right = is_right(pose_of(cup));
+            single_was_right = single_is_right;
+        }
+    }
+    EXPECT_EQ(flips, 0);
+    EXPECT_GT(flips_of_single_frames, 10) << "the motion must be a challenge";
+}
+
+TEST_F(TargetSolverTest, ReportsTheOtherSolution) {
+    bool has_exchanged = false;
+    for (int frame = 0; frame < 1000; ++frame) {
+        solve({see(on_path(frame / 30.0, 0, side_mm), 5, single, 0.1)}, frame);
+        const arhost_target &target = solved[cup];
+        ASSERT_GE(target.ambiguity, 0);
+        ASSERT_LE(target.ambiguity, 1);
+        const bool has_alternative = target.mt_alternative[15] == 1;
+        ASSERT_EQ(target.ambiguity > 0, has_alternative);
+        if (has_alternative) {
+            ASSERT_GT(degrees_between(rigid_of(target.mt_alternative), pose_of(cup)), 1);
+        }
+        has_exchanged |= target.ambiguity == 1;
+    }
+    EXPECT_TRUE(has_exchanged) << "at least once, the true pose has the larger error";
+}
+
+TEST_F(TargetSolverTest, CountsTheFramesSinceATargetWasLost) {
+    const Rigid truth = pose_at({0, 0, 900}, 30);
+    solve({});
+    EXPECT_EQ(solved[cup].state, 0);
+    solve({see(truth, 5)}, 1);
+    EXPECT_EQ(solved[cup].age_frames, 0u);
+    const arhost_target seen = solved[cup];
+    for (std::uint32_t age = 1; age < 4; ++age) {
+        solve({}, 1 + age);
+        EXPECT_EQ(solved[cup].state, ARHOST_TARGET_LOST);
+        EXPECT_EQ(solved[cup].age_frames, age);
+        EXPECT_TRUE(std::ranges::equal(solved[cup].mt, seen.mt)) << "the last known pose";
+        EXPECT_EQ(solved[cup].reprojection_px, 0);
+    }
+    arhost_observation mirrored = see(truth, 5);
+    std::swap(mirrored.corners_px[1], mirrored.corners_px[3]);
+    solve({mirrored}, 5);
+    EXPECT_EQ(solved[cup].state, ARHOST_TARGET_LOST) << "no pose shows the front of a marker at these corners";
+    solve({see(truth, 5)}, 6);
+    EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
+    EXPECT_EQ(solved[cup].age_frames, 0u);
+}
+
+TEST_F(TargetSolverTest, IgnoresAMarkerWithACornerElsewhere) {
+    arhost_observation hidden = see(pose_at({0, 0, 900}, 30), 5);
+    const double side_px = std::hypot(hidden.corners_px[1][0] - hidden.corners_px[0][0],
+                                      hidden.corners_px[1][1] - hidden.corners_px[0][1]);
+    hidden.corners_px[2][0] -= 0.4 * side_px;
+    hidden.corners_px[2][1] -= 0.3 * side_px;
+    solve({hidden});
+    EXPECT_EQ(solved[cup].state, 0);
+    EXPECT_EQ(solved[cup].observation_count, 1u) << "it is reported nevertheless";
+    // The other markers of a map tell which corner is wrong.
+    const Rigid truth = pose_at({0, 0, 1200}, 30);
+    std::vector<arhost_observation> seen = see_board(truth);
+    seen[1].corners_px[2][0] -= 20;
+    solve(seen);
+    expect_near(pose_of(board), truth);
+}
+
+TEST_F(TargetSolverTest, OfSeveralCopiesTakesTheOneThatContinuesTheMotion) {
+    const Rigid here = pose_at({-100, 0, 900}, 30), elsewhere = pose_at({150, 0, 900}, 30);
+    solve({see(here, 5)});
+    solve({see(elsewhere, 5, single, 0, 0, 9), see(here, 5)}, 1);
+    expect_near(pose_of(cup), here);
+    EXPECT_EQ(solved[cup].observation_count, 2u) << "all copies are reported";
+    is_first = true;
+    std::vector<arhost_observation> seen = {see(here, 5), see(elsewhere, 5, single, 0, 0, 9)};
+    solve(seen);
+    expect_near(pose_of(cup), elsewhere); // without a motion, that which was read more clearly
+    is_first = true;
+    seen[1].hamming = 1;
+    solve(seen);
+    expect_near(pose_of(cup), here); // or that without corrected bits
+}
+
+TEST_F(TargetSolverTest, OfSeveralCopiesTakesTheOneThatFitsToTheOtherMarkersOfTheMap) {
+    const Rigid truth = pose_at({0, 0, 1200}, 40);
+    std::vector<arhost_observation> seen = see_board(truth);
+    seen.push_back(see(pose_at({250, 100, 1100}, 10), 12, single, 0, 0, 9));
+    solve(seen);
+    expect_near(pose_of(board), truth);
+    EXPECT_LT(solved[board].reprojection_px, 1e-3);
+    EXPECT_EQ(solved[board].observation_count, 5u);
+}
+
+TEST_F(TargetSolverTest, PassesThePosesOfBodies) {
+    const arhost_body_pose pose = body_pose(head);
+    solve({}, 0, {pose});
+    EXPECT_EQ(solved[head].state, ARHOST_TARGET_DETECTED);
+    EXPECT_TRUE(std::ranges::equal(solved[head].mt, pose.mt));
+    EXPECT_TRUE(std::ranges::equal(solved[head].covariance, pose.covariance));
+    EXPECT_EQ(solved[cup].state, 0);
+    solve({}, 1);
+    EXPECT_EQ(solved[head].state, ARHOST_TARGET_LOST);
+    EXPECT_EQ(solved[head].age_frames, 1u);
+    EXPECT_TRUE(std::ranges::equal(solved[head].mt, pose.mt));
+    arhost_body_pose extrapolated = pose;
+    extrapolated.state = ARHOST_TARGET_PREDICTED;
+    extrapolated.age_frames = 2;
+    solve({}, 2, {extrapolated});
+    EXPECT_EQ(solved[head].state, ARHOST_TARGET_PREDICTED);
+    EXPECT_EQ(solved[head].age_frames, 2u);
+    solve({}, 3);
+    EXPECT_EQ(solved[head].age_frames, 3u);
+}
+
+TEST_F(TargetSolverTest, ExpectsMarkersWhereTheirTargetsMove) {
+    int outside = 0;
+    for (int frame = 0; frame < 300; ++frame) {
+        const Rigid truth = on_path(frame / 30.0, 0, 3 * side_mm);
+        std::vector<arhost_observation> seen = see_board(truth, 0.1);
+        seen.pop_back(); // one marker is hidden, but expected
+        solve(seen, frame);
+        ASSERT_EQ(expectation.markers.size(), frame == 0 ? 0u : 4u) << frame;
+        for (std::size_t i = 0; i < expectation.markers.size(); ++i) {
+            const arhost_expected_marker &expected = expectation.markers[i];
+            ASSERT_EQ(expected.marker, 1 + i) << "index among the markers of all targets";
+            const arhost_observation marker = see(truth, 0, on_board(10 + static_cast<std::int32_t>(i)));
+            for (int corner = 0; corner < 4; ++corner)
+                outside +=
+                    !(std::hypot(marker.corners_px[corner][0] - expected.corners_px[corner][0],
+                                 marker.corners_px[corner][1] - expected.corners_px[corner][1]) < expected.margin_px);
+            if (frame > 10) {
+                ASSERT_LT(expected.margin_px, 60);
+            }
+        }
+    }
+    EXPECT_EQ(outside, 0);
+}
+
+TEST_F(TargetSolverTest, RequestsAFullSearchFirstAtIntervalsAndAfterALoss) {
+    const Rigid truth = pose_at({0, 0, 900}, 30);
+    std::vector<bool> full;
+    for (int frame = 0; frame < 20; ++frame) {
+        solve(frame == 8 || frame == 9 ? std::vector<arhost_observation>() : std::vector{see(truth, 5)}, frame);
+        full.push_back(expectation.search_everywhere);
+    }
+    const std::vector<bool> expected = {true, false, false, false, false, false, true, false, false, true,
+                                        true, false, false, false, false, false, true, false, false, false};
+    EXPECT_EQ(full, expected) << "lost in frame 8, found again in frame 10";
+    TargetSolver always(pinhole, targets, 1);
+    EXPECT_TRUE(always.expect(20 * frame_ns, before.data()).search_everywhere);
+}
+
+TEST_F(TargetSolverTest, ExpectsNoMarkerThatIsOutOfView) {
+    solve({see(pose_at({560, 0, 800}, 0), 5)}); // at the right border of the frame
+    solve({see(pose_at({640, 0, 900}, 0), 5)}, 1);
+    solve({}, 2);
+    EXPECT_EQ(expectation.markers.size(), 1u);
+    const Rigid gone = pose_at({0, 0, 900}, 30);
+    solve({see(gone, 5)}, 40);
+    EXPECT_TRUE(expectation.markers.empty()) << "it was not seen for more than a second";
+}
+
+TEST_F(TargetSolverTest, RejectsAReportThatViolatesTheContract) {
+    const arhost_observation good = see(pose_at({0, 0, 900}, 30), 5);
+    const auto altered = [](auto one, auto alter) { return alter(one), std::vector{one}; };
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_THAT(violation(altered(good, [](auto &o) { o.family = 2; })), HasSubstr("family index 2"));
+    EXPECT_THAT(violation(altered(good, [](auto &o) { o.corners_px[2][1] = nan; })),
+                HasSubstr("marker 5 with a corner that is not finite"));
+    EXPECT_THAT(violation(altered(good, [](auto &o) { o.decision_margin = -1; })), HasSubstr("decision margin"));
+    EXPECT_THAT(violation(std::vector(ARHOST_MAX_OBSERVATIONS + 1, good)),
+                HasSubstr("1025 observations; the limit is 1024"));
+    EXPECT_THAT(violation({}, {body_pose(cup)}), HasSubstr("the target 0, which is not a body"));
+    EXPECT_THAT(violation({}, {body_pose(4)}), HasSubstr("the target 4, which is not a body"));
+    EXPECT_THAT(violation({}, {body_pose(head), body_pose(head)}), HasSubstr("two poses of the target 3"));
+    EXPECT_THAT(violation({}, std::vector(5, body_pose(head))), HasSubstr("more poses than there are targets"));
+    for (const auto alter : {+[](arhost_body_pose &p) { p.mt[0] = 2; }, +[](arhost_body_pose &p) { p.mt[12] = nan; },
+                             +[](arhost_body_pose &p) { p.covariance[35] = nan; }})
+        EXPECT_THAT(violation({}, altered(body_pose(head), alter)),
+                    HasSubstr("not finite, or a pose that is no rotation"));
+    EXPECT_THAT(violation({}, altered(body_pose(head), [](auto &p) { p.state = 0; })), HasSubstr("invalid state"));
+    EXPECT_EQ(violation({good}, {body_pose(head)}), "");
+}
+
+TEST_F(TargetSolverTest, SurvivesAStateOfArbitraryBytes) {
+    std::mt19937 random(6);
+    is_first = false;
+    const std::size_t memory_size = solver.state_size() / targets.size();
+    for (int round = 0; round < 400; ++round) {
+        for (std::byte &byte : before)
+            byte = static_cast<std::byte>(random());
+        for (std::size_t at = 0; at < before.size() && round % 2; at += memory_size) { // begins with a valid track
+            Track track;
+            std::memcpy(&track, &before[at], sizeof track);
+            track.capture_ns = 0;
+            track.branches = 1 + static_cast<std::uint32_t>(round) / 2 % 2;
+            if (round % 3 == 0)
+                track.log_odds = std::nan("");
+            std::memcpy(&before[at], &track, sizeof track);
+        }
+        solve({see(pose_at({0, 0, 1500}, 30), 5)}, 1);
+        EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
+        EXPECT_TRUE(pose_of(cup).rotation.allFinite());
+        EXPECT_EQ(solved[board].state, 0) << "its pose is none";
+    }
+}
+
+} // namespace arhost::worker
