@@ -168,6 +168,8 @@ int main(int argc, char **argv) {
         app.raw_subcommand("conform", "Test whether a plugin conforms to the ABI (docs/conformance.md)");
     CommandLine marker_command =
         app.raw_subcommand("marker", "Print markers and boards in their true size (docs/markers.md)");
+    CommandLine calibrate_command =
+        app.raw_subcommand("calibrate", "Calibrate a camera with a printed board (docs/calibration.md)");
     std::string helped;
     CommandLine help_command = app.subcommand("help", "Print help about arhost or a command");
     help_command.option("COMMAND", helped, "The command").one_of(app.subcommands());
@@ -175,7 +177,7 @@ int main(int argc, char **argv) {
     if (const auto status = app.parse(argc, argv))
         return checked_output(*status);
     const auto command = [&]() -> int {
-        if (help_command.selected() && (helped == "conform" || helped == "marker")) // programs with their own options
+        if (help_command.selected() && (helped == "conform" || helped == "marker" || helped == "calibrate"))
             return run_program(("arhost-" + helped).c_str(), {"--help"});
         if (help_command.selected()) {
             std::fputs(app.help(helped).c_str(), stdout);
@@ -191,6 +193,8 @@ int main(int argc, char **argv) {
             return run_program("arhost-conform", conform_command.arguments());
         if (marker_command.selected())
             return run_program("arhost-marker", marker_command.arguments());
+        if (calibrate_command.selected())
+            return run_program("arhost-calibrate", calibrate_command.arguments());
         arhost::supervise::Launcher launcher(own_folder() / "arhost-launcher");
         if (replay_command.selected())
             return replay(arguments, replay_arguments, launcher);
