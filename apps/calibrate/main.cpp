@@ -176,9 +176,12 @@ std::string calibrate(const Arguments &arguments) {
     base::AtomicFile output(arguments.output), picture(arguments.coverage);
 
     const Views found = views_of(arguments, board, model);
-    reject(found.views.empty(),
-           fmt::format("the board is in no image; expected a {}{}", board.description(),
-                       found.seen_instead.empty() ? "" : ", but the images show " + found.seen_instead));
+    if (found.views.empty())
+        throw std::runtime_error(fmt::format(
+            "{}; expected a {}{}",
+            found.summary.empty() ? "the board is in no image"
+                                  : "no view was taken; hold the board still in each one (" + found.summary + ")",
+            board.description(), found.seen_instead.empty() ? "" : ", but the images show " + found.seen_instead));
     const Calibration calibration = arhost::calibrate::calibrate(found.views, found.image, model);
     const Coverage coverage(calibration);
     const std::string text = report(found, calibration, coverage);
@@ -191,7 +194,8 @@ std::string calibrate(const Arguments &arguments) {
         std::fputs(text.c_str(), stdout);
     if (!arguments.coverage.empty()) { // also of refused views, because it shows what is missing
         std::vector<unsigned char> png;
-        cv::imencode(".png", coverage_picture(found.views, calibration, coverage), png);
+        cv::imencode(".png", coverage_picture(found.views, calibration, coverage), png,
+                     {cv::IMWRITE_PNG_COMPRESSION, 9});
         picture.write({png.begin(), png.end()});
     }
     reject(is_wrong, fmt::format("an error of {:.1f} px is too large for any lens; expected a {}, flat and rigid",

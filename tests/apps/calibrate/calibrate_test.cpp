@@ -156,6 +156,18 @@ TEST_F(Calibrate, ChoosesViewsFromAVideo) {
     EXPECT_THAT(printed(), HasSubstr(" corners of 14 views)"));
 }
 
+TEST_F(Calibrate, SaysIfTheBoardNeverRests) {
+    Renderer renderer(brown_camera(), charuco);
+    cv::VideoWriter video(folder() / "video.avi", cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 30, {640, 480}, false);
+    for (int i = 0; i < 5; ++i)
+        video.write(renderer.image({0.4 + 0.04 * i, 0.5, 1.05, 10, 0, 0}));
+    video.release();
+    EXPECT_EQ(calibrate(charuco_arguments + "--video video.avi -o camera.yaml"), 2);
+    EXPECT_THAT(printed(),
+                HasSubstr("no view was taken; hold the board still in each one (video.avi: 5 frames, 0 views "
+                          "taken; 0 frames without the board, 5 in motion, "));
+}
+
 TEST_F(Calibrate, AdvisesWhichViewACameraNeeds) {
     write_video(brown_camera(), charuco, poses_for(charuco));
     ASSERT_EQ(calibrate(charuco_arguments + "--camera video.avi -o camera.yaml"), 0) << printed();
@@ -332,6 +344,27 @@ TEST_F(Calibrate, FailsIfTheDiskIsFull) {
     write_images(brown_camera(), chessboard, {good_poses()[0], good_poses()[4], good_poses()[8]});
     EXPECT_EQ(calibrate(chessboard_arguments + "--images images/*.png --accept-poor-coverage -o camera.yaml"), 2);
     EXPECT_THAT(printed(), HasSubstr("No space left on device"));
+}
+
+TEST_F(Calibrate, FindsTheBoardThatArhostPrints) {
+    std::ifstream document(ARHOST_SOURCE_DIRECTORY "/docs/calibration.md");
+    std::string print, calibrate;
+    for (std::string line; std::getline(document, line);) {
+        const std::size_t at = line.find_first_not_of(' ');
+        if (at == std::string::npos)
+            continue;
+        if (line.substr(at).starts_with("arhost marker "))
+            print = line.substr(at);
+        if (line.substr(at).starts_with("arhost calibrate "))
+            calibrate = line.substr(at);
+    }
+    ASSERT_NE(print.find("board.pdf"), std::string::npos);
+    ASSERT_NE(calibrate.find("--camera /dev/video0 --size 1280x720"), std::string::npos);
+    print.replace(print.find("board.pdf"), 9, "board.png --dpi 150");
+    calibrate.replace(calibrate.find("--camera"), 36, "--images board.png");
+    ASSERT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/" + print), 0) << printed();
+    EXPECT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/" + calibrate), 2);
+    EXPECT_THAT(printed(), HasSubstr("the board was found in 1 view, but"));
 }
 
 TEST_F(Calibrate, IsACommandOfArhost) {

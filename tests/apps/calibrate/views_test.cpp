@@ -264,6 +264,36 @@ TEST(Collector, StopsAtItsLimit) {
     EXPECT_EQ(collector.views().size(), 5u);
 }
 
+TEST(Board, IsFoundInLargeImages) {
+    for (const BoardOptions &options :
+         {BoardOptions{false, 9, 6, 36, 0, "", 0}, BoardOptions{true, 10, 7, 36, 27, "DICT_5X5_100", 0}}) {
+        const cv::Mat image = Renderer(brown_camera(), options).image({0.45, 0.55, 1.2, 20, 10, 5});
+        cv::Mat large;
+        constexpr int factor = 5;
+        cv::resize(image, large, {}, factor, factor, cv::INTER_CUBIC);
+        const Board board(options);
+        const auto view = board.find(image), large_view = board.find(large);
+        ASSERT_TRUE(view && large_view);
+        ASSERT_EQ(view->board_mm, large_view->board_mm);
+        for (std::size_t i = 0; i < view->image_px.size(); ++i) {
+            const cv::Point2f half(0.5F, 0.5F);
+            EXPECT_LT(cv::norm((large_view->image_px[i] + half) / factor - half - view->image_px[i]), 0.15) << i;
+        }
+    }
+}
+
+TEST(Board, IsNotFoundInOtherImages) {
+    cv::Mat noise(480, 640, CV_8U);
+    cv::RNG(3).fill(noise, cv::RNG::UNIFORM, 0, 256);
+    for (const cv::Mat &image :
+         {noise, cv::Mat(cv::Mat::zeros(64, 64, CV_8U)), cv::Mat(cv::Mat::ones(65, 2000, CV_8U))})
+        for (const BoardOptions &options :
+             {BoardOptions{false, 9, 6, 36, 0, "", 0}, BoardOptions{true, 10, 7, 36, 27, "DICT_5X5_100", 0}}) {
+            EXPECT_FALSE(Board(options).find(image));
+            EXPECT_EQ(Board(options).seen_instead(image), "");
+        }
+}
+
 TEST(Sharpness, IsTheWidthOfEdges) {
     const BoardOptions board{false, 9, 6, 36, 0, "", 0};
     Renderer renderer(brown_camera(), board);
