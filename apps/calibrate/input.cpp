@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibrate/input.hpp"
 
-#include "base/text.hpp"
-
 #include <arhost/frame.h>
 
 #include <fmt/format.h>
@@ -14,6 +12,10 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <fcntl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 namespace arhost::calibrate {
 namespace {
@@ -160,12 +162,35 @@ bool show(const cv::Mat &frame, const std::optional<View> &view, const Collector
     return key == 'q' || key == 27;
 }
 
-bool has_display() {
+// Whether there is a display. OpenCV's window library aborts the process if it cannot open the one that the
+// environment names, so a child process tries it first.
+bool can_open_window() {
     const auto is_set = [](const char *name) {
         const char *value = std::getenv(name);
         return value && *value;
     };
-    return is_set("DISPLAY") || is_set("WAYLAND_DISPLAY");
+    if (!is_set("DISPLAY") && !is_set("WAYLAND_DISPLAY"))
+        return false;
+    const pid_t child = ::fork();
+    if (child == 0) {
+        const rlimit no_core_file{0, 0};
+        ::setrlimit(RLIMIT_CORE, &no_core_file);
+        const int null = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
+        ::dup2(null, STDOUT_FILENO);
+        ::dup2(null, STDERR_FILENO);
+        try {
+            cv::namedWindow(window);
+        } catch (const cv::Exception &) {
+            ::_exit(1);
+        }
+        ::_exit(0);
+    }
+    int status = -1;
+    if (child < 0 || ::waitpid(child, &status, 0) != child || status != 0) {
+        std::fputs("warning: the display cannot be opened, so there is no window (--no-window omits it)\n", stderr);
+        return false;
+    }
+    return true;
 }
 
 } // namespace
@@ -229,6 +254,7 @@ Views views_of_video(const fs::path &file, const Board &board, Model model, std:
 }
 
 Views views_of_camera(const CameraOptions &camera, const Board &board, Model model, std::size_t limit) {
+    const bool with_window = camera.with_window && can_open_window(); // first, because threads do not survive a fork
     cv::VideoCapture capture(camera.name, camera.name.starts_with("/dev/") ? cv::CAP_V4L2 : cv::CAP_ANY);
     if (!capture.isOpened())
         throw std::runtime_error(fmt::format(
@@ -237,7 +263,6 @@ Views views_of_camera(const CameraOptions &camera, const Board &board, Model mod
         capture.set(cv::CAP_PROP_FRAME_WIDTH, camera.size.width);
         capture.set(cv::CAP_PROP_FRAME_HEIGHT, camera.size.height);
     }
-    const bool with_window = camera.with_window && has_display();
     const Interruptible interruptible;
     Frames frames(capture, camera.name);
     Counts counts;

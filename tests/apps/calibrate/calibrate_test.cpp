@@ -181,6 +181,20 @@ TEST_F(Calibrate, AdvisesWhichViewACameraNeeds) {
     EXPECT_THAT(printed(), HasSubstr("--size 800x600: the camera delivers 640 x 480 px"));
 }
 
+TEST_F(Calibrate, ShowsAWindowIfThereIsADisplay) {
+    write_video(brown_camera(), charuco, poses_for(charuco));
+    const std::string command =
+        ARHOST_BINARY_DIRECTORY "/bin/arhost-calibrate " + charuco_arguments + "--camera video.avi -o camera.yaml";
+    EXPECT_EQ(execute("DISPLAY=:9977 " + command), 0) << printed();
+    EXPECT_THAT(printed(), HasSubstr("warning: the display cannot be opened, so there is no window"));
+    EXPECT_EQ(execute("DISPLAY=:9977 " + command + " --no-window"), 0) << printed();
+    EXPECT_THAT(printed(), Not(HasSubstr("warning")));
+    if (std::system("command -v xvfb-run > /dev/null") != 0)
+        GTEST_SKIP() << "xvfb-run is not installed";
+    EXPECT_EQ(execute("xvfb-run -a " + command), 0) << printed();
+    EXPECT_THAT(printed(), Not(HasSubstr("warning")));
+}
+
 TEST_F(Calibrate, AgreesWithOpenCvOnItsChessboardPhotos) {
     const fs::path data = fs::path(photos) / "examples/data";
     if (!fs::exists(data / "left01.jpg"))
