@@ -142,9 +142,11 @@ std::optional<View> Board::find(const cv::Mat &grey) const {
     view.image_px = options_.is_charuco ? find_charuco(grey, ids) : find_chessboard(grey, ids);
     if (ids.size() < fewest_corners_)
         return std::nullopt;
-    for (const int id : ids)
-        view.board_mm.emplace_back(static_cast<float>(id % corner_columns_ * options_.square_mm),
-                                   static_cast<float>(id / corner_columns_ * options_.square_mm), 0.0F);
+    for (const int id : ids) {
+        const int column = id % corner_columns_, row = id / corner_columns_;
+        view.board_mm.emplace_back(static_cast<float>(column * options_.square_mm),
+                                   static_cast<float>(row * options_.square_mm), 0.0F);
+    }
     const std::vector<bool> is_refined = refine(
         grey, view, options_.is_charuco ? (options_.square_mm - options_.marker_mm) / 2 : options_.square_mm * 0.45);
     if (!options_.is_charuco)
@@ -176,7 +178,7 @@ std::string Board::seen_instead(const cv::Mat &grey) const {
         return best;
     std::vector<cv::Point2f> corners;
     cv::Mat squares;
-    if (cv::findChessboardCornersSB(grey, {3, 3}, corners, cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER,
+    if (cv::findChessboardCornersSB(grey, {5, 4}, corners, cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_LARGER,
                                     squares))
         return fmt::format("a chessboard with about {} x {} inner corners", std::max(squares.cols, squares.rows),
                            std::min(squares.cols, squares.rows));

@@ -259,6 +259,7 @@ Views views_of_camera(const CameraOptions &camera, const Board &board, Model mod
     if (!capture.isOpened())
         throw std::runtime_error(fmt::format(
             "{}: the camera cannot be opened; 'arhost devices' lists the cameras and says why", camera.name));
+    capture.set(cv::CAP_PROP_BUFFERSIZE, 1); // otherwise the images are several frames old
     if (!camera.size.empty()) {
         capture.set(cv::CAP_PROP_FRAME_WIDTH, camera.size.width);
         capture.set(cv::CAP_PROP_FRAME_HEIGHT, camera.size.height);

@@ -111,6 +111,10 @@ struct Case {
     std::string arguments;
 };
 
+void PrintTo(const Case &value, std::ostream *out) {
+    *out << value.name;
+}
+
 class EveryBoardAndLens : public Calibrate, public testing::WithParamInterface<Case> {};
 INSTANTIATE_TEST_SUITE_P(Calibrate, EveryBoardAndLens,
                          testing::Values(Case{"CharucoBrown", charuco, brown_camera(), charuco_arguments},

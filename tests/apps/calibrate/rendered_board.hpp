@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <numbers>
+#include <ostream>
 #include <vector>
 
 namespace arhost::calibrate {
@@ -41,6 +42,10 @@ struct TrueCamera {
     cv::Size size;
     Lens lens;
 };
+
+inline void PrintTo(const TrueCamera &camera, std::ostream *out) {
+    *out << (camera.lens.model == Model::fisheye ? "fisheye" : "brown");
+}
 
 inline TrueCamera brown_camera() {
     return {{640, 480}, {Model::brown, {521, 0, 326, 0, 523, 235, 0, 0, 1}, {-0.24, 0.08, 0.0011, -0.0008, -0.01}}};
