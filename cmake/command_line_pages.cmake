@@ -4,7 +4,7 @@ find_program(GZIP gzip REQUIRED)
 set(pages_directory ${CMAKE_BINARY_DIR}/pages)
 file(MAKE_DIRECTORY ${pages_directory})
 set(pages)
-foreach(program arhost arhost-conform arhost-inprocess arhost-map arhost-marker render-scene)
+foreach(program arhost arhost-calibrate arhost-conform arhost-inprocess arhost-map arhost-marker render-scene)
   set(page ${pages_directory}/${program}.1.gz)
   add_custom_command(OUTPUT ${page} DEPENDS ${program} VERBATIM
                      COMMAND ${program} --generate man > ${program}.1
@@ -25,11 +25,12 @@ foreach(shell bash zsh fish)
   if(shell STREQUAL zsh)
     set(last_line COMMAND ${CMAKE_COMMAND} -E echo "_arhost \"$@\"" >> arhost.zsh)
   endif()
-  add_custom_command(OUTPUT ${pages_directory}/arhost.${shell} DEPENDS arhost arhost-conform arhost-map arhost-marker VERBATIM
+  add_custom_command(OUTPUT ${pages_directory}/arhost.${shell} DEPENDS arhost arhost-calibrate arhost-conform arhost-map arhost-marker VERBATIM
                      COMMAND arhost --generate ${shell} > arhost.${shell}
                      COMMAND arhost-conform --generate ${shell} >> arhost.${shell}
                      COMMAND arhost-map --generate ${shell} >> arhost.${shell}
                      COMMAND arhost-marker --generate ${shell} >> arhost.${shell}
+                     COMMAND arhost-calibrate --generate ${shell} >> arhost.${shell}
                      ${last_line}
                      WORKING_DIRECTORY ${pages_directory})
   list(APPEND pages ${pages_directory}/arhost.${shell})

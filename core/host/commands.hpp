@@ -60,7 +60,7 @@ int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, su
 int devices(const Arguments &arguments, const DevicesArguments &options, supervise::Starter &launcher);
 int print_schema(bool markdown);
 // Replaces this process with another program of arhost (exec): arhost-conform, because the host process never loads a
-// plugin itself, or arhost-map and arhost-marker, because it links no OpenCV.
+// plugin itself, or arhost-calibrate, arhost-map and arhost-marker, because it links no OpenCV.
 int run_program(const char *name, std::vector<std::string> arguments);
 
 // own_folder() is the folder of this executable, which also contains the programs that arhost starts. own_prefix() is

@@ -168,6 +168,8 @@ int main(int argc, char **argv) {
         app.raw_subcommand("conform", "Test whether a plugin conforms to the ABI (docs/conformance.md)");
     CommandLine marker_command =
         app.raw_subcommand("marker", "Print markers and boards in their true size (docs/markers.md)");
+    CommandLine calibrate_command =
+        app.raw_subcommand("calibrate", "Calibrate a camera with a printed board (docs/calibration.md)");
     CommandLine map_command =
         app.raw_subcommand("map", "Learn where markers are relative to each other, from images (docs/maps.md)");
     std::string helped;
@@ -178,7 +180,8 @@ int main(int argc, char **argv) {
         return checked_output(*status);
     const auto command = [&]() -> int {
         if (help_command.selected() &&
-            (helped == "conform" || helped == "marker" || helped == "map")) // programs with their own options
+            (helped == "conform" || helped == "marker" || helped == "map" ||
+             helped == "calibrate")) // programs with their own options
             return run_program(("arhost-" + helped).c_str(), {"--help"});
         if (help_command.selected()) {
             std::fputs(app.help(helped).c_str(), stdout);
@@ -194,6 +197,8 @@ int main(int argc, char **argv) {
             return run_program("arhost-conform", conform_command.arguments());
         if (marker_command.selected())
             return run_program("arhost-marker", marker_command.arguments());
+        if (calibrate_command.selected())
+            return run_program("arhost-calibrate", calibrate_command.arguments());
         if (map_command.selected())
             return run_program("arhost-map", map_command.arguments());
         arhost::supervise::Launcher launcher(own_folder() / "arhost-launcher");

@@ -18,14 +18,14 @@ namespace arhost::worker {
 // apart (pose/track.hpp).
 class TargetSolver {
 public:
-    // `full_search_every`: a tracker searches the whole frame at least once in so many frames; at least 1.
+    // `full_search_every`: longest interval, in frames, between searches of the whole frame; at least 1.
     TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<ipc::Target> &targets,
                  std::uint32_t full_search_every);
 
     // Bytes of `before` and `after`.
     std::uint64_t state_size() const;
 
-    // What to tell the tracker before its call.
+    // Returns what arhost_track_request says about a frame.
     struct Expectation {
         std::vector<arhost_expected_marker> markers;
         bool search_everywhere;

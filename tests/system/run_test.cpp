@@ -440,6 +440,8 @@ TEST(CommandLine, HelpDescribesCommands) {
     EXPECT_THAT(run.output(), HasSubstr("Usage: arhost map [OPTIONS]"));
     EXPECT_EQ(run.run({"help", "marker"}), 0);
     EXPECT_THAT(run.output(), HasSubstr("Usage: arhost marker [OPTIONS] MARKERS"));
+    EXPECT_EQ(run.run({"help", "calibrate"}), 0);
+    EXPECT_THAT(run.output(), HasSubstr("Usage: arhost calibrate [OPTIONS]"));
     EXPECT_EQ(run.run({"help", "help"}), 0);
     EXPECT_THAT(run.output(), HasSubstr("Usage: arhost help [OPTIONS] [COMMAND]"));
     EXPECT_EQ(run.run({"help", "nonsense"}), 2);
@@ -486,6 +488,8 @@ TEST(CommandLine, CompletesInBash) {
     EXPECT_EQ(completed("arhost conform --reads pl"), "plugins ");
     EXPECT_EQ(completed("arhost marker --cha"), "--charuco ");
     EXPECT_EQ(completed("arhost marker --map la"), "lab.yaml ");
+    EXPECT_EQ(completed("arhost calibrate --chess"), "--chessboard ");
+    EXPECT_EQ(completed("arhost calibrate --images la"), "lab.yaml ");
 }
 
 TEST(CommandLine, CompletesInFish) {
@@ -535,12 +539,13 @@ TEST(CommandLine, CompletesInZsh) {
     EXPECT_TRUE(completes("arhost help rep", "lay "));
     EXPECT_TRUE(completes("arhost conform --timeo", "ut-factor "));
     EXPECT_TRUE(completes("arhost marker --cha", "ruco "));
+    EXPECT_TRUE(completes("arhost calibrate --chess", "board "));
     EXPECT_TRUE(completes("arhost map --skip", "-unconnected "));
 }
 
 TEST(CommandLine, HasAManPageForEachProgram) {
     const std::filesystem::path pages = ARHOST_BINARY_DIRECTORY "/pages";
-    for (const char *program : {"arhost", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-map",
+    for (const char *program : {"arhost", "arhost-calibrate", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-map",
                                 "arhost-marker", "arhost-worker", "render-scene"})
         EXPECT_TRUE(std::filesystem::is_regular_file(pages / (std::string(program) + ".1.gz"))) << program;
     ArhostRun run;
