@@ -94,8 +94,8 @@ void lift_deadlines(run_config::Configuration &configuration) {
 
 // Throws if an output would overwrite one of arhost's own programs, libraries and plugins.
 void protect_programs(const run_config::FilesInUse &files) {
-    for (const char *program : {"arhost", "arhost-calibrate", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-map",
-                                "arhost-marker", "arhost-worker", "render-scene"})
+    for (const char *program : {"arhost", "arhost-calibrate", "arhost-conform", "arhost-inprocess", "arhost-launcher",
+                                "arhost-map", "arhost-marker", "arhost-worker", "render-scene"})
         files.protect(base::identity_of(own_folder() / program));
     std::error_code ignored;
     for (fs::recursive_directory_iterator entry(own_prefix() / "lib/arhost", ignored), end; !ignored && entry != end;

@@ -179,9 +179,8 @@ int main(int argc, char **argv) {
     if (const auto status = app.parse(argc, argv))
         return checked_output(*status);
     const auto command = [&]() -> int {
-        if (help_command.selected() &&
-            (helped == "conform" || helped == "marker" || helped == "map" ||
-             helped == "calibrate")) // programs with their own options
+        if (help_command.selected() && (helped == "conform" || helped == "marker" || helped == "map" ||
+                                        helped == "calibrate")) // programs with their own options
             return run_program(("arhost-" + helped).c_str(), {"--help"});
         if (help_command.selected()) {
             std::fputs(app.help(helped).c_str(), stdout);

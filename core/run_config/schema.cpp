@@ -127,7 +127,8 @@ std::vector<Key> make_table() {
          {"world_grace_frames", integer, false, "90",
           "Frames for which other targets tell where the world is, after the first target was last seen."},
          {"full_search_every", integer, false, "10",
-          "Longest interval, in frames, between searches of the whole frame; in the other frames, a tracker may search "
+          "Longest interval, in frames, between searches of the whole frame; in the other frames, a tracker may "
+          "search "
           "only where markers are expected. 1: always."},
          fallback,
          conform});

@@ -545,8 +545,8 @@ TEST(CommandLine, CompletesInZsh) {
 
 TEST(CommandLine, HasAManPageForEachProgram) {
     const std::filesystem::path pages = ARHOST_BINARY_DIRECTORY "/pages";
-    for (const char *program : {"arhost", "arhost-calibrate", "arhost-conform", "arhost-inprocess", "arhost-launcher", "arhost-map",
-                                "arhost-marker", "arhost-worker", "render-scene"})
+    for (const char *program : {"arhost", "arhost-calibrate", "arhost-conform", "arhost-inprocess", "arhost-launcher",
+                                "arhost-map", "arhost-marker", "arhost-worker", "render-scene"})
         EXPECT_TRUE(std::filesystem::is_regular_file(pages / (std::string(program) + ".1.gz"))) << program;
     ArhostRun run;
     EXPECT_EQ(run.run({"--generate", "man"}), 0);
