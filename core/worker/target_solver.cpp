@@ -15,7 +15,7 @@ struct TargetSolver::Header {
     std::uint32_t frames_since_full_search, reserved;
 };
 
-// What is known about a target from earlier frames. Plain data without pointers; all zero if it was never seen.
+// The state of a target after the last frame. Plain data without pointers; all zero if it was never seen.
 struct TargetSolver::Memory {
     pose::Track track; // not of bodies
     double mt[16];     // the last known pose

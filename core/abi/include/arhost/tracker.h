@@ -104,7 +104,7 @@ typedef struct arhost_tracker_result {
     uint32_t reserved;                /* 0 */
 } arhost_tracker_result;
 
-/* What the outputs learn about a target (arhost/sink.h). */
+/* A target as the outputs get it (arhost/sink.h). */
 typedef struct arhost_target {
     uint32_t struct_size;
     arhost_target_state state;
