@@ -139,9 +139,9 @@ typedef struct arhost_expected_marker {
 /* The input of `track`. */
 typedef struct arhost_track_request {
     uint32_t struct_size;
-    int32_t
-        search_everywhere; /* 0: a detector may search only where markers are expected, which takes less time. This
-                              is not 0 if no marker is expected, after a target was lost, and at regular intervals */
+    /* 0: a detector may search only where markers are expected, which takes less time. Not 0 if no marker is
+     * expected, after a target was lost, and at regular intervals. */
+    int32_t search_everywhere;
     const arhost_frame *frame; /* read-only */
     /* The memory of a tracker whose `state_size` is not 0; otherwise both are NULL. The host keeps it, so it survives
      * the end of the worker process. Both are aligned to 64 bytes.
