@@ -10,7 +10,6 @@
 #include <glm/trigonometric.hpp>
 
 #include <algorithm>
-#include <cstring>
 
 namespace arhost::conformance {
 
@@ -406,7 +405,7 @@ std::string difference(std::span<const arhost_observation> actual, std::span<con
     if (actual.size() != expected.size())
         return fmt::format("gives {} observations; expected {}", actual.size(), expected.size());
     for (std::size_t i = 0; i < actual.size(); ++i)
-        if (std::memcmp(&actual[i], &expected[i], sizeof actual[i]) != 0)
+        if (!std::ranges::equal(std::as_bytes(actual.subspan(i, 1)), std::as_bytes(expected.subspan(i, 1))))
             return fmt::format("gives other bytes for {}: the first corner differs by {:.3g} px",
                                text_of(expected[i]),
                                glm::distance(corners_of(actual[i])[0], corners_of(expected[i])[0]));

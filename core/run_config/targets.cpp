@@ -20,8 +20,8 @@
 #include <limits>
 #include <map>
 #include <optional>
-#include <ranges>
 #include <set>
+#include <sstream>
 #include <tuple>
 #include <utility>
 
@@ -53,7 +53,7 @@ std::string parse_name(const yaml::Node &node, std::size_t size_with_nul) {
 
 // Bodies have the names that another program gave them.
 std::string parse_body(const yaml::Node &node) {
-    const std::string body = node.text();
+    std::string body = node.text();
     if (body.size() >= ARHOST_MAX_NAME || base::printable(body) != body)
         node.fail("must have at most " + std::to_string(ARHOST_MAX_NAME - 1) + " bytes of printable text");
     return body;
@@ -122,9 +122,10 @@ std::optional<std::pair<std::int32_t, std::int32_t>> parse_range(std::string_vie
 // Parses ids, which are text such as "0-3,7", or a list of such texts.
 std::vector<std::int32_t> parse_ids(const yaml::Node &node) {
     std::vector<std::int32_t> ids;
-    for (const yaml::Node &item : node.is_sequence() ? node.items() : std::vector{node})
-        for (const auto &part : std::views::split(item.text(), ',')) {
-            std::string_view text(part.begin(), part.end());
+    for (const yaml::Node &item : node.is_sequence() ? node.items() : std::vector{node}) {
+        std::istringstream parts(item.text() + ",");
+        for (std::string part; std::getline(parts, part, ',');) {
+            std::string_view text = part;
             text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
             text = text.substr(0, text.find_last_not_of(' ') + 1);
             const auto range = parse_range(text);
@@ -139,6 +140,7 @@ std::vector<std::int32_t> parse_ids(const yaml::Node &node) {
                 ids.push_back(id);
             ids.push_back(range->second);
         }
+    }
     if (ids.empty())
         node.fail("must not be empty");
     return ids;

@@ -24,7 +24,6 @@ struct TargetSolver::Memory {
 
 namespace {
 
-using pose::Correspondence;
 using pose::Estimate;
 using pose::ObservedMarker;
 using pose::Rigid;
