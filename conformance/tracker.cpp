@@ -10,6 +10,7 @@
 #include <glm/trigonometric.hpp>
 
 #include <algorithm>
+#include <cstring>
 
 namespace arhost::conformance {
 
