@@ -190,4 +190,45 @@ TEST(Estimate, CornersThatNoFrontCanShowHaveNoPose) {
     EXPECT_TRUE(estimate_poses({}, camera.projection()).empty());
 }
 
+TEST(Estimate, ASquareParallelToTheImageHasTheFrontalPose) {
+    // Both solutions coincide, and rounding errors could select either.
+    const Projection projection(pinhole);
+    constexpr double side_px = 95, distance_mm = 900 * side_mm / side_px;
+    for (int left = 300; left <= 900; left += 10)
+        for (const double nudge_px : {0.0, 1e-9, 1e-7, 1e-6}) {
+            const double right = left + side_px, top = 310, bottom = top + side_px * 910 / 900;
+            const ObservedMarker marker{square_corners_mm(side_mm),
+                                        {{{double(left), top},
+                                          {right + nudge_px, top - nudge_px / 2},
+                                          {right, bottom},
+                                          {double(left), bottom}}},
+                                        0.1};
+            const auto found = estimate_poses({&marker, 1}, projection);
+            ASSERT_FALSE(found.empty()) << left;
+            const double x_px = left + side_px / 2 - pinhole.cx, y_px = (top + bottom) / 2 - pinhole.cy;
+            expect_pose(found[0].camera_from_target,
+                        pose_at({x_px * distance_mm / 900, y_px * distance_mm / 910, distance_mm}, 0), 1e-3, 1e-3);
+        }
+}
+
+TEST(Estimate, EveryPoseOfArbitraryCornersShowsTheFrontOfTheMarker) {
+    const Projection projection(pinhole);
+    std::mt19937 random(7);
+    std::uniform_real_distribution<double> x_px(0, 1280), y_px(0, 720);
+    int poses = 0;
+    for (int round = 0; round < 3000; ++round) {
+        ObservedMarker marker{square_corners_mm(side_mm), {}, 0.1};
+        for (Eigen::Vector2d &corner : marker.corners_px)
+            corner = {x_px(random), y_px(random)};
+        for (const Estimate &estimate : estimate_poses({&marker, 1}, projection)) {
+            ++poses;
+            const Rigid &pose = estimate.camera_from_target;
+            EXPECT_GT(pose.translation_mm.z(), 0);
+            EXPECT_LT(pose.rotation.col(2).dot(pose.translation_mm), 0);
+            EXPECT_TRUE(std::isfinite(estimate.reprojection_px));
+        }
+    }
+    EXPECT_GT(poses, 100);
+}
+
 } // namespace arhost::pose
