@@ -309,7 +309,7 @@ int main(int argc, char **argv) {
         .type_name("N")
         .range(1, 10'000)
         .show_default();
-    app.option("--camera", arguments.camera, "Calibration of the camera, as in camera: {file: …}")
+    app.option("--camera", arguments.camera, "Calibration of the camera, as for the key camera.file")
         .type_name("FILE")
         .required();
     app.option("--family,--dictionary", arguments.family,
