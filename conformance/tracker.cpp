@@ -202,6 +202,7 @@ arhost_status Tracker::try_track(const SealedFrame &frame, std::uint64_t sequenc
     const arhost_frame input = frame.frame(sequence, capture_ns);
     arhost_track_request request{};
     request.struct_size = sizeof request;
+    request.search_everywhere = 1;
     request.frame = &input;
     std::unique_ptr<GuardedMemory> after;
     if (state_size_ > 0) {

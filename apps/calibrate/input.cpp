@@ -34,14 +34,14 @@ void check_size(const cv::Size &size, const std::string &name) {
                                              size.width, size.height, static_cast<int>(ARHOST_MAX_IMAGE_SIDE)));
 }
 
-// The pixels of the sensor: cameras in arhost do not turn their images either.
+// Turns the image as its metadata request, as source_file does.
 cv::Mat read_image(const fs::path &file) {
     std::error_code error;
     if (!fs::exists(file, error))
         throw std::runtime_error(fmt::format("{}: there is no such file", file.string()));
     cv::Mat image;
     try {
-        image = cv::imread(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+        image = cv::imread(file, cv::IMREAD_GRAYSCALE);
     } catch (const cv::Exception &) { // too large for OpenCV
     }
     if (image.empty())
@@ -60,9 +60,7 @@ cv::Mat grey_of(const cv::Mat &frame) {
 
 class Frames {
 public:
-    Frames(cv::VideoCapture &capture, std::string name) : capture_(capture), name_(std::move(name)) {
-        capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
-    }
+    Frames(cv::VideoCapture &capture, std::string name) : capture_(capture), name_(std::move(name)) {}
 
     // Returns false at the end.
     bool next(cv::Mat &frame) {

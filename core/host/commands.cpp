@@ -119,11 +119,14 @@ bool may_redirect(const fs::path &folder, const fs::path &file, int links = 40) 
     return false;
 }
 
-// Throws if a plugin may change the configuration or a scene: with `--watch`, it could grant itself permissions.
+// Throws if a plugin may change the configuration, a map or a scene: with `--watch`, it could grant itself
+// permissions.
 void expect_watchable(const run_config::Configuration &configuration) {
     std::vector<fs::path> files{fs::absolute(configuration.node.file())};
     for (const run_config::Scene &scene : configuration.scenes)
         files.push_back(scene.file);
+    if (configuration.tracker)
+        files.insert(files.end(), configuration.tracker->map_files.begin(), configuration.tracker->map_files.end());
     for_each_component(configuration, [&](const run_config::ComponentConfiguration &component) {
         if (component.policy.mode == sandbox::Mode::none)
             return;
@@ -504,13 +507,14 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     if (!completed && !pipeline.failure_was_logged())
         console.log(ARHOST_SEVERITY_ERROR, "arhost", pipeline.failure());
     const Statistics &statistics = pipeline.statistics();
-    const auto problem = completed ? problem_with_run(configuration, statistics) : std::nullopt;
+    const auto problem = completed ? problem_with_run(configuration, statistics, pipeline.targets()) : std::nullopt;
     const bool is_accepted = problem && problem->is_missing_target && arguments.allow_no_target;
     if (problem)
         console.log(is_accepted || stopped_by_signal ? ARHOST_SEVERITY_WARNING : ARHOST_SEVERITY_ERROR,
                     problem->component,
                     problem->text + (problem->is_missing_target ? " (--allow-no-target accepts this)" : ""));
-    if (const std::string unseen = unseen_targets(configuration, statistics); completed && !unseen.empty())
+    if (const std::string unseen = unseen_targets(configuration, statistics, pipeline.targets());
+        completed && !unseen.empty())
         console.log(ARHOST_SEVERITY_WARNING, "tracker", unseen);
     if (configuration.mode == run_config::Mode::live && statistics.composited > 0)
         console.log(ARHOST_SEVERITY_INFO, "arhost",
@@ -674,7 +678,7 @@ int check_by_opening(run_config::Configuration configuration, const Arguments &a
     }
     for (const std::string &line : pipeline.findings())
         std::printf("%s\n", base::printable(line).c_str());
-    const auto problem = problem_with_run(configuration, pipeline.statistics());
+    const auto problem = problem_with_run(configuration, pipeline.statistics(), pipeline.targets());
     if (problem)
         context.log(ARHOST_SEVERITY_ERROR, problem->component, problem->text);
     return problem ? run_failed : success;

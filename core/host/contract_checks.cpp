@@ -55,7 +55,7 @@ std::string problem_with_covariance(const arhost_target &target) {
     if (target.state == ARHOST_TARGET_LOST || std::ranges::all_of(c, [](double number) { return number == 0; }))
         return {};
     for (int row = 0; row < 6; ++row) {
-        if (!(c[7 * row] > 0))
+        if (!(c[7 * row] >= 0))
             return fmt::format("{} has a variance of {:g}", target.name, c[7 * row]);
         for (int column = 0; column < row; ++column)
             if (std::abs(c[6 * row + column] - c[6 * column + row]) > 1e-6 * std::sqrt(c[7 * row] * c[7 * column]))

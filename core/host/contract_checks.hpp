@@ -31,7 +31,7 @@ struct ContractCheck {
 
 class ContractChecks {
 public:
-    // Calls `on_first` at the first violation of each check, for example with ("tracker.order", "frame 3: …").
+    // Calls `on_first` at the first violation of each check, for example with ("tracker.corners", "frame 3: …").
     explicit ContractChecks(std::function<void(const std::string &name, const std::string &violation)> on_first = {})
         : on_first_(std::move(on_first)) {}
 

@@ -22,8 +22,8 @@ std::uint64_t count(const std::map<std::string, std::uint64_t> &counts, const ch
 
 } // namespace
 
-std::optional<Problem> problem_with_run(const run_config::Configuration &configuration,
-                                        const Statistics &statistics) {
+std::optional<Problem> problem_with_run(const run_config::Configuration &configuration, const Statistics &statistics,
+                                        const std::vector<ipc::Target> &targets) {
     if (statistics.frames_in == 0)
         return std::nullopt;
     if (configuration.time_codes)
@@ -41,7 +41,7 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
             fmt::format("no target was seen in any of {} frames{}; it looked for {}{}; compare the numbers and the "
                         "family with the print",
                         statistics.tracker_results, configuration.raytracer ? ", so no frame has an overlay" : "",
-                        describe_targets(configuration.tracker->targets), seen_instead(statistics)),
+                        describe_targets(targets), seen_instead(statistics)),
             true};
     if (configuration.mode != run_config::Mode::live || !configuration.raytracer || statistics.composited == 0 ||
         statistics.augmented > 0)
@@ -55,11 +55,12 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
                                statistics.composited, why.empty() ? "all were late" : why)};
 }
 
-std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics) {
+std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics,
+                           const std::vector<ipc::Target> &targets) {
     if (!configuration.tracker || configuration.trajectory || configuration.time_codes || statistics.targets.empty())
         return {};
     std::vector<ipc::Target> unseen;
-    std::ranges::copy_if(configuration.tracker->targets, std::back_inserter(unseen),
+    std::ranges::copy_if(targets, std::back_inserter(unseen),
                          [&](const ipc::Target &target) { return !statistics.targets.contains(target.name); });
     if (unseen.empty())
         return {};

@@ -17,10 +17,13 @@ struct Problem {
     bool is_missing_target = false; // the tracker works, but has seen none of its targets in any frame
 };
 
-std::optional<Problem> problem_with_run(const run_config::Configuration &configuration, const Statistics &statistics);
+// `targets`: those of the tracker at the end of the run.
+std::optional<Problem> problem_with_run(const run_config::Configuration &configuration, const Statistics &statistics,
+                                        const std::vector<ipc::Target> &targets);
 
-// Names the configured targets that were never seen although others were; "" if there are none.
-std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics);
+// Names the targets that were never seen although others were; "" if there are none.
+std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics,
+                           const std::vector<ipc::Target> &targets);
 
 // Describes what a tracker looks for, such as "desk (tag36h11 23), board (map of 12 markers)".
 std::string describe_targets(const std::vector<ipc::Target> &targets);

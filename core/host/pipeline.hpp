@@ -58,6 +58,10 @@ public:
 
     const std::string &failure() const { return failure_; }
     bool failure_was_logged() const { return failure_was_logged_; }
+    // The targets that the tracker looks for now.
+    std::vector<ipc::Target> targets() const {
+        return tracker_ ? tracker_->configuration->targets : std::vector<ipc::Target>();
+    }
     bool failed_by_configuration() const { return failed_by_configuration_; }
 
     // Handles Ctrl-C. The first call lets the frames in progress finish and then ends the run, after the longest

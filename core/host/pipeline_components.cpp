@@ -175,6 +175,9 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(TrackerPointer configuratio
     TrackerStage *stage = tracker.get();
     stage->families = families_of(configuration->targets);
     stage->targets = to_memory(configuration->targets);
+    for (const ipc::Target &target : configuration->targets)
+        for (const ipc::TargetMarker &marker : target.markers)
+            stage->listed.emplace(marker.family, marker.id);
     Component::Callbacks callbacks = common_callbacks("tracker", configuration->node);
     callbacks.hello = [this, stage](const PluginDescription &plugin, std::size_t candidate) {
         const run_config::TrackerConfiguration &own = *stage->configuration;

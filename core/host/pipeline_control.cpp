@@ -121,8 +121,13 @@ bool Pipeline::finish_swaps() {
     const auto finish = [this](auto &current, auto &next) {
         if (!next || !next->running() || current->component->in_flight() > 0)
             return false;
-        if constexpr (requires { next->inherit_state(*current); })
+        if constexpr (requires { next->inherit_state(*current); }) {
             next->inherit_state(*current);
+            if (next->configuration->targets != current->configuration->targets) { // perhaps another world
+                world_ = World();
+                last_camera_.reset();
+            }
+        }
         retire(std::exchange(current, std::exchange(next, nullptr)));
         std::string text = current->component->name() + " is now " + current->configuration->name;
         nlohmann::ordered_json members = {{"plugin", current->configuration->name}};

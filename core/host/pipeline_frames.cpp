@@ -277,17 +277,10 @@ void Pipeline::count_targets(const Frame &frame) {
 
 // Counts the markers that no target lists, and tells the user of them if there is no target for a while.
 void Pipeline::count_strangers(const Frame &frame) {
-    std::size_t listed = 0; // the observations of targets come first
-    for (const arhost_target &target : frame.targets)
-        listed = std::max<std::size_t>(listed, target.first_observation + target.observation_count);
     std::set<std::string> strangers;
-    for (const arhost_observation &observation : std::span(frame.observations).subspan(listed)) {
+    for (const arhost_observation &observation : frame.observations) {
         const std::string &family = tracker_->families[observation.family];
-        const auto is_this = [&](const ipc::TargetMarker &marker) {
-            return marker.id == observation.id && marker.family == family;
-        };
-        const auto lists_it = [&](const ipc::Target &target) { return std::ranges::any_of(target.markers, is_this); };
-        if (std::ranges::none_of(tracker_->configuration->targets, lists_it))
+        if (strangers.size() < Statistics::max_strangers && !tracker_->listed.contains({family, observation.id}))
             strangers.insert(family + " " + std::to_string(observation.id));
     }
     for (const std::string &name : strangers)

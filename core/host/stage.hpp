@@ -62,8 +62,9 @@ struct TrackerStage : Stage {
         state = std::move(previous.state);
         state_is_of_solver_only = true;
     }
-    std::vector<std::string> families;        // of the targets' markers
-    std::optional<ipc::SharedMemory> targets; // those of the configuration, for its workers
+    std::vector<std::string> families;                     // of the targets' markers
+    std::set<std::pair<std::string, std::int32_t>> listed; // family and id of the targets' markers
+    std::optional<ipc::SharedMemory> targets;              // those of the configuration, for its workers
 };
 
 struct LoadedScene {

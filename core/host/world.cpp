@@ -29,19 +29,17 @@ std::optional<std::array<double, 16>> World::locate(const std::string &first, st
     if (const auto own = std::ranges::find_if(
             targets, [&](const auto &target) { return is_visible(target) && target.name == first; });
         own != targets.end()) {
-        last_seen_ = frame;
         substitute_.clear();
         for (const arhost_target &target : targets)
             if (&target != &*own && target.state == ARHOST_TARGET_DETECTED && own->state == ARHOST_TARGET_DETECTED)
-                target_from_world_[target.name] =
-                    product(glm::affineInverse(glm::make_mat4(target.mt)), glm::make_mat4(own->mt));
+                relations_[target.name] = {
+                    product(glm::affineInverse(glm::make_mat4(target.mt)), glm::make_mat4(own->mt)), frame};
         std::ranges::copy(own->mt, world.begin());
         return world;
     }
-    if (frame - last_seen_ > grace_frames)
-        return {};
-    const auto is_known = [&](const auto &target) {
-        return is_visible(target) && target_from_world_.contains(target.name);
+    const auto is_known = [&](const arhost_target &target) {
+        const auto relation = relations_.find(target.name);
+        return is_visible(target) && relation != relations_.end() && frame - relation->second.frame <= grace_frames;
     };
     auto other = std::ranges::find_if(
         targets, [&](const auto &target) { return is_known(target) && target.name == substitute_; });
@@ -50,7 +48,7 @@ std::optional<std::array<double, 16>> World::locate(const std::string &first, st
     if (other == targets.end())
         return {};
     substitute_ = other->name;
-    const glm::dmat4 mt = product(glm::make_mat4(other->mt), target_from_world_.at(substitute_));
+    const glm::dmat4 mt = product(glm::make_mat4(other->mt), relations_.at(substitute_).target_from_world);
     std::copy_n(glm::value_ptr(mt), 16, world.begin());
     return world;
 }

@@ -21,14 +21,17 @@ namespace arhost::host {
 class World {
 public:
     // Returns the pose of the world in a frame, as arhost_target.mt. `first`: name of the first target.
-    // `grace_frames`: for how long the relations to other targets are trusted after the first target was last seen.
+    // `grace_frames`: for how long the relation of a target is trusted after both were detected.
     std::optional<std::array<double, 16>> locate(const std::string &first, std::span<const arhost_target> targets,
                                                  std::uint64_t frame, std::uint64_t grace_frames);
 
 private:
-    std::map<std::string, glm::dmat4> target_from_world_; // by name of the target
-    std::uint64_t last_seen_ = 0;                         // the frame in which the first target was last detected
-    std::string substitute_;                              // the target that was used instead in the last frame
+    struct Relation {
+        glm::dmat4 target_from_world;
+        std::uint64_t frame; // in which both were detected
+    };
+    std::map<std::string, Relation> relations_; // by name of the target
+    std::string substitute_;                    // the target that was used instead in the last frame
 };
 
 } // namespace arhost::host

@@ -52,7 +52,7 @@ inline Eigen::Matrix3d orthonormal(const Eigen::Matrix3d &rotation) {
     return Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
 }
 
-// The pose as arhost_marker.mt: column-major, in OpenGL eye space.
+// The pose as arhost_target.mt: column-major, in OpenGL eye space.
 inline std::array<double, 16> matrix_of(const Rigid &pose) {
     std::array<double, 16> matrix{};
     Eigen::Map<Eigen::Matrix4d> m(matrix.data());

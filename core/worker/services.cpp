@@ -126,11 +126,11 @@ struct TrackerSetup {
     std::vector<const char *> family_names;
 };
 
-// Returns an array for a plugin to fill.
-template <class T> std::vector<T> elements(std::size_t count) {
+// Prepares an array for a plugin to fill, which may have written anything to it before.
+template <class T> void reset(std::vector<T> &elements) {
     T element{};
     element.struct_size = sizeof element;
-    return std::vector<T>(count, element);
+    std::ranges::fill(elements, element);
 }
 
 class TrackerService final : public Service {
@@ -169,7 +169,7 @@ public:
         }
         solver_.emplace(message.intrinsics, targets, message.full_search_every);
         layout_.emplace(targets.size());
-        poses_ = elements<arhost_body_pose>(targets.size());
+        poses_.resize(targets.size());
         plugin_offset_ = layout_->state_offset + (solver_->state_size() + 63) / 64 * 64;
         ready.state_size = plugin_offset_ - layout_->state_offset + state_size_;
         return status;
@@ -216,6 +216,8 @@ public:
         request.search_everywhere = expectation.search_everywhere;
         request.expected = expectation.markers.data();
         request.expected_count = static_cast<std::uint32_t>(expectation.markers.size());
+        reset(observations_);
+        reset(poses_);
         arhost_tracker_result result{};
         result.struct_size = sizeof result;
         result.observations = observations_.data();
@@ -246,7 +248,7 @@ private:
     arhost_frame_format format_{};
     std::optional<TargetSolver> solver_;
     std::optional<TrackerSlot> layout_;
-    std::vector<arhost_observation> observations_ = elements<arhost_observation>(ARHOST_MAX_OBSERVATIONS);
+    std::vector<arhost_observation> observations_ = std::vector<arhost_observation>(ARHOST_MAX_OBSERVATIONS);
     std::vector<arhost_body_pose> poses_;
     std::uint64_t state_size_ = 0;       // of the plugin
     std::uint64_t plugin_offset_ = 0;    // of the plugin's state in a slot

@@ -176,6 +176,8 @@ void TargetSolver::check(const arhost_tracker_result &reported) const {
         has_pose[body.target] = true;
         if (body.state < ARHOST_TARGET_DETECTED || body.state > ARHOST_TARGET_LOST)
             violation("reports a pose with an invalid state");
+        if (body.state == ARHOST_TARGET_DETECTED && body.age_frames != 0)
+            violation("reports a detected body with an age of " + std::to_string(body.age_frames) + " frames");
         const auto is_finite = [](double number) { return std::isfinite(number); };
         if (!std::ranges::all_of(body.mt, is_finite) || !std::ranges::all_of(body.covariance, is_finite) ||
             !is_rotation(pose::rigid_of(body.mt)))

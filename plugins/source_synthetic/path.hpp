@@ -9,7 +9,7 @@ namespace arhost::synthetic {
 
 enum class PathKind { orbit, still, approach };
 
-// Marker-to-camera as arhost_marker.mt: column-major, GL eye space.
+// Marker-to-camera as arhost_target.mt: column-major, GL eye space.
 using Mt = std::array<double, 16>;
 
 // Returns the pose at a point of the path. `phase` is the elapsed fraction of the period, 0 to 1. `distance_scale` is

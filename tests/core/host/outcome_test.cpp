@@ -20,7 +20,9 @@ struct Outcome : testing::Test {
         statistics.frames_in = statistics.composited = statistics.tracker_results = 30;
         statistics.tracked = statistics.augmented = 20;
     }
-    std::optional<Problem> problem() const { return problem_with_run(*configuration, statistics); }
+    std::optional<Problem> problem() const {
+        return problem_with_run(*configuration, statistics, configuration->tracker->targets);
+    }
     std::optional<run_config::Configuration> configuration;
     Statistics statistics;
 };
@@ -87,14 +89,16 @@ TEST_F(Outcome, NamesTheMarkersThatWereSeenInsteadOfATarget) {
 }
 
 TEST_F(Outcome, NamesTargetsThatWereNeverSeenAlthoughOthersWere) {
-    EXPECT_EQ(unseen_targets(*configuration, statistics), "") << "problem_with_run reports that none was seen";
+    EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets), "")
+        << "problem_with_run reports that none was seen";
     statistics.targets["desk"].frames = 20;
-    EXPECT_EQ(unseen_targets(*configuration, statistics), "never seen in 30 frames: 'cup' (D 7)");
+    EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets),
+              "never seen in 30 frames: 'cup' (D 7)");
     statistics.strangers = {{"D 8", 30}};
-    EXPECT_EQ(unseen_targets(*configuration, statistics),
+    EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets),
               "never seen in 30 frames: 'cup' (D 7); it saw D 8 (30 frames)");
     statistics.targets["cup"].frames = 1;
-    EXPECT_EQ(unseen_targets(*configuration, statistics), "");
+    EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets), "");
 }
 
 TEST(Targets, AreDescribedByTheirMarkers) {

@@ -80,8 +80,15 @@ TEST_F(WorldTest, IsLostAfterTheGracePeriod) {
     locate({{"desk", desk}, {"cup", cup}}, 5);
     EXPECT_TRUE(locate({{"cup", cup}}, 5 + grace_frames));
     EXPECT_FALSE(locate({{"cup", cup}}, 6 + grace_frames));
-    EXPECT_TRUE(locate({{"desk", desk}}, 7 + grace_frames));
+    EXPECT_TRUE(locate({{"desk", desk}, {"cup", cup}}, 7 + grace_frames));
     EXPECT_TRUE(locate({{"cup", cup}}, 8 + grace_frames)) << "the relation is known again";
+}
+
+TEST_F(WorldTest, ARelationThatIsOldIsNotTrusted) {
+    locate({{"desk", desk}, {"cup", cup}}, 0);
+    for (std::uint64_t frame = 1; frame <= 2 * grace_frames; ++frame)
+        locate({{"desk", desk}}, frame); // the cup is out of view, and may be moved
+    EXPECT_FALSE(locate({{"cup", cup}}, 2 * grace_frames + 1));
 }
 
 TEST_F(WorldTest, LearnsRelationsOnlyFromDetectedTargets) {

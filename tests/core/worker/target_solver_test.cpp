@@ -363,6 +363,8 @@ TEST_F(TargetSolverTest, RejectsAReportThatViolatesTheContract) {
         EXPECT_THAT(violation({}, altered(body_pose(head), alter)),
                     HasSubstr("not finite, or a pose that is no rotation"));
     EXPECT_THAT(violation({}, altered(body_pose(head), [](auto &p) { p.state = 0; })), HasSubstr("invalid state"));
+    EXPECT_THAT(violation({}, altered(body_pose(head), [](auto &p) { p.age_frames = 5; })),
+                HasSubstr("a detected body with an age of 5 frames"));
     EXPECT_EQ(violation({good}, {body_pose(head)}), "");
 }
 
