@@ -184,7 +184,7 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(TrackerPointer configuratio
         if (const auto body =
                 std::ranges::find_if(own.targets, [](const auto &target) { return !target.body.empty(); });
             body != own.targets.end() && !(plugin.capabilities & ARHOST_CAPABILITY_REPORTS_POSES))
-            own.node.require("targets").fail(
+            own.node.find("targets").value_or(own.node).fail(
                 "the target '" + body->name + "' is a body, but '" + plugin.id +
                 "' finds only markers; choose a tracker that reports the poses of bodies");
         return Component::Create{{options_for(*stage->component, ARHOST_KIND_TRACKER, own, candidate),

@@ -35,8 +35,8 @@ constexpr double marker_sigma_px = 0.1, map_sigma_px = 0.5;
     throw std::runtime_error("contract violation: the tracker " + what);
 }
 
-bool is_rotation(const Rigid &pose) {
-    return (pose.rotation * pose.rotation.transpose()).isIdentity(1e-6) && pose.rotation.determinant() > 0;
+bool is_rotation(const Rigid &pose, double tolerance = 1e-6) {
+    return (pose.rotation * pose.rotation.transpose()).isIdentity(tolerance) && pose.rotation.determinant() > 0;
 }
 
 // Converts a covariance from OpenCV's camera axes to those of arhost_target.mt. Both flip y and z.
@@ -287,7 +287,10 @@ void TargetSolver::solve(const arhost_tracker_result &reported, bool searched_ev
         if (const auto body = std::ranges::find(poses, index, &arhost_body_pose::target); body != poses.end()) {
             memory.was_seen = 1;
             memory.age_frames = out.age_frames = body->age_frames;
-            std::ranges::copy(body->mt, memory.mt);
+            Rigid pose = pose::rigid_of(body->mt);
+            if (!is_rotation(pose, 1e-9)) // the precision that arhost_target.mt promises
+                pose.rotation = pose::orthonormal(pose.rotation);
+            std::ranges::copy(matrix_of(pose), memory.mt);
             out.state = body->state;
             std::ranges::copy(body->covariance, out.covariance);
         }

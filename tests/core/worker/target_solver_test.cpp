@@ -286,6 +286,11 @@ TEST_F(TargetSolverTest, PassesThePosesOfBodies) {
     EXPECT_EQ(solved[head].state, ARHOST_TARGET_LOST);
     EXPECT_EQ(solved[head].age_frames, 1u);
     EXPECT_TRUE(std::ranges::equal(solved[head].mt, pose.mt));
+    arhost_body_pose imprecise = pose;
+    imprecise.mt[0] += 2e-7;
+    solve({}, 1, {imprecise});
+    const Eigen::Matrix3d rotation = pose_of(head).rotation;
+    EXPECT_TRUE((rotation * rotation.transpose()).isIdentity(1e-12));
     arhost_body_pose extrapolated = pose;
     extrapolated.state = ARHOST_TARGET_PREDICTED;
     extrapolated.age_frames = 2;
