@@ -42,7 +42,8 @@ const char *problem_with(const arhost_observation &observation, std::size_t fami
 
 // Copies an array from a slot to which the worker may still write, so that later checks and uses see the same bytes.
 template <class T> void copy_array(std::span<const std::byte> slot, std::uint64_t offset, std::vector<T> &copy) {
-    std::memcpy(copy.data(), slot.subspan(offset, copy.size() * sizeof(T)).data(), copy.size() * sizeof(T));
+    const auto to = std::as_writable_bytes(std::span(copy));
+    std::ranges::copy(slot.subspan(offset, to.size()), to.begin());
 }
 
 } // namespace

@@ -640,7 +640,7 @@ void Pipeline::compose(Frame &frame, std::uint32_t inputs, std::span<std::byte> 
     frame.record.observation_count = static_cast<std::uint32_t>(frame.observations.size());
     std::memcpy(slot.data(), &frame.record, sizeof frame.record);
     const auto copy_array = [&]<class T>(const std::vector<T> &array, std::uint64_t offset) {
-        std::memcpy(slot.data() + offset, array.data(), array.size() * sizeof(T));
+        std::ranges::copy(std::as_bytes(std::span(array)), slot.data() + offset);
     };
     copy_array(frame.targets, OutputSlot::targets_offset);
     copy_array(frame.observations, OutputSlot::observations_offset);
