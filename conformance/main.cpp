@@ -6,6 +6,7 @@
 #include "base/file_identity.hpp"
 #include "base/listening_socket.hpp"
 #include "base/text.hpp"
+#include "base/write_all.hpp"
 #include "conformance/report.hpp"
 #include "run_config/plugin_path.hpp"
 
@@ -21,7 +22,6 @@
 #include <poll.h>
 #include <set>
 #include <sys/resource.h>
-#include <sys/signalfd.h>
 #include <thread>
 
 namespace {
@@ -364,19 +364,6 @@ void check_report_files(const std::vector<std::string> &reports, const Subject &
     }
 }
 
-// A signalfd for SIGINT, SIGTERM and SIGHUP, except those that the parent process ignores (nohup).
-base::UniqueFd take_signals() {
-    sigset_t taken;
-    ::sigemptyset(&taken);
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-        struct sigaction now {};
-        if (::sigaction(signal, nullptr, &now) == 0 && now.sa_handler != SIG_IGN)
-            ::sigaddset(&taken, signal);
-    }
-    ::sigprocmask(SIG_BLOCK, &taken, nullptr);
-    return base::checked(::signalfd(-1, &taken, SFD_CLOEXEC), "signalfd");
-}
-
 // Prints the last line. Blocks while nobody reads standard error; another signal ends the program.
 void print_last_line(const std::string &line, int signals) noexcept {
     try {
@@ -473,7 +460,7 @@ int main(int argc, char **argv) {
         expect_utf8(option_texts);
         expect_descriptors(settings.jobs);
         check_report_files({json, junit, html}, settings.subject);
-        signals = take_signals(); // not in a test's process: signals terminate it
+        signals = base::watch_signals(); // not in a test's process: signals terminate it
         settings.signals = signals.get();
         if (is_script)
             settings.subject.plugin = adapter_of(settings);

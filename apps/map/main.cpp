@@ -22,7 +22,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <numbers>
-#include <sys/signalfd.h>
 #include <unistd.h>
 
 namespace {
@@ -279,19 +278,6 @@ void run(const Arguments &arguments, int signals) {
         throw std::runtime_error("cannot write to standard output");
 }
 
-// A signalfd for SIGINT, SIGTERM and SIGHUP, except those that the parent process ignores (nohup).
-base::UniqueFd take_signals() {
-    sigset_t taken;
-    ::sigemptyset(&taken);
-    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
-        struct sigaction now {};
-        if (::sigaction(signal, nullptr, &now) == 0 && now.sa_handler != SIG_IGN)
-            ::sigaddset(&taken, signal);
-    }
-    ::sigprocmask(SIG_BLOCK, &taken, nullptr);
-    return base::UniqueFd(::signalfd(-1, &taken, SFD_CLOEXEC | SFD_NONBLOCK));
-}
-
 } // namespace
 
 int main(int argc, char **argv) {
@@ -335,9 +321,8 @@ int main(int argc, char **argv) {
     if (const auto status = app.parse(argc, argv))
         return base::flush_stdout() ? *status : failed;
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT); // the messages below name the file
-    const base::UniqueFd signals = take_signals();
     try {
-        run(arguments, signals.get());
+        run(arguments, base::watch_signals().get());
         return success;
     } catch (const base::Interrupted &interrupted) {
         std::signal(interrupted.signal, SIG_DFL);

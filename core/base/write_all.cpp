@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/write_all.hpp"
 
-#include "base/unique_fd.hpp"
-
 #include <algorithm>
 #include <cerrno>
 #include <climits>
+#include <csignal>
 #include <cstdio>
 #include <fcntl.h>
 #include <poll.h>
@@ -40,6 +39,18 @@ void write_all(int fd, std::string_view bytes, int signals) {
 
 bool flush_stdout() {
     return std::fflush(stdout) == 0 && !std::ferror(stdout);
+}
+
+UniqueFd watch_signals() {
+    sigset_t watched;
+    ::sigemptyset(&watched);
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+        struct sigaction now {};
+        if (::sigaction(signal, nullptr, &now) == 0 && now.sa_handler != SIG_IGN)
+            ::sigaddset(&watched, signal);
+    }
+    ::sigprocmask(SIG_BLOCK, &watched, nullptr);
+    return checked(::signalfd(-1, &watched, SFD_CLOEXEC), "signalfd");
 }
 
 int take_signal(int signals) {

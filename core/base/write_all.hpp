@@ -3,6 +3,8 @@
 // Interruptible writes to descriptors that may block forever, such as an unread pipe or a stopped terminal.
 #pragma once
 
+#include "base/unique_fd.hpp"
+
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -21,6 +23,10 @@ void write_all(int fd, std::string_view bytes, int signals = -1);
 
 // Flushes stdout. Returns false if any output was lost, for example because the disk is full.
 bool flush_stdout();
+
+// Blocks SIGINT, SIGTERM and SIGHUP, except those that the parent process ignores (nohup), and returns a signalfd for
+// them.
+UniqueFd watch_signals();
 
 // Reads the next pending signal from the signalfd `signals`. Returns 0 at once if there is none.
 int take_signal(int signals);

@@ -74,7 +74,7 @@ private:
 // Checks a tracker's result:
 // tracker.corners: the corners of each observation are clockwise in the image and form a convex quadrilateral.
 // tracker.repeats: no observation is reported twice.
-// tracker.covariance: covariances are symmetric, with positive variances.
+// tracker.covariance: covariances are symmetric, and no variance is negative.
 void check_tracking(ContractChecks &checks, std::uint64_t frame, std::span<const arhost_target> targets,
                     std::span<const arhost_observation> observations);
 
