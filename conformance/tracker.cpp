@@ -202,7 +202,11 @@ arhost_status Tracker::try_track(const SealedFrame &frame, std::uint64_t sequenc
     const arhost_frame input = frame.frame(sequence, capture_ns);
     arhost_track_request request{};
     request.struct_size = sizeof request;
-    request.search_everywhere = 1;
+    request.search_everywhere = expected_memory_ == nullptr;
+    if (expected_memory_) {
+        request.expected = reinterpret_cast<const arhost_expected_marker *>(expected_memory_->data());
+        request.expected_count = expected_count_;
+    }
     request.frame = &input;
     std::unique_ptr<GuardedMemory> after;
     if (state_size_ > 0) {
@@ -219,6 +223,24 @@ arhost_status Tracker::try_track(const SealedFrame &frame, std::uint64_t sequenc
         state_before_ = std::move(after);
     }
     return status;
+}
+
+void Tracker::expect(const std::vector<Expected> &markers) {
+    Elements<arhost_expected_marker> elements(extra_);
+    for (const Expected &marker : markers) {
+        arhost_expected_marker one{};
+        one.marker = marker.marker;
+        for (std::size_t i = 0; i < 4; ++i)
+            for (int axis = 0; axis < 2; ++axis)
+                one.corners_px[i][axis] = marker.corners_px[i][axis];
+        one.margin_px = marker.margin_px;
+        elements.add(one);
+    }
+    expected_count_ = elements.count();
+    const std::size_t size = expected_count_ * (sizeof(arhost_expected_marker) + extra_);
+    expected_memory_ = std::make_unique<GuardedMemory>(size);
+    std::memcpy(expected_memory_->data(), elements.first(), size);
+    expected_memory_->seal();
 }
 
 std::vector<std::byte> Tracker::state() const {

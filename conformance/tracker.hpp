@@ -29,6 +29,8 @@ private:
 
 arhost_frame_format format_of(std::uint32_t width, std::uint32_t height, arhost_pixel_format format);
 
+using Corners = std::array<glm::dvec2, 4>;
+
 struct Listed { // a target that consists of one marker
     int id;
     double side_mm;
@@ -100,6 +102,14 @@ public:
     std::vector<std::byte> state() const;
     void set_state(const std::vector<std::byte> &state, std::byte filler = std::byte{0xa5});
     bool has_state() const { return state_size_ > 0; }
+    // The next calls of track expect these markers and need not search elsewhere.
+    struct Expected {
+        std::uint32_t marker; // index in the setup
+        Corners corners_px;
+        double margin_px;
+    };
+    void expect(const std::vector<Expected> &markers);
+    void search_everywhere() { expected_memory_.reset(); }
 
     // Observations in the next frame, at 30 frames/s. Throws Failure unless it succeeds.
     std::vector<arhost_observation> track(const SealedFrame &frame);
@@ -132,7 +142,9 @@ private:
     GuardedMemory result_memory_;
     std::uint64_t state_size_ = 0;
     std::byte state_filler_{0xa5};
-    std::unique_ptr<GuardedMemory> state_before_; // null: none
+    std::unique_ptr<GuardedMemory> state_before_;    // null: none
+    std::unique_ptr<GuardedMemory> expected_memory_; // null: search everywhere
+    std::uint32_t expected_count_ = 0;
     bool fresh_ = true, started_ = false;
     arhost_intrinsics camera_{}; // of the last start
     std::vector<Listed> listed_;
@@ -158,7 +170,6 @@ struct Bounds {
 };
 inline constexpr Bounds roughly{3, 0.02};
 
-using Corners = std::array<glm::dvec2, 4>;
 Corners corners_of(const arhost_observation &observation);
 inline constexpr std::array corner_names = {"top left", "top right", "bottom right", "bottom left"};
 

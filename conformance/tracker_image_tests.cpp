@@ -188,6 +188,51 @@ void several(Context &context) {
     }
 }
 
+// Of those expected, each must be found; others may be found too.
+void expected_places(Context &context) {
+    const Group group(context);
+    const Grey image = draw(wide_camera(), group.markers),
+               empty = filled(320, 256, [](auto, auto) { return background_code; });
+    Tracker tracker(context);
+    std::vector<Listed> list;
+    std::vector<Tracker::Expected> expected, outside;
+    for (const Placed &marker : group.markers) {
+        const auto index = static_cast<std::uint32_t>(list.size());
+        list.push_back({marker.print.id, marker.side_mm});
+        Corners near = corners_of(wide_camera(), marker), far = near;
+        for (std::size_t i = 0; i < 4; ++i) {
+            near[i] += glm::dvec2(5, -4);
+            far[i] += glm::dvec2(index % 2 == 0 ? -1000 : 1e9, 0);
+        }
+        expected.push_back({index, near, 8});
+        outside.push_back({index, far, 8});
+    }
+    tracker.start(wide_camera(), list);
+    tracker.expect(expected);
+    expect_all(tracker.track_first(image), wide_camera(), group.expected(),
+               "with markers that are up to 7 px from the "
+               "expected places",
+               image);
+    expect_none(tracker.track_first(empty), "with markers that are expected but not there", empty);
+
+    const auto expect_at_least = [&](std::vector<Tracker::Expected> markers, const std::string &where) {
+        tracker.expect(markers);
+        const std::vector<arhost_observation> found = tracker.track_first(image);
+        std::vector<InFamily> all = group.expected();
+        for (std::size_t i = all.size(); i-- > markers.size();)
+            if (std::ranges::count(found, all[i].marker.print.id, &arhost_observation::id) == 0)
+                all.erase(all.begin() + static_cast<std::ptrdiff_t>(i));
+        expect_all(found, wide_camera(), all, where, image);
+    };
+    expect_at_least({expected[0]}, "with one of several markers expected");
+    expect_at_least({expected[0], expected[1]}, "with two of several markers expected");
+    tracker.expect(outside);
+    (void)tracker.track_first(image);
+    tracker.search_everywhere();
+    expect_all(tracker.track_first(image), wide_camera(), group.expected(), "after frames with expected markers",
+               image);
+}
+
 void unlisted(Context &context) {
     const Group group(context);
     const Grey image = draw(wide_camera(), group.markers);
@@ -376,6 +421,11 @@ constexpr Test tests[] = {
     {"tracker.several",
      "Several markers are observed, each once with its id and its corners; their order in the list does not matter.",
      kind, corner_gate, 20s, several},
+    {"tracker.expected",
+     "If only some places have to be searched, the markers that are expected there are found, and those that have "
+     "left "
+     "are not reported.",
+     kind, corner_gate, 20s, expected_places},
     {"tracker.families", "Markers of two families are told apart, also with the same id.", kind, corner_gate, 20s,
      families},
     {"tracker.unlisted", "Markers that no target lists are left out, or reported with their ids and corners.", kind,

@@ -140,6 +140,10 @@ void longer_structs(Context &context) {
             setup.add({marker.print.id, marker.side_mm});
         Tracker tracker(context);
         tracker.instance().expect_ok("start", tracker.start_with(setup, more));
+        std::vector<Tracker::Expected> expected;
+        for (std::uint32_t i = 0; i < 2; ++i)
+            expected.push_back({i, corners_of(wide_camera(), markers[i]), 8});
+        tracker.expect(expected);
         std::vector<arhost_observation> found = tracker.track(image);
         for (arhost_observation &one : found)
             one.struct_size = sizeof one;
@@ -147,7 +151,9 @@ void longer_structs(Context &context) {
     };
     const std::vector<arhost_observation> found = found_with(extra);
     if (const std::string text = difference(found, found_with(0)); !text.empty())
-        throw Failure("with a longer struct_size of targets, markers and observations, the same frame " + text)
+        throw Failure(
+            "with a longer struct_size of targets, markers, expected markers and observations, the same frame " +
+            text)
             .with("frame", image.picture());
 }
 
@@ -330,8 +336,8 @@ constexpr Test tests[] = {
     {"tracker.unusable-lens", "A lens with an unknown model, or the wrong number of coefficients, is rejected.", kind,
      gate, 20s, unusable_lens},
     {"tracker.longer-structs",
-     "It uses struct_size as the stride of the arrays of targets, markers and observations.", kind, gate, 20s,
-     longer_structs},
+     "It uses struct_size as the stride of the arrays of targets, markers, expected markers and observations.", kind,
+     gate, 20s, longer_structs},
     {"tracker.cancelled", "After cancellation, start and track promptly return OK or CANCELLED.", kind, gate, 20s,
      cancelled},
     {"tracker.numbers",

@@ -59,10 +59,6 @@ std::vector<bool> refine(const cv::Mat &grey, View &view, double clear_mm) {
     return is_refined;
 }
 
-aruco::DetectedMarkers markers(const cv::Mat &grey, const cv::aruco::Dictionary &dictionary) {
-    return aruco::Detector(dictionary, cv::aruco::DetectorParameters{}).detect(grey);
-}
-
 } // namespace
 
 Board::Board(const BoardOptions &options)
@@ -129,7 +125,7 @@ std::vector<cv::Point2f> Board::find_charuco(const cv::Mat &grey, std::vector<in
 #if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
     cv::aruco::CharucoDetector(*charuco_).detectBoard(grey, corners, ids);
 #else
-    const aruco::DetectedMarkers found = markers(grey, dictionary_);
+    const aruco::DetectedMarkers found = aruco::detect(grey, dictionary_, {});
     if (!found.ids.empty())
         cv::aruco::interpolateCornersCharuco(found.corners, found.ids, grey, charuco_, corners, ids);
 #endif
@@ -170,7 +166,8 @@ std::string Board::seen_instead(const cv::Mat &grey) const {
     std::string best;
     std::size_t most = 2; // of other dictionaries, one or two markers may be wrong detections
     for (const aruco::DictionaryType &type : aruco::dictionary_types)
-        if (const std::size_t count = markers(grey, aruco::predefined(type.name)).ids.size(); count > most) {
+        if (const std::size_t count = aruco::detect(grey, aruco::predefined(type.name), {}).ids.size();
+            count > most) {
             most = count;
             best = fmt::format("{} markers of {}", count, type.option);
         }

@@ -107,16 +107,14 @@ public:
                 listed.push_back(dictionary_.bytesList.row(id));
             dictionary_.bytesList = listed;
         }
-        cv::aruco::DetectorParameters parameters;
-        parameters.minMarkerDistanceRate = 0.02;
+        parameters_.minMarkerDistanceRate = 0.02;
         const int size = dictionary_.markerSize, errors = size <= 4 ? 0 : size == 5 ? 1 : 3;
         if (size <= 6 && dictionary_.maxCorrectionBits > 0)
-            parameters.errorCorrectionRate = std::min(0.6, (errors + 0.5) / dictionary_.maxCorrectionBits);
-        detector_ = std::make_unique<aruco::Detector>(dictionary_, parameters);
+            parameters_.errorCorrectionRate = std::min(0.6, (errors + 0.5) / dictionary_.maxCorrectionBits);
     }
 
     std::vector<Detection> operator()(const cv::Mat &grey) const {
-        const aruco::DetectedMarkers found = detector_->detect(grey);
+        const aruco::DetectedMarkers found = aruco::detect(grey, dictionary_, parameters_);
         std::vector<Candidate> candidates;
         for (std::size_t i = 0; i < found.ids.size(); ++i) {
             Candidate candidate{ids_.empty() ? found.ids[i] : ids_[found.ids[i]],
@@ -135,7 +133,7 @@ private:
     std::vector<int> ids_;
     fiducial::Lens lens_;
     cv::aruco::Dictionary dictionary_;
-    std::unique_ptr<aruco::Detector> detector_;
+    cv::aruco::DetectorParameters parameters_;
 };
 
 } // namespace

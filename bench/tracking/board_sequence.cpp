@@ -159,10 +159,10 @@ cv::Mat grey(const test::GreyFrame &frame) {
 Poses with_opencv(const RbtSequence &sequence) {
     cv::aruco::DetectorParameters parameters;
     parameters.cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
-    const aruco::Detector detector(aruco::predefined(cv::aruco::DICT_APRILTAG_36h11), parameters);
+    const cv::aruco::Dictionary dictionary = aruco::predefined(cv::aruco::DICT_APRILTAG_36h11);
     Poses poses;
     for (const test::GreyFrame &frame : sequence.frames()) {
-        const aruco::DetectedMarkers found = detector.detect(grey(frame));
+        const aruco::DetectedMarkers found = aruco::detect(grey(frame), dictionary, parameters);
         std::vector<cv::Point3d> object;
         std::vector<cv::Point2d> image;
         for (std::size_t m = 0; m < found.ids.size(); ++m)

@@ -33,6 +33,10 @@ struct Family {
                                          // arhost_tracker_setup.families
 
     bool lists(int id) const { return listed.contains(id); }
+    bool lists(int id, std::uint32_t name) const { // under this name
+        const auto found = listed.find(id);
+        return found != listed.end() && found->second == name;
+    }
     // Returns an observation with family, id and corners.
     arhost_observation observation(int id, const Corners &corners_px) const;
 };

@@ -44,33 +44,16 @@ inline void draw(const cv::aruco::Dictionary &dictionary, int id, int side_px, c
 #endif
 }
 
-class Detector {
-public:
+inline DetectedMarkers detect(const cv::Mat &grey, const cv::aruco::Dictionary &dictionary,
+                              const cv::aruco::DetectorParameters &parameters) {
+    DetectedMarkers found;
 #if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
-    Detector(const cv::aruco::Dictionary &dictionary, const cv::aruco::DetectorParameters &parameters)
-        : detector_(dictionary, parameters) {}
-    DetectedMarkers detect(const cv::Mat &grey) const {
-        DetectedMarkers found;
-        detector_.detectMarkers(grey, found.corners, found.ids);
-        return found;
-    }
-
-private:
-    cv::aruco::ArucoDetector detector_;
+    cv::aruco::ArucoDetector(dictionary, parameters).detectMarkers(grey, found.corners, found.ids);
 #else
-    Detector(const cv::aruco::Dictionary &dictionary, const cv::aruco::DetectorParameters &parameters)
-        : dictionary_(cv::makePtr<cv::aruco::Dictionary>(dictionary)),
-          parameters_(cv::makePtr<cv::aruco::DetectorParameters>(parameters)) {}
-    DetectedMarkers detect(const cv::Mat &grey) const {
-        DetectedMarkers found;
-        cv::aruco::detectMarkers(grey, dictionary_, found.corners, found.ids, parameters_);
-        return found;
-    }
-
-private:
-    cv::Ptr<cv::aruco::Dictionary> dictionary_;
-    cv::Ptr<cv::aruco::DetectorParameters> parameters_;
+    cv::aruco::detectMarkers(grey, cv::makePtr<cv::aruco::Dictionary>(dictionary), found.corners, found.ids,
+                             cv::makePtr<cv::aruco::DetectorParameters>(parameters));
 #endif
-};
+    return found;
+}
 
 } // namespace arhost::aruco

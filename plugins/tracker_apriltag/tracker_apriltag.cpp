@@ -5,6 +5,7 @@
 #include <fiducial_common/edge_refinement.hpp>
 #include <fiducial_common/lens.hpp>
 #include <fiducial_common/observations.hpp>
+#include <fiducial_common/search_regions.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -129,9 +130,17 @@ const FamilyType &family_type(const std::string &name) {
                       (name.starts_with("DICT_") ? "; tracker_aruco has OpenCV's dictionaries" : ""));
 }
 
-int tag_count(const FamilyType &type) {
-    const std::unique_ptr<apriltag_family_t, decltype(type.destroy)> whole(type.create(), type.destroy);
-    return static_cast<int>(whole->ncodes);
+using WholeFamily = std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t *)>;
+
+WholeFamily whole_family(const std::string &name) {
+    const FamilyType &type = family_type(name);
+    return {type.create(), type.destroy};
+}
+
+// The bits outside the border, or the white margin, relative to the side of the square.
+double print_margin(const std::string &name) {
+    const WholeFamily family = whole_family(name);
+    return (family->total_width - family->width_at_border) / 2.0 / family->width_at_border;
 }
 
 class AprilTagTracker {
@@ -173,7 +182,8 @@ public:
         stop();
         lens_.emplace(*setup.intrinsics);
         families_ = arhost::fiducial::families_of(
-            setup, [](const std::string &name) { return tag_count(family_type(name)); });
+            setup, [](const std::string &name) { return static_cast<int>(whole_family(name)->ncodes); });
+        regions_.emplace(setup, print_margin);
         for (const Family &family : families_)
             for (const bool is_listed : {true, false}) {
                 auto part = std::make_unique<PartOfFamily>(family, family_type(family.name), is_listed);
@@ -195,25 +205,11 @@ public:
         const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
                            const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
         std::vector<arhost_observation> seen;
-        const Detections tags = detect(grey);
-        for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
-            apriltag_detection_t *tag = nullptr;
-            zarray_get(tags.get(), i, &tag);
-            if (tag->decision_margin < min_margin_)
-                continue;
-            const PartOfFamily &part =
-                **std::ranges::find(parts_, tag->family, [](const auto &one) { return one->tags(); });
-            Corners corners_px;
-            // AprilTag's corners begin at the bottom left and are counter-clockwise; pixel centres are at +0.5.
-            for (int corner = 0; corner < 4; ++corner)
-                corners_px[corner] = {tag->p[3 - corner][0] - 0.5, tag->p[3 - corner][1] - 0.5};
-            if (fit_edges_ && part.is_listed())
-                corners_px = arhost::fiducial::refine_edges(grey, corners_px, *lens_, tag->family->width_at_border,
-                                                            refine_edges_)
-                                 .value_or(corners_px);
-            arhost_observation &one = seen.emplace_back(part.family().observation(part.id(tag->id), corners_px));
-            one.hamming = static_cast<std::uint32_t>(tag->hamming);
-            one.decision_margin = tag->decision_margin;
+        for (const cv::Rect &region : regions_->of(request, {grid_px(), min_image_side()}))
+            observe(grey, region, seen);
+        if (regions_->miss_a_target(request, seen)) {
+            seen.clear();
+            observe(grey, cv::Rect({0, 0}, grey.size()), seen);
         }
         arhost::fiducial::report(std::move(seen), observations);
     }
@@ -233,6 +229,34 @@ private:
         for (const auto &part : parts_)
             apriltag_detector_add_family_bits(detector_.get(), part->tags(), part->max_hamming(max_hamming_));
     }
+
+    // Adds the tags of a region of the frame to `seen`.
+    void observe(const cv::Mat &grey, const cv::Rect &region, std::vector<arhost_observation> &seen) {
+        const Detections tags = detect(grey(region));
+        for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
+            apriltag_detection_t *tag = nullptr;
+            zarray_get(tags.get(), i, &tag);
+            if (tag->decision_margin < min_margin_)
+                continue;
+            const PartOfFamily &part =
+                **std::ranges::find(parts_, tag->family, [](const auto &one) { return one->tags(); });
+            Corners corners_px;
+            // AprilTag's corners begin at the bottom left and are counter-clockwise; pixel centres are at +0.5.
+            for (int corner = 0; corner < 4; ++corner)
+                corners_px[corner] = {tag->p[3 - corner][0] - 0.5 + region.x, tag->p[3 - corner][1] - 0.5 + region.y};
+            if (fit_edges_ && part.is_listed())
+                corners_px = arhost::fiducial::refine_edges(grey, corners_px, *lens_, tag->family->width_at_border,
+                                                            refine_edges_)
+                                 .value_or(corners_px);
+            arhost_observation &one = seen.emplace_back(part.family().observation(part.id(tag->id), corners_px));
+            one.hamming = static_cast<std::uint32_t>(tag->hamming);
+            one.decision_margin = tag->decision_margin;
+        }
+    }
+
+    // The library's threshold is that of 4×4 px tiles of the decimated image. Regions on this grid have the tiles of
+    // the whole frame.
+    int grid_px() const { return decimate_ == 1.5 ? 6 : 4 * static_cast<int>(decimate_); }
 
     // The library reads out of bounds in images smaller than one of its 4×4 px tiles.
     int min_image_side() const { return static_cast<int>(8 * decimate_); }
@@ -256,6 +280,7 @@ private:
     double min_margin_ = 0;
 
     std::optional<arhost::fiducial::Lens> lens_;
+    std::optional<arhost::fiducial::SearchRegions> regions_;
     std::vector<Family> families_;
     std::vector<std::unique_ptr<PartOfFamily>> parts_;
     Detector detector_{

@@ -6,6 +6,7 @@
 #include <fiducial_common/lens.hpp>
 #include <fiducial_common/observations.hpp>
 #include <fiducial_common/opencv_aruco.hpp>
+#include <fiducial_common/search_regions.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -162,11 +163,11 @@ struct Dictionary {
     bool rotated_180 = false; // relative to AprilTag's own library
 };
 
-// The markers of a family and their detector.
+// The markers of a family, and how to detect them.
 struct Detectable {
     Family family;
     Dictionary dictionary;
-    std::optional<arhost::aruco::Detector> detector;
+    cv::aruco::DetectorParameters parameters;
 };
 
 class ArucoTracker {
@@ -224,7 +225,7 @@ public:
                           "threshold_window_max_px: must not be less than threshold_window_min_px");
         parameters_ = parameters;
         correction_rate_ = rate;
-        make_detectors();
+        make_parameters();
     }
 
     void start(const arhost_tracker_setup &setup) {
@@ -233,9 +234,10 @@ public:
         for (Family &family : arhost::fiducial::families_of(
                  setup, [&](const std::string &name) { return dictionary_of(name).table.bytesList.rows; })) {
             Dictionary dictionary = dictionary_of(family.name);
-            detectables_.push_back({std::move(family), std::move(dictionary), std::nullopt});
+            detectables_.push_back({std::move(family), std::move(dictionary), {}});
         }
-        make_detectors();
+        make_parameters();
+        regions_.emplace(setup, [&](const std::string &name) { return 1.0 / cells_of(dictionary_of(name).table); });
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
@@ -243,27 +245,13 @@ public:
         const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
                            const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
         std::vector<arhost_observation> seen;
-        for (const Detectable &detectable : detectables_) {
-            const cv::aruco::Dictionary &table = detectable.dictionary.table;
-            const arhost::aruco::DetectedMarkers found = detectable.detector->detect(grey);
-            for (std::size_t i = 0; i < found.ids.size(); ++i) {
-                const bool is_listed = detectable.family.lists(found.ids[i]);
-                Corners corners_px;
-                for (int corner = 0; corner < 4; ++corner)
-                    corners_px[corner] =
-                        cv::Point2d(found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner]) -
-                        cv::Point2d(centre_shift_px_, centre_shift_px_);
-                if (refine_edges_ && is_listed)
-                    corners_px = arhost::fiducial::refine_edges(grey, corners_px, *lens_,
-                                                                table.markerSize + 2 * parameters_.markerBorderBits)
-                                     .value_or(corners_px);
-                const Reading reading = read(grey, corners_px, table, found.ids[i], parameters_.markerBorderBits);
-                if (!is_listed && reading.wrong_bits > 0) // in large dictionaries, it may be anything
-                    continue;
-                arhost_observation &one = seen.emplace_back(detectable.family.observation(found.ids[i], corners_px));
-                one.hamming = reading.wrong_bits;
-                one.decision_margin = reading.contrast;
-            }
+        for (const Detectable &detectable : detectables_)
+            for (const cv::Rect &region : regions_->of(request, {}, &detectable.family))
+                observe(grey, region, detectable, seen);
+        if (regions_->miss_a_target(request, seen)) {
+            seen.clear();
+            for (const Detectable &detectable : detectables_)
+                observe(grey, cv::Rect({0, 0}, grey.size()), detectable, seen);
         }
         arhost::fiducial::report(std::move(seen), observations);
     }
@@ -271,6 +259,40 @@ public:
     void stop() { detectables_.clear(); }
 
 private:
+    // Adds the markers of a dictionary in a region of the frame to `seen`.
+    void observe(const cv::Mat &grey, const cv::Rect &region, const Detectable &detectable,
+                 std::vector<arhost_observation> &seen) const {
+        const cv::aruco::Dictionary &table = detectable.dictionary.table;
+        cv::aruco::DetectorParameters parameters = detectable.parameters;
+        // OpenCV takes the perimeter relative to the longer side of the image that it gets.
+        parameters.minMarkerPerimeterRate *=
+            static_cast<double>(std::max(grey.cols, grey.rows)) / std::max(region.width, region.height);
+        const cv::Point2d offset(region.x - centre_shift_px_, region.y - centre_shift_px_);
+        const arhost::aruco::DetectedMarkers found = arhost::aruco::detect(grey(region), table, parameters);
+        for (std::size_t i = 0; i < found.ids.size(); ++i) {
+            const bool is_listed = detectable.family.lists(found.ids[i]);
+            Corners corners_px;
+            for (int corner = 0; corner < 4; ++corner)
+                corners_px[corner] =
+                    cv::Point2d(found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner]) +
+                    offset;
+            if (refine_edges_ && is_listed)
+                corners_px =
+                    arhost::fiducial::refine_edges(grey, corners_px, *lens_, cells_of(table)).value_or(corners_px);
+            const Reading reading = read(grey, corners_px, table, found.ids[i], parameters.markerBorderBits);
+            if (!is_listed && reading.wrong_bits > 0) // in large dictionaries, it may be anything
+                continue;
+            arhost_observation &one = seen.emplace_back(detectable.family.observation(found.ids[i], corners_px));
+            one.hamming = reading.wrong_bits;
+            one.decision_margin = reading.contrast;
+        }
+    }
+
+    // The side of a marker's square in cells.
+    int cells_of(const cv::aruco::Dictionary &table) const {
+        return table.markerSize + 2 * parameters_.markerBorderBits;
+    }
+
     Dictionary dictionary_of(const std::string &name) const {
         if (!file_name_.empty() && name == file_name_)
             return {file_table_};
@@ -290,12 +312,11 @@ private:
                           (name.starts_with("tag") ? "; tracker_apriltag has more families of AprilTag" : ""));
     }
 
-    void make_detectors() {
+    void make_parameters() {
         for (Detectable &detectable : detectables_) {
-            cv::aruco::DetectorParameters parameters = parameters_;
-            parameters.errorCorrectionRate =
+            detectable.parameters = parameters_;
+            detectable.parameters.errorCorrectionRate =
                 correction_rate_ < 0 ? default_correction_rate(detectable.dictionary.table) : correction_rate_;
-            detectable.detector.emplace(detectable.dictionary.table, parameters);
         }
     }
 
@@ -307,6 +328,7 @@ private:
     double centre_shift_px_ = 0; // for CORNER_REFINE_APRILTAG, whose pixel centres are at +0.5
 
     std::optional<arhost::fiducial::Lens> lens_;
+    std::optional<arhost::fiducial::SearchRegions> regions_;
     std::vector<Detectable> detectables_;
 };
 

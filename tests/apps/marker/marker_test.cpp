@@ -65,7 +65,7 @@ arhost::aruco::DetectedMarkers detected(const std::string &name, const cv::Mat &
     cv::aruco::DetectorParameters parameters;
     parameters.cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
     parameters.minMarkerDistanceRate = 0.02;
-    return arhost::aruco::Detector(dictionary(name), parameters).detect(picture);
+    return arhost::aruco::detect(picture, dictionary(name), parameters);
 }
 
 Found aruco_markers(const std::string &name, const cv::Mat &picture) {

@@ -401,6 +401,41 @@ std::uint64_t state_size(arhost_instance *) {
     return has_state() ? sizeof(Seen) : 0;
 }
 
+// Changes the result of a request that expects markers.
+void modify_expected(const Wrong &self, std::span<const arhost_expected_marker> expected,
+                     arhost_tracker_result &result) {
+    const auto place_of = [&](const arhost_observation &seen) {
+        return std::ranges::find_if(expected, [&](const arhost_expected_marker &one) {
+            const arhost_marker_config &marker = self.listed[one.marker];
+            return marker.id == seen.id && marker.family == seen.family;
+        });
+    };
+    if (has("finds_only_the_first_expected_marker"))
+        keep(result, [&](const arhost_observation &seen) { return place_of(seen) == expected.begin(); });
+    if (has("ignores_the_margin_of_expected_markers"))
+        keep(result, [&](const arhost_observation &seen) {
+            const auto place = place_of(seen);
+            return place == expected.end() || std::abs(seen.corners_px[0][0] - place->corners_px[0][0]) < 2;
+        });
+    if (has("reports_corners_within_the_region"))
+        for (arhost_observation &seen : observations_of(result))
+            if (const auto place = place_of(seen); place != expected.end())
+                for (auto &corner : seen.corners_px)
+                    corner[0] -= place->corners_px[0][0];
+    if (has("reports_expected_markers")) {
+        result.observation_count = static_cast<std::uint32_t>(expected.size());
+        for (std::size_t i = 0; i < expected.size(); ++i) {
+            const arhost_marker_config &marker = self.listed[expected[i].marker];
+            arhost_observation &seen = observations_of(result)[i];
+            seen.id = marker.id;
+            seen.family = marker.family;
+            seen.hamming = 0;
+            seen.decision_margin = 0;
+            std::memcpy(seen.corners_px, expected[i].corners_px, sizeof seen.corners_px);
+        }
+    }
+}
+
 arhost_status track(arhost_instance *instance, const arhost_track_request *input, arhost_tracker_result *result) {
     Wrong &self = wrong(instance);
     arhost_frame frame = *input->frame;
@@ -450,6 +485,15 @@ arhost_status track(arhost_instance *instance, const arhost_track_request *input
         frame.grey = frame.plane[0];
         format.grey_stride = format.stride[0];
     }
+    const bool is_packed = has("ignores_the_stride_of_expected_markers");
+    std::vector<arhost_expected_marker> expected;
+    for (std::uint32_t i = 0; i < request.expected_count; ++i) {
+        const std::size_t stride = is_packed ? sizeof(arhost_expected_marker) : request.expected->struct_size;
+        std::memcpy(&expected.emplace_back(), reinterpret_cast<const std::byte *>(request.expected) + i * stride,
+                    sizeof(arhost_expected_marker));
+        expected.back().struct_size = sizeof(arhost_expected_marker);
+    }
+    request.expected = expected.data();
     arhost_status status = real_functions().track(self.real, &request, result);
     if (status == ARHOST_STATUS_OK && has("finds_mirrored_prints") && result->observation_count == 0) {
         mirror(self, frame);
@@ -468,6 +512,8 @@ arhost_status track(arhost_instance *instance, const arhost_track_request *input
             std::memcpy(self.last.get(), input->state_before, sizeof *self.last);
     }
     modify_all(self, frame, *result);
+    if (!request.search_everywhere)
+        modify_expected(self, expected, *result);
     if (has("reads_state_after") && result->observation_count > 0)
         result->observations->corners_px[0][0] += 1e-9 * *static_cast<const std::uint8_t *>(input->state_after);
     if (has("reports_too_many"))

@@ -351,6 +351,67 @@ TEST_P(FiducialTracker, GivesTheSameResultWithAnyNumberOfThreads) {
     cv::setNumThreads(threads);
 }
 
+// A request that expects the corners of a marker here.
+inline arhost_expected_marker expected_at(uint32_t marker, const std::array<cv::Point2d, 4> &corners_px) {
+    arhost_expected_marker expected{sizeof expected, marker, {}, 6};
+    for (int i = 0; i < 4; ++i) {
+        expected.corners_px[i][0] = corners_px[i].x;
+        expected.corners_px[i][1] = corners_px[i].y;
+    }
+    return expected;
+}
+
+TEST_P(FiducialTracker, SearchesOnlyWhereMarkersAreExpected) {
+    const Mt here = pose_of(-83, 40, 600, 30, 20, 15), there = pose_of(97, -60, 620, -20, 10, 200);
+    const cv::Mat picture = picture_of({{tag(4), 80, here}, {tag(9), 80, there}});
+    const auto everywhere = track(picture, {{4, 80}, {9, 80}});
+    ASSERT_EQ(everywhere.size(), 2u);
+    const auto expected = expected_at(0, corners_of(here, test_camera, 80));
+    const auto seen = tracker_.track(GreyFrame(picture), {expected}, false);
+    ASSERT_EQ(seen.size(), 1u);
+    EXPECT_EQ(seen[0].id, 4);
+    EXPECT_EQ(seen[0].hamming, everywhere[0].hamming);
+    EXPECT_NEAR(seen[0].decision_margin, everywhere[0].decision_margin, 0.5);
+    for (int i = 0; i < 4; ++i)
+        EXPECT_LT(corner_distance_px(seen[0], i, {everywhere[0].corners_px[i][0], everywhere[0].corners_px[i][1]}),
+                  0.02);
+}
+
+TEST_P(FiducialTracker, SearchesTheWholeFrameIfATargetIsNotWhereItIsExpected) {
+    const Mt here = pose_of(-80, 40, 600), there = pose_of(95, -60, 620), nowhere = pose_of(90, 60, 600);
+    const cv::Mat picture = picture_of({{tag(4), 80, here}, {tag(9), 80, there}});
+    const auto everywhere = track(picture, {{4, 80}, {9, 80}});
+    const auto right = expected_at(0, corners_of(here, test_camera, 80)),
+               wrong = expected_at(1, corners_of(nowhere, test_camera, 80));
+    const auto seen = tracker_.track(GreyFrame(picture), {right, wrong}, false);
+    ASSERT_EQ(seen.size(), 2u);
+    for (std::size_t i = 0; i < 2; ++i)
+        EXPECT_EQ(std::memcmp(seen[i].corners_px, everywhere[i].corners_px, sizeof seen[i].corners_px), 0);
+}
+
+TEST_P(FiducialTracker, FindsExpectedMarkersOfTwoFamiliesAtTheBorderOfTheFrame) {
+    const Print other = april_tag("tag25h9", 4).with_margin(1);
+    const Mt left = pose_of(-250, 190, 600), right = pose_of(260, -190, 600);
+    const cv::Mat picture = picture_of({{tag(4), 80, left}, {other, 80, right}});
+    ASSERT_EQ(track(picture, {{4, 80}, {4, 80, "tag25h9"}}).size(), 2u);
+    const auto seen = tracker_.track(
+        GreyFrame(picture),
+        {expected_at(0, corners_of(left, test_camera, 80)), expected_at(1, corners_of(right, test_camera, 80))},
+        false);
+    ASSERT_EQ(seen.size(), 2u);
+    EXPECT_LT(greatest_distance_px(seen[0], corners_of(left, test_camera, 80)), 0.2);
+    EXPECT_LT(greatest_distance_px(seen[1], corners_of(right, test_camera, 80)), 0.2);
+}
+
+TEST_P(FiducialTracker, SearchesRegionsOfTinyFrames) {
+    for (const cv::Size size : {cv::Size(1, 1), cv::Size(3, 40), cv::Size(40, 20)}) {
+        const cv::Mat picture(size, CV_8UC1, cv::Scalar(128));
+        ASSERT_THAT(track(picture, {{4}}), testing::IsEmpty());
+        const auto expected = expected_at(0, {cv::Point2d(-3, -3), {9, -3}, {9, 9}, {-3, 9}});
+        EXPECT_THAT(tracker_.track(GreyFrame(picture), {expected}, false), testing::IsEmpty());
+    }
+}
+
 TEST_P(FiducialTracker, DoesNotModifyTheFrame) {
     const GreyFrame frame(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}));
     const std::vector<uint8_t> before(frame.slot().data(), frame.slot().data() + frame.slot().size());

@@ -150,13 +150,24 @@ public:
             functions().stop(plugin_.instance());
         started_ = false;
     }
-    std::vector<arhost_observation> track(const GreyFrame &picture) {
+    // Searches everywhere.
+    std::vector<arhost_observation> track(const GreyFrame &picture) { return track(picture, {}, true); }
+    std::vector<arhost_observation>
+    track(const GreyFrame &picture, const std::vector<arhost_expected_marker> &expected, bool search_everywhere) {
         arhost_observation empty{};
         empty.struct_size = sizeof empty;
         std::vector<arhost_observation> observations(ARHOST_MAX_OBSERVATIONS, empty);
         arhost_tracker_result result{sizeof result, 0, observations.data(), nullptr, 0, 0};
         const arhost_frame frame = picture.frame();
-        const arhost_track_request request{sizeof request, 1, &frame, nullptr, nullptr, 0, nullptr, 0, 0};
+        const arhost_track_request request{sizeof request,
+                                           search_everywhere,
+                                           &frame,
+                                           nullptr,
+                                           nullptr,
+                                           0,
+                                           expected.data(),
+                                           static_cast<uint32_t>(expected.size()),
+                                           0};
         if (functions().track(plugin_.instance(), &request, &result) != ARHOST_STATUS_OK)
             throw std::runtime_error("track failed: " + log());
         observations.resize(result.observation_count);

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Where a tracker has to search in a frame.
+#pragma once
+
+#include "observations.hpp"
+
+#include <span>
+
+namespace arhost::fiducial {
+
+// What a detector needs of the regions that it searches.
+struct RegionLimits {
+    int grid_px = 1;     // regions begin at multiples of this
+    int min_side_px = 1; // in smaller regions, nothing is detected
+};
+
+// Derives rectangles from the markers that a request expects.
+class SearchRegions {
+public:
+    // `margin`: what must be visible around a square of a family to detect it, relative to its side.
+    SearchRegions(const arhost_tracker_setup &setup, const std::function<double(const std::string &family)> &margin);
+
+    // Returns rectangles that do not overlap and contain all expected markers, or those of `family`. They are the
+    // whole frame if the request says so, or if they would cover most of it.
+    std::vector<cv::Rect> of(const arhost_track_request &request, const RegionLimits &limits,
+                             const Family *family = nullptr) const;
+
+    // Returns whether a target is not where it is expected: none of its expected markers has been seen. The tracker
+    // must then search the whole frame.
+    bool miss_a_target(const arhost_track_request &request, std::span<const arhost_observation> seen) const;
+
+private:
+    struct Marker {
+        std::int32_t id;
+        std::uint32_t family, target; // indices in the setup
+        double margin;                // relative to its side
+    };
+    std::vector<Marker> markers_; // as in the setup
+};
+
+} // namespace arhost::fiducial

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fiducial_common/search_regions.hpp>
+
+#include <gmock/gmock.h>
+
+#include <limits>
+
+namespace {
+
+using arhost::fiducial::Family;
+using arhost::fiducial::RegionLimits;
+using arhost::fiducial::SearchRegions;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::UnorderedElementsAre;
+
+// Markers 0 to 3: 0 and 1 belong to the first target, the others to targets of their own. Marker 3 is of the second
+// family. All need a margin of half of their side.
+class Regions : public testing::Test {
+protected:
+    Regions() {
+        for (std::int32_t i = 0; i < 4; ++i)
+            markers_.push_back({sizeof(arhost_marker_config),
+                                i,
+                                i == 3 ? 1U : 0U,
+                                i < 2 ? 0U : static_cast<std::uint32_t>(i - 1),
+                                {}});
+        setup_.markers = markers_.data();
+        setup_.marker_count = 4;
+        setup_.families = families_;
+        setup_.family_count = 2;
+        format_.width = 400;
+        format_.height = 300;
+        frame_.format = &format_;
+        request_.frame = &frame_;
+        regions_.emplace(setup_, [](const std::string &) { return 0.5; });
+    }
+    // Expects a marker with sides of 20 px, centred here, to 5 px.
+    void expect(std::uint32_t marker, double x, double y) {
+        expected_.push_back({sizeof(arhost_expected_marker),
+                             marker,
+                             {{x - 10, y - 10}, {x + 10, y - 10}, {x + 10, y + 10}, {x - 10, y + 10}},
+                             5});
+        request_.expected = expected_.data();
+        request_.expected_count = static_cast<std::uint32_t>(expected_.size());
+    }
+    std::vector<cv::Rect> regions(const RegionLimits &limits = {}, const Family *family = nullptr) const {
+        return regions_->of(request_, limits, family);
+    }
+    bool missed(const std::vector<arhost_observation> &seen) const { return regions_->miss_a_target(request_, seen); }
+    static arhost_observation seen(std::int32_t id, std::uint32_t family = 0) {
+        arhost_observation one{};
+        one.id = id;
+        one.family = family;
+        return one;
+    }
+
+    const char *families_[2] = {"tag36h11", "tag25h9"};
+    std::vector<arhost_marker_config> markers_;
+    std::vector<arhost_expected_marker> expected_;
+    arhost_tracker_setup setup_{};
+    arhost_frame_format format_{};
+    arhost_frame frame_{};
+    arhost_track_request request_{};
+    std::optional<SearchRegions> regions_;
+};
+
+const cv::Rect whole_frame(0, 0, 400, 300);
+
+TEST_F(Regions, AreTheWholeFrameIfTheRequestSaysSo) {
+    expect(0, 100, 100);
+    request_.search_everywhere = 1;
+    EXPECT_THAT(regions(), ElementsAre(whole_frame));
+}
+
+TEST_F(Regions, ContainTheExpectedCornersWithTheirMarginAndThatOfThePrint) {
+    expect(0, 100, 150);
+    EXPECT_THAT(regions(), ElementsAre(cv::Rect(75, 125, 51, 51))); // ±10 of the square, ±5, ±20/2
+}
+
+TEST_F(Regions, ThatOverlapBecomeOne) {
+    expect(0, 100, 100);
+    expect(1, 300, 100);
+    expect(2, 130, 100);
+    EXPECT_THAT(regions(), UnorderedElementsAre(cv::Rect(75, 75, 81, 51), cv::Rect(275, 75, 51, 51)));
+    expect(3, 215, 100); // overlaps neither
+    EXPECT_EQ(regions().size(), 3u);
+    expected_.back().margin_px = 40; // overlaps both
+    EXPECT_THAT(regions(), ElementsAre(cv::Rect(75, 40, 251, 121)));
+}
+
+TEST_F(Regions, BeginOnTheGrid) {
+    expect(0, 100, 150);
+    EXPECT_THAT(regions({8, 1}), ElementsAre(cv::Rect(72, 120, 56, 56)));
+}
+
+TEST_F(Regions, AreLargeEnoughForTheDetector) {
+    expect(0, 100, 150);
+    expect(2, -10, 285); // cut off by two borders
+    for (const cv::Rect &region : regions({4, 90})) {
+        EXPECT_GE(region.width, 90) << region;
+        EXPECT_GE(region.height, 90) << region;
+        EXPECT_EQ(region & whole_frame, region);
+        EXPECT_EQ(region.x % 4 + region.y % 4, 0) << region;
+    }
+}
+
+TEST_F(Regions, EndAtTheBorderOfTheFrame) {
+    expect(0, 0, 0);
+    expect(2, 399, 299);
+    EXPECT_THAT(regions(), ElementsAre(cv::Rect(0, 0, 26, 26), cv::Rect(374, 274, 26, 26)));
+    format_.width = format_.height = 1;
+    EXPECT_THAT(regions({4, 8}), ElementsAre(cv::Rect(0, 0, 1, 1)));
+}
+
+TEST_F(Regions, OutsideOfTheFrameAreLeftOut) {
+    expect(0, -26, 100);
+    expect(1, 100, 1e300);
+    expect(2, std::numeric_limits<double>::quiet_NaN(), 100);
+    EXPECT_THAT(regions(), IsEmpty());
+}
+
+TEST_F(Regions, ThatCoverMostOfTheFrameAreTheWholeFrame) {
+    expect(0, 100, 150);
+    expected_.back().margin_px = 1e12;
+    EXPECT_THAT(regions(), ElementsAre(whole_frame));
+}
+
+TEST_F(Regions, AreThoseOfOneFamilyIfThatIsGiven) {
+    expect(0, 100, 150);
+    expect(3, 300, 150);
+    const Family second{"tag25h9", 1, 35, {{0, 1}, {3, 1}}};
+    EXPECT_THAT(regions({}, &second), ElementsAre(cv::Rect(275, 125, 51, 51)));
+}
+
+TEST_F(Regions, MissATargetIfNoneOfItsExpectedMarkersIsSeen) {
+    expect(0, 100, 150);
+    expect(1, 200, 150);
+    expect(3, 300, 150);
+    EXPECT_FALSE(missed({seen(1), seen(3, 1)}));
+    EXPECT_TRUE(missed({seen(0), seen(1)}));
+    EXPECT_TRUE(missed({seen(0), seen(3, 0)})) << "of another family";
+    request_.search_everywhere = 1;
+    EXPECT_FALSE(missed({})) << "everything has been searched";
+}
+
+} // namespace
