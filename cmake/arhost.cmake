@@ -45,11 +45,12 @@ endfunction()
 # the shading headers of core/.
 include(${CMAKE_CURRENT_LIST_DIR}/arhost_add_plugin.cmake)
 
-# arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…] [EXHAUSTIVE]): a GoogleTest
-# program; each of its tests is a CTest test. With EXHAUSTIVE, those of instantiations named `Exhaustive` are
-# registered, too, with that label and ten times the timeout.
+# arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…] [STATISTICAL filter]
+# [EXHAUSTIVE]): a GoogleTest program; each of its tests is a CTest test. STATISTICAL: these tests measure accuracy over
+# many samples; sanitizers omit them, because fewer samples execute the same code. With EXHAUSTIVE, those of
+# instantiations named `Exhaustive` are registered, too, with that label and ten times the timeout.
 function(arhost_add_test name)
-  cmake_parse_arguments(ARG "EXHAUSTIVE" "TIMEOUT" "SOURCES;LIBRARIES;LABELS;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "EXHAUSTIVE" "TIMEOUT;STATISTICAL" "SOURCES;LIBRARIES;LABELS;DEPENDS" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 60)
   endif()
@@ -65,8 +66,16 @@ function(arhost_add_test name)
     set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON) # never run under sanitizers
     return()
   endif()
+  set(omitted)
   if(ARG_EXHAUSTIVE)
-    set(per_push TEST_FILTER "-Exhaustive/*")
+    list(APPEND omitted "Exhaustive/*")
+  endif()
+  if(ARHOST_SANITIZE AND ARG_STATISTICAL)
+    list(APPEND omitted "${ARG_STATISTICAL}")
+  endif()
+  if(omitted)
+    list(JOIN omitted ":" omitted)
+    set(per_push TEST_FILTER "-${omitted}")
   endif()
   # LeakSanitizer may crash while scanning thread-locals of libraries loaded with dlopen, such as the image module's.
   set(lsan_options suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0:intercept_tls_get_addr=0)

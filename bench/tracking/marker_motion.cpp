@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Single markers on exactly known continuous motions, with Gaussian corner noise: flips, errors relative to the
-// Cramér–Rao bound, coverage of the covariance, cost. OpenCV's IPPE on the same corners for comparison.
+// Cramér–Rao bound, coverage of the covariance, cost, delay of the filter. OpenCV's IPPE on the same corners for
+// comparison.
+#include "pose/smoothing.hpp"
 #include "pose/track.hpp"
 
+#include "cramer_rao.hpp"
 #include "simulated_markers.hpp"
 
 #include <opencv2/calib3d.hpp>
@@ -11,10 +14,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <limits>
+#include <optional>
 
 namespace {
 
 using namespace arhost::pose;
+using arhost::bench::cramer_rao;
 
 constexpr double side_mm = 80, focal_px = 900;
 constexpr double chi2_6_95 = 12.59; // 95 % quantile of the chi-squared distribution with 6 degrees of freedom
@@ -53,20 +59,24 @@ Eigen::Matrix3d opencv_rotation(const ObservedMarker &marker, const arhost_intri
 struct Cell {
     int flips = 0, opencv_flips = 0, wrong_first = 0, covered = 0, counted = 0;
     std::vector<double> rotation_share, translation_share; // errors relative to the standard deviation of the bound
+    std::vector<double> lag_frames;                        // of the filter, where a corner moves by more than 1 px
     double us = 0;
 };
 
-// The smallest possible standard deviations: the inverse of the Fisher information at the true pose.
-Matrix6d cramer_rao(const Rigid &truth, const Projection &projection, double noise_px) {
-    Matrix6d information = Matrix6d::Zero();
-    for (const Eigen::Vector3d &corner : square_corners_mm(side_mm)) {
-        Jacobian23 derivative;
-        projection.pixel(truth * corner, &derivative);
-        Eigen::Matrix<double, 2, 6> jacobian;
-        jacobian << derivative, -derivative * cross_matrix(truth.rotation * corner);
-        information += jacobian.transpose() * jacobian / (noise_px * noise_px);
-    }
-    return information.inverse();
+// How many frames ago a corner was where the filtered pose shows it; nullopt if it hardly moves, because noise then
+// decides.
+template <class Truth>
+std::optional<double> lag_of(const Rigid &filtered, double frame, const Truth &truth, const Projection &projection) {
+    const auto corner = [&](const Rigid &pose) { return *projection.pixel(pose * square_corners_mm(side_mm)[1]); };
+    if ((corner(truth(frame)) - corner(truth(frame - 1))).norm() <= 1)
+        return std::nullopt;
+    double nearest_px = std::numeric_limits<double>::infinity(), lag = 0;
+    for (int tenths = 0; tenths <= 50; ++tenths)
+        if (const double px = (corner(filtered) - corner(truth(frame - tenths / 10.0))).norm(); px < nearest_px) {
+            nearest_px = px;
+            lag = tenths / 10.0;
+        }
+    return lag;
 }
 
 Cell run(double side_px, double noise_px, int frames) {
@@ -78,9 +88,11 @@ Cell run(double side_px, double noise_px, int frames) {
     for (int start = 0; start < frames; start += frames_per_run) {
         Camera camera(in, static_cast<std::uint32_t>(start + 1));
         Track track{};
+        Smoothing smoothing{};
+        const auto truth_at = [&](double frame) { return at_size(frame / 30.0, 0.0007 * start, side_px); };
         bool was_right = false, opencv_was_right = false;
         for (int frame = 0; frame < frames_per_run; ++frame) {
-            const Rigid truth = at_size(frame / 30.0, 0.0007 * start, side_px);
+            const Rigid truth = truth_at(frame);
             const ObservedMarker marker = camera.observe(truth, square_corners_mm(side_mm), noise_px);
             const auto begin = std::chrono::steady_clock::now();
             const auto poses = estimate_poses({&marker, 1}, camera.projection());
@@ -90,6 +102,7 @@ Cell run(double side_px, double noise_px, int frames) {
             spent += std::chrono::steady_clock::now() - begin;
             track = step.track;
             const Estimate &found = poses[step.chosen];
+            const Rigid filtered = smoothed(smoothing, found, std::int64_t{frame} * 33'333'333);
             const bool right = degrees_between(found.camera_from_target, truth) < 20;
             const bool opencv_right = angle_between_rad(opencv_rotation(marker, camera.projection().intrinsics()),
                                                         truth.rotation) < 20 * radians;
@@ -100,7 +113,9 @@ Cell run(double side_px, double noise_px, int frames) {
             opencv_was_right = opencv_right;
             if (!right)
                 continue;
-            const Matrix6d bound = cramer_rao(truth, camera.projection(), noise_px);
+            if (const auto lag = lag_of(filtered, frame, truth_at, camera.projection()))
+                cell.lag_frames.push_back(*lag);
+            const Matrix6d bound = cramer_rao(truth, camera.projection(), side_mm, noise_px);
             Eigen::Matrix<double, 6, 1> error;
             error << truth.translation_mm - found.camera_from_target.translation_mm,
                 rotation_vector(truth.rotation * found.camera_from_target.rotation.transpose());
@@ -122,17 +137,18 @@ int main(int argc, char **argv) {
     const int frames = quick ? 1000 : 10'000;
     std::printf(
         "single markers in continuous motion, corner noise 0.1 px, %d frames per size; errors relative to the "
-        "Cramer-Rao bound\n%8s %8s %10s %8s %12s %8s %12s %8s %10s %8s\n",
+        "Cramer-Rao bound\n%8s %8s %10s %8s %12s %8s %12s %8s %10s %8s %10s\n",
         frames, "side, px", "flips", "OpenCV's", "wrong 1st", "rotation p50", "p99", "translat. p50", "p99",
-        "covered", "us");
+        "covered", "us", "lag p95");
     bool met = true;
     for (const double side_px : {15.0, 20.0, 25.0, 35.0, 50.0, 80.0, 120.0, 200.0}) {
         const Cell cell = run(side_px, 0.1, frames);
         const double covered = 100.0 * cell.covered / cell.counted;
-        std::printf("%8.0f %8d %10d %8d %12.2f %8.2f %12.2f %8.2f %9.1f%% %8.1f\n", side_px, cell.flips,
+        std::printf("%8.0f %8d %10d %8d %12.2f %8.2f %12.2f %8.2f %9.1f%% %8.1f %10.1f\n", side_px, cell.flips,
                     cell.opencv_flips, cell.wrong_first, percentile(cell.rotation_share, 0.5),
                     percentile(cell.rotation_share, 0.99), percentile(cell.translation_share, 0.5),
-                    percentile(cell.translation_share, 0.99), covered, cell.us);
+                    percentile(cell.translation_share, 0.99), covered, cell.us, percentile(cell.lag_frames, 0.95));
+        met = met && percentile(cell.lag_frames, 0.95) <= 1;
         if (side_px >= 25)
             met = met && cell.flips == 0 && covered >= 90 && covered <= 98;
     }

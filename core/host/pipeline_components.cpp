@@ -188,7 +188,7 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(TrackerPointer configuratio
                 "the target '" + body->name + "' is a body, but '" + plugin.id +
                 "' finds only markers; choose a tracker that reports the poses of bodies");
         return Component::Create{{options_for(*stage->component, ARHOST_KIND_TRACKER, own, candidate),
-                                  messages::TrackerSetup{*format_, intrinsics_, own.full_search_every}},
+                                  messages::TrackerSetup{*format_, intrinsics_, own.full_search_every, own.smooth}},
                                  {stage->targets->fd()}};
     };
     callbacks.ready = [stage](const messages::Ready &ready) {

@@ -125,6 +125,8 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared,
     tracker.hold_frames = frames("tracker.hold_frames", 0);
     tracker.world_grace_frames = frames("tracker.world_grace_frames", 0);
     tracker.full_search_every = frames("tracker.full_search_every", 1);
+    if (const auto filter = node.find("filter"))
+        tracker.smooth = filter->choice(key_at("tracker.filter").choices) == "adaptive";
     return tracker;
 }
 

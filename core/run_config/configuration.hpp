@@ -53,6 +53,7 @@ struct TrackerConfiguration : ComponentConfiguration {
     std::vector<std::filesystem::path> map_files{};
     std::uint32_t hold_frames = 0;
     std::uint32_t world_grace_frames = 90, full_search_every = 10;
+    bool smooth = false; // filter: adaptive
 };
 
 struct RaytracerConfiguration : ComponentConfiguration {

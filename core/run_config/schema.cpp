@@ -117,10 +117,11 @@ std::vector<Key> make_table() {
          {"targets[].ids", text, false, "",
           "IDs of several single markers, such as `0-35` or `[0-3, 7]`: a target for each, named FAMILY-ID."},
          {"targets[].family", text, false, "",
-          "Family of `marker` or `ids`, such as `tag36h11`; `dictionary` means the same."},
+          "Family of `marker` or `ids`, or of a bundle in `map`, such as `tag36h11`; `dictionary` means the same."},
          {"targets[].dictionary", text, false, "", "Dictionary of `marker` or `ids`, such as `DICT_6X6_250`."},
          {"targets[].side_mm", real, false, "", "Side of the black square of `marker` or `ids`, in mm."},
-         {"targets[].map", input_path, false, "", "File with the places of several markers (docs/markers.md)."},
+         {"targets[].map", input_path, false, "",
+          "File with the places of several markers, or with bundles of apriltag_ros (docs/markers.md)."},
          {"targets[].body", text, false, "",
           "Name of a body, for trackers that report the poses of bodies, such as motion capture."},
          {"hold_frames", integer, false, "0", "Frames for which the last pose is kept after the targets are lost."},
@@ -130,6 +131,13 @@ std::vector<Key> make_table() {
           "Longest interval, in frames, between searches of the whole frame; in the other frames, a tracker may "
           "search "
           "only where markers are expected. 1: always."},
+         {"filter",
+          text,
+          false,
+          "none",
+          "Filter of the poses: `adaptive` halves the jitter of resting targets and hardly delays moving ones "
+          "(docs/tracking.md).",
+          {"none", "adaptive"}},
          fallback,
          conform});
     add_component(keys, {"raytracer", map, false, "no overlay", "Renders the virtual objects."}, "rt_embree",

@@ -10,6 +10,7 @@
 
 #include <glm/ext/matrix_transform.hpp>
 #include <glm/geometric.hpp>
+#include <glm/gtc/quaternion.hpp>
 #include <glm/mat3x3.hpp>
 #include <glm/trigonometric.hpp>
 #include <glm/vec3.hpp>
@@ -224,7 +225,15 @@ struct PlacedMarker {
     Corners corners_mm;
 };
 
+PlacedMarker placed(std::int64_t id, double side_mm, const glm::dmat3 &rotation, const glm::dvec3 &position_mm) {
+    PlacedMarker marker{id, square_mm(side_mm)};
+    for (glm::dvec3 &corner : marker.corners_mm)
+        corner = rotation * corner + position_mm;
+    return marker;
+}
+
 PlacedMarker parse_placed_marker(const yaml::Node &node) {
+    node.allow_keys({"id", "side_mm", "position_mm", "rotation_degrees", "corners_mm"});
     const auto corners = node.find("corners_mm");
     if (!corners && !node.find("side_mm"))
         node.fail("the key 'side_mm' (with 'position_mm') or 'corners_mm' is missing");
@@ -234,13 +243,28 @@ PlacedMarker parse_placed_marker(const yaml::Node &node) {
     const std::int64_t id = node.require("id").integer(0, max_id);
     if (corners)
         return {id, parse_corners(*corners)};
-    PlacedMarker marker{id, square_mm(parse_side(node.require("side_mm")))};
-    const glm::dvec3 position = parse_point(node.require("position_mm"));
     const auto rotation = node.find("rotation_degrees");
-    const glm::dmat3 rotation_matrix = rotation ? parse_rotation(*rotation) : glm::dmat3(1);
-    for (glm::dvec3 &corner : marker.corners_mm)
-        corner = rotation_matrix * corner + position;
-    return marker;
+    return placed(id, parse_side(node.require("side_mm")), rotation ? parse_rotation(*rotation) : glm::dmat3(1),
+                  parse_point(node.require("position_mm")));
+}
+
+// Parses a tag of a bundle of AprilRobotics' apriltag_ros: metres, and a quaternion of any length.
+PlacedMarker parse_tag_of_bundle(const yaml::Node &node) {
+    constexpr double mm_per_m = 1000;
+    node.allow_keys({"id", "size", "name", "x", "y", "z", "qw", "qx", "qy", "qz"});
+    const auto real_or = [&](const char *key, double fallback, double limit) {
+        const auto value = node.find(key);
+        return value ? value->real(-limit, limit) : fallback;
+    };
+    constexpr double limit_m = max_coordinate_mm / mm_per_m;
+    const glm::dvec3 position_m(real_or("x", 0, limit_m), real_or("y", 0, limit_m), real_or("z", 0, limit_m));
+    const glm::dquat rotation(real_or("qw", 1, 1e6), real_or("qx", 0, 1e6), real_or("qy", 0, 1e6),
+                              real_or("qz", 0, 1e6));
+    if (!(glm::length(rotation) > 1e-6))
+        node.fail("the quaternion qw, qx, qy, qz must not be 0");
+    return placed(node.require("id").integer(0, max_id),
+                  mm_per_m * node.require("size").real(min_side_mm / mm_per_m, max_side_mm / mm_per_m),
+                  glm::mat3_cast(glm::normalize(rotation)), mm_per_m * position_m);
 }
 
 bool are_at_the_same_place(const Corners &a, const Corners &b) {
@@ -273,6 +297,64 @@ private:
     std::set<std::string> families_;
 };
 
+// Parses a list of placed markers and checks that they are different and at different places.
+template <class ParseMarker>
+std::vector<TargetMarker> parse_layout(const yaml::Node &list, const std::string &family, const ParseMarker &parse,
+                                       const std::string &example, std::vector<std::string> &warnings) {
+    const std::vector<yaml::Node> nodes = list.items();
+    if (nodes.empty() || nodes.size() > ARHOST_MAX_MARKERS)
+        list.fail("must list 1 to " + std::to_string(int{ARHOST_MAX_MARKERS}) + " markers, as in [" + example + "]");
+    std::vector<PlacedMarker> layout;
+    bool warned = false; // the unit is the same for all markers
+    for (const yaml::Node &node : nodes) {
+        const PlacedMarker marker = parse(node);
+        for (std::size_t i = 0; i < layout.size(); ++i) {
+            const auto other = [&] { return nodes[i].path() + " (" + nodes[i].where() + ")"; };
+            if (layout[i].id == marker.id)
+                node.require("id").fail("the marker " + std::to_string(marker.id) + " is also " + other() +
+                                        "; keep one of them");
+            if (are_at_the_same_place(layout[i].corners_mm, marker.corners_mm))
+                node.fail("the marker " + std::to_string(marker.id) + " is at the place of marker " +
+                          std::to_string(layout[i].id) + ", " + other() + "; correct one of them");
+        }
+        layout.push_back(marker);
+        warned = warned || warn_of_side(node, mean_side(marker.corners_mm), warnings);
+    }
+    std::vector<TargetMarker> markers(layout.size());
+    std::ranges::transform(layout, markers.begin(), [&](const PlacedMarker &marker) {
+        return marker_of(marker.id, family, marker.corners_mm);
+    });
+    return markers;
+}
+
+std::vector<TargetMarker> parse_map(const yaml::Node &root, std::vector<std::string> &warnings) {
+    root.allow_keys({"version", "family", "dictionary", "markers"});
+    if (const yaml::Node version = root.require("version"); version.integer() != 1)
+        version.fail("must be 1, the only supported version");
+    return parse_layout(root.require("markers"), parse_family(root), parse_placed_marker,
+                        "{id: 0, side_mm: 80, position_mm: [0, 0, 0]}", warnings);
+}
+
+// Parses a file of AprilRobotics' apriltag_ros. Of several bundles, takes that with the name of the target.
+std::vector<TargetMarker> parse_bundle(const yaml::Node &bundles, const std::string &target_name,
+                                       const std::string &family, std::vector<std::string> &warnings) {
+    std::optional<yaml::Node> chosen;
+    std::string names;
+    const std::vector<yaml::Node> all = bundles.items();
+    for (const yaml::Node &bundle : all) {
+        bundle.allow_keys({"name", "layout"});
+        const std::string name = bundle.require("name").text();
+        if (all.size() == 1 || name == target_name)
+            chosen = bundle;
+        names += (names.empty() ? "'" : ", '") + base::printable(name, 200) + "'";
+    }
+    if (!chosen)
+        bundles.fail(all.empty() ? "has no bundle"
+                                 : "has the bundles " + names + "; give the target the name of one of them");
+    return parse_layout(chosen->require("layout"), family, parse_tag_of_bundle,
+                        "{id: 0, size: 0.08, x: 0, y: 0, z: 0, qw: 1, qx: 0, qy: 0, qz: 0}", warnings);
+}
+
 Target parse_map_target(const yaml::Node &node, std::vector<fs::path> &map_files,
                         std::vector<std::string> &warnings) {
     Target target{parse_name(node.require("name"), ARHOST_MAX_NAME), {}, ""};
@@ -282,7 +364,15 @@ Target parse_map_target(const yaml::Node &node, std::vector<fs::path> &map_files
     if (!fs::exists(file, ignored))
         map.fail("there is no map file '" + file.string() + "'" + hint_at_similar_name(file));
     map_files.push_back(file);
-    target.markers = read_map(file, warnings);
+    const yaml::Node root = yaml::Node::load(file);
+    if (const auto bundles = root.find("tag_bundles")) {
+        target.markers = parse_bundle(*bundles, target.name, parse_family(node), warnings);
+        return target;
+    }
+    for (const char *key : {"family", "dictionary"})
+        if (const auto family = node.find(key))
+            family->fail("belongs in the map; remove it here");
+    target.markers = parse_map(root, warnings);
     return target;
 }
 
@@ -306,7 +396,8 @@ std::vector<Target> parse_target(const yaml::Node &node, std::vector<fs::path> &
                   "side_mm: 80}");
     const bool has_marker = kind == "marker" || kind == "ids";
     for (const char *key : {"family", "dictionary", "side_mm"})
-        if (const auto found = has_marker ? std::nullopt : node.find(key))
+        if (const auto found =
+                has_marker || (kind == "map" && key != std::string_view("side_mm")) ? std::nullopt : node.find(key))
             found->fail(kind == "map" ? "belongs in the map; remove it here"
                                       : "does not apply to a body, which has no markers; remove it");
     if (kind == "body")
@@ -374,38 +465,7 @@ std::vector<Target> parse_targets(const yaml::Node &list, std::vector<fs::path> 
 }
 
 std::vector<TargetMarker> read_map(const fs::path &file, std::vector<std::string> &warnings) {
-    const yaml::Node root = yaml::Node::load(file);
-    root.allow_keys({"version", "family", "dictionary", "markers"});
-    if (const yaml::Node version = root.require("version"); version.integer() != 1)
-        version.fail("must be 1, the only supported version");
-    const std::string family = parse_family(root);
-    const yaml::Node list = root.require("markers");
-    const std::vector<yaml::Node> nodes = list.items();
-    if (nodes.empty() || nodes.size() > ARHOST_MAX_MARKERS)
-        list.fail("must list 1 to " + std::to_string(int{ARHOST_MAX_MARKERS}) +
-                  " markers, as in [{id: 0, side_mm: 80, position_mm: [0, 0, 0]}]");
-    std::vector<PlacedMarker> placed;
-    bool warned = false; // the unit is the same for all markers
-    for (const yaml::Node &node : nodes) {
-        node.allow_keys({"id", "side_mm", "position_mm", "rotation_degrees", "corners_mm"});
-        const PlacedMarker marker = parse_placed_marker(node);
-        for (std::size_t i = 0; i < placed.size(); ++i) {
-            const auto other = [&] { return nodes[i].path() + " (" + nodes[i].where() + ")"; };
-            if (placed[i].id == marker.id)
-                node.require("id").fail("the marker " + std::to_string(marker.id) + " is also " + other() +
-                                        "; keep one of them");
-            if (are_at_the_same_place(placed[i].corners_mm, marker.corners_mm))
-                node.fail("the marker " + std::to_string(marker.id) + " is at the place of marker " +
-                          std::to_string(placed[i].id) + ", " + other() + "; correct one of them");
-        }
-        placed.push_back(marker);
-        warned = warned || warn_of_side(node, mean_side(marker.corners_mm), warnings);
-    }
-    std::vector<TargetMarker> markers(placed.size());
-    std::ranges::transform(placed, markers.begin(), [&](const PlacedMarker &marker) {
-        return marker_of(marker.id, family, marker.corners_mm);
-    });
-    return markers;
+    return parse_map(yaml::Node::load(file), warnings);
 }
 
 void reject_markers(const yaml::Node &tracker) {

@@ -167,7 +167,7 @@ public:
             tracker_.stop(instance_);
             throw;
         }
-        solver_.emplace(message.intrinsics, targets, message.full_search_every);
+        solver_.emplace(message.intrinsics, targets, message.full_search_every, message.smooth);
         layout_.emplace(targets.size());
         poses_.resize(targets.size());
         plugin_offset_ = layout_->state_offset + (solver_->state_size() + 63) / 64 * 64;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/target_solver.hpp"
 
+#include "pose/smoothing.hpp"
 #include "pose/track.hpp"
 
 #include <algorithm>
@@ -17,8 +18,9 @@ struct TargetSolver::Header {
 
 // The state of a target after the last frame. Plain data without pointers; all zero if it was never seen.
 struct TargetSolver::Memory {
-    pose::Track track; // not of bodies
-    double mt[16];     // the last known pose
+    pose::Track track;         // not of bodies
+    pose::Smoothing smoothing; // only if the poses are filtered
+    double mt[16];             // the last known pose
     std::uint32_t was_seen, age_frames;
 };
 
@@ -62,8 +64,8 @@ Eigen::Vector2d centre_px(const arhost_observation &observation) {
 } // namespace
 
 TargetSolver::TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<ipc::Target> &targets,
-                           std::uint32_t full_search_every)
-    : projection_(intrinsics), full_search_every_(full_search_every) {
+                           std::uint32_t full_search_every, bool smooth)
+    : projection_(intrinsics), full_search_every_(full_search_every), smooth_(smooth) {
     std::uint32_t next_index = 0;
     const std::vector<std::string> families = families_of(targets);
     family_count_ = static_cast<std::uint32_t>(families.size());
@@ -240,7 +242,8 @@ void TargetSolver::solve(const Target &target, std::span<const arhost_observatio
     memory.was_seen = 1;
     memory.age_frames = 0;
     const Estimate &chosen = poses[step.chosen];
-    std::ranges::copy(matrix_of(chosen.camera_from_target), memory.mt);
+    const Rigid pose = smooth_ ? smoothed(memory.smoothing, chosen, capture_ns) : chosen.camera_from_target;
+    std::ranges::copy(matrix_of(pose), memory.mt);
     out.state = ARHOST_TARGET_DETECTED;
     write_covariance(chosen.covariance, out.covariance);
     out.reprojection_px = chosen.reprojection_px;

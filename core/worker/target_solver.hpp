@@ -18,9 +18,10 @@ namespace arhost::worker {
 // apart (pose/track.hpp).
 class TargetSolver {
 public:
-    // `full_search_every`: longest interval, in frames, between searches of the whole frame; at least 1.
+    // `full_search_every`: longest interval, in frames, between searches of the whole frame; at least 1. `smooth`:
+    // whether the poses are filtered (pose/smoothing.hpp).
     TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<ipc::Target> &targets,
-                 std::uint32_t full_search_every);
+                 std::uint32_t full_search_every, bool smooth = false);
 
     // Bytes of `before` and `after`.
     std::uint64_t state_size() const;
@@ -68,6 +69,7 @@ private:
     std::vector<Target> targets_;
     std::map<std::pair<std::uint32_t, std::int32_t>, Marker> markers_; // by family and id
     std::uint32_t family_count_, full_search_every_;
+    bool smooth_;
 };
 
 } // namespace arhost::worker

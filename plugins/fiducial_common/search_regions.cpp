@@ -102,9 +102,8 @@ bool SearchRegions::miss_a_target(const arhost_track_request &request,
     std::map<std::uint32_t, bool> is_seen; // targets
     for (const arhost_expected_marker &expected : elements(request.expected, request.expected_count)) {
         const Marker &marker = markers_.at(expected.marker);
-        is_seen[marker.target] |= std::ranges::any_of(seen, [&](const arhost_observation &one) {
-            return one.id == marker.id && one.family == marker.family;
-        });
+        is_seen[marker.target] |= std::ranges::any_of(
+            seen, [&](const arhost_observation &one) { return one.id == marker.id && one.family == marker.family; });
     }
     return std::ranges::any_of(is_seen, [](const auto &target) { return !target.second; });
 }

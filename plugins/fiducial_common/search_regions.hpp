@@ -9,7 +9,7 @@
 
 namespace arhost::fiducial {
 
-// What a detector needs of the regions that it searches.
+// Requirements of a detector on the regions that it searches.
 struct RegionLimits {
     int grid_px = 1;     // regions begin at multiples of this
     int min_side_px = 1; // in smaller regions, nothing is detected

@@ -88,3 +88,26 @@ TEST(RealFrames, KillingEveryWorkerDoesNotChangeTheResult) {
     for (const char *component : {"source", "tracker", "raytracer", "sink_poses", "sink_images"})
         EXPECT_EQ(killed.stats()["restarts"][component], 1) << component << "\n" << killed.output();
 }
+
+// The memory of the filter and of the search survives the tracker.
+TEST(RealFrames, KillingTheTrackerDoesNotChangeFilteredPoses) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/rbt_sequence");
+    for (const std::string tracker : {aruco, apriltag}) {
+        const std::string filtered = configuration(tracker + "\n  filter: adaptive");
+        ArhostRun clean(filtered), killed(filtered), plain(configuration(tracker));
+        ASSERT_EQ(clean.run(), 0) << clean.output();
+        killed.start();
+        for (const char *frame : {"frames/0006.png", "frames/0016.png", "frames/0026.png"}) {
+            while (killed.running() && !killed.exists(frame))
+                std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            const pid_t worker = killed.worker(tracker);
+            ASSERT_NE(worker, 0) << killed.output();
+            ::kill(worker, SIGKILL);
+        }
+        ASSERT_EQ(killed.wait(), 0) << killed.output();
+        expect_same_results(clean, killed);
+        EXPECT_EQ(killed.stats()["restarts"]["tracker"], 3) << killed.output();
+        ASSERT_EQ(plain.run(), 0) << plain.output();
+        EXPECT_NE(clean.read("poses.jsonl"), plain.read("poses.jsonl")) << "the poses are not filtered";
+    }
+}

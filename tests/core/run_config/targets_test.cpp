@@ -148,6 +148,15 @@ TEST_F(TargetsTest, LimitsOfFramesHaveDefaults) {
                 HasSubstr("tracker.full_search_every: must be 1 to "));
 }
 
+TEST_F(TargetsTest, PosesAreFilteredOnRequest) {
+    const std::string targets = "targets: [{name: head, body: head}]";
+    EXPECT_FALSE(parse_tracker("{plugin: tracker_x, " + targets + "}").tracker->smooth);
+    EXPECT_FALSE(parse_tracker("{plugin: tracker_x, filter: none, " + targets + "}").tracker->smooth);
+    EXPECT_TRUE(parse_tracker("{plugin: tracker_x, filter: adaptive, " + targets + "}").tracker->smooth);
+    EXPECT_THAT(error_of([&] { parse_tracker("{plugin: tracker_x, filter: kalman, " + targets + "}"); }),
+                HasSubstr("tracker.filter: 'kalman' is not one of none, adaptive"));
+}
+
 TEST_F(TargetsTest, RejectsInvalidTargets) {
     const std::string at = "lab.yaml:4:40: tracker.targets[0]";
     EXPECT_EQ(error_in("[]"), "lab.yaml:4:39: tracker.targets: must list 1 to 1024 targets, as in [{marker: 0, "
@@ -185,6 +194,58 @@ TEST_F(TargetsTest, RejectsInvalidTargets) {
     EXPECT_THAT(error_in("[{map: a.map.yaml}]"), EndsWith("tracker.targets[0]: the key 'name' is missing"));
     EXPECT_THAT(error_in("[{name: board, map: a.map.yaml, side_mm: 80}]"),
                 HasSubstr("tracker.targets[0].side_mm: belongs in the map; remove it here"));
+}
+
+// A file of AprilRobotics' apriltag_ros: metres, quaternions; the tags' axes are those of arhost.
+const std::string bundles = R"(standalone_tags: [{id: 9, size: 0.1}]
+tag_bundles:
+  [
+    {name: desk, layout: [{id: 3, size: 0.04, x: 0.1, y: -0.02, z: 0.003, qw: 1, qx: 0, qy: 0, qz: 0},
+                          {id: 4, size: 0.06, qw: 2, qz: 2}]},
+    {name: wall, layout: [{id: 5, size: 0.04}]}
+  ]
+)";
+
+TEST_F(TargetsTest, BundlesOfAprilTagRosAreMaps) {
+    write("tags.yaml", bundles);
+    const auto targets = parse("[{name: desk, map: tags.yaml, family: tag36h11}]").targets;
+    ASSERT_EQ(targets.size(), 1u);
+    ASSERT_EQ(targets[0].markers.size(), 2u);
+    const auto &[first, second] = std::tie(targets[0].markers[0], targets[0].markers[1]);
+    EXPECT_EQ(first.id, 3);
+    EXPECT_EQ(first.family, "tag36h11");
+    const auto near = [](double x, double y, double z) {
+        return ElementsAre(testing::DoubleNear(x, 1e-9), testing::DoubleNear(y, 1e-9), testing::DoubleNear(z, 1e-9));
+    };
+    EXPECT_THAT(first.corners_mm, ElementsAre(near(80, 0, 3), near(120, 0, 3), near(120, -40, 3), near(80, -40, 3)));
+    EXPECT_EQ(second.id, 4);
+    EXPECT_THAT(second.corners_mm,
+                ElementsAre(near(-30, -30, 0), near(-30, 30, 0), near(30, 30, 0), near(30, -30, 0)))
+        << "a quarter turn about z, of a quaternion that is not normalized";
+    EXPECT_EQ(parse("[{name: wall, map: tags.yaml, dictionary: DICT_APRILTAG_36h11}]").targets[0].markers[0].id, 5);
+}
+
+TEST_F(TargetsTest, RejectsInvalidBundles) {
+    write("tags.yaml", bundles);
+    EXPECT_THAT(error_in("[{name: desk, map: tags.yaml}]"), HasSubstr("the key 'family' or 'dictionary' is missing"));
+    EXPECT_THAT(
+        error_in("[{name: table, map: tags.yaml, family: tag36h11}]"),
+        HasSubstr("tags.yaml:3:3: tag_bundles: has the bundles 'desk', 'wall'; give the target the name of one "
+                  "of them"));
+    const auto error_in_layout = [&](const std::string &layout) {
+        write("tags.yaml", "tag_bundles: [{name: a, layout: [" + layout + "]}]\n");
+        return error_in("[{name: desk, map: tags.yaml, family: tag36h11}]");
+    };
+    EXPECT_EQ(error_in_layout("{id: 1, size: 0.1}"), "no error") << "the only bundle may have another name";
+    EXPECT_THAT(error_in_layout("{id: 1, size: 0.1}, {id: 1, size: 0.1, x: 1}"), HasSubstr("the marker 1 is also"));
+    EXPECT_THAT(error_in_layout("{id: 1, size: 0}"), HasSubstr("layout[0].size: must be "));
+    EXPECT_THAT(error_in_layout("{size: 0.1}"), HasSubstr("the key 'id' is missing"));
+    EXPECT_THAT(error_in_layout("{id: 1, size: 0.1, qw: 0}"),
+                HasSubstr("the quaternion qw, qx, qy, qz must not be 0"));
+    EXPECT_THAT(error_in_layout("{id: 1, size: 0.1, roll: 0}"), HasSubstr("roll"));
+    EXPECT_THAT(error_in_layout(""), HasSubstr("must list 1 to 1024 markers"));
+    write("tags.yaml", "tag_bundles: []\n");
+    EXPECT_THAT(error_in("[{name: desk, map: tags.yaml, family: tag36h11}]"), HasSubstr("has no bundle"));
 }
 
 TEST_F(TargetsTest, RejectsInvalidNames) {

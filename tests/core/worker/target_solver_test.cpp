@@ -339,6 +339,31 @@ TEST_F(TargetSolverTest, RequestsAFullSearchFirstAtIntervalsAndAfterALoss) {
     EXPECT_TRUE(always.expect(20 * frame_ns, before.data()).search_everywhere);
 }
 
+TEST_F(TargetSolverTest, FiltersPosesOnRequest) {
+    const Rigid truth = pose_at({20, 10, 900}, 30);
+    const auto jitter_mm = [&](bool smooth) {
+        const TargetSolver own(pinhole, targets, full_search_every, smooth);
+        Camera noisy(pinhole, 4);
+        std::vector<std::byte> state, next(own.state_size());
+        double sum = 0;
+        for (int frame = 0; frame < 300; ++frame) {
+            arhost_observation seen = observed(noisy.observe(truth, single, 0.1), 5);
+            arhost_tracker_result result{};
+            result.observations = &seen;
+            result.observation_count = 1;
+            std::array<arhost_observation, 1> sorted;
+            own.solve(result, true, frame * frame_ns, state.empty() ? nullptr : state.data(), next.data(),
+                      {solved, sorted});
+            state = next;
+            EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
+            if (frame >= 30)
+                sum += (pose_of(cup).translation_mm - truth.translation_mm).squaredNorm();
+        }
+        return std::sqrt(sum / 270);
+    };
+    EXPECT_LT(jitter_mm(true), 0.6 * jitter_mm(false));
+}
+
 TEST_F(TargetSolverTest, ExpectsNoMarkerThatIsOutOfView) {
     solve({see(pose_at({560, 0, 800}, 0), 5)}); // at the right border of the frame
     solve({see(pose_at({640, 0, 900}, 0), 5)}, 1);

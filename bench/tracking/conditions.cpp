@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Single tags under one difficulty at a time: how many are found, how precise their corners are, and how precise the
+// poses are that follow from the corners, relative to the Cramér–Rao bound at the measured noise of the corners. Both
+// trackers, and the bare libraries on the same pictures. Writes a CSV file if its path is given.
+#include "bare_detectors.hpp"
+#include "cramer_rao.hpp"
+
+#include <fiducial_common/prints.hpp>
+#include <fiducial_common/rendered_marker.hpp>
+
+#include <cstdio>
+#include <deque>
+#include <exception>
+#include <fstream>
+#include <functional>
+#include <numbers>
+#include <random>
+
+namespace {
+
+using namespace arhost;
+using fiducial::Corners;
+using pose::Rigid;
+using test::GreyFrame;
+
+constexpr double side_mm = 100;
+constexpr double chi2_6_95 = 12.59; // 95 % quantile of the chi-squared distribution with 6 degrees of freedom
+const cv::Size size(480, 360);
+const arhost_intrinsics camera = test::intrinsics_of(size, 450, 450, 239.5, 179.5);
+
+struct Conditions {
+    double tilt_degrees = 30, side_px = 60;
+    double blur_px = 0.6, noise = 1.5; // standard deviations; noise in grey levels
+    double exposure = 1;               // 1: white is 0.8 of the largest level
+    double hidden = 0;                 // side of the square that covers a corner, relative to the tag's side
+    double rolling_px = 0;             // motion to the right while the sensor reads the tag's height
+};
+
+struct Dimension {
+    const char *name, *unit;
+    std::vector<double> values;
+    double Conditions::*field;
+};
+
+const std::vector<Dimension> dimensions = {
+    {"tilt", "degrees", {0, 10, 20, 30, 40, 50, 60, 70, 75, 80}, &Conditions::tilt_degrees},
+    {"size", "px", {8, 10, 13, 16, 20, 25, 35, 50, 80, 120, 200}, &Conditions::side_px},
+    {"blur", "px", {0.4, 0.6, 1, 1.5, 2, 3, 4}, &Conditions::blur_px},
+    {"noise", "levels", {0, 1.5, 4, 8, 15, 25, 40}, &Conditions::noise},
+    {"exposure", "", {0.03, 0.06, 0.1, 0.3, 1, 1.5, 2}, &Conditions::exposure},
+    {"hidden", "of side", {0, 0.05, 0.1, 0.15, 0.2, 0.3}, &Conditions::hidden},
+    {"rolling", "px", {0, 1, 2, 4, 8, 16}, &Conditions::rolling_px},
+};
+
+struct View {
+    GreyFrame frame;
+    test::Mt truth;
+};
+
+// A tag at a random place near the centre, turned at random and tilted about a random axis.
+class Views {
+public:
+    Views(const Conditions &conditions, int count) {
+        std::mt19937 random(1);
+        std::uniform_real_distribution<double> turn(-180, 180), shift(-30, 30);
+        const test::Print print = test::april_tag("tag36h11", 0).with_margin(1);
+        for (int i = 0; i < count; ++i) {
+            const double z = camera.fx * side_mm / conditions.side_px;
+            const double axis = turn(random) * std::numbers::pi / 180;
+            const Eigen::Matrix3d rotation = pose::rotation_by(conditions.tilt_degrees * std::numbers::pi / 180 *
+                                                               Eigen::Vector3d(std::cos(axis), std::sin(axis), 0)) *
+                                             pose::rotation_by({0, 0, turn(random) * std::numbers::pi / 180}) *
+                                             Eigen::Vector3d(1, -1, -1).asDiagonal();
+            const double x = shift(random) * z / camera.fx, y = shift(random) * z / camera.fy;
+            const test::Mt truth = matrix_of(Rigid{rotation, {x, y, z}});
+            views_.emplace_back(
+                View{GreyFrame(picture(conditions, print, truth, static_cast<std::uint64_t>(i) + 1)), truth});
+        }
+    }
+    const std::deque<View> &all() const { return views_; }
+
+private:
+    static cv::Mat picture(const Conditions &conditions, const test::Print &print, const test::Mt &truth,
+                           std::uint64_t seed) {
+        cv::Mat grey = test::render(camera, {{print, side_mm, truth}});
+        if (conditions.hidden > 0) {
+            const double far = side_mm / 2 + 10, near = side_mm * (0.5 - conditions.hidden);
+            std::vector<cv::Point> cover;
+            for (const auto &[x, y] : {std::pair(-far, far), {-near, far}, {-near, near}, {-far, near}})
+                cover.emplace_back(test::pixel_of(truth, camera, x, y));
+            cv::fillConvexPoly(grey, cover, cv::Scalar(120), cv::LINE_AA);
+        }
+        if (conditions.rolling_px > 0) {
+            const cv::Point2d centre = test::pixel_of(truth, camera, 0, 0);
+            const double skew = conditions.rolling_px / conditions.side_px;
+            const cv::Matx23d shear(1, skew, -skew * centre.y, 0, 1, 0);
+            cv::warpAffine(grey, grey, shear, size, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+        }
+        cv::GaussianBlur(grey, grey, {}, conditions.blur_px);
+        grey *= conditions.exposure;
+        test::add_noise(grey, conditions.noise, seed);
+        return grey;
+    }
+
+    std::deque<View> views_;
+};
+
+double percentile(std::vector<double> values, double fraction) {
+    return values.empty() ? 0 : test::percentile(std::move(values), fraction);
+}
+
+struct Result {
+    int found = 0, covered = 0;
+    int flips = 0;                       // neither of the two solutions is within 20° of the truth
+    double corner_px = 0;                // RMS of each coordinate
+    std::vector<double> rotation, shift; // errors without flips, relative to the bound
+
+    double share(int count) const { return 100.0 * found / count; }
+    double covered_share() const { return found > flips ? 100.0 * covered / (found - flips) : 0; }
+};
+
+using Detect = std::function<std::optional<Corners>(const GreyFrame &)>;
+
+Result measure(const Views &views, const Detect &detect) {
+    const pose::Projection projection(camera);
+    Result result;
+    double sum = 0;
+    std::vector<std::pair<Rigid, pose::Estimate>> poses; // truth, and the nearest of the two solutions
+    for (const View &view : views.all()) {
+        const std::optional<Corners> corners = detect(view.frame);
+        if (!corners)
+            continue;
+        ++result.found;
+        const auto expected = test::corners_of(view.truth, camera, side_mm);
+        pose::ObservedMarker marker{pose::square_corners_mm(side_mm), {}, 0.1};
+        for (std::size_t i = 0; i < 4; ++i) {
+            const cv::Point2d error = (*corners)[i] - expected[i];
+            sum += error.dot(error) / 8;
+            marker.corners_px[i] = {(*corners)[i].x, (*corners)[i].y};
+        }
+        const Rigid truth = pose::rigid_of(view.truth);
+        const auto all = estimate_poses({&marker, 1}, projection);
+        const auto nearest = std::ranges::min_element(all, {}, [&](const pose::Estimate &pose) {
+            return pose::angle_between_rad(pose.camera_from_target.rotation, truth.rotation);
+        });
+        if (nearest != all.end())
+            poses.emplace_back(truth, *nearest);
+    }
+    if (result.found == 0)
+        return result;
+    result.corner_px = std::sqrt(sum / result.found);
+    for (const auto &[truth, found] : poses) {
+        const pose::Matrix6d bound = bench::cramer_rao(truth, projection, side_mm, std::max(result.corner_px, 1e-6));
+        Eigen::Matrix<double, 6, 1> error;
+        error << truth.translation_mm - found.camera_from_target.translation_mm,
+            pose::rotation_vector(truth.rotation * found.camera_from_target.rotation.transpose());
+        if (error.tail<3>().norm() > 20 * std::numbers::pi / 180) {
+            ++result.flips;
+            continue;
+        }
+        result.covered += error.dot(found.covariance.ldlt().solve(error)) < chi2_6_95;
+        result.shift.push_back(error.head<3>().norm() / std::sqrt(bound.topLeftCorner<3, 3>().trace()));
+        result.rotation.push_back(error.tail<3>().norm() / std::sqrt(bound.bottomRightCorner<3, 3>().trace()));
+    }
+    return result;
+}
+
+// Both trackers and both libraries.
+class Detectors {
+public:
+    Detectors() {
+        for (const char *name : {"tracker_apriltag", "tracker_aruco"}) {
+            test::Tracker &tracker = trackers_.emplace_back(name);
+            if (tracker.created() != ARHOST_STATUS_OK || tracker.start(camera, {{0, side_mm}}) != ARHOST_STATUS_OK)
+                throw std::runtime_error(tracker.log());
+        }
+    }
+    static constexpr const char *names[] = {"tracker_apriltag", "AprilTag", "tracker_aruco", "OpenCV"};
+    std::optional<Corners> detect(std::size_t which, const GreyFrame &frame) {
+        if (which % 2 == 1) {
+            const bench::Detections found = which == 1 ? april_tag_(frame) : opencv_(frame);
+            return found.contains(0) ? std::optional(found.at(0)) : std::nullopt;
+        }
+        for (const arhost_observation &seen : trackers_[which / 2].track(frame))
+            if (seen.id == 0) {
+                Corners corners;
+                for (std::size_t i = 0; i < 4; ++i)
+                    corners[i] = {seen.corners_px[i][0], seen.corners_px[i][1]};
+                return corners;
+            }
+        return std::nullopt;
+    }
+
+private:
+    std::deque<test::Tracker> trackers_;
+    bench::BareAprilTag april_tag_;
+    bench::BareOpenCv opencv_{true};
+};
+
+} // namespace
+
+int main(int argc, char **argv) try {
+    bool is_quick = false;
+    std::ofstream csv;
+    for (int i = 1; i < argc; ++i)
+        if (std::string(argv[i]) == "--quick")
+            is_quick = true;
+        else
+            csv.open(argv[i]);
+    csv << "dimension,value,detector,found,corner_px,rotation_p50,rotation_p95,rotation_p99,translation_p50,"
+           "translation_p95,translation_p99,covered,flips\n";
+    const int count = is_quick ? 20 : 300;
+    Detectors detectors;
+    bool met = true;
+    std::printf(
+        "%d pictures of a tag for each row, tilt 30 degrees, 60 px, blur 0.6 px, noise 1.5 levels where nothing "
+        "else is said; errors of poses relative to the Cramer-Rao bound at the corners' noise\n",
+        count);
+    for (const Dimension &dimension : dimensions) {
+        std::printf("\n%-8s | %31s | %35s | %41s\n%-8s | %7s %7s %7s %7s | %8s %8s %8s %8s | %20s %20s\n",
+                    dimension.name, "found, %", "noise of corners, px",
+                    "rotation p50/p99, translation p50/p99, covered", dimension.unit, "apriltag", "bare", "aruco",
+                    "bare", "apriltag", "bare", "aruco", "bare", "apriltag", "aruco");
+        for (const double value : dimension.values) {
+            Conditions conditions;
+            conditions.*dimension.field = value;
+            const Views views(conditions, count);
+            std::array<Result, 4> results;
+            for (std::size_t which = 0; which < results.size(); ++which) {
+                const Result &result = results[which] =
+                    measure(views, [&](const GreyFrame &frame) { return detectors.detect(which, frame); });
+                csv << dimension.name << ',' << value << ',' << Detectors::names[which] << ',' << result.share(count)
+                    << ',' << result.corner_px;
+                for (const auto *errors : {&result.rotation, &result.shift})
+                    for (const double fraction : {0.5, 0.95, 0.99})
+                        csv << ',' << percentile(*errors, fraction);
+                csv << ',' << result.covered_share() << ',' << result.flips << '\n';
+            }
+            std::printf("%8g |", value);
+            for (const Result &result : results)
+                std::printf(" %7.1f", result.share(count));
+            std::printf(" |");
+            for (const Result &result : results)
+                std::printf(" %8.3f", result.corner_px);
+            std::printf(" |");
+            for (const std::size_t which : {0U, 2U})
+                std::printf(" %.2f/%.2f %.2f/%.2f %3.0f%%", percentile(results[which].rotation, 0.5),
+                            percentile(results[which].rotation, 0.99), percentile(results[which].shift, 0.5),
+                            percentile(results[which].shift, 0.99), results[which].covered_share());
+            std::printf("\n");
+            std::fflush(stdout);
+            met = met && results[0].found >= results[1].found && results[2].found >= results[3].found;
+        }
+    }
+    std::printf("\ntarget: each tracker finds at least as many as its library\n");
+    return met ? 0 : 1;
+} catch (const std::exception &error) {
+    std::fprintf(stderr, "tracking-conditions: %s\n", error.what());
+    return 1;
+}

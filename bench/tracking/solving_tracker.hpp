@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A tracker plugin with the solver of its worker, in one process.
+#pragma once
+
+#include "worker/target_solver.hpp"
+
+#include <fiducial_common/tracker_support.hpp>
+
+#include <chrono>
+#include <span>
+#include <stdexcept>
+
+namespace arhost::bench {
+
+// Tracks the tags 0 … tag_count − 1 of tag36h11, each a target of its own.
+class SolvingTracker {
+public:
+    struct Settings {
+        int tag_count;
+        double side_mm;
+        std::uint32_t full_search_every = 10; // the default of tracker.full_search_every
+        bool smooth = false;
+    };
+
+    SolvingTracker(const std::string &plugin, const arhost_intrinsics &camera, const Settings &settings)
+        : tracker_(plugin), solver_(camera, targets_of(settings), settings.full_search_every, settings.smooth),
+          targets_(static_cast<std::size_t>(settings.tag_count)) {
+        std::vector<test::Listed> listed;
+        for (int id = 0; id < settings.tag_count; ++id)
+            listed.push_back({id, settings.side_mm});
+        if (tracker_.created() != ARHOST_STATUS_OK || tracker_.start(camera, listed) != ARHOST_STATUS_OK)
+            throw std::runtime_error(tracker_.log());
+    }
+
+    // Returns the time of the plugin's call.
+    std::chrono::nanoseconds track(const test::GreyFrame &frame, std::int64_t capture_ns) {
+        const void *const before = before_.empty() ? nullptr : before_.data();
+        const auto expectation = solver_.expect(capture_ns, before);
+        const auto begin = std::chrono::steady_clock::now();
+        seen_ = tracker_.track(frame, expectation.markers, expectation.search_everywhere);
+        const auto spent = std::chrono::steady_clock::now() - begin;
+        arhost_tracker_result result{};
+        result.observations = seen_.data();
+        result.observation_count = static_cast<std::uint32_t>(seen_.size());
+        std::vector<arhost_observation> sorted(seen_.size());
+        after_.resize(solver_.state_size());
+        solver_.solve(result, expectation.search_everywhere, capture_ns, before, after_.data(), {targets_, sorted});
+        before_.swap(after_);
+        return spent;
+    }
+    std::span<const arhost_observation> seen() const { return seen_; } // in the last frame
+    std::span<const arhost_target> targets() const { return targets_; }
+
+private:
+    static std::vector<ipc::Target> targets_of(const Settings &settings) {
+        const double h = settings.side_mm / 2;
+        std::vector<ipc::Target> targets;
+        for (int id = 0; id < settings.tag_count; ++id)
+            targets.push_back(
+                {std::to_string(id), {{id, "tag36h11", {{{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}}}}, ""});
+        return targets;
+    }
+
+    test::Tracker tracker_;
+    worker::TargetSolver solver_;
+    std::vector<std::byte> before_, after_; // empty before the first frame
+    std::vector<arhost_observation> seen_;
+    std::vector<arhost_target> targets_;
+};
+
+} // namespace arhost::bench
