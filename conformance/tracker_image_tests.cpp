@@ -215,7 +215,7 @@ void expected_places(Context &context) {
                image);
     expect_none(tracker.track_first(empty), "with markers that are expected but not there", empty);
 
-    const auto expect_at_least = [&](std::vector<Tracker::Expected> markers, const std::string &where) {
+    const auto expect_at_least = [&](const std::vector<Tracker::Expected> &markers, const std::string &where) {
         tracker.expect(markers);
         const std::vector<arhost_observation> found = tracker.track_first(image);
         std::vector<InFamily> all = group.expected();

@@ -78,7 +78,7 @@ std::vector<cv::Rect> SearchRegions::of(const arhost_track_request &request, con
                                         const Family *family) const {
     const cv::Size size(static_cast<int>(request.frame->format->width),
                         static_cast<int>(request.frame->format->height));
-    const std::vector<cv::Rect> whole{cv::Rect({0, 0}, size)};
+    std::vector<cv::Rect> whole{cv::Rect({0, 0}, size)};
     if (request.search_everywhere)
         return whole;
     std::vector<cv::Rect> regions;
