@@ -210,9 +210,7 @@ void expected_places(Context &context) {
     tracker.start(wide_camera(), list);
     tracker.expect(expected);
     expect_all(tracker.track_first(image), wide_camera(), group.expected(),
-               "with markers that are up to 7 px from the "
-               "expected places",
-               image);
+               "with markers that are up to 7 px from the expected places", image);
     expect_none(tracker.track_first(empty), "with markers that are expected but not there", empty);
 
     const auto expect_at_least = [&](const std::vector<Tracker::Expected> &markers, const std::string &where) {
@@ -423,8 +421,7 @@ constexpr Test tests[] = {
      kind, corner_gate, 20s, several},
     {"tracker.expected",
      "If only some places have to be searched, the markers that are expected there are found, and those that have "
-     "left "
-     "are not reported.",
+     "left are not reported.",
      kind, corner_gate, 20s, expected_places},
     {"tracker.families", "Markers of two families are told apart, also with the same id.", kind, corner_gate, 20s,
      families},

@@ -2,16 +2,14 @@
 //
 // The pose of a board of tags on a real sequence: core/pose/ with the corners of tracker_apriltag, compared with
 // bare OpenCV and bare AprilTag on the same frames, and the map of `arhost map` compared with the nominal layout.
+#include "bare_detectors.hpp"
 #include "map/learning.hpp"
 #include "pose/track.hpp"
 
-#include <fiducial_common/opencv_aruco.hpp>
 #include <fiducial_common/rbt_sequence.hpp>
 
-#include <apriltag.h>
 #include <apriltag_pose.h>
 #include <opencv2/calib3d.hpp>
-#include <tag36h11.h>
 
 #include <cstdio>
 #include <cstdlib>
@@ -149,29 +147,19 @@ cv::Matx33d camera_matrix() {
     return {c.fx, 0, c.cx, 0, c.fy, c.cy, 0, 0, 1};
 }
 
-cv::Mat grey(const test::GreyFrame &frame) {
-    const arhost_frame_format &format = frame.format();
-    return {static_cast<int>(format.height), static_cast<int>(format.width), CV_8UC1,
-            const_cast<std::uint8_t *>(frame.frame().grey), format.grey_stride};
-}
-
 // detectMarkers with sub-pixel corners, and solvePnP with all of them.
 Poses with_opencv(const RbtSequence &sequence) {
-    cv::aruco::DetectorParameters parameters;
-    parameters.cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
-    const cv::aruco::Dictionary dictionary = aruco::predefined(cv::aruco::DICT_APRILTAG_36h11);
+    const bench::BareOpenCv detect(true);
     Poses poses;
     for (const test::GreyFrame &frame : sequence.frames()) {
-        const aruco::DetectedMarkers found = aruco::detect(grey(frame), dictionary, parameters);
         std::vector<cv::Point3d> object;
         std::vector<cv::Point2d> image;
-        for (std::size_t m = 0; m < found.ids.size(); ++m)
-            if (std::ranges::count(sequence.ids(), found.ids[m]))
-                for (int i = 0; i < 4; ++i) {
-                    // OpenCV's prints of AprilTags are rotated by 180°.
-                    const cv::Point2d on_board = RbtSequence::on_board_mm(found.ids[m])[(i + 2) % 4];
+        for (const auto &[id, corners] : detect(frame))
+            if (std::ranges::count(sequence.ids(), id))
+                for (std::size_t i = 0; i < corners.size(); ++i) {
+                    const cv::Point2d on_board = RbtSequence::on_board_mm(id)[i];
                     object.emplace_back(on_board.x, on_board.y, 0);
-                    image.emplace_back(found.corners[m][i]);
+                    image.push_back(corners[i]);
                 }
         cv::Vec3d r, t;
         if (object.empty() || !cv::solvePnP(object, image, camera_matrix(), cv::noArray(), r, t)) {
@@ -193,7 +181,7 @@ Poses with_apriltag(const RbtSequence &sequence) {
     const arhost_intrinsics camera = RbtSequence::camera();
     Poses poses;
     for (const test::GreyFrame &frame : sequence.frames()) {
-        const cv::Mat pixels = grey(frame);
+        const cv::Mat pixels = bench::grey_of(frame);
         image_u8_t image{pixels.cols, pixels.rows, static_cast<int>(pixels.step), pixels.data};
         const std::unique_ptr<zarray_t, decltype(&apriltag_detections_destroy)> tags(
             apriltag_detector_detect(detector.get(), &image), apriltag_detections_destroy);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pose/smoothing.hpp"
 
-#include "simulated_markers.hpp"
+#include "hand_held_marker.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -9,31 +9,7 @@
 namespace arhost::pose {
 namespace {
 
-constexpr double side_mm = 80, noise_px = 0.1;
 constexpr std::int64_t frame_ns = 33'333'333;
-const arhost_intrinsics pinhole = intrinsics_of(ARHOST_DISTORTION_NONE, {});
-
-// The estimate that is nearest to the truth: the choice between two is not tested here.
-Estimate measure(Camera &camera, const Rigid &truth, double noise = noise_px) {
-    const ObservedMarker marker = camera.observe(truth, square_corners_mm(side_mm), noise);
-    ObservedMarker assumed = marker;
-    assumed.corner_sigma_px = noise_px;
-    const auto poses = estimate_poses({&assumed, 1}, camera.projection());
-    if (poses.empty())
-        throw std::runtime_error("no pose");
-    return *std::ranges::min_element(
-        poses, {}, [&](const Estimate &pose) { return degrees_between(pose.camera_from_target, truth); });
-}
-
-Eigen::Vector2d corner_px(const Camera &camera, const Rigid &pose) {
-    return *camera.projection().pixel(pose * square_corners_mm(side_mm)[1]);
-}
-
-// A marker in a hand: its corner moves by up to 6 px from frame to frame.
-Rigid in_hand(double seconds) {
-    return pose_at({60 * std::sin(3 * seconds), 40 * std::sin(4 * seconds), 800 + 60 * std::sin(2 * seconds)},
-                   35 + 15 * std::sin(2.5 * seconds), 30 * seconds, 40 * std::sin(seconds));
-}
 
 const Rigid resting = pose_at({40, -30, 700}, 40, 20, 15);
 
