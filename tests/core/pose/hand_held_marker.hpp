@@ -12,8 +12,8 @@ namespace arhost::pose {
 constexpr double side_mm = 80, noise_px = 0.1;
 inline const arhost_intrinsics pinhole = intrinsics_of(ARHOST_DISTORTION_NONE, {});
 
-// The estimate that is nearest to the truth: the choice between two is not tested here. `actual_noise_px`: that of the
-// corners, for which the estimate assumes noise_px.
+// The estimate that is nearest to the truth: the choice between two is not tested here. `actual_noise_px`: that of
+// the corners, for which the estimate assumes noise_px.
 inline Estimate measure(Camera &camera, const Rigid &truth, double actual_noise_px = noise_px) {
     ObservedMarker marker = camera.observe(truth, square_corners_mm(side_mm), actual_noise_px);
     marker.corner_sigma_px = noise_px;
