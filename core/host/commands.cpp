@@ -561,7 +561,10 @@ std::vector<ipc::PluginDescription> check_plugins(const run_config::Configuratio
             if (const auto *reason = std::get_if<std::string>(&result))
                 component.node.require(i == 0 ? "plugin" : "fallback").fail(*reason);
             plugins.push_back(std::get<ipc::PluginDescription>(result));
-            run_config::options_for(plugins.back(), kind, component, i);
+            std::vector<std::string> notes;
+            run_config::options_for(plugins.back(), kind, component, i, notes);
+            for (const std::string &note : notes)
+                context.log(ARHOST_SEVERITY_WARNING, plugins.back().id, note);
         }
         return plugins;
     };

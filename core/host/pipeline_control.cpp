@@ -289,9 +289,14 @@ void Pipeline::execute(const control::Set &set, const control::Done &done) {
 std::vector<OptionValue> Pipeline::options_for(const Component &component, arhost_kind kind,
                                                const run_config::ComponentConfiguration &configuration,
                                                std::size_t candidate) {
+    std::vector<std::string> notes;
     std::vector<OptionValue> values =
-        run_config::options_for(component.description(), kind, configuration, candidate);
-    OptionsInUse &in_use = options_[&component];
+        run_config::options_for(component.description(), kind, configuration, candidate, notes);
+    const auto [entry, is_first] = options_.try_emplace(&component);
+    OptionsInUse &in_use = entry->second;
+    for (const std::string &note : notes)
+        if (is_first)
+            context_.log(ARHOST_SEVERITY_WARNING, component.description().id, note);
     in_use.path = configuration.node.path();
     if (candidate > 0)
         in_use.changed.clear();

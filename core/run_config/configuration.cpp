@@ -248,7 +248,8 @@ std::string yaml_text(const ipc::OptionValue &value) {
 }
 
 std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
-                                          const ComponentConfiguration &component, std::size_t candidate) {
+                                          const ComponentConfiguration &component, std::size_t candidate,
+                                          std::vector<std::string> &notes) {
     const bool configured = candidate == 0;
     if (plugin.kind != kind)
         component.node.require(configured ? "plugin" : "fallback")
@@ -260,7 +261,7 @@ std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, 
                       "]'" + (need == "usb" ? ", or better 'usb: {vendor: …, product: …}'," : "") + " to " +
                       component.node.path() + " (docs/security.md)");
     const std::optional<yaml::Node> options = configured ? component.options : std::nullopt;
-    std::vector<ipc::OptionValue> values = resolve_options(plugin, options, component.path, component.node);
+    std::vector<ipc::OptionValue> values = resolve_options(plugin, options, component.path, component.node, notes);
     if (const auto usb = std::ranges::find(values, "usb", &ipc::OptionValue::key);
         usb != values.end() && !component.policy.usb_device.empty()) {
         if (const auto option = options ? options->find("usb") : std::nullopt)

@@ -104,8 +104,10 @@ struct Configuration {
 // fallback, for which the configured options are ignored and all options have their defaults. Throws yaml::Error if
 // the plugin has the wrong kind, needs a permission that is not allowed, or does not accept the options, or if an
 // input file cannot be read or an output file cannot be written.
+// Adds to `notes` the options that are set aside (resolve_options).
 std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
-                                          const ComponentConfiguration &component, std::size_t candidate);
+                                          const ComponentConfiguration &component, std::size_t candidate,
+                                          std::vector<std::string> &notes);
 
 // Returns the value of the declared option that `text`, in YAML syntax, represents. Throws yaml::Error.
 ipc::OptionValue option_value(const ipc::OptionDeclaration &declared, const std::string &text);

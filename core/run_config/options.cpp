@@ -62,12 +62,18 @@ ipc::OptionValue default_of(const ipc::OptionDeclaration &declared, const std::s
 
 std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plugin,
                                               const std::optional<yaml::Node> &options,
-                                              const std::optional<yaml::Node> &path, const yaml::Node &owner) {
+                                              const std::optional<yaml::Node> &path, const yaml::Node &owner,
+                                              std::vector<std::string> &notes) {
     std::vector<std::string_view> keys;
     for (const ipc::OptionDeclaration &declared : plugin.options)
         keys.push_back(declared.key);
-    if (options)
+    if (options && (plugin.kind == ARHOST_KIND_TRACKER || plugin.kind == ARHOST_KIND_RAYTRACER)) {
+        for (const yaml::Node &unknown : options->set_aside_keys(keys))
+            notes.push_back(unknown.where() + ": " + unknown.path() + ": set aside, because " + plugin.id +
+                            " has no such option");
+    } else if (options) {
         options->allow_keys(keys);
+    }
     if (path && std::find(keys.begin(), keys.end(), "path") == keys.end())
         path->fail(plugin.id + " has no option 'path'; remove this key");
 

@@ -351,20 +351,29 @@ void Node::fail(const std::string &message) const {
 }
 
 void Node::allow_keys(std::span<const std::string_view> keys) const {
+    if (const std::vector<Node> unknown = set_aside_keys(keys); !unknown.empty())
+        unknown.front().fail("unknown key; known keys: " + listed(keys));
+}
+
+std::vector<Node> Node::set_aside_keys(std::span<const std::string_view> keys) const {
     expect_map();
     std::set<std::string> seen;
+    std::vector<Node> unknown;
     for (const auto &entry : node_) {
         const std::string &key = entry.first.Scalar();
         const Node at_key(entry.first, child_path(path_, key), document_);
-        if (std::find(keys.begin(), keys.end(), std::string_view(key)) == keys.end()) {
-            const std::string hint = hint_for_missing_space(key), near = nearest(key, keys);
-            at_key.fail("unknown key" + (!hint.empty()  ? hint
-                                         : near.empty() ? "; known keys: " + listed(keys)
-                                                        : "; did you mean '" + near + "'?"));
-        }
         if (!seen.insert(key).second)
             at_key.fail("duplicate key; keep one of them");
+        if (std::ranges::find(keys, std::string_view(key)) != keys.end())
+            continue;
+        const std::string hint = hint_for_missing_space(key), near = nearest(key, keys);
+        if (!hint.empty() || !near.empty())
+            at_key.fail("unknown key" + (!hint.empty() ? hint : "; did you mean '" + near + "'?"));
+        if (at_key.is_overridden())
+            at_key.fail("unknown key; known keys: " + listed(keys));
+        unknown.push_back(at_key);
     }
+    return unknown;
 }
 
 std::optional<Node> Node::find(std::string_view key) const {

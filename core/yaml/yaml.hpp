@@ -93,6 +93,9 @@ public:
     void allow_keys(std::initializer_list<std::string_view> keys) const {
         allow_keys(std::span(keys.begin(), keys.size()));
     }
+    // Like `allow_keys`, but accepts unknown keys that resemble no known one, unless they were set by an option of
+    // the command line, and returns them.
+    std::vector<Node> set_aside_keys(std::span<const std::string_view> keys) const;
     std::optional<Node> find(std::string_view key) const;
     Node require(std::string_view key) const;
     std::vector<std::pair<std::string, Node>> entries() const; // in file order

@@ -55,10 +55,12 @@ void run_configuration(Bytes bytes) {
     try {
         const auto root = yaml::Node::parse(text_of(bytes), (scratch() / "run.yaml").string());
         const run_config::Configuration configuration = run_config::parse(root, scratch() / "plugins");
+        std::vector<std::string> notes;
         if (configuration.source)
-            run_config::options_for(plugin_of(ARHOST_KIND_SOURCE), ARHOST_KIND_SOURCE, *configuration.source, 0);
+            run_config::options_for(plugin_of(ARHOST_KIND_SOURCE), ARHOST_KIND_SOURCE, *configuration.source, 0,
+                                    notes);
         for (const auto &output : configuration.outputs)
-            run_config::options_for(plugin_of(ARHOST_KIND_SINK), ARHOST_KIND_SINK, output, 0);
+            run_config::options_for(plugin_of(ARHOST_KIND_SINK), ARHOST_KIND_SINK, output, 0, notes);
     } catch (const yaml::Error &) {
     }
 }

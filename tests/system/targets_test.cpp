@@ -105,6 +105,22 @@ TEST(Targets, AMapIsOneTarget) {
     }
 }
 
+TEST(Targets, ATrackerIsSwappedInOneLine) {
+    for (const std::string tracker : {"tracker_aruco", "tracker_apriltag"}) {
+        ArhostRun run(
+            "version: 1\nsource: {plugin: source_synthetic, options: {frames: 3, family: tag36h11, id: 4}}\n"
+            "tracker:\n  plugin: " +
+            tracker +
+            "\n  targets: [{marker: 4, family: tag36h11, side_mm: 80}]\n"
+            "  options: {quad_decimate: 1, min_perimeter_rate: 0.02}\n"
+            "outputs: [{plugin: sink_null}]\n");
+        EXPECT_EQ(run.run(), 0) << run.output();
+        EXPECT_THAT(run.output(), HasSubstr(tracker == "tracker_aruco"
+                                                ? "options.quad_decimate: set aside, because tracker_aruco has no"
+                                                : "options.min_perimeter_rate: set aside, because tracker_apriltag"));
+    }
+}
+
 TEST(Targets, MarkersOfNoTargetAreNamedIfTargetsAreMissing) {
     const std::string yaml =
         "version: 1\nsource: {plugin: source_synthetic, options: {frames: 10, family: tag36h11, id: 4}}\n"

@@ -80,8 +80,11 @@ RayTracer::RayTracer(const std::string &name, yaml::Node options) {
     if (plugin.kind != ARHOST_KIND_RAYTRACER)
         requested.fail("'" + plugin.id + "' is a " + ipc::to_text(plugin.kind) + ", not a ray tracer");
     prefer_samples(options, plugin);
+    std::vector<std::string> notes;
     const std::vector<ipc::OptionValue> values =
-        run_config::resolve_options(plugin, options, std::nullopt, requested);
+        run_config::resolve_options(plugin, options, std::nullopt, requested, notes);
+    for (const std::string &note : notes)
+        std::fprintf(stderr, "render-scene: %s\n", note.c_str());
     std::vector<arhost_option> passed;
     passed.reserve(values.size());
     for (const ipc::OptionValue &v : values)

@@ -19,9 +19,14 @@ ipc::PluginDescription plugin() {
     return description;
 }
 
-std::vector<ipc::OptionValue> resolve(const std::string &yaml) {
+std::vector<ipc::OptionValue> resolve(const std::string &yaml, std::vector<std::string> *notes = nullptr,
+                                      arhost_kind kind = ARHOST_KIND_TRACKER) {
     const yaml::Node owner = yaml::Node::parse(yaml, "/lab/a.yaml");
-    return run_config::resolve_options(plugin(), owner.find("options"), owner.find("path"), owner);
+    ipc::PluginDescription description = plugin();
+    description.kind = kind;
+    std::vector<std::string> ignored;
+    return run_config::resolve_options(description, owner.find("options"), owner.find("path"), owner,
+                                       notes ? *notes : ignored);
 }
 
 std::string error_of(const std::string &yaml) {
@@ -54,4 +59,13 @@ TEST(Options, ReportErrorsWithTheirPosition) {
                 HasSubstr("options.tread: unknown key; did you mean 'threads'?"));
     EXPECT_THAT(error_of("{options: {}}"), HasSubstr("tracker_x needs 'path': The file."));
     EXPECT_THAT(error_of("{path: x, options: {path: y}}"), HasSubstr("remove one of them"));
+}
+
+TEST(Options, OfAnotherTrackerAreSetAsideWithANote) {
+    std::vector<std::string> notes;
+    const auto values = resolve("{path: x, options: {quad_decimate: 2, threads: 4}}", &notes);
+    EXPECT_EQ(values[0].integer, 4);
+    EXPECT_THAT(notes, testing::ElementsAre("/lab/a.yaml:1:21: options.quad_decimate: set aside, because tracker_x "
+                                            "has no such option"));
+    EXPECT_THROW(resolve("{path: x, options: {quad_decimate: 2}}", &notes, ARHOST_KIND_SINK), yaml::Error);
 }
