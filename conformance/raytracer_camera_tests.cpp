@@ -187,7 +187,7 @@ void moving_object(Context &context) {
     Tracer tracer(context, std::move(builder));
     for (const double mm : {0.0, 15.0, 30.0})
         for (const glm::dvec3 &to : {glm::dvec3(mm, mm / 2, 0), glm::dvec3(-mm, -mm / 2, 0)}) {
-            arhost_moved_object moved{0, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
+            arhost_moved_object moved{0, 1, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
             for (int i = 0; i < 3; ++i)
                 moved.world_from_object[9 + i] = static_cast<float>(to[i]);
             const arhost_motion now{sizeof now, 1, &moved, nullptr, 0, 0};
@@ -200,6 +200,13 @@ void moving_object(Context &context) {
                     fmt::format("an object moved by {:.1f} mm is {:.1f} px from the centre; expected {:.1f}",
                                 glm::length(to), glm::length(actual), expected))
                     .with("rendered", picture);
+            moved.is_visible = 0;
+            const Picture hidden = tracer.render(from_front(), &now);
+            for (std::uint32_t y = 0; y < hidden.height(); ++y)
+                for (std::uint32_t x = 0; x < hidden.width(); ++x)
+                    if (hidden.alpha(x, y) != 0)
+                        throw Failure(fmt::format("an object that is not visible is drawn at ({}, {})", x, y))
+                            .with("rendered", hidden);
         }
 }
 
@@ -219,7 +226,8 @@ constexpr Test tests[] = {
     {"raytracer.crop", "A camera with the intrinsics of a crop renders that crop.", kind, gate, 20s, crop},
     {"raytracer.moved-with-camera", "A scene moved together with its camera looks the same.", kind, gate, 20s,
      moved_with_camera},
-    {"raytracer.moving-object", "Objects move as the request's motion specifies.", kind, gate, 20s, moving_object},
+    {"raytracer.moving-object", "Objects move, and are hidden, as the request's motion specifies.", kind, gate, 20s,
+     moving_object},
 };
 
 } // namespace

@@ -98,13 +98,15 @@ void TrackerSetup::add(const Listed &marker) {
                   marker.id,
                   marker.family,
                   add_target(fmt::format("{}-{}", families_[marker.family], marker.id)),
-                  {{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}});
+                  {{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}},
+                  nullptr,
+                  0});
 }
 
 void TrackerSetup::add_map(std::span<const Placed> markers, const Pose &camera_from_map) {
     const std::uint32_t target = add_target("map");
     for (const Placed &marker : markers) {
-        arhost_marker_config config{0, marker.print.id, 0, target, {}};
+        arhost_marker_config config{0, marker.print.id, 0, target, {}, nullptr, 0};
         const auto corners = corners_in(marker, camera_from_map);
         for (std::size_t i = 0; i < corners.size(); ++i)
             std::copy_n(&corners[i].x, 3, config.corners_mm[i]);

@@ -48,4 +48,13 @@ std::optional<arhost_camera> camera_from_marker(std::span<const double, 16> mt, 
     return camera;
 }
 
+glm::dmat4 scene_from_target(const arhost_camera &camera, std::span<const double, 16> mt,
+                             const Coordinates &coordinates) {
+    const glm::dvec3 eye = glm::make_vec3(camera.eye), z = glm::normalize(eye - glm::make_vec3(camera.look_at)),
+                     x = glm::normalize(glm::cross(glm::make_vec3(camera.up), z));
+    const glm::dmat4 scene_from_camera(glm::dvec4(x, 0), glm::dvec4(glm::cross(z, x), 0), glm::dvec4(z, 0),
+                                       glm::dvec4(eye, 1));
+    return scene_from_camera * glm::make_mat4(mt.data()) * rotation_of(coordinates);
+}
+
 } // namespace arhost::camera

@@ -7,6 +7,8 @@
 
 #include <arhost/camera.h>
 
+#include <glm/mat4x4.hpp>
+
 #include <optional>
 #include <span>
 
@@ -21,5 +23,11 @@ const char *problem_with(std::span<const double, 16> mt);
 // Returns nullopt if problem_with(mt) is not nullptr. `coordinates` must be valid.
 std::optional<arhost_camera> camera_from_marker(std::span<const double, 16> mt, const Coordinates &coordinates,
                                                 const arhost_intrinsics &intrinsics);
+
+// Returns the transform from the coordinates of a target, with the axes of the scene, to those of the scene. `mt`:
+// the pose of the target, for which problem_with returns nullptr. `camera`: from camera_from_marker in the same
+// frame.
+glm::dmat4 scene_from_target(const arhost_camera &camera, std::span<const double, 16> mt,
+                             const Coordinates &coordinates);
 
 } // namespace arhost::camera

@@ -44,6 +44,7 @@ struct Frame {
     std::uint32_t attempts = 0; // how often the worker died while processing this frame in the current stage
     Lease pixels;               // slot in the source's memory
     Lease result;               // slot in the tracker's memory, while tracking
+    Lease anchors;              // slot that the ray tracer reads, while rendering
     Lease overlay;              // slot in the ray tracer's memory
     arhost_render_info render{};
     Quality quality;                    // of the overlay

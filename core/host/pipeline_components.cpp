@@ -3,9 +3,11 @@
 // Creates the components of a pipeline and defines how the pipeline reacts to changes of their state.
 #include "host/pipeline.hpp"
 
+#include "base/text.hpp"
 #include "camera/calibration.hpp"
 #include "camera/coordinates.hpp"
 #include "camera/lens.hpp"
+#include "host/outcome.hpp"
 #include "run_config/access.hpp"
 
 #include <spdlog/fmt/fmt.h>
@@ -141,6 +143,30 @@ void Pipeline::load_scene() {
         });
 }
 
+// The names of the targets that objects belong to. The arena is valid.
+static std::vector<std::string> anchors_of(const arhost_scene &scene) {
+    const auto *arena = reinterpret_cast<const char *>(&scene);
+    std::vector<std::string> names;
+    for (std::uint32_t i = 0; i < scene.anchors.count; ++i)
+        names.emplace_back(arena + scene.names.offset +
+                           reinterpret_cast<const arhost_anchor *>(arena + scene.anchors.offset)[i].target);
+    return names;
+}
+
+// Returns why objects cannot belong to these targets; empty if they can.
+std::string Pipeline::problem_with_anchors(const std::vector<std::string> &anchors) const {
+    for (const std::string &name : anchors) {
+        if (!latest_->tracker)
+            return "there is no tracker, so no object can be 'on: " + base::printable(name) +
+                   "'; remove this key, or configure a tracker with this target";
+        const std::vector<ipc::Target> &targets = latest_->tracker->targets;
+        if (std::ranges::find(targets, name, &ipc::Target::name) == targets.end())
+            return "no target has the name of 'on: " + base::printable(name) + "'; the tracker looks for " +
+                   describe_targets(targets);
+    }
+    return "";
+}
+
 // Starts to load a scene. Calls one of the two functions, which may destroy the returned object.
 std::unique_ptr<SceneLoading> Pipeline::load(const run_config::Scene &scene,
                                              const run_config::RaytracerConfiguration &raytracer,
@@ -149,11 +175,14 @@ std::unique_ptr<SceneLoading> Pipeline::load(const run_config::Scene &scene,
     auto loaded = std::make_shared<LoadedScene>();
     loaded->source = scene;
     SceneLoading::Callbacks callbacks;
-    callbacks.loaded = [this, loaded, conform = raytracer.conform, on_loaded](SharedMemory arena,
-                                                                              const FileWatch::Files &files) {
+    callbacks.loaded = [this, loaded, conform = raytracer.conform, on_loaded,
+                        on_failed](SharedMemory arena, const FileWatch::Files &files) {
         const Mapping mapping = arena.map(Access::read_only);
         const auto &content = mapping.as<const arhost_scene>();
         loaded->files = files;
+        loaded->anchors = anchors_of(content);
+        if (const std::string problem = problem_with_anchors(loaded->anchors); !problem.empty())
+            return on_failed(loaded->source.file.string() + ": " + problem);
         loaded->coordinates = latest_->coordinates.value_or(camera::default_for(content.axes));
         if (conform)
             loaded->overlay_checks.emplace(content);
@@ -224,6 +253,9 @@ std::unique_ptr<RaytracerStage> Pipeline::make_raytracer(RaytracerPointer config
     auto raytracer = std::make_unique<RaytracerStage>();
     RaytracerStage *stage = raytracer.get();
     stage->scene = std::move(scene);
+    if (const std::size_t count = stage->scene->anchors.size(); count > 0)
+        stage->anchor_slots = std::make_shared<SlotPool>(
+            supervise::make_host_region("arhost-anchors", {count * sizeof(AnchorPose), stage_slot_count}));
     Component::Callbacks callbacks = common_callbacks("raytracer", configuration->node);
     callbacks.hello = [this, stage](const PluginDescription &plugin, std::size_t candidate) {
         std::vector<OptionValue> options =

@@ -7,6 +7,7 @@
 #include "host/outcome.hpp"
 
 #include <arhost/shading/lens.hpp>
+#include <glm/gtc/type_ptr.hpp>
 
 #include <algorithm>
 #include <cmath>
@@ -350,10 +351,12 @@ bool Pipeline::render() {
         return false;
     if (!raytracer_->running() || raytracer_->component->in_flight() >= (live_ ? 1u : 2u))
         return false;
-    std::optional<Lease> slot = raytracer_->slots->acquire();
-    if (!slot)
+    std::optional<Lease> slot = raytracer_->slots->acquire(),
+                         anchors = raytracer_->anchor_slots ? raytracer_->anchor_slots->acquire() : Lease();
+    if (!slot || !anchors)
         return false;
     frame->overlay = std::move(*slot);
+    frame->anchors = std::move(*anchors);
     frame->stage = Frame::Stage::rendering;
     if (repeats_decisions(*frame))
         frame->quality = {frame->recorded->scale, frame->recorded->samples};
@@ -370,8 +373,31 @@ bool Pipeline::render() {
         const auto [width, height] = overlay_size(frame->quality);
         command.camera.intrinsics = shading::scaled(frame->record.camera.intrinsics, width, height);
     }
-    raytracer_->component->submit(command);
+    if (!frame->anchors)
+        raytracer_->component->submit(command);
+    else {
+        write_anchors(*frame, frame->anchors.bytes());
+        command.input_slot = frame->anchors.index();
+        raytracer_->component->submit(command, frame->anchors.region());
+    }
     return true;
+}
+
+// Writes where the targets are that objects belong to. With them, an object is where its target is seen, also if the
+// pose of the world is that of an earlier frame.
+void Pipeline::write_anchors(const Frame &frame, std::span<std::byte> slot) const {
+    const LoadedScene &scene = *raytracer_->scene;
+    auto *poses = reinterpret_cast<AnchorPose *>(slot.data());
+    for (std::size_t i = 0; i < scene.anchors.size(); ++i) {
+        const auto target = std::ranges::find_if(
+            frame.targets, [&](const arhost_target &one) { return is_visible(one) && one.name == scene.anchors[i]; });
+        poses[i] = {};
+        if (target == frame.targets.end())
+            continue;
+        poses[i].is_visible = 1;
+        const glm::dmat4 pose = camera::scene_from_target(frame.record.camera, target->mt, scene.coordinates);
+        std::copy_n(glm::value_ptr(pose), 16, poses[i].world_from_anchor);
+    }
 }
 
 // Begins to adapt the quality of images to `live.target_fps`, unless `stage` already does so within the same limits.
@@ -433,6 +459,7 @@ void Pipeline::on_rendered(const Command &command, const Result &result) {
     if (!accepted)
         return;
     Frame &frame = *accepted;
+    frame.anchors = Lease();
     frame.render = result.render;
     frame.times.raytracer = busy;
     raytracer_->add_duration(busy);
@@ -495,6 +522,7 @@ void Pipeline::on_stage_lost(Stage &stage, const std::vector<Command> &unanswere
             continue;
         Frame &frame = *found->second;
         frame.result = Lease();
+        frame.anchors = Lease();
         frame.overlay = Lease();
         // The worker was executing the oldest unanswered command when it died.
         const bool was_executing = &command == &unanswered.front();
@@ -520,6 +548,7 @@ bool Pipeline::is_behind() const {
 
 void Pipeline::skip(Frame &frame, const char *stage) {
     frame.result = Lease();
+    frame.anchors = Lease();
     frame.overlay = Lease();
     frame.record.overlay = ARHOST_OVERLAY_NONE;
     frame.stage = Frame::Stage::done;

@@ -71,6 +71,7 @@ struct LoadedScene {
     run_config::Scene source;
     std::set<std::filesystem::path> files; // as in SceneLoading::Callbacks
     ipc::SharedMemory arena;
+    std::vector<std::string> anchors;            // names of the targets that objects belong to
     camera::Coordinates coordinates;             // from the configuration or from the scene's axes
     std::optional<OverlayChecks> overlay_checks; // only for `conform: true`
 };
@@ -78,6 +79,7 @@ struct LoadedScene {
 struct RaytracerStage : Stage {
     std::shared_ptr<const run_config::RaytracerConfiguration> configuration;
     std::shared_ptr<LoadedScene> scene;
+    std::shared_ptr<SlotPool> anchor_slots;   // of AnchorPose; null if the scene has no anchors
     std::optional<QualityController> quality; // only with `live.target_fps`
     std::uint32_t samples_in_use = 0;         // the option of the current worker
 };

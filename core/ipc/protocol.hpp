@@ -20,7 +20,8 @@ enum class CommandKind : std::uint32_t {
     read = 2,    // source: read a frame into output slot `slot`
     track = 3,   // tracker: process slot `input_slot` of input memory `input_generation`, with the state in slot
                  // `state_slot` of input memory `state_generation`; write result and new state to output slot `slot`
-    render = 4,  // ray tracer: render the view of `camera` into output slot `slot`
+    render = 4,  // ray tracer: render the view of `camera` into output slot `slot`; the anchors of the scene, if it
+                 // has any, are in slot `input_slot` of input memory `input_generation`
     write = 5    // sink: write the frame in slot `input_slot` of input memory `input_generation`
 };
 
@@ -96,6 +97,13 @@ using ResultConsumer = Consumer<Result, ring_capacity>;
 inline std::uint32_t overlay_stride(std::uint32_t width) {
     return (width * 4 + 63) / 64 * 64;
 }
+
+// A slot that a ray tracer's worker reads consists of one of these for each anchor of the scene.
+struct AnchorPose {
+    std::uint32_t is_visible;
+    std::uint32_t reserved;
+    double world_from_anchor[16]; // column-major
+};
 
 // Layout of a slot that a tracker's worker writes: the number of observations (uint32), an arhost_target for each
 // configured target, the observations, then the state of the worker and of the plugin, which only the worker can

@@ -10,7 +10,7 @@
 
 namespace arhost::ipc {
 
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TargetMarker, id, family, corners_mm)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TargetMarker, id, family, corners_mm, file, pattern_ratio)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Target, name, markers, body)
 
 std::vector<std::string> families_of(const std::vector<Target> &targets) {

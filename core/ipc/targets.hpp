@@ -16,6 +16,8 @@ struct TargetMarker {
     std::int32_t id = 0;
     std::string family;                                // or dictionary
     std::array<std::array<double, 3>, 4> corners_mm{}; // as in arhost_marker_config
+    std::string file{};                                // of a pattern; "" for others
+    double pattern_ratio = 0;
     bool operator==(const TargetMarker &) const = default;
 };
 

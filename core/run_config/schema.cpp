@@ -109,19 +109,27 @@ std::vector<Key> make_table() {
     add_component(
         keys, {"tracker", map, false, "no tracking", "Finds the targets."}, "tracker_aruco",
         {{"targets", list, true, "",
-          "The targets, each with one of `marker`, `ids`, `map` and `body`. The first one is the world, the frame of "
+          "The targets, each with one of `marker`, `ids`, `map`, `pattern`, `image` and `body`. The first one is the "
+          "world, the frame of "
           "the scene."},
          {"targets[].name", text, false, "FAMILY-ID",
-          "Name of the target, required with `map` and `body`: up to 63 letters, digits, `_`, `.` and `-`."},
+          "Name of the target, required with `map`, `pattern`, `image` and `body`: up to 63 letters, digits, `_`, "
+          "`.` "
+          "and `-`."},
          {"targets[].marker", integer, false, "", "ID of a single marker in its family."},
          {"targets[].ids", text, false, "",
           "IDs of several single markers, such as `0-35` or `[0-3, 7]`: a target for each, named FAMILY-ID."},
          {"targets[].family", text, false, "",
           "Family of `marker` or `ids`, or of a bundle in `map`, such as `tag36h11`; `dictionary` means the same."},
          {"targets[].dictionary", text, false, "", "Dictionary of `marker` or `ids`, such as `DICT_6X6_250`."},
-         {"targets[].side_mm", real, false, "", "Side of the black square of `marker` or `ids`, in mm."},
+         {"targets[].side_mm", real, false, "", "Side of the black square of `marker`, `ids` or `pattern`, in mm."},
          {"targets[].map", input_path, false, "",
           "File with the places of several markers, or with bundles of apriltag_ros (docs/markers.md)."},
+         {"targets[].pattern", input_path, false, "", "Pattern file of ARToolKit (`.patt`), for `tracker_pattern`."},
+         {"targets[].pattern_ratio", real, false, "0.5",
+          "Side of the pattern inside the black border, relative to that of the square."},
+         {"targets[].image", input_path, false, "", "Picture, for `tracker_image`."},
+         {"targets[].width_mm", real, false, "", "Width of the printed picture, in mm."},
          {"targets[].body", text, false, "",
           "Name of a body, for trackers that report the poses of bodies, such as motion capture."},
          {"hold_frames", integer, false, "0", "Frames for which the last pose is kept after the targets are lost."},

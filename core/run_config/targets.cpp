@@ -34,7 +34,8 @@ using Corners = std::array<glm::dvec3, 4>;
 
 constexpr std::int32_t max_id = std::numeric_limits<std::int32_t>::max();
 constexpr double min_side_mm = 0.01, max_side_mm = 1e6, max_coordinate_mm = 1e7;
-constexpr double tolerance = 0.01; // of places in a map, relative to the side
+constexpr double tolerance = 0.01;                                         // of places in a map, relative to the side
+constexpr const char *pattern_family = "pattern", *image_family = "image"; // arhost_marker_config.file
 constexpr const char *name_rule = "letters, digits, '_', '.' and '-'";
 
 bool is_name(std::string_view text, std::size_t size_with_nul) {
@@ -67,7 +68,11 @@ std::string parse_family(const yaml::Node &map) {
     if (!family && !dictionary)
         map.fail("the key 'family' or 'dictionary' is missing, as in 'family: tag36h11' or 'dictionary: "
                  "DICT_6X6_250'");
-    return parse_name(family ? *family : *dictionary, ARHOST_MAX_FAMILY);
+    const yaml::Node node = family ? *family : *dictionary;
+    std::string name = parse_name(node, ARHOST_MAX_FAMILY);
+    if (name == pattern_family || name == image_family)
+        node.fail("is not a family of markers; write '" + name + ": FILE' instead of 'marker' or 'ids'");
+    return name;
 }
 
 // The name under which two names of a family are the same: AprilTag's families are also dictionaries of OpenCV.
@@ -101,7 +106,9 @@ Corners square_mm(double side_mm) {
 }
 
 TargetMarker marker_of(std::int64_t id, const std::string &family, const Corners &corners_mm) {
-    TargetMarker marker{static_cast<std::int32_t>(id), family, {}};
+    TargetMarker marker;
+    marker.id = static_cast<std::int32_t>(id);
+    marker.family = family;
     for (std::size_t i = 0; i < corners_mm.size(); ++i)
         marker.corners_mm[i] = {corners_mm[i].x, corners_mm[i].y, corners_mm[i].z};
     return marker;
@@ -376,34 +383,81 @@ Target parse_map_target(const yaml::Node &node, std::vector<fs::path> &map_files
     return target;
 }
 
-// Returns the targets of an element of the list; several if it is a range of ids.
-std::vector<Target> parse_target(const yaml::Node &node, std::vector<fs::path> &map_files,
+// Reads the path of a target's print, which the tracker reads.
+std::string parse_print(const yaml::Node &node, std::vector<fs::path> &files) {
+    const fs::path file = node.input_path();
+    std::error_code ignored;
+    if (!fs::exists(file, ignored))
+        node.fail("there is no file '" + file.string() + "'" + hint_at_similar_name(file));
+    files.push_back(file);
+    return file.string();
+}
+
+// A pattern of ARToolKit or a picture. `number`: the id that the marker gets.
+Target parse_print_target(const yaml::Node &node, const char *kind, std::size_t number, std::vector<fs::path> &files,
+                          std::vector<std::string> &warnings) {
+    const bool is_pattern = std::string_view(kind) == pattern_family;
+    const yaml::Node side = node.require(is_pattern ? "side_mm" : "width_mm");
+    TargetMarker marker = marker_of(static_cast<std::int64_t>(number), kind, square_mm(parse_side(side)));
+    warn_of_side(side, parse_side(side), warnings);
+    marker.file = parse_print(node.require(kind), files);
+    const auto ratio = node.find("pattern_ratio");
+    marker.pattern_ratio = ratio ? ratio->real(0.1, 0.9) : is_pattern ? 0.5 : 0;
+    return {parse_name(node.require("name"), ARHOST_MAX_NAME), {marker}, ""};
+}
+
+// A kind of target, which is named by the key that only it has, and the keys that apply to it besides `name`.
+struct Kind {
+    const char *key;
+    std::vector<std::string_view> keys;
+};
+const std::vector<Kind> &kinds() {
+    static const std::vector<Kind> all = {{"marker", {"family", "dictionary", "side_mm"}},
+                                          {"ids", {"family", "dictionary", "side_mm"}},
+                                          {"map", {"family", "dictionary"}},
+                                          {"pattern", {"side_mm", "pattern_ratio"}},
+                                          {"image", {"width_mm"}},
+                                          {"body", {}}};
+    return all;
+}
+
+constexpr const char *kind_names = "'marker', 'ids', 'map', 'pattern', 'image' and 'body'";
+
+std::string kind_of(const yaml::Node &node) {
+    const Kind *found = nullptr;
+    for (const Kind &kind : kinds())
+        if (const auto key = node.find(kind.key)) {
+            if (found)
+                key->fail(std::string("a target has only one of the keys ") + kind_names + ", but '" + found->key +
+                          "' is there, too; make two targets of them");
+            found = &kind;
+        }
+    if (!found)
+        node.fail(std::string("one of the keys ") + kind_names +
+                  " is missing, as in {marker: 0, family: tag36h11, side_mm: 80}");
+    for (const char *key : {"family", "dictionary", "side_mm", "width_mm", "pattern_ratio"})
+        if (const auto other = node.find(key); other && std::ranges::count(found->keys, key) == 0)
+            other->fail(std::string_view(found->key) == "map" ? "belongs in the map; remove it here"
+                        : std::string_view(found->key) == "body"
+                            ? "does not apply to a body, which has no markers; remove it"
+                            : "does not apply to a target with '" + std::string(found->key) + "'; remove it");
+    return found->key;
+}
+
+// Returns the targets of an element of the list; several if it is a range of ids. `number`: of the first one.
+std::vector<Target> parse_target(const yaml::Node &node, std::size_t number, std::vector<fs::path> &files,
                                  std::vector<std::string> &warnings) {
     if (!node.is_map())
         node.fail("must be a map of keys, as in {marker: 0, family: tag36h11, side_mm: 80}");
     expect_no_ids_as_keys(node);
     node.allow_keys(keys_of("tracker.targets[]"));
-    std::string kind;
-    for (const char *key : {"marker", "ids", "map", "body"})
-        if (const auto found = node.find(key)) {
-            if (!kind.empty())
-                found->fail("a target has only one of the keys 'marker', 'ids', 'map' and 'body', but '" + kind +
-                            "' is there, too; make two targets of them");
-            kind = key;
-        }
-    if (kind.empty())
-        node.fail("one of the keys 'marker', 'ids', 'map' and 'body' is missing, as in {marker: 0, family: tag36h11, "
-                  "side_mm: 80}");
-    const bool has_marker = kind == "marker" || kind == "ids";
-    for (const char *key : {"family", "dictionary", "side_mm"})
-        if (const auto found =
-                has_marker || (kind == "map" && key != std::string_view("side_mm")) ? std::nullopt : node.find(key))
-            found->fail(kind == "map" ? "belongs in the map; remove it here"
-                                      : "does not apply to a body, which has no markers; remove it");
+    const std::string kind = kind_of(node);
     if (kind == "body")
         return {{parse_name(node.require("name"), ARHOST_MAX_NAME), {}, parse_body(node.require("body"))}};
     if (kind == "map")
-        return {parse_map_target(node, map_files, warnings)};
+        return {parse_map_target(node, files, warnings)};
+    if (kind == pattern_family || kind == image_family)
+        return {parse_print_target(node, kind.c_str(), number, files, warnings)};
 
     const std::string family = parse_family(node);
     const yaml::Node side = node.require("side_mm");
@@ -444,12 +498,12 @@ std::string family_of_all_markers(const yaml::Node &tracker) {
 
 } // namespace
 
-std::vector<Target> parse_targets(const yaml::Node &list, std::vector<fs::path> &map_files,
+std::vector<Target> parse_targets(const yaml::Node &list, std::vector<fs::path> &files,
                                   std::vector<std::string> &warnings) {
     std::vector<Target> targets;
     Owners owners;
     for (const yaml::Node &node : list.items())
-        for (Target &target : parse_target(node, map_files, warnings)) {
+        for (Target &target : parse_target(node, targets.size(), files, warnings)) {
             owners.add(node, target);
             targets.push_back(std::move(target));
             for (const auto &[count, limit, what] : {std::tuple{targets.size(), int{ARHOST_MAX_TARGETS}, "targets"},

@@ -214,6 +214,13 @@ std::uint32_t ArenaBuilder::add_skin(Skin skin) {
     return static_cast<std::uint32_t>(skins_.size() - 1);
 }
 
+std::uint32_t ArenaBuilder::add_anchor(const std::string &target) {
+    origins_.add(Table::anchors);
+    const std::uint32_t node = add_node({});
+    anchors_.push_back({node, add_name(target)});
+    return node;
+}
+
 std::uint32_t ArenaBuilder::add_material(const arhost_material &material) {
     origins_.add(Table::materials);
     materials_.push_back(material);
@@ -258,6 +265,7 @@ std::size_t ArenaBuilder::byte_size() const {
     counter.put(objects_);
     counter.put(lights_);
     counter.put(std::span<const char>(names_));
+    counter.put(anchors_);
     counter.put(environment.rows);
     counter.put(environment.columns);
     put_table<arhost_node>(counter, nodes_, [&](const MotionNode &node) { return put_node(counter, node); });
@@ -295,6 +303,7 @@ void ArenaBuilder::write(std::span<std::byte> arena) && {
     scene.objects = writer.put(objects_);
     scene.lights = writer.put(lights_);
     scene.names = writer.put(std::span<const char>(names_));
+    scene.anchors = writer.put(anchors_);
     scene.environment.texture = environment.texture;
     if (environment.texture != ARHOST_NONE) {
         scene.environment.intensity = environment.intensity;
@@ -344,7 +353,7 @@ void ArenaBuilder::apply_initial_motion(std::span<std::byte> arena) const {
                            ? box_of(std::span<const glm::vec4>(elements(geometry.positions, glm::vec4())))
                            : box_of(std::span<const glm::vec3>(elements(geometry.positions, glm::vec3())));
         }
-    if (scene.duration_s > 0) {
+    if (is_moving(scene)) {
         MotionEvaluator evaluator(scene);
         const arhost_motion motion = evaluator.at(0);
         for (std::uint32_t i = 0; i < motion.moved_count; ++i)

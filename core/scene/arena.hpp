@@ -100,8 +100,8 @@ struct Settings {
 };
 
 // The tables of an arena, and the scene as a whole.
-enum class Table { scene, geometries, textures, materials, objects, lights, nodes, channels, skins };
-constexpr std::size_t table_count = 9;
+enum class Table { scene, geometries, textures, materials, objects, lights, nodes, channels, skins, anchors };
+constexpr std::size_t table_count = 10;
 
 // A violation of the rules in arhost/scene.h, for example "object 2 'ball' refers to material 7, but the scene has
 // only 3".
@@ -170,6 +170,8 @@ public:
     std::uint32_t add_node(MotionNode node);
     std::uint32_t add_channel(Channel channel);
     std::uint32_t add_skin(Skin skin);
+    // Adds a node that follows a target; returns the index of the node.
+    std::uint32_t add_anchor(const std::string &target);
 
     std::size_t byte_size() const;
 
@@ -198,6 +200,7 @@ private:
     std::vector<MotionNode> nodes_;
     std::vector<Channel> channels_;
     std::vector<Skin> skins_;
+    std::vector<arhost_anchor> anchors_;
     std::string names_;
     Origins origins_;
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/capabilities.hpp"
 
+#include "scene/motion.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cstddef>
@@ -57,7 +59,7 @@ std::uint32_t needed_capabilities(const arhost_scene &scene) {
     for (const arhost_object &object : view<arhost_object>(scene, scene.objects)) {
         (object.role == ARHOST_ROLE_OCCLUDER ? needed_for_occluders : needed) |=
             needed_for(materials[object.material]);
-        if (scene.duration_s > 0 && (object.moves || object.deforms))
+        if (is_moving(scene) && (object.moves || object.deforms))
             needed |= ARHOST_CAPABILITY_MOTION;
     }
     // Only mirrors, glass and rough surfaces show occluders.

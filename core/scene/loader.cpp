@@ -8,6 +8,7 @@
 #include "scene/stand_in.hpp"
 #include "scene/textures.hpp"
 
+#include <arhost/tracker.h>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
 
@@ -608,7 +609,7 @@ private:
 
     void add_object(const Node &node, std::size_t index, std::size_t count) {
         node.allow_keys({"name", "mesh", "gltf", "animation", "smooth", "stand_in", "sphere", "cuboid", "plane",
-                         "transform", "motion", "material", "role"});
+                         "transform", "motion", "material", "role", "on"});
         const std::string shape_key = shape_key_of(node);
         const Node shape = node.require(shape_key);
         for (const char *key : {"smooth", "stand_in"})
@@ -623,7 +624,7 @@ private:
             material = material_index(*material_node);
         const arhost_role role = role_of(node);
         const Transform world_from_object = transform_of(node);
-        const std::uint32_t motion_node = add_motion(node, shape_key == "sphere");
+        const std::uint32_t motion_node = add_motion(node, shape_key == "sphere", anchor_of(node));
 
         LoadCallbacks part = callbacks_; // converts the progress of this object to that of the whole scene
         if (callbacks_.progress)
@@ -646,13 +647,29 @@ private:
         Reporter(part, name).report(1);
     }
 
-    // Adds a node and channels for the object's `motion`. Returns the index of the node, or ARHOST_NONE if the object
+    // Returns the node that follows the object's target, or ARHOST_NONE if the object belongs to the world.
+    std::uint32_t anchor_of(const Node &object) {
+        const auto target = object.find("on");
+        if (!target)
+            return ARHOST_NONE;
+        const std::string name = target->text();
+        if (name.size() >= ARHOST_MAX_NAME)
+            target->fail("must be the name of a target, of up to " + std::to_string(ARHOST_MAX_NAME - 1) +
+                         " characters");
+        const auto [anchor, is_new] = anchors_.try_emplace(name, ARHOST_NONE);
+        if (is_new)
+            anchor->second = builder_.add_anchor(name);
+        return anchor->second;
+    }
+
+    // Adds a node and channels for the object's `motion`. Returns the index of the node, or `parent` if the object
     // has no `motion`.
-    std::uint32_t add_motion(const Node &object, bool is_sphere) {
+    std::uint32_t add_motion(const Node &object, bool is_sphere, std::uint32_t parent) {
         const auto motion = object.find("motion");
         if (!motion)
-            return ARHOST_NONE;
+            return parent;
         KeyframeMotion keyframes = keyframe_motion_of(*motion, is_sphere);
+        keyframes.node.parent = parent;
         const std::uint32_t node = builder_.add_node(std::move(keyframes.node));
         for (Channel &channel : keyframes.channels) {
             channel.node = node;
@@ -754,7 +771,8 @@ private:
     ArenaBuilder builder_;
     Textures textures_;
     std::map<std::string, std::uint32_t> materials_;
-    std::vector<std::filesystem::path> reads_; // without links
+    std::map<std::string, std::uint32_t> anchors_; // nodes, by name of the target
+    std::vector<std::filesystem::path> reads_;     // without links
 };
 
 } // namespace

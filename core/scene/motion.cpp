@@ -91,14 +91,15 @@ Interval interval_of(std::span<const float> times, float time_s) {
 } // namespace
 
 MotionEvaluator::MotionEvaluator(const arhost_scene &scene)
-    : scene_(scene), poses_(scene.nodes.count), world_from_node_(scene.nodes.count) {
+    : scene_(scene), poses_(scene.nodes.count), world_from_node_(scene.nodes.count),
+      node_is_visible_(scene.nodes.count) {
     const auto nodes = view<arhost_node>(scene_.nodes);
     for (std::size_t i = 0; i < nodes.size(); ++i)
         poses_[i].morph_weights.resize(nodes[i].morph_weights.count);
     const auto objects = view<arhost_object>(scene_.objects);
     for (std::uint32_t i = 0; i < objects.size(); ++i) {
         if (objects[i].moves) {
-            moved_.push_back({i, {}});
+            moved_.push_back({i, 1, {}});
             std::ranges::copy(objects[i].world_from_object, moved_.back().world_from_object);
         }
         if (objects[i].deforms) {
@@ -107,25 +108,37 @@ MotionEvaluator::MotionEvaluator(const arhost_scene &scene)
             const bool has_normals = geometry.normals.count > 0;
             const Deformed &buffer = buffers_.emplace_back(
                 Deformed{std::vector<float>(floats), std::vector<float>(has_normals ? floats : 0)});
-            deformed_.push_back({i, geometry.positions.count, buffer.positions.data(),
+            deformed_.push_back({i, 1, geometry.positions.count, 0, buffer.positions.data(),
                                  has_normals ? buffer.normals.data() : nullptr});
         }
     }
 }
 
-arhost_motion MotionEvaluator::at(double time_s) {
+arhost_motion MotionEvaluator::at(double time_s, std::span<const Anchored> anchors) {
     const double within = std::isfinite(time_s) && scene_.duration_s > 0 ? std::fmod(time_s, scene_.duration_s) : 0;
-    evaluate_nodes(static_cast<float>(within < 0 ? within + scene_.duration_s : within));
+    evaluate_nodes(static_cast<float>(within < 0 ? within + scene_.duration_s : within), anchors);
     const auto objects = view<arhost_object>(scene_.objects);
-    for (arhost_moved_object &moved : moved_)
+    for (arhost_moved_object &moved : moved_) {
+        moved.is_visible = is_visible(objects[moved.object]);
         write(world_from_node_[objects[moved.object].node], moved.world_from_object);
-    for (std::size_t i = 0; i < buffers_.size(); ++i)
+    }
+    for (std::size_t i = 0; i < buffers_.size(); ++i) {
+        deformed_[i].is_visible = is_visible(objects[deformed_[i].object]);
         deform(objects[deformed_[i].object], buffers_[i]);
+    }
     return {sizeof(arhost_motion), static_cast<std::uint32_t>(moved_.size()),    moved_.data(),
             deformed_.data(),      static_cast<std::uint32_t>(deformed_.size()), 0};
 }
 
-void MotionEvaluator::evaluate_nodes(float time_s) {
+// A skinned object has the nodes of its joints, which all belong to the same anchor.
+bool MotionEvaluator::is_visible(const arhost_object &object) const {
+    const std::uint32_t node = object.skin == ARHOST_NONE
+                                   ? object.node
+                                   : view<std::uint32_t>(view<arhost_skin>(scene_.skins)[object.skin].joints).front();
+    return node == ARHOST_NONE || node_is_visible_[node];
+}
+
+void MotionEvaluator::evaluate_nodes(float time_s, std::span<const Anchored> anchors) {
     const auto nodes = view<arhost_node>(scene_.nodes);
     for (std::size_t i = 0; i < nodes.size(); ++i) {
         Pose &pose = poses_[i];
@@ -136,12 +149,21 @@ void MotionEvaluator::evaluate_nodes(float time_s) {
     }
     for (const arhost_channel &channel : view<arhost_channel>(scene_.channels))
         apply(channel, time_s);
-    for (std::size_t i = 0; i < nodes.size(); ++i) { // parents precede their children
+    const auto anchor_nodes = view<arhost_anchor>(scene_.anchors);
+    for (std::size_t i = 0, anchor = 0; i < nodes.size(); ++i) { // parents precede their children
         const Pose &pose = poses_[i];
+        const std::uint32_t parent = nodes[i].parent;
         const glm::dmat4 parent_from_node = nodes[i].animated ? matrix_of(pose.translation, pose.rotation, pose.scale)
                                                               : matrix_of(nodes[i].parent_from_node);
-        world_from_node_[i] =
-            nodes[i].parent == ARHOST_NONE ? parent_from_node : world_from_node_[nodes[i].parent] * parent_from_node;
+        world_from_node_[i] = parent == ARHOST_NONE ? parent_from_node : world_from_node_[parent] * parent_from_node;
+        node_is_visible_[i] = parent == ARHOST_NONE || node_is_visible_[parent];
+        if (anchor < std::min(anchor_nodes.size(), anchors.size()) &&
+            anchor_nodes[anchor].node == i) { // anchors are in the order of nodes
+            node_is_visible_[i] = anchors[anchor].is_visible;
+            if (anchors[anchor].is_visible)
+                world_from_node_[i] = anchors[anchor].world_from_anchor;
+            ++anchor;
+        }
     }
 }
 

@@ -17,13 +17,25 @@
 
 namespace arhost::scene {
 
+// Whether objects may move or deform, so that ray tracers get an arhost_motion.
+inline bool is_moving(const arhost_scene &scene) {
+    return scene.duration_s > 0 || scene.anchors.count > 0;
+}
+
+// Where an anchor is in a frame.
+struct Anchored {
+    bool is_visible = false;
+    glm::dmat4 world_from_anchor{1}; // not used if it is not visible
+};
+
 // The scene must be valid (`validate`) and outlive the evaluator. Not thread-safe.
 class MotionEvaluator {
 public:
     explicit MotionEvaluator(const arhost_scene &scene);
 
-    // Returns the motion at `time_s`. It repeats with the period duration_s of the scene. Valid until the next call.
-    arhost_motion at(double time_s);
+    // Returns the motion at `time_s`. It repeats with the period duration_s of the scene. `anchors`: one element for
+    // each anchor of the scene; without them, the anchors are at the origin of the world. Valid until the next call.
+    arhost_motion at(double time_s, std::span<const Anchored> anchors = {});
 
 private:
     struct Pose {
@@ -41,7 +53,8 @@ private:
         return {reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&scene_) + buffer.offset),
                 buffer.count};
     }
-    void evaluate_nodes(float time_s);
+    void evaluate_nodes(float time_s, std::span<const Anchored> anchors);
+    bool is_visible(const arhost_object &object) const;
     void apply(const arhost_channel &channel, float time_s);
     void deform(const arhost_object &object, Deformed &into) const;
     void skin(const arhost_geometry &geometry, const arhost_skin &skin, Deformed &into) const;
@@ -49,6 +62,7 @@ private:
     const arhost_scene &scene_;
     std::vector<Pose> poses_; // local pose of each node
     std::vector<glm::dmat4> world_from_node_;
+    std::vector<bool> node_is_visible_;
     std::vector<arhost_moved_object> moved_;
     std::vector<Deformed> buffers_;
     std::vector<arhost_deformed_geometry> deformed_;

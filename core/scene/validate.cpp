@@ -2,6 +2,9 @@
 #include "scene/arena.hpp"
 
 #include "scene/box.hpp"
+#include "scene/motion.hpp"
+
+#include <arhost/tracker.h>
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>
@@ -91,8 +94,10 @@ public:
         channels_ = view<arhost_channel>(scene_->channels, "the table of channels");
         skins_ = view<arhost_skin>(scene_->skins, "the table of skins");
         names_ = view<char>(scene_->names, "the table of names");
+        anchors_ = view<arhost_anchor>(scene_->anchors, "the table of anchors");
         check_names();
         for_each(Table::nodes, nodes_.size(), [&](std::size_t i) { check_node(i); });
+        for_each(Table::anchors, anchors_.size(), [&](std::size_t i) { check_anchor(i); });
         for_each(Table::channels, channels_.size(), [&](std::size_t i) { check_channel(i); });
         for_each(Table::skins, skins_.size(), [&](std::size_t i) { check_skin(i); });
         for_each(Table::materials, materials_.size(), [&](std::size_t i) { check_material(i); });
@@ -221,8 +226,8 @@ private:
                 fail(name_of(i) + " has a node or a skin, but neither moves nor deforms");
             return;
         }
-        if (scene_->duration_s == 0)
-            fail(name_of(i) + " moves or deforms, but the scene's duration_s is 0");
+        if (!is_moving(*scene_))
+            fail(name_of(i) + " moves or deforms, but the scene has no anchors and its duration_s is 0");
         if (object.node != ARHOST_NONE || object.moves)
             in_table(object.node, nodes_.size(), "node");
         if (object.skin != ARHOST_NONE)
@@ -340,6 +345,23 @@ private:
             fail(what + "its rotation is not of length 1");
         check_floats(view<float>(node.morph_weights, what + "the buffer of morph_weights"), -coordinate_limit_mm,
                      coordinate_limit_mm, what + "a morph weight");
+    }
+
+    void check_anchor(std::size_t i) {
+        const arhost_anchor &anchor = anchors_[i];
+        const std::string what = "anchor " + std::to_string(i) + ": ";
+        if (anchors_.size() > ARHOST_MAX_TARGETS)
+            fail("there are " + std::to_string(anchors_.size()) + " anchors; the limit is " +
+                 std::to_string(int{ARHOST_MAX_TARGETS}));
+        if (anchor.node >= nodes_.size())
+            fail(what + "it refers to node " + std::to_string(anchor.node) + ", but the scene has only " +
+                 std::to_string(nodes_.size()));
+        if (nodes_[anchor.node].parent != ARHOST_NONE || nodes_[anchor.node].animated)
+            fail(what + "its node has a parent or is animated");
+        if (i > 0 && anchor.node <= anchors_[i - 1].node)
+            fail(what + "its node does not follow that of the previous anchor");
+        if (anchor.target >= names_.size())
+            fail(what + "its name is outside the table of names");
     }
 
     void check_channel(std::size_t i) {
@@ -631,6 +653,7 @@ private:
     std::span<const arhost_channel> channels_;
     std::span<const arhost_skin> skins_;
     std::span<const char> names_;
+    std::span<const arhost_anchor> anchors_;
     std::vector<std::uint32_t> deformers_; // for each geometry: index of the object that deforms it, or ARHOST_NONE
     std::vector<std::uint32_t> uses_;      // for each geometry: number of objects that use it
     Table table_ = Table::scene;

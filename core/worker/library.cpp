@@ -158,4 +158,14 @@ std::uint64_t state_size_of(const arhost_tracker &tracker, arhost_instance *inst
     return size;
 }
 
+double aspect_of(const arhost_tracker &tracker, arhost_instance *instance, std::uint32_t marker) {
+    if (tracker.struct_size < ARHOST_SIZE_UP_TO(arhost_tracker, aspect) || !tracker.aspect)
+        return 1;
+    const double aspect = tracker.aspect(instance, marker);
+    if (!(aspect >= 0.01 && aspect <= 100))
+        throw std::runtime_error("the aspect of the tracker's marker " + std::to_string(marker) + " is " +
+                                 std::to_string(aspect) + "; it must be 0.01 to 100");
+    return aspect;
+}
+
 } // namespace arhost::worker

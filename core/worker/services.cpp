@@ -9,6 +9,8 @@
 #include "worker/library.hpp"
 #include "worker/target_solver.hpp"
 
+#include <glm/gtc/type_ptr.hpp>
+
 #include <algorithm>
 #include <optional>
 
@@ -99,7 +101,7 @@ private:
     std::uint64_t next_ = 0; // arhost_frame_buffer.sequence of the next call, which counts skipped frames
 };
 
-// The arrays of an arhost_tracker_setup.
+// The arrays of an arhost_tracker_setup. Refers to the texts of `targets`.
 struct TrackerSetup {
     explicit TrackerSetup(const std::vector<Target> &targets) : families(families_of(targets)) {
         for (const Target &target : targets) {
@@ -109,7 +111,9 @@ struct TrackerSetup {
                                             marker.id,
                                             static_cast<std::uint32_t>(family),
                                             static_cast<std::uint32_t>(configs.size()),
-                                            {}};
+                                            {},
+                                            marker.file.empty() ? nullptr : marker.file.c_str(),
+                                            marker.pattern_ratio};
                 for (std::size_t corner = 0; corner < 4; ++corner)
                     std::ranges::copy(marker.corners_mm[corner], config.corners_mm[corner]);
                 markers.push_back(config);
@@ -142,7 +146,7 @@ public:
                         messages::Ready &ready) override {
         const auto &message = setup_of_kind<messages::TrackerSetup>(any);
         require(!fds.empty(), "'create' was sent without the descriptor of the targets");
-        const std::vector<Target> targets =
+        std::vector<Target> targets =
             targets_from(SharedMemory::adopt(base::UniqueFd(::dup(fds[0].get()))).map(Access::read_only));
         format_ = message.format;
         if (has_limited_luma_plane(format_))
@@ -163,6 +167,7 @@ public:
             return status;
         try {
             state_size_ = state_size_of(tracker_, instance_);
+            scale_pictures(targets);
         } catch (...) {
             tracker_.stop(instance_);
             throw;
@@ -239,6 +244,19 @@ public:
     arhost_status stop() override { return tracker_.stop(instance_), ARHOST_STATUS_OK; }
 
 private:
+    // Sets the heights of pictures, which only the plugin knows.
+    void scale_pictures(std::vector<Target> &targets) const {
+        std::uint32_t index = 0;
+        for (Target &target : targets)
+            for (TargetMarker &marker : target.markers) {
+                if (marker.family == "image")
+                    for (const double aspect = aspect_of(tracker_, instance_, index);
+                         auto &corner : marker.corners_mm)
+                        corner[1] *= aspect;
+                ++index;
+            }
+    }
+
     struct alignas(64) Block { // the stride and the alignment of planes are multiples of it
         std::uint8_t bytes[64];
     };
@@ -280,8 +298,9 @@ public:
                           [this](double fraction) { link_.progress(fraction, "computing the lens distortion"); });
             setup.intrinsics = &warp_->pinhole();
         }
-        if (setup.scene->duration_s > 0)
+        if (scene::is_moving(*setup.scene))
             motion_.emplace(*setup.scene);
+        anchors_.resize(setup.scene->anchors.count);
         const std::uint32_t missing =
             scene::needed_capabilities(*setup.scene) & ~scene::capabilities_of(descriptor_, raytracer_, instance_);
         if (const std::string warning = scene::missing_capabilities_text(descriptor_.id, missing); !warning.empty())
@@ -308,7 +327,9 @@ public:
         request.camera = command.camera;
         arhost_motion motion{};
         if (motion_) {
-            motion = motion_->at(command.time_s);
+            if (!anchors_.empty())
+                read_anchors(memory.input(command.input_generation).slot(command.input_slot));
+            motion = motion_->at(command.time_s, anchors_);
             request.motion = &motion;
         }
         result.render.struct_size = sizeof result.render;
@@ -327,6 +348,13 @@ public:
     arhost_status stop() override { return raytracer_.stop(instance_), ARHOST_STATUS_OK; }
 
 private:
+    void read_anchors(std::span<const std::byte> slot) {
+        require(slot.size() >= anchors_.size() * sizeof(AnchorPose), "the slots of anchors are too small");
+        const auto *poses = reinterpret_cast<const AnchorPose *>(slot.data());
+        for (std::size_t i = 0; i < anchors_.size(); ++i)
+            anchors_[i] = {poses[i].is_visible != 0, glm::make_mat4(poses[i].world_from_anchor)};
+    }
+
     const Link &link_;
     const arhost_host &host_;
     const arhost_descriptor &descriptor_;
@@ -335,7 +363,8 @@ private:
     bool supports_lenses_;
     std::optional<LensWarp> warp_; // only for a distorting lens that the plugin does not support
     Mapping arena_;
-    std::optional<scene::MotionEvaluator> motion_; // only for animated scenes
+    std::optional<scene::MotionEvaluator> motion_; // only if objects move or deform
+    std::vector<scene::Anchored> anchors_;
     std::uint32_t width_ = 0, height_ = 0;
 };
 

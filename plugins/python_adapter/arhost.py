@@ -235,11 +235,18 @@ class _Adapter:
             self.format = Fields(_record(format, FRAME_FORMAT))
             self.plugin.start(Fields(format=self.format, intrinsics=Fields(_record(intrinsics, INTRINSICS)),
                                      targets=[Fields(name=name, body=body) for name, body in targets],
-                                     markers=[Fields(m) for m in _elements(bytes(markers), MARKER_CONFIG)],
+                                     markers=[Fields(id=id, family=family, target=target, file=file,
+                                                     corners_mm=np.frombuffer(bytes(corners)).reshape(4, 3),
+                                                     pattern_ratio=ratio)
+                                              for id, family, target, corners, file, ratio in markers],
                                      families=list(families)))
             return STATUS_OK
 
         return self._guarded(start)
+
+    def aspect(self, marker):
+        return self._guarded(lambda: (STATUS_OK, (float(self.plugin.aspect(marker)),)
+                                      if hasattr(self.plugin, "aspect") else (1.0,)))
 
     def track(self, sequence, capture_ns, clock, planes, grey, search_everywhere, expected, observations):
         def track():
@@ -286,12 +293,13 @@ class _Adapter:
             request = Fields(
                 sequence=sequence, time_s=time_s, camera=Fields(_record(camera, CAMERA)),
                 moved=np.ndarray(len(moved) // MOVED_OBJECT.itemsize, MOVED_OBJECT, moved),
-                deformed=[Fields(object=index, positions=_vectors(positions), normals=normals and _vectors(normals))
-                          for index, positions, normals in deformed])
+                deformed=[Fields(object=index, is_visible=bool(is_visible), positions=_vectors(positions),
+                                 normals=normals and _vectors(normals))
+                          for index, is_visible, positions, normals in deformed])
             region = self.plugin.render(request, _pixels(pixels, height, width, 4, stride))
             return STATUS_OK, None if region is None else tuple(int(side) for side in region)
 
-        memory = [pixels, moved] + [view for _, p, n in deformed for view in (p, n) if view]
+        memory = [pixels, moved] + [view for _, _, p, n in deformed for view in (p, n) if view]
         return self._with_memory(memory, render)
 
     # ---- sinks ----

@@ -180,12 +180,6 @@ MAX_OBSERVATIONS = 1024
 MAX_FAMILIES = 16
 MAX_FAMILY = 32
 MAX_STATE = 16777216
-MARKER_CONFIG = _struct(112,
-    ("struct_size", "u4", 0),
-    ("id", "i4", 4),
-    ("family", "u4", 8),
-    ("target", "u4", 12),
-    ("corners_mm", ("f8", (4, 3)), 16))
 OBSERVATION = _struct(88,
     ("struct_size", "u4", 0),
     ("id", "i4", 4),
@@ -224,7 +218,7 @@ EXPECTED_MARKER = _struct(80,
 
 # arhost/scene.h
 SCENE_MAGIC = 0x435354534f485241
-SCENE_VERSION = 2
+SCENE_VERSION = 3
 NONE = 0xffffffff
 BUFFER = _struct(16,
     ("offset", "u8", 0),
@@ -329,6 +323,9 @@ CHANNEL = _struct(48,
 SKIN = _struct(32,
     ("joints", BUFFER, 0),
     ("node_from_mesh", BUFFER, 16))
+ANCHOR = _struct(8,
+    ("node", "u4", 0),
+    ("target", "u4", 4))
 LIGHT_POINT = 1
 LIGHT_DIRECTIONAL = 2
 LIGHT_SPOT = 3
@@ -353,7 +350,7 @@ ENVIRONMENT = _struct(80,
     ("environment_from_world", ("f4", (9,)), 8),
     ("rows", BUFFER, 48),
     ("columns", BUFFER, 64))
-SCENE = _struct(320,
+SCENE = _struct(336,
     ("magic", "u8", 0),
     ("version", "u4", 8),
     ("struct_size", "u4", 12),
@@ -377,12 +374,14 @@ SCENE = _struct(320,
     ("nodes", BUFFER, 256),
     ("channels", BUFFER, 272),
     ("skins", BUFFER, 288),
-    ("names", BUFFER, 304))
+    ("names", BUFFER, 304),
+    ("anchors", BUFFER, 320))
 
 # arhost/motion.h
-MOVED_OBJECT = _struct(52,
+MOVED_OBJECT = _struct(56,
     ("object", "u4", 0),
-    ("world_from_object", ("f4", (12,)), 4))
+    ("is_visible", "u4", 4),
+    ("world_from_object", ("f4", (12,)), 8))
 
 # arhost/raytracer.h
 RENDER_INFO = _struct(32,

@@ -286,14 +286,24 @@ public:
     // trackers
     void start(const arhost_tracker_setup &setup) {
         const GilLock lock;
-        std::vector<Object> targets, families;
+        std::vector<Object> targets, markers, families;
         for (const arhost_target_config &target : elements(setup.targets, setup.target_count))
             targets.push_back(checked(Py_BuildValue("sz", target.name, target.body)));
+        for (const arhost_marker_config &marker : elements(setup.markers, setup.marker_count))
+            markers.push_back(checked(Py_BuildValue("iIINzd", marker.id, marker.family, marker.target,
+                                                    view(marker.corners_mm, sizeof marker.corners_mm).release(),
+                                                    marker.file, marker.pattern_ratio)));
         for (std::uint32_t i = 0; i < setup.family_count; ++i)
             families.push_back(checked(PyUnicode_FromString(setup.families[i])));
         call("start_tracker", "NNNNN", view_of(setup.format).release(), view_of(setup.intrinsics).release(),
-             tuple_of(std::move(targets)).release(), view_of_elements(setup.markers, setup.marker_count).release(),
+             tuple_of(std::move(targets)).release(), tuple_of(std::move(markers)).release(),
              tuple_of(std::move(families)).release());
+    }
+    double aspect(std::uint32_t marker) {
+        const GilLock lock;
+        double aspect = 0;
+        require(PyArg_ParseTuple(call("aspect", "I", marker).value.get(), "d", &aspect));
+        return aspect;
     }
     void track(const arhost_track_request &request, arhost_tracker_result &result) {
         const GilLock lock;
@@ -328,7 +338,7 @@ public:
             const arhost_deformed_geometry &geometry = motion->deformed[i];
             const std::size_t size = std::size_t(geometry.vertex_count) * 12;
             deformed.push_back(checked(
-                Py_BuildValue("INN", geometry.object, view(geometry.positions, size).release(),
+                Py_BuildValue("IINN", geometry.object, geometry.is_visible, view(geometry.positions, size).release(),
                               geometry.normals ? view(geometry.normals, size).release() : Py_NewRef(Py_None))));
         }
         const Answer answer =

@@ -229,7 +229,7 @@ void EmbreeScene::move(const arhost_motion &motion) {
         place_object(moved.object, moved.world_from_object);
         const RTCGeometry instance = rtcGetGeometry(root_.get(), moved.object);
         rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, moved.world_from_object);
-        rtcCommitGeometry(instance);
+        show(moved.object, instance, moved.is_visible != 0);
     }
     for (std::uint32_t i = 0; i < motion.deformed_count; ++i)
         deform(motion.deformed[i]);
@@ -264,9 +264,18 @@ void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
         ++rebuilds_;
     }
     const RTCGeometry instance = rtcGetGeometry(root_.get(), deformed.object);
-    rtcCommitGeometry(instance); // makes Embree notice that the instance's bounds have changed
     placements_[deformed.object].local = box_of(positions, deformed.vertex_count, 3 * sizeof(float), false);
     update_bounds(deformed.object);
+    show(deformed.object, instance, deformed.is_visible != 0);
+}
+
+// Commits the instance, which also makes Embree notice that its bounds have changed. No ray hits an object whose mask
+// is 0.
+void EmbreeScene::show(std::uint32_t object, RTCGeometry instance, bool is_visible) {
+    rtcSetGeometryMask(instance, is_visible ? mask_of(objects_[object]) : 0);
+    rtcCommitGeometry(instance);
+    if (!is_visible)
+        visible_boxes_[object] = empty_box();
 }
 
 void EmbreeScene::place_object(std::uint32_t object, const float *world_from_object) {

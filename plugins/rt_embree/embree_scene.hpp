@@ -59,6 +59,7 @@ private:
     GeometryHandle new_instance(RTCScene of, const float *world_from_object) const;
     void attach(RTCScene to, const GeometryHandle &geometry, std::uint32_t number) const;
     void deform(const arhost_deformed_geometry &deformed);
+    void show(std::uint32_t object, RTCGeometry instance, bool is_visible);
     void commit(RTCScene scene) const;
     void check() const;
 

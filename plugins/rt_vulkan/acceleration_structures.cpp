@@ -127,7 +127,8 @@ AccelerationStructures::AccelerationStructures(const Device &device, const Submi
         const auto structure = bottom_level_.find(
             from[i].geometry); // absent if the mesh is empty; rays ignore instances with reference 0
         instance.accelerationStructureReference = structure == bottom_level_.end() ? 0 : address(structure->second);
-        write_instance(i, from[i].world_from_object);
+        set_transform(i, from[i].world_from_object);
+        write_instance(i);
     }
     submission.run(rebuild_);
 }
@@ -308,21 +309,30 @@ void AccelerationStructures::record_moving(VkCommandBuffer commands, bool refits
     submission_.end(commands);
 }
 
-void AccelerationStructures::write_instance(std::uint32_t object, const float *m) {
-    VkAccelerationStructureInstanceKHR &instance = instances_[object];
+void AccelerationStructures::set_transform(std::uint32_t object, const float *m) {
     for (int row = 0; row < 3; ++row)
         for (int column = 0; column < 4; ++column)
-            instance.transform.matrix[row][column] = m[3 * column + row];
+            instances_[object].transform.matrix[row][column] = m[3 * column + row];
+}
+
+void AccelerationStructures::write_instance(std::uint32_t object) {
+    const VkAccelerationStructureInstanceKHR &instance = instances_[object];
     std::memcpy(moving_.mapped().data() + sizeof instance * object, &instance, sizeof instance);
 }
 
-VkCommandBuffer AccelerationStructures::update(const arhost_motion &motion) {
-    for (std::uint32_t i = 0; i < motion.moved_count; ++i)
-        write_instance(motion.moved[i].object, motion.moved[i].world_from_object);
-    const auto objects = elements<arhost_object>(arena_, arena_.objects);
+VkCommandBuffer AccelerationStructures::update(const arhost_motion &motion, std::span<const Object> objects) {
+    for (std::uint32_t i = 0; i < motion.moved_count; ++i) {
+        const std::uint32_t object = motion.moved[i].object;
+        instances_[object].mask = objects[object].mask;
+        set_transform(object, motion.moved[i].world_from_object);
+        write_instance(object);
+    }
+    const auto from = elements<arhost_object>(arena_, arena_.objects);
     for (std::uint32_t i = 0; i < motion.deformed_count; ++i) {
         const arhost_deformed_geometry &deformed = motion.deformed[i];
-        const auto structure = bottom_level_.find(objects[deformed.object].geometry);
+        instances_[deformed.object].mask = objects[deformed.object].mask;
+        write_instance(deformed.object);
+        const auto structure = bottom_level_.find(from[deformed.object].geometry);
         if (structure != bottom_level_.end())
             std::memcpy(moving_.mapped().data() + structure->second.vertices_offset, deformed.positions,
                         3 * sizeof(float) * deformed.vertex_count);

@@ -27,9 +27,9 @@ public:
 
     VkAccelerationStructureKHR top_level() const { return top_level_.handle.get(); }
 
-    // Writes the new transforms and vertices to host memory. Returns a command buffer that updates the structures; it
-    // must run before the next image is traced.
-    VkCommandBuffer update(const arhost_motion &motion);
+    // Writes the new transforms, masks and vertices to host memory; `objects` has already been updated. Returns a
+    // command buffer that updates the structures; it must run before the next image is traced.
+    VkCommandBuffer update(const arhost_motion &motion, std::span<const Object> objects);
 
 private:
     struct Structure {
@@ -57,7 +57,8 @@ private:
     VkDeviceAddress address(const Structure &structure) const;
     Storage allocate(VkDeviceSize size);
     void record_moving(VkCommandBuffer commands, bool refits) const;
-    void write_instance(std::uint32_t object, const float *world_from_object);
+    void write_instance(std::uint32_t object);
+    void set_transform(std::uint32_t object, const float *world_from_object);
 
     const Device &device_;
     const Submission &submission_;

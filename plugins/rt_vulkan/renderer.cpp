@@ -401,7 +401,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     if (motion) {
         scene_.update(*motion);
         if (structures_)
-            commands.push_back(structures_->update(*motion));
+            commands.push_back(structures_->update(*motion, scene_.objects()));
     }
     if (motion || image_count_ == 0)
         write_moving_parts();

@@ -278,6 +278,19 @@ void SceneData::write_bvh(const Mesh &mesh, const arhost_geometry &geometry, Poi
     }
 }
 
+std::uint32_t SceneData::mask_of(const arhost_object &object) const {
+    switch (object.role) {
+    case ARHOST_ROLE_CATCHER:
+        return catcher_mask;
+    case ARHOST_ROLE_OCCLUDER:
+        return occluder_mask;
+    default:
+        return elements<arhost_material>(arena_, arena_.materials)[object.material].model == ARHOST_MATERIAL_GLASS
+                   ? glass_mask
+                   : opaque_mask;
+    }
+}
+
 void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
     const arhost_material &material = elements<arhost_material>(arena_, arena_.materials)[from.material];
     const arhost_geometry &geometry = elements<arhost_geometry>(arena_, arena_.geometries)[from.geometry];
@@ -285,10 +298,7 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
     Object object{};
     object.material = from.material;
     object.role = static_cast<std::uint32_t>(from.role);
-    object.mask = from.role == ARHOST_ROLE_CATCHER    ? catcher_mask
-                  : from.role == ARHOST_ROLE_OCCLUDER ? occluder_mask
-                  : is_glass                          ? glass_mask
-                                                      : opaque_mask;
+    object.mask = mask_of(from);
     object.root = mesh.root;
     object.first_index = mesh.first_index;
     object.first_normal = mesh.first_normal;
@@ -360,9 +370,13 @@ void SceneData::update(const arhost_motion &motion) {
         const arhost_moved_object &moved = motion.moved[i];
         set_transform(objects_[moved.object], meshes_.at(from[moved.object].geometry), moved.world_from_object);
         std::copy_n(moved.world_from_object, 12, transforms_[moved.object].begin());
+        objects_[moved.object].mask = moved.is_visible ? mask_of(from[moved.object]) : 0;
     }
-    for (std::uint32_t i = 0; i < motion.deformed_count; ++i)
+    for (std::uint32_t i = 0; i < motion.deformed_count; ++i) {
         deform(motion.deformed[i]);
+        objects_[motion.deformed[i].object].mask =
+            motion.deformed[i].is_visible ? mask_of(from[motion.deformed[i].object]) : 0;
+    }
     build_top_level();
 }
 

@@ -67,6 +67,7 @@ private:
     void add_normals(Mesh &mesh, const arhost_geometry &geometry);
     void add_texcoords(Mesh &mesh, const arhost_geometry &geometry);
     void write_bvh(const Mesh &mesh, const arhost_geometry &geometry, Points points);
+    std::uint32_t mask_of(const arhost_object &object) const;
     void add_object(const arhost_object &object, const Mesh &mesh);
     static void set_transform(Object &object, const Mesh &mesh, const float *world_from_object);
     void deform(const arhost_deformed_geometry &deformed);

@@ -196,6 +196,7 @@ inline const std::vector<WrongPlugin> wrong_plugins = {
      "fail",
      {"raytracer.parallel-up", "raytracer.eye-look-at-up", "raytracer.moved-with-camera", "raytracer.reference"}},
     {"no_motion", "ignores motion", "fail", {"raytracer.moving-object"}},
+    {"draws_hidden_objects", "draws objects that are not visible", "fail", {"raytracer.moving-object"}},
     {"near_clip_at_1_mm", "near clip at 1 mm", "fail", {"raytracer.near-the-eye"}},
     {"far_clip_at_100_m", "far clip at 100 m", "fail", {"raytracer.far-away", "raytracer.size"}},
     {"drops_small_objects", "ignores objects smaller than 1 mm", "fail", {"raytracer.size"}},

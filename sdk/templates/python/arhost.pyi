@@ -187,13 +187,6 @@ MAX_OBSERVATIONS: int
 MAX_FAMILIES: int
 MAX_FAMILY: int
 MAX_STATE: int
-MARKER_CONFIG: np.dtype[np.void]
-class MarkerConfig:
-    struct_size: int
-    id: int
-    family: int
-    target: int
-    corners_mm: np.ndarray
 OBSERVATION: np.dtype[np.void]
 class Observation:
     id: int
@@ -350,6 +343,10 @@ SKIN: np.dtype[np.void]
 class Skin:
     joints: Buffer
     node_from_mesh: Buffer
+ANCHOR: np.dtype[np.void]
+class Anchor:
+    node: int
+    target: int
 LIGHT_POINT: int
 LIGHT_DIRECTIONAL: int
 LIGHT_SPOT: int
@@ -402,12 +399,14 @@ class Scene:
     channels: Buffer
     skins: Buffer
     names: Buffer
+    anchors: Buffer
     def elements(self, buffer: Any, dtype: Any) -> np.ndarray: ...
 
 # arhost/motion.h
 MOVED_OBJECT: np.dtype[np.void]
 class MovedObject:
     object: int
+    is_visible: int
     world_from_object: np.ndarray
 
 # arhost/raytracer.h
@@ -473,6 +472,14 @@ class TargetConfig(Protocol):
     name: str
     body: Optional[str]
 
+class MarkerConfig(Protocol):
+    id: int
+    family: int
+    target: int
+    corners_mm: np.ndarray
+    file: Optional[str]
+    pattern_ratio: float
+
 class TrackerSetup(Protocol):
     format: FrameFormat
     intrinsics: Intrinsics
@@ -498,6 +505,7 @@ class RaytracerSetup(Protocol):
 
 class Deformed(Protocol):
     object: int
+    is_visible: bool
     positions: np.ndarray
     normals: Optional[np.ndarray]
 

@@ -159,12 +159,13 @@ protected:
     std::map<int, cv::Point2d> positions_in(const std::string &map, double side_mm) const {
         std::map<int, cv::Point2d> positions;
         std::vector<std::string> warnings;
-        for (const auto &[id, family, corners] : arhost::run_config::read_map(folder() / map, warnings)) {
+        for (const auto &marker : arhost::run_config::read_map(folder() / map, warnings)) {
+            const auto &corners = marker.corners_mm;
             const cv::Point2d top_left(corners[0][0], corners[0][1]), bottom_right(corners[2][0], corners[2][1]);
             EXPECT_NEAR(bottom_right.x - top_left.x, side_mm, 1e-9);
             EXPECT_NEAR(top_left.y - bottom_right.y, side_mm, 1e-9);
             EXPECT_EQ(corners[0][2], 0);
-            positions[id] = (top_left + bottom_right) / 2;
+            positions[marker.id] = (top_left + bottom_right) / 2;
         }
         return positions;
     }

@@ -480,10 +480,20 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
     modified.camera = modify(request->camera);
     if (has("near_clip_at_1_mm") && is_near(self, modified.camera))
         modified.camera.eye[2] -= 1; // the camera looks along −z
-    const arhost_moved_object nowhere{0, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
+    const arhost_moved_object nowhere{0, 1, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
     const arhost_motion still{sizeof still, 1, &nowhere, nullptr, 0, 0};
     if ((has("no_motion") || has("lambert_only")) && request->motion)
         modified.motion = &still;
+    std::vector<arhost_moved_object> moved;
+    arhost_motion shown{};
+    if (has("draws_hidden_objects") && request->motion) {
+        shown = *request->motion;
+        moved.assign(shown.moved, shown.moved + shown.moved_count);
+        for (arhost_moved_object &object : moved)
+            object.is_visible = 1;
+        shown.moved = moved.data();
+        modified.motion = &shown;
+    }
     const Pixels pixels{*image};
     std::vector<std::array<std::uint8_t, 4>> before;
     pixels.each([&](const std::uint8_t *p) { before.push_back({p[0], p[1], p[2], p[3]}); });

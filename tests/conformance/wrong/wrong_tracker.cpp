@@ -542,8 +542,8 @@ const void *get_extension(const char *) {
 }
 
 const arhost_plugin &wrong_plugin() {
-    static const arhost_tracker functions = {sizeof functions, start, has("no_track") ? nullptr : track, stop,
-                                             state_size};
+    static const arhost_tracker functions = {sizeof functions, start,  has("no_track") ? nullptr : track, stop,
+                                             state_size,       nullptr};
     static arhost_descriptor descriptor = *real().descriptor;
     descriptor.id = library_name().c_str();
     static constexpr arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};

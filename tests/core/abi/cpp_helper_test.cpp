@@ -224,7 +224,7 @@ TEST(CppHelper, StepsThroughExtendedOptions) {
 
 TEST(CppHelper, StepsThroughExtendedElements) {
     constexpr auto size = static_cast<std::uint32_t>(sizeof(Longer<arhost_marker_config>));
-    Longer<arhost_marker_config> listed[] = {{{size, 4, 0, 0, {}}}, {{size, 7, 0, 1, {}}}};
+    Longer<arhost_marker_config> listed[] = {{{size, 4, 0, 0, {}, nullptr, 0}}, {{size, 7, 0, 1, {}, nullptr, 0}}};
     std::vector<std::int32_t> ids;
     for (const arhost_marker_config &marker : arhost::elements(&std::as_const(listed[0].known), 2))
         ids.push_back(marker.id);

@@ -348,12 +348,14 @@ FIELD(arhost_target_config, reserved, 4, 4);
 FIELD(arhost_target_config, name, 8, 8);
 FIELD(arhost_target_config, body, 16, 8);
 
-STRUCT(arhost_marker_config, 112);
+STRUCT(arhost_marker_config, 128);
 FIELD(arhost_marker_config, struct_size, 0, 4);
 FIELD(arhost_marker_config, id, 4, 4);
 FIELD(arhost_marker_config, family, 8, 4);
 FIELD(arhost_marker_config, target, 12, 4);
 FIELD(arhost_marker_config, corners_mm, 16, 96);
+FIELD(arhost_marker_config, file, 112, 8);
+FIELD(arhost_marker_config, pattern_ratio, 120, 8);
 
 STRUCT(arhost_tracker_setup, 56);
 FIELD(arhost_tracker_setup, struct_size, 0, 4);
@@ -424,16 +426,17 @@ FIELD(arhost_track_request, expected, 40, 8);
 FIELD(arhost_track_request, expected_count, 48, 4);
 FIELD(arhost_track_request, reserved, 52, 4);
 
-STRUCT(arhost_tracker, 40);
+STRUCT(arhost_tracker, 48);
 FIELD(arhost_tracker, struct_size, 0, 4);
 FIELD(arhost_tracker, start, 8, 8);
 FIELD(arhost_tracker, track, 16, 8);
 FIELD(arhost_tracker, stop, 24, 8);
 FIELD(arhost_tracker, state_size, 32, 8);
+FIELD(arhost_tracker, aspect, 40, 8);
 
 /* arhost/scene.h */
 VALUE(ARHOST_SCENE_MAGIC, 0x435354534f485241);
-VALUE(ARHOST_SCENE_VERSION, 2);
+VALUE(ARHOST_SCENE_VERSION, 3);
 VALUE(ARHOST_NONE, 0xffffffff);
 
 STRUCT(arhost_buffer, 16);
@@ -546,6 +549,10 @@ FIELD(arhost_channel, values, 32, 16);
 STRUCT(arhost_skin, 32);
 FIELD(arhost_skin, joints, 0, 16);
 FIELD(arhost_skin, node_from_mesh, 16, 16);
+
+STRUCT(arhost_anchor, 8);
+FIELD(arhost_anchor, node, 0, 4);
+FIELD(arhost_anchor, target, 4, 4);
 VALUE(ARHOST_LIGHT_POINT, 1);
 VALUE(ARHOST_LIGHT_DIRECTIONAL, 2);
 VALUE(ARHOST_LIGHT_SPOT, 3);
@@ -573,7 +580,7 @@ FIELD(arhost_environment, environment_from_world, 8, 36);
 FIELD(arhost_environment, rows, 48, 16);
 FIELD(arhost_environment, columns, 64, 16);
 
-STRUCT(arhost_scene, 320);
+STRUCT(arhost_scene, 336);
 FIELD(arhost_scene, magic, 0, 8);
 FIELD(arhost_scene, version, 8, 4);
 FIELD(arhost_scene, struct_size, 12, 4);
@@ -598,18 +605,22 @@ FIELD(arhost_scene, nodes, 256, 16);
 FIELD(arhost_scene, channels, 272, 16);
 FIELD(arhost_scene, skins, 288, 16);
 FIELD(arhost_scene, names, 304, 16);
+FIELD(arhost_scene, anchors, 320, 16);
 
 /* arhost/motion.h */
 
-STRUCT(arhost_moved_object, 52);
+STRUCT(arhost_moved_object, 56);
 FIELD(arhost_moved_object, object, 0, 4);
-FIELD(arhost_moved_object, world_from_object, 4, 48);
+FIELD(arhost_moved_object, is_visible, 4, 4);
+FIELD(arhost_moved_object, world_from_object, 8, 48);
 
-STRUCT(arhost_deformed_geometry, 24);
+STRUCT(arhost_deformed_geometry, 32);
 FIELD(arhost_deformed_geometry, object, 0, 4);
-FIELD(arhost_deformed_geometry, vertex_count, 4, 4);
-FIELD(arhost_deformed_geometry, positions, 8, 8);
-FIELD(arhost_deformed_geometry, normals, 16, 8);
+FIELD(arhost_deformed_geometry, is_visible, 4, 4);
+FIELD(arhost_deformed_geometry, vertex_count, 8, 4);
+FIELD(arhost_deformed_geometry, reserved, 12, 4);
+FIELD(arhost_deformed_geometry, positions, 16, 8);
+FIELD(arhost_deformed_geometry, normals, 24, 8);
 
 STRUCT(arhost_motion, 32);
 FIELD(arhost_motion, struct_size, 0, 4);

@@ -44,5 +44,6 @@ TEST(Schema, ListsEachKeyOnceUnderAListedParent) {
         EXPECT_TRUE(seen.contains(parent)) << key.path;
     }
     EXPECT_THAT(keys_of("tracker.targets[]"),
-                testing::ElementsAre("name", "marker", "ids", "family", "dictionary", "side_mm", "map", "body"));
+                testing::ElementsAre("name", "marker", "ids", "family", "dictionary", "side_mm", "map", "pattern",
+                                     "pattern_ratio", "image", "width_mm", "body"));
 }

@@ -172,7 +172,7 @@ TEST(ArenaBuilder, WritesTexturesEnvironmentAndMotion) {
     EXPECT_STREQ(elements<char>(arena, arena.scene().names) + texture.name, "wood.png");
     EXPECT_EQ(elements<float>(arena, arena.scene().environment.columns)[2], 0.25f);
     EXPECT_EQ(arena.scene().environment.environment_from_world[8], 1);
-    EXPECT_EQ(arena.scene().nodes.count, 3u);
+    EXPECT_EQ(arena.scene().nodes.count, 4u);
     EXPECT_EQ(arena.scene().channels.count, 4u);
     EXPECT_EQ(arena.scene().skins.count, 1u);
     EXPECT_EQ(geometries(arena)[2].morph_positions.count, 4u);
@@ -384,6 +384,9 @@ arhost_channel *channels(Arena &a) {
 arhost_skin *skins(Arena &a) {
     return elements<arhost_skin>(a, header(a).skins);
 }
+arhost_anchor *anchors(Arena &a) {
+    return elements<arhost_anchor>(a, header(a).anchors);
+}
 float *floats(Arena &a, const arhost_buffer &buffer) {
     return elements<float>(a, buffer);
 }
@@ -443,10 +446,22 @@ INSTANTIATE_TEST_SUITE_P(
     Motion, RejectsInFullScene,
     testing::Values(
         Corruption{"Duration", [](Arena &a) { header(a).duration_s = nan_value; }, "duration_s is nan"},
-        Corruption{"NoDuration", [](Arena &a) { header(a).duration_s = 0; },
-                   "object 1 'ball' moves or deforms, but the scene's duration_s is 0"},
-        Corruption{"ObjectNode", [](Arena &a) { objects(a)[1].node = 3; },
-                   "refers to node 3, but the scene has only 3"},
+        Corruption{"NoDuration",
+                   [](Arena &a) {
+                       header(a).duration_s = 0;
+                       header(a).anchors = {};
+                   },
+                   "object 1 'ball' moves or deforms, but the scene has no anchors and its duration_s is 0"},
+        Corruption{"AnchorNode", [](Arena &a) { anchors(a)[0].node = 9; },
+                   "anchor 0: it refers to node 9, but the scene has only"},
+        Corruption{"AnchorWithParent", [](Arena &a) { nodes(a)[anchors(a)[0].node].parent = 0; },
+                   "anchor 0: its node has a parent or is animated"},
+        Corruption{"AnchorAnimated", [](Arena &a) { nodes(a)[anchors(a)[0].node].animated = 1; },
+                   "anchor 0: its node has a parent or is animated"},
+        Corruption{"AnchorName", [](Arena &a) { anchors(a)[0].target = 1'000'000; },
+                   "anchor 0: its name is outside the table of names"},
+        Corruption{"ObjectNode", [](Arena &a) { objects(a)[1].node = 4; },
+                   "refers to node 4, but the scene has only 4"},
         Corruption{"ObjectWithoutNode", [](Arena &a) { objects(a)[1].node = ARHOST_NONE; },
                    "refers to node 4294967295"},
         Corruption{"ObjectSkin", [](Arena &a) { objects(a)[2].skin = 1; },
@@ -505,7 +520,7 @@ INSTANTIATE_TEST_SUITE_P(
         Corruption{"NodeScale", [](Arena &a) { nodes(a)[0].scale[2] = nan_value; }, "scale is nan"},
         Corruption{"NodeWeight", [](Arena &a) { floats(a, nodes(a)[2].morph_weights)[0] = nan_value; },
                    "a morph weight is nan"},
-        Corruption{"ChannelNode", [](Arena &a) { channels(a)[0].node = 3; }, "channel 0: it refers to node 3"},
+        Corruption{"ChannelNode", [](Arena &a) { channels(a)[0].node = 4; }, "channel 0: it refers to node 4"},
         Corruption{"ChannelNodeNotAnimated", [](Arena &a) { channels(a)[0].node = 1; }, "its node is not animated"},
         Corruption{"ChannelTarget", [](Arena &a) { channels(a)[0].target = 5; }, "its target is unknown"},
         Corruption{"ChannelInterpolation", [](Arena &a) { channels(a)[0].interpolation = 0; },
@@ -530,8 +545,8 @@ INSTANTIATE_TEST_SUITE_P(
                    "a value is nan"},
         Corruption{"ChannelRotation", [](Arena &a) { floats(a, channels(a)[1].values)[7] = 1; },
                    "the rotation of key 1 is not of length 1"},
-        Corruption{"SkinJoint", [](Arena &a) { elements<std::uint32_t>(a, skins(a)[0].joints)[1] = 3; },
-                   "skin 0: it refers to node 3, but the scene has only 3"},
+        Corruption{"SkinJoint", [](Arena &a) { elements<std::uint32_t>(a, skins(a)[0].joints)[1] = 4; },
+                   "skin 0: it refers to node 4, but the scene has only 4"},
         Corruption{"SkinWithoutJoints", [](Arena &a) { skins(a)[0].joints = {}; }, "has 0 joints and 2 matrices"},
         Corruption{"SkinMatrixCount", [](Arena &a) { skins(a)[0].node_from_mesh.count = 1; },
                    "2 joints and 1 matrices"},

@@ -578,3 +578,34 @@ TEST(SceneDocumentation, ExampleLoads) {
     EXPECT_EQ(validate(arena.bytes()), "");
     EXPECT_GT(arena.scene().objects.count, 3u);
 }
+
+TEST(Anchors, ObjectsBelongToTargets) {
+    const Arena arena =
+        load(start + "objects:\n"
+                     "  - {name: floor, plane: {size: 9}, material: grey}\n"
+                     "  - {name: a, sphere: {radius: 1}, material: grey, on: cup}\n"
+                     "  - {name: b, cuboid: {size: 1}, material: grey, on: lid, motion: {keys: [{at_s: "
+                     "0, translate: [5, 0, 0]}, {at_s: 1, translate: [0, 0, 0]}]}}\n"
+                     "  - {name: c, sphere: {radius: 1}, material: grey, on: cup}\n");
+    const arhost_scene &scene = arena.scene();
+    ASSERT_EQ(scene.anchors.count, 2u);
+    const auto *anchors = at<arhost_anchor>(arena, scene.anchors);
+    const auto *names = at<char>(arena, scene.names);
+    EXPECT_STREQ(names + anchors[0].target, "cup");
+    EXPECT_STREQ(names + anchors[1].target, "lid");
+    EXPECT_FALSE(object(arena, 0).moves);
+    EXPECT_TRUE(object(arena, 1).moves);
+    EXPECT_EQ(object(arena, 1).node, anchors[0].node);
+    EXPECT_EQ(object(arena, 3).node, anchors[0].node);
+    EXPECT_EQ(at<arhost_node>(arena, scene.nodes)[object(arena, 2).node].parent, anchors[1].node)
+        << "the motion is relative to the target";
+}
+
+TEST(Anchors, NeedTheNameOfATarget) {
+    const auto with = [](const std::string &on) {
+        return error_of(start + "objects:\n  - {sphere: {radius: 1}, material: grey, on: " + on + "}\n");
+    };
+    EXPECT_THAT(with("\"\""), HasSubstr("objects[0].on: must not be empty"));
+    EXPECT_THAT(with(std::string(64, 'x')),
+                HasSubstr("objects[0].on: must be the name of a target, of up to 63 characters"));
+}

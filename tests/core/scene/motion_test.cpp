@@ -166,6 +166,61 @@ TEST(Motion, CollapsesAnObjectBeyondTheCoordinateLimit) {
             EXPECT_LT(std::abs(evaluator->at(1.5).moved[0].world_from_object[i]), 1e-6f) << i;
 }
 
+// Two balls on anchors; the second one also moves by its own keyframes, 10 mm in 1 s.
+Arena anchored_balls() {
+    ArenaBuilder builder;
+    builder.settings.duration_s = 2;
+    const std::uint32_t cup = builder.add_anchor("cup"), lid = builder.add_anchor("lid");
+    MotionNode node;
+    node.animated = true;
+    node.parent = lid;
+    const std::uint32_t moving = builder.add_node(node);
+    builder.add_channel(
+        {moving, ARHOST_CHANNEL_TRANSLATION, ARHOST_INTERPOLATION_LINEAR, {0, 1, 2}, {0, 0, 0, 10, 0, 0, 0, 0, 0}});
+    for (const std::uint32_t on : {cup, moving})
+        builder.add_object("ball", builder.add_spheres({{0, 0, 0, 1}}), builder.add_material(grey()),
+                           ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), {true, false, on, ARHOST_NONE});
+    Arena arena = std::move(builder).build();
+    EXPECT_EQ(validate(arena.bytes()), "");
+    return arena;
+}
+
+Anchored at_mm(double x, double y, double z) {
+    Anchored anchor{true, glm::dmat4(1)};
+    anchor.world_from_anchor[3] = {x, y, z, 1};
+    return anchor;
+}
+
+TEST(Motion, FollowsAnchorsAndTheirChildren) {
+    const Arena arena = anchored_balls();
+    MotionEvaluator evaluator(arena.scene());
+    const std::vector<Anchored> anchors{at_mm(1, 2, 3), at_mm(100, 0, 0)};
+    const arhost_motion motion = evaluator.at(1, anchors);
+    ASSERT_EQ(motion.moved_count, 2u);
+    EXPECT_EQ(motion.moved[0].world_from_object[9], 1);
+    EXPECT_EQ(motion.moved[0].world_from_object[11], 3);
+    EXPECT_EQ(motion.moved[1].world_from_object[9], 110) << "its own motion, in the frame of the target";
+    EXPECT_TRUE(motion.moved[0].is_visible && motion.moved[1].is_visible);
+}
+
+TEST(Motion, HidesObjectsWhoseAnchorIsNotVisible) {
+    const Arena arena = anchored_balls();
+    MotionEvaluator evaluator(arena.scene());
+    const std::vector<Anchored> anchors{at_mm(1, 2, 3), Anchored{}};
+    arhost_motion motion = evaluator.at(1, anchors);
+    EXPECT_EQ(motion.moved[0].is_visible, 1u);
+    EXPECT_EQ(motion.moved[1].is_visible, 0u) << "a child of the anchor";
+    motion = evaluator.at(1, std::vector{at_mm(1, 2, 3), at_mm(0, 0, 0)});
+    EXPECT_EQ(motion.moved[1].is_visible, 1u);
+}
+
+TEST(Motion, AnchorsAreAtTheOriginIfTheirTargetsAreUnknown) {
+    const Arena arena = anchored_balls();
+    EXPECT_EQ(arena.scene().bounds_max[0], 1) << "at time 0";
+    MotionEvaluator evaluator(arena.scene());
+    EXPECT_EQ(evaluator.at(1).moved[1].world_from_object[9], 10);
+}
+
 TEST(Motion, BlendsJointsByWeight) {
     ArenaBuilder builder;
     builder.settings.duration_s = 1;

@@ -67,7 +67,7 @@ inline TriangleMesh bending_square() {
 
 // Uses every feature of an arena. Objects: 0 'square', textured; 1 'ball', moves with node 0; 2 'bend',
 // deformed by skin 0, whose joints are nodes 0 and 1. Textures: 0 has bytes; 1 has floats and is the environment.
-// Channels: translation, rotation and scale of node 0, and morph weights of node 2.
+// Channels: translation, rotation and scale of node 0, and morph weights of node 2. Node 3 is an anchor.
 inline ArenaBuilder full_scene() {
     ArenaBuilder builder;
     builder.settings.duration_s = 2;
@@ -96,6 +96,7 @@ inline ArenaBuilder full_scene() {
     builder.add_object("bend", builder.add_triangles(bending_square()), plain, ARHOST_ROLE_VIRTUAL, glm::mat4x3(1),
                        {false, true, 2, skin});
     builder.add_light(lamp());
+    builder.add_anchor("cup");
     return builder;
 }
 

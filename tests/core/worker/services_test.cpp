@@ -31,7 +31,9 @@ constexpr arhost_tracker tracker_functions = {
         }
         return ARHOST_STATUS_OK;
     },
-    [](arhost_instance *) {}, nullptr};
+    [](arhost_instance *) {},
+    nullptr,
+    nullptr};
 
 // Lets a tracker see a frame of 64×4 px whose luma counts from 0 to 255.
 void track(arhost_pixel_format pixel_format, arhost_yuv_range range) {

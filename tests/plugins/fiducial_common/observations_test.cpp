@@ -24,7 +24,7 @@ std::vector<Family> families_of(const std::vector<const char *> &names, const st
     const arhost_target_config target{sizeof target, 0, "cup", nullptr};
     std::vector<arhost_marker_config> configured;
     for (const auto &[family, id] : markers)
-        configured.push_back({sizeof(arhost_marker_config), id, family, 0, {}});
+        configured.push_back({sizeof(arhost_marker_config), id, family, 0, {}, nullptr, 0});
     const arhost_tracker_setup setup{sizeof setup,
                                      1,
                                      nullptr,

@@ -24,7 +24,9 @@ protected:
                                 i,
                                 i == 3 ? 1U : 0U,
                                 i < 2 ? 0U : static_cast<std::uint32_t>(i - 1),
-                                {}});
+                                {},
+                                nullptr,
+                                0});
         setup_.markers = markers_.data();
         setup_.marker_count = 4;
         setup_.families = families_;

@@ -87,6 +87,8 @@ struct Listed {
     int id;
     double side_mm = 100;
     std::string family = "tag36h11";
+    std::string file{}; // of a pattern
+    double pattern_ratio = 0;
 };
 
 using Options = std::map<std::string, std::string>;
@@ -117,7 +119,9 @@ public:
                                marker.id,
                                static_cast<uint32_t>(family),
                                static_cast<uint32_t>(names.size()),
-                               {{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}});
+                               {{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}},
+                               marker.file.empty() ? nullptr : marker.file.c_str(),
+                               marker.pattern_ratio});
             names.push_back(marker.family + "-" + std::to_string(marker.id));
         }
         std::vector<arhost_target_config> targets;

@@ -294,7 +294,7 @@ TEST(BvhQuality, TriggersRebuilds) {
     for (const float amount : {0.1f, 200.0f, 200.0f, 0.1f}) {
         std::vector<glm::vec3> positions = sheared(amount, 200).positions;
         positions.resize(vertices + 2); // Embree may read beyond the last vertex
-        const arhost_deformed_geometry deformed{0, vertices, &positions[0].x, nullptr};
+        const arhost_deformed_geometry deformed{0, 1, vertices, 0, &positions[0].x, nullptr};
         scene.move({sizeof(arhost_motion), 0, nullptr, &deformed, 1, 0});
         rebuilds.push_back(scene.rebuilds());
     }

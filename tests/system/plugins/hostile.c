@@ -838,7 +838,7 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              sizeof options / sizeof *options,
                                              options,
                                              NULL};
-static const arhost_tracker functions = {sizeof(arhost_tracker), start, track, stop, NULL};
+static const arhost_tracker functions = {sizeof(arhost_tracker), start, track, stop, NULL, NULL};
 static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {

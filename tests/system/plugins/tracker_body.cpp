@@ -16,7 +16,8 @@ class Bodies {
 public:
     Bodies(const Host &, const Options &options)
         : faults_(options), known_(options.text("bodies")), lost_from_(options.integer("lost_from")),
-          lost_to_(options.integer("lost_to")), has_covariance_(options.boolean("covariance")) {}
+          lost_to_(options.integer("lost_to")), lost_target_(options.integer("lost_target")),
+          has_covariance_(options.boolean("covariance")) {}
 
     void start(const arhost_tracker_setup &setup) {
         target_count_ = setup.target_count;
@@ -34,10 +35,11 @@ public:
         const std::uint64_t number = request.frame->sequence;
         faults_.at(number);
         const auto signed_number = static_cast<std::int64_t>(number);
-        const bool is_lost = signed_number >= lost_from_ && signed_number < lost_to_;
-        if (is_lost && lost_from_ == 0)
-            return; // never seen
+        const bool are_lost = signed_number >= lost_from_ && signed_number < lost_to_;
         for (std::uint32_t target = 0; target < target_count_; ++target) {
+            const bool is_lost = are_lost && (lost_target_ < 0 || lost_target_ == target);
+            if (is_lost && lost_from_ == 0)
+                continue; // never seen
             arhost_body_pose &pose = elements(result.poses, target_count_)[result.pose_count++];
             pose.target = target;
             pose.state = is_lost ? ARHOST_TARGET_LOST : ARHOST_TARGET_DETECTED;
@@ -63,7 +65,7 @@ private:
 
     test::Faults faults_;
     std::string known_;
-    std::int64_t lost_from_, lost_to_;
+    std::int64_t lost_from_, lost_to_, lost_target_;
     bool has_covariance_;
     std::uint32_t target_count_ = 0;
 };
@@ -72,7 +74,9 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "bodies", "head hand", "Names of the bodies that it knows"),
     option(ARHOST_OPTION_INTEGER, "lost_from", "0", "First frame in which the bodies are lost"),
     option(ARHOST_OPTION_INTEGER, "lost_to", "0", "End of that range of frames, exclusive"),
-    option(ARHOST_OPTION_BOOL, "covariance", "true", "Reports covariances"), ARHOST_FAULT_OPTIONS};
+    option(ARHOST_OPTION_INTEGER, "lost_target", "-1", "Index of the only target that is lost then; -1: all"),
+    option(ARHOST_OPTION_BOOL, "covariance", "true", "Reports covariances"),
+    ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_TRACKER,
                                           "tracker_body",

@@ -440,6 +440,12 @@ inline constexpr arhost_source source_functions = {
 template <class T> std::uint64_t state_size_of(arhost_instance *instance) {
     return instance_of<T>(instance).plugin.state_size();
 }
+// `aspect` is an optional member of the plugin class. The worker rejects the 0 that remains if it throws.
+template <class T> double aspect_of(arhost_instance *instance, std::uint32_t marker) {
+    double aspect = 0;
+    with<T>(instance, [&](T &p) { return aspect = p.aspect(marker), ARHOST_STATUS_OK; });
+    return aspect;
+}
 template <class T> constexpr arhost_tracker make_tracker_functions() {
     arhost_tracker tracker{};
     tracker.struct_size = sizeof(arhost_tracker);
@@ -458,6 +464,8 @@ template <class T> constexpr arhost_tracker make_tracker_functions() {
     tracker.stop = stop_instance<T>;
     if constexpr (requires(const T &p) { p.state_size(); })
         tracker.state_size = state_size_of<T>;
+    if constexpr (requires(const T &p) { p.aspect(std::uint32_t{}); })
+        tracker.aspect = aspect_of<T>;
     return tracker;
 }
 template <class T> inline constexpr arhost_tracker tracker_functions = make_tracker_functions<T>();

@@ -2,9 +2,10 @@
 /*
  * arhost/motion.h: the animated state of a scene at the time of one image.
  *
- * Each render request contains an arhost_motion if the scene's duration_s is above 0. The worker computes it from the
- * scene's nodes, channels and skins, so ray tracers need not do this. The struct and its arrays are valid only during
- * the call. Array elements have no struct_size and never grow, so they are sizeof(element) bytes apart.
+ * Each render request contains an arhost_motion if an object of the scene moves or deforms. The worker computes it
+ * from the scene's nodes, channels, skins and anchors, so ray tracers need not do this. The struct and its arrays are
+ * valid only during the call. Array elements have no struct_size and never grow, so they are sizeof(element) bytes
+ * apart.
  */
 #ifndef ARHOST_MOTION_H
 #define ARHOST_MOTION_H
@@ -19,6 +20,8 @@ extern "C" {
  * scene's objects. */
 typedef struct arhost_moved_object {
     uint32_t object;             /* index of the object in the scene */
+    uint32_t is_visible;         /* 0: the object is not in the scene now, neither for rays from the camera nor for
+                                    others, because the target that it belongs to is lost */
     float world_from_object[12]; /* column-major 3×4, invertible; mm */
 } arhost_moved_object;
 
@@ -27,7 +30,9 @@ typedef struct arhost_moved_object {
  * the identity. */
 typedef struct arhost_deformed_geometry {
     uint32_t object;        /* index of the object in the scene */
+    uint32_t is_visible;    /* as in arhost_moved_object */
     uint32_t vertex_count;  /* same as in the arena, positions.count of the geometry */
+    uint32_t reserved;      /* 0 */
     const float *positions; /* 3 floats per vertex; at least 16 readable bytes follow the last one */
     const float *normals;   /* 3 floats per vertex, unit length; NULL if the geometry has no normals */
 } arhost_deformed_geometry;

@@ -30,7 +30,7 @@ typedef struct arhost_render_request {
     uint64_t sequence; /* number of the video frame; use it to seed random numbers */
     double time_s;     /* scene time, s */
     arhost_camera camera;
-    const arhost_motion *motion; /* NULL if the scene's duration_s is 0 */
+    const arhost_motion *motion; /* NULL if no object moves or deforms */
 } arhost_render_request;
 
 /* The image to write: R, G, B, A bytes, straight (not premultiplied) alpha, sRGB-encoded, top row first. Alpha is

@@ -20,7 +20,7 @@ extern "C" {
 #endif
 
 #define ARHOST_SCENE_MAGIC 0x435354534f485241ull /* "ARHOSTSC" */
-#define ARHOST_SCENE_VERSION 2u
+#define ARHOST_SCENE_VERSION 3u
 #define ARHOST_NONE 0xffffffffu
 
 /* An array in the arena: `count` elements, `stride` bytes apart. If `count` is 0, the array is absent. */
@@ -197,6 +197,13 @@ typedef struct arhost_skin {
     arhost_buffer node_from_mesh; /* inverse bind matrices, one per joint: column-major 3×4 floats, stride 48 */
 } arhost_skin;
 
+/* A node that follows a target of the tracker: its pose is that of the target in the world. Ray tracers need not know
+ * it, because arhost_motion contains the transforms that follow from it. */
+typedef struct arhost_anchor {
+    uint32_t node;   /* without a parent, not animated */
+    uint32_t target; /* name of the target: byte offset into `names`, of a NUL-terminated string */
+} arhost_anchor;
+
 /* ---- lights ---- */
 
 typedef int32_t arhost_light_type;
@@ -260,7 +267,7 @@ typedef struct arhost_scene {
      * arhost/shading/leaf/alpha.h. */
     float shadow_alpha_opaque, shadow_alpha_translucent;
     uint32_t coloured_shadows; /* non-zero: glass casts coloured shadows on catchers */
-    float duration_s;          /* period of the repeating animation, s; 0: static scene */
+    float duration_s;          /* period of the repeating animation, s; 0: no animation */
     arhost_environment environment;
     arhost_buffer geometries; /* arhost_geometry, stride sizeof */
     arhost_buffer textures;   /* arhost_texture */
@@ -271,6 +278,7 @@ typedef struct arhost_scene {
     arhost_buffer channels;   /* arhost_channel */
     arhost_buffer skins;      /* arhost_skin */
     arhost_buffer names;      /* bytes of NUL-terminated strings */
+    arhost_buffer anchors;    /* arhost_anchor, by increasing node */
 } arhost_scene;
 
 #ifdef __cplusplus

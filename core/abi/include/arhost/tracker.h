@@ -51,6 +51,11 @@ typedef struct arhost_marker_config {
     uint32_t family;         /* index in arhost_tracker_setup.families */
     uint32_t target;         /* index in arhost_tracker_setup.targets */
     double corners_mm[4][3]; /* in the target's coordinates; they form a plane convex quadrilateral */
+    const char *file;        /* path of the print; NULL if the family defines it by the id. In the family "pattern", a
+                                pattern file of ARToolKit; in "image", a picture, whose `corners_mm` are those of a
+                                square of its width: see arhost_tracker.aspect */
+    double pattern_ratio;    /* side of the pattern, without its black border, relative to that of the square; 0 if
+                                `file` is NULL */
 } arhost_marker_config;
 
 typedef struct arhost_tracker_setup {
@@ -182,6 +187,10 @@ typedef struct arhost_tracker {
     /* [worker, started] Optional; NULL: 0. Called once, after `start`. Returns the size in bytes of the memory that
      * the tracker needs from frame to frame (arhost_track_request.state_before), at most ARHOST_MAX_STATE. */
     uint64_t (*state_size)(arhost_instance *instance);
+
+    /* [worker, started] Optional; NULL: 1. Called after `start` for each marker of the family "image". Returns the
+     * height of the picture, divided by its width. The worker scales the marker's corners_mm along y accordingly. */
+    double (*aspect)(arhost_instance *instance, uint32_t marker);
 } arhost_tracker;
 
 #ifdef __cplusplus

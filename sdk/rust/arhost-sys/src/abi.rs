@@ -477,8 +477,11 @@ pub struct arhost_marker_config {
     pub family: u32,
     pub target: u32,
     pub corners_mm: [[f64; 3]; 4],
+    pub file: *const c_char,
+    pub pattern_ratio: f64,
 }
-const _: () = assert!(size_of::<arhost_marker_config>() == 112);
+const _: () = assert!(size_of::<arhost_marker_config>() == 128);
+unsafe impl Sync for arhost_marker_config {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_tracker_setup {
@@ -581,14 +584,15 @@ pub struct arhost_tracker {
     pub track: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_track_request, *mut arhost_tracker_result) -> arhost_status>,
     pub stop: Option<unsafe extern "C" fn(*mut arhost_instance)>,
     pub state_size: Option<unsafe extern "C" fn(*mut arhost_instance) -> u64>,
+    pub aspect: Option<unsafe extern "C" fn(*mut arhost_instance, u32) -> f64>,
 }
-const _: () = assert!(size_of::<arhost_tracker>() == 40);
+const _: () = assert!(size_of::<arhost_tracker>() == 48);
 unsafe impl Sync for arhost_tracker {} // a plugin's statics are immutable
 
 // ---- arhost/scene.h ----
 
 pub const ARHOST_SCENE_MAGIC: u64 = 0x435354534f485241;
-pub const ARHOST_SCENE_VERSION: u32 = 2;
+pub const ARHOST_SCENE_VERSION: u32 = 3;
 pub const ARHOST_NONE: u32 = 0xffffffff;
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -733,6 +737,13 @@ pub struct arhost_skin {
     pub node_from_mesh: arhost_buffer,
 }
 const _: () = assert!(size_of::<arhost_skin>() == 32);
+#[repr(C)]
+#[derive(Clone, Copy)]
+pub struct arhost_anchor {
+    pub node: u32,
+    pub target: u32,
+}
+const _: () = assert!(size_of::<arhost_anchor>() == 8);
 pub type arhost_light_type = i32;
 pub const ARHOST_LIGHT_POINT: arhost_light_type = 1;
 pub const ARHOST_LIGHT_DIRECTIONAL: arhost_light_type = 2;
@@ -794,8 +805,9 @@ pub struct arhost_scene {
     pub channels: arhost_buffer,
     pub skins: arhost_buffer,
     pub names: arhost_buffer,
+    pub anchors: arhost_buffer,
 }
-const _: () = assert!(size_of::<arhost_scene>() == 320);
+const _: () = assert!(size_of::<arhost_scene>() == 336);
 
 // ---- arhost/motion.h ----
 
@@ -803,18 +815,21 @@ const _: () = assert!(size_of::<arhost_scene>() == 320);
 #[derive(Clone, Copy)]
 pub struct arhost_moved_object {
     pub object: u32,
+    pub is_visible: u32,
     pub world_from_object: [f32; 12],
 }
-const _: () = assert!(size_of::<arhost_moved_object>() == 52);
+const _: () = assert!(size_of::<arhost_moved_object>() == 56);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_deformed_geometry {
     pub object: u32,
+    pub is_visible: u32,
     pub vertex_count: u32,
+    pub reserved: u32,
     pub positions: *const f32,
     pub normals: *const f32,
 }
-const _: () = assert!(size_of::<arhost_deformed_geometry>() == 24);
+const _: () = assert!(size_of::<arhost_deformed_geometry>() == 32);
 unsafe impl Sync for arhost_deformed_geometry {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]

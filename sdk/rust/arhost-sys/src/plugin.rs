@@ -183,6 +183,10 @@ pub trait Tracker: Plugin {
     fn state_size(&self) -> u64 {
         0
     }
+    /// The height of the picture of a marker of the family "image", divided by its width.
+    fn aspect(&self, _marker: u32) -> f64 {
+        1.0
+    }
 }
 
 pub trait Raytracer: Plugin {
@@ -553,6 +557,14 @@ unsafe extern "C" fn state_size<T: Tracker>(instance: *mut arhost_instance) -> u
     });
     size
 }
+unsafe extern "C" fn aspect<T: Tracker>(instance: *mut arhost_instance, marker: u32) -> f64 {
+    let mut aspect = f64::NAN;
+    with(instance, |plugin: &mut T| {
+        aspect = plugin.aspect(marker);
+        Ok(ARHOST_STATUS_OK)
+    });
+    aspect
+}
 #[doc(hidden)]
 pub const fn tracker<T: Tracker>() -> arhost_tracker {
     arhost_tracker {
@@ -561,6 +573,7 @@ pub const fn tracker<T: Tracker>() -> arhost_tracker {
         track: Some(track::<T>),
         stop: Some(stop::<T>),
         state_size: Some(state_size::<T>),
+        aspect: Some(aspect::<T>),
     }
 }
 

@@ -20,6 +20,7 @@ typedef struct triangle {
 
 typedef struct object {
     unsigned kind;
+    int is_visible; /* rays pass through invisible objects */
     const arhost_material *material;
     const arhost_geometry *geometry;
     sphere bounds;
@@ -138,6 +139,7 @@ tracer *tracer_new(const arhost_scene *scene) {
     self->objects = calloc(scene->objects.count + 1, sizeof *self->objects);
     for (i = 0; self->objects && i < scene->objects.count; ++i) {
         object *o = &self->objects[i];
+        o->is_visible = 1;
         o->geometry = &geometries[objects[i].geometry];
         o->material = &materials[objects[i].material];
         o->kind = objects[i].role == ARHOST_ROLE_CATCHER        ? CATCHER
@@ -173,14 +175,18 @@ void tracer_free(tracer *self) {
 void tracer_update(tracer *self, const arhost_motion *motion) {
     const arhost_object *objects = elements(self->scene, self->scene->objects);
     uint32_t i, k;
-    for (i = 0; i < motion->moved_count; ++i)
-        update_transform(self, &self->objects[motion->moved[i].object], motion->moved[i].world_from_object);
+    for (i = 0; i < motion->moved_count; ++i) {
+        object *o = &self->objects[motion->moved[i].object];
+        o->is_visible = motion->moved[i].is_visible != 0;
+        update_transform(self, o, motion->moved[i].world_from_object);
+    }
     for (i = 0; i < motion->deformed_count; ++i) {
         const arhost_deformed_geometry *deformed = &motion->deformed[i];
         const float *m = objects[deformed->object].world_from_object;
         for (k = 0; k < motion->moved_count; ++k)
             if (motion->moved[k].object == deformed->object)
                 m = motion->moved[k].world_from_object;
+        self->objects[deformed->object].is_visible = deformed->is_visible != 0;
         update_geometry(self, &self->objects[deformed->object], m, deformed->positions, deformed->normals);
     }
 }
@@ -259,7 +265,7 @@ static hit nearest_hit(const tracer *self, ray r, unsigned kinds, int front_face
     for (i = 0; i < self->scene->objects.count; ++i) {
         const object *o = &self->objects[i];
         double enter, leave;
-        if (!(o->kind & kinds) || !sphere_interval(o->bounds, r, &enter, &leave) || enter > nearest.distance ||
+        if (!o->is_visible || !(o->kind & kinds) || !sphere_interval(o->bounds, r, &enter, &leave) || enter > nearest.distance ||
             leave < 0)
             continue;
         for (k = 0; k < o->sphere_count; ++k)

@@ -37,12 +37,14 @@ void Tracer::update(const arhost_motion &motion) {
         const arhost_moved_object &moved = motion.moved[i];
         const arhost_geometry &geometry = geometries[objects[moved.object].geometry];
         transforms[moved.object] = moved.world_from_object;
+        objects_[moved.object].is_visible = moved.is_visible != 0;
         if (!objects[moved.object].deforms)
             update_geometry(moved.object, moved.world_from_object, elements<float>(geometry.positions),
                             elements<float>(geometry.normals));
     }
     for (std::uint32_t i = 0; i < motion.deformed_count; ++i) {
         const arhost_deformed_geometry &deformed = motion.deformed[i];
+        objects_[deformed.object].is_visible = deformed.is_visible != 0;
         update_geometry(deformed.object, transforms[deformed.object], deformed.positions, deformed.normals);
     }
 }
@@ -171,7 +173,7 @@ Tracer::Hit Tracer::nearest(const Ray &ray, unsigned kinds, Faces faces) const {
     Hit nearest;
     nearest.distance = ray.end;
     for (const Object &object : objects_) {
-        if (!(object.kind & kinds))
+        if (!object.is_visible || !(object.kind & kinds))
             continue;
         const Interval bounds = sphere_interval(object.bounds.centre, object.bounds.radius, ray);
         if (!(bounds.enter < nearest.distance && bounds.leave > 0))

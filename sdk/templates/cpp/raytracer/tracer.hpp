@@ -78,6 +78,7 @@ private:
     };
     struct Object {
         Kind kind;
+        bool is_visible = true; // rays pass through invisible objects
         const arhost_material *material;
         Sphere bounds;
         std::vector<Sphere> spheres; // an object has either spheres or triangles

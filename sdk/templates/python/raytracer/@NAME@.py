@@ -33,6 +33,7 @@ class Object:
 
     def __init__(self, record, material):
         self.material = material
+        self.is_visible = True  # rays pass through invisible objects
         self.kind = {arhost.ROLE_CATCHER: CATCHER, arhost.ROLE_OCCLUDER: OCCLUDER}.get(
             int(record["role"]), GLASS if material["model"] == arhost.MATERIAL_GLASS else SOLID)
 
@@ -153,9 +154,12 @@ class Tracer:
     def update(self, moved, deformed):
         """Applies the animated state."""
         transforms = {int(m["object"]): m["world_from_object"] for m in moved}
+        for m in moved:
+            self.objects[m["object"]].is_visible = bool(m["is_visible"])
         for number, transform in transforms.items():
             self.update_object(number, transform)
         for d in deformed:
+            self.objects[d.object].is_visible = d.is_visible
             transform = transforms.get(d.object, self.scene.objects[d.object]["world_from_object"])
             self.update_object(d.object, transform, d.positions, d.normals)
 
@@ -167,7 +171,7 @@ class Tracer:
         self.check_cancelled()
         hits = Hits(len(origins), end)
         for number, o in enumerate(self.objects):
-            if not o.kind & kinds:
+            if not o.is_visible or not o.kind & kinds:
                 continue
             enters, leaves = sphere_interval(o.centre, o.radius, origins, directions)
             rays = np.flatnonzero((enters < hits.distance) & (leaves > 0))

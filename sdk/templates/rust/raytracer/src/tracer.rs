@@ -52,6 +52,7 @@ struct Shape {
 
 struct Object {
     kind: Kinds,
+    is_visible: bool, // rays pass through invisible objects
     material: arhost_material,
     shape: Shape,
 }
@@ -153,7 +154,8 @@ impl Tracer {
                 _ if material.model == ARHOST_MATERIAL_GLASS => GLASS,
                 _ => SOLID,
             };
-            Object { kind, material, shape: shape_at(scene, number as u32, &from.world_from_object) }
+            let shape = shape_at(scene, number as u32, &from.world_from_object);
+            Object { kind, is_visible: true, material, shape }
         };
         let objects = objects_of(scene).iter().enumerate().map(object).collect();
         Tracer { scene, lights: lights.to_vec(), objects }
@@ -162,7 +164,9 @@ impl Tracer {
     /// Applies the animated state.
     pub fn update(&mut self, motion: &arhost_motion) {
         for moved in motion.moved() {
-            self.objects[moved.object as usize].shape = shape_at(self.scene, moved.object, &moved.world_from_object);
+            let object = &mut self.objects[moved.object as usize];
+            object.is_visible = moved.is_visible != 0;
+            object.shape = shape_at(self.scene, moved.object, &moved.world_from_object);
         }
         for deformed in motion.deformed() {
             let moved = motion.moved().iter().find(|moved| moved.object == deformed.object);
@@ -170,8 +174,9 @@ impl Tracer {
                 &moved.world_from_object
             });
             let geometry = geometry_of(self.scene, deformed.object);
-            self.objects[deformed.object as usize].shape =
-                mesh(self.scene, geometry, m, deformed.positions(), deformed.normals());
+            let object = &mut self.objects[deformed.object as usize];
+            object.is_visible = deformed.is_visible != 0;
+            object.shape = mesh(self.scene, geometry, m, deformed.positions(), deformed.normals());
         }
     }
 }
@@ -253,7 +258,7 @@ impl Tracer {
     fn nearest(&self, ray: &Ray, kinds: Kinds, faces: Faces) -> Hit<'_> {
         let nothing = Vec3([0.0; 3]);
         let mut nearest = Hit { distance: ray.end, object: None, face_normal: nothing, normal: nothing, lift: nothing };
-        for object in self.objects.iter().filter(|object| object.kind & kinds != 0) {
+        for object in self.objects.iter().filter(|object| object.is_visible && object.kind & kinds != 0) {
             match sphere_interval(&object.shape.bounds, ray) {
                 Some((enters, leaves)) if enters < nearest.distance && leaves > 0.0 => {}
                 _ => continue,
