@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Patterns of ARToolKit: small pictures inside the black border of a square.
+#pragma once
+
+#include <opencv2/core.hpp>
+
+#include <array>
+#include <string>
+
+namespace tracker_pattern {
+
+// The samples of a square's interior: side × side mean grey levels, top row first.
+using Samples = cv::Mat_<float>;
+
+class Pattern {
+public:
+    // Reads a .patt file: the picture in four orientations, each with the planes blue, green and red, as rows of
+    // numbers from 0 to 255. Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION), with the place of the error.
+    explicit Pattern(const std::string &file);
+
+    int side() const { return side_; } // samples
+
+    // Returns the correlation of samples of this size with the picture, −1 to 1, and the number of quarter turns
+    // (clockwise, as seen) by which the print is rotated. `normalized`: from `normalized()`.
+    struct Match {
+        double correlation;
+        int quarter_turns;
+    };
+    Match match(const Samples &normalized) const;
+
+private:
+    int side_ = 0;
+    std::array<Samples, 4> rotated_; // normalized; rotated clockwise by 0 to 3 quarter turns
+};
+
+// Returns samples with the mean 0 and the length 1; empty if they are almost uniform.
+Samples normalized(const Samples &samples);
+
+} // namespace tracker_pattern

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "squares.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+
+namespace tracker_pattern {
+namespace {
+
+using arhost::fiducial::Corners;
+
+// Windows of the adaptive threshold, px: small ones separate near squares, large ones keep wide borders closed.
+constexpr int windows_px[] = {7, 21, 51};
+constexpr double threshold_levels = 7; // darker than the mean of the window
+// Greatest distance of a contour from the quadrilateral, relative to the perimeter.
+constexpr double max_deviation = 0.03;
+
+double shortest_side(const std::vector<cv::Point> &corners) {
+    double shortest = cv::norm(corners[0] - corners[3]);
+    for (std::size_t i = 0; i < 3; ++i)
+        shortest = std::min(shortest, cv::norm(corners[i + 1] - corners[i]));
+    return shortest;
+}
+
+} // namespace
+
+std::vector<Corners> find_squares(const cv::Mat &grey, double min_side_px) {
+    std::vector<Corners> squares;
+    cv::Mat dark;
+    std::vector<std::vector<cv::Point>> contours;
+    std::vector<cv::Point> polygon;
+    for (const int window : windows_px) {
+        cv::adaptiveThreshold(grey, dark, 255, cv::ADAPTIVE_THRESH_MEAN_C, cv::THRESH_BINARY_INV, window,
+                              threshold_levels);
+        cv::findContours(dark, contours, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
+        for (const std::vector<cv::Point> &contour : contours) {
+            if (static_cast<double>(contour.size()) < 4 * min_side_px)
+                continue;
+            cv::approxPolyDP(contour, polygon, max_deviation * static_cast<double>(contour.size()), true);
+            if (polygon.size() != 4 || !cv::isContourConvex(polygon) || shortest_side(polygon) < min_side_px)
+                continue;
+            // The outer contour of a dark region runs counter-clockwise in the image, that of a hole clockwise.
+            if (cv::contourArea(polygon, true) >= 0)
+                continue;
+            Corners corners;
+            for (std::size_t i = 0; i < 4; ++i)
+                corners[i] = polygon[3 - i];
+            squares.push_back(corners);
+        }
+    }
+    return squares;
+}
+
+} // namespace tracker_pattern

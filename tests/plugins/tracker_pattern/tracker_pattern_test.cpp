@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fiducial_common/rendered_marker.hpp>
+
+#include <gmock/gmock.h>
+
+#include <fstream>
+#include <random>
+
+namespace {
+
+using namespace arhost::test;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+const arhost_intrinsics camera = intrinsics_of({640, 480}, 600, 600, 319.5, 239.5);
+
+std::string file_of(const std::string &name) {
+    return (shared_data("markers/artoolkit") / (name + ".patt")).string();
+}
+
+// The print of a pattern with a black border, as wide as half of the picture.
+Print print_of(const std::string &name) {
+    std::ifstream stream(file_of(name));
+    constexpr int side = 16, border = 8;
+    Print print{cv::Mat_<std::uint8_t>(side + 2 * border, side + 2 * border, std::uint8_t{0}), side + 2 * border};
+    for (int y = 0; y < side; ++y) // the first of three colours: the patterns are black and white
+        for (int x = 0; x < side; ++x) {
+            int value = 0;
+            stream >> value;
+            print.cells(border + y, border + x) = static_cast<std::uint8_t>(value);
+        }
+    return print.with_margin(4);
+}
+
+const std::vector<Listed> both() {
+    return {{0, 80, "pattern", file_of("hiro"), 0.5}, {1, 80, "pattern", file_of("kanji"), 0.5}};
+}
+
+cv::Mat picture_of(const std::vector<Placed> &markers, std::uint64_t seed = 1) {
+    cv::Mat picture = render(camera, markers);
+    cv::GaussianBlur(picture, picture, {}, 0.6);
+    add_noise(picture, 1.5, seed);
+    return picture;
+}
+
+TEST(PatternTracker, TellsHiroFromKanjiAtTiltsOfUpTo60Degrees) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/artoolkit");
+    Tracker tracker("tracker_pattern");
+    ASSERT_EQ(tracker.start(camera, both()), ARHOST_STATUS_OK) << tracker.log();
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> turn(-180, 180), shift(-20, 20);
+    const char *const names[] = {"hiro", "kanji"};
+    double worst_px = 0;
+    for (const double tilt : {0.0, 15.0, 30.0, 45.0, 60.0})
+        for (int view = 0; view < 10; ++view) {
+            std::vector<Placed> placed;
+            for (int id = 0; id < 2; ++id) {
+                const bool about_x = view % 2 == 0;
+                placed.push_back({print_of(names[id]), 80,
+                                  pose_of(id * 150 - 75 + shift(random), shift(random), 500, about_x ? tilt : 0,
+                                          about_x ? 0 : tilt, turn(random))});
+            }
+            const auto seen = tracker.track(GreyFrame(picture_of(placed, static_cast<std::uint64_t>(view) + 1)));
+            ASSERT_EQ(seen.size(), 2u) << "tilt " << tilt << ", view " << view;
+            for (int id = 0; id < 2; ++id) {
+                ASSERT_EQ(seen[id].id, id) << "tilt " << tilt << ", view " << view;
+                worst_px = std::max(worst_px, greatest_distance_px(seen[id], corners_of(placed[id].mt, camera, 80)));
+                EXPECT_GT(seen[id].decision_margin, 60);
+            }
+        }
+    EXPECT_LE(worst_px, 0.2);
+}
+
+TEST(PatternTracker, SearchesOnlyWherePatternsAreExpected) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/artoolkit");
+    Tracker tracker("tracker_pattern");
+    ASSERT_EQ(tracker.start(camera, both()), ARHOST_STATUS_OK) << tracker.log();
+    const Mt hiro = pose_of(-75, 0, 500, 20, 10, 5), kanji = pose_of(75, 0, 500);
+    const GreyFrame frame(picture_of({{print_of("hiro"), 80, hiro}, {print_of("kanji"), 80, kanji}}));
+    arhost_expected_marker expected{sizeof expected, 0, {}, 6};
+    const auto corners = corners_of(hiro, camera, 80);
+    for (std::size_t i = 0; i < 4; ++i) {
+        expected.corners_px[i][0] = corners[i].x;
+        expected.corners_px[i][1] = corners[i].y;
+    }
+    const auto seen = tracker.track(frame, {expected}, false);
+    ASSERT_EQ(seen.size(), 1u);
+    EXPECT_EQ(seen[0].id, 0);
+    EXPECT_LT(greatest_distance_px(seen[0], corners), 0.2);
+}
+
+TEST(PatternTracker, FindsNothingElse) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/artoolkit");
+    Tracker tracker("tracker_pattern");
+    ASSERT_EQ(tracker.start(camera, {{0, 80, "pattern", file_of("hiro"), 0.5}}), ARHOST_STATUS_OK) << tracker.log();
+    EXPECT_THAT(tracker.track(GreyFrame(picture_of({{print_of("kanji"), 80, pose_of(0, 0, 500, 20, 20, 30)}}))),
+                IsEmpty());
+    for (const cv::Size size : {cv::Size(1, 1), cv::Size(3, 200), cv::Size(640, 480)}) {
+        auto other = camera;
+        other.width = static_cast<std::uint32_t>(size.width);
+        other.height = static_cast<std::uint32_t>(size.height);
+        ASSERT_EQ(tracker.start(other, {{0, 80, "pattern", file_of("hiro"), 0.5}}), ARHOST_STATUS_OK);
+        EXPECT_THAT(tracker.track(GreyFrame(cv::Mat(size, CV_8UC1, cv::Scalar(128)))), IsEmpty());
+    }
+}
+
+TEST(PatternTracker, RejectsFamiliesOfMarkersAndBadFiles) {
+    Tracker tracker("tracker_pattern");
+    EXPECT_EQ(tracker.start(camera, {{0, 80, "tag36h11"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(),
+                HasSubstr("unknown family 'tag36h11': tracker_pattern finds targets with a 'pattern'"));
+    ScratchFolder folder;
+    const std::string file = (folder.path() / "short.patt").string();
+    std::ofstream(file) << "1 2 3";
+    EXPECT_EQ(tracker.start(camera, {{0, 80, "pattern", file, 0.5}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(), HasSubstr("short.patt' is not a pattern of ARToolKit: it has 3 numbers"));
+}
+
+} // namespace
