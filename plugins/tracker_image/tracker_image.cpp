@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// tracker_image: detects plane pictures, such as posters and the covers of books.
+#include "picture.hpp"
+
+#include <fiducial_common/observations.hpp>
+
+#include <arhost-cpp/plugin.hpp>
+
+#include <opencv2/core/utility.hpp>
+
+#include <algorithm>
+#include <cstring>
+#include <vector>
+
+namespace tracker_image {
+namespace {
+
+using arhost::Failure;
+
+constexpr arhost_descriptor descriptor = {
+    sizeof(arhost_descriptor),
+    ARHOST_KIND_TRACKER,
+    "tracker_image",
+    "Pictures",
+    "0.1.0",
+    "arhost",
+    "Apache-2.0",
+    "Detects plane pictures, such as posters and covers of books.",
+    0,
+    0,
+    nullptr,
+    nullptr,
+};
+
+class ImageTracker {
+public:
+    ImageTracker(const arhost::Host &, const arhost::Options &) { cv::setNumThreads(1); }
+
+    void start(const arhost_tracker_setup &setup) {
+        stop();
+        for (std::uint32_t i = 0; i < setup.family_count; ++i)
+            if (std::strcmp(setup.families[i], "image") != 0)
+                throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                              std::string("unknown family '") + setup.families[i] +
+                                  "': tracker_image finds targets with an 'image'; tracker_apriltag and "
+                                  "tracker_aruco have families of markers");
+        for (const arhost_marker_config &marker : arhost::elements(setup.markers, setup.marker_count)) {
+            if (!marker.file)
+                throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "a marker of the family 'image' has no file");
+            shown_.push_back({marker.id, marker.family, Picture(marker.file)});
+        }
+    }
+
+    double aspect(std::uint32_t marker) const { return shown_.at(marker).picture.aspect(); }
+
+    // Pictures that are expected somewhere are aligned there. The features of the frame are needed only for others.
+    void track(const arhost_track_request &request, arhost::Observations &observations) const {
+        const arhost_frame &frame = *request.frame;
+        const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
+                           const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
+        std::vector<bool> is_found(shown_.size()), is_missed(shown_.size());
+        std::vector<arhost_observation> seen;
+        for (const arhost_expected_marker &expected : arhost::elements(request.expected, request.expected_count)) {
+            std::vector<cv::Point2f> corners;
+            for (const auto &corner : expected.corners_px)
+                corners.emplace_back(static_cast<float>(corner[0]), static_cast<float>(corner[1]));
+            const Shown &shown = shown_.at(expected.marker);
+            const auto place = shown.picture.align(grey, corners);
+            is_found[expected.marker] = place.has_value();
+            is_missed[expected.marker] = !place;
+            if (place)
+                seen.push_back(observation_of(shown, *place));
+        }
+        const bool searches_all = request.search_everywhere != 0;
+        if (searches_all || std::ranges::count(is_missed, true) > 0) {
+            const Features features = features_of(grey);
+            for (std::size_t i = 0; i < shown_.size(); ++i)
+                if (!is_found[i] && (searches_all || is_missed[i]))
+                    if (const auto place = shown_[i].picture.find(grey, features))
+                        seen.push_back(observation_of(shown_[i], *place));
+        }
+        arhost::fiducial::report(std::move(seen), observations);
+    }
+
+    void stop() { shown_.clear(); }
+
+private:
+    // A picture that a target has.
+    struct Shown {
+        std::int32_t id;
+        std::uint32_t family;
+        Picture picture;
+    };
+
+    static arhost_observation observation_of(const Shown &shown, const Picture::Place &place) {
+        arhost_observation one{};
+        one.id = shown.id;
+        one.family = shown.family;
+        const std::vector<cv::Point2d> corners = shown.picture.corners_px(place);
+        for (std::size_t i = 0; i < 4; ++i) {
+            one.corners_px[i][0] = corners[i].x;
+            one.corners_px[i][1] = corners[i].y;
+        }
+        one.decision_margin = 100 * place.inlier_share;
+        return one;
+    }
+
+    std::vector<Shown> shown_; // as the markers of the setup
+};
+
+} // namespace
+} // namespace tracker_image
+
+using tracker_image::ImageTracker;
+ARHOST_TRACKER(ImageTracker, tracker_image::descriptor)
