@@ -157,6 +157,47 @@ TEST_F(TargetsTest, PosesAreFilteredOnRequest) {
                 HasSubstr("tracker.filter: 'kalman' is not one of none, adaptive"));
 }
 
+TEST_F(TargetsTest, ArePatternsAndPicturesThatTheTrackerMayRead) {
+    write("hiro.patt", "");
+    write("poster.png", "");
+    const std::string targets = "[{name: hiro, pattern: hiro.patt, side_mm: 80}, {name: logo, pattern: hiro.patt, "
+                                "side_mm: 60, pattern_ratio: 0.7}, {name: poster, image: poster.png, width_mm: 210}]";
+    const auto configuration = parse_tracker("{plugin: tracker_x, targets: " + targets + "}",
+                                             "alternatives: {tracker: [{plugin: tracker_aruco}]}\n");
+    const run_config::TrackerConfiguration &tracker = *configuration.tracker;
+    ASSERT_EQ(names_of(tracker.targets), (std::vector<std::string>{"hiro", "logo", "poster"}));
+    const auto marker = [&](std::size_t target) { return tracker.targets[target].markers.at(0); };
+    EXPECT_EQ(marker(0).family, "pattern");
+    EXPECT_EQ(marker(0).file, (folder / "hiro.patt").string());
+    EXPECT_EQ(marker(0).pattern_ratio, 0.5);
+    EXPECT_EQ(marker(1).pattern_ratio, 0.7);
+    EXPECT_EQ(marker(1).corners_mm[2], (std::array<double, 3>{30, -30, 0}));
+    EXPECT_NE(marker(0).id, marker(1).id);
+    EXPECT_EQ(marker(2).family, "image");
+    EXPECT_EQ(marker(2).corners_mm[1], (std::array<double, 3>{105, 105, 0}))
+        << "a square, until the tracker is asked";
+    for (const run_config::TrackerConfiguration &choice : configuration.trackers)
+        EXPECT_THAT(choice.policy.readable, testing::IsSupersetOf({folder / "hiro.patt", folder / "poster.png"}));
+}
+
+TEST_F(TargetsTest, RejectsInvalidPatternsAndPictures) {
+    const std::string at = "lab.yaml:4:40: tracker.targets[0]";
+    write("hiro.patt", "");
+    EXPECT_THAT(error_in("[{name: a, pattern: hiri.patt, side_mm: 80}]"),
+                HasSubstr("tracker.targets[0].pattern: there is no file 'hiri.patt'; did you mean 'hiro.patt'?"));
+    EXPECT_THAT(error_in("[{name: a, image: a.png, width_mm: 80}]"), HasSubstr("image: there is no file 'a.png'"));
+    EXPECT_EQ(error_in("[{pattern: hiro.patt, side_mm: 80}]"), at + ": the key 'name' is missing");
+    EXPECT_EQ(error_in("[{name: a, pattern: hiro.patt}]"), at + ": the key 'side_mm' is missing");
+    EXPECT_EQ(error_in("[{name: a, image: hiro.patt}]"), at + ": the key 'width_mm' is missing");
+    EXPECT_THAT(error_in("[{name: a, image: hiro.patt, side_mm: 80}]"),
+                HasSubstr("side_mm: does not apply to a target with 'image'; remove it"));
+    EXPECT_THAT(error_in("[{name: a, pattern: hiro.patt, side_mm: 80, pattern_ratio: 0.95}]"),
+                HasSubstr("pattern_ratio: must be 0.1 to 0.9, but is 0.95"));
+    EXPECT_THAT(error_in("[{name: a, pattern: hiro.patt, side_mm: 0}]"), HasSubstr("side_mm: must be"));
+    EXPECT_THAT(error_in("[{marker: 1, family: pattern, side_mm: 80}]"),
+                HasSubstr("family: is not a family of markers; write 'pattern: FILE' instead of 'marker' or 'ids'"));
+}
+
 TEST_F(TargetsTest, RejectsInvalidTargets) {
     const std::string at = "lab.yaml:4:40: tracker.targets[0]";
     EXPECT_EQ(error_in("[]"), "lab.yaml:4:39: tracker.targets: must list 1 to 1024 targets, as in [{marker: 0, "
@@ -165,11 +206,11 @@ TEST_F(TargetsTest, RejectsInvalidTargets) {
               "lab.yaml:4:10: tracker: the key 'targets' is missing");
     EXPECT_EQ(error_in("[7]"), at + ": must be a map of keys, as in {marker: 0, family: tag36h11, side_mm: 80}");
     EXPECT_EQ(error_in("[{family: tag36h11, side_mm: 80}]"),
-              at + ": one of the keys 'marker', 'ids', 'map' and 'body' is missing, as in {marker: 0, family: "
-                   "tag36h11, side_mm: 80}");
+              at + ": one of the keys 'marker', 'ids', 'map', 'pattern', 'image' and 'body' is missing, as in "
+                   "{marker: 0, family: tag36h11, side_mm: 80}");
     EXPECT_EQ(error_in("[{marker: 0, ids: 1-2, family: a, side_mm: 80}]"),
-              "lab.yaml:4:57: tracker.targets[0].ids: a target has only one of the keys 'marker', 'ids', 'map' and "
-              "'body', but 'marker' is there, too; make two targets of them");
+              "lab.yaml:4:57: tracker.targets[0].ids: a target has only one of the keys 'marker', 'ids', 'map', "
+              "'pattern', 'image' and 'body', but 'marker' is there, too; make two targets of them");
     EXPECT_EQ(error_in("[{marker: 0, side_mm: 80}]"),
               at + ": the key 'family' or 'dictionary' is missing, as in 'family: tag36h11' or 'dictionary: "
                    "DICT_6X6_250'");

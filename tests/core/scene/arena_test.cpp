@@ -197,7 +197,7 @@ INSTANTIATE_TEST_SUITE_P(
     Validate, Rejects,
     testing::Values(
         Corruption{"Magic", [](Arena &a) { header(a).magic ^= 1; }, "magic number"},
-        Corruption{"Version", [](Arena &a) { header(a).version = 1; }, "version is 1, not 2"},
+        Corruption{"Version", [](Arena &a) { header(a).version = 1; }, "version is 1, not 3"},
         Corruption{"StructSize", [](Arena &a) { header(a).struct_size += 8; }, "the struct_size of its header is wrong"},
         Corruption{"ByteSizeTooLarge", [](Arena &a) { header(a).byte_size += 64; }, "bytes, but"},
         Corruption{"ByteSizeHuge", [](Arena &a) { header(a).byte_size = ~0ull; }, "bytes, but"},
