@@ -552,8 +552,9 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
 }
 
 // Checks the plugins, fallbacks included, and their options. Returns the ray tracers.
+// `logs_notes`: warns of options that are set aside, which otherwise the pipeline does.
 std::vector<ipc::PluginDescription> check_plugins(const run_config::Configuration &configuration,
-                                                  supervise::Context &context) {
+                                                  supervise::Context &context, bool logs_notes) {
     const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
         std::vector<ipc::PluginDescription> plugins;
         for (std::size_t i = 0; i < component.plugins.size(); ++i) {
@@ -564,7 +565,8 @@ std::vector<ipc::PluginDescription> check_plugins(const run_config::Configuratio
             std::vector<std::string> notes;
             run_config::options_for(plugins.back(), kind, component, i, notes);
             for (const std::string &note : notes)
-                context.log(ARHOST_SEVERITY_WARNING, plugins.back().id, note);
+                if (logs_notes)
+                    context.log(ARHOST_SEVERITY_WARNING, plugins.back().id, note);
         }
         return plugins;
     };
@@ -774,7 +776,7 @@ int check(const Arguments &arguments, bool open, supervise::Starter &launcher) {
     show_warnings(configuration, console);
     ipc::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
-    const std::vector<ipc::PluginDescription> raytracers = check_plugins(configuration, context);
+    const std::vector<ipc::PluginDescription> raytracers = check_plugins(configuration, context, !open);
     if (open) {
         if (const int status = check_by_opening(configuration, arguments, context); status != success)
             return status;

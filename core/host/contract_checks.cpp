@@ -2,6 +2,7 @@
 #include "host/contract_checks.hpp"
 
 #include "camera/lens.hpp"
+#include "scene/motion.hpp"
 
 #include <fmt/format.h>
 
@@ -166,8 +167,8 @@ std::size_t sample_hash(std::span<const std::byte> bytes, std::uint64_t frame) {
 
 OverlayChecks::OverlayChecks(const arhost_scene &scene) {
     const auto is_opaque = [](float alpha) { return alpha * 255 >= 254.5f; };
-    checks_place_ =
-        scene.duration_s == 0 && !is_opaque(scene.shadow_alpha_opaque) && !is_opaque(scene.shadow_alpha_translucent);
+    checks_place_ = !scene::is_moving(scene) && !is_opaque(scene.shadow_alpha_opaque) &&
+                    !is_opaque(scene.shadow_alpha_translucent);
     if (!checks_place_)
         return;
     const auto array = [&]<class T>(const arhost_buffer &buffer, const T *) {

@@ -155,14 +155,20 @@ static std::vector<std::string> anchors_of(const arhost_scene &scene) {
 
 // Returns why objects cannot belong to these targets; empty if they can.
 std::string Pipeline::problem_with_anchors(const std::vector<std::string> &anchors) const {
+    // A session contains the poses of the targets, so its replay needs no tracker.
+    const bool replays_poses = configuration_.recording && configuration_.recording->repeats_decisions;
+    const run_config::TrackerConfiguration *tracker = latest_->tracker ? &*latest_->tracker
+                                                      : replays_poses && !latest_->trackers.empty()
+                                                          ? &latest_->trackers.front()
+                                                          : nullptr;
     for (const std::string &name : anchors) {
-        if (!latest_->tracker)
-            return "there is no tracker, so no object can be 'on: " + base::printable(name) +
-                   "'; remove this key, or configure a tracker with this target";
-        const std::vector<ipc::Target> &targets = latest_->tracker->targets;
-        if (std::ranges::find(targets, name, &ipc::Target::name) == targets.end())
-            return "no target has the name of 'on: " + base::printable(name) + "'; the tracker looks for " +
-                   describe_targets(targets);
+        if (!tracker)
+            return "an object is 'on: " + base::printable(name) +
+                   "', but no tracker runs; remove this key, or run a tracker with this target";
+        if (std::ranges::find(tracker->targets, name, &ipc::Target::name) == tracker->targets.end())
+            return "there is no target '" + base::printable(name) +
+                   "', which an object is 'on'; the tracker looks for " + describe_targets(tracker->targets) +
+                   "; correct the name, or add the target";
     }
     return "";
 }

@@ -114,12 +114,13 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
     return component;
 }
 
-// A tracker may read the files of its targets' patterns.
-void let_read_patterns(TrackerConfiguration &tracker) {
+// Lets a tracker read the prints of its targets. If the sandbox cannot grant a file, the plugin says that it cannot
+// read it.
+void let_read_prints(TrackerConfiguration &tracker) {
     for (const Target &target : tracker.targets)
         for (const TargetMarker &marker : target.markers)
             if (!marker.file.empty())
-                tracker.policy.readable.emplace_back(marker.file);
+                sandbox::allow_read(tracker.policy, marker.file);
 }
 
 TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared, std::vector<std::string> &warnings) {
@@ -127,7 +128,7 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared,
     TrackerConfiguration tracker{parse_component(node, "tracker", shared), {}};
     reject_family_option(node);
     tracker.targets = parse_targets(node.require("targets"), tracker.map_files, warnings);
-    let_read_patterns(tracker);
+    let_read_prints(tracker);
     const auto frames = [&](const char *path, std::int64_t minimum) {
         return static_cast<std::uint32_t>(integer_or_default(node, path, minimum, 1'000'000));
     };
@@ -213,8 +214,8 @@ void parse_choices(Configuration &configuration, const Shared &shared,
             static_cast<ComponentConfiguration &>(alternative) =
                 parse_component(node, std::string("alternatives.") + kind + "[]", shared);
             reject_family_option(node);
-            if constexpr (requires { let_read_patterns(alternative); })
-                let_read_patterns(alternative);
+            if constexpr (requires { let_read_prints(alternative); })
+                let_read_prints(alternative);
             expect_new_name(node, alternative.name, all);
             all.push_back(std::move(alternative));
         }

@@ -389,6 +389,8 @@ std::string parse_print(const yaml::Node &node, std::vector<fs::path> &files) {
     std::error_code ignored;
     if (!fs::exists(file, ignored))
         node.fail("there is no file '" + file.string() + "'" + hint_at_similar_name(file));
+    if (!fs::is_regular_file(file, ignored))
+        node.fail("'" + file.string() + "' is not a file");
     files.push_back(file);
     return file.string();
 }

@@ -362,6 +362,8 @@ private:
             fail(what + "its node does not follow that of the previous anchor");
         if (anchor.target >= names_.size())
             fail(what + "its name is outside the table of names");
+        if (strnlen(names_.data() + anchor.target, ARHOST_MAX_NAME) == ARHOST_MAX_NAME)
+            fail(what + "its name has more than " + std::to_string(ARHOST_MAX_NAME - 1) + " characters");
     }
 
     void check_channel(std::size_t i) {

@@ -80,10 +80,13 @@ Picture::Picture(const std::string &file) {
     const auto reject = [&](const std::string &reason) {
         throw arhost::Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "'" + file + "' " + reason);
     };
-    cv::Mat grey = cv::imread(file, cv::IMREAD_GRAYSCALE | cv::IMREAD_IGNORE_ORIENTATION);
+    cv::Mat grey = cv::imread(file, cv::IMREAD_GRAYSCALE);
     if (grey.empty())
         reject("is not an image that OpenCV can read");
     aspect_ = static_cast<double>(grey.rows) / grey.cols;
+    constexpr double max_aspect = 20;
+    if (!(aspect_ <= max_aspect && aspect_ >= 1 / max_aspect))
+        reject("is more than " + std::to_string(static_cast<int>(max_aspect)) + " times as long as wide");
     const auto longer_side = [&] { return static_cast<double>(std::max(grey.cols, grey.rows)); };
     if (longer_side() > stored_side_px)
         cv::resize(grey, grey, {}, stored_side_px / longer_side(), stored_side_px / longer_side(), cv::INTER_AREA);
@@ -156,6 +159,7 @@ std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const cv::Mat
         if (!is_plausible(place.frame_from_picture, corners))
             return std::nullopt;
         std::vector<cv::Point2f> outline;
+        outline.reserve(corners.size());
         for (const cv::Point2f &corner : corners)
             outline.emplace_back(transformed(place.frame_from_picture, corner));
         const cv::Rect whole({0, 0}, frame.size());

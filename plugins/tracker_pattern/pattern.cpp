@@ -63,7 +63,8 @@ Pattern::Pattern(const std::string &file) {
     const std::vector<int> numbers = numbers_in(file);
     side_ = static_cast<int>(std::lround(std::sqrt(static_cast<double>(numbers.size()) / (orientations * planes))));
     if (side_ < min_side || side_ > max_side ||
-        numbers.size() != static_cast<std::size_t>(orientations * planes * side_ * side_))
+        numbers.size() !=
+            std::size_t{orientations * planes} * static_cast<std::size_t>(side_) * static_cast<std::size_t>(side_))
         reject(file, "is not a pattern of ARToolKit: it has " + std::to_string(numbers.size()) +
                          " numbers; a pattern of 16 x 16 has 3072: four orientations of three colours");
     // The first orientation is the upright one. The others are the same picture, rotated.

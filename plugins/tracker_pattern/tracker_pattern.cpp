@@ -123,7 +123,7 @@ private:
             const int cells = static_cast<int>(std::ceil(2 / (1 - best->ratio)));
             corners_px = arhost::fiducial::refine_edges(grey, corners_px, *lens_, cells).value_or(corners_px);
             // A print that is rotated clockwise begins with a later corner.
-            std::ranges::rotate(corners_px, corners_px.begin() + match.quarter_turns);
+            std::rotate(corners_px.begin(), corners_px.begin() + match.quarter_turns, corners_px.end());
             arhost_observation &one = seen.emplace_back();
             one.id = best->id;
             one.family = best->family;

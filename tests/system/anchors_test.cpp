@@ -111,8 +111,8 @@ TEST(AnchorErrors, ATargetThatDoesNotExistIsAnError) {
     run.write("scene.yaml", "version: 1\naxes: z-up\nmaterials: {grey: {model: diffuse, diffuse: 1}}\n"
                             "objects: [{sphere: {radius: 8}, material: grey, on: cup}]\n");
     EXPECT_EQ(run.run(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("scene.yaml: no target has the name of 'on: cup'; the tracker looks for "
-                                        "'visor'"));
+    EXPECT_THAT(run.output(), HasSubstr("scene.yaml: there is no target 'cup', which an object is 'on'; the tracker "
+                                        "looks for 'visor'"));
 }
 
 TEST(AnchorErrors, AKilledRayTracerKeepsObjectsOnTheirTargets) {

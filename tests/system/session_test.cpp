@@ -87,6 +87,17 @@ std::size_t count(const std::vector<Json> &lines, const std::string &overlay) {
 
 } // namespace
 
+TEST(Sessions, AReplayShowsObjectsOnTheirTargets) {
+    std::string yaml = recording("lockstep", "12");
+    yaml.replace(yaml.find(scenes), scenes.size() + std::string("optix-cs.yaml").size(), "anchored.yaml");
+    ArhostRun run(yaml);
+    run.write("anchored.yaml", "version: 1\naxes: z-up\nambient: 1\nmaterials: {grey: {model: diffuse, diffuse: 1}}\n"
+                               "objects: [{sphere: {radius: 8}, material: grey, on: tag36h11-0}]\n");
+    ASSERT_EQ(run.run(), 0) << run.output();
+    ASSERT_EQ(run.run(replaying()), 0) << run.output();
+    expect_same(run);
+}
+
 TEST(Sessions, AReplayReproducesPosesAndImagesOfLockstep) {
     ArhostRun run(recording("lockstep", "40"));
     ASSERT_EQ(run.run(), 0) << run.output();

@@ -186,6 +186,7 @@ TEST_F(TargetsTest, RejectsInvalidPatternsAndPictures) {
     EXPECT_THAT(error_in("[{name: a, pattern: hiri.patt, side_mm: 80}]"),
                 HasSubstr("tracker.targets[0].pattern: there is no file 'hiri.patt'; did you mean 'hiro.patt'?"));
     EXPECT_THAT(error_in("[{name: a, image: a.png, width_mm: 80}]"), HasSubstr("image: there is no file 'a.png'"));
+    EXPECT_THAT(error_in("[{name: a, image: /home, width_mm: 80}]"), HasSubstr("image: '/home' is not a file"));
     EXPECT_EQ(error_in("[{pattern: hiro.patt, side_mm: 80}]"), at + ": the key 'name' is missing");
     EXPECT_EQ(error_in("[{name: a, pattern: hiro.patt}]"), at + ": the key 'side_mm' is missing");
     EXPECT_EQ(error_in("[{name: a, image: hiro.patt}]"), at + ": the key 'width_mm' is missing");

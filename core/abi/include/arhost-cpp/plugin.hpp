@@ -464,7 +464,7 @@ template <class T> constexpr arhost_tracker make_tracker_functions() {
     tracker.stop = stop_instance<T>;
     if constexpr (requires(const T &p) { p.state_size(); })
         tracker.state_size = state_size_of<T>;
-    if constexpr (requires(const T &p) { p.aspect(std::uint32_t{}); })
+    if constexpr (requires(T & p) { p.aspect(std::uint32_t{}); })
         tracker.aspect = aspect_of<T>;
     return tracker;
 }
