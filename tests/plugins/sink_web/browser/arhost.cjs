@@ -8,9 +8,11 @@ const path = require("node:path");
 const {chromium} = require("playwright-core");
 
 const build = process.env.ARHOST_BUILD;
+// Limits what hangs, not what is slow: other tests may occupy the machine.
+const patience_s = 60;
 const sleep = ms => new Promise(resolve => setTimeout(resolve, ms));
 
-async function until(what, condition, seconds = 20) {
+async function until(what, condition, seconds = patience_s) {
   for (const end = Date.now() + 1000 * seconds; Date.now() < end; await sleep(20)) {
     const value = await condition();
     if (value)
@@ -79,4 +81,4 @@ stats: stats.json
 // Chromium cannot create its own sandbox as root and in most containers.
 const launch = () => chromium.launch({executablePath: "/usr/bin/chromium", args: ["--no-sandbox", "--disable-dev-shm-usage"]});
 
-module.exports = {Run, commands, launch, sleep, until};
+module.exports = {Run, commands, launch, patience_s, sleep, until};
