@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <stdexcept>
 
 namespace arhost::map {
 namespace {
@@ -149,6 +150,9 @@ Detector detector_of(const marker::Family &family, const std::set<int> &ids, con
         return shared(std::make_shared<ArucoMarkers>(*type, ids, camera));
     }
     const auto type = std::ranges::find(apriltag::family_types, family.name, &apriltag::FamilyType::name);
+    if (type == apriltag::family_types.end())
+        throw std::runtime_error("arhost map finds AprilTags and markers of OpenCV, not " + family.name +
+                                 "; write the map by hand, as in docs/markers.md");
     return shared(std::make_shared<AprilTags>(*type, ids, camera));
 }
 

@@ -111,6 +111,29 @@ private:
         for (const auto &[column, row, width, height] : blocks_of(family.black(marker.id), family.cells))
             add(left + edge(column), top + edge(row), left + edge(column + width), top + edge(row + height));
         cairo_fill(context_.get());
+        if (family.picture)
+            draw(*family.picture, left, top, marker.side_mm * scale_);
+    }
+
+    // Each sample reaches to the right and bottom edge, below the following ones: between neighbours that end at the
+    // same edge, an antialiased line would show.
+    void draw(const Picture &picture, double left, double top, double side) {
+        const double first = side * (1 - picture.ratio) / 2, pitch = side * picture.ratio / picture.side;
+        const auto edge = [&](int samples) { return placed(first + samples * pitch); };
+        if (whole_) // the surface has only ink, which brighter samples must replace
+            cairo_set_operator(context_.get(), CAIRO_OPERATOR_SOURCE);
+        for (int i = 0; i < picture.side * picture.side; ++i) {
+            const double white = picture.grey[static_cast<std::size_t>(i)] / 255.0;
+            if (whole_)
+                cairo_set_source_rgba(context_.get(), 0, 0, 0, 1 - white);
+            else
+                cairo_set_source_rgb(context_.get(), white, white, white);
+            add(left + edge(i % picture.side), top + edge(i / picture.side), left + edge(picture.side),
+                top + edge(picture.side));
+            cairo_fill(context_.get());
+        }
+        cairo_set_operator(context_.get(), CAIRO_OPERATOR_OVER);
+        cairo_set_source_rgb(context_.get(), 0, 0, 0);
     }
 
     // Adds a rectangle to the path. cairo_rectangle() would round the width instead of the right edge.
@@ -214,7 +237,8 @@ std::string as_png(const Document &document, std::size_t page, const Family &fam
     const int width = static_cast<int>(std::lround(document.width_mm * pixels_per_mm));
     const int height = static_cast<int>(std::lround(document.height_mm * pixels_per_mm));
     const PlacedMarker &marker = document.pages[page].markers.front();
-    const double cell = marker.side_mm / family.border_cells * pixels_per_mm;
+    const double cells = family.picture ? family.picture->side / family.picture->ratio : family.border_cells;
+    const double cell = marker.side_mm / cells * pixels_per_mm;
     if (cell < 2)
         throw std::runtime_error(
             fmt::format("--dpi {}: a cell would be only {:.1f} px wide; use a larger --dpi or a PDF", dpi, cell));

@@ -3,6 +3,8 @@
 
 #include <fiducial_common/apriltag_families.hpp>
 #include <fiducial_common/aruco_dictionaries.hpp>
+#include <fiducial_common/matrix_codes.hpp>
+#include <fiducial_common/pattern_file.hpp>
 
 #include <fmt/format.h>
 
@@ -10,6 +12,8 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
+#include <iterator>
 #include <memory>
 #include <numeric>
 #include <stdexcept>
@@ -19,32 +23,67 @@
 namespace arhost::marker {
 namespace {
 
+constexpr double artoolkit_quiet = 0.125; // half of the border
+
 Family april_tags(const apriltag::FamilyType &type) {
     const std::shared_ptr<apriltag_family_t> family(type.create(), type.destroy);
     // Families with a reversed border have bits outside it. The others only have their quiet zone there.
     const int cells = family->reversed_border ? family->total_width : family->width_at_border;
-    return {
-        type.name, false, static_cast<int>(family->ncodes), cells, family->width_at_border, [family, cells](int id) {
-            const std::unique_ptr<image_u8_t, decltype(&image_u8_destroy)> image(apriltag_to_image(family.get(), id),
-                                                                                 image_u8_destroy);
-            const int quiet = (image->width - cells) / 2;
-            std::vector<bool> black;
-            for (int row = quiet; row < quiet + cells; ++row)
-                for (int column = quiet; column < quiet + cells; ++column)
-                    black.push_back(image->buf[row * image->stride + column] == 0);
-            return black;
-        }};
+    return {type.name,
+            false,
+            static_cast<int>(family->ncodes),
+            cells,
+            family->width_at_border,
+            [family, cells](int id) {
+                const std::unique_ptr<image_u8_t, decltype(&image_u8_destroy)> image(
+                    apriltag_to_image(family.get(), id), image_u8_destroy);
+                const int quiet = (image->width - cells) / 2;
+                std::vector<bool> black;
+                for (int row = quiet; row < quiet + cells; ++row)
+                    for (int column = quiet; column < quiet + cells; ++column)
+                        black.push_back(image->buf[row * image->stride + column] == 0);
+                return black;
+            },
+            1.0 / family->width_at_border};
 }
 
 Family aruco_markers(const aruco::DictionaryType &type) {
     const cv::aruco::Dictionary dictionary = aruco::predefined(type.name);
     const int cells = dictionary.markerSize + 2;
-    return {type.family, true, dictionary.bytesList.rows, cells, cells, [dictionary, cells](int id) {
+    return {type.family,
+            true,
+            dictionary.bytesList.rows,
+            cells,
+            cells,
+            [dictionary, cells](int id) {
                 cv::Mat image;
                 aruco::draw(dictionary, id, cells, image, 1);
                 const cv::Mat_<uchar> is_black = image == 0;
                 return std::vector<bool>(is_black.begin(), is_black.end());
-            }};
+            },
+            1.0 / cells};
+}
+
+// In halves of the code's cells, because the border is half as wide as all of them.
+Family matrix_codes(const fiducial::MatrixFamily &type) {
+    const int side = 4 * type.side;
+    return {type.name,
+            false,
+            type.id_count,
+            side,
+            side,
+            [&type, side](int id) {
+                const std::vector<bool> code = fiducial::matrix_cells(type, id);
+                std::vector<bool> black;
+                for (int row = 0; row < side; ++row)
+                    for (int column = 0; column < side; ++column) {
+                        const int y = row - type.side, x = column - type.side;
+                        const bool inside = std::min(x, y) >= 0 && std::max(x, y) < 2 * type.side;
+                        black.push_back(!inside || code[static_cast<std::size_t>(y / 2 * type.side + x / 2)]);
+                    }
+                return black;
+            },
+            artoolkit_quiet};
 }
 
 std::size_t edit_distance(std::string_view a, std::string_view b) {
@@ -68,6 +107,8 @@ std::vector<std::string> family_names() {
     for (const aruco::DictionaryType &type : aruco::dictionary_types)
         if (!type.is_april_tag())
             names.emplace_back(type.option);
+    for (const fiducial::MatrixFamily &type : fiducial::matrix_families())
+        names.emplace_back(type.name);
     return names;
 }
 
@@ -82,11 +123,22 @@ Family find_family(const std::string &name) {
     for (const apriltag::FamilyType &type : apriltag::family_types)
         if (known_as == type.name)
             return april_tags(type);
+    if (const auto *type = fiducial::find_matrix_family(name))
+        return matrix_codes(*type);
     std::vector<std::string> names = family_names();
     std::ranges::stable_sort(names, {}, [&](const std::string &other) { return edit_distance(name, other); });
     names.resize(3);
     throw std::runtime_error(fmt::format("unknown family '{}'; similar names: {}; 'arhost marker --help' lists all",
                                          name, fmt::join(names, ", ")));
+}
+
+Family read_pattern(const std::string &file, double ratio) {
+    const cv::Mat_<float> luma = fiducial::read_pattern(file);
+    Picture picture{ratio, luma.rows, {}};
+    std::ranges::transform(luma, std::back_inserter(picture.grey),
+                           [](float grey) { return static_cast<std::uint8_t>(std::lround(grey)); });
+    return {std::filesystem::path(file).filename(), false,           1,      1, 1,
+            [](int) { return std::vector{true}; },  artoolkit_quiet, picture};
 }
 
 std::vector<int> parse_ids(std::string_view text, const Family &family) {

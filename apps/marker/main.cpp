@@ -35,7 +35,7 @@ enum ExitStatus { success = 0, failed = 2 };
 
 struct Arguments {
     std::string markers, output, map, paper = "a4";
-    std::optional<double> side_mm, gap_mm, square_mm, marker_mm;
+    std::optional<double> side_mm, gap_mm, square_mm, marker_mm, pattern_ratio;
     std::array<std::uint32_t, 2> grid{}, charuco{}; // columns, rows; 0 if not given
     double margin_mm = 10;
     unsigned dpi = 600;
@@ -95,12 +95,20 @@ Paper paper_of(const Arguments &arguments) {
     return {width, height, arguments.margin_mm};
 }
 
+bool is_pattern(const Arguments &arguments) {
+    return fs::path(arguments.markers).extension() == ".patt";
+}
+
 void expect_consistent(const Arguments &arguments) {
     const bool is_grid = arguments.grid[0] > 0, is_charuco = arguments.charuco[0] > 0;
     const auto reject = [](bool wrong, const char *message) {
         if (wrong)
             throw std::runtime_error(message);
     };
+    reject(!is_pattern(arguments) && arguments.pattern_ratio,
+           "--pattern-ratio needs a pattern file of ARToolKit, such as hiro.patt");
+    reject(is_pattern(arguments) && (is_grid || is_charuco),
+           "--grid and --charuco need a family of markers; print the patterns one by one");
     reject(is_grid && is_charuco, "--grid and --charuco exclude each other; remove one of them");
     reject(is_charuco && arguments.side_mm,
            "--side does not apply to --charuco; set the marker's side with --marker");
@@ -122,10 +130,9 @@ std::vector<Item> items_of(const Arguments &arguments, const Family &family, con
     if (squares_x > 0)
         return {charuco_board(family, board_ids(family, ids, squares_x * squares_y / 2), as_int(squares_x),
                               as_int(squares_y), *arguments.square_mm, *arguments.marker_mm)};
-    const double cell = *arguments.side_mm / family.border_cells;
     if (columns > 0)
         return {grid_board(family, board_ids(family, ids, columns * rows), as_int(columns), as_int(rows),
-                           *arguments.side_mm, arguments.gap_mm.value_or(cell))};
+                           *arguments.side_mm, arguments.gap_mm.value_or(*arguments.side_mm * family.quiet))};
     std::vector<Item> items(ids.size());
     std::ranges::transform(ids, items.begin(), [&](int id) { return single_marker(family, id, *arguments.side_mm); });
     return items;
@@ -147,10 +154,12 @@ Result draw(const Arguments &arguments) {
         throw std::runtime_error(arguments.output + ": the file's name must end in .pdf, .svg or .png");
     expect_consistent(arguments);
     const Paper paper = paper_of(arguments);
-    const std::size_t colon = arguments.markers.find(':');
-    const Family family = find_family(arguments.markers.substr(0, colon));
+    const std::size_t colon = is_pattern(arguments) ? std::string::npos : arguments.markers.find(':');
+    const Family family = is_pattern(arguments)
+                              ? read_pattern(arguments.markers, arguments.pattern_ratio.value_or(0.5))
+                              : find_family(arguments.markers.substr(0, colon));
     const bool is_board = arguments.grid[0] > 0 || arguments.charuco[0] > 0;
-    if (colon == std::string::npos && !is_board)
+    if (colon == std::string::npos && !is_board && !is_pattern(arguments))
         throw std::runtime_error(fmt::format("'{0}' names no ids; write for example {0}:0-9", arguments.markers));
     const std::string ids = colon == std::string::npos ? "0" : arguments.markers.substr(colon + 1);
     const std::vector<Item> items = items_of(arguments, family, parse_ids(ids, family));
@@ -206,7 +215,8 @@ int main(int argc, char **argv) {
     Arguments arguments;
     app.option(
            "MARKERS", arguments.markers,
-           "Family and ids, such as tag36h11:0-35 or DICT_6X6_250:7,9,12-20; for a board its first id, by default 0")
+           "Family and ids, such as tag36h11:0-35 or DICT_6X6_250:7,9,12-20; for a board its first id, by default 0; "
+           "or a pattern file of ARToolKit, such as hiro.patt")
         .required();
     const auto add_length = [&](const char *name, auto &value, double minimum_mm, const char *help) {
         return app.option(name, value, help).type_name("MM").check(length_from(minimum_mm, 1000));
@@ -220,10 +230,13 @@ int main(int argc, char **argv) {
         app.option(name, counts, help).separator('x').type_name("COLUMNSxROWS").range(minimum, 200);
     };
     add_counts("--grid", arguments.grid, 1, "Print a board: a grid of markers");
-    add_length("--gap", arguments.gap_mm, 0, "Gap between the markers of --grid (default: one cell)");
+    add_length("--gap", arguments.gap_mm, 0, "Gap between the markers of --grid (default: the smallest possible)");
     add_counts("--charuco", arguments.charuco, 2, "Print a ChArUco board, as a number of squares");
     add_length("--square", arguments.square_mm, 1, "Side of a square of --charuco");
     add_length("--marker", arguments.marker_mm, 1, "Side of a marker of --charuco");
+    app.option("--pattern-ratio", arguments.pattern_ratio,
+               "Side of the picture of a .patt file, relative to that of the black square (default: 0.5)")
+        .range(0.1, 0.9);
     app.option("--map", arguments.map, "Also write the board's map, such as board.map.yaml").type_name("FILE");
     app.option("--paper", arguments.paper, "a4, a3, letter, or WIDTHxHEIGHT in mm; landscape if that saves pages")
         .type_name("FORMAT")

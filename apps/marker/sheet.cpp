@@ -74,20 +74,21 @@ std::string mm_text(double mm) {
 
 Item single_marker(const Family &family, int id, double side_mm) {
     Item item = grid_board(family, {id}, 1, 1, side_mm, side_mm);
-    item.label = fmt::format("{} {}, {} mm", family.name, id, mm_text(side_mm));
+    item.label = family.picture ? fmt::format("{}, {} mm", family.name, mm_text(side_mm))
+                                : fmt::format("{} {}, {} mm", family.name, id, mm_text(side_mm));
     return item;
 }
 
 Item grid_board(const Family &family, const std::vector<int> &ids, int columns, int rows, double side_mm,
                 double gap_mm) {
-    const double cell = side_mm / family.border_cells, print = cell * family.cells, pitch = print + gap_mm;
-    if (gap_mm < cell * (1 - 1e-9))
-        throw std::runtime_error(
-            fmt::format("--gap {}: each marker needs a quiet zone of one cell; use --gap {} or more", mm_text(gap_mm),
-                        mm_text(std::ceil(cell * 100 - 1e-6) / 100)));
+    const double print = side_mm / family.border_cells * family.cells, pitch = print + gap_mm;
+    const double quiet = side_mm * family.quiet;
+    if (gap_mm < quiet * (1 - 1e-9))
+        throw std::runtime_error(fmt::format("--gap {}: each marker needs a quiet zone; use --gap {} or more",
+                                             mm_text(gap_mm), mm_text(std::ceil(quiet * 100 - 1e-6) / 100)));
     Item board{columns * pitch - gap_mm,
                rows * pitch - gap_mm,
-               cell,
+               quiet,
                {},
                {},
                fmt::format("{} {}, {} x {}, {} mm, gap {} mm", family.name, id_range(ids), columns, rows,
@@ -104,8 +105,8 @@ Item charuco_board(const Family &family, const std::vector<int> &ids, int column
                    double marker_mm) {
     if (!family.is_dictionary)
         throw std::runtime_error(
-            fmt::format("--charuco: {} is not an ArUco dictionary, and OpenCV detects ChArUco boards "
-                        "of AprilTags only if they are upside down; use for example DICT_6X6_250",
+            fmt::format("--charuco: {} is not an ArUco dictionary, and OpenCV detects no ChArUco boards of other "
+                        "markers, and those of AprilTags only if they are upside down; use for example DICT_6X6_250",
                         family.name));
     const double cell = marker_mm / family.cells, largest = square_mm * family.cells / (family.cells + 2);
     if (marker_mm > largest * (1 + 1e-9))
@@ -145,7 +146,7 @@ std::string map_of(const Item &board, const Family &family) {
 
 Document lay_out(const std::vector<Item> &items, const Paper &paper, bool cut_marks) {
     const Item &first = items.front();
-    const double quiet = first.cell_mm + (cut_marks ? cut_mark_space_mm : 0);
+    const double quiet = first.quiet_mm + (cut_marks ? cut_mark_space_mm : 0);
     const double slot_width = first.width_mm + 2 * quiet, slot_height = first.height_mm + 2 * quiet + label_space_mm;
     const Layout as_given(paper.width_mm, paper.height_mm, paper.margin_mm, slot_width, slot_height);
     const Layout turned(paper.height_mm, paper.width_mm, paper.margin_mm, slot_width, slot_height);

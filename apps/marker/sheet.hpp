@@ -22,7 +22,7 @@ struct Square {
 // A single marker, or a board: a rigid body of several markers. Coordinates begin at its top left corner.
 struct Item {
     double width_mm, height_mm; // without the quiet zone
-    double cell_mm;             // of its markers
+    double quiet_mm;            // width of the quiet zone
     std::vector<PlacedMarker> markers;
     std::vector<Square> squares; // the black squares of a ChArUco board
     std::string label;
@@ -30,7 +30,7 @@ struct Item {
 
 Item single_marker(const Family &family, int id, double side_mm);
 // Markers in rows from the top left. `gap_mm`: between neighbouring prints. Throws std::runtime_error if the gap is
-// narrower than a cell.
+// narrower than the quiet zone.
 Item grid_board(const Family &family, const std::vector<int> &ids, int columns, int rows, double side_mm,
                 double gap_mm);
 // A board of OpenCV 4.6 and later: the top left square is black, and the ids are in rows from the top left. Throws

@@ -120,11 +120,13 @@ std::vector<Key> make_table() {
          {"targets[].ids", text, false, "",
           "IDs of several single markers, such as `0-35` or `[0-3, 7]`: a target for each, named FAMILY-ID."},
          {"targets[].family", text, false, "",
-          "Family of `marker` or `ids`, or of a bundle in `map`, such as `tag36h11`; `dictionary` means the same."},
+          "Family of `marker` or `ids`, or of a `map` whose format does not name it, such as `tag36h11`; "
+          "`dictionary` means "
+          "the same."},
          {"targets[].dictionary", text, false, "", "Dictionary of `marker` or `ids`, such as `DICT_6X6_250`."},
          {"targets[].side_mm", real, false, "", "Side of the black square of `marker`, `ids` or `pattern`, in mm."},
          {"targets[].map", input_path, false, "",
-          "File with the places of several markers, or with bundles of apriltag_ros (docs/markers.md)."},
+          "File with the places of several markers, also of apriltag_ros or ARToolKit (docs/markers.md)."},
          {"targets[].pattern", input_path, false, "", "Pattern file of ARToolKit (`.patt`), for `tracker_pattern`."},
          {"targets[].pattern_ratio", real, false, "0.5",
           "Side of the pattern inside the black border, relative to that of the square."},

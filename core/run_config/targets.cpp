@@ -3,6 +3,7 @@
 
 #include "base/text.hpp"
 #include "run_config/access.hpp"
+#include "run_config/multi_marker.hpp"
 #include "run_config/schema.hpp"
 #include "run_config/user_view.hpp"
 
@@ -36,6 +37,7 @@ constexpr std::int32_t max_id = std::numeric_limits<std::int32_t>::max();
 constexpr double min_side_mm = 0.01, max_side_mm = 1e6, max_coordinate_mm = 1e7;
 constexpr double tolerance = 0.01;                                         // of places in a map, relative to the side
 constexpr const char *pattern_family = "pattern", *image_family = "image"; // arhost_marker_config.file
+constexpr double default_pattern_ratio = 0.5;                              // ARToolKit's
 constexpr const char *name_rule = "letters, digits, '_', '.' and '-'";
 
 bool is_name(std::string_view text, std::size_t size_with_nul) {
@@ -89,15 +91,21 @@ double parse_side(const yaml::Node &node) {
     return node.real(min_side_mm, max_side_mm);
 }
 
-// Returns whether it warns.
-bool warn_of_side(const yaml::Node &node, double side_mm, std::vector<std::string> &warnings) {
+// Returns a warning, or "".
+std::string doubt_of_side(double side_mm) {
     if (side_mm >= 1 && side_mm <= 5000)
-        return false;
+        return "";
     char text[32];
     char *const end = std::to_chars(text, std::end(text), side_mm, std::chars_format::general, 6).ptr;
-    warnings.push_back(warning_at(node, "a marker with a side of " + std::string(text, end) +
-                                            " mm is implausible; check the unit, which is mm"));
-    return true;
+    return "a marker with a side of " + std::string(text, end) + " mm is implausible; check the unit, which is mm";
+}
+
+// Returns whether it warns.
+bool warn_of_side(const yaml::Node &node, double side_mm, std::vector<std::string> &warnings) {
+    const std::string doubt = doubt_of_side(side_mm);
+    if (!doubt.empty())
+        warnings.push_back(warning_at(node, doubt));
+    return !doubt.empty();
 }
 
 Corners square_mm(double side_mm) {
@@ -362,7 +370,58 @@ std::vector<TargetMarker> parse_bundle(const yaml::Node &bundles, const std::str
                         "{id: 0, size: 0.08, x: 0, y: 0, z: 0, qw: 1, qx: 0, qy: 0, qz: 0}", warnings);
 }
 
-Target parse_map_target(const yaml::Node &node, std::vector<fs::path> &map_files,
+// Reads the path of a target's print, which the tracker reads. `owner` reports errors.
+template <class Owner>
+std::string found_print(const fs::path &file, const Owner &owner, std::vector<fs::path> &files) {
+    std::error_code ignored;
+    if (!fs::exists(file, ignored))
+        owner.fail("there is no file '" + base::printable(file.string()) + "'" + hint_at_similar_name(file));
+    if (!fs::is_regular_file(file, ignored))
+        owner.fail("'" + base::printable(file.string()) + "' is not a file");
+    files.push_back(file);
+    return file.string();
+}
+
+// Takes the markers of a multi-marker file. `number`: the id that the first pattern gets.
+std::vector<TargetMarker> markers_of(const std::vector<MultiMarker> &layout, const yaml::Node &target,
+                                     const fs::path &folder, std::size_t number, std::vector<fs::path> &files,
+                                     std::vector<std::string> &warnings) {
+    std::vector<TargetMarker> markers;
+    std::vector<Corners> places;
+    bool has_ids = false;
+    for (std::size_t i = 0; i < layout.size(); ++i) {
+        const MultiMarker &one = layout[i];
+        places.push_back(placed(0, one.side_mm, one.rotation, one.position_mm).corners_mm);
+        for (std::size_t k = 0; k < i; ++k) {
+            if (layout[k].print == one.print)
+                one.fail("'" + base::printable(one.print, 200) + "' is also at " + layout[k].where +
+                         "; keep one of them");
+            if (are_at_the_same_place(places[k], places[i]))
+                one.fail("this marker is at the place of that at " + layout[k].where + "; correct one of them");
+        }
+        if (const std::string doubt = doubt_of_side(one.side_mm); i == 0 && !doubt.empty())
+            warnings.push_back(one.where + ": " + doubt);
+        const bool is_id = one.print.find_first_not_of("0123456789") == std::string::npos;
+        if (is_id) {
+            std::int32_t id = 0;
+            if (std::from_chars(one.print.data(), one.print.data() + one.print.size(), id).ec != std::errc())
+                one.fail("ids are 0 to " + std::to_string(max_id) + ", but this is " +
+                         base::printable(one.print, 200));
+            markers.push_back(marker_of(id, parse_family(target), places[i]));
+        } else {
+            markers.push_back(marker_of(static_cast<std::int64_t>(number + i), pattern_family, places[i]));
+            markers.back().file = found_print((folder / one.print).lexically_normal(), one, files);
+            markers.back().pattern_ratio = default_pattern_ratio;
+        }
+        has_ids |= is_id;
+    }
+    for (const char *key : {"family", "dictionary"})
+        if (const auto family = target.find(key); family && !has_ids)
+            family->fail("does not apply to a map of patterns; remove it");
+    return markers;
+}
+
+Target parse_map_target(const yaml::Node &node, std::size_t number, std::vector<fs::path> &map_files,
                         std::vector<std::string> &warnings) {
     Target target{parse_name(node.require("name"), ARHOST_MAX_NAME), {}, ""};
     const yaml::Node map = node.require("map");
@@ -371,7 +430,13 @@ Target parse_map_target(const yaml::Node &node, std::vector<fs::path> &map_files
     if (!fs::exists(file, ignored))
         map.fail("there is no map file '" + file.string() + "'" + hint_at_similar_name(file));
     map_files.push_back(file);
-    const yaml::Node root = yaml::Node::load(file);
+    const std::string text = yaml::read_file(file);
+    if (is_multi_marker_file(text)) {
+        target.markers =
+            markers_of(parse_multi_marker_file(file, text), node, file.parent_path(), number, map_files, warnings);
+        return target;
+    }
+    const yaml::Node root = yaml::Node::parse(text, file.string());
     if (const auto bundles = root.find("tag_bundles")) {
         target.markers = parse_bundle(*bundles, target.name, parse_family(node), warnings);
         return target;
@@ -383,18 +448,6 @@ Target parse_map_target(const yaml::Node &node, std::vector<fs::path> &map_files
     return target;
 }
 
-// Reads the path of a target's print, which the tracker reads.
-std::string parse_print(const yaml::Node &node, std::vector<fs::path> &files) {
-    const fs::path file = node.input_path();
-    std::error_code ignored;
-    if (!fs::exists(file, ignored))
-        node.fail("there is no file '" + file.string() + "'" + hint_at_similar_name(file));
-    if (!fs::is_regular_file(file, ignored))
-        node.fail("'" + file.string() + "' is not a file");
-    files.push_back(file);
-    return file.string();
-}
-
 // A pattern of ARToolKit or a picture. `number`: the id that the marker gets.
 Target parse_print_target(const yaml::Node &node, const char *kind, std::size_t number, std::vector<fs::path> &files,
                           std::vector<std::string> &warnings) {
@@ -402,9 +455,10 @@ Target parse_print_target(const yaml::Node &node, const char *kind, std::size_t 
     const yaml::Node side = node.require(is_pattern ? "side_mm" : "width_mm");
     TargetMarker marker = marker_of(static_cast<std::int64_t>(number), kind, square_mm(parse_side(side)));
     warn_of_side(side, parse_side(side), warnings);
-    marker.file = parse_print(node.require(kind), files);
+    const yaml::Node print = node.require(kind);
+    marker.file = found_print(print.input_path(), print, files);
     const auto ratio = node.find("pattern_ratio");
-    marker.pattern_ratio = ratio ? ratio->real(0.1, 0.9) : is_pattern ? 0.5 : 0;
+    marker.pattern_ratio = ratio ? ratio->real(0.1, 0.9) : is_pattern ? default_pattern_ratio : 0;
     return {parse_name(node.require("name"), ARHOST_MAX_NAME), {marker}, ""};
 }
 
@@ -446,7 +500,8 @@ std::string kind_of(const yaml::Node &node) {
     return found->key;
 }
 
-// Returns the targets of an element of the list; several if it is a range of ids. `number`: of the first one.
+// Returns the targets of an element of the list; several if it is a range of ids. `number`: of its first
+// marker.
 std::vector<Target> parse_target(const yaml::Node &node, std::size_t number, std::vector<fs::path> &files,
                                  std::vector<std::string> &warnings) {
     if (!node.is_map())
@@ -457,7 +512,7 @@ std::vector<Target> parse_target(const yaml::Node &node, std::size_t number, std
     if (kind == "body")
         return {{parse_name(node.require("name"), ARHOST_MAX_NAME), {}, parse_body(node.require("body"))}};
     if (kind == "map")
-        return {parse_map_target(node, files, warnings)};
+        return {parse_map_target(node, number, files, warnings)};
     if (kind == pattern_family || kind == image_family)
         return {parse_print_target(node, kind.c_str(), number, files, warnings)};
 
@@ -505,7 +560,7 @@ std::vector<Target> parse_targets(const yaml::Node &list, std::vector<fs::path> 
     std::vector<Target> targets;
     Owners owners;
     for (const yaml::Node &node : list.items())
-        for (Target &target : parse_target(node, targets.size(), files, warnings)) {
+        for (Target &target : parse_target(node, owners.marker_count(), files, warnings)) {
             owners.add(node, target);
             targets.push_back(std::move(target));
             for (const auto &[count, limit, what] : {std::tuple{targets.size(), int{ARHOST_MAX_TARGETS}, "targets"},

@@ -15,11 +15,10 @@ using Samples = cv::Mat_<float>;
 
 class Pattern {
 public:
-    // Reads a .patt file: the picture in four orientations, each with the planes blue, green and red, as rows of
-    // numbers from 0 to 255. Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION), with the place of the error.
+    // Reads a .patt file. Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION), with the place of the error.
     explicit Pattern(const std::string &file);
 
-    int side() const { return side_; } // samples
+    int side() const { return rotated_[0].rows; } // samples
 
     // Returns the correlation of samples of this size with the picture, −1 to 1, and the number of quarter turns
     // (clockwise, as seen) by which the print is rotated. `normalized`: from `normalized()`.
@@ -30,7 +29,6 @@ public:
     Match match(const Samples &normalized) const;
 
 private:
-    int side_ = 0;
     std::array<Samples, 4> rotated_; // normalized; rotated clockwise by 0 to 3 quarter turns
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // tracker_pattern: detects the square patterns of ARToolKit.
+#include "matrix_reader.hpp"
 #include "pattern.hpp"
 #include "squares.hpp"
 
@@ -14,7 +15,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
+#include <limits>
+#include <map>
 #include <optional>
 
 namespace tracker_pattern {
@@ -59,16 +61,20 @@ public:
 
     void start(const arhost_tracker_setup &setup) {
         stop();
-        for (std::uint32_t i = 0; i < setup.family_count; ++i)
-            if (std::strcmp(setup.families[i], "pattern") != 0)
-                throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                              std::string("unknown family '") + setup.families[i] +
-                                  "': tracker_pattern finds targets with a 'pattern'; tracker_apriltag and "
-                                  "tracker_aruco have families of markers");
+        arhost::fiducial::families_of(setup, id_count);
         for (const arhost_marker_config &marker : arhost::elements(setup.markers, setup.marker_count)) {
-            if (!marker.file)
+            const char *const family = setup.families[marker.family];
+            if (const auto *type = arhost::fiducial::find_matrix_family(family)) {
+                auto reader = std::ranges::find(matrix_readers_, type->side, &MatrixReader::cells);
+                if (reader == matrix_readers_.end())
+                    reader = matrix_readers_.insert(reader, MatrixReader(type->side));
+                reader->add(*type, marker.id, marker.family);
+            } else if (marker.file) {
+                const Pattern pattern(marker.file);
+                patterns_[{marker.pattern_ratio, pattern.side()}].push_back({marker.id, marker.family, pattern});
+            } else {
                 throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "a marker of the family 'pattern' has no file");
-            marked_.push_back({marker.id, marker.family, marker.pattern_ratio, Pattern(marker.file)});
+            }
         }
         lens_.emplace(*setup.intrinsics);
         regions_.emplace(setup, [](const std::string &) { return 0.1; });
@@ -88,50 +94,86 @@ public:
         arhost::fiducial::report(std::move(seen), observations);
     }
 
-    void stop() { marked_.clear(); }
+    void stop() {
+        patterns_.clear();
+        matrix_readers_.clear();
+    }
 
 private:
-    // A pattern that a target has.
     struct Marked {
         std::int32_t id;
         std::uint32_t family;
-        double ratio; // of the side of the picture to that of the square
         Pattern pattern;
     };
+    // The samples of a square that patterns of the same size have in common.
+    struct Sampling {
+        double ratio; // of the side of the samples to that of the square
+        int side;     // samples
+        auto operator<=>(const Sampling &) const = default;
+    };
 
-    // Adds the patterns in a region of the frame to `seen`.
-    void observe(const cv::Mat &grey, const cv::Rect &region, std::vector<arhost_observation> &seen) const {
-        for (Corners rough_px : find_squares(grey(region), min_side_px_)) {
-            for (cv::Point2d &corner : rough_px)
-                corner += cv::Point2d(region.tl());
-            const Marked *best = nullptr;
-            Pattern::Match match{min_correlation_, 0};
-            for (const Marked &marked : marked_) {
-                const Samples samples = normalized(interior(grey, rough_px, marked.ratio, marked.pattern.side()));
-                if (samples.empty())
-                    continue;
-                if (const Pattern::Match found = marked.pattern.match(samples);
-                    found.correlation > match.correlation) {
-                    match = found;
-                    best = &marked;
-                }
-            }
-            if (!best)
+    static int id_count(const std::string &family) {
+        if (family == "pattern")
+            return std::numeric_limits<int>::max();
+        if (const auto *type = arhost::fiducial::find_matrix_family(family))
+            return type->id_count;
+        std::string names;
+        for (const auto &type : arhost::fiducial::matrix_families())
+            names += std::string(names.empty() ? "" : ", ") + type.name;
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                      "unknown family '" + family + "': tracker_pattern finds targets with a 'pattern', and has " +
+                          names + "; tracker_apriltag and tracker_aruco have other families");
+    }
+
+    // The marker that a square resembles most.
+    struct Best {
+        arhost_observation observation{}; // without corners
+        double correlation = 0, ratio = 0;
+        int quarter_turns = 0;
+    };
+    Best recognised(const cv::Mat &grey, const Corners &corners_px) const {
+        Best best;
+        const auto consider = [&](const auto &marker, const auto &match, double ratio, int wrong_cells) {
+            if (match.correlation <= best.correlation)
+                return;
+            best = {{}, match.correlation, ratio, match.quarter_turns};
+            best.observation.id = marker.id;
+            best.observation.family = marker.family;
+            best.observation.hamming = wrong_cells;
+            best.observation.decision_margin = 100 * match.correlation;
+        };
+        for (const auto &[sampling, patterns] : patterns_) {
+            const Samples samples = normalized(interior(grey, corners_px, sampling.ratio, sampling.side));
+            if (samples.empty())
                 continue;
-            Corners corners_px = rough_px;
+            for (const Marked &marked : patterns)
+                if (const Pattern::Match match = marked.pattern.match(samples); match.correlation > min_correlation_)
+                    consider(marked, match, sampling.ratio, 0);
+        }
+        for (const MatrixReader &reader : matrix_readers_)
+            if (const auto match = reader.match(interior(grey, corners_px, reader.ratio(), reader.side())))
+                consider(*match, *match, arhost::fiducial::matrix_ratio, match->wrong_cells);
+        return best;
+    }
+
+    // Adds the markers in a region of the frame to `seen`.
+    void observe(const cv::Mat &grey, const cv::Rect &region, std::vector<arhost_observation> &seen) const {
+        for (Corners corners_px : find_squares(grey(region), min_side_px_)) {
+            for (cv::Point2d &corner : corners_px)
+                corner += cv::Point2d(region.tl());
+            const Best best = recognised(grey, corners_px);
+            if (best.correlation <= 0)
+                continue;
             // The search for an edge must not reach the picture inside the border.
-            const int cells = static_cast<int>(std::ceil(2 / (1 - best->ratio)));
+            const int cells = static_cast<int>(std::ceil(2 / (1 - best.ratio)));
             corners_px = arhost::fiducial::refine_edges(grey, corners_px, *lens_, cells).value_or(corners_px);
             // A print that is rotated clockwise begins with a later corner.
-            std::rotate(corners_px.begin(), corners_px.begin() + match.quarter_turns, corners_px.end());
-            arhost_observation &one = seen.emplace_back();
-            one.id = best->id;
-            one.family = best->family;
+            std::rotate(corners_px.begin(), corners_px.begin() + best.quarter_turns, corners_px.end());
+            arhost_observation &one = seen.emplace_back(best.observation);
             for (std::size_t i = 0; i < 4; ++i) {
                 one.corners_px[i][0] = corners_px[i].x;
                 one.corners_px[i][1] = corners_px[i].y;
             }
-            one.decision_margin = 100 * match.correlation;
         }
     }
 
@@ -155,7 +197,8 @@ private:
     double min_correlation_ = 0.6, min_side_px_ = 12;
     std::optional<arhost::fiducial::Lens> lens_;
     std::optional<arhost::fiducial::SearchRegions> regions_;
-    std::vector<Marked> marked_;
+    std::map<Sampling, std::vector<Marked>> patterns_;
+    std::vector<MatrixReader> matrix_readers_;
 };
 
 } // namespace

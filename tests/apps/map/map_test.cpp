@@ -248,6 +248,8 @@ TEST_F(MapProgram, RejectsInvalidArgumentsWithoutWritingAFile) {
         {photos + camera + side, "--output is required"},
         {photos + camera + side + "-o missing/desk.yaml", "missing/desk.yaml: No such file or directory"},
         {photos + " --camera camera.yaml --family tag36h12 --side 40 " + out, "unknown family 'tag36h12'"},
+        {photos + " --camera camera.yaml --family artoolkit-3x3 --side 40 " + out,
+         "arhost map finds AprilTags and markers of OpenCV, not artoolkit-3x3"},
         {photos + " --camera missing.yaml --family tag36h11 --side 40 " + out, "missing.yaml"},
         {photos + " --camera wide.yaml --family tag36h11 --side 40 " + out,
          "the calibration is for images of 1280×480"},

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Prints sheets with arhost-marker and measures them with the libraries that the trackers use.
+#include "fiducial_common/tracker_support.hpp"
 #include "plugin_under_test.hpp"
 #include "run_config/targets.hpp"
 
 #include <fiducial_common/apriltag_families.hpp>
 #include <fiducial_common/aruco_dictionaries.hpp>
+#include <fiducial_common/matrix_codes.hpp>
 
 #include <gmock/gmock.h>
 #include <opencv2/aruco/charuco.hpp>
@@ -77,7 +79,26 @@ Found aruco_markers(const std::string &name, const cv::Mat &picture) {
     return found;
 }
 
+// Finds what tracker_pattern finds.
+Found artoolkit_markers(const std::vector<arhost::test::Listed> &listed, const cv::Mat &picture) {
+    arhost::test::Tracker tracker("tracker_pattern");
+    if (tracker.start(arhost::test::plain_camera(picture.size()), listed) != ARHOST_STATUS_OK)
+        throw std::runtime_error(tracker.log());
+    Found found;
+    for (const arhost_observation &seen : tracker.track(arhost::test::GreyFrame(picture)))
+        for (std::size_t k = 0; k < 4; ++k) // pixel centres are at integers
+            found[seen.id][k] =
+                (cv::Point2d(seen.corners_px[k][0], seen.corners_px[k][1]) + cv::Point2d(0.5, 0.5)) / px_per_mm;
+    return found;
+}
+
 Found markers(const std::string &name, const cv::Mat &picture) {
+    if (const auto *family = arhost::fiducial::find_matrix_family(name)) {
+        std::vector<arhost::test::Listed> listed;
+        for (int id = 0; id < std::min(family->id_count, 64); ++id)
+            listed.push_back({id, 12, name});
+        return artoolkit_markers(listed, picture);
+    }
     return name.starts_with("DICT_") ? aruco_markers(name, picture) : april_tags(name, picture);
 }
 
@@ -136,6 +157,15 @@ protected:
         return {std::istreambuf_iterator<char>(stream), {}};
     }
     std::string printed() const { return read("../output.txt"); }
+    // Writes a pattern file of ARToolKit: grey levels from 20 on, and a white corner at the top left.
+    fs::path write_pattern() const {
+        const fs::path file = folder() / "hiro.patt";
+        std::ofstream stream(file);
+        for (int plane = 0; plane < 12; ++plane)
+            for (int i = 0; i < 16; ++i)
+                stream << (i == 0 ? 255 : 20 + 10 * i) << (i % 4 == 3 ? '\n' : ' ');
+        return file;
+    }
     std::vector<std::string> files() const {
         std::vector<std::string> names;
         for (const auto &entry : fs::directory_iterator(folder()))
@@ -229,7 +259,7 @@ TEST_P(EveryFamily, IsPrintedUprightInItsTrueSize) {
 TEST_P(EveryFormat, HasMarkersInTheirTrueSize) {
     ARHOST_REQUIRE_RENDERER(GetParam());
     for (const auto &[name, side_mm] :
-         {std::pair("tag36h11", 17.3), {"tagStandard41h12", 11.0}, {"DICT_5X5_100", 14.0}}) {
+         {std::pair("tag36h11", 17.3), {"tagStandard41h12", 11.0}, {"DICT_5X5_100", 14.0}, {"artoolkit-3x3", 15.0}}) {
         const std::string file = std::string("sheet.") + GetParam();
         ASSERT_EQ(print(std::string(name) + ":1-4 --side " + std::to_string(side_mm) +
                         " --paper 110x90 --margin 5 --cut-marks -o " + file),
@@ -238,6 +268,35 @@ TEST_P(EveryFormat, HasMarkersInTheirTrueSize) {
         const Found found = markers(name, page(file));
         EXPECT_THAT(ids_of(found), ElementsAre(1, 2, 3, 4));
         expect_upright_squares(found, side_mm);
+    }
+}
+
+TEST_F(Marker, PrintsTheMatrixCodesOfArToolKit) {
+    for (const auto &family : arhost::fiducial::matrix_families()) {
+        SCOPED_TRACE(family.name);
+        ASSERT_EQ(print(std::string(family.name) + ":0,3,7 --side 12 --paper 120x70 --margin 5 -o sheet.png"), 0)
+            << printed();
+        const Found found = markers(family.name, picture("sheet.png"));
+        EXPECT_THAT(ids_of(found), ElementsAre(0, 3, 7));
+        expect_upright_squares(found, 12);
+    }
+}
+
+TEST_P(EveryFormat, HasPatternsOfArToolKit) {
+    ARHOST_REQUIRE_RENDERER(GetParam());
+    const std::string pattern = write_pattern(), file = std::string("sheet.") + GetParam();
+    for (const auto &[option, ratio] : {std::pair("", 0.5), {" --pattern-ratio 0.7", 0.7}}) {
+        ASSERT_EQ(print("hiro.patt --side 20 --paper 60x70 --margin 5 -o " + file + option), 0) << printed();
+        const cv::Mat page = this->page(file);
+        const Found found = artoolkit_markers({{0, 20, "pattern", pattern, ratio}}, page);
+        ASSERT_THAT(ids_of(found), ElementsAre(0));
+        expect_upright_squares(found, 20);
+        const cv::Point2d centre = centre_of(found.at(0));
+        for (int i = 0; i < 16; ++i) {
+            const double cell = 20 * ratio / 4;
+            const cv::Point2d px = (centre + cell * cv::Point2d(i % 4 - 1.5, i / 4 - 1.5)) * px_per_mm;
+            EXPECT_NEAR(page.at<std::uint8_t>(px), i == 0 ? 255 : 20 + 10 * i, 1) << i;
+        }
     }
 }
 
@@ -272,6 +331,18 @@ TEST_P(EveryFormat, HasBoardsThatAgreeWithTheirMap) {
     const Found found = markers("tag25h9", page(file));
     expect_as_in_map(found, positions);
     expect_upright_squares(found, 12);
+}
+
+TEST_F(Marker, PrintsBoardsOfMatrixCodesWithTheirMap) {
+    ASSERT_EQ(
+        print("artoolkit-4x4-bch-13-9-3:5 --grid 3x2 --side 12 --paper 90x80 --margin 5 --map board.map.yaml -o "
+              "board.png"),
+        0)
+        << printed();
+    EXPECT_THAT(read("board.map.yaml"), HasSubstr("\nversion: 1\nfamily: artoolkit-4x4-bch-13-9-3\n"));
+    const auto positions = positions_in("board.map.yaml", 12);
+    EXPECT_EQ(positions.at(5), cv::Point2d(-13.5, 6.75));
+    expect_as_in_map(markers("artoolkit-4x4-bch-13-9-3", picture("board.png")), positions);
 }
 
 TEST_F(Marker, PrintsTheChArucoBoardsOfOpenCv) {
@@ -395,6 +466,7 @@ TEST_F(Marker, IsACommandOfArhost) {
 }
 
 TEST_F(Marker, RunsTheCommandsOfItsDocumentation) {
+    write_pattern();
     std::ifstream document(ARHOST_SOURCE_DIRECTORY "/docs/markers.md");
     int count = 0;
     for (std::string line; std::getline(document, line);)
@@ -444,7 +516,7 @@ TEST_F(Marker, RejectsInvalidArgumentsWithoutWritingAFile) {
         {"tag36h11:0 --side 10 --gap 5 -o a.pdf", "--gap needs --grid"},
         {"tag36h11:0 --side 10 --marker 5 -o a.pdf", "--square and --marker need --charuco"},
         {"tag36h11:0 --side 10 --map a.map.yaml -o a.pdf", "--map needs a board: --grid or --charuco"},
-        {board + "--gap 1", "--gap 1: each marker needs a quiet zone of one cell; use --gap 1.5 or more"},
+        {board + "--gap 1", "--gap 1: each marker needs a quiet zone; use --gap 1.5 or more"},
         {board + "--map map.txt", "--map: the file's name must end in .yaml"},
         {board + "--map missing/a.map.yaml", "missing/a.map.yaml: No such file or directory"},
         {"tag36h11 --grid 3x2 " + charuco, "--grid and --charuco exclude each other"},
@@ -458,6 +530,13 @@ TEST_F(Marker, RejectsInvalidArgumentsWithoutWritingAFile) {
         {"DICT_4X4_50 --marker 12 " + charuco,
          "--marker 12: each marker needs a quiet zone of one cell in its square of 14 "
          "mm; use --marker 10.5 or less"},
+        {"missing.patt --side 40 -o a.pdf", "'missing.patt' cannot be read"},
+        {"missing.patt --grid 3x2 --side 12 -o a.pdf", "--grid and --charuco need a family of markers; print the "},
+        {"tag36h11:0 --pattern-ratio 0.5 --side 12 -o a.pdf", "--pattern-ratio needs a pattern file of ARToolKit"},
+        {"a.patt --pattern-ratio 1 --side 12 -o a.pdf", "--pattern-ratio: "},
+        {"artoolkit-3x3-hamming63:8 --side 40 -o a.pdf", "artoolkit-3x3-hamming63 has the ids 0 to 7, not 8"},
+        {"artoolkit-3x4:0 --side 40 -o a.pdf", "unknown family 'artoolkit-3x4'; similar names: artoolkit-3x3, "},
+        {"artoolkit-4x4 --marker 10 " + charuco, "--charuco: artoolkit-4x4 is not an ArUco dictionary"},
         {"tag36h11 --marker 10 " + charuco, "--charuco: tag36h11 is not an ArUco dictionary"},
     };
     for (const auto &[arguments, message] : cases) {

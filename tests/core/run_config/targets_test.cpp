@@ -124,6 +124,45 @@ TEST_F(TargetsTest, IdsAreSeveralTargets) {
                 ElementsAre("t-5", "t-6", "t-8"));
 }
 
+TEST_F(TargetsTest, AMultiMarkerFileIsAMap) {
+    const std::string upright = "40\n1 0 0 35\n0 1 0 -7\n0 0 1 0.5\n", lying = "20\n1 0 0 0\n0 0 -1 0\n0 1 0 100\n";
+    const auto error_with = [&](const std::string &file, const std::string &more = "") {
+        write("marker.dat", file);
+        return error_in("[{name: board, map: marker.dat" + more + "}]");
+    };
+    write("hiro.patt", "");
+    write("marker.dat", "2\nhiro.patt\n" + upright + "07\n" + lying);
+    const auto tracker =
+        parse("[{name: one, pattern: hiro.patt, side_mm: 9}, {name: board, map: marker.dat, family: artoolkit-3x3}]");
+    const auto &markers = tracker.targets.at(1).markers;
+    ASSERT_EQ(markers.size(), 2u);
+    EXPECT_EQ(markers[0].family, "pattern");
+    EXPECT_EQ(markers[0].file, (folder / "hiro.patt").string());
+    EXPECT_EQ(markers[0].pattern_ratio, 0.5);
+    EXPECT_NE(markers[0].id, tracker.targets[0].markers.at(0).id);
+    expect_near(markers[0].corners_mm, {{{15, 13, 0.5}, {55, 13, 0.5}, {55, -27, 0.5}, {15, -27, 0.5}}});
+    EXPECT_EQ(markers[1].family, "artoolkit-3x3");
+    EXPECT_EQ(markers[1].id, 7);
+    EXPECT_EQ(markers[1].file, "");
+    expect_near(markers[1].corners_mm, {{{-10, 0, 110}, {10, 0, 110}, {10, 0, 90}, {-10, 0, 90}}});
+    EXPECT_THAT(tracker.map_files, testing::Contains(folder / "marker.dat"));
+    EXPECT_THAT(tracker.policy.readable, testing::Contains(folder / "hiro.patt"));
+
+    EXPECT_THAT(error_with("1\n7\n" + upright), HasSubstr("the key 'family' or 'dictionary' is missing"));
+    EXPECT_THAT(error_with("1\nhiro.patt\n" + upright, ", family: t"),
+                HasSubstr("family: does not apply to a map of patterns; remove it"));
+    EXPECT_THAT(error_with("1\nhira.patt\n" + upright),
+                AllOf(HasSubstr("marker.dat:2: there is no file 'hira.patt'"), HasSubstr("hiro.patt")));
+    EXPECT_THAT(error_with("2\n7\n" + upright + "7\n" + lying, ", family: t"),
+                HasSubstr("marker.dat:7: '7' is also at marker.dat:2; keep one of them"));
+    EXPECT_THAT(error_with("2\n7\n" + upright + "07\n" + lying, ", family: t"), HasSubstr("t-7 also belongs to"));
+    EXPECT_THAT(error_with("2\n7\n" + upright + "8\n" + upright, ", family: t"),
+                HasSubstr("marker.dat:7: this marker is at the place of that at marker.dat:2; correct one of them"));
+    EXPECT_THAT(error_with("1\n99999999999\n" + upright, ", family: t"),
+                HasSubstr("marker.dat:2: ids are 0 to 2147483647, but this is 99999999999"));
+    EXPECT_THAT(error_with("1\n7\nwide\n", ", family: t"), HasSubstr("marker.dat:3: the width of marker 1 must be"));
+}
+
 TEST_F(TargetsTest, ABodyHasNoMarkers) {
     const auto targets = parse("[{name: head, body: 'Rigid body 1'}]").targets;
     EXPECT_EQ(targets[0].name, "head");

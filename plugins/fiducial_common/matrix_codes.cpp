@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "matrix_codes.hpp"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+
+namespace arhost::fiducial {
+namespace {
+
+std::uint32_t plain(std::uint32_t id) {
+    return id;
+}
+
+// The highest bit makes the number of ones even.
+std::uint32_t parity65(std::uint32_t id) {
+    return id | (static_cast<std::uint32_t>(std::popcount(id)) & 1) << 5;
+}
+
+std::uint32_t hamming63(std::uint32_t id) {
+    return (id & 1 ? 0b000111U : 0) ^ (id & 2 ? 0b011001U : 0) ^ (id & 4 ? 0b101010U : 0);
+}
+
+// Shortened BCH codes: the id, and then the remainder of its division by the generator polynomial.
+template <std::uint32_t generator> std::uint32_t bch(std::uint32_t id) {
+    constexpr int degree = std::bit_width(generator) - 1;
+    const std::uint32_t dividend = id << degree;
+    std::uint32_t remainder = dividend;
+    while (std::bit_width(remainder) > degree)
+        remainder ^= generator << (std::bit_width(remainder) - 1 - degree);
+    return dividend | remainder;
+}
+
+// The generators are products of the minimal polynomials of α, α³ and α⁵, where α⁴ = α + 1 or α⁵ = α² + 1.
+constexpr std::array families{
+    MatrixFamily{"artoolkit-3x3", 3, 64, 0, plain},
+    MatrixFamily{"artoolkit-3x3-parity65", 3, 32, 0, parity65},
+    MatrixFamily{"artoolkit-3x3-hamming63", 3, 8, 1, hamming63},
+    MatrixFamily{"artoolkit-4x4", 4, 8192, 0, plain},
+    MatrixFamily{"artoolkit-4x4-bch-13-9-3", 4, 512, 1, bch<0b10011>},
+    MatrixFamily{"artoolkit-4x4-bch-13-5-5", 4, 32, 2, bch<0b111010001>},
+    MatrixFamily{"artoolkit-5x5", 5, 1 << 22, 0, plain},
+    MatrixFamily{"artoolkit-5x5-bch-22-12-5", 5, 4096, 2, bch<0b11101101001>},
+    MatrixFamily{"artoolkit-5x5-bch-22-7-7", 5, 128, 3, bch<0b1000111110101111>},
+};
+
+enum class Cell { black, white, bit };
+
+Cell cell_at(int row, int column, int side) {
+    if (column == 0 && (row == 0 || row == side - 1))
+        return Cell::black;
+    return row == side - 1 && column == side - 1 ? Cell::white : Cell::bit;
+}
+
+} // namespace
+
+std::span<const MatrixFamily> matrix_families() {
+    return families;
+}
+
+const MatrixFamily *find_matrix_family(std::string_view name) {
+    const auto found = std::ranges::find(families, name, &MatrixFamily::name);
+    return found == families.end() ? nullptr : &*found;
+}
+
+std::vector<bool> matrix_cells(const MatrixFamily &family, int id) {
+    const std::uint32_t word = family.word(static_cast<std::uint32_t>(id));
+    int bits = family.side * family.side - 3;
+    std::vector<bool> black;
+    for (int row = 0; row < family.side; ++row)
+        for (int column = 0; column < family.side; ++column) {
+            const Cell cell = cell_at(row, column, family.side);
+            black.push_back(cell == Cell::bit ? (word >> --bits & 1) != 0 : cell == Cell::black);
+        }
+    return black;
+}
+
+std::optional<std::uint32_t> matrix_word(const std::vector<bool> &cells, int side) {
+    std::uint32_t word = 0;
+    for (int row = 0; row < side; ++row)
+        for (int column = 0; column < side; ++column) {
+            const bool black = cells[static_cast<std::size_t>(row * side + column)];
+            if (const Cell cell = cell_at(row, column, side); cell == Cell::bit)
+                word = word << 1 | black;
+            else if (black != (cell == Cell::black))
+                return std::nullopt;
+        }
+    return word;
+}
+
+} // namespace arhost::fiducial

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The matrix codes ("barcodes") of ARToolKit: square cells inside a black border, as wide as half of them.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace arhost::fiducial {
+
+inline constexpr double matrix_ratio = 0.5; // of the side of all cells to that of the black square
+
+struct MatrixFamily {
+    const char *name; // "artoolkit-3x3-parity65" for ARToolKit's AR_MATRIX_CODE_3x3_PARITY65
+    int side;         // cells
+    int id_count;     // ids are 0 to id_count − 1
+    int corrects;     // number of wrong cells from which the code recovers the id
+    std::uint32_t (*word)(std::uint32_t id);
+};
+
+std::span<const MatrixFamily> matrix_families();
+const MatrixFamily *find_matrix_family(std::string_view name); // nullptr if there is none
+
+// Whether each cell is black, in rows from the top left of the upright print. Three corners show which side is up:
+// the left ones are black, the bottom right one is white. The other cells are the bits of the word, the highest one
+// first.
+std::vector<bool> matrix_cells(const MatrixFamily &family, int id);
+
+// Returns the word in the cells of a print; nullopt if it is not upright.
+std::optional<std::uint32_t> matrix_word(const std::vector<bool> &cells, int side);
+
+} // namespace arhost::fiducial
