@@ -153,6 +153,8 @@ run_config::Configuration parse_configuration(yaml::Node &root, const Arguments 
     run_config::Configuration configuration = run_config::parse(root, built_in_plugins());
     if (const auto coordinates = coordinates_of(arguments))
         configuration.coordinates = coordinates;
+    for (run_config::ComponentConfiguration &output : configuration.outputs)
+        output.debug_view = arguments.debug_view;
     if (arguments.in_process)
         lift_deadlines(configuration);
     protect_programs(configuration.files);

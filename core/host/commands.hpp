@@ -25,6 +25,7 @@ struct Arguments {
     double axis1[3] = {0, 0, 0}, axis2[3] = {0, 0, 0};
     bool verbose = false;
     bool allow_no_target = false; // a run in which the tracker sees no marker succeeds
+    bool debug_view = false;      // set the option of this name of every output that has it
     bool watch = false;           // apply edits of the configuration and of the scene while the video runs
     bool in_process = false;      // run the plugins in the host's process, without timeouts and sandbox
 };

@@ -32,11 +32,21 @@ const char *problem_with(const arhost_target &target, std::uint32_t observation_
 const char *problem_with(const arhost_observation &observation, std::size_t family_count) {
     if (observation.family >= family_count)
         return "an observation's family is out of range";
-    for (const auto &corner : observation.corners_px)
-        if (!all_finite(corner))
-            return "a coordinate of an observation's corner is not finite";
+    for (const auto &corners : {observation.corners_px, observation.projected_px})
+        for (int i = 0; i < 4; ++i)
+            if (!all_finite(corners[i]))
+                return "a coordinate of an observation's corner is not finite";
     if (!std::isfinite(observation.decision_margin))
         return "an observation's decision margin is not finite";
+    return nullptr;
+}
+
+const char *problem_with(const arhost_expected_marker &expected) {
+    for (const auto &corner : expected.corners_px)
+        if (!all_finite(corner))
+            return "a coordinate of an expected marker's corner is not finite";
+    if (!(expected.margin_px >= 0 && std::isfinite(expected.margin_px)))
+        return "an expected marker's margin is negative or not finite";
     return nullptr;
 }
 
@@ -51,9 +61,13 @@ template <class T> void copy_array(std::span<const std::byte> slot, std::uint64_
 const char *accept_tracker_result(std::span<const std::byte> slot, const std::vector<ipc::Target> &configured,
                                   std::size_t family_count, Frame &frame) {
     const ipc::TrackerSlot layout(configured.size());
-    const std::uint32_t count = *reinterpret_cast<const volatile std::uint32_t *>(slot.data());
+    std::vector<ipc::TrackerSlot::Header> header(1);
+    copy_array(slot, 0, header);
+    const auto [count, expected_count, missed_count, searched_everywhere] = header.front();
     if (count > ARHOST_MAX_OBSERVATIONS)
         return "the tracker reports more observations than ARHOST_MAX_OBSERVATIONS";
+    if (expected_count > ARHOST_MAX_MARKERS || missed_count > expected_count)
+        return "the number of expected or missed markers is out of range";
     std::vector<arhost_observation> observations(count);
     copy_array(slot, layout.observations_offset, observations);
     std::vector<arhost_target> targets(configured.size());
@@ -61,6 +75,13 @@ const char *accept_tracker_result(std::span<const std::byte> slot, const std::ve
     for (arhost_observation &observation : observations) {
         observation.struct_size = sizeof observation;
         if (const char *problem = problem_with(observation, family_count))
+            return problem;
+    }
+    std::vector<arhost_expected_marker> expected(expected_count);
+    copy_array(slot, layout.expected_offset, expected);
+    for (arhost_expected_marker &marker : expected) {
+        marker.struct_size = sizeof marker;
+        if (const char *problem = problem_with(marker))
             return problem;
     }
     for (std::size_t i = 0; i < targets.size(); ++i) {
@@ -77,6 +98,13 @@ const char *accept_tracker_result(std::span<const std::byte> slot, const std::ve
     std::erase_if(targets, [](const arhost_target &target) { return target.state == 0; });
     frame.targets = std::move(targets);
     frame.observations = std::move(observations);
+    frame.expected = std::move(expected);
+    frame.record.search = {.everywhere = searched_everywhere != 0,
+                           .observation_count = count,
+                           .unlisted_count = 0,
+                           .expected_count = expected_count,
+                           .missed_count = missed_count,
+                           .reserved = 0};
     return nullptr;
 }
 

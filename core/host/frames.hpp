@@ -48,9 +48,10 @@ struct Frame {
     Lease overlay;              // slot in the ray tracer's memory
     arhost_render_info render{};
     Quality quality;                    // of the overlay
-    arhost_record record{};             // without the pointers and counts of targets and observations
+    arhost_record record{};             // without the arrays and their lengths
     std::vector<arhost_target> targets; // those seen so far
     std::vector<arhost_observation> observations;
+    std::vector<arhost_expected_marker> expected;
     std::optional<std::array<double, 16>> world;              // the pose of the scene, as arhost_target.mt
     std::optional<std::size_t> pixels_sample, overlay_sample; // hashes for the contract checks
     Clock::time_point captured; // arrival, unless the source reports capture times of CLOCK_MONOTONIC
@@ -76,7 +77,7 @@ struct OutputFrame {
 using OutputFramePointer = std::shared_ptr<const OutputFrame>;
 
 // Copies a tracker's result into the frame and validates the copy. Returns nullptr if the copy is valid (finite
-// numbers, valid poses), otherwise a description of the contract violation.
+// numbers, valid poses), otherwise a description of the contract violation. Does not set `search.unlisted_count`.
 const char *accept_tracker_result(std::span<const std::byte> slot, const std::vector<ipc::Target> &configured,
                                   std::size_t family_count, Frame &frame);
 

@@ -94,6 +94,8 @@ int main(int argc, char **argv) {
     replay_command.option("--frames", arguments.frames, "Stop after N frames").type_name("N").range(0.0, 1e15);
     replay_command.option("--output", replay_arguments.output, "Video, images or poses, by file extension")
         .type_name("FILE|none");
+    replay_command.flag("--debug-view", arguments.debug_view,
+                        "Draw the measurements of the tracker into every output that can (docs/tracking.md)");
     replay_command.option("--stats", replay_arguments.stats, "File for the statistics (JSON)").type_name("FILE");
     replay_command.option("--timeline", replay_arguments.timeline, "File for the times of each frame (CSV)")
         .type_name("FILE");

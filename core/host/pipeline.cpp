@@ -195,6 +195,15 @@ void Pipeline::advance_phase() {
         if (ends_when_started_)
             return kill_components();
         phase_ = Phase::running;
+        const auto has_debug_view = [](const auto &sink) {
+            return std::ranges::count(sink->component->description().options, "debug_view", &OptionDeclaration::key) >
+                   0;
+        };
+        if (!configuration_.outputs.empty() && configuration_.outputs.front().debug_view &&
+            std::ranges::none_of(sinks_, has_debug_view))
+            context_.log(ARHOST_SEVERITY_WARNING, "arhost",
+                         "--debug-view has no effect, because no output can draw it; add one that can, such as "
+                         "{plugin: sink_video, path: out/debug.mp4}");
         end_without_sinks();
     }
 }

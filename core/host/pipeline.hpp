@@ -174,7 +174,7 @@ private:
     bool repeats_decisions(const Frame &frame) const;
     void set_recorded_camera(Frame &frame) const;
     void count_targets(const Frame &frame);
-    void count_strangers(const Frame &frame);
+    void count_strangers(Frame &frame);
     void set_camera_from_targets(Frame &frame);
     void set_camera_from_trajectory(Frame &frame) const;
     void on_camera_known(Frame &frame);

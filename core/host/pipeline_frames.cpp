@@ -163,7 +163,9 @@ void Pipeline::repeat_record(Frame &frame, const run_config::RecordedFrame &reco
         return;
     frame.targets = recorded.targets;
     frame.observations = recorded.observations;
+    frame.record.search = recorded.search;
     count_targets(frame);
+    statistics_.search.add(frame.record.search);
     set_recorded_camera(frame);
 }
 
@@ -261,6 +263,7 @@ void Pipeline::on_tracked(const Command &command, const Result &result) {
     tracker_->add_duration(frame.times.tracker);
     count_targets(frame);
     count_strangers(frame);
+    statistics_.search.add(frame.record.search);
     frame.world = world_.locate(configuration.targets.front().name, frame.targets, command.sequence,
                                 configuration.world_grace_frames);
     set_camera_from_targets(frame);
@@ -277,11 +280,14 @@ void Pipeline::count_targets(const Frame &frame) {
 }
 
 // Counts the markers that no target lists, and tells the user of them if there is no target for a while.
-void Pipeline::count_strangers(const Frame &frame) {
+void Pipeline::count_strangers(Frame &frame) {
     std::set<std::string> strangers;
     for (const arhost_observation &observation : frame.observations) {
         const std::string &family = tracker_->families[observation.family];
-        if (strangers.size() < Statistics::max_strangers && !tracker_->listed.contains({family, observation.id}))
+        if (tracker_->listed.contains({family, observation.id}))
+            continue;
+        ++frame.record.search.unlisted_count;
+        if (strangers.size() < Statistics::max_strangers)
             strangers.insert(family + " " + std::to_string(observation.id));
     }
     for (const std::string &name : strangers)
@@ -667,12 +673,14 @@ void Pipeline::compose(Frame &frame, std::uint32_t inputs, std::span<std::byte> 
         std::tie(overlay, region) = full_size_overlay(frame);
     frame.record.target_count = static_cast<std::uint32_t>(frame.targets.size());
     frame.record.observation_count = static_cast<std::uint32_t>(frame.observations.size());
+    frame.record.expected_count = static_cast<std::uint32_t>(frame.expected.size());
     std::memcpy(slot.data(), &frame.record, sizeof frame.record);
     const auto copy_array = [&]<class T>(const std::vector<T> &array, std::uint64_t offset) {
         std::ranges::copy(std::as_bytes(std::span(array)), slot.data() + offset);
     };
     copy_array(frame.targets, OutputSlot::targets_offset);
     copy_array(frame.observations, OutputSlot::observations_offset);
+    copy_array(frame.expected, OutputSlot::expected_offset);
     const OutputView out{reinterpret_cast<std::uint8_t *>(slot.data()) + OutputSlot::image_offset,
                          OutputSlot::stride(format_->width)};
     if (configuration_.time_codes)

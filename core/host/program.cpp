@@ -24,6 +24,8 @@ base::Option add_run_options(base::CommandLine &command, Arguments &arguments) {
     command.option("--frames", arguments.frames, "Stop after N frames").type_name("N").range(0.0, 1e15);
     command.flag("--allow-no-target", arguments.allow_no_target,
                  "Exit with status 0 even if the tracker has seen no marker in any frame");
+    command.flag("--debug-view", arguments.debug_view,
+                 "Draw the measurements of the tracker into every output that can (docs/tracking.md)");
     command.flag("--watch", arguments.watch,
                  "Apply edits of the configuration and of the scene while the video runs (docs/control.md)");
     return config;

@@ -30,6 +30,17 @@ void TargetStatistics::add(const arhost_target &target, std::span<const arhost_o
     mean_reprojection_px += (target.reprojection_px - mean_reprojection_px) / static_cast<double>(frames);
 }
 
+void SearchStatistics::add(const arhost_search &search) {
+    if (!search.everywhere && search.expected_count == 0) // the tracker has not processed the frame
+        return;
+    ++frames;
+    everywhere += search.everywhere != 0;
+    observations += search.observation_count;
+    unlisted += search.unlisted_count;
+    expected += search.expected_count;
+    missed += search.missed_count;
+}
+
 void Timing::add(std::chrono::nanoseconds time) {
     const std::int64_t ns = std::max<std::int64_t>(time.count(), 1);
     const auto bucket = static_cast<std::size_t>(std::lround(std::log(static_cast<double>(ns)) / log_growth));
@@ -183,6 +194,10 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
                                  {"smallest_px", target.smallest_px},
                                  {"largest_px", target.largest_px},
                                  {"mean_reprojection_px", target.mean_reprojection_px}};
+    const SearchStatistics &search = statistics.search;
+    json["search"] = {
+        {"frames", search.frames},     {"everywhere", search.everywhere}, {"observations", search.observations},
+        {"unlisted", search.unlisted}, {"expected", search.expected},     {"missed", search.missed}};
     json["unlisted_markers"] = statistics.strangers;
     for (const auto &[name, timing] : statistics.stages.all())
         json["stages"][name] = timing.to_json();

@@ -85,6 +85,13 @@ struct TargetStatistics {
     void add(const arhost_target &target, std::span<const arhost_observation> observations);
 };
 
+// Totals of arhost_record.search.
+struct SearchStatistics {
+    std::uint64_t frames = 0, everywhere = 0; // frames that the tracker has processed; of these, those searched whole
+    std::uint64_t observations = 0, unlisted = 0, expected = 0, missed = 0; // markers
+    void add(const arhost_search &search);
+};
+
 struct Statistics {
     static constexpr std::size_t max_strangers = 64;
     std::uint64_t frames_in = 0;                     // frames received from the source
@@ -93,9 +100,10 @@ struct Statistics {
     std::uint64_t augmented = 0;                     // frames composited with an overlay
     std::uint64_t composited = 0;                    // frames sent to the outputs, augmented or not
     std::map<std::string, TargetStatistics> targets; // by name
-    std::map<std::string, std::uint64_t> strangers;  // frames with a marker that no target lists, by name
-    std::map<std::string, std::uint64_t> dropped;    // number of dropped frames by stage
-    std::map<std::string, std::uint64_t> skipped;    // number of unaugmented frames by the failed stage
+    SearchStatistics search;
+    std::map<std::string, std::uint64_t> strangers; // frames with a marker that no target lists, by name
+    std::map<std::string, std::uint64_t> dropped;   // number of dropped frames by stage
+    std::map<std::string, std::uint64_t> skipped;   // number of unaugmented frames by the failed stage
     StageTimings stages;
     // From the capture of a frame until an output has written it, by output; `latency` of `stages` ends when the
     // frame is composited. Both begin at the arrival of the frame if the source does not know when it was captured.

@@ -105,32 +105,39 @@ struct AnchorPose {
     double world_from_anchor[16]; // column-major
 };
 
-// Layout of a slot that a tracker's worker writes: the number of observations (uint32), an arhost_target for each
-// configured target, the observations, then the state of the worker and of the plugin, which only the worker can
-// read.
+// Layout of a slot that a tracker's worker writes: a header, an arhost_target for each configured target, the
+// observations, the expected markers, then the state of the worker and of the plugin, which only the worker can read.
 class TrackerSlot {
 public:
+    struct Header {
+        std::uint32_t observation_count, expected_count;
+        std::uint32_t missed_count; // of the expected markers
+        std::int32_t searched_everywhere;
+    };
     static constexpr std::uint64_t targets_offset = 64;
 
     explicit TrackerSlot(std::size_t target_count)
         : observations_offset(aligned(targets_offset + target_count * sizeof(arhost_target))),
-          state_offset(aligned(observations_offset + ARHOST_MAX_OBSERVATIONS * sizeof(arhost_observation))) {}
-    const std::uint64_t observations_offset, state_offset;
+          expected_offset(aligned(observations_offset + ARHOST_MAX_OBSERVATIONS * sizeof(arhost_observation))),
+          state_offset(aligned(expected_offset + ARHOST_MAX_MARKERS * sizeof(arhost_expected_marker))) {}
+    const std::uint64_t observations_offset, expected_offset, state_offset;
     std::uint64_t byte_size(std::uint64_t state_size) const { return state_offset + state_size; }
 
 private:
     static std::uint64_t aligned(std::uint64_t offset) { return (offset + 63) / 64 * 64; }
 };
 
-// Layout of a slot that sinks read: the record, its targets and observations (the pointers in the record are not
-// set), the composited image, the video frame and the overlay. The host fills the last two only if a sink reads them;
-// unused pages take no memory.
+// Layout of a slot that sinks read: the record, its targets, observations and expected markers (the pointers in the
+// record are not set), the composited image, the video frame and the overlay. The host fills the last two only if a
+// sink reads them; unused pages take no memory.
 class OutputSlot {
 public:
     static constexpr std::uint64_t targets_offset = (sizeof(arhost_record) + 63) / 64 * 64;
     static constexpr std::uint64_t observations_offset = targets_offset + ARHOST_MAX_TARGETS * sizeof(arhost_target);
+    static constexpr std::uint64_t expected_offset =
+        observations_offset + ARHOST_MAX_OBSERVATIONS * sizeof(arhost_observation);
     static constexpr std::uint64_t image_offset =
-        (observations_offset + ARHOST_MAX_OBSERVATIONS * sizeof(arhost_observation) + 4095) / 4096 * 4096;
+        (expected_offset + ARHOST_MAX_MARKERS * sizeof(arhost_expected_marker) + 4095) / 4096 * 4096;
     static std::uint32_t stride(std::uint32_t width) { return (width * 3 + 63) / 64 * 64; }
 
     explicit OutputSlot(const arhost_frame_format &video)

@@ -280,6 +280,9 @@ std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, 
             option->fail("the device is also given by the key 'usb' next to 'plugin'; remove one of them");
         usb->text = component.policy.usb_device;
     }
+    if (const auto debug_view = std::ranges::find(values, "debug_view", &ipc::OptionValue::key);
+        component.debug_view && debug_view != values.end() && debug_view->type == ARHOST_OPTION_BOOL)
+        debug_view->integer = 1;
     for (const ipc::OptionDeclaration &declared : plugin.options) {
         const auto option = options ? options->find(declared.key) : std::nullopt;
         const auto node = declared.key == "path" && component.path ? component.path : option;

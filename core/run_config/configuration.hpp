@@ -41,6 +41,7 @@ struct ComponentConfiguration {
     sandbox::Policy policy;                       // docs/security.md
     bool conform = false;                         // check results at run time (docs/conformance.md)
     std::set<std::string, std::less<>> control{}; // the commands that the output may send
+    bool debug_view = false;                      // of an output: set the option of this name, if the plugin has it
     std::string name{}; // of a tracker or ray tracer among the alternatives; by default the plugin's
 };
 

@@ -110,6 +110,13 @@ RecordedFrame frame_of(const Line &line, const nlohmann::json &object) {
         line.fail("overlay_scale: must be 0.01 to 1");
     for (const nlohmann::json &target : object.at("targets"))
         read_target(line, target, frame);
+    if (const auto search = object.find("search"); search != object.end())
+        frame.search = {.everywhere = search->at("everywhere").get<bool>(),
+                        .observation_count = search->at("observations").get<std::uint32_t>(),
+                        .unlisted_count = search->at("unlisted").get<std::uint32_t>(),
+                        .expected_count = search->at("expected").get<std::uint32_t>(),
+                        .missed_count = search->at("missed").get<std::uint32_t>(),
+                        .reserved = 0};
     if (const nlohmann::json &camera = object.at("camera"); !camera.is_null()) {
         camera::View view{};
         read_numbers(camera.at("eye"), view.eye_mm);

@@ -32,6 +32,7 @@ struct RecordedFrame {
     std::uint32_t samples; // likewise
     std::vector<arhost_target> targets;
     std::vector<arhost_observation> observations; // of the targets
+    arhost_search search{};
     std::optional<camera::View> view;
     std::optional<std::pair<std::string, std::array<double, 16>>> truth; // truth_target and true_mt of arhost_record
 };

@@ -217,7 +217,7 @@ public:
             request.state_size = state_size_;
         }
         const std::byte *solver_before = before ? before + layout_->state_offset : nullptr;
-        const TargetSolver::Expectation expectation = solver_->expect(command.capture_ns, solver_before);
+        TargetSolver::Expectation expectation = solver_->expect(command.capture_ns, solver_before);
         request.search_everywhere = expectation.search_everywhere;
         request.expected = expectation.markers.data();
         request.expected_count = static_cast<std::uint32_t>(expectation.markers.size());
@@ -237,7 +237,10 @@ public:
         solver_->solve(result, expectation.search_everywhere, command.capture_ns, solver_before,
                        output.data() + layout_->state_offset,
                        {{targets, poses_.size()}, {observations, observations_.size()}});
-        *reinterpret_cast<std::uint32_t *>(output.data()) = result.observation_count;
+        const std::uint32_t missed_count = solver_->move_missed_to_end(expectation, result);
+        std::ranges::copy(std::as_bytes(std::span(expectation.markers)), output.data() + layout_->expected_offset);
+        *reinterpret_cast<TrackerSlot::Header *>(output.data()) = {result.observation_count, request.expected_count,
+                                                                   missed_count, request.search_everywhere};
         return status;
     }
 
@@ -418,6 +421,8 @@ public:
         record.targets = reinterpret_cast<const arhost_target *>(input.data() + OutputSlot::targets_offset);
         record.observations =
             reinterpret_cast<const arhost_observation *>(input.data() + OutputSlot::observations_offset);
+        record.expected =
+            reinterpret_cast<const arhost_expected_marker *>(input.data() + OutputSlot::expected_offset);
         output.record = &record;
         return sink_.write(instance_, &output);
     }

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <set>
 #include <stdexcept>
 
 namespace arhost::worker {
@@ -147,6 +148,16 @@ TargetSolver::Expectation TargetSolver::expect(std::int64_t capture_ns, const vo
     return expectation;
 }
 
+std::uint32_t TargetSolver::move_missed_to_end(Expectation &expectation,
+                                               const arhost_tracker_result &reported) const {
+    std::set<std::uint32_t> seen;
+    for (const arhost_observation &observation : std::span(reported.observations, reported.observation_count))
+        if (const Marker *marker = marker_of(observation))
+            seen.insert(marker->index);
+    const auto is_seen = [&](const arhost_expected_marker &expected) { return seen.contains(expected.marker); };
+    return static_cast<std::uint32_t>(std::ranges::stable_partition(expectation.markers, is_seen).size());
+}
+
 const TargetSolver::Marker *TargetSolver::marker_of(const arhost_observation &observation) const {
     const auto found = markers_.find({observation.family, observation.id});
     return found == markers_.end() ? nullptr : &found->second;
@@ -225,8 +236,21 @@ std::vector<ObservedMarker> TargetSolver::without_copies(std::span<const arhost_
     return markers;
 }
 
-void TargetSolver::solve(const Target &target, std::span<const arhost_observation> observations,
-                         std::int64_t capture_ns, Memory &memory, arhost_target &out) const {
+// Sets `projected_px`.
+void TargetSolver::project(const Rigid &pose, arhost_observation &observation) const {
+    std::array<Eigen::Vector2d, 4> corners_px;
+    for (std::size_t i = 0; i < 4; ++i) {
+        const auto pixel = projection_.pixel(pose * marker_of(observation)->corners_mm[i]);
+        if (!pixel)
+            return;
+        corners_px[i] = *pixel;
+    }
+    for (std::size_t i = 0; i < 4; ++i)
+        std::ranges::copy(corners_px[i], observation.projected_px[i]);
+}
+
+void TargetSolver::solve(const Target &target, std::span<arhost_observation> observations, std::int64_t capture_ns,
+                         Memory &memory, arhost_target &out) const {
     const auto markers =
         without_copies(observations, predicted_motion(memory.track, capture_ns), target.corner_sigma_px);
     std::vector<Estimate> poses = estimate_poses(markers, projection_);
@@ -244,6 +268,8 @@ void TargetSolver::solve(const Target &target, std::span<const arhost_observatio
     const Estimate &chosen = poses[step.chosen];
     const Rigid pose = smooth_ ? smoothed(memory.smoothing, chosen, capture_ns) : chosen.camera_from_target;
     std::ranges::copy(matrix_of(pose), memory.mt);
+    for (arhost_observation &observation : observations)
+        project(pose, observation);
     out.state = ARHOST_TARGET_DETECTED;
     write_covariance(chosen.covariance, out.covariance);
     out.reprojection_px = chosen.reprojection_px;
@@ -269,6 +295,10 @@ void TargetSolver::solve(const arhost_tracker_result &reported, bool searched_ev
         order.push_back(i);
     }
     std::ranges::stable_sort(order, {}, [&](std::size_t i) { return target_of[i]; });
+    for (std::size_t i = 0; i < all.size(); ++i) {
+        output.observations[i] = all[order[i]];
+        std::memset(output.observations[i].projected_px, 0, sizeof output.observations[i].projected_px);
+    }
 
     std::size_t next = 0;
     for (std::size_t index = 0; index < targets_.size(); ++index) {
@@ -280,8 +310,8 @@ void TargetSolver::solve(const arhost_tracker_result &reported, bool searched_ev
         out.struct_size = sizeof out;
         out.state = memory.was_seen ? ARHOST_TARGET_LOST : 0;
         out.first_observation = static_cast<std::uint32_t>(next);
-        for (; next < all.size() && target_of[order[next]] == index; ++next)
-            output.observations[next] = all[order[next]];
+        while (next < all.size() && target_of[order[next]] == index)
+            ++next;
         out.observation_count = static_cast<std::uint32_t>(next) - out.first_observation;
         if (out.observation_count > 0)
             solve(targets_[index], output.observations.subspan(out.first_observation, out.observation_count),
@@ -301,8 +331,6 @@ void TargetSolver::solve(const arhost_tracker_result &reported, bool searched_ev
         std::ranges::copy(memory.mt, out.mt);
         std::memcpy(static_cast<std::byte *>(after) + sizeof header + index * sizeof memory, &memory, sizeof memory);
     }
-    for (; next < all.size(); ++next)
-        output.observations[next] = all[order[next]];
 }
 
 } // namespace arhost::worker

@@ -33,6 +33,10 @@ public:
     };
     Expectation expect(std::int64_t capture_ns, const void *before) const;
 
+    // Moves the markers that the tracker has not reported to the end, and returns their number. The report must be
+    // valid.
+    std::uint32_t move_missed_to_end(Expectation &expectation, const arhost_tracker_result &reported) const;
+
     struct Output {
         std::span<arhost_target> targets;           // one for each target; state 0 if it was never seen
         std::span<arhost_observation> observations; // at least as many as reported; those of the same target adjoin
@@ -61,9 +65,10 @@ private:
     std::vector<pose::ObservedMarker> without_copies(std::span<const arhost_observation> observations,
                                                      const std::optional<pose::Motion> &predicted,
                                                      double corner_sigma_px) const;
-    void solve(const Target &target, std::span<const arhost_observation> observations, std::int64_t capture_ns,
+    void solve(const Target &target, std::span<arhost_observation> observations, std::int64_t capture_ns,
                Memory &memory, arhost_target &out) const;
     void check(const arhost_tracker_result &reported) const;
+    void project(const pose::Rigid &pose, arhost_observation &observation) const;
 
     pose::Projection projection_;
     std::vector<Target> targets_;

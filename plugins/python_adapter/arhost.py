@@ -57,6 +57,13 @@ class Observation:
             raise ValueError("corners_px must be four corners (x, y)")
         self.id, self.corners_px, self.family = id, corners.reshape(4, 2), family
         self.hamming, self.decision_margin = hamming, decision_margin
+        self.projected_px = np.zeros((4, 2))
+
+    @classmethod
+    def _of(cls, record):
+        seen = cls(*(record[name] for name in ("id", "corners_px", "family", "hamming", "decision_margin")))
+        seen.projected_px = record["projected_px"]
+        return seen
 
 
 class Scene(Fields):
@@ -316,8 +323,7 @@ class _Adapter:
         def write():
             fields = Fields(_record(record, RECORD))
             fields.targets = [Fields(t) for t in _elements(bytes(targets), TARGET)]
-            fields.observations = [Observation(o["id"], o["corners_px"], o["family"], o["hamming"], o["decision_margin"])
-                                   for o in _elements(bytes(observations), OBSERVATION)]
+            fields.observations = [Observation._of(o) for o in _elements(bytes(observations), OBSERVATION)]
             fields.families = [name.decode() for name in fields.families if name]
             more = self.plugin.write(Fields(bgr=_pixels(bgr, height, width, 3, stride), height=height, width=width,
                                             record=fields))

@@ -180,13 +180,14 @@ MAX_OBSERVATIONS = 1024
 MAX_FAMILIES = 16
 MAX_FAMILY = 32
 MAX_STATE = 16777216
-OBSERVATION = _struct(88,
+OBSERVATION = _struct(152,
     ("struct_size", "u4", 0),
     ("id", "i4", 4),
     ("family", "u4", 8),
     ("hamming", "u4", 12),
     ("corners_px", ("f8", (4, 2)), 16),
-    ("decision_margin", "f8", 80))
+    ("decision_margin", "f8", 80),
+    ("projected_px", ("f8", (4, 2)), 88))
 TARGET_DETECTED = 1
 TARGET_PREDICTED = 2
 TARGET_LOST = 3
@@ -397,7 +398,14 @@ RENDER_INFO = _struct(32,
 OVERLAY_RENDERED = 1
 OVERLAY_HELD = 2
 OVERLAY_NONE = 3
-RECORD = _struct(1008,
+SEARCH = _struct(24,
+    ("everywhere", "i4", 0),
+    ("observation_count", "u4", 4),
+    ("unlisted_count", "u4", 8),
+    ("expected_count", "u4", 12),
+    ("missed_count", "u4", 16),
+    ("reserved", "u4", 20))
+RECORD = _struct(1048,
     ("struct_size", "u4", 0),
     ("clock", "i4", 4),
     ("sequence", "u8", 8),
@@ -414,4 +422,8 @@ RECORD = _struct(1008,
     ("observation_count", "u4", 476),
     ("targets", "u8", 480),
     ("observations", "u8", 488),
-    ("families", ("S32", (16,)), 496))
+    ("families", ("S32", (16,)), 496),
+    ("search", SEARCH, 1008),
+    ("expected", "u8", 1032),
+    ("expected_count", "u4", 1040),
+    ("reserved", "u4", 1044))

@@ -102,6 +102,21 @@ void append(std::string &text, const arhost_target &target, const arhost_record 
     text += '}';
 }
 
+void append(std::string &text, const arhost_search &search) {
+    if (!search.everywhere && search.expected_count == 0) // the tracker has not processed the frame
+        return;
+    text += "\"search\": {\"everywhere\": ";
+    text += search.everywhere ? "true" : "false";
+    for (const auto &[key, count] : {std::pair{"observations", search.observation_count},
+                                     {"unlisted", search.unlisted_count},
+                                     {"expected", search.expected_count},
+                                     {"missed", search.missed_count}}) {
+        text += std::string(", \"") + key + "\": ";
+        append_number(text, count);
+    }
+    text += "}, ";
+}
+
 void append(std::string &text, const arhost_camera &camera) {
     text += "{\"eye\": ";
     append(text, std::span(camera.eye));
@@ -141,7 +156,9 @@ void append_members(std::string &text, const arhost_record &record) {
         append(text, target, record);
         separator = ", ";
     }
-    text += "], \"camera\": ";
+    text += "], ";
+    append(text, record.search);
+    text += "\"camera\": ";
     if (record.has_camera)
         append(text, record.camera);
     else

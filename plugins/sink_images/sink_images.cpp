@@ -3,6 +3,7 @@
 // sink_images: writes frames as numbered image files, or one frame as a single image file.
 #include "encoder.hpp"
 #include "last_frame.hpp"
+#include "sink_common/debug_view.hpp"
 #include "sink_common/files.hpp"
 
 #include <arhost-cpp/numbered_name.hpp>
@@ -47,11 +48,14 @@ std::optional<NumberedName> numbered_name_of(const fs::path &path) try {
 
 class ImageSink {
 public:
+    static constexpr const char *changeable[] = {drawing::DebugView::key, nullptr};
+
     ImageSink(const Host &host, const Options &options)
         : host_(host), path_(options.text("path")), scratch_(files::hidden_sibling(path_, ".partial")),
           kept_path_(files::hidden_sibling(path_, ".last")), pattern_(numbered_name_of(path_)),
           encoder_(make_encoder(path_, options)), frame_(options.integer("frame")),
-          every_(static_cast<std::uint64_t>(options.integer("every"))), format_(format_of(options.text("content"))) {
+          every_(static_cast<std::uint64_t>(options.integer("every"))), format_(format_of(options.text("content"))),
+          debug_view_(options) {
         if (format_ != PixelFormat::bgr8 && path_.extension() != ".png")
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "content: JPEG stores neither transparent pixels nor depth; let 'path' end in .png");
@@ -76,6 +80,7 @@ public:
     void start(const arhost_sink_setup &setup) {
         if (format_ == PixelFormat::depth16 && !setup.video_format->has_depth)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "content: the source delivers no depth");
+        debug_view_.start(setup);
         depth_stride_ = setup.video_format->depth_stride;
         files::make_parent_folders(path_);
         files::check_can_write(scratch_); // reports an error now, not only at the first frame
@@ -115,6 +120,8 @@ public:
         return ARHOST_STATUS_OK;
     }
 
+    void set(const Options &changed) { debug_view_.is_on = changed.boolean(drawing::DebugView::key); }
+
     void stop() {
         if (kept_)
             if (const std::optional<Image> last = kept_->newest())
@@ -127,7 +134,7 @@ public:
     }
 
 private:
-    Image image_of(const arhost_output &output) const {
+    Image image_of(const arhost_output &output) {
         switch (format_) {
         case PixelFormat::rgba8:
             return {output.width, output.height, output.overlay_stride, output.overlay_rgba, format_};
@@ -135,7 +142,8 @@ private:
             return {output.width, output.height, depth_stride_,
                     reinterpret_cast<const std::uint8_t *>(output.depth_mm), format_};
         default:
-            return {output.width, output.height, output.stride, output.bgr, format_};
+            const arhost_output &shown = debug_view_.applied_to(output);
+            return {shown.width, shown.height, shown.stride, shown.bgr, format_};
         }
     }
 
@@ -165,6 +173,7 @@ private:
     std::int64_t frame_;  // for a single image: the frame to write, or -1 for the last
     std::uint64_t every_; // for numbered images
     PixelFormat format_;
+    drawing::DebugView debug_view_;
     std::uint32_t depth_stride_ = 0;
     arhost_sink_setup setup_{};
     std::optional<images::LastFrame> kept_;
@@ -185,6 +194,7 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_INTEGER, "compression", "1", "PNG compression: 1 (fast) to 12 (small); lossless.", 1, 12),
     option(ARHOST_OPTION_INTEGER, "quality", "95", "JPEG quality: 1 to 100; from 90 on, chroma is not subsampled.", 1,
            100),
+    drawing::DebugView::option,
 };
 
 constexpr arhost_descriptor descriptor = {

@@ -4,6 +4,7 @@
 // new segment. At the end, joins all segments without re-encoding and atomically replaces the video.
 #include "encoder.hpp"
 #include "segments.hpp"
+#include "sink_common/debug_view.hpp"
 #include "sink_common/files.hpp"
 
 #include <arhost-cpp/plugin.hpp>
@@ -45,6 +46,8 @@ AVRational rational(double fps) {
 
 class VideoSink {
 public:
+    static constexpr const char *changeable[] = {drawing::DebugView::key, nullptr};
+
     VideoSink(const Host &host, const Options &options)
         : host_(host), path_(options.text("path")), partial_(files::hidden_sibling(path_, ".partial")),
           format_(format_of(path_)), settings_{.width = 0,
@@ -53,7 +56,8 @@ public:
                                                .codec = options.text("codec"),
                                                .crf = static_cast<int>(options.integer("crf")),
                                                .preset = options.text("preset"),
-                                               .threads = static_cast<int>(options.integer("threads"))} {
+                                               .threads = static_cast<int>(options.integer("threads"))},
+          debug_view_(options) {
         av_log_set_level(AV_LOG_FATAL); // suppresses x264's statistics and messages about truncated segments
     }
 
@@ -62,6 +66,7 @@ public:
         settings_.height = static_cast<int>(setup.height);
         settings_.fps = rational(setup.fps);
         encoder_.emplace(settings_);
+        debug_view_.start(setup);
 
         files::make_parent_folders(path_);
         std::error_code ignored;
@@ -85,10 +90,13 @@ public:
             failed_ = false;
         }
         const auto number = static_cast<std::int64_t>(output.record->sequence);
-        writer_->append(encoder_->encode(output.bgr, output.stride, number), number, output.record->capture_ns);
+        const arhost_output &shown = debug_view_.applied_to(output);
+        writer_->append(encoder_->encode(shown.bgr, shown.stride, number), number, output.record->capture_ns);
         finished_ = false;
         return ARHOST_STATUS_OK;
     }
+
+    void set(const Options &changed) { debug_view_.is_on = changed.boolean(drawing::DebugView::key); }
 
     void stop() {
         if (failed_)
@@ -146,6 +154,7 @@ private:
     fs::path path_, partial_;
     const char *format_; // libav's name of the file format
     EncoderSettings settings_;
+    drawing::DebugView debug_view_;
     std::optional<Encoder> encoder_;
     std::optional<SegmentWriter> writer_;
     std::int64_t first_ = 0; // number of the first frame
@@ -164,6 +173,7 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "preset", "veryfast", "x264 preset; slower presets give smaller files.", 0, 0,
            presets),
     option(ARHOST_OPTION_INTEGER, "threads", "1", "Number of encoder threads.", 1, 64),
+    drawing::DebugView::option,
 };
 
 constexpr arhost_descriptor descriptor = {

@@ -3,6 +3,7 @@
 // sink_web: a web page with the live picture, the state of the run and its commands.
 #include "checks.hpp"
 #include "server.hpp"
+#include "sink_common/debug_view.hpp"
 
 namespace {
 
@@ -10,10 +11,10 @@ constexpr std::size_t min_token_size = 16;
 
 class WebSink {
 public:
-    static constexpr const char *changeable[] = {"quality", nullptr};
+    static constexpr const char *changeable[] = {"quality", arhost::drawing::DebugView::key, nullptr};
 
     WebSink(const arhost::Host &host, const arhost::Options &options)
-        : host_(host), control_(host), frames_(static_cast<int>(options.integer("quality"))),
+        : host_(host), control_(host), debug_view_(options), frames_(static_cast<int>(options.integer("quality"))),
           settings_{static_cast<int>(options.integer("listen")), options.text("token"), options.text("hosts"), 0, 0},
           address_(options.text("listen")) {
         if (settings_.socket < 0)
@@ -28,12 +29,13 @@ public:
     void start(const arhost_sink_setup &setup) {
         settings_.width = setup.width;
         settings_.height = setup.height;
+        debug_view_.start(setup);
         server_ = std::make_unique<arhost::web::Server>(settings_, frames_, control_);
         host_.info(address_.starts_with('/') ? "listens at " + address_ : "open http://" + address_ + "/");
     }
 
     arhost_status write(const arhost_output &output) {
-        frames_.put(output);
+        frames_.put(debug_view_.applied_to(output));
         return idle();
     }
 
@@ -42,7 +44,12 @@ public:
         return ARHOST_STATUS_OK;
     }
 
-    void set(const arhost::Options &changed) { frames_.set_quality(static_cast<int>(changed.integer("quality"))); }
+    void set(const arhost::Options &changed) {
+        if (changed.contains("quality"))
+            frames_.set_quality(static_cast<int>(changed.integer("quality")));
+        else
+            debug_view_.is_on = changed.boolean(arhost::drawing::DebugView::key);
+    }
 
     void stop() { server_.reset(); }
 
@@ -53,6 +60,7 @@ private:
 
     arhost::Host host_;
     arhost::HostControl control_;
+    arhost::drawing::DebugView debug_view_;
     arhost::web::Frames frames_;
     arhost::web::Settings settings_;
     std::string address_;
@@ -67,6 +75,7 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_TEXT, "hosts", "",
                    "Names of this machine, separated by commas, under which browsers may open the page."),
     arhost::option(ARHOST_OPTION_INTEGER, "quality", "80", "JPEG quality.", 1, 100),
+    arhost::drawing::DebugView::option,
 };
 
 constexpr const char *needs[] = {"listen", nullptr};

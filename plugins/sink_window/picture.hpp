@@ -3,6 +3,7 @@
 // The frame in the window: a texture, and where the window shows it.
 #pragma once
 
+#include "sink_common/canvas.hpp"
 #include "window.hpp"
 
 #include <arhost/sink.h>
@@ -12,10 +13,6 @@
 
 namespace sink_window {
 
-struct Point {
-    double x, y;
-};
-
 // Where and how the window shows a frame.
 struct View {
     Rectangle area;    // px of the window
@@ -23,7 +20,7 @@ struct View {
     bool mirrored;
 
     // Converts pixel coordinates of the frame, whose pixel centres are at integers, to coordinates of the window.
-    Point to_window(Point pixel) const {
+    arhost::drawing::Point to_window(arhost::drawing::Point pixel) const {
         const double u = (pixel.x + 0.5) / width, v = (pixel.y + 0.5) / height;
         return {area.x + (mirrored ? 1 - u : u) * area.width, area.y + v * area.height};
     }

@@ -2,9 +2,9 @@
 //
 // sink_window: shows frames in a window, and sends commands to the host when the user presses keys.
 #include "controls.hpp"
-#include "debug_view.hpp"
 #include "overlay.hpp"
 #include "picture.hpp"
+#include "sink_common/debug_view.hpp"
 #include "window.hpp"
 
 #include <arhost-cpp/plugin.hpp>
@@ -22,6 +22,7 @@
 namespace {
 
 using namespace arhost;
+using namespace arhost::drawing;
 using namespace sink_window;
 using Clock = std::chrono::steady_clock;
 
@@ -45,11 +46,14 @@ private:
 
 class WindowSink {
 public:
+    static constexpr const char *changeable[] = {DebugView::key, nullptr};
+
     static std::vector<Device> devices() { return list_displays(); }
 
     WindowSink(const Host &host, const Options &options)
         : title_(options.text("title")), scale_(options.real("scale")), vsync_(options.boolean("vsync")),
           status_line_(options.boolean("status_line")), shows_overlay_(options.text("content") == "overlay"),
+          debug_view_(options),
           controls_(host, [this](const std::string &text, bool is_error) { show(text, is_error); }) {}
 
     std::uint32_t capabilities() const {
@@ -60,10 +64,7 @@ public:
     void start(const arhost_sink_setup &setup) {
         width_ = static_cast<int>(setup.width);
         height_ = static_cast<int>(setup.height);
-        if (setup.intrinsics) {
-            lens_.emplace(*setup.intrinsics);
-            focal_length_px_ = setup.intrinsics->fx;
-        }
+        debug_view_.start(setup);
         window_.emplace(width_, height_, scale_, vsync_, title_, [this](char key) { on_key(key); });
         picture_.emplace(width_, height_, shows_overlay_);
         draw();
@@ -89,6 +90,11 @@ public:
         return status;
     }
 
+    void set(const Options &changed) {
+        debug_view_.is_on = changed.boolean(DebugView::key);
+        stale_ = true;
+    }
+
     void stop() { window_.reset(); }
 
 private:
@@ -110,6 +116,7 @@ private:
         record_ = record;
         record_->targets = copy(targets_, record.targets, record.target_count);
         record_->observations = copy(observations_, record.observations, record.observation_count);
+        record_->expected = copy(expected_, record.expected, record.expected_count);
     }
 
     void show(const std::string &text, bool is_error) {
@@ -130,7 +137,7 @@ private:
         case 'r':
             return controls_.record();
         case 'd':
-            debug_ = !debug_;
+            debug_view_.is_on = !debug_view_.is_on;
             break;
         case 'f':
             return window_->toggle_full_screen();
@@ -160,15 +167,14 @@ private:
         const View view{fit(width_, height_, size.width, size.height), width_, height_, mirrored_};
         glClear(GL_COLOR_BUFFER_BIT);
         picture_->draw(view, size);
-        draw_overlay(Overlay(size), view);
+        draw_overlay(Overlay(size, view));
         window_->present();
     }
 
-    void draw_overlay(const Overlay &overlay, const View &view) {
+    void draw_overlay(const Overlay &overlay) {
         double top = 0;
-        if (debug_ && record_)
-            top = draw_debug_view(overlay, view, *record_, lens_ ? &*lens_ : nullptr, focal_length_px_,
-                                  controls_.numbers() ? controls_.numbers()->timings : Timings());
+        if (debug_view_.is_on && record_)
+            top = debug_view_.draw(overlay, *record_, controls_.numbers() ? controls_.numbers()->timings : Timings());
         std::vector<Row> states;
         if (controls_.recording())
             states.push_back({"", "REC", red});
@@ -224,17 +230,17 @@ private:
     double scale_;
     bool vsync_, status_line_, shows_overlay_;
     int width_ = 0, height_ = 0; // frame size in px
-    std::optional<shading::Lens> lens_;
-    double focal_length_px_ = 0;
+    DebugView debug_view_;
     Controls controls_;
     std::optional<Window> window_;
     std::optional<Picture> picture_;
     std::optional<arhost_record> record_; // of the frame in the window
     std::vector<arhost_target> targets_;  // of the record
     std::vector<arhost_observation> observations_;
+    std::vector<arhost_expected_marker> expected_;
     Rate rate_;
     std::optional<double> latency_ms_; // from the capture of a frame to its arrival here
-    bool help_ = false, debug_ = false, mirrored_ = false, stale_ = false;
+    bool help_ = false, mirrored_ = false, stale_ = false;
     std::optional<Message> message_;
 };
 
@@ -246,6 +252,7 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "content", "frame",
            "frame, or the overlay alone over black, for see-through displays.", 0, 0, contents),
     option(ARHOST_OPTION_BOOL, "status_line", "true", "Show frame rate, latency, targets and restarts."),
+    DebugView::option,
 };
 
 constexpr const char *needs[] = {"display", nullptr};

@@ -29,7 +29,7 @@ void take_result(Input &input) {
     const std::vector<ipc::Target> configured(2, {"target", {}, ""});
     const ipc::TrackerSlot layout(configured.size());
     std::vector<std::byte> slot(layout.byte_size(0));
-    *reinterpret_cast<std::uint32_t *>(slot.data()) = 2;
+    *reinterpret_cast<ipc::TrackerSlot::Header *>(slot.data()) = {2, 2, 1, 0};
     auto *targets = reinterpret_cast<arhost_target *>(slot.data() + ipc::TrackerSlot::targets_offset);
     for (std::uint32_t i = 0; i < 2; ++i) {
         targets[i].state = ARHOST_TARGET_DETECTED;
@@ -49,6 +49,9 @@ void take_result(Input &input) {
         for (const double number : target.mt)
             require(std::isfinite(number), "a pose is not finite");
     }
+    require(frame.record.search.missed_count <= frame.expected.size(), "more markers are missed than expected");
+    for (const arhost_expected_marker &expected : frame.expected)
+        require(std::isfinite(expected.margin_px), "a margin is not finite");
 }
 
 void overlay(const arhost_render_info &info) {

@@ -17,6 +17,7 @@ struct TrackedRecord {
     arhost_record fields{}; // without the arrays and their lengths
     std::vector<arhost_target> targets;
     std::vector<arhost_observation> observations;
+    std::vector<arhost_expected_marker> expected{};
 
     // Adds a target with this position (mm, eye space), which faces the camera.
     arhost_target &add_target(std::string_view name, arhost_target_state state, std::array<double, 3> position_mm) {
@@ -47,6 +48,8 @@ struct TrackedRecord {
         record.targets = targets.data();
         record.observation_count = static_cast<std::uint32_t>(observations.size());
         record.observations = observations.data();
+        record.expected_count = static_cast<std::uint32_t>(expected.size());
+        record.expected = expected.data();
         return record;
     }
 };

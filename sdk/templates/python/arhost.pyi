@@ -194,6 +194,7 @@ class Observation:
     hamming: int
     corners_px: np.ndarray
     decision_margin: float
+    projected_px: np.ndarray
     def __init__(self, id: int, corners_px: Any, family: int = ..., hamming: int = ...,
                  decision_margin: float = ...) -> None: ...
 TARGET_DETECTED: int
@@ -424,6 +425,14 @@ class RenderInfo:
 OVERLAY_RENDERED: int
 OVERLAY_HELD: int
 OVERLAY_NONE: int
+SEARCH: np.dtype[np.void]
+class Search:
+    everywhere: int
+    observation_count: int
+    unlisted_count: int
+    expected_count: int
+    missed_count: int
+    reserved: int
 RECORD: np.dtype[np.void]
 class Record:
     struct_size: int
@@ -443,6 +452,10 @@ class Record:
     targets: list[Target]
     observations: list[Observation]
     families: list[str]
+    search: Search
+    expected: list[Expected]
+    expected_count: int
+    reserved: int
 
 # The module
 

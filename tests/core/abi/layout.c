@@ -368,13 +368,14 @@ FIELD(arhost_tracker_setup, marker_count, 40, 4);
 FIELD(arhost_tracker_setup, family_count, 44, 4);
 FIELD(arhost_tracker_setup, families, 48, 8);
 
-STRUCT(arhost_observation, 88);
+STRUCT(arhost_observation, 152);
 FIELD(arhost_observation, struct_size, 0, 4);
 FIELD(arhost_observation, id, 4, 4);
 FIELD(arhost_observation, family, 8, 4);
 FIELD(arhost_observation, hamming, 12, 4);
 FIELD(arhost_observation, corners_px, 16, 64);
 FIELD(arhost_observation, decision_margin, 80, 8);
+FIELD(arhost_observation, projected_px, 88, 64);
 VALUE(ARHOST_TARGET_DETECTED, 1);
 VALUE(ARHOST_TARGET_PREDICTED, 2);
 VALUE(ARHOST_TARGET_LOST, 3);
@@ -687,7 +688,15 @@ VALUE(ARHOST_OVERLAY_RENDERED, 1);
 VALUE(ARHOST_OVERLAY_HELD, 2);
 VALUE(ARHOST_OVERLAY_NONE, 3);
 
-STRUCT(arhost_record, 1008);
+STRUCT(arhost_search, 24);
+FIELD(arhost_search, everywhere, 0, 4);
+FIELD(arhost_search, observation_count, 4, 4);
+FIELD(arhost_search, unlisted_count, 8, 4);
+FIELD(arhost_search, expected_count, 12, 4);
+FIELD(arhost_search, missed_count, 16, 4);
+FIELD(arhost_search, reserved, 20, 4);
+
+STRUCT(arhost_record, 1048);
 FIELD(arhost_record, struct_size, 0, 4);
 FIELD(arhost_record, clock, 4, 4);
 FIELD(arhost_record, sequence, 8, 8);
@@ -705,6 +714,10 @@ FIELD(arhost_record, observation_count, 476, 4);
 FIELD(arhost_record, targets, 480, 8);
 FIELD(arhost_record, observations, 488, 8);
 FIELD(arhost_record, families, 496, 512);
+FIELD(arhost_record, search, 1008, 24);
+FIELD(arhost_record, expected, 1032, 8);
+FIELD(arhost_record, expected_count, 1040, 4);
+FIELD(arhost_record, reserved, 1044, 4);
 
 STRUCT(arhost_output, 80);
 FIELD(arhost_output, struct_size, 0, 4);

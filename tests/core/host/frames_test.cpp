@@ -34,7 +34,9 @@ const std::vector<ipc::Target> targets = {
 // The result of a tracker: "desk" was never seen, "cup" is detected, "head" is lost.
 struct TrackerResult {
     TrackerResult() : bytes(layout.byte_size(0)) {
-        count() = 2;
+        header() = {.observation_count = 2, .expected_count = 2, .missed_count = 1, .searched_everywhere = -1};
+        expected(0).margin_px = expected(1).margin_px = 4;
+        expected(1).corners_px[3][1] = 20;
         for (const int index : {1, 2}) {
             target(index).state = index == 1 ? ARHOST_TARGET_DETECTED : ARHOST_TARGET_LOST;
             for (const int diagonal : {0, 5, 10, 15})
@@ -45,12 +47,15 @@ struct TrackerResult {
         observation(0).id = 7;
         observation(1).id = 99;
     }
-    std::uint32_t &count() { return *reinterpret_cast<std::uint32_t *>(bytes.data()); }
+    ipc::TrackerSlot::Header &header() { return *reinterpret_cast<ipc::TrackerSlot::Header *>(bytes.data()); }
     arhost_target &target(int index) {
         return reinterpret_cast<arhost_target *>(bytes.data() + ipc::TrackerSlot::targets_offset)[index];
     }
     arhost_observation &observation(int index) {
         return reinterpret_cast<arhost_observation *>(bytes.data() + layout.observations_offset)[index];
+    }
+    arhost_expected_marker &expected(int index) {
+        return reinterpret_cast<arhost_expected_marker *>(bytes.data() + layout.expected_offset)[index];
     }
     const char *problem() { return accept_tracker_result(bytes, targets, 1, frame); }
 
@@ -73,6 +78,14 @@ TEST(TrackerResult, IsCopiedWithTheConfiguredNamesOfTheTargets) {
     ASSERT_EQ(result.frame.observations.size(), 2u);
     EXPECT_EQ(result.frame.observations[1].id, 99);
     EXPECT_EQ(result.frame.observations[1].struct_size, sizeof(arhost_observation));
+    ASSERT_EQ(result.frame.expected.size(), 2u);
+    EXPECT_EQ(result.frame.expected[1].corners_px[3][1], 20);
+    EXPECT_EQ(result.frame.expected[1].struct_size, sizeof(arhost_expected_marker));
+    const arhost_search &search = result.frame.record.search;
+    EXPECT_EQ(search.everywhere, 1);
+    EXPECT_EQ(search.observation_count, 2u);
+    EXPECT_EQ(search.expected_count, 2u);
+    EXPECT_EQ(search.missed_count, 1u);
 }
 
 TEST(TrackerResult, IsRejectedIfItsNumbersAreInvalid) {
@@ -83,9 +96,23 @@ TEST(TrackerResult, IsRejectedIfItsNumbersAreInvalid) {
         EXPECT_STREQ(result.problem(), problem);
         EXPECT_TRUE(result.frame.targets.empty());
         EXPECT_TRUE(result.frame.observations.empty());
+        EXPECT_TRUE(result.frame.expected.empty());
+        EXPECT_EQ(result.frame.record.search.expected_count, 0u);
     };
-    expect([](TrackerResult &r) { r.count() = ARHOST_MAX_OBSERVATIONS + 1; },
+    expect([](TrackerResult &r) { r.header().observation_count = ARHOST_MAX_OBSERVATIONS + 1; },
            "the tracker reports more observations than ARHOST_MAX_OBSERVATIONS");
+    for (const auto alter : {+[](TrackerResult &r) { r.header().expected_count = ARHOST_MAX_MARKERS + 1; },
+                             +[](TrackerResult &r) { r.header().expected_count = UINT32_MAX; },
+                             +[](TrackerResult &r) { r.header().missed_count = 3; }})
+        expect(alter, "the number of expected or missed markers is out of range");
+    for (const double number : {nan, std::numeric_limits<double>::infinity()}) {
+        TrackerResult result;
+        result.expected(1).corners_px[0][1] = number;
+        EXPECT_STREQ(result.problem(), "a coordinate of an expected marker's corner is not finite");
+    }
+    for (const auto alter : {+[](TrackerResult &r) { r.expected(0).margin_px = nan; },
+                             +[](TrackerResult &r) { r.expected(1).margin_px = -1; }})
+        expect(alter, "an expected marker's margin is negative or not finite");
     expect([](TrackerResult &r) { r.target(1).state = 4; }, "a target's state is out of range");
     expect([](TrackerResult &r) { r.target(0).state = -1; }, "a target's state is out of range");
     for (const auto alter : {+[](TrackerResult &r) { r.target(1).first_observation = 3; },
@@ -101,8 +128,9 @@ TEST(TrackerResult, IsRejectedIfItsNumbersAreInvalid) {
     expect([](TrackerResult &r) { r.target(2).mt[0] = nan; }, "the pose is not finite");
     expect([](TrackerResult &r) { r.target(2).mt[0] = 2; }, "the pose's rotation is not orthonormal");
     expect([](TrackerResult &r) { r.observation(1).family = 1; }, "an observation's family is out of range");
-    expect([](TrackerResult &r) { r.observation(1).corners_px[3][1] = nan; },
-           "a coordinate of an observation's corner is not finite");
+    for (const auto alter : {+[](TrackerResult &r) { r.observation(1).corners_px[3][1] = nan; },
+                             +[](TrackerResult &r) { r.observation(0).projected_px[0][0] = nan; }})
+        expect(alter, "a coordinate of an observation's corner is not finite");
     expect([](TrackerResult &r) { r.observation(0).decision_margin = nan; },
            "an observation's decision margin is not finite");
 }

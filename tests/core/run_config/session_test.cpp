@@ -27,6 +27,7 @@ const std::string rendered =
     R"("reprojection_px": 0.25, "ambiguity": 0.5, "observations": [{"id": 7, "corners_px": [[1, 2], [3, 2], [3, 4], [1, 4]], )"
     R"("decision_margin": 60, "hamming": 1}]}, )"
     R"({"name": "lid", "state": "lost", "age_frames": 5, "mt": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -9, 1]}], )"
+    R"("search": {"everywhere": true, "observations": 3, "unlisted": 2, "expected": 4, "missed": 1}, )"
     R"("camera": {"eye": [1, 2, 3.5], "look_at": [1, 2, 2.5], )"
     R"("up": [0, 1, 0]}, "truth": {"target": "cup", "mt": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]})";
 const std::string end = "{\"end\": true}\n";
@@ -92,6 +93,12 @@ TEST_F(SessionFolder, HasTheFactsOfEachFrame) {
     EXPECT_EQ(full.observations[0].hamming, 1u);
     EXPECT_EQ(full.observations[0].decision_margin, 60);
     EXPECT_EQ(full.observations[0].corners_px[2][1], 4);
+    EXPECT_EQ(full.search.everywhere, 1);
+    EXPECT_EQ(full.search.observation_count, 3u);
+    EXPECT_EQ(full.search.unlisted_count, 2u);
+    EXPECT_EQ(full.search.expected_count, 4u);
+    EXPECT_EQ(full.search.missed_count, 1u);
+    EXPECT_EQ(plain.search.observation_count, 0u);
     ASSERT_TRUE(full.view && full.truth);
     EXPECT_EQ(full.view->eye_mm[2], 3.5);
     EXPECT_EQ(full.truth->first, "cup");
@@ -127,6 +134,10 @@ TEST_F(SessionFolder, DamagedLinesAreReportedWithTheirPosition) {
         error_of_log(line(0) + "{\"frame\": 1, ]\n" + line(2)),
         HasSubstr("frames.jsonl:2:14: is not valid JSON; to replay the frames before it, delete this line and "
                   "all that follow"));
+    EXPECT_THAT(
+        error_of_log(line(0) +
+                     line(1, R"("overlay": "none", "targets": [], "search": {"everywhere": 1}, "camera": null)")),
+        HasSubstr("frames.jsonl:2:1: is not the record of a frame: type must be boolean"));
     EXPECT_THAT(error_of_log(line(0) + "[]\n"), HasSubstr("frames.jsonl:2:1: is not the record of a frame: "));
     EXPECT_THAT(error_of_log(line(0) + "\n"), HasSubstr("frames.jsonl:2:1: is not valid JSON"));
     EXPECT_THAT(error_of_log("{\"frame\": 0}\n"), HasSubstr("frames.jsonl:1:1: is not the record of a frame: key "

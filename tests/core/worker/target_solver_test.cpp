@@ -49,7 +49,7 @@ enum Index { cup, board, box, head };
 
 arhost_observation observed(const ObservedMarker &seen, std::int32_t id, std::uint32_t family = 0,
                             double margin = 1) {
-    arhost_observation observation{sizeof observation, id, family, 0, {}, margin};
+    arhost_observation observation{sizeof observation, id, family, 0, {}, margin, {}};
     for (int i = 0; i < 4; ++i) {
         observation.corners_px[i][0] = seen.corners_px[i].x();
         observation.corners_px[i][1] = seen.corners_px[i].y();
@@ -84,6 +84,7 @@ protected:
         expectation = solver.expect(frame * frame_ns, known);
         solver.solve(result, expectation.search_everywhere, frame * frame_ns, known, after.data(),
                      {solved, observations});
+        missed = solver.move_missed_to_end(expectation, result);
         before.swap(after);
         is_first = false;
     }
@@ -103,6 +104,7 @@ protected:
     bool is_first = true;
     std::array<arhost_target, 4> solved{};
     TargetSolver::Expectation expectation; // before the last frame
+    std::uint32_t missed = 0;              // of it
     std::vector<arhost_observation> observations;
 };
 
@@ -141,6 +143,46 @@ TEST_F(TargetSolverTest, ComputesThePoseOfAMarkerAndOfAMap) {
     for (const arhost_observation &observation : observations)
         ids.push_back(observation.id);
     EXPECT_EQ(ids, (std::vector{5, 10, 11, 12, 13, 77}));
+}
+
+TEST_F(TargetSolverTest, ProjectsTheCornersOfTargetsWithTheirPoses) {
+    const Rigid cup_truth = pose_at({-100, 50, 900}, 35), board_truth = pose_at({100, -50, 1200}, 50, 30);
+    std::vector<arhost_observation> seen = see_board(board_truth);
+    seen[1].corners_px[2][0] += 3; // an outlier
+    seen.push_back(see(cup_truth, 5));
+    seen.push_back(see(cup_truth, 77)); // of no target
+    seen.back().projected_px[0][0] = 1; // written by the tracker
+    solve(seen);
+    const Projection projection(pinhole);
+    for (std::size_t i = 0; i < 5; ++i) {
+        const arhost_observation &seen_again = observations[i];
+        const Corners corners = seen_again.id == 5 ? single : on_board(seen_again.id);
+        for (std::size_t corner = 0; corner < 4; ++corner) {
+            const auto expected =
+                projection.pixel((seen_again.id == 5 ? cup_truth : board_truth) * corners.at(corner)).value();
+            EXPECT_NEAR(seen_again.projected_px[corner][0], expected.x(), 0.02) << i;
+            EXPECT_NEAR(seen_again.projected_px[corner][1], expected.y(), 0.02) << i;
+        }
+    }
+    EXPECT_EQ(observations[5].id, 77);
+    for (const auto &corner : observations[5].projected_px)
+        EXPECT_TRUE(corner[0] == 0 && corner[1] == 0);
+}
+
+TEST_F(TargetSolverTest, CountsExpectedMarkersThatTheTrackerMisses) {
+    const Rigid cup_truth = pose_at({-100, 50, 900}, 35), board_truth = pose_at({100, -50, 1200}, 50, 30);
+    std::vector<arhost_observation> seen = see_board(board_truth);
+    seen.push_back(see(cup_truth, 5));
+    solve(seen);
+    EXPECT_TRUE(expectation.search_everywhere);
+    EXPECT_EQ(missed, 0u);
+    seen.erase(seen.begin() + 1);
+    seen.push_back(see(cup_truth, 77));
+    solve(seen, 1);
+    EXPECT_FALSE(expectation.search_everywhere);
+    ASSERT_EQ(expectation.markers.size(), 5u);
+    EXPECT_EQ(missed, 1u);
+    EXPECT_EQ(expectation.markers.back().marker, 2u) << "the marker 11 is the third one of the setup";
 }
 
 TEST_F(TargetSolverTest, TellsTheSameIdOfTwoFamiliesApart) {

@@ -128,6 +128,16 @@ TEST(SinkWeb, ServesThePageThePictureAndTheDescription) {
     EXPECT_EQ(run.quit(), 0) << run.output();
 }
 
+TEST(SinkWeb, TheCommandSetTurnsTheDebugViewOn) {
+    WebRun run("[quit, set]");
+    const std::size_t plain = run.get("/snapshot.jpg").body.size(); // a frame of one colour
+    const std::string set = R"({"command": "set", "component": "sink_web", "option": "debug_view", "value": "true"})";
+    EXPECT_EQ(run.post(set).status, 200);
+    while (run.running() && run.get("/snapshot.jpg").body.size() < plain * 3 / 2)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
 TEST(SinkWeb, StreamsChangingFrames) {
     WebRun run;
     HttpClient viewer = run.watch();

@@ -400,6 +400,14 @@ TEST_F(SinkWindow, DShowsMarkersAndAxesOfTargetsWhereTheyAre) {
     EXPECT_LE(difference(picture, 0, 0, 640, 480), 2);
 }
 
+TEST_F(SinkWindow, AnOptionShowsTheDebugViewAtOnce) {
+    SinkUnderTest &sink = start(640, 480, {{"debug_view", "true"}});
+    ASSERT_EQ(sink.write(Picture(640, 480, 5), make_record(0)), ARHOST_STATUS_OK);
+    EXPECT_TRUE(becomes([&] { return count(yellow) > 0; })) << "the label of the first row";
+    observer_->press(XK_d);
+    EXPECT_TRUE(becomes([&] { return count(yellow) == 0; }));
+}
+
 TEST_F(SinkWindow, CanBeReopened) {
     for (int i = 0; i < 2; ++i) {
         SinkUnderTest &sink = start(160, 120);

@@ -37,6 +37,16 @@ enum {
     ARHOST_OVERLAY_NONE = 3      /* no overlay, only video: no target in view, or a component is not running */
 };
 
+/* How the tracker has searched a frame for markers. All 0 if it has not processed the frame. */
+typedef struct arhost_search {
+    int32_t everywhere;         /* arhost_track_request.search_everywhere */
+    uint32_t observation_count; /* markers that it has reported */
+    uint32_t unlisted_count;    /* of these, those that no target lists */
+    uint32_t expected_count;    /* markers that were expected */
+    uint32_t missed_count;      /* of these, those that it has not reported */
+    uint32_t reserved;          /* 0 */
+} arhost_search;
+
 /* Metadata of a frame. All numbers that are set are finite. */
 typedef struct arhost_record {
     uint32_t struct_size;
@@ -59,6 +69,12 @@ typedef struct arhost_record {
     /* The markers seen in this frame: those of the targets, then those that no target lists. */
     const arhost_observation *observations;
     char families[ARHOST_MAX_FAMILIES][ARHOST_MAX_FAMILY]; /* arhost_observation.family is an index in it */
+    arhost_search search;
+    /* Where markers were expected: those that the tracker has reported, then those that it has missed. A replay of a
+     * session has the numbers in `search`, but not these places, nor the observations that no target lists. */
+    const arhost_expected_marker *expected;
+    uint32_t expected_count;
+    uint32_t reserved; /* 0 */
 } arhost_record;
 
 /* An augmented frame to read: B, G, R bytes, top row first, `stride` bytes per row. */

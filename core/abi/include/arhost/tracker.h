@@ -74,11 +74,13 @@ typedef struct arhost_tracker_setup {
 typedef struct arhost_observation {
     uint32_t struct_size;
     int32_t id;
-    uint32_t family;         /* index in arhost_tracker_setup.families */
-    uint32_t hamming;        /* bits of the code that were corrected */
-    double corners_px[4][2]; /* in pixels of the distorted frame */
-    double decision_margin;  /* how clearly the bits were read, >= 0: larger is better, on a scale of the tracker's
-                                own;  0: unknown */
+    uint32_t family;           /* index in arhost_tracker_setup.families */
+    uint32_t hamming;          /* bits of the code that were corrected */
+    double corners_px[4][2];   /* in pixels of the distorted frame */
+    double decision_margin;    /* how clearly the bits were read, >= 0: larger is better, on a scale of the tracker's
+                                  own;  0: unknown */
+    double projected_px[4][2]; /* for sinks: where the pose of the marker's target projects the corners; all 0 if it
+                                  does not. The worker sets it */
 } arhost_observation;
 
 typedef int32_t arhost_target_state;

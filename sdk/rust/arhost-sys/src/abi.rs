@@ -506,8 +506,9 @@ pub struct arhost_observation {
     pub hamming: u32,
     pub corners_px: [[f64; 2]; 4],
     pub decision_margin: f64,
+    pub projected_px: [[f64; 2]; 4],
 }
-const _: () = assert!(size_of::<arhost_observation>() == 88);
+const _: () = assert!(size_of::<arhost_observation>() == 152);
 pub type arhost_target_state = i32;
 pub const ARHOST_TARGET_DETECTED: arhost_target_state = 1;
 pub const ARHOST_TARGET_PREDICTED: arhost_target_state = 2;
@@ -928,6 +929,17 @@ pub const ARHOST_OVERLAY_HELD: arhost_overlay = 2;
 pub const ARHOST_OVERLAY_NONE: arhost_overlay = 3;
 #[repr(C)]
 #[derive(Clone, Copy)]
+pub struct arhost_search {
+    pub everywhere: i32,
+    pub observation_count: u32,
+    pub unlisted_count: u32,
+    pub expected_count: u32,
+    pub missed_count: u32,
+    pub reserved: u32,
+}
+const _: () = assert!(size_of::<arhost_search>() == 24);
+#[repr(C)]
+#[derive(Clone, Copy)]
 pub struct arhost_record {
     pub struct_size: u32,
     pub clock: arhost_clock,
@@ -946,8 +958,12 @@ pub struct arhost_record {
     pub targets: *const arhost_target,
     pub observations: *const arhost_observation,
     pub families: [[c_char; ARHOST_MAX_FAMILY]; ARHOST_MAX_FAMILIES],
+    pub search: arhost_search,
+    pub expected: *const arhost_expected_marker,
+    pub expected_count: u32,
+    pub reserved: u32,
 }
-const _: () = assert!(size_of::<arhost_record>() == 1008);
+const _: () = assert!(size_of::<arhost_record>() == 1048);
 unsafe impl Sync for arhost_record {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]

@@ -649,7 +649,10 @@ mod tests {
         let marker = |id, target| {
             let struct_size = size_of::<Longer<arhost_marker_config>>() as u32;
             let corners_mm = [[f64::from(id), 1.0, 2.0]; 4];
-            Longer(arhost_marker_config { struct_size, id, family: 0, target, corners_mm }, [!0; 2])
+            let (file, pattern_ratio) = (std::ptr::null(), 0.0);
+            let marker =
+                arhost_marker_config { struct_size, id, family: 0, target, corners_mm, file, pattern_ratio };
+            Longer(marker, [!0; 2])
         };
         let listed = [marker(4, 0), marker(7, 1)];
         let target = |name: &'static [u8], body: Option<&'static [u8]>| {

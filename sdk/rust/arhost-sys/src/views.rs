@@ -94,7 +94,8 @@ unsafe fn append<T>(first: *mut T, count: &mut u32, capacity: u32, value: T) -> 
 impl Default for arhost_observation {
     fn default() -> Self {
         let struct_size = std::mem::size_of::<Self>() as u32;
-        arhost_observation { struct_size, id: 0, family: 0, hamming: 0, corners_px: [[0.0; 2]; 4], decision_margin: 0.0 }
+        let (corners_px, projected_px) = ([[0.0; 2]; 4], [[0.0; 2]; 4]);
+        arhost_observation { struct_size, id: 0, family: 0, hamming: 0, corners_px, decision_margin: 0.0, projected_px }
     }
 }
 
@@ -252,6 +253,9 @@ impl arhost_record {
     }
     pub fn observations(&self) -> Vec<&arhost_observation> {
         unsafe { elements(self.observations, self.observation_count) }
+    }
+    pub fn expected(&self) -> Vec<&arhost_expected_marker> {
+        unsafe { elements(self.expected, self.expected_count) }
     }
     /// The name of an observation's family. Panics if there is no such family.
     pub fn family(&self, seen: &arhost_observation) -> Cow<'_, str> {
