@@ -81,7 +81,8 @@ public:
                 candidate.corners_px[corner] = {tag->p[3 - corner][0] - 0.5, tag->p[3 - corner][1] - 0.5};
             candidate.corners_px =
                 fiducial::refine_edges(grey, candidate.corners_px, lens_, family_->width_at_border, true)
-                    .value_or(candidate.corners_px);
+                    .value_or(fiducial::MeasuredCorners{candidate.corners_px})
+                    .corners_px;
             candidates.push_back(candidate);
         }
         return best_of_each(candidates);
@@ -124,7 +125,8 @@ public:
             std::ranges::copy(found.corners[i], candidate.corners_px.begin());
             candidate.corners_px =
                 fiducial::refine_edges(grey, candidate.corners_px, lens_, dictionary_.markerSize + 2)
-                    .value_or(candidate.corners_px);
+                    .value_or(fiducial::MeasuredCorners{candidate.corners_px})
+                    .corners_px;
             candidates.push_back(candidate);
         }
         return best_of_each(candidates);

@@ -26,6 +26,7 @@ using test::GreyFrame;
 
 constexpr double side_mm = 100;
 constexpr double chi2_6_95 = 12.59; // 95 % quantile of the chi-squared distribution with 6 degrees of freedom
+constexpr double unknown_sigma_px = 0.3; // as the worker assumes
 const cv::Size size(480, 360);
 const arhost_intrinsics camera = test::intrinsics_of(size, 450, 450, 239.5, 179.5);
 
@@ -120,7 +121,12 @@ struct Result {
     double covered_share() const { return found > flips ? 100.0 * covered / (found - flips) : 0; }
 };
 
-using Detect = std::function<std::optional<Corners>(const GreyFrame &)>;
+// Corners, and the standard deviation that the detector tells; 0: none.
+struct Detection {
+    Corners corners;
+    double sigma_px = 0;
+};
+using Detect = std::function<std::optional<Detection>(const GreyFrame &)>;
 
 Result measure(const Views &views, const Detect &detect) {
     const pose::Projection projection(camera);
@@ -128,16 +134,18 @@ Result measure(const Views &views, const Detect &detect) {
     double sum = 0;
     std::vector<std::pair<Rigid, pose::Estimate>> poses; // truth, and the nearest of the two solutions
     for (const View &view : views.all()) {
-        const std::optional<Corners> corners = detect(view.frame);
-        if (!corners)
+        const std::optional<Detection> detection = detect(view.frame);
+        if (!detection)
             continue;
+        const Corners &corners = detection->corners;
         ++result.found;
         const auto expected = test::corners_of(view.truth, camera, side_mm);
-        pose::ObservedMarker marker{pose::square_corners_mm(side_mm), {}, 0.1};
+        pose::ObservedMarker marker{
+            pose::square_corners_mm(side_mm), {}, detection->sigma_px > 0 ? detection->sigma_px : unknown_sigma_px};
         for (std::size_t i = 0; i < 4; ++i) {
-            const cv::Point2d error = (*corners)[i] - expected[i];
+            const cv::Point2d error = corners[i] - expected[i];
             sum += error.dot(error) / 8;
-            marker.corners_px[i] = {(*corners)[i].x, (*corners)[i].y};
+            marker.corners_px[i] = {corners[i].x, corners[i].y};
         }
         const Rigid truth = pose::rigid_of(view.truth);
         const auto all = estimate_poses({&marker, 1}, projection);
@@ -177,17 +185,17 @@ public:
         }
     }
     static constexpr const char *names[] = {"tracker_apriltag", "AprilTag", "tracker_aruco", "OpenCV"};
-    std::optional<Corners> detect(std::size_t which, const GreyFrame &frame) {
+    std::optional<Detection> detect(std::size_t which, const GreyFrame &frame) {
         if (which % 2 == 1) {
             const bench::Detections found = which == 1 ? april_tag_(frame) : opencv_(frame);
-            return found.contains(0) ? std::optional(found.at(0)) : std::nullopt;
+            return found.contains(0) ? std::optional(Detection{found.at(0)}) : std::nullopt;
         }
         for (const arhost_observation &seen : trackers_[which / 2].track(frame))
             if (seen.id == 0) {
-                Corners corners;
+                Detection detection{{}, seen.corner_sigma_px};
                 for (std::size_t i = 0; i < 4; ++i)
-                    corners[i] = {seen.corners_px[i][0], seen.corners_px[i][1]};
-                return corners;
+                    detection.corners[i] = {seen.corners_px[i][0], seen.corners_px[i][1]};
+                return detection;
             }
         return std::nullopt;
     }

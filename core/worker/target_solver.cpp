@@ -31,8 +31,12 @@ using pose::Estimate;
 using pose::ObservedMarker;
 using pose::Rigid;
 
-// The noise of a corner. That of a map contains the errors of its printed layout.
+// The errors of corners that the choice among poses allows for: more than their noise, because calibrations are not
+// exact. Those of a map contain the errors of its printed layout.
 constexpr double marker_sigma_px = 0.1, map_sigma_px = 0.5;
+
+// The noise of the corners of a tracker that does not know it.
+constexpr double unknown_sigma_px = 0.3;
 
 [[noreturn]] void violation(const std::string &what) {
     throw std::runtime_error("contract violation: the tracker " + what);
@@ -80,8 +84,12 @@ TargetSolver::TargetSolver(const arhost_intrinsics &intrinsics, const std::vecto
             std::ranges::transform(marker.corners_mm, added.corners_mm.begin(),
                                    [](const auto &corner) { return Eigen::Vector3d(corner.data()); });
         }
-        targets_.push_back({!target.body.empty(), target.markers.size() > 1 ? map_sigma_px : marker_sigma_px});
+        targets_.push_back({!target.body.empty(), target.markers.size() > 1});
     }
+}
+
+double TargetSolver::Target::corner_sigma_px() const {
+    return has_map ? map_sigma_px : marker_sigma_px;
 }
 
 std::uint64_t TargetSolver::state_size() const {
@@ -177,6 +185,8 @@ void TargetSolver::check(const arhost_tracker_result &reported) const {
                 violation("reports " + name + " with a corner that is not finite");
         if (!(observation.decision_margin >= 0 && std::isfinite(observation.decision_margin)))
             violation("reports " + name + " with an invalid decision margin");
+        if (!(observation.corner_sigma_px >= 0 && std::isfinite(observation.corner_sigma_px)))
+            violation("reports " + name + " with an invalid corner noise");
     }
     if (reported.pose_count > targets_.size())
         violation("reports more poses than there are targets");
@@ -198,27 +208,31 @@ void TargetSolver::check(const arhost_tracker_result &reported) const {
     }
 }
 
+ObservedMarker TargetSolver::observed(const arhost_observation &observation, double corner_sigma_px) const {
+    ObservedMarker marker{marker_of(observation)->corners_mm, {}, corner_sigma_px};
+    std::ranges::transform(observation.corners_px, marker.corners_px.begin(),
+                           [](const auto &corner) { return Eigen::Vector2d(corner); });
+    return marker;
+}
+
 // If the same marker is seen several times, keeps the copy that is nearest to where the target is expected: by its
 // motion or, if it is unknown, by the target's other markers. Otherwise keeps the copy with the fewest corrected
 // bits, or that which was read most clearly.
-std::vector<ObservedMarker> TargetSolver::without_copies(std::span<const arhost_observation> observations,
-                                                         const std::optional<pose::Motion> &predicted,
-                                                         double corner_sigma_px) const {
-    const auto observed = [&](const arhost_observation &observation) {
-        ObservedMarker marker{marker_of(observation)->corners_mm, {}, corner_sigma_px};
-        std::ranges::transform(observation.corners_px, marker.corners_px.begin(),
-                               [](const auto &corner) { return Eigen::Vector2d(corner); });
-        return marker;
-    };
+std::vector<const arhost_observation *> TargetSolver::without_copies(std::span<const arhost_observation> observations,
+                                                                     const std::optional<pose::Motion> &predicted,
+                                                                     double corner_sigma_px) const {
     std::map<std::pair<std::uint32_t, std::int32_t>, std::vector<const arhost_observation *>> by_marker;
     for (const arhost_observation &observation : observations)
         by_marker[{observation.family, observation.id}].push_back(&observation);
+    std::vector<const arhost_observation *> kept;
     std::vector<ObservedMarker> markers;
     for (const auto &[marker, copies] : by_marker)
-        if (copies.size() == 1)
-            markers.push_back(observed(*copies.front()));
+        if (copies.size() == 1) {
+            kept.push_back(copies.front());
+            markers.push_back(observed(*kept.back(), corner_sigma_px));
+        }
     std::vector<Estimate> poses;
-    if (!predicted && markers.size() < by_marker.size())
+    if (!predicted && kept.size() < by_marker.size())
         poses = estimate_poses(markers, projection_);
     const bool is_known = predicted || !poses.empty();
     const Rigid expected = predicted ? pose_of(*predicted) : is_known ? poses.front().camera_from_target : Rigid();
@@ -231,9 +245,20 @@ std::vector<ObservedMarker> TargetSolver::without_copies(std::span<const arhost_
             return centre ? std::pair((centre_px(*copy) - *centre).norm(), 0.0)
                           : std::pair(static_cast<double>(copy->hamming), -copy->decision_margin);
         };
-        markers.push_back(observed(**std::ranges::min_element(copies, {}, cost)));
+        kept.push_back(*std::ranges::min_element(copies, {}, cost));
     }
-    return markers;
+    return kept;
+}
+
+// Returns the covariance of a target with a single marker, from the noise of its corners.
+pose::Matrix6d TargetSolver::covariance_of(const Rigid &pose, const arhost_observation &single) const {
+    const ObservedMarker marker =
+        observed(single, single.corner_sigma_px > 0 ? single.corner_sigma_px : unknown_sigma_px);
+    std::array<pose::Correspondence, 4> corners;
+    for (std::size_t i = 0; i < 4; ++i)
+        corners[i] = {marker.corners_on_target_mm[i], marker.corners_px[i], marker.corner_sigma_px};
+    const auto estimate = assess(pose, corners, projection_);
+    return estimate ? estimate->covariance : pose::Matrix6d::Zero();
 }
 
 // Sets `projected_px`.
@@ -251,8 +276,11 @@ void TargetSolver::project(const Rigid &pose, arhost_observation &observation) c
 
 void TargetSolver::solve(const Target &target, std::span<arhost_observation> observations, std::int64_t capture_ns,
                          Memory &memory, arhost_target &out) const {
-    const auto markers =
-        without_copies(observations, predicted_motion(memory.track, capture_ns), target.corner_sigma_px);
+    const auto kept =
+        without_copies(observations, predicted_motion(memory.track, capture_ns), target.corner_sigma_px());
+    std::vector<ObservedMarker> markers;
+    for (const arhost_observation *observation : kept)
+        markers.push_back(observed(*observation, target.corner_sigma_px()));
     std::vector<Estimate> poses = estimate_poses(markers, projection_);
     // Something hides a corner of the only marker. With several markers, such corners are outliers.
     if (markers.size() == 1)
@@ -271,7 +299,8 @@ void TargetSolver::solve(const Target &target, std::span<arhost_observation> obs
     for (arhost_observation &observation : observations)
         project(pose, observation);
     out.state = ARHOST_TARGET_DETECTED;
-    write_covariance(chosen.covariance, out.covariance);
+    write_covariance(target.has_map ? chosen.covariance : covariance_of(chosen.camera_from_target, *kept.front()),
+                     out.covariance);
     out.reprojection_px = chosen.reprojection_px;
     if (poses.size() == 1)
         return;

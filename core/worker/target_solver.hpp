@@ -53,8 +53,8 @@ private:
         std::array<Eigen::Vector3d, 4> corners_mm;
     };
     struct Target {
-        bool is_body;
-        double corner_sigma_px;
+        bool is_body, has_map;
+        double corner_sigma_px() const;
     };
     struct Header;
     struct Memory;
@@ -62,12 +62,14 @@ private:
     Header header_of(const void *state) const;
     Memory memory_of(const void *state, std::size_t target) const;
     const Marker *marker_of(const arhost_observation &observation) const;
-    std::vector<pose::ObservedMarker> without_copies(std::span<const arhost_observation> observations,
-                                                     const std::optional<pose::Motion> &predicted,
-                                                     double corner_sigma_px) const;
+    pose::ObservedMarker observed(const arhost_observation &observation, double corner_sigma_px) const;
+    std::vector<const arhost_observation *> without_copies(std::span<const arhost_observation> observations,
+                                                           const std::optional<pose::Motion> &predicted,
+                                                           double corner_sigma_px) const;
     void solve(const Target &target, std::span<arhost_observation> observations, std::int64_t capture_ns,
                Memory &memory, arhost_target &out) const;
     void check(const arhost_tracker_result &reported) const;
+    pose::Matrix6d covariance_of(const pose::Rigid &pose, const arhost_observation &single) const;
     void project(const pose::Rigid &pose, arhost_observation &observation) const;
 
     pose::Projection projection_;

@@ -15,7 +15,15 @@ namespace arhost::fiducial {
 namespace {
 
 struct Line {
-    cv::Point2d point, direction;
+    cv::Point2d point, direction; // `point` is the centroid of the points that the line was fitted to
+    double offset_variance;       // px², of the distance between the line and the true one at `point`
+    double spread;                // px², variance of the points along the line
+
+    // Variance of the distance between the line and the true one, beside `at`.
+    double variance_at(cv::Point2d at) const {
+        const double along = direction.dot(at - point);
+        return offset_variance * (1 + along * along / spread);
+    }
 };
 
 double sample(const cv::Mat &grey, cv::Point2d at) {
@@ -58,12 +66,18 @@ cv::Mat_<float> mean_of_rows(const cv::Mat_<float> &rises) {
     return mean;
 }
 
+// Neighbouring positions on an edge share pixels, and rows of rises that were averaged. This is the distance in px at
+// which positions get independent, if pixels are: the integral of the autocorrelation of bilinear samples.
+constexpr double correlation_px = 1.5;
+
 // The rises near an edge. `peak` and `at_rim` are the greatest mean rises at any offset and at the greatest offsets,
 // `on_line` is the mean at offset 0 with steps of the smallest size; `width_px` is the width of a slope of constant
-// rise that is as high, `noise` the standard deviation of a rise before averaging, relative to the peak.
+// rise that is as high, `noise` the standard deviation of a rise before averaging, relative to the peak, and
+// `averaged` the number of rows that each was averaged from.
 struct Slope {
     cv::Mat_<float> rises;
     double step_px, peak = 0, at_rim = 0, on_line = 0, width_px = 0, noise = 0;
+    int averaged = 1;
 };
 
 constexpr double contained = 0.35; // greatest rise at the rim relative to the peak, if the slope ends before the rim
@@ -86,9 +100,9 @@ Slope find_slope(const cv::Mat &grey, const Edge &edge, double min_step_px, doub
     }
 }
 
-// Averages the rises of neighbouring positions until their noise is small relative to the slope. Returns the standard
-// deviation that they had, relative to the peak.
-double reduce_noise(Slope &slope) {
+// Averages the rises of neighbouring positions until their noise is small relative to the slope. Sets `noise` and
+// `averaged`.
+void reduce_noise(Slope &slope) {
     constexpr double max_noise = 0.08; // relative to the peak
     std::vector<float> steps; // differences between neighbours contain little of the picture, but all the noise
     for (int row = 1; row < slope.rises.rows; ++row)
@@ -99,9 +113,11 @@ double reduce_noise(Slope &slope) {
     const double noise = 1.05 * *median; // standard deviation of a rise, if it is normally distributed
     const double ratio = noise / (max_noise * slope.peak);
     const int averaged = static_cast<int>(std::min(ratio * ratio, slope.rises.rows / 4.0));
-    if (averaged > 1)
-        cv::blur(slope.rises, slope.rises, {1, averaged | 1});
-    return noise / slope.peak;
+    if (averaged > 1) {
+        slope.averaged = averaged | 1;
+        cv::blur(slope.rises, slope.rises, {1, slope.averaged});
+    }
+    slope.noise = noise / slope.peak;
 }
 
 // Returns the offset of the edge in px: the mean offset weighted by the squared rise, as in AprilTag. Only uses rises
@@ -116,10 +132,22 @@ std::optional<double> edge_offset_px(const Slope &slope, int row, double min_ris
     return weights > 0 ? std::optional(weighted / weights * slope.step_px) : std::nullopt;
 }
 
-Line fit_line(const std::vector<cv::Point2f> &points) {
-    cv::Vec4f line;
-    cv::fitLine(points, line, cv::DIST_L2, 0, 0, 0);
-    return {cv::Point2d(line[2], line[3]), cv::Point2d(line[0], line[1])};
+// `dependent`: the number of neighbouring points whose errors are the same.
+Line fit_line(const std::vector<cv::Point2f> &points, double dependent) {
+    cv::Vec4f fitted;
+    cv::fitLine(points, fitted, cv::DIST_L2, 0, 0, 0);
+    Line line{cv::Point2d(fitted[2], fitted[3]), cv::Point2d(fitted[0], fitted[1]), 0, 0};
+    const double independent = static_cast<double>(points.size()) / dependent;
+    for (const cv::Point2f &point : points) {
+        const cv::Point2d from_centroid = cv::Point2d(point) - line.point;
+        const double across = line.direction.cross(from_centroid), along = line.direction.dot(from_centroid);
+        line.offset_variance += across * across;
+        line.spread += along * along;
+    }
+    const auto count = static_cast<double>(points.size());
+    line.spread /= count;
+    line.offset_variance /= count * std::max(independent - 2, 1.0); // a line has two degrees of freedom
+    return line;
 }
 
 // Returns the points that are closer than `tolerance_px` to the line through two of the points that has most of them.
@@ -142,12 +170,13 @@ std::vector<cv::Point2f> most_collinear(const std::vector<cv::Point2f> &points, 
 
 // Fits a line without outliers. `sampled` is the number of positions at which an edge was searched. Returns
 // std::nullopt if fewer than half of them remain, or if half of these are further than `max_median_px` from the line.
-std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size_t sampled, double max_median_px) {
+std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size_t sampled, double max_median_px,
+                                      double dependent) {
     constexpr double min_inlier_px = 0.3;
     for (int round = 0;; ++round) {
         if (points.size() < std::max<std::size_t>(sampled / 2, 2))
             return std::nullopt;
-        const Line line = fit_line(points);
+        const Line line = fit_line(points, dependent);
         std::vector<double> residuals;
         residuals.reserve(points.size());
         for (const cv::Point2f &point : points)
@@ -194,7 +223,7 @@ std::optional<Line> fit_edge(const Edge &edge, Slope &slope, cv::Point2d from, c
     constexpr double max_median_steps = 4;
     if (!(slope.peak >= min_peak))
         return std::nullopt;
-    slope.noise = reduce_noise(slope);
+    reduce_noise(slope);
     std::vector<cv::Point2d> found;
     for (std::size_t i = 0; i < edge.at_px.size(); ++i)
         if (const auto offset = edge_offset_px(slope, static_cast<int>(i), min_rise * slope.peak))
@@ -206,9 +235,13 @@ std::optional<Line> fit_edge(const Edge &edge, Slope &slope, cv::Point2d from, c
     for (const cv::Point2d &point : *straight)
         relative.push_back(point - from);
     const double max_median_px = max_median_steps * slope.step_px;
-    auto line = fit_line_robustly(relative, edge.at_px.size(), max_median_px);
+    const double spacing_px =
+        cv::norm(edge.at_px.back() - edge.at_px.front()) / static_cast<double>(edge.at_px.size() - 1);
+    const double dependent = std::max<double>(slope.averaged, correlation_px / std::min(spacing_px, correlation_px));
+    auto line = fit_line_robustly(relative, edge.at_px.size(), max_median_px, dependent);
     if (!line)
-        line = fit_line_robustly(most_collinear(relative, max_median_px / 2), edge.at_px.size(), max_median_px);
+        line = fit_line_robustly(most_collinear(relative, max_median_px / 2), edge.at_px.size(), max_median_px,
+                                 dependent);
     if (line)
         line->point += from;
     return line;
@@ -216,8 +249,8 @@ std::optional<Line> fit_edge(const Edge &edge, Slope &slope, cv::Point2d from, c
 
 } // namespace
 
-std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens, int cells,
-                                    bool is_subpixel) {
+std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens, int cells,
+                                            bool is_subpixel) {
     constexpr int max_passes = 8;
     constexpr double sharp_step_px = 0.25; // suffices for a sharp edge
     constexpr double min_strength = 0.9;   // of the refined edges, relative to the rough ones
@@ -242,7 +275,8 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
     const double min_step_px = std::min(sharp_step_px, max_step_px), converged_px = 0.8 * min_step_px;
 
     // +1 if the square is darker than its surroundings, otherwise −1
-    double sign = 0, rough_strength = 0, strength = 0, moved = converged_px, margin_px = reach * min_step_px;
+    double sign = 0, rough_strength = 0, strength = 0, moved = converged_px, margin_px = reach * min_step_px,
+           variance = 0; // of a coordinate of a corner
     bool is_unclear = false;
     for (int pass = 0; pass < max_passes && moved >= converged_px; ++pass) {
         std::array<Edge, 4> edges;
@@ -276,12 +310,15 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
         }
         if (pass == 0)
             rough_strength = strength;
-        moved = 0;
+        moved = variance = 0;
         for (int i = 0; i < 4; ++i) {
             const Line &before = lines[(i + 3) % 4], &after = lines[i];
             const cv::Point2d crossing = before.point + (after.point - before.point).cross(after.direction) /
                                                             before.direction.cross(after.direction) *
                                                             before.direction;
+            // An error of a line moves the crossing along the other line.
+            const double sine = before.direction.cross(after.direction);
+            variance += (before.variance_at(crossing) + after.variance_at(crossing)) / (sine * sine) / (2 * 4);
             moved = std::max(moved, cv::norm(crossing - corners[i]));
             corners[i] = crossing;
             if (!(cv::norm(crossing - (*rough)[i]) < shortest / 4)) // the comparison is false for NaN
@@ -293,7 +330,7 @@ std::optional<Corners> refine_edges(const cv::Mat &grey, const Corners &rough_px
     const auto distorted = lens.distort(corners);
     if (!distorted)
         return std::nullopt;
-    return Corners{(*distorted)[0], (*distorted)[1], (*distorted)[2], (*distorted)[3]};
+    return MeasuredCorners{{(*distorted)[0], (*distorted)[1], (*distorted)[2], (*distorted)[3]}, std::sqrt(variance)};
 }
 
 } // namespace arhost::fiducial

@@ -52,16 +52,21 @@ std::string april_tag_name(std::string_view name) {
     return std::string(name);
 }
 
-arhost_observation Family::observation(int id, const Corners &corners_px) const {
+arhost_observation observation_of(std::int32_t id, std::uint32_t family, const MeasuredCorners &corners) {
     arhost_observation seen{};
     seen.id = id;
-    const auto found = listed.find(id);
-    seen.family = found == listed.end() ? index : found->second;
+    seen.family = family;
+    seen.corner_sigma_px = corners.sigma_px;
     for (int i = 0; i < 4; ++i) {
-        seen.corners_px[i][0] = corners_px[i].x;
-        seen.corners_px[i][1] = corners_px[i].y;
+        seen.corners_px[i][0] = corners.corners_px[i].x;
+        seen.corners_px[i][1] = corners.corners_px[i].y;
     }
     return seen;
+}
+
+arhost_observation Family::observation(int id, const MeasuredCorners &corners) const {
+    const auto found = listed.find(id);
+    return observation_of(id, found == listed.end() ? index : found->second, corners);
 }
 
 std::vector<Family> families_of(const arhost_tracker_setup &setup,

@@ -21,6 +21,14 @@ namespace arhost::fiducial {
 // upright print.
 using Corners = std::array<cv::Point2d, 4>;
 
+struct MeasuredCorners {
+    Corners corners_px;
+    double sigma_px = 0; // standard deviation of each coordinate, RMS over the corners; 0: unknown
+};
+
+// Returns an observation without decision margin.
+arhost_observation observation_of(std::int32_t id, std::uint32_t family, const MeasuredCorners &corners);
+
 // AprilTag's name of a family: "tag36h11" for "DICT_APRILTAG_36h11". Other names remain as they are.
 std::string april_tag_name(std::string_view name);
 
@@ -37,8 +45,8 @@ struct Family {
         const auto found = listed.find(id);
         return found != listed.end() && found->second == name;
     }
-    // Returns an observation with family, id and corners.
-    arhost_observation observation(int id, const Corners &corners_px) const;
+    // Returns an observation of a marker of the family, without decision margin.
+    arhost_observation observation(int id, const MeasuredCorners &corners) const;
 };
 
 // Returns the families of the setup. `id_count` returns the number of markers of a family, and throws if it is

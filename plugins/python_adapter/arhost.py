@@ -51,17 +51,19 @@ class Fields:
 class Observation:
     """A marker seen in a frame, with the fields of arhost_observation. `corners_px`: 4 × (x, y)."""
 
-    def __init__(self, id, corners_px, family=0, hamming=0, decision_margin=0.0):
+    def __init__(self, id, corners_px, family=0, hamming=0, decision_margin=0.0,
+                 corner_sigma_px=0.0):
         corners = np.array(corners_px, float)
         if corners.size != 8:
             raise ValueError("corners_px must be four corners (x, y)")
         self.id, self.corners_px, self.family = id, corners.reshape(4, 2), family
-        self.hamming, self.decision_margin = hamming, decision_margin
+        self.hamming, self.decision_margin, self.corner_sigma_px = hamming, decision_margin, corner_sigma_px
         self.projected_px = np.zeros((4, 2))
 
     @classmethod
     def _of(cls, record):
-        seen = cls(*(record[name] for name in ("id", "corners_px", "family", "hamming", "decision_margin")))
+        seen = cls(*(record[name] for name in ("id", "corners_px", "family", "hamming", "decision_margin",
+                                               "corner_sigma_px")))
         seen.projected_px = record["projected_px"]
         return seen
 
@@ -275,6 +277,7 @@ class _Adapter:
                 to = out[count]
                 to["id"], to["family"], to["hamming"] = seen.id, seen.family, seen.hamming
                 to["corners_px"], to["decision_margin"] = seen.corners_px, seen.decision_margin
+                to["corner_sigma_px"] = seen.corner_sigma_px
                 count += 1
             return STATUS_OK, count
 

@@ -180,14 +180,15 @@ MAX_OBSERVATIONS = 1024
 MAX_FAMILIES = 16
 MAX_FAMILY = 32
 MAX_STATE = 16777216
-OBSERVATION = _struct(152,
+OBSERVATION = _struct(160,
     ("struct_size", "u4", 0),
     ("id", "i4", 4),
     ("family", "u4", 8),
     ("hamming", "u4", 12),
     ("corners_px", ("f8", (4, 2)), 16),
     ("decision_margin", "f8", 80),
-    ("projected_px", ("f8", (4, 2)), 88))
+    ("corner_sigma_px", "f8", 88),
+    ("projected_px", ("f8", (4, 2)), 96))
 TARGET_DETECTED = 1
 TARGET_PREDICTED = 2
 TARGET_LOST = 3

@@ -240,15 +240,16 @@ private:
                 continue;
             const PartOfFamily &part =
                 **std::ranges::find(parts_, tag->family, [](const auto &one) { return one->tags(); });
-            Corners corners_px;
+            arhost::fiducial::MeasuredCorners corners;
             // AprilTag's corners begin at the bottom left and are counter-clockwise; pixel centres are at +0.5.
             for (int corner = 0; corner < 4; ++corner)
-                corners_px[corner] = {tag->p[3 - corner][0] - 0.5 + region.x, tag->p[3 - corner][1] - 0.5 + region.y};
+                corners.corners_px[corner] = {tag->p[3 - corner][0] - 0.5 + region.x,
+                                              tag->p[3 - corner][1] - 0.5 + region.y};
             if (fit_edges_ && part.is_listed())
-                corners_px = arhost::fiducial::refine_edges(grey, corners_px, *lens_, tag->family->width_at_border,
-                                                            refine_edges_)
-                                 .value_or(corners_px);
-            arhost_observation &one = seen.emplace_back(part.family().observation(part.id(tag->id), corners_px));
+                corners = arhost::fiducial::refine_edges(grey, corners.corners_px, *lens_,
+                                                         tag->family->width_at_border, refine_edges_)
+                              .value_or(corners);
+            arhost_observation &one = seen.emplace_back(part.family().observation(part.id(tag->id), corners));
             one.hamming = static_cast<std::uint32_t>(tag->hamming);
             one.decision_margin = tag->decision_margin;
         }

@@ -271,18 +271,18 @@ private:
         const arhost::aruco::DetectedMarkers found = arhost::aruco::detect(grey(region), table, parameters);
         for (std::size_t i = 0; i < found.ids.size(); ++i) {
             const bool is_listed = detectable.family.lists(found.ids[i]);
-            Corners corners_px;
+            arhost::fiducial::MeasuredCorners corners;
             for (int corner = 0; corner < 4; ++corner)
-                corners_px[corner] =
+                corners.corners_px[corner] =
                     cv::Point2d(found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner]) +
                     offset;
             if (refine_edges_ && is_listed)
-                corners_px =
-                    arhost::fiducial::refine_edges(grey, corners_px, *lens_, cells_of(table)).value_or(corners_px);
-            const Reading reading = read(grey, corners_px, table, found.ids[i], parameters.markerBorderBits);
+                corners = arhost::fiducial::refine_edges(grey, corners.corners_px, *lens_, cells_of(table))
+                              .value_or(corners);
+            const Reading reading = read(grey, corners.corners_px, table, found.ids[i], parameters.markerBorderBits);
             if (!is_listed && reading.wrong_bits > 0) // in large dictionaries, it may be anything
                 continue;
-            arhost_observation &one = seen.emplace_back(detectable.family.observation(found.ids[i], corners_px));
+            arhost_observation &one = seen.emplace_back(detectable.family.observation(found.ids[i], corners));
             one.hamming = reading.wrong_bits;
             one.decision_margin = reading.contrast;
         }

@@ -94,14 +94,9 @@ private:
     };
 
     static arhost_observation observation_of(const Shown &shown, const Picture::Place &place) {
-        arhost_observation one{};
-        one.id = shown.id;
-        one.family = shown.family;
         const std::vector<cv::Point2d> corners = shown.picture.corners_px(place);
-        for (std::size_t i = 0; i < 4; ++i) {
-            one.corners_px[i][0] = corners[i].x;
-            one.corners_px[i][1] = corners[i].y;
-        }
+        arhost_observation one = arhost::fiducial::observation_of(shown.id, shown.family,
+                                                                  {{corners[0], corners[1], corners[2], corners[3]}});
         one.decision_margin = 100 * place.inlier_share;
         return one;
     }

@@ -127,20 +127,16 @@ private:
 
     // The marker that a square resembles most.
     struct Best {
-        arhost_observation observation{}; // without corners
+        std::int32_t id = 0;
+        std::uint32_t family = 0, wrong_cells = 0;
         double correlation = 0, ratio = 0;
         int quarter_turns = 0;
     };
     Best recognised(const cv::Mat &grey, const Corners &corners_px) const {
         Best best;
-        const auto consider = [&](const auto &marker, const auto &match, double ratio, int wrong_cells) {
-            if (match.correlation <= best.correlation)
-                return;
-            best = {{}, match.correlation, ratio, match.quarter_turns};
-            best.observation.id = marker.id;
-            best.observation.family = marker.family;
-            best.observation.hamming = wrong_cells;
-            best.observation.decision_margin = 100 * match.correlation;
+        const auto consider = [&](const auto &marker, const auto &match, double ratio, std::uint32_t wrong_cells) {
+            if (match.correlation > best.correlation)
+                best = {marker.id, marker.family, wrong_cells, match.correlation, ratio, match.quarter_turns};
         };
         for (const auto &[sampling, patterns] : patterns_) {
             const Samples samples = normalized(interior(grey, corners_px, sampling.ratio, sampling.side));
@@ -166,14 +162,15 @@ private:
                 continue;
             // The search for an edge must not reach the picture inside the border.
             const int cells = static_cast<int>(std::ceil(2 / (1 - best.ratio)));
-            corners_px = arhost::fiducial::refine_edges(grey, corners_px, *lens_, cells).value_or(corners_px);
+            auto corners = arhost::fiducial::refine_edges(grey, corners_px, *lens_, cells)
+                               .value_or(arhost::fiducial::MeasuredCorners{corners_px});
             // A print that is rotated clockwise begins with a later corner.
-            std::rotate(corners_px.begin(), corners_px.begin() + best.quarter_turns, corners_px.end());
-            arhost_observation &one = seen.emplace_back(best.observation);
-            for (std::size_t i = 0; i < 4; ++i) {
-                one.corners_px[i][0] = corners_px[i].x;
-                one.corners_px[i][1] = corners_px[i].y;
-            }
+            std::rotate(corners.corners_px.begin(), corners.corners_px.begin() + best.quarter_turns,
+                        corners.corners_px.end());
+            arhost_observation &one =
+                seen.emplace_back(arhost::fiducial::observation_of(best.id, best.family, corners));
+            one.hamming = best.wrong_cells;
+            one.decision_margin = 100 * best.correlation;
         }
     }
 

@@ -194,6 +194,7 @@ class Observation:
     hamming: int
     corners_px: np.ndarray
     decision_margin: float
+    corner_sigma_px: float
     projected_px: np.ndarray
     def __init__(self, id: int, corners_px: Any, family: int = ..., hamming: int = ...,
                  decision_margin: float = ...) -> None: ...

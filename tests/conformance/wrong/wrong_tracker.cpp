@@ -197,6 +197,8 @@ void modify(const Wrong &self, arhost_observation &seen) {
         seen.hamming = 0xffffffff; // as before the call
     if (has("negative_margin"))
         seen.decision_margin = -1;
+    if (has("negative_corner_sigma"))
+        seen.corner_sigma_px = -1;
     if (has("infinite_margin"))
         seen.decision_margin = std::numeric_limits<double>::infinity();
     if (has("nondeterministic"))
@@ -431,6 +433,7 @@ void modify_expected(const Wrong &self, std::span<const arhost_expected_marker> 
             seen.family = marker.family;
             seen.hamming = 0;
             seen.decision_margin = 0;
+            seen.corner_sigma_px = 0;
             std::memcpy(seen.corners_px, expected[i].corners_px, sizeof seen.corners_px);
         }
     }

@@ -368,14 +368,15 @@ FIELD(arhost_tracker_setup, marker_count, 40, 4);
 FIELD(arhost_tracker_setup, family_count, 44, 4);
 FIELD(arhost_tracker_setup, families, 48, 8);
 
-STRUCT(arhost_observation, 152);
+STRUCT(arhost_observation, 160);
 FIELD(arhost_observation, struct_size, 0, 4);
 FIELD(arhost_observation, id, 4, 4);
 FIELD(arhost_observation, family, 8, 4);
 FIELD(arhost_observation, hamming, 12, 4);
 FIELD(arhost_observation, corners_px, 16, 64);
 FIELD(arhost_observation, decision_margin, 80, 8);
-FIELD(arhost_observation, projected_px, 88, 64);
+FIELD(arhost_observation, corner_sigma_px, 88, 8);
+FIELD(arhost_observation, projected_px, 96, 64);
 VALUE(ARHOST_TARGET_DETECTED, 1);
 VALUE(ARHOST_TARGET_PREDICTED, 2);
 VALUE(ARHOST_TARGET_LOST, 3);

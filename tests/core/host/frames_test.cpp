@@ -131,8 +131,9 @@ TEST(TrackerResult, IsRejectedIfItsNumbersAreInvalid) {
     for (const auto alter : {+[](TrackerResult &r) { r.observation(1).corners_px[3][1] = nan; },
                              +[](TrackerResult &r) { r.observation(0).projected_px[0][0] = nan; }})
         expect(alter, "a coordinate of an observation's corner is not finite");
-    expect([](TrackerResult &r) { r.observation(0).decision_margin = nan; },
-           "an observation's decision margin is not finite");
+    for (const auto alter : {+[](TrackerResult &r) { r.observation(0).decision_margin = nan; },
+                             +[](TrackerResult &r) { r.observation(1).corner_sigma_px = nan; }})
+        expect(alter, "an observation's decision margin or corner noise is not finite");
 }
 
 TEST(DeviceTime, IsIgnoredIfLongerThanTheRenderCall) {

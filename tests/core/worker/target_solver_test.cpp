@@ -49,7 +49,7 @@ enum Index { cup, board, box, head };
 
 arhost_observation observed(const ObservedMarker &seen, std::int32_t id, std::uint32_t family = 0,
                             double margin = 1) {
-    arhost_observation observation{sizeof observation, id, family, 0, {}, margin, {}};
+    arhost_observation observation{sizeof observation, id, family, 0, {}, margin, 0, {}};
     for (int i = 0; i < 4; ++i) {
         observation.corners_px[i][0] = seen.corners_px[i].x();
         observation.corners_px[i][1] = seen.corners_px[i].y();
@@ -424,6 +424,7 @@ TEST_F(TargetSolverTest, RejectsAReportThatViolatesTheContract) {
     EXPECT_THAT(violation(altered(good, [](auto &o) { o.corners_px[2][1] = nan; })),
                 HasSubstr("marker 5 with a corner that is not finite"));
     EXPECT_THAT(violation(altered(good, [](auto &o) { o.decision_margin = -1; })), HasSubstr("decision margin"));
+    EXPECT_THAT(violation(altered(good, [](auto &o) { o.corner_sigma_px = nan; })), HasSubstr("corner noise"));
     EXPECT_THAT(violation(std::vector(ARHOST_MAX_OBSERVATIONS + 1, good)),
                 HasSubstr("1025 observations; the limit is 1024"));
     EXPECT_THAT(violation({}, {body_pose(cup)}), HasSubstr("the target 0, which is not a body"));

@@ -39,7 +39,7 @@ Errors errors(bool inverted) {
         Corners rough = truth;
         for (auto &corner : rough)
             corner += cv::Point2d(offset(generator), offset(generator));
-        const Corners fine = refine_edges(picture, rough, lens, cells).value();
+        const Corners fine = refine_edges(picture, rough, lens, cells).value().corners_px;
         for (int k = 0; k < 4; ++k, ++count) {
             sum.before_px += cv::norm(rough[k] - truth[k]);
             sum.after_px += cv::norm(fine[k] - truth[k]);
@@ -70,7 +70,7 @@ TEST(EdgeRefinement, FindsAHiddenCorner) {
         const auto fine = refine_edges(picture, rough, lens, cells);
         ASSERT_TRUE(fine);
         for (int k = 0; k < 4; ++k)
-            EXPECT_LT(cv::norm((*fine)[k] - truth[k]), 0.2) << grey << " " << k;
+            EXPECT_LT(cv::norm(fine->corners_px[k] - truth[k]), 0.2) << grey << " " << k;
     }
 }
 
@@ -96,7 +96,7 @@ TEST(EdgeRefinement, NeverMovesACornerFar) {
             corner = {at(generator), at(generator)};
         if (const auto refined = refine_edges(noise, corners, lens, cells)) {
             for (int k = 0; k < 4; ++k)
-                EXPECT_LT(cv::norm((*refined)[k] - corners[k]), cv::norm(corners[(k + 1) % 4] - corners[k]) / 4);
+                EXPECT_LT(cv::norm(refined->corners_px[k] - corners[k]), cv::norm(corners[(k + 1) % 4] - corners[k]) / 4);
         }
     }
 }

@@ -111,7 +111,7 @@ std::vector<arhost_observation> report(const std::vector<arhost_observation> &se
 const Family tags{"tag16h5", 1, 30, {{7, 0}}};
 
 arhost_observation at(int id, double x_px) {
-    return tags.observation(id, {{{x_px, 80}, {x_px + 60, 80}, {x_px + 60, 140}, {x_px, 140}}});
+    return tags.observation(id, {{{{x_px, 80}, {x_px + 60, 80}, {x_px + 60, 140}, {x_px, 140}}}});
 }
 
 TEST(Report, IsOrderedByFamilyThenIdThenPlace) {
@@ -157,7 +157,7 @@ TEST(Report, HasOverlappingDetectionsOfAMarkerOnce) {
     second.hamming = 1;
     EXPECT_EQ(report({first, second})[0].decision_margin, 50);
     EXPECT_EQ(report({at(4, 10), at(5, 10), at(4, 80)}).size(), 3u) << "another marker, and a copy beside the first";
-    const arhost_observation inner = tags.observation(4, {{{12, 82}, {22, 82}, {22, 92}, {12, 92}}});
+    const arhost_observation inner = tags.observation(4, {{{{12, 82}, {22, 82}, {22, 92}, {12, 92}}}});
     EXPECT_EQ(report({inner, at(4, 10)}).size(), 1u);
     EXPECT_EQ(report({at(4, 10), inner}).size(), 1u);
 }

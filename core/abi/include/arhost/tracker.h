@@ -79,6 +79,8 @@ typedef struct arhost_observation {
     double corners_px[4][2];   /* in pixels of the distorted frame */
     double decision_margin;    /* how clearly the bits were read, >= 0: larger is better, on a scale of the tracker's
                                   own;  0: unknown */
+    double corner_sigma_px;    /* standard deviation of the noise of each coordinate of corners_px, >= 0; 0: unknown.
+                                  The worker computes the covariance of the pose from it */
     double projected_px[4][2]; /* for sinks: where the pose of the marker's target projects the corners; all 0 if it
                                   does not. The worker sets it */
 } arhost_observation;

@@ -506,9 +506,10 @@ pub struct arhost_observation {
     pub hamming: u32,
     pub corners_px: [[f64; 2]; 4],
     pub decision_margin: f64,
+    pub corner_sigma_px: f64,
     pub projected_px: [[f64; 2]; 4],
 }
-const _: () = assert!(size_of::<arhost_observation>() == 152);
+const _: () = assert!(size_of::<arhost_observation>() == 160);
 pub type arhost_target_state = i32;
 pub const ARHOST_TARGET_DETECTED: arhost_target_state = 1;
 pub const ARHOST_TARGET_PREDICTED: arhost_target_state = 2;
