@@ -25,7 +25,7 @@ using pose::Rigid;
 using test::GreyFrame;
 
 constexpr double side_mm = 100;
-constexpr double chi2_6_95 = 12.59; // 95 % quantile of the chi-squared distribution with 6 degrees of freedom
+constexpr double chi2_6_95 = 12.59;      // 95 % quantile of the chi-squared distribution with 6 degrees of freedom
 constexpr double unknown_sigma_px = 0.3; // as the worker assumes
 const cv::Size size(480, 360);
 const arhost_intrinsics camera = test::intrinsics_of(size, 450, 450, 239.5, 179.5);

@@ -251,9 +251,8 @@ std::vector<const arhost_observation *> TargetSolver::without_copies(std::span<c
 }
 
 // Returns the covariance of a target with a single marker, from the noise of its corners.
-pose::Matrix6d TargetSolver::covariance_of(const Rigid &pose, const arhost_observation &single) const {
-    const ObservedMarker marker =
-        observed(single, single.corner_sigma_px > 0 ? single.corner_sigma_px : unknown_sigma_px);
+pose::Matrix6d TargetSolver::single_covariance(const Rigid &pose, const arhost_observation &seen) const {
+    const ObservedMarker marker = observed(seen, seen.corner_sigma_px > 0 ? seen.corner_sigma_px : unknown_sigma_px);
     std::array<pose::Correspondence, 4> corners;
     for (std::size_t i = 0; i < 4; ++i)
         corners[i] = {marker.corners_on_target_mm[i], marker.corners_px[i], marker.corner_sigma_px};
@@ -299,7 +298,7 @@ void TargetSolver::solve(const Target &target, std::span<arhost_observation> obs
     for (arhost_observation &observation : observations)
         project(pose, observation);
     out.state = ARHOST_TARGET_DETECTED;
-    write_covariance(target.has_map ? chosen.covariance : covariance_of(chosen.camera_from_target, *kept.front()),
+    write_covariance(target.has_map ? chosen.covariance : single_covariance(chosen.camera_from_target, *kept.front()),
                      out.covariance);
     out.reprojection_px = chosen.reprojection_px;
     if (poses.size() == 1)

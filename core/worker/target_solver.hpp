@@ -69,7 +69,7 @@ private:
     void solve(const Target &target, std::span<arhost_observation> observations, std::int64_t capture_ns,
                Memory &memory, arhost_target &out) const;
     void check(const arhost_tracker_result &reported) const;
-    pose::Matrix6d covariance_of(const pose::Rigid &pose, const arhost_observation &single) const;
+    pose::Matrix6d single_covariance(const pose::Rigid &pose, const arhost_observation &seen) const;
     void project(const pose::Rigid &pose, arhost_observation &observation) const;
 
     pose::Projection projection_;

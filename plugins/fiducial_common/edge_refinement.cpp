@@ -120,14 +120,14 @@ void reduce_noise(Slope &slope) {
     slope.noise = noise / slope.peak;
 }
 
-// Returns the offset of the edge in px: the mean offset weighted by the squared rise, as in AprilTag. Only uses rises
-// that exceed `min_rise`; returns std::nullopt if there are none.
+// Returns the offset of the edge in px: the mean offset weighted by the square of the rise above `min_rise`. Returns
+// std::nullopt if no rise is above it.
 std::optional<double> edge_offset_px(const Slope &slope, int row, double min_rise) {
     double weighted = 0, weights = 0;
     for (int i = -search; i <= search; ++i)
-        if (const double rise = slope.rises(row, i + search); rise > min_rise) {
-            weighted += rise * rise * i;
-            weights += rise * rise;
+        if (const double above = slope.rises(row, i + search) - min_rise; above > 0) {
+            weighted += above * above * i;
+            weights += above * above;
         }
     return weights > 0 ? std::optional(weighted / weights * slope.step_px) : std::nullopt;
 }
@@ -217,9 +217,11 @@ std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &l
 }
 
 // Fits a line in undistorted pixels to the slope of an edge. `from` is a corner near it.
-std::optional<Line> fit_edge(const Edge &edge, Slope &slope, cv::Point2d from, const Lens &lens) {
-    constexpr double min_peak = 1;   // grey levels
-    constexpr double min_rise = 0.2; // relative to the peak
+std::optional<Line> fit_edge(const Edge &edge, Slope &slope, double cell_px, cv::Point2d from, const Lens &lens) {
+    constexpr double min_peak = 1; // grey levels
+    // Rises, relative to the peak. The wider the slope is relative to the cell, the more its flanks depend on what is
+    // beside the border and the margin, and the less of them is used.
+    const double min_rise = std::clamp(slope.width_px / cell_px - 0.2, 0.1, 0.6);
     constexpr double max_median_steps = 4;
     if (!(slope.peak >= min_peak))
         return std::nullopt;
@@ -297,7 +299,7 @@ std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, const Corners &
         is_unclear = false;
         for (int i = 0; i < 4; ++i) {
             Slope slope = find_slope(grey, edges[i], min_step_px, max_step_px, sign);
-            const auto line = fit_edge(edges[i], slope, corners[i], lens);
+            const auto line = fit_edge(edges[i], slope, cell_px, corners[i], lens);
             if (!line)
                 return std::nullopt;
             lines[i] = *line;

@@ -45,6 +45,11 @@ std::array<double, 8> place(const arhost_observation &seen) {
 
 } // namespace
 
+cv::Mat grey_of(const arhost_frame &frame) {
+    return {static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
+            const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride};
+}
+
 std::string april_tag_name(std::string_view name) {
     for (const char *size : {"16h5", "25h9", "36h10", "36h11"})
         if (name == std::string("DICT_APRILTAG_") + size)

@@ -29,6 +29,9 @@ struct MeasuredCorners {
 // Returns an observation without decision margin.
 arhost_observation observation_of(std::int32_t id, std::uint32_t family, const MeasuredCorners &corners);
 
+// Returns the grey plane of a frame, without copying it.
+cv::Mat grey_of(const arhost_frame &frame);
+
 // AprilTag's name of a family: "tag36h11" for "DICT_APRILTAG_36h11". Other names remain as they are.
 std::string april_tag_name(std::string_view name);
 

@@ -29,6 +29,10 @@ Interval on_grid(double first, double last, int size, const RegionLimits &limits
     return interval;
 }
 
+cv::Rect whole_of(const arhost_track_request &request) {
+    return {0, 0, static_cast<int>(request.frame->format->width), static_cast<int>(request.frame->format->height)};
+}
+
 // Returns the region in which the marker is detected if it is where it is expected; empty if that is outside of the
 // frame.
 cv::Rect region_of(const arhost_expected_marker &expected, double margin, cv::Size frame,
@@ -74,25 +78,37 @@ SearchRegions::SearchRegions(const arhost_tracker_setup &setup,
         markers_.push_back({marker.id, marker.family, marker.target, margins.at(marker.family)});
 }
 
+std::vector<arhost_observation> SearchRegions::search(const arhost_track_request &request, const RegionLimits &limits,
+                                                      std::span<const Pass> passes) const {
+    std::vector<arhost_observation> seen;
+    for (const Pass &pass : passes)
+        for (const cv::Rect &region : of(request, limits, pass.family))
+            pass.detect(region, seen);
+    if (miss_a_target(request, seen)) {
+        seen.clear();
+        for (const Pass &pass : passes)
+            pass.detect(whole_of(request), seen);
+    }
+    return seen;
+}
+
 std::vector<cv::Rect> SearchRegions::of(const arhost_track_request &request, const RegionLimits &limits,
                                         const Family *family) const {
-    const cv::Size size(static_cast<int>(request.frame->format->width),
-                        static_cast<int>(request.frame->format->height));
-    std::vector<cv::Rect> whole{cv::Rect({0, 0}, size)};
+    const cv::Rect whole = whole_of(request);
     if (request.search_everywhere)
-        return whole;
+        return {whole};
     std::vector<cv::Rect> regions;
     for (const arhost_expected_marker &expected : elements(request.expected, request.expected_count)) {
         const Marker &marker = markers_.at(expected.marker);
         if (family && !family->lists(marker.id, marker.family))
             continue;
-        if (const cv::Rect region = region_of(expected, marker.margin, size, limits); !region.empty())
+        if (const cv::Rect region = region_of(expected, marker.margin, whole.size(), limits); !region.empty())
             add(regions, region);
     }
     double area = 0;
     for (const cv::Rect &region : regions)
         area += region.area();
-    return area > max_share * size.area() ? whole : regions;
+    return area > max_share * whole.area() ? std::vector{whole} : regions;
 }
 
 bool SearchRegions::miss_a_target(const arhost_track_request &request,

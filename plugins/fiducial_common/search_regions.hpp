@@ -15,11 +15,24 @@ struct RegionLimits {
     int min_side_px = 1; // in smaller regions, nothing is detected
 };
 
-// Derives rectangles from the markers that a request expects.
+// Detects markers in a region of the frame and adds them to `seen`.
+using Detect = std::function<void(const cv::Rect &region, std::vector<arhost_observation> &seen)>;
+
+// How to search for the markers of `family`, or for those of all families if it is null.
+struct Pass {
+    const Family *family;
+    Detect detect;
+};
+
+// Derives rectangles from the markers that a request expects, and searches them.
 class SearchRegions {
 public:
     // `margin`: what must be visible around a square of a family to detect it, relative to its side.
     SearchRegions(const arhost_tracker_setup &setup, const std::function<double(const std::string &family)> &margin);
+
+    // Returns what the passes detect where markers are expected, or in the whole frame if a target is not there.
+    std::vector<arhost_observation> search(const arhost_track_request &request, const RegionLimits &limits,
+                                           std::span<const Pass> passes) const;
 
     // Returns rectangles that do not overlap and contain all expected markers, or those of `family`. They are the
     // whole frame if the request says so, or if they would cover most of it.

@@ -201,17 +201,10 @@ public:
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
-        const arhost_frame &frame = *request.frame;
-        const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
-                           const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
-        std::vector<arhost_observation> seen;
-        for (const cv::Rect &region : regions_->of(request, {grid_px(), min_image_side()}))
-            observe(grey, region, seen);
-        if (regions_->miss_a_target(request, seen)) {
-            seen.clear();
-            observe(grey, cv::Rect({0, 0}, grey.size()), seen);
-        }
-        arhost::fiducial::report(std::move(seen), observations);
+        const cv::Mat grey = arhost::fiducial::grey_of(*request.frame);
+        const arhost::fiducial::Pass pass{nullptr,
+                                          [&](const cv::Rect &region, auto &seen) { observe(grey, region, seen); }};
+        arhost::fiducial::report(regions_->search(request, {grid_px(), min_image_side()}, {&pass, 1}), observations);
     }
 
     void stop() {

@@ -241,19 +241,12 @@ public:
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
-        const arhost_frame &frame = *request.frame;
-        const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
-                           const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
-        std::vector<arhost_observation> seen;
+        const cv::Mat grey = arhost::fiducial::grey_of(*request.frame);
+        std::vector<arhost::fiducial::Pass> passes;
         for (const Detectable &detectable : detectables_)
-            for (const cv::Rect &region : regions_->of(request, {}, &detectable.family))
-                observe(grey, region, detectable, seen);
-        if (regions_->miss_a_target(request, seen)) {
-            seen.clear();
-            for (const Detectable &detectable : detectables_)
-                observe(grey, cv::Rect({0, 0}, grey.size()), detectable, seen);
-        }
-        arhost::fiducial::report(std::move(seen), observations);
+            passes.push_back({&detectable.family,
+                              [&](const cv::Rect &region, auto &seen) { observe(grey, region, detectable, seen); }});
+        arhost::fiducial::report(regions_->search(request, {}, passes), observations);
     }
 
     void stop() { detectables_.clear(); }

@@ -56,9 +56,7 @@ public:
 
     // Pictures that are expected somewhere are aligned there. The features of the frame are needed only for others.
     void track(const arhost_track_request &request, arhost::Observations &observations) const {
-        const arhost_frame &frame = *request.frame;
-        const cv::Mat grey(static_cast<int>(frame.format->height), static_cast<int>(frame.format->width), CV_8UC1,
-                           const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride);
+        const cv::Mat grey = arhost::fiducial::grey_of(*request.frame);
         std::vector<bool> is_found(shown_.size()), is_missed(shown_.size());
         std::vector<arhost_observation> seen;
         for (const arhost_expected_marker &expected : arhost::elements(request.expected, request.expected_count)) {

@@ -286,7 +286,7 @@ void modify_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &r
         result.observation_count = 1;
         const double corners[4][2] = {{10, 10}, {20, 10}, {20, 20}, {10, 20}};
         arhost_observation &invented = *result.observations;
-        invented = {invented.struct_size, self.listed[0].id, 0, 0, {}, 1, {}};
+        invented = {invented.struct_size, self.listed[0].id, 0, 0, {}, 1, 0, {}};
         std::copy_n(&corners[0][0], 8, &invented.corners_px[0][0]);
     }
     if (has("reports_a_pose"))

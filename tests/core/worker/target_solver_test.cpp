@@ -195,20 +195,26 @@ TEST_F(TargetSolverTest, TellsTheSameIdOfTwoFamiliesApart) {
 TEST_F(TargetSolverTest, CovariancesAreThoseOfTheErrors) {
     const Rigid truth = pose_at({50, 20, 1000}, 40);
     const int count = 400;
-    double mahalanobis2 = 0;
-    for (int i = 0; i < count; ++i) {
-        is_first = true;
-        solve({see(truth, 5, single, 0.1)});
-        // The difference to the truth in the axes of `mt`.
-        const Eigen::Vector3d to_gl(1, -1, -1);
-        Eigen::Matrix<double, 6, 1> error;
-        error << to_gl.cwiseProduct(truth.translation_mm - pose_of(cup).translation_mm),
-            to_gl.cwiseProduct(rotation_vector(truth.rotation * pose_of(cup).rotation.transpose()));
-        const Eigen::Map<const Matrix6d> covariance(solved[cup].covariance);
-        if (degrees_between(pose_of(cup), truth) < 20) // not the other branch
-            mahalanobis2 += error.dot(covariance.ldlt().solve(error));
+    for (const auto &[noise_px, told_px] :
+         {std::pair(0.02, 0.02), {0.1, 0.1}, {0.3, 0.3}, {0.3, 0.0}}) { // 0: the solver assumes 0.3
+        double mahalanobis2 = 0;
+        for (int i = 0; i < count; ++i) {
+            is_first = true;
+            arhost_observation seen = see(truth, 5, single, noise_px);
+            seen.corner_sigma_px = told_px;
+            solve({seen});
+            // The difference to the truth in the axes of `mt`.
+            const Eigen::Vector3d to_gl(1, -1, -1);
+            Eigen::Matrix<double, 6, 1> error;
+            error << to_gl.cwiseProduct(truth.translation_mm - pose_of(cup).translation_mm),
+                to_gl.cwiseProduct(rotation_vector(truth.rotation * pose_of(cup).rotation.transpose()));
+            const Eigen::Map<const Matrix6d> covariance(solved[cup].covariance);
+            if (degrees_between(pose_of(cup), truth) < 20) // not the other branch
+                mahalanobis2 += error.dot(covariance.ldlt().solve(error));
+        }
+        // The mean of the chi-square distribution with 6 degrees of freedom.
+        EXPECT_NEAR(mahalanobis2 / count, 6, 1) << noise_px << " " << told_px;
     }
-    EXPECT_NEAR(mahalanobis2 / count, 6, 1); // the mean of the chi-square distribution with 6 degrees of freedom
 }
 
 TEST_F(TargetSolverTest, APoseDoesNotFlipDuring3000FramesOfMotion) {

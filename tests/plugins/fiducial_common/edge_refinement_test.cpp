@@ -59,6 +59,34 @@ TEST(EdgeRefinement, MovesRoughCornersToTheProjectedOnes) {
     }
 }
 
+TEST(EdgeRefinement, TellsTheNoiseOfTheCorners) {
+    std::mt19937 generator(5);
+    std::uniform_real_distribution<double> tilt(-30, 30), turn(-180, 180);
+    struct Case {
+        double distance_mm, blur_px, noise;
+    };
+    for (const auto &[distance_mm, blur_px, noise] :
+         {Case{400, 0.7, 2}, Case{400, 0.7, 12}, Case{400, 2, 6}, Case{1400, 0.7, 6}}) {
+        double squares = 0, told = 0;
+        constexpr int count = 60;
+        for (int i = 0; i < count; ++i) {
+            const Mt mt = pose_of(0, 0, distance_mm, tilt(generator), tilt(generator), turn(generator));
+            cv::Mat picture = render(camera, {{april_tag("tag36h11", i).with_margin(2), 100, mt}});
+            cv::GaussianBlur(picture, picture, {}, blur_px);
+            add_noise(picture, noise, i + 1);
+            const auto truth = corners_of(mt, camera, 100);
+            const auto fine = refine_edges(picture, truth, lens, cells);
+            ASSERT_TRUE(fine) << i;
+            for (int k = 0; k < 4; ++k) {
+                const cv::Point2d error = fine->corners_px[k] - truth[k];
+                squares += error.dot(error) / 8;
+            }
+            told += fine->sigma_px * fine->sigma_px;
+        }
+        EXPECT_NEAR(std::sqrt(told / squares), 1, 0.25) << distance_mm << " " << blur_px << " " << noise;
+    }
+}
+
 TEST(EdgeRefinement, FindsAHiddenCorner) {
     const Mt mt = pose_of(5, -3, 300, 20, 15, 25);
     const auto truth = corners_of(mt, camera, 100);
@@ -96,7 +124,8 @@ TEST(EdgeRefinement, NeverMovesACornerFar) {
             corner = {at(generator), at(generator)};
         if (const auto refined = refine_edges(noise, corners, lens, cells)) {
             for (int k = 0; k < 4; ++k)
-                EXPECT_LT(cv::norm(refined->corners_px[k] - corners[k]), cv::norm(corners[(k + 1) % 4] - corners[k]) / 4);
+                EXPECT_LT(cv::norm(refined->corners_px[k] - corners[k]),
+                          cv::norm(corners[(k + 1) % 4] - corners[k]) / 4);
         }
     }
 }

@@ -144,7 +144,7 @@ TEST(Report, LeavesOutCornersThatNoFrontHas) {
         {{{50, 10}, {10, 10}, {10, 50}, {50, 50}}},       // wrong orientation: shows the back face
     };
     for (const Corners &corners : wrong)
-        EXPECT_EQ(report({tags.observation(3, corners), at(4, 10)}).size(), 1u);
+        EXPECT_EQ(report({tags.observation(3, {corners}), at(4, 10)}).size(), 1u);
 }
 
 TEST(Report, HasOverlappingDetectionsOfAMarkerOnce) {
