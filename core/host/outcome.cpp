@@ -4,6 +4,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <functional>
 #include <iterator>
 
@@ -78,7 +79,10 @@ std::string describe_targets(const std::vector<ipc::Target> &targets) {
         if (!target.body.empty())
             text += "(body '" + target.body + "')";
         else if (target.markers.size() == 1)
-            text += fmt::format("({} {})", target.markers[0].family, target.markers[0].id);
+            text += fmt::format("({} {})", target.markers[0].family,
+                                target.markers[0].file.empty()
+                                    ? std::to_string(target.markers[0].id)
+                                    : std::filesystem::path(target.markers[0].file).filename().string());
         else
             text += fmt::format("(map of {} markers of {})", target.markers.size(), target.markers[0].family);
     }

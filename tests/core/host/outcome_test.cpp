@@ -108,5 +108,7 @@ TEST(Targets, AreDescribedByTheirMarkers) {
         board.markers.push_back({id, "tag36h11", {}});
     EXPECT_EQ(describe_targets({cup, board, head}),
               "'cup' (D 7), 'board' (map of 12 markers of tag36h11), 'head' (body 'skull')");
+    EXPECT_EQ(describe_targets({{"hiro", {{0, "pattern", {}, "/prints/hiro.patt", 0.5}}, ""}}),
+              "'hiro' (pattern hiro.patt)");
     EXPECT_EQ(describe_targets(std::vector<ipc::Target>(10, head)).substr(8 * 23 - 2), " and 2 more");
 }

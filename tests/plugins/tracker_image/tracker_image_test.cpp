@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/tracker_support.hpp>
+#include "poster_video.hpp"
 
 #include <gmock/gmock.h>
-#include <opencv2/imgproc.hpp>
 
 #include <fstream>
-#include <numbers>
 
 namespace {
 
@@ -14,88 +12,6 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 const arhost_intrinsics camera = plain_camera({640, 480});
-using Quad = std::array<cv::Point2d, 4>;
-
-// A poster of 480 × 640: many patches of different brightness and size, the same for the same seed.
-cv::Mat poster(std::uint64_t seed) {
-    cv::RNG random(seed);
-    cv::Mat picture(640, 480, CV_8UC1, cv::Scalar(170));
-    for (int i = 0; i < 400; ++i) {
-        const cv::Point at(random.uniform(0, picture.cols), random.uniform(0, picture.rows));
-        const cv::Size size(random.uniform(4, 50), random.uniform(4, 50));
-        if (i % 2)
-            cv::rectangle(picture, {at, size}, cv::Scalar(random.uniform(0, 256)), cv::FILLED);
-        else
-            cv::ellipse(picture, at, size / 2, random.uniform(0, 180), 0, 360, cv::Scalar(random.uniform(0, 256)),
-                        cv::FILLED, cv::LINE_AA);
-    }
-    return picture;
-}
-
-Quad moved(const Quad &quad, double x, double y) {
-    Quad result = quad;
-    for (cv::Point2d &corner : result)
-        corner += cv::Point2d(x, y);
-    return result;
-}
-
-// A poster in motion: it turns, tilts and comes nearer. `t` in frames.
-Quad place(double t) {
-    const auto wave = [&](double frames) { return std::sin(2 * std::numbers::pi * t / frames); };
-    const double height = 240 + 40 * wave(170), width = height * 0.75, turn = 0.5 * wave(130);
-    Quad quad;
-    const double x[] = {-1, 1, 1, -1}, y[] = {-1, -1, 1, 1};
-    for (std::size_t i = 0; i < 4; ++i) {
-        const double depth = 1 + 0.2 * wave(90) * x[i] + 0.15 * wave(110) * y[i];
-        const double u = x[i] * width / 2 / depth, v = y[i] * height / 2 / depth;
-        quad[i] = {320 + 60 * wave(150) + u * std::cos(turn) - v * std::sin(turn),
-                   240 + 40 * wave(100) + u * std::sin(turn) + v * std::cos(turn)};
-    }
-    return quad;
-}
-
-void draw(const cv::Mat &picture, const Quad &quad, cv::Mat &frame) {
-    const float right = static_cast<float>(picture.cols) - 0.5F, bottom = static_cast<float>(picture.rows) - 0.5F;
-    const std::vector<cv::Point2f> from{{-0.5F, -0.5F}, {right, -0.5F}, {right, bottom}, {-0.5F, bottom}};
-    std::vector<cv::Point2f> to;
-    for (const cv::Point2d &corner : quad)
-        to.emplace_back(corner);
-    // Drawn at twice the size and averaged.
-    cv::Mat large;
-    cv::resize(frame, large, {}, 2, 2, cv::INTER_NEAREST);
-    for (cv::Point2f &corner : to)
-        corner = 2 * corner + cv::Point2f(0.5F, 0.5F);
-    cv::warpPerspective(picture, large, cv::getPerspectiveTransform(from, to), large.size(), cv::INTER_AREA,
-                        cv::BORDER_TRANSPARENT);
-    cv::resize(large, frame, frame.size(), 0, 0, cv::INTER_AREA);
-}
-
-cv::Mat empty_frame() {
-    return {480, 640, CV_8UC1, cv::Scalar(110)};
-}
-
-void add_sensor(cv::Mat &frame, std::uint64_t seed) {
-    cv::Mat noise(frame.size(), CV_16S);
-    cv::RNG(seed).fill(noise, cv::RNG::NORMAL, 0, 2);
-    cv::GaussianBlur(frame, frame, {}, 0.6);
-    cv::add(frame, noise, frame, cv::noArray(), CV_8U);
-}
-
-arhost_expected_marker expected_at(std::uint32_t marker, const Quad &corners) {
-    arhost_expected_marker expected{sizeof expected, marker, {}, 8};
-    for (std::size_t i = 0; i < 4; ++i) {
-        expected.corners_px[i][0] = corners[i].x;
-        expected.corners_px[i][1] = corners[i].y;
-    }
-    return expected;
-}
-
-double mean_error_px(const arhost_observation &seen, const Quad &truth) {
-    double sum = 0;
-    for (int i = 0; i < 4; ++i)
-        sum += corner_distance_px(seen, i, truth[static_cast<std::size_t>(i)]) / 4;
-    return sum;
-}
 
 class ImageTracker : public testing::Test {
 protected:
@@ -139,11 +55,7 @@ TEST_F(ImageTracker, FollowsAPictureThatIsHalfCovered) {
         const Quad truth = place(t);
         cv::Mat frame = empty_frame();
         draw(picture, truth, frame);
-        // A sheet with other texture covers one half.
-        const std::vector<cv::Point> half{truth[t / 50 % 4], truth[(t / 50 + 1) % 4],
-                                          (truth[(t / 50 + 1) % 4] + truth[(t / 50 + 2) % 4]) / 2,
-                                          (truth[t / 50 % 4] + truth[(t / 50 + 3) % 4]) / 2};
-        cv::fillConvexPoly(frame, half, cv::Scalar(60), cv::LINE_AA);
+        cover_half(frame, truth, t);
         add_sensor(frame, static_cast<std::uint64_t>(t) + 1);
         const auto seen =
             t == 0 ? tracker_.track(GreyFrame(frame))
