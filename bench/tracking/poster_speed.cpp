@@ -8,13 +8,14 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <exception>
-#include <filesystem>
-#include <functional>
+#include <numeric>
 #include <optional>
+#include <vector>
 
 namespace {
 

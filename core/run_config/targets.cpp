@@ -370,7 +370,8 @@ std::vector<TargetMarker> parse_bundle(const yaml::Node &bundles, const std::str
                         "{id: 0, size: 0.08, x: 0, y: 0, z: 0, qw: 1, qx: 0, qy: 0, qz: 0}", warnings);
 }
 
-// Reads the path of a target's print, which the tracker reads. `owner` reports errors.
+// Checks that the print of a target exists, and adds it to the files that the tracker may read. `owner` reports
+// errors.
 template <class Owner>
 std::string found_print(const fs::path &file, const Owner &owner, std::vector<fs::path> &files) {
     std::error_code ignored;
@@ -388,7 +389,7 @@ std::vector<TargetMarker> markers_of(const std::vector<MultiMarker> &layout, con
                                      std::vector<std::string> &warnings) {
     std::vector<TargetMarker> markers;
     std::vector<Corners> places;
-    bool has_ids = false;
+    bool has_ids = false, warned = false;
     for (std::size_t i = 0; i < layout.size(); ++i) {
         const MultiMarker &one = layout[i];
         places.push_back(placed(0, one.side_mm, one.rotation, one.position_mm).corners_mm);
@@ -399,8 +400,10 @@ std::vector<TargetMarker> markers_of(const std::vector<MultiMarker> &layout, con
             if (are_at_the_same_place(places[k], places[i]))
                 one.fail("this marker is at the place of that at " + layout[k].where + "; correct one of them");
         }
-        if (const std::string doubt = doubt_of_side(one.side_mm); i == 0 && !doubt.empty())
+        if (const std::string doubt = doubt_of_side(one.side_mm); !warned && !doubt.empty()) {
             warnings.push_back(one.where + ": " + doubt);
+            warned = true;
+        }
         const bool is_id = one.print.find_first_not_of("0123456789") == std::string::npos;
         if (is_id) {
             std::int32_t id = 0;

@@ -220,13 +220,14 @@ std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &l
 // Fits a line in undistorted pixels to the slope of an edge. `from` is a corner near it.
 std::optional<Line> fit_edge(const Edge &edge, Slope &slope, double cell_px, cv::Point2d from, const Lens &lens) {
     constexpr double min_peak = 1; // grey levels
-    // Rises, relative to the peak. The wider the slope is relative to the cell, the more its flanks depend on what is
-    // beside the border and the margin, and the less of them is used.
-    const double min_rise = std::clamp(slope.width_px / cell_px - 0.2, 0.1, 0.6);
     constexpr double max_median_steps = 4;
     if (!(slope.peak >= min_peak))
         return std::nullopt;
     reduce_noise(slope);
+    // Relative to the peak. The wider the slope is relative to the cell, the more its flanks depend on what is beside
+    // the border and the margin, and the less of them is used. In noise, the flanks are needed for averaging.
+    const double noise = slope.noise / std::sqrt(slope.averaged);
+    const double min_rise = std::clamp(slope.width_px / cell_px - 0.2, 0.1, std::max(0.1, 0.6 - 75 * noise * noise));
     std::vector<cv::Point2d> found;
     for (std::size_t i = 0; i < edge.at_px.size(); ++i)
         if (const auto offset = edge_offset_px(slope, static_cast<int>(i), min_rise * slope.peak))
@@ -264,16 +265,17 @@ std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, const Corners &
     if (!rough)
         return std::nullopt;
     std::vector<cv::Point2d> corners = *rough;
-    double shortest = std::numeric_limits<double>::infinity(), thinnest = shortest;
+    double shortest = std::numeric_limits<double>::infinity();
+    // One cell on each side of an edge is uniform: the border and the margin of the print.
+    std::array<double, 4> cells_px;
     for (int i = 0; i < 4; ++i) {
         const cv::Point2d edge = corners[(i + 1) % 4] - corners[i];
         const double length = cv::norm(edge);
         shortest = std::min(shortest, length);
-        for (const int other : {2, 3})
-            thinnest = std::min(thinnest, std::abs(edge.cross(corners[(i + other) % 4] - corners[i])) / length);
+        const auto height = [&](int other) { return std::abs(edge.cross(corners[other % 4] - corners[i])) / length; };
+        cells_px[i] = std::min(height(i + 2), height(i + 3)) / cells;
     }
-    // One cell on each side of the edge is uniform: the border and the margin of the print.
-    const double cell_px = thinnest / cells, max_step_px = cell_px / reach;
+    const double cell_px = *std::ranges::min_element(cells_px), max_step_px = cell_px / reach;
     if (!(cell_px >= 1))
         return std::nullopt;
     const double min_step_px = std::min(sharp_step_px, max_step_px), converged_px = 0.8 * min_step_px;
@@ -302,7 +304,7 @@ std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, const Corners &
         is_unclear = false;
         for (int i = 0; i < 4; ++i) {
             Slope slope = find_slope(grey, edges[i], min_step_px, max_step_px, sign);
-            const auto line = fit_edge(edges[i], slope, cell_px, corners[i], lens);
+            const auto line = fit_edge(edges[i], slope, cells_px[i], corners[i], lens);
             if (!line)
                 return std::nullopt;
             lines[i] = *line;
@@ -335,7 +337,16 @@ std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, const Corners &
     const auto distorted = lens.distort(corners);
     if (!distorted)
         return std::nullopt;
-    return MeasuredCorners{{(*distorted)[0], (*distorted)[1], (*distorted)[2], (*distorted)[3]}, std::sqrt(variance)};
+    const MeasuredCorners result{{(*distorted)[0], (*distorted)[1], (*distorted)[2], (*distorted)[3]}};
+    const auto perimeter_px = [](const auto &square) {
+        double sum = 0;
+        for (std::size_t i = 0; i < 4; ++i)
+            sum += cv::norm(square[(i + 1) % 4] - square[i]);
+        return sum;
+    };
+    // The distortion scales the noise as it scales the square.
+    const double sigma_px = std::sqrt(variance) * perimeter_px(result.corners_px) / perimeter_px(corners);
+    return MeasuredCorners{result.corners_px, std::isfinite(sigma_px) ? sigma_px : 0};
 }
 
 } // namespace arhost::fiducial

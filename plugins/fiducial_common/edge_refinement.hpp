@@ -13,9 +13,9 @@ namespace arhost::fiducial {
 // has no inward bias, and tolerates a hidden corner. It fits the lines in undistorted pixels, where edges are
 // straight. `cells` is the side of the square in cells; the search for an edge stays within one cell of it, because
 // only the border and the margin, one cell wide each, are uniform. The noise of the corners follows from the scatter
-// along the edges. Returns std::nullopt if it does not find four
-// edges that fit the image at least as well as the rough ones; these are then the best that is known. `is_subpixel`:
-// the rough corners are accurate to a fraction of a pixel, so they are kept if noise or blur hides the edges.
+// along the edges. Returns std::nullopt if it does not find four edges that fit the image at least as well as the
+// rough ones; these are then the best that is known. `is_subpixel`: the rough corners are accurate to a fraction of a
+// pixel, so they are kept if noise or blur hides the edges.
 std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens, int cells,
                                             bool is_subpixel = false);
 

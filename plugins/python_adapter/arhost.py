@@ -322,11 +322,12 @@ class _Adapter:
 
         return self._guarded(start)
 
-    def write(self, bgr, height, width, stride, record, targets, observations):
+    def write(self, bgr, height, width, stride, record, targets, observations, expected):
         def write():
             fields = Fields(_record(record, RECORD))
             fields.targets = [Fields(t) for t in _elements(bytes(targets), TARGET)]
             fields.observations = [Observation._of(o) for o in _elements(bytes(observations), OBSERVATION)]
+            fields.expected = [Fields(e) for e in _elements(bytes(expected), EXPECTED_MARKER)]
             fields.families = [name.decode() for name in fields.families if name]
             more = self.plugin.write(Fields(bgr=_pixels(bgr, height, width, 3, stride), height=height, width=width,
                                             record=fields))

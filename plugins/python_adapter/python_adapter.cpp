@@ -368,12 +368,13 @@ public:
     arhost_status write(const arhost_output &output) {
         const GilLock lock;
         const arhost_record &record = *output.record;
-        return call("write", "NIIINNN",
+        return call("write", "NIIINNNN",
                     view(output.bgr, std::size_t(output.stride) * (output.height - 1) + std::size_t(3) * output.width)
                         .release(),
                     output.height, output.width, output.stride, view_of(&record).release(),
                     view_of_elements(record.targets, record.target_count).release(),
-                    view_of_elements(record.observations, record.observation_count).release())
+                    view_of_elements(record.observations, record.observation_count).release(),
+                    view_of_elements(record.expected, record.expected_count).release())
             .status;
     }
 

@@ -181,7 +181,10 @@ void PictureCanvas::fill(std::span<const Point> corners, Colour colour, std::uin
                 else if (edge.a < 0)
                     end = std::min(end, std::floor(-rest / edge.a - 0.5) + 1);
             }
-            for (int x = static_cast<int>(begin); x < end; ++x) {
+            if (end <= 0)
+                continue;
+            // An edge that is almost horizontal may put `begin` far outside of the picture.
+            for (int x = static_cast<int>(std::min(begin, end)); x < end; ++x) {
                 const auto covers = [&](const Edge &edge) { return edge.covers(x + 0.5, y + 0.5); };
                 const double opacity = alpha / 255.0 * std::max(0.0, covers(edges[0]) + covers(edges[2]) - 1) *
                                        std::max(0.0, covers(edges[1]) + covers(edges[3]) - 1);

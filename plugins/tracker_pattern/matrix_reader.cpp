@@ -68,10 +68,13 @@ std::optional<MatrixReader::Match> MatrixReader::match(const Samples &samples) c
         if (!black)
             return std::nullopt;
         if (const auto word = arhost::fiducial::matrix_word(*black, cells_)) {
+            const Samples picture = normalized(upright);
+            if (picture.empty())
+                return std::nullopt;
             for (const Code &code : codes_)
                 if (const int wrong = std::popcount(code.word ^ *word);
                     wrong <= code.type->corrects && (!best || wrong < best->wrong_cells))
-                    best = {code.id, code.family, wrong, normalized(upright).dot(code.picture), turns};
+                    best = {code.id, code.family, wrong, picture.dot(code.picture), turns};
             break; // no other side of a print can be up
         }
         Samples turned;

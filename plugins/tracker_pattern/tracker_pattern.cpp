@@ -40,7 +40,7 @@ constexpr arhost_descriptor descriptor = {
     "0.1.0",
     "arhost",
     "Apache-2.0",
-    "Detects the square patterns of ARToolKit.",
+    "Detects the square patterns and matrix codes of ARToolKit.",
     0,
     std::size(options),
     options,

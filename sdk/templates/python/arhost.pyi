@@ -197,7 +197,7 @@ class Observation:
     corner_sigma_px: float
     projected_px: np.ndarray
     def __init__(self, id: int, corners_px: Any, family: int = ..., hamming: int = ...,
-                 decision_margin: float = ...) -> None: ...
+                 decision_margin: float = ..., corner_sigma_px: float = ...) -> None: ...
 TARGET_DETECTED: int
 TARGET_PREDICTED: int
 TARGET_LOST: int
@@ -454,7 +454,7 @@ class Record:
     observations: list[Observation]
     families: list[str]
     search: Search
-    expected: list[Expected]
+    expected: list[ExpectedMarker]
     expected_count: int
     reserved: int
 

@@ -63,19 +63,23 @@ TEST(EdgeRefinement, TellsTheNoiseOfTheCorners) {
     std::mt19937 generator(5);
     std::uniform_real_distribution<double> tilt(-30, 30), turn(-180, 180);
     struct Case {
-        double distance_mm, blur_px, noise;
+        double distance_mm, blur_px, noise, k1 = 0, x_mm = 0;
     };
-    for (const auto &[distance_mm, blur_px, noise] :
-         {Case{400, 0.7, 2}, Case{400, 0.7, 12}, Case{400, 2, 6}, Case{1400, 0.7, 6}}) {
+    for (const auto &[distance_mm, blur_px, noise, k1, x_mm] :
+         {Case{400, 0.7, 2}, Case{400, 0.7, 12}, Case{400, 2, 6}, Case{1000, 0.7, 6}, Case{300, 0.7, 6, -0.3, 130}}) {
+        const arhost_intrinsics curved =
+            k1 == 0 ? camera
+                    : intrinsics_of({320, 240}, 200, 200, 159.5, 119.5, ARHOST_DISTORTION_BROWN, {k1, 0, 0, 0});
+        const arhost::fiducial::Lens curved_lens(curved);
         double squares = 0, told = 0;
         constexpr int count = 60;
         for (int i = 0; i < count; ++i) {
-            const Mt mt = pose_of(0, 0, distance_mm, tilt(generator), tilt(generator), turn(generator));
-            cv::Mat picture = render(camera, {{april_tag("tag36h11", i).with_margin(2), 100, mt}});
+            const Mt mt = pose_of(x_mm, 0, distance_mm, tilt(generator), tilt(generator), turn(generator));
+            cv::Mat picture = render(curved, {{april_tag("tag36h11", i).with_margin(2), 100, mt}});
             cv::GaussianBlur(picture, picture, {}, blur_px);
             add_noise(picture, noise, i + 1);
-            const auto truth = corners_of(mt, camera, 100);
-            const auto fine = refine_edges(picture, truth, lens, cells);
+            const auto truth = corners_of(mt, curved, 100);
+            const auto fine = refine_edges(picture, truth, curved_lens, cells);
             ASSERT_TRUE(fine) << i;
             for (int k = 0; k < 4; ++k) {
                 const cv::Point2d error = fine->corners_px[k] - truth[k];
@@ -83,7 +87,7 @@ TEST(EdgeRefinement, TellsTheNoiseOfTheCorners) {
             }
             told += fine->sigma_px * fine->sigma_px;
         }
-        EXPECT_NEAR(std::sqrt(told / squares), 1, 0.25) << distance_mm << " " << blur_px << " " << noise;
+        EXPECT_NEAR(std::sqrt(told / squares), 1, 0.25) << distance_mm << " " << blur_px << " " << noise << " " << k1;
     }
 }
 

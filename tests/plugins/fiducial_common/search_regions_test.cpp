@@ -8,6 +8,7 @@
 namespace {
 
 using arhost::fiducial::Family;
+using arhost::fiducial::Pass;
 using arhost::fiducial::RegionLimits;
 using arhost::fiducial::SearchRegions;
 using testing::ElementsAre;
@@ -144,6 +145,34 @@ TEST_F(Regions, MissATargetIfNoneOfItsExpectedMarkersIsSeen) {
     EXPECT_TRUE(missed({seen(0), seen(3, 0)})) << "of another family";
     request_.search_everywhere = 1;
     EXPECT_FALSE(missed({})) << "everything has been searched";
+}
+
+TEST_F(Regions, AreSearchedByEachPassAndThenTheWholeFrameIfATargetIsMissed) {
+    expect(0, 100, 150);
+    expect(3, 300, 150);
+    const Family first{"tag36h11", 0, 587, {{0, 0}, {1, 0}, {2, 0}}}, second{"tag25h9", 1, 35, {{0, 1}, {3, 1}}};
+    std::vector<std::pair<int, cv::Rect>> searched; // pass and region
+    bool finds_second = true;
+    const auto search = [&] {
+        searched.clear();
+        const Pass passes[] = {{&first,
+                                [&](const cv::Rect &region, auto &seen_markers) {
+                                    searched.emplace_back(1, region);
+                                    seen_markers.push_back(seen(0));
+                                }},
+                               {&second, [&](const cv::Rect &region, auto &seen_markers) {
+                                    searched.emplace_back(2, region);
+                                    if (finds_second)
+                                        seen_markers.push_back(seen(3, 1));
+                                }}};
+        return regions_->search(request_, {}, passes);
+    };
+    const std::pair near_first(1, cv::Rect(75, 125, 51, 51)), near_second(2, cv::Rect(275, 125, 51, 51));
+    EXPECT_EQ(search().size(), 2u);
+    EXPECT_THAT(searched, ElementsAre(near_first, near_second));
+    finds_second = false;
+    EXPECT_EQ(search().size(), 1u) << "what the first search found is not reported twice";
+    EXPECT_THAT(searched, ElementsAre(near_first, near_second, std::pair(1, whole_frame), std::pair(2, whole_frame)));
 }
 
 } // namespace

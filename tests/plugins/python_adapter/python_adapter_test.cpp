@@ -387,6 +387,8 @@ class Sink:
     def write(self, output):
         check("Output", output), check("Record", output.record), check("Camera", output.record.camera)
         check("Target", output.record.targets[0]), check("Observation", output.record.observations[0])
+        for each in output.record.expected: check("ExpectedMarker", each)
+        assert len(output.record.expected) == output.record.expected_count == output.record.sequence, "none in frame 0"
 )";
     ArhostRun run("version: 1\nsandbox: none\ncamera: {width: 64, height: 48, fx: 60}\n"
                   "source: {plugin: source_python, options: {script: script.py}}\n"

@@ -171,6 +171,17 @@ TEST_F(DebugViewTest, SurvivesPlacesFarOutsideTheFrame) {
     }
 }
 
+TEST(PictureCanvas, LinesMayBeAlmostHorizontal) {
+    for (const double rise : {1e-14, 1e-13, 1e-12, 1e-10, -1e-14, -1e-13, -1e-12, -1e-10})
+        for (const double y : {200.0, 200.25, 200.5, 200.75}) {
+            Black picture;
+            const PictureCanvas canvas(picture.bgr.data(), stride, width, height);
+            canvas.line({100.5, y}, {180.5, y + rise}, white);
+            canvas.line({180.5, y + rise}, {100.5, y}, white);
+            EXPECT_GT(picture.at(140, static_cast<std::size_t>(y))[0], 100) << y << " " << rise;
+        }
+}
+
 TEST(PictureCanvas, LinesAreSmoothAndStayInThePicture) {
     Black picture;
     const PictureCanvas canvas(picture.bgr.data(), stride, width, height);

@@ -116,6 +116,20 @@ TEST(MatrixReader, ReadsOnlyClearCellsInsideABlackBorder) {
     EXPECT_THAT(seen(dim), IsEmpty());
 }
 
+TEST(MatrixReader, SurvivesDimCodesThatAreAlmostUniform) {
+    for (const auto &[name, id] : {std::pair("artoolkit-3x3", 63), {"artoolkit-4x4", 8191}}) {
+        const MatrixFamily &family = *find_matrix_family(name);
+        Tracker tracker("tracker_pattern");
+        ASSERT_EQ(tracker.start(camera, {{id, side_mm, name}}), ARHOST_STATUS_OK) << tracker.log();
+        cv::Mat picture = render(camera, {{print_of(family, id), side_mm, pose_of(0, 0, 1000, 20, 10, 100)}});
+        cv::GaussianBlur(picture, picture, {}, 1.5);
+        for (int percent = 5; percent <= 20; ++percent) {
+            cv::Mat dim = picture * (percent / 100.0);
+            EXPECT_NO_THROW(tracker.track(GreyFrame(dim))) << percent;
+        }
+    }
+}
+
 TEST(MatrixReader, FindsSeveralFamiliesAndPatternsInOnePicture) {
     ARHOST_REQUIRE_SHARED_DATA("markers/artoolkit");
     const MatrixFamily &small = *find_matrix_family("artoolkit-3x3-hamming63"),

@@ -70,8 +70,10 @@ typedef struct arhost_record {
     const arhost_observation *observations;
     char families[ARHOST_MAX_FAMILIES][ARHOST_MAX_FAMILY]; /* arhost_observation.family is an index in it */
     arhost_search search;
-    /* Where markers were expected: those that the tracker has reported, then those that it has missed. A replay of a
-     * session has the numbers in `search`, but not these places, nor the observations that no target lists. */
+    /* Where markers were expected: those that the tracker has reported, then those that it has missed. Their
+     * `marker` is an index in the setup of the tracker, which a sink does not have. A replay of a session has the
+     * numbers in `search`, but not these places, nor the observations that no target lists, nor `projected_px` and
+     * `corner_sigma_px` of the others. */
     const arhost_expected_marker *expected;
     uint32_t expected_count;
     uint32_t reserved; /* 0 */

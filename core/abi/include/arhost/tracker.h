@@ -78,9 +78,9 @@ typedef struct arhost_observation {
     uint32_t hamming;          /* bits of the code that were corrected */
     double corners_px[4][2];   /* in pixels of the distorted frame */
     double decision_margin;    /* how clearly the bits were read, >= 0: larger is better, on a scale of the tracker's
-                                  own;  0: unknown */
+                                  own; 0: unknown */
     double corner_sigma_px;    /* standard deviation of the noise of each coordinate of corners_px, >= 0; 0: unknown.
-                                  The worker computes the covariance of the pose from it */
+                                  The covariance of a target with a single marker follows from it */
     double projected_px[4][2]; /* for sinks: where the pose of the marker's target projects the corners; all 0 if it
                                   does not. The worker sets it */
 } arhost_observation;
@@ -103,7 +103,8 @@ typedef struct arhost_body_pose {
     double covariance[36];
 } arhost_body_pose;
 
-/* The buffers for the results of `track`. The `struct_size` of each element is set; write all other fields. */
+/* The buffers for the results of `track`. The `struct_size` of each element is set; write all other fields, except
+ * `projected_px`. */
 typedef struct arhost_tracker_result {
     uint32_t struct_size;
     uint32_t observation_count;       /* 0; set by the tracker, at most ARHOST_MAX_OBSERVATIONS */
