@@ -618,6 +618,7 @@ bool Pipeline::compose() {
         return false;
     const bool has_sink = std::any_of(sinks_.begin(), sinks_.end(), [](const auto &sink) { return !sink->closed; });
     bool is_shown = true;
+    Clock::time_point composited = Clock::now();
     if (has_sink) {
         std::optional<Lease> slot = output_slots_->acquire();
         if (!slot && !live_)
@@ -630,6 +631,7 @@ bool Pipeline::compose() {
             auto output = std::make_shared<OutputFrame>(
                 OutputFrame{ready->first, std::move(*slot), ready->second->captured, ready->second->quality, inputs});
             compose(*ready->second, inputs, output->slot.bytes());
+            composited = Clock::now(); // before an output can have written the frame
             if (configuration_.snapshot)
                 last_output_ = output;
             for (const auto &sink : sinks_)
@@ -644,7 +646,7 @@ bool Pipeline::compose() {
     last_targets_ = std::move(ready->second->targets);
     statistics_.composited += is_shown;
     statistics_.augmented += is_shown && ready->second->record.overlay != ARHOST_OVERLAY_NONE;
-    statistics_.last_frame = Clock::now();
+    statistics_.last_frame = composited;
     const Clock::duration latency = statistics_.last_frame - ready->second->captured;
     statistics_.stages.add("latency", latency);
     if (configuration_.timeline && is_shown) {

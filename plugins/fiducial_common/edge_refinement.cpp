@@ -198,11 +198,10 @@ std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size
 // Returns positions on the line between two corners in undistorted pixels, which are in clockwise order. Keeps
 // `margin_px` away from the corners, where the search would hit the adjacent edges. Returns std::nullopt if the lens
 // does not see the edge.
-std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &lens, double margin_px,
-                                 std::size_t max_count) {
+std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &lens, double margin_px) {
     const double length = cv::norm(to - from);
     const double margin = std::min(margin_px, length / 4) / length;
-    const std::size_t count = std::clamp<std::size_t>(static_cast<std::size_t>(length / 2), 16, max_count);
+    const std::size_t count = std::clamp<std::size_t>(static_cast<std::size_t>(length / 2), 16, 100);
     std::vector<cv::Point2d> straight;
     for (std::size_t i = 0; i < count; ++i)
         straight.push_back(from + (margin + (1 - 2 * margin) * static_cast<double>(i) / (count - 1)) * (to - from));
@@ -256,11 +255,10 @@ std::optional<Line> fit_edge(const Edge &edge, Slope &slope, double cell_px, cv:
 std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens, int cells,
                                             bool is_subpixel) {
     constexpr int max_passes = 8;
-    constexpr std::size_t positions = 100, first_positions = 24; // at most; the first pass only gets near the edges
-    constexpr double sharp_step_px = 0.25;                       // suffices for a sharp edge
-    constexpr double min_strength = 0.9;                         // of the refined edges, relative to the rough ones
-    constexpr double max_noise = 0.12; // relative to the peak, for tags too small to average it out
-    constexpr double max_blur = 0.7;   // relative to the cell; a wider slope depends on the cells beside the border
+    constexpr double sharp_step_px = 0.25; // suffices for a sharp edge
+    constexpr double min_strength = 0.9;   // of the refined edges, relative to the rough ones
+    constexpr double max_noise = 0.12;     // relative to the peak, for tags too small to average it out
+    constexpr double max_blur = 0.7; // relative to the cell; a wider slope depends on the cells beside the border
     const auto rough = lens.undistort({rough_px.begin(), rough_px.end()});
     if (!rough)
         return std::nullopt;
@@ -284,11 +282,10 @@ std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, const Corners &
     double sign = 0, rough_strength = 0, strength = 0, moved = converged_px, margin_px = reach * min_step_px,
            variance = 0; // of a coordinate of a corner
     bool is_unclear = false;
-    for (int pass = 0; pass < max_passes && (pass < 2 || moved >= converged_px); ++pass) {
+    for (int pass = 0; pass < max_passes && moved >= converged_px; ++pass) {
         std::array<Edge, 4> edges;
         for (int i = 0; i < 4; ++i) {
-            auto edge = edge_between(corners[i], corners[(i + 1) % 4], lens, margin_px,
-                                     pass == 0 ? first_positions : positions);
+            auto edge = edge_between(corners[i], corners[(i + 1) % 4], lens, margin_px);
             if (!edge)
                 return std::nullopt;
             edges[i] = std::move(*edge);
