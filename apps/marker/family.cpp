@@ -79,7 +79,8 @@ Family matrix_codes(const fiducial::MatrixFamily &type) {
                     for (int column = 0; column < side; ++column) {
                         const int y = row - type.side, x = column - type.side;
                         const bool inside = std::min(x, y) >= 0 && std::max(x, y) < 2 * type.side;
-                        black.push_back(!inside || code[static_cast<std::size_t>(y / 2 * type.side + x / 2)]);
+                        const int cell = y / 2 * type.side + x / 2;
+                        black.push_back(!inside || code[static_cast<std::size_t>(cell)]);
                     }
                 return black;
             },

@@ -163,7 +163,8 @@ std::uint32_t TargetSolver::move_missed_to_end(Expectation &expectation,
         if (const Marker *marker = marker_of(observation))
             seen.insert(marker->index);
     const auto is_seen = [&](const arhost_expected_marker &expected) { return seen.contains(expected.marker); };
-    return static_cast<std::uint32_t>(std::ranges::stable_partition(expectation.markers, is_seen).size());
+    auto &markers = expectation.markers;
+    return static_cast<std::uint32_t>(markers.end() - std::stable_partition(markers.begin(), markers.end(), is_seen));
 }
 
 const TargetSolver::Marker *TargetSolver::marker_of(const arhost_observation &observation) const {
@@ -278,6 +279,7 @@ void TargetSolver::solve(const Target &target, std::span<arhost_observation> obs
     const auto kept =
         without_copies(observations, predicted_motion(memory.track, capture_ns), target.corner_sigma_px());
     std::vector<ObservedMarker> markers;
+    markers.reserve(kept.size());
     for (const arhost_observation *observation : kept)
         markers.push_back(observed(*observation, target.corner_sigma_px()));
     std::vector<Estimate> poses = estimate_poses(markers, projection_);

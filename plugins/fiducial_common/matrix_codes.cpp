@@ -79,7 +79,8 @@ std::optional<std::uint32_t> matrix_word(const std::vector<bool> &cells, int sid
     std::uint32_t word = 0;
     for (int row = 0; row < side; ++row)
         for (int column = 0; column < side; ++column) {
-            const bool black = cells[static_cast<std::size_t>(row * side + column)];
+            const int index = row * side + column;
+            const bool black = cells[static_cast<std::size_t>(index)];
             if (const Cell cell = cell_at(row, column, side); cell == Cell::bit)
                 word = word << 1 | black;
             else if (black != (cell == Cell::black))

@@ -85,7 +85,7 @@ void Canvas::text(double x, double y, int scale, const std::string &text, Colour
     const int quads = stb_easy_font_print(0, 0, copy.data(), nullptr, vertices.data(),
                                           static_cast<int>(vertices.size() * sizeof(Vertex)));
     std::vector<Point> corners;
-    for (const Vertex &vertex : std::span(vertices).first(static_cast<std::size_t>(4 * quads)))
+    for (const Vertex &vertex : std::span(vertices).first(std::size_t{4} * static_cast<std::size_t>(quads)))
         corners.push_back({std::round(x) + scale * vertex.x, std::round(y) + scale * (vertex.y + baseline_offset)});
     fill(corners, colour, 255);
 }

@@ -18,6 +18,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <tuple>
 
 namespace tracker_pattern {
 namespace {
@@ -102,7 +103,9 @@ private:
     struct Sampling {
         double ratio; // of the side of the samples to that of the square
         int side;     // samples
-        auto operator<=>(const Sampling &) const = default;
+        bool operator<(const Sampling &other) const {
+            return std::tie(ratio, side) < std::tie(other.ratio, other.side);
+        }
     };
 
     static int id_count(const std::string &family) {
