@@ -108,6 +108,8 @@ std::string SourceRun::problem() const {
         return fmt::format("its YUV matrix {} is invalid", f.yuv_matrix);
     if (is_yuv && (f.yuv_range < ARHOST_YUV_RANGE_LIMITED || f.yuv_range > ARHOST_YUV_RANGE_FULL))
         return fmt::format("its YUV range {} is invalid", f.yuv_range);
+    if (f.transfer < ARHOST_TRANSFER_SRGB || f.transfer > ARHOST_TRANSFER_LINEAR)
+        return fmt::format("its transfer {} is invalid", f.transfer);
     if (!std::isfinite(f.fps) || f.fps < 0)
         return fmt::format("its frame rate of {} is invalid", f.fps);
     return {};

@@ -37,6 +37,7 @@ arhost_frame_format format_of(std::uint32_t width, std::uint32_t height, arhost_
     format.yuv_matrix = ARHOST_YUV_MATRIX_BT709;
     format.yuv_range = ARHOST_YUV_RANGE_FULL;
     format.fps = 30;
+    format.transfer = ARHOST_TRANSFER_LINEAR; // the pictures average the codes of their samples
     if (!arhost_frame_layout(&format))
         throw std::runtime_error("the test's frame format is invalid");
     return format;

@@ -287,6 +287,8 @@ std::string problem_with(const arhost_observation &seen, std::uint32_t struct_si
         return fmt::format("decision_margin is {}; expected a finite number of at least 0", seen.decision_margin);
     if (!(seen.corner_sigma_px >= 0 && std::isfinite(seen.corner_sigma_px)))
         return fmt::format("corner_sigma_px is {}; expected a finite number of at least 0", seen.corner_sigma_px);
+    if (!(seen.false_positive_rate >= 0 && seen.false_positive_rate <= 1))
+        return fmt::format("false_positive_rate is {}; expected a number from 0 to 1", seen.false_positive_rate);
     const Corners corners = corners_of(seen);
     for (std::size_t i = 0; i < corners.size(); ++i) {
         if (!std::isfinite(corners[i].x) || !std::isfinite(corners[i].y))

@@ -75,7 +75,7 @@ double tracker_alone(const std::string &picture, const arhost_intrinsics &camera
     Tracker tracker("tracker_aruco");
     if (tracker.created() != ARHOST_STATUS_OK || tracker.start(camera, {{0, 80}}) != ARHOST_STATUS_OK)
         throw std::runtime_error(tracker.log());
-    const GreyFrame frame(read_grey(picture));
+    const GreyFrame frame(read_grey(picture), ARHOST_TRANSFER_SRGB);
     return cpu_ms_of(frames, [&](int) { tracker.track(frame); });
 }
 

@@ -127,8 +127,9 @@ template <class Detector> Result bare(const Video &video, const Detector &detect
 
 Result plugin(const Video &video, const std::string &name, std::uint32_t full_search_every) {
     return measure(video, [&] {
-        auto tracker = std::make_shared<bench::SolvingTracker>(
-            name, camera, bench::SolvingTracker::Settings{marker_count, side_mm, full_search_every});
+        auto tracker =
+            std::make_shared<bench::SolvingTracker>(name, camera, bench::first_markers(marker_count, side_mm),
+                                                    arhost::worker::TargetSolver::Settings{full_search_every});
         return [tracker, capture_ns = std::int64_t{0}](const GreyFrame &frame) mutable {
             const std::chrono::nanoseconds spent = tracker->track(frame, capture_ns);
             capture_ns += std::llround(1e9 * seconds_per_frame);

@@ -13,22 +13,23 @@
 
 namespace arhost::bench {
 
-// Tracks the tags 0 … tag_count − 1 of tag36h11, each a target of its own.
+constexpr std::uint32_t default_full_search_every = 10; // of tracker.full_search_every
+
+// The markers 0 … count − 1 of a family.
+inline std::vector<test::Listed> first_markers(int count, double side_mm, const std::string &family = "tag36h11") {
+    std::vector<test::Listed> listed;
+    for (int id = 0; id < count; ++id)
+        listed.push_back({id, side_mm, family});
+    return listed;
+}
+
+// Each listed marker is a target of its own.
 class SolvingTracker {
 public:
-    struct Settings {
-        int tag_count;
-        double side_mm;
-        std::uint32_t full_search_every = 10; // the default of tracker.full_search_every
-        bool smooth = false;
-    };
-
-    SolvingTracker(const std::string &plugin, const arhost_intrinsics &camera, const Settings &settings)
-        : tracker_(plugin), solver_(camera, targets_of(settings), settings.full_search_every, settings.smooth),
-          targets_(static_cast<std::size_t>(settings.tag_count)) {
-        std::vector<test::Listed> listed;
-        for (int id = 0; id < settings.tag_count; ++id)
-            listed.push_back({id, settings.side_mm});
+    SolvingTracker(const std::string &plugin, const arhost_intrinsics &camera,
+                   const std::vector<test::Listed> &listed,
+                   const worker::TargetSolver::Settings &settings = {default_full_search_every})
+        : tracker_(plugin), solver_(camera, targets_of(listed), settings), targets_(listed.size()) {
         if (tracker_.created() != ARHOST_STATUS_OK || tracker_.start(camera, listed) != ARHOST_STATUS_OK)
             throw std::runtime_error(tracker_.log());
     }
@@ -53,12 +54,14 @@ public:
     std::span<const arhost_target> targets() const { return targets_; }
 
 private:
-    static std::vector<ipc::Target> targets_of(const Settings &settings) {
-        const double h = settings.side_mm / 2;
+    static std::vector<ipc::Target> targets_of(const std::vector<test::Listed> &listed) {
         std::vector<ipc::Target> targets;
-        for (int id = 0; id < settings.tag_count; ++id)
-            targets.push_back(
-                {std::to_string(id), {{id, "tag36h11", {{{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}}}}, ""});
+        for (const test::Listed &one : listed) {
+            const double h = one.side_mm / 2;
+            targets.push_back({one.family + " " + std::to_string(one.id),
+                               {{one.id, one.family, {{{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}}}},
+                               ""});
+        }
         return targets;
     }
 

@@ -57,7 +57,8 @@ template <class Detector> double with_bare(const std::deque<GreyFrame> &frames, 
 }
 
 double with_plugin(const std::deque<GreyFrame> &frames, const std::string &plugin, bool smooth) {
-    bench::SolvingTracker tracker(plugin, camera, {1, side_mm, 10, smooth});
+    bench::SolvingTracker tracker(plugin, camera, bench::first_markers(1, side_mm),
+                                  {bench::default_full_search_every, smooth});
     std::vector<cv::Point2d> corners;
     std::int64_t capture_ns = 0;
     for (const GreyFrame &frame : frames) {

@@ -11,9 +11,17 @@
 namespace arhost::host {
 namespace {
 
-std::string seen_instead(const Statistics &statistics) {
-    const std::string strangers = strangers_text(statistics);
-    return strangers.empty() ? "" : "; it saw " + strangers;
+// Names the markers with the most frames.
+std::string frames_text(const std::map<std::string, std::uint64_t> &frames_of_marker) {
+    std::vector<std::pair<std::uint64_t, std::string>> most_frequent;
+    for (const auto &[name, frames] : frames_of_marker)
+        most_frequent.emplace_back(frames, name);
+    std::ranges::stable_sort(most_frequent, std::greater{}, &std::pair<std::uint64_t, std::string>::first);
+    most_frequent.resize(std::min<std::size_t>(most_frequent.size(), 5));
+    std::string text;
+    for (const auto &[frames, name] : most_frequent)
+        text += fmt::format("{}{} ({} {})", text.empty() ? "" : ", ", name, frames, frames == 1 ? "frame" : "frames");
+    return text;
 }
 
 std::uint64_t count(const std::map<std::string, std::uint64_t> &counts, const char *stage) {
@@ -42,7 +50,7 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
             fmt::format("no target was seen in any of {} frames{}; it looked for {}{}; compare the numbers and the "
                         "family with the print",
                         statistics.tracker_results, configuration.raytracer ? ", so no frame has an overlay" : "",
-                        describe_targets(targets), seen_instead(statistics)),
+                        describe_targets(targets), seen_instead(statistics, targets)),
             true};
     if (configuration.mode != run_config::Mode::live || !configuration.raytracer || statistics.composited == 0 ||
         statistics.augmented > 0)
@@ -66,7 +74,7 @@ std::string unseen_targets(const run_config::Configuration &configuration, const
     if (unseen.empty())
         return {};
     return fmt::format("never seen in {} frames: {}{}", statistics.tracker_results, describe_targets(unseen),
-                       seen_instead(statistics));
+                       seen_instead(statistics, unseen));
 }
 
 std::string describe_targets(const std::vector<ipc::Target> &targets) {
@@ -91,16 +99,25 @@ std::string describe_targets(const std::vector<ipc::Target> &targets) {
     return text;
 }
 
-std::string strangers_text(const Statistics &statistics) {
-    std::vector<std::pair<std::uint64_t, std::string>> most_frequent;
-    for (const auto &[name, frames] : statistics.strangers)
-        most_frequent.emplace_back(frames, name);
-    std::ranges::stable_sort(most_frequent, std::greater{}, &std::pair<std::uint64_t, std::string>::first);
-    most_frequent.resize(std::min<std::size_t>(most_frequent.size(), 5));
+std::string seen_instead(const Statistics &statistics, const std::vector<ipc::Target> &unseen) {
+    std::map<std::string, std::uint64_t> unconfirmed;
+    for (const ipc::Target &target : unseen)
+        for (const ipc::TargetMarker &marker : target.markers)
+            if (const auto found = statistics.unconfirmed.find(fmt::format("{} {}", marker.family, marker.id));
+                found != statistics.unconfirmed.end())
+                unconfirmed.insert(*found);
     std::string text;
-    for (const auto &[frames, name] : most_frequent)
-        text += fmt::format("{}{} ({} {})", text.empty() ? "" : ", ", name, frames, frames == 1 ? "frame" : "frames");
+    if (const std::string strangers = strangers_text(statistics); !strangers.empty())
+        text += "; it saw " + strangers;
+    if (!unconfirmed.empty())
+        text += "; it saw " + frames_text(unconfirmed) +
+                " but got no pose: corners were hidden, or a small family was not seen in successive frames (see "
+                "'tracker.confirm' in docs/config.md)";
     return text;
+}
+
+std::string strangers_text(const Statistics &statistics) {
+    return frames_text(statistics.strangers);
 }
 
 } // namespace arhost::host

@@ -28,6 +28,9 @@ std::string unseen_targets(const run_config::Configuration &configuration, const
 // Describes what a tracker looks for, such as "desk (tag36h11 23), board (map of 12 markers)".
 std::string describe_targets(const std::vector<ipc::Target> &targets);
 
+// Tells what the tracker saw instead of the unseen targets, as "; it saw tag36h11 5 (30 frames)"; "" if nothing.
+std::string seen_instead(const Statistics &statistics, const std::vector<ipc::Target> &unseen);
+
 // Names the most frequent markers that belong to no target, as "tag36h11 5 (30 frames)"; "" if there are none.
 std::string strangers_text(const Statistics &statistics);
 

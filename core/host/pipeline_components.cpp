@@ -69,7 +69,8 @@ void Pipeline::make_source() {
             throw ProtocolViolation("the source's 'ready' lacks the frame format");
         const arhost_frame_format &format = *ready.format;
         if (format_ && (format.pixel_format != format_->pixel_format || format.width != format_->width ||
-                        format.height != format_->height || format.has_depth != format_->has_depth))
+                        format.height != format_->height || format.has_depth != format_->has_depth ||
+                        format.transfer != format_->transfer))
             throw std::runtime_error("the frame format differs after the restart");
         format_ = format;
         frame_count_ = ready.frame_count;
@@ -222,9 +223,10 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(TrackerPointer configuratio
             own.node.find("targets").value_or(own.node).fail(
                 "the target '" + body->name + "' is a body, but '" + plugin.id +
                 "' finds only markers; choose a tracker that reports the poses of bodies");
-        return Component::Create{{options_for(*stage->component, ARHOST_KIND_TRACKER, own, candidate),
-                                  messages::TrackerSetup{*format_, intrinsics_, own.full_search_every, own.smooth}},
-                                 {stage->targets->fd()}};
+        return Component::Create{
+            {options_for(*stage->component, ARHOST_KIND_TRACKER, own, candidate),
+             messages::TrackerSetup{*format_, intrinsics_, own.full_search_every, own.smooth, own.confirm}},
+            {stage->targets->fd()}};
     };
     callbacks.ready = [stage](const messages::Ready &ready) {
         constexpr std::uint64_t max_size = 2 * std::uint64_t{ARHOST_MAX_STATE}; // of the plugin and the worker itself

@@ -279,27 +279,36 @@ void Pipeline::count_targets(const Frame &frame) {
                 target, observations.subspan(target.first_observation, target.observation_count));
 }
 
-// Counts the markers that no target lists, and tells the user of them if there is no target for a while.
+// Counts the markers of no target and those of targets without a pose. If there is no target for a while, tells the
+// user of them.
 void Pipeline::count_strangers(Frame &frame) {
-    std::set<std::string> strangers;
-    for (const arhost_observation &observation : frame.observations) {
+    std::set<std::string> strangers, unconfirmed;
+    std::vector<bool> has_pose(frame.observations.size());
+    for (const arhost_target &target : frame.targets)
+        if (is_visible(target))
+            std::fill_n(has_pose.begin() + target.first_observation, target.observation_count, true);
+    for (std::size_t i = 0; i < frame.observations.size(); ++i) {
+        const arhost_observation &observation = frame.observations[i];
         const std::string &family = tracker_->families[observation.family];
-        if (tracker_->listed.contains({family, observation.id}))
-            continue;
-        ++frame.record.search.unlisted_count;
-        if (strangers.size() < Statistics::max_strangers)
-            strangers.insert(family + " " + std::to_string(observation.id));
+        const bool is_listed = tracker_->listed.contains({family, observation.id});
+        frame.record.search.unlisted_count += !is_listed;
+        std::set<std::string> &names = is_listed ? unconfirmed : strangers;
+        if (!has_pose[i] && names.size() < Statistics::max_strangers)
+            names.insert(family + " " + std::to_string(observation.id));
     }
-    for (const std::string &name : strangers)
-        if (statistics_.strangers.contains(name) || statistics_.strangers.size() < Statistics::max_strangers)
-            ++statistics_.strangers[name];
+    const auto add = [](const std::set<std::string> &names, std::map<std::string, std::uint64_t> &frames) {
+        for (const std::string &name : names)
+            if (frames.contains(name) || frames.size() < Statistics::max_strangers)
+                ++frames[name];
+    };
+    add(strangers, statistics_.strangers);
+    add(unconfirmed, statistics_.unconfirmed);
     if (live_ && statistics_.targets.empty() && !reported_missing_targets_ && !configuration_.time_codes &&
         Clock::now() - statistics_.first_frame > max_time_without_target) {
         reported_missing_targets_ = true;
-        const std::string seen = strangers_text(statistics_);
         context_.log(ARHOST_SEVERITY_WARNING, "tracker",
                      "has seen no target yet; it looks for " + describe_targets(tracker_->configuration->targets) +
-                         (seen.empty() ? "" : "; it sees " + seen) +
+                         seen_instead(statistics_, tracker_->configuration->targets) +
                          "; compare the numbers and the family with the print");
     }
 }

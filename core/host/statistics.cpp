@@ -199,6 +199,7 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
         {"frames", search.frames},     {"everywhere", search.everywhere}, {"observations", search.observations},
         {"unlisted", search.unlisted}, {"expected", search.expected},     {"missed", search.missed}};
     json["unlisted_markers"] = statistics.strangers;
+    json["unconfirmed_markers"] = statistics.unconfirmed;
     for (const auto &[name, timing] : statistics.stages.all())
         json["stages"][name] = timing.to_json();
     json["latency"] = latency_json(statistics, statistics.latencies.all());

@@ -101,9 +101,10 @@ struct Statistics {
     std::uint64_t composited = 0;                    // frames sent to the outputs, augmented or not
     std::map<std::string, TargetStatistics> targets; // by name
     SearchStatistics search;
-    std::map<std::string, std::uint64_t> strangers; // frames with a marker that no target lists, by name
-    std::map<std::string, std::uint64_t> dropped;   // number of dropped frames by stage
-    std::map<std::string, std::uint64_t> skipped;   // number of unaugmented frames by the failed stage
+    std::map<std::string, std::uint64_t> strangers;   // frames with a marker that no target lists, by name
+    std::map<std::string, std::uint64_t> unconfirmed; // frames with a listed marker whose target got no pose
+    std::map<std::string, std::uint64_t> dropped;     // number of dropped frames by stage
+    std::map<std::string, std::uint64_t> skipped;     // number of unaugmented frames by the failed stage
     StageTimings stages;
     // From the capture of a frame until an output has written it, by output; `latency` of `stages` ends when the
     // frame is composited. Both begin at the arrival of the frame if the source does not know when it was captured.

@@ -164,7 +164,7 @@ arhost_intrinsics intrinsics_from_json(const Json &json) {
 Json to_json(const arhost_frame_format &f) {
     return {{"pixel_format", f.pixel_format}, {"width", f.width},         {"height", f.height},
             {"yuv_matrix", f.yuv_matrix},     {"yuv_range", f.yuv_range}, {"fps", f.fps},
-            {"has_depth", f.has_depth != 0}};
+            {"has_depth", f.has_depth != 0},  {"transfer", f.transfer}};
 }
 
 arhost_frame_format format_from_json(const Json &json) {
@@ -177,8 +177,9 @@ arhost_frame_format format_from_json(const Json &json) {
     f.yuv_range = json.at("yuv_range").get<arhost_yuv_range>();
     f.fps = finite(json, "fps");
     f.has_depth = json.at("has_depth").get<bool>();
+    f.transfer = json.at("transfer").get<arhost_transfer>();
     const bool yuv = f.pixel_format >= ARHOST_PIXEL_FORMAT_YUYV;
-    if (f.fps < 0 || f.fps > 100'000 ||
+    if (f.fps < 0 || f.fps > 100'000 || f.transfer < ARHOST_TRANSFER_SRGB || f.transfer > ARHOST_TRANSFER_LINEAR ||
         (yuv && (f.yuv_matrix < ARHOST_YUV_MATRIX_BT601 || f.yuv_matrix > ARHOST_YUV_MATRIX_BT709 ||
                  f.yuv_range < ARHOST_YUV_RANGE_LIMITED || f.yuv_range > ARHOST_YUV_RANGE_FULL)) ||
         !arhost_frame_layout(&f))

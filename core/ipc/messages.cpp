@@ -54,7 +54,7 @@ namespace messages {
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Open, plugin, sandbox)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Load, scene, sandbox)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SourceSetup, first_sequence, fps, paced, intrinsics)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TrackerSetup, format, intrinsics, full_search_every, smooth)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TrackerSetup, format, intrinsics, full_search_every, smooth, confirm)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RaytracerSetup, width, height, intrinsics)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SinkSetup, video_format, fps, first_sequence, intrinsics, run_description)
 

@@ -67,7 +67,7 @@ struct TrackerSetup {
     arhost_frame_format format{};
     arhost_intrinsics intrinsics{};
     std::uint32_t full_search_every = 1;
-    bool smooth = false;
+    bool smooth = false, confirm = true;
 };
 struct RaytracerSetup {
     static constexpr const char *kind = "raytracer";

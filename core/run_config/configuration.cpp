@@ -137,6 +137,8 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared,
     tracker.full_search_every = frames("tracker.full_search_every", 1);
     if (const auto filter = node.find("filter"))
         tracker.smooth = filter->choice(key_at("tracker.filter").choices) == "adaptive";
+    if (const auto confirm = node.find("confirm"))
+        tracker.confirm = confirm->boolean();
     return tracker;
 }
 

@@ -55,6 +55,7 @@ struct TrackerConfiguration : ComponentConfiguration {
     std::uint32_t hold_frames = 0;
     std::uint32_t world_grace_frames = 90, full_search_every = 10;
     bool smooth = false; // filter: adaptive
+    bool confirm = true;
 };
 
 struct RaytracerConfiguration : ComponentConfiguration {

@@ -141,6 +141,9 @@ std::vector<Key> make_table() {
           "Longest interval, in frames, between searches of the whole frame; in the other frames, a tracker may "
           "search "
           "only where markers are expected. 1: always."},
+         {"confirm", boolean, false, "true",
+          "Report markers of small families, which clutter contains by chance, only when they are seen in successive "
+          "frames (docs/tracking.md)."},
          {"filter",
           text,
           false,

@@ -172,7 +172,8 @@ public:
             tracker_.stop(instance_);
             throw;
         }
-        solver_.emplace(message.intrinsics, targets, message.full_search_every, message.smooth);
+        solver_.emplace(message.intrinsics, targets,
+                        TargetSolver::Settings{message.full_search_every, message.smooth, message.confirm});
         layout_.emplace(targets.size());
         poses_.resize(targets.size());
         plugin_offset_ = layout_->state_offset + (solver_->state_size() + 63) / 64 * 64;

@@ -17,12 +17,14 @@ struct TargetSolver::Header {
     std::uint32_t frames_since_full_search, reserved;
 };
 
-// The state of a target after the last frame. Plain data without pointers; all zero if it was never seen.
+// The state of a target after the last frame. Plain data without pointers; all zero if it was never sighted.
 struct TargetSolver::Memory {
-    pose::Track track;         // not of bodies
-    pose::Smoothing smoothing; // only if the poses are filtered
-    double mt[16];             // the last known pose
-    std::uint32_t was_seen, age_frames;
+    pose::Track track;                      // not of bodies
+    pose::Smoothing smoothing;              // only if the poses are filtered
+    double mt[16];                          // the last reported pose
+    std::uint32_t was_reported, age_frames; // whether it was ever reported; frames since then
+    double log_chance; // logarithm of the probability that its sightings in successive frames are chance
+    std::uint32_t is_sighted, reserved; // whether it was seen in the last frame, reported or not
 };
 
 namespace {
@@ -34,6 +36,11 @@ using pose::Rigid;
 // The errors of corners that the choice among poses allows for: more than their noise, because calibrations are not
 // exact. Those of a map contain the errors of its printed layout.
 constexpr double marker_sigma_px = 0.1, map_sigma_px = 0.5;
+
+// A target is reported if the probability that its sightings are chance is lower. A cluttered frame has dozens of
+// squares that look random, so at this limit, one of some thousand frames has a false marker.
+const double confirmed_log_chance = std::log(1e-5), certain_log_chance = std::log(1e-30),
+             max_log_chance = std::log(double{ARHOST_MAX_MARKERS});
 
 // The noise of the corners of a tracker that does not know it.
 constexpr double unknown_sigma_px = 0.3;
@@ -69,17 +76,18 @@ Eigen::Vector2d centre_px(const arhost_observation &observation) {
 } // namespace
 
 TargetSolver::TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<ipc::Target> &targets,
-                           std::uint32_t full_search_every, bool smooth)
-    : projection_(intrinsics), full_search_every_(full_search_every), smooth_(smooth) {
+                           const Settings &settings)
+    : projection_(intrinsics), settings_(settings) {
     std::uint32_t next_index = 0;
     const std::vector<std::string> families = families_of(targets);
-    family_count_ = static_cast<std::uint32_t>(families.size());
+    marker_counts_.resize(families.size());
     for (const ipc::Target &target : targets) {
         for (const ipc::TargetMarker &marker : target.markers) {
             const auto family =
                 static_cast<std::uint32_t>(std::ranges::find(families, marker.family) - families.begin());
             Marker &added = markers_[{family, marker.id}];
             added.index = next_index++;
+            ++marker_counts_[family];
             added.target = targets_.size();
             std::ranges::transform(marker.corners_mm, added.corners_mm.begin(),
                                    [](const auto &corner) { return Eigen::Vector3d(corner.data()); });
@@ -108,52 +116,65 @@ TargetSolver::Memory TargetSolver::memory_of(const void *state, std::size_t targ
     if (state)
         std::memcpy(&memory, static_cast<const std::byte *>(state) + sizeof(Header) + target * sizeof memory,
                     sizeof memory);
-    if (memory.was_seen && !is_rotation(pose::rigid_of(memory.mt))) // bytes that this class has not written
-        memory = {};
+    const bool has_pose = !memory.was_reported || is_rotation(pose::rigid_of(memory.mt));
+    if (!has_pose || !(memory.log_chance >= certain_log_chance && memory.log_chance <= max_log_chance))
+        memory = {}; // this class has not written these bytes
     return memory;
 }
 
 TargetSolver::Expectation TargetSolver::expect(std::int64_t capture_ns, const void *before) const {
-    constexpr double sigmas = 4, min_margin_px = 4;
-    Expectation expectation{{}, !before || header_of(before).frames_since_full_search + 1 >= full_search_every_};
+    Expectation expectation{{},
+                            !before || header_of(before).frames_since_full_search + 1 >= settings_.full_search_every};
     std::vector<std::optional<pose::Motion>> motions;
     for (std::size_t target = 0; target < targets_.size(); ++target) {
         const Memory memory = memory_of(before, target);
-        const bool is_visible = memory.was_seen && memory.age_frames == 0;
-        motions.push_back(is_visible ? predicted_motion(memory.track, capture_ns) : std::nullopt);
+        motions.push_back(memory.is_sighted ? predicted_motion(memory.track, capture_ns) : std::nullopt);
         // A target that was lost in the last frame may be anywhere now.
-        expectation.search_everywhere |= memory.was_seen && memory.age_frames == 1;
+        expectation.search_everywhere |= memory.was_reported && memory.age_frames == 1;
     }
-    const arhost_intrinsics &frame = projection_.intrinsics();
-    for (const auto &[key, marker] : markers_) {
-        if (!motions[marker.target])
-            continue;
-        const pose::Motion &motion = *motions[marker.target];
-        const Rigid pose = pose_of(motion);
-        arhost_expected_marker expected{sizeof expected, marker.index, {}, min_margin_px};
-        bool is_visible = true;
-        Eigen::AlignedBox2d bounds;
-        for (int i = 0; i < 4 && is_visible; ++i) {
-            pose::Jacobian23 derivative;
-            const auto pixel = projection_.pixel(pose * marker.corners_mm[i], &derivative);
-            is_visible = pixel.has_value();
-            if (!pixel)
-                continue;
-            const Eigen::Matrix2d covariance =
-                derivative * covariance_of(motion, marker.corners_mm[i]) * derivative.transpose();
-            expected.margin_px = std::max(expected.margin_px, sigmas * std::sqrt(covariance.trace()));
-            expected.corners_px[i][0] = pixel->x();
-            expected.corners_px[i][1] = pixel->y();
-            bounds.extend(*pixel);
-        }
-        const Eigen::Vector2d margin(expected.margin_px, expected.margin_px);
-        const Eigen::AlignedBox2d whole(Eigen::Vector2d(0, 0), Eigen::Vector2d(frame.width - 1, frame.height - 1)),
-            region(bounds.min() - margin, bounds.max() + margin);
-        if (is_visible && whole.intersects(region))
-            expectation.markers.push_back(expected);
-    }
+    for (const auto &[key, marker] : markers_)
+        if (const auto &motion = motions[marker.target])
+            if (const auto place = expected(marker, *motion))
+                expectation.markers.push_back(*place);
     expectation.search_everywhere |= expectation.markers.empty();
     return expectation;
+}
+
+// Returns where a marker is expected; std::nullopt if it is outside of the frame.
+std::optional<arhost_expected_marker> TargetSolver::expected(const Marker &marker, const pose::Motion &motion) const {
+    constexpr double sigmas = 4, min_margin_px = 4;
+    arhost_expected_marker expected{sizeof expected, marker.index, {}, min_margin_px};
+    Eigen::AlignedBox2d bounds;
+    for (int i = 0; i < 4; ++i) {
+        pose::Jacobian23 derivative;
+        const auto pixel = projection_.pixel(pose_of(motion) * marker.corners_mm[i], &derivative);
+        if (!pixel)
+            return std::nullopt;
+        const Eigen::Matrix2d covariance =
+            derivative * covariance_of(motion, marker.corners_mm[i]) * derivative.transpose();
+        expected.margin_px = std::max(expected.margin_px, sigmas * std::sqrt(covariance.trace()));
+        expected.corners_px[i][0] = pixel->x();
+        expected.corners_px[i][1] = pixel->y();
+        bounds.extend(*pixel);
+    }
+    const arhost_intrinsics &frame = projection_.intrinsics();
+    const Eigen::Vector2d margin(expected.margin_px, expected.margin_px);
+    const Eigen::AlignedBox2d whole(Eigen::Vector2d(0, 0), Eigen::Vector2d(frame.width - 1, frame.height - 1)),
+        region(bounds.min() - margin, bounds.max() + margin);
+    return whole.intersects(region) ? std::optional(expected) : std::nullopt;
+}
+
+// Whether a marker is where its target's motion leads, or at most its own side from there if the motion is uncertain.
+bool TargetSolver::is_expected(const arhost_observation &observation, const pose::Motion &motion) const {
+    const auto place = expected(*marker_of(observation), motion);
+    if (!place)
+        return false;
+    const ObservedMarker seen = observed(observation, marker_sigma_px);
+    const double tolerance_px = std::min(place->margin_px, shortest_side_px(seen));
+    for (std::size_t i = 0; i < 4; ++i)
+        if (!((seen.corners_px[i] - Eigen::Vector2d(place->corners_px[i])).norm() <= tolerance_px))
+            return false;
+    return true;
 }
 
 std::uint32_t TargetSolver::move_missed_to_end(Expectation &expectation,
@@ -178,9 +199,9 @@ void TargetSolver::check(const arhost_tracker_result &reported) const {
                   std::to_string(ARHOST_MAX_OBSERVATIONS));
     for (const arhost_observation &observation : std::span(reported.observations, reported.observation_count)) {
         const std::string name = "marker " + std::to_string(observation.id);
-        if (observation.family >= family_count_)
+        if (observation.family >= marker_counts_.size())
             violation("reports " + name + " with the family index " + std::to_string(observation.family) +
-                      ", but the setup has " + std::to_string(family_count_) + " families");
+                      ", but the setup has " + std::to_string(marker_counts_.size()) + " families");
         for (const auto &corner : observation.corners_px)
             if (!std::isfinite(corner[0]) || !std::isfinite(corner[1]))
                 violation("reports " + name + " with a corner that is not finite");
@@ -188,6 +209,8 @@ void TargetSolver::check(const arhost_tracker_result &reported) const {
             violation("reports " + name + " with an invalid decision margin");
         if (!(observation.corner_sigma_px >= 0 && std::isfinite(observation.corner_sigma_px)))
             violation("reports " + name + " with an invalid corner noise");
+        if (!(observation.false_positive_rate >= 0 && observation.false_positive_rate <= 1))
+            violation("reports " + name + " with a false positive rate outside of 0 to 1");
     }
     if (reported.pose_count > targets_.size())
         violation("reports more poses than there are targets");
@@ -261,6 +284,18 @@ pose::Matrix6d TargetSolver::single_covariance(const Rigid &pose, const arhost_o
     return estimate ? estimate->covariance : pose::Matrix6d::Zero();
 }
 
+// Whether the corners are near their places in a pose of the target.
+bool TargetSolver::fits(const ObservedMarker &marker, const Rigid &pose) const {
+    double squares = 0;
+    for (std::size_t i = 0; i < 4; ++i) {
+        const auto pixel = projection_.pixel(pose * marker.corners_on_target_mm[i]);
+        if (!pixel)
+            return false;
+        squares += (*pixel - marker.corners_px[i]).squaredNorm();
+    }
+    return std::sqrt(squares / 4) <= std::max(2.0, 0.05 * shortest_side_px(marker));
+}
+
 // Sets `projected_px`.
 void TargetSolver::project(const Rigid &pose, arhost_observation &observation) const {
     std::array<Eigen::Vector2d, 4> corners_px;
@@ -274,10 +309,20 @@ void TargetSolver::project(const Rigid &pose, arhost_observation &observation) c
         std::ranges::copy(corners_px[i], observation.projected_px[i]);
 }
 
+// `predicted`: from memory.track.
+void TargetSolver::add_sighting(Memory &memory, const arhost_observation &seen,
+                                const std::optional<pose::Motion> &predicted) const {
+    if (seen.false_positive_rate > 0 && !(predicted && is_expected(seen, *predicted))) {
+        memory.track = {};
+        memory.log_chance = std::log(marker_counts_[seen.family]);
+    }
+    memory.log_chance = std::max(memory.log_chance + std::log(seen.false_positive_rate), certain_log_chance);
+}
+
 void TargetSolver::solve(const Target &target, std::span<arhost_observation> observations, std::int64_t capture_ns,
                          Memory &memory, arhost_target &out) const {
-    const auto kept =
-        without_copies(observations, predicted_motion(memory.track, capture_ns), target.corner_sigma_px());
+    const auto predicted = predicted_motion(memory.track, capture_ns);
+    const auto kept = without_copies(observations, predicted, target.corner_sigma_px());
     std::vector<ObservedMarker> markers;
     markers.reserve(kept.size());
     for (const arhost_observation *observation : kept)
@@ -285,17 +330,26 @@ void TargetSolver::solve(const Target &target, std::span<arhost_observation> obs
     std::vector<Estimate> poses = estimate_poses(markers, projection_);
     // Something hides a corner of the only marker. With several markers, such corners are outliers.
     if (markers.size() == 1)
-        std::erase_if(poses, [limit = std::max(2.0, 0.05 * shortest_side_px(markers.front()))](const Estimate &pose) {
-            return pose.reprojection_px > limit;
-        });
+        std::erase_if(poses, [&](const Estimate &pose) { return !fits(markers.front(), pose.camera_from_target); });
     if (poses.empty())
         return;
+    std::vector<const arhost_observation *> fitting;
+    for (std::size_t i = 0; i < kept.size(); ++i)
+        if (fits(markers[i], poses.front().camera_from_target))
+            fitting.push_back(kept[i]);
+    memory.is_sighted = 1;
+    if (!settings_.confirm || fitting.size() > 1) // several markers agree
+        memory.log_chance = certain_log_chance;
+    else
+        add_sighting(memory, fitting.empty() ? *kept.front() : *fitting.front(), predicted);
     const pose::Step step = next_step(memory.track, poses, capture_ns);
     memory.track = step.track;
-    memory.was_seen = 1;
+    if (memory.log_chance > confirmed_log_chance)
+        return;
+    memory.was_reported = 1;
     memory.age_frames = 0;
     const Estimate &chosen = poses[step.chosen];
-    const Rigid pose = smooth_ ? smoothed(memory.smoothing, chosen, capture_ns) : chosen.camera_from_target;
+    const Rigid pose = settings_.smooth ? smoothed(memory.smoothing, chosen, capture_ns) : chosen.camera_from_target;
     std::ranges::copy(matrix_of(pose), memory.mt);
     for (arhost_observation &observation : observations)
         project(pose, observation);
@@ -333,12 +387,13 @@ void TargetSolver::solve(const arhost_tracker_result &reported, bool searched_ev
     std::size_t next = 0;
     for (std::size_t index = 0; index < targets_.size(); ++index) {
         Memory memory = memory_of(before, index);
-        if (memory.was_seen)
+        if (memory.was_reported)
             ++memory.age_frames;
+        memory.is_sighted = 0;
         arhost_target &out = output.targets[index];
         out = {};
         out.struct_size = sizeof out;
-        out.state = memory.was_seen ? ARHOST_TARGET_LOST : 0;
+        out.state = memory.was_reported ? ARHOST_TARGET_LOST : 0;
         out.first_observation = static_cast<std::uint32_t>(next);
         while (next < all.size() && target_of[order[next]] == index)
             ++next;
@@ -346,9 +401,13 @@ void TargetSolver::solve(const arhost_tracker_result &reported, bool searched_ev
         if (out.observation_count > 0)
             solve(targets_[index], output.observations.subspan(out.first_observation, out.observation_count),
                   capture_ns, memory, out);
+        if (!memory.is_sighted && memory.log_chance > confirmed_log_chance) {
+            memory.track = {};
+            memory.log_chance = 0;
+        }
         const auto poses = std::span(reported.poses, reported.pose_count);
         if (const auto body = std::ranges::find(poses, index, &arhost_body_pose::target); body != poses.end()) {
-            memory.was_seen = 1;
+            memory.was_reported = 1;
             memory.age_frames = out.age_frames = body->age_frames;
             Rigid pose = pose::rigid_of(body->mt);
             if (!is_rotation(pose, 1e-9)) // the precision that arhost_target.mt promises

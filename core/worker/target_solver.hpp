@@ -18,10 +18,15 @@ namespace arhost::worker {
 // apart (pose/track.hpp).
 class TargetSolver {
 public:
-    // `full_search_every`: longest interval, in frames, between searches of the whole frame; at least 1. `smooth`:
-    // whether the poses are filtered (pose/smoothing.hpp).
+    struct Settings {
+        std::uint32_t
+            full_search_every; // longest interval, in frames, between searches of the whole frame; at least 1
+        bool smooth = false;   // whether the poses are filtered (pose/smoothing.hpp)
+        bool confirm = true;   // whether a target is reported only when its sightings in successive frames are too
+                               // unlikely to be chance (arhost_observation.false_positive_rate; ADR 29)
+    };
     TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<ipc::Target> &targets,
-                 std::uint32_t full_search_every, bool smooth = false);
+                 const Settings &settings);
 
     // Bytes of `before` and `after`.
     std::uint64_t state_size() const;
@@ -38,7 +43,7 @@ public:
     std::uint32_t move_missed_to_end(Expectation &expectation, const arhost_tracker_result &reported) const;
 
     struct Output {
-        std::span<arhost_target> targets;           // one for each target; state 0 if it was never seen
+        std::span<arhost_target> targets;           // one for each target; state 0 if it was never reported
         std::span<arhost_observation> observations; // at least as many as reported; those of the same target adjoin
     };
     // Throws std::runtime_error if the report violates the contract. `before`: what the last accepted call wrote to
@@ -61,22 +66,27 @@ private:
 
     Header header_of(const void *state) const;
     Memory memory_of(const void *state, std::size_t target) const;
+    std::optional<arhost_expected_marker> expected(const Marker &marker, const pose::Motion &motion) const;
+    bool is_expected(const arhost_observation &observation, const pose::Motion &motion) const;
     const Marker *marker_of(const arhost_observation &observation) const;
     pose::ObservedMarker observed(const arhost_observation &observation, double corner_sigma_px) const;
     std::vector<const arhost_observation *> without_copies(std::span<const arhost_observation> observations,
                                                            const std::optional<pose::Motion> &predicted,
                                                            double corner_sigma_px) const;
+    void add_sighting(Memory &memory, const arhost_observation &seen,
+                      const std::optional<pose::Motion> &predicted) const;
     void solve(const Target &target, std::span<arhost_observation> observations, std::int64_t capture_ns,
                Memory &memory, arhost_target &out) const;
     void check(const arhost_tracker_result &reported) const;
     pose::Matrix6d single_covariance(const pose::Rigid &pose, const arhost_observation &seen) const;
+    bool fits(const pose::ObservedMarker &marker, const pose::Rigid &pose) const;
     void project(const pose::Rigid &pose, arhost_observation &observation) const;
 
     pose::Projection projection_;
     std::vector<Target> targets_;
     std::map<std::pair<std::uint32_t, std::int32_t>, Marker> markers_; // by family and id
-    std::uint32_t family_count_, full_search_every_;
-    bool smooth_;
+    std::vector<std::uint32_t> marker_counts_;                         // of each family
+    Settings settings_;
 };
 
 } // namespace arhost::worker

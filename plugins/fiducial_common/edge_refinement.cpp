@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -26,15 +27,44 @@ struct Line {
     }
 };
 
-double sample(const cv::Mat &grey, cv::Point2d at) {
-    if (!(at.x >= 0 && at.y >= 0 && at.x < grey.cols - 1 && at.y < grey.rows - 1)) // also true for NaN
-        return std::numeric_limits<double>::quiet_NaN();
-    const int x = static_cast<int>(at.x), y = static_cast<int>(at.y); // faster than std::floor
-    const double a = at.x - x, b = at.y - y;
-    const std::uint8_t *upper = grey.ptr(y) + x;
-    const std::uint8_t *lower = upper + grey.step;
-    return (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
+// The light of each code, 0 to 255.
+using LightOfCode = std::array<float, 256>;
+
+const LightOfCode &light_of_code(arhost_transfer transfer) {
+    static const LightOfCode linear = [] {
+        LightOfCode light;
+        std::iota(light.begin(), light.end(), 0.0F);
+        return light;
+    }();
+    static const LightOfCode srgb = [] {
+        LightOfCode light;
+        for (int code = 0; code < 256; ++code) {
+            const double encoded = code / 255.0; // IEC 61966-2-1
+            light[code] = static_cast<float>(
+                255 * (encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4)));
+        }
+        return light;
+    }();
+    return transfer == ARHOST_TRANSFER_LINEAR ? linear : srgb;
 }
+
+struct Picture {
+    const cv::Mat &grey;
+    const LightOfCode &light;
+
+    // Whether light_at() can interpolate there; false for NaN.
+    bool contains(cv::Point2d at) const {
+        return at.x >= 0 && at.y >= 0 && at.x < grey.cols - 1 && at.y < grey.rows - 1;
+    }
+    float light_at(cv::Point2d at) const {
+        const int x = static_cast<int>(at.x), y = static_cast<int>(at.y); // faster than std::floor
+        const float a = static_cast<float>(at.x - x), b = static_cast<float>(at.y - y);
+        const std::uint8_t *upper = grey.ptr(y) + x;
+        const std::uint8_t *lower = upper + grey.step;
+        return (1 - b) * ((1 - a) * light[upper[0]] + a * light[upper[1]]) +
+               b * ((1 - a) * light[lower[0]] + a * light[lower[1]]);
+    }
+};
 
 // Positions along an edge and the unit normals at them, which point out of the square.
 struct Edge {
@@ -44,17 +74,22 @@ struct Edge {
 // All in steps along the normal, whose length depends on the size of the marker and on the blur.
 constexpr int search = 9, half_baseline = 3, reach = search + half_baseline;
 
-// Returns how much the grey level rises over the baseline, outwards, times `sign`: one row for each position, one
+// Returns how much the light rises over the baseline, outwards, times `sign`: one row for each position, one
 // column for each offset from −search to search. The rise is 0 where the baseline leaves the image.
-cv::Mat_<float> rises(const cv::Mat &grey, const Edge &edge, double step_px, double sign) {
+cv::Mat_<float> rises(const Picture &picture, const Edge &edge, double step_px, double sign) {
     cv::Mat_<float> result(static_cast<int>(edge.at_px.size()), 2 * search + 1);
-    std::array<double, 2 * reach + 1> profile;
+    constexpr float outside = std::numeric_limits<float>::quiet_NaN();
+    std::array<float, 2 * reach + 1> profile;
     for (int row = 0; row < result.rows; ++row) {
-        for (int i = -reach; i <= reach; ++i)
-            profile[i + reach] = sample(grey, edge.at_px[row] + i * step_px * edge.outward[row]);
+        const cv::Point2d step = step_px * edge.outward[row], first = edge.at_px[row] - reach * step;
+        const bool is_inside = picture.contains(first) && picture.contains(first + 2 * reach * step);
+        for (int i = 0; i <= 2 * reach; ++i) {
+            const cv::Point2d at = first + i * step;
+            profile[i] = is_inside || picture.contains(at) ? picture.light_at(at) : outside;
+        }
         for (int column = 0; column < result.cols; ++column) {
-            const double rise = sign * (profile[column + 2 * half_baseline] - profile[column]);
-            result(row, column) = std::isfinite(rise) ? static_cast<float>(rise) : 0;
+            const float rise = static_cast<float>(sign) * (profile[column + 2 * half_baseline] - profile[column]);
+            result(row, column) = std::isfinite(rise) ? rise : 0;
         }
     }
     return result;
@@ -83,11 +118,11 @@ struct Slope {
 constexpr double contained = 0.35; // greatest rise at the rim relative to the peak, if the slope ends before the rim
 
 // Doubles the steps, up to `max_step_px`, until they contain the whole slope, which blur widens.
-Slope find_slope(const cv::Mat &grey, const Edge &edge, double min_step_px, double max_step_px, double sign) {
+Slope find_slope(const Picture &picture, const Edge &edge, double min_step_px, double max_step_px, double sign) {
     constexpr int rim = 3; // columns
     Slope slope{{}, min_step_px};
     for (;; slope.step_px = std::min(2 * slope.step_px, max_step_px)) {
-        slope.rises = rises(grey, edge, slope.step_px, sign);
+        slope.rises = rises(picture, edge, slope.step_px, sign);
         const cv::Mat_<float> mean = mean_of_rows(slope.rises);
         if (slope.step_px == min_step_px)
             slope.on_line = mean(0, search);
@@ -216,11 +251,22 @@ std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &l
     return edge;
 }
 
+// Returns the light of a step from one code to the next, at the mean code along an edge.
+double code_step(const Picture &picture, const Edge &edge) {
+    double sum = 0;
+    for (const cv::Point2d &at : edge.at_px)
+        sum += picture.grey.at<std::uint8_t>(std::clamp(cvRound(at.y), 0, picture.grey.rows - 1),
+                                             std::clamp(cvRound(at.x), 0, picture.grey.cols - 1));
+    const std::size_t code =
+        std::min(static_cast<std::size_t>(sum / static_cast<double>(edge.at_px.size())), std::size_t{254});
+    return picture.light[code + 1] - picture.light[code];
+}
+
 // Fits a line in undistorted pixels to the slope of an edge. `from` is a corner near it.
-std::optional<Line> fit_edge(const Edge &edge, Slope &slope, double cell_px, cv::Point2d from, const Lens &lens) {
-    constexpr double min_peak = 1; // grey levels
+std::optional<Line> fit_edge(const Picture &picture, const Edge &edge, Slope &slope, double cell_px, cv::Point2d from,
+                             const Lens &lens) {
     constexpr double max_median_steps = 4;
-    if (!(slope.peak >= min_peak))
+    if (!(slope.peak >= code_step(picture, edge)))
         return std::nullopt;
     reduce_noise(slope);
     // Relative to the peak. The wider the slope is relative to the cell, the more its flanks depend on what is beside
@@ -252,8 +298,9 @@ std::optional<Line> fit_edge(const Edge &edge, Slope &slope, double cell_px, cv:
 
 } // namespace
 
-std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, const Corners &rough_px, const Lens &lens, int cells,
-                                            bool is_subpixel) {
+std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
+                                            const Lens &lens, int cells, bool is_subpixel) {
+    const Picture picture{grey, light_of_code(transfer)};
     constexpr int max_passes = 8;
     constexpr double sharp_step_px = 0.25; // suffices for a sharp edge
     constexpr double min_strength = 0.9;   // of the refined edges, relative to the rough ones
@@ -293,15 +340,15 @@ std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, const Corners &
         if (pass == 0) {
             double rise = 0;
             for (const Edge &edge : edges)
-                rise += cv::sum(rises(grey, edge, min_step_px, 1))[0];
+                rise += cv::sum(rises(picture, edge, min_step_px, 1))[0];
             sign = rise < 0 ? -1 : 1;
         }
         std::array<Line, 4> lines;
         strength = margin_px = 0;
         is_unclear = false;
         for (int i = 0; i < 4; ++i) {
-            Slope slope = find_slope(grey, edges[i], min_step_px, max_step_px, sign);
-            const auto line = fit_edge(edges[i], slope, cells_px[i], corners[i], lens);
+            Slope slope = find_slope(picture, edges[i], min_step_px, max_step_px, sign);
+            const auto line = fit_edge(picture, edges[i], slope, cells_px[i], corners[i], lens);
             if (!line)
                 return std::nullopt;
             lines[i] = *line;

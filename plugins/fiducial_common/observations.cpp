@@ -2,6 +2,7 @@
 #include "observations.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <tuple>
 
 namespace arhost::fiducial {
@@ -55,6 +56,15 @@ std::string april_tag_name(std::string_view name) {
         if (name == std::string("DICT_APRILTAG_") + size)
             return std::string("tag") + size;
     return std::string(name);
+}
+
+double false_positive_rate(int bits, std::uint32_t hamming) {
+    double matching = 0, combinations = 1; // C(bits, k)
+    for (std::uint32_t k = 0; k <= hamming; ++k) {
+        matching += combinations;
+        combinations = combinations * (bits - static_cast<int>(k)) / (k + 1);
+    }
+    return std::min(4 * std::ldexp(matching, -bits), 1.0);
 }
 
 arhost_observation observation_of(std::int32_t id, std::uint32_t family, const MeasuredCorners &corners) {

@@ -26,6 +26,10 @@ struct MeasuredCorners {
     double sigma_px = 0; // standard deviation of each coordinate, RMS over the corners; 0: unknown
 };
 
+// arhost_observation.false_positive_rate of a code with so many bits, in any of four orientations:
+// 4 · Σ C(bits, k) / 2^bits, summed over k = 0 to `hamming`.
+double false_positive_rate(int bits, std::uint32_t hamming);
+
 // Returns an observation without decision margin.
 arhost_observation observation_of(std::int32_t id, std::uint32_t family, const MeasuredCorners &corners);
 

@@ -116,6 +116,7 @@ PictureConverter::PictureConverter(const AVFrame &first, int quarter_turns)
     format_.width = static_cast<std::uint32_t>(quarter_turns % 2 ? first.height : first.width);
     format_.height = static_cast<std::uint32_t>(quarter_turns % 2 ? first.width : first.height);
     format_.yuv_matrix = matrix.value_or(ARHOST_YUV_MATRIX_BT601);
+    format_.transfer = first.color_trc == AVCOL_TRC_LINEAR ? ARHOST_TRANSFER_LINEAR : ARHOST_TRANSFER_SRGB;
     format_.yuv_range = is_full_range(first) ? ARHOST_YUV_RANGE_FULL : ARHOST_YUV_RANGE_LIMITED;
 }
 

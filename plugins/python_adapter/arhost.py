@@ -52,18 +52,19 @@ class Observation:
     """A marker seen in a frame, with the fields of arhost_observation. `corners_px`: 4 × (x, y)."""
 
     def __init__(self, id, corners_px, family=0, hamming=0, decision_margin=0.0,
-                 corner_sigma_px=0.0):
+                 corner_sigma_px=0.0, false_positive_rate=0.0):
         corners = np.array(corners_px, float)
         if corners.size != 8:
             raise ValueError("corners_px must be four corners (x, y)")
         self.id, self.corners_px, self.family = id, corners.reshape(4, 2), family
         self.hamming, self.decision_margin, self.corner_sigma_px = hamming, decision_margin, corner_sigma_px
+        self.false_positive_rate = false_positive_rate
         self.projected_px = np.zeros((4, 2))
 
     @classmethod
     def _of(cls, record):
         seen = cls(*(record[name] for name in ("id", "corners_px", "family", "hamming", "decision_margin",
-                                               "corner_sigma_px")))
+                                               "corner_sigma_px", "false_positive_rate")))
         seen.projected_px = record["projected_px"]
         return seen
 
@@ -221,7 +222,8 @@ class _Adapter:
             format = [int(result.pop("pixel_format", PIXEL_FORMAT_RGB8)), int(result.pop("width")),
                       int(result.pop("height")), float(result.pop("fps", fps) or 0),
                       int(result.pop("yuv_matrix", YUV_MATRIX_BT601)),
-                      int(result.pop("yuv_range", YUV_RANGE_LIMITED)), int(result.pop("frame_count", 0))]
+                      int(result.pop("yuv_range", YUV_RANGE_LIMITED)),
+                      int(result.pop("transfer", TRANSFER_SRGB)), int(result.pop("frame_count", 0))]
             if result:
                 raise Failure(f"start returned the unknown key '{next(iter(result))}'", STATUS_ERROR_INTERNAL)
             return STATUS_OK, tuple(format)
@@ -278,6 +280,7 @@ class _Adapter:
                 to["id"], to["family"], to["hamming"] = seen.id, seen.family, seen.hamming
                 to["corners_px"], to["decision_margin"] = seen.corners_px, seen.decision_margin
                 to["corner_sigma_px"] = seen.corner_sigma_px
+                to["false_positive_rate"] = seen.false_positive_rate
                 count += 1
             return STATUS_OK, count
 

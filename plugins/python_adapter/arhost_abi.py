@@ -107,6 +107,8 @@ YUV_MATRIX_BT601 = 1
 YUV_MATRIX_BT709 = 2
 YUV_RANGE_LIMITED = 1
 YUV_RANGE_FULL = 2
+TRANSFER_SRGB = 0
+TRANSFER_LINEAR = 1
 CLOCK_MONOTONIC = 1
 CLOCK_MEDIA = 2
 MAX_PLANES = 3
@@ -121,8 +123,9 @@ FRAME_FORMAT = _struct(112,
     ("yuv_range", "i4", 20),
     ("fps", "f8", 24),
     ("has_depth", "i4", 32),
-    ("plane_count", "u4", 36),
-    ("stride", ("u4", (3,)), 40),
+    ("transfer", "i4", 36),
+    ("plane_count", "u4", 40),
+    ("stride", ("u4", (3,)), 44),
     ("offset", ("u8", (3,)), 56),
     ("grey_stride", "u4", 80),
     ("depth_stride", "u4", 84),
@@ -180,7 +183,7 @@ MAX_OBSERVATIONS = 1024
 MAX_FAMILIES = 16
 MAX_FAMILY = 32
 MAX_STATE = 16777216
-OBSERVATION = _struct(160,
+OBSERVATION = _struct(168,
     ("struct_size", "u4", 0),
     ("id", "i4", 4),
     ("family", "u4", 8),
@@ -188,7 +191,8 @@ OBSERVATION = _struct(160,
     ("corners_px", ("f8", (4, 2)), 16),
     ("decision_margin", "f8", 80),
     ("corner_sigma_px", "f8", 88),
-    ("projected_px", ("f8", (4, 2)), 96))
+    ("false_positive_rate", "f8", 96),
+    ("projected_px", ("f8", (4, 2)), 104))
 TARGET_DETECTED = 1
 TARGET_PREDICTED = 2
 TARGET_LOST = 3

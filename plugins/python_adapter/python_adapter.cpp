@@ -264,8 +264,8 @@ public:
                                    setup.fps, PyBool_FromLong(setup.paced), view_of(setup.intrinsics).release());
         arhost_frame_format &format = properties.format;
         unsigned long long frames = 0;
-        require(PyArg_ParseTuple(answer.value.get(), "iIIdiiK", &format.pixel_format, &format.width, &format.height,
-                                 &format.fps, &format.yuv_matrix, &format.yuv_range, &frames));
+        require(PyArg_ParseTuple(answer.value.get(), "iIIdiiiK", &format.pixel_format, &format.width, &format.height,
+                                 &format.fps, &format.yuv_matrix, &format.yuv_range, &format.transfer, &frames));
         properties.frame_count = frames;
         if (!arhost_frame_layout(&format))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "start returned an invalid frame format or size");

@@ -137,6 +137,8 @@ void VideoFile::open_encoder() {
     const bool is_yuv = !is_rgb(format.pixel_format) && format.pixel_format != ARHOST_PIXEL_FORMAT_GREY8;
     encoder_->color_range =
         is_yuv && format.yuv_range == ARHOST_YUV_RANGE_LIMITED ? AVCOL_RANGE_MPEG : AVCOL_RANGE_JPEG;
+    if (format.transfer == ARHOST_TRANSFER_LINEAR)
+        encoder_->color_trc = AVCOL_TRC_LINEAR;
     if (is_yuv)
         encoder_->colorspace = format.yuv_matrix == ARHOST_YUV_MATRIX_BT709 ? AVCOL_SPC_BT709 : AVCOL_SPC_SMPTE170M;
     else if (!is_ffv1 && is_rgb(format.pixel_format))

@@ -109,6 +109,7 @@ public:
         format.width = camera_.width;
         format.height = camera_.height;
         format.fps = fps_;
+        format.transfer = ARHOST_TRANSFER_LINEAR; // edges are filtered in codes (docs/adr/0007)
         if (!arhost_frame_layout(&format))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "the camera's image size of " + std::to_string(camera_.width) + "×" +

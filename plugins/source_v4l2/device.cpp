@@ -114,13 +114,8 @@ std::vector<CaptureFormat> list_formats(int fd, v4l2_buf_type buffer_type) {
 
 PictureFormat picture_format(const v4l2_format &format) {
     const auto copy = [](const auto &pixels) {
-        return PictureFormat{pixels.pixelformat,
-                             pixels.width,
-                             pixels.height,
-                             pixels.colorspace,
-                             pixels.ycbcr_enc,
-                             pixels.quantization,
-                             {}};
+        return PictureFormat{pixels.pixelformat, pixels.width,        pixels.height,    pixels.colorspace,
+                             pixels.ycbcr_enc,   pixels.quantization, pixels.xfer_func, {}};
     };
     if (format.type == V4L2_BUF_TYPE_VIDEO_CAPTURE) {
         PictureFormat picture = copy(format.fmt.pix);

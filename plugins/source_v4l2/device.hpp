@@ -35,7 +35,7 @@ struct CaptureFormat {
 // The format that a camera is set to.
 struct PictureFormat {
     std::uint32_t fourcc = 0, width = 0, height = 0;
-    std::uint32_t colour_space = 0, ycbcr_encoding = 0, quantization = 0; // V4L2's constants
+    std::uint32_t colour_space = 0, ycbcr_encoding = 0, quantization = 0, transfer = 0; // V4L2's constants
     std::vector<std::uint32_t> strides; // bytes per row in each plane of memory; the single-planar API has one
 };
 

@@ -106,6 +106,10 @@ bool describe(const PictureFormat &camera, arhost_frame_format &format) {
         camera.quantization == V4L2_QUANTIZATION_DEFAULT
             ? std::uint32_t{V4L2_MAP_QUANTIZATION_DEFAULT(false, camera.colour_space, encoding)}
             : camera.quantization;
+    const std::uint32_t transfer = camera.transfer == V4L2_XFER_FUNC_DEFAULT
+                                       ? std::uint32_t{V4L2_MAP_XFER_FUNC_DEFAULT(camera.colour_space)}
+                                       : camera.transfer;
+    format.transfer = transfer == V4L2_XFER_FUNC_NONE ? ARHOST_TRANSFER_LINEAR : ARHOST_TRANSFER_SRGB;
     format.yuv_range = range == V4L2_QUANTIZATION_FULL_RANGE ? ARHOST_YUV_RANGE_FULL : ARHOST_YUV_RANGE_LIMITED;
     return true;
 }

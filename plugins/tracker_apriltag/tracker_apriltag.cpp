@@ -201,9 +201,8 @@ public:
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
-        const cv::Mat grey = arhost::fiducial::grey_of(*request.frame);
-        const arhost::fiducial::Pass pass{nullptr,
-                                          [&](const cv::Rect &region, auto &seen) { observe(grey, region, seen); }};
+        const arhost::fiducial::Pass pass{
+            nullptr, [&](const cv::Rect &region, auto &seen) { observe(*request.frame, region, seen); }};
         arhost::fiducial::report(regions_->search(request, {grid_px(), min_image_side()}, {&pass, 1}), observations);
     }
 
@@ -224,7 +223,8 @@ private:
     }
 
     // Adds the tags of a region of the frame to `seen`.
-    void observe(const cv::Mat &grey, const cv::Rect &region, std::vector<arhost_observation> &seen) {
+    void observe(const arhost_frame &frame, const cv::Rect &region, std::vector<arhost_observation> &seen) {
+        const cv::Mat grey = arhost::fiducial::grey_of(frame);
         const Detections tags = detect(grey(region));
         for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
             apriltag_detection_t *tag = nullptr;
@@ -239,12 +239,14 @@ private:
                 corners.corners_px[corner] = {tag->p[3 - corner][0] - 0.5 + region.x,
                                               tag->p[3 - corner][1] - 0.5 + region.y};
             if (fit_edges_ && part.is_listed())
-                corners = arhost::fiducial::refine_edges(grey, corners.corners_px, *lens_,
+                corners = arhost::fiducial::refine_edges(grey, frame.format->transfer, corners.corners_px, *lens_,
                                                          tag->family->width_at_border, refine_edges_)
                               .value_or(corners);
             arhost_observation &one = seen.emplace_back(part.family().observation(part.id(tag->id), corners));
             one.hamming = static_cast<std::uint32_t>(tag->hamming);
             one.decision_margin = tag->decision_margin;
+            one.false_positive_rate =
+                arhost::fiducial::false_positive_rate(static_cast<int>(tag->family->nbits), one.hamming);
         }
     }
 

@@ -241,11 +241,11 @@ public:
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
-        const cv::Mat grey = arhost::fiducial::grey_of(*request.frame);
         std::vector<arhost::fiducial::Pass> passes;
         for (const Detectable &detectable : detectables_)
-            passes.push_back({&detectable.family,
-                              [&](const cv::Rect &region, auto &seen) { observe(grey, region, detectable, seen); }});
+            passes.push_back({&detectable.family, [&](const cv::Rect &region, auto &seen) {
+                                  observe(*request.frame, region, detectable, seen);
+                              }});
         arhost::fiducial::report(regions_->search(request, {}, passes), observations);
     }
 
@@ -253,8 +253,9 @@ public:
 
 private:
     // Adds the markers of a dictionary in a region of the frame to `seen`.
-    void observe(const cv::Mat &grey, const cv::Rect &region, const Detectable &detectable,
+    void observe(const arhost_frame &frame, const cv::Rect &region, const Detectable &detectable,
                  std::vector<arhost_observation> &seen) const {
+        const cv::Mat grey = arhost::fiducial::grey_of(frame);
         const cv::aruco::Dictionary &table = detectable.dictionary.table;
         cv::aruco::DetectorParameters parameters = detectable.parameters;
         // OpenCV takes the perimeter relative to the longer side of the image that it gets.
@@ -270,7 +271,8 @@ private:
                     cv::Point2d(found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner]) +
                     offset;
             if (refine_edges_ && is_listed)
-                corners = arhost::fiducial::refine_edges(grey, corners.corners_px, *lens_, cells_of(table))
+                corners = arhost::fiducial::refine_edges(grey, frame.format->transfer, corners.corners_px, *lens_,
+                                                         cells_of(table))
                               .value_or(corners);
             const Reading reading = read(grey, corners.corners_px, table, found.ids[i], parameters.markerBorderBits);
             if (!is_listed && reading.wrong_bits > 0) // in large dictionaries, it may be anything
@@ -278,6 +280,8 @@ private:
             arhost_observation &one = seen.emplace_back(detectable.family.observation(found.ids[i], corners));
             one.hamming = reading.wrong_bits;
             one.decision_margin = reading.contrast;
+            one.false_positive_rate =
+                arhost::fiducial::false_positive_rate(table.markerSize * table.markerSize, one.hamming);
         }
     }
 

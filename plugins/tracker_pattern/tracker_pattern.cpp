@@ -82,9 +82,8 @@ public:
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) const {
-        const cv::Mat grey = arhost::fiducial::grey_of(*request.frame);
-        const arhost::fiducial::Pass pass{nullptr,
-                                          [&](const cv::Rect &region, auto &seen) { observe(grey, region, seen); }};
+        const arhost::fiducial::Pass pass{
+            nullptr, [&](const cv::Rect &region, auto &seen) { observe(*request.frame, region, seen); }};
         arhost::fiducial::report(regions_->search(request, {}, {&pass, 1}), observations);
     }
 
@@ -127,12 +126,15 @@ private:
         std::uint32_t family = 0, wrong_cells = 0;
         double correlation = 0, ratio = 0;
         int quarter_turns = 0;
+        double false_positive_rate = 0; // of a pattern: negligible
     };
     Best recognised(const cv::Mat &grey, const Corners &corners_px) const {
         Best best;
-        const auto consider = [&](const auto &marker, const auto &match, double ratio, std::uint32_t wrong_cells) {
+        const auto consider = [&](const auto &marker, const auto &match, double ratio, std::uint32_t wrong_cells,
+                                  double false_positive_rate) {
             if (match.correlation > best.correlation)
-                best = {marker.id, marker.family, wrong_cells, match.correlation, ratio, match.quarter_turns};
+                best = {marker.id, marker.family,       wrong_cells,        match.correlation,
+                        ratio,     match.quarter_turns, false_positive_rate};
         };
         for (const auto &[sampling, patterns] : patterns_) {
             const Samples samples = normalized(interior(grey, corners_px, sampling.ratio, sampling.side));
@@ -140,16 +142,18 @@ private:
                 continue;
             for (const Marked &marked : patterns)
                 if (const Pattern::Match match = marked.pattern.match(samples); match.correlation > min_correlation_)
-                    consider(marked, match, sampling.ratio, 0);
+                    consider(marked, match, sampling.ratio, 0, 0);
         }
         for (const MatrixReader &reader : matrix_readers_)
             if (const auto match = reader.match(interior(grey, corners_px, reader.ratio(), reader.side())))
-                consider(*match, *match, arhost::fiducial::matrix_ratio, match->wrong_cells);
+                consider(*match, *match, arhost::fiducial::matrix_ratio, match->wrong_cells,
+                         arhost::fiducial::false_positive_rate(reader.cells() * reader.cells(), match->wrong_cells));
         return best;
     }
 
     // Adds the markers in a region of the frame to `seen`.
-    void observe(const cv::Mat &grey, const cv::Rect &region, std::vector<arhost_observation> &seen) const {
+    void observe(const arhost_frame &frame, const cv::Rect &region, std::vector<arhost_observation> &seen) const {
+        const cv::Mat grey = arhost::fiducial::grey_of(frame);
         for (Corners corners_px : find_squares(grey(region), min_side_px_)) {
             for (cv::Point2d &corner : corners_px)
                 corner += cv::Point2d(region.tl());
@@ -158,7 +162,7 @@ private:
                 continue;
             // The search for an edge must not reach the picture inside the border.
             const int cells = static_cast<int>(std::ceil(2 / (1 - best.ratio)));
-            auto corners = arhost::fiducial::refine_edges(grey, corners_px, *lens_, cells)
+            auto corners = arhost::fiducial::refine_edges(grey, frame.format->transfer, corners_px, *lens_, cells)
                                .value_or(arhost::fiducial::MeasuredCorners{corners_px});
             // A print that is rotated clockwise begins with a later corner.
             std::rotate(corners.corners_px.begin(), corners.corners_px.begin() + best.quarter_turns,
@@ -167,6 +171,7 @@ private:
                 seen.emplace_back(arhost::fiducial::observation_of(best.id, best.family, corners));
             one.hamming = best.wrong_cells;
             one.decision_margin = 100 * best.correlation;
+            one.false_positive_rate = best.false_positive_rate;
         }
     }
 

@@ -70,6 +70,7 @@ inline const std::vector<WrongPlugin> wrong_trackers = of_kind(
           "tracker.copies", "tracker.expected"}},
         {"unset_hamming", "leaves hamming unset", "fail", {"tracker.numbers"}},
         {"negative_margin", "reports a decision margin below 0", "fail", {"tracker.numbers"}},
+        {"false_positive_rate_of_two", "reports a false positive rate of 2", "fail", {"tracker.numbers"}},
         {"negative_corner_sigma", "reports a negative noise of the corners", "fail", {"tracker.numbers"}},
         {"infinite_margin", "reports an infinite decision margin", "fail", {"tracker.numbers"}},
         {"nan_corner", "reports a NaN as a corner", "fail", {"tracker.numbers", "tracker.corners"}},

@@ -616,14 +616,29 @@ TEST(Run, WarnsOfTargetsThatWereNeverSeen) {
         HasSubstr("tracker: never seen in 10 frames: 'tag36h11-7' (tag36h11 7), 'tag36h11-5' (tag36h11 5)\n"));
 }
 
+TEST(Run, ReportsAMarkerOfASmallFamilyWhenItIsSeenAgain) {
+    const auto output_of = [](int frames, const std::string &option) {
+        ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: " + std::to_string(frames) +
+                      ", family: DICT_4X4_50, id: 4, side_mm: 80}}\ntracker: {plugin: tracker_aruco, " + option +
+                      "targets: [{name: cup, marker: 4, dictionary: DICT_4X4_50, side_mm: 80}]}\n"
+                      "outputs: [{plugin: sink_null}]\n");
+        run.run();
+        return run.output();
+    };
+    EXPECT_THAT(output_of(1, ""),
+                HasSubstr("no target was seen in any of 1 frames; it looked for 'cup' (DICT_4X4_50 4); it saw "
+                          "DICT_4X4_50 4 (1 frame) but got no pose: "));
+    EXPECT_THAT(output_of(1, "confirm: false, "), Not(HasSubstr("no target")));
+    EXPECT_THAT(output_of(2, ""), Not(HasSubstr("no target")));
+}
+
 TEST(Run, InModeLiveWarnsAfterFiveSecondsWithoutTargets) {
     ArhostRun run("version: 1\nmode: live\n"
                   "source: {plugin: source_synthetic, fps: 10, options: {frames: 58, id: 4, side_mm: 80}}\n"
                   "tracker: {plugin: tracker_aruco, targets: [{marker: 7, family: tag36h11, side_mm: 80}]}\n"
                   "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run(), 1) << run.output();
-    const std::string warning =
-        "has seen no target yet; it looks for 'tag36h11-7' (tag36h11 7); it sees tag36h11 4 (";
+    const std::string warning = "has seen no target yet; it looks for 'tag36h11-7' (tag36h11 7); it saw tag36h11 4 (";
     ASSERT_THAT(run.output(), HasSubstr(warning));
     EXPECT_THAT(run.output().substr(run.output().find(warning) + 1), testing::Not(HasSubstr(warning)));
 }

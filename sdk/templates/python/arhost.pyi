@@ -109,6 +109,8 @@ YUV_MATRIX_BT601: int
 YUV_MATRIX_BT709: int
 YUV_RANGE_LIMITED: int
 YUV_RANGE_FULL: int
+TRANSFER_SRGB: int
+TRANSFER_LINEAR: int
 CLOCK_MONOTONIC: int
 CLOCK_MEDIA: int
 MAX_PLANES: int
@@ -124,6 +126,7 @@ class FrameFormat:
     yuv_range: int
     fps: float
     has_depth: int
+    transfer: int
     plane_count: int
     stride: np.ndarray
     offset: np.ndarray
@@ -195,9 +198,11 @@ class Observation:
     corners_px: np.ndarray
     decision_margin: float
     corner_sigma_px: float
+    false_positive_rate: float
     projected_px: np.ndarray
     def __init__(self, id: int, corners_px: Any, family: int = ..., hamming: int = ...,
-                 decision_margin: float = ..., corner_sigma_px: float = ...) -> None: ...
+                 decision_margin: float = ..., corner_sigma_px: float = ...,
+                 false_positive_rate: float = ...) -> None: ...
 TARGET_DETECTED: int
 TARGET_PREDICTED: int
 TARGET_LOST: int

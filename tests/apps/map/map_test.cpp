@@ -106,9 +106,20 @@ protected:
                                 cv::Size(samples * width, samples * height), cv::INTER_LINEAR, cv::BORDER_CONSTANT,
                                 cv::Scalar(200));
             cv::resize(fine, photo, cv::Size(width, height), 0, 0, cv::INTER_AREA);
+            cv::LUT(photo, srgb_of_light(), photo);
             result.push_back(photo);
         }
         return result;
+    }
+    // A camera averages light and then encodes it.
+    static cv::Mat srgb_of_light() {
+        cv::Mat_<std::uint8_t> codes(1, 256);
+        for (int i = 0; i < 256; ++i) {
+            const double light = i / 255.0;
+            codes(0, i) = static_cast<std::uint8_t>(
+                std::lround(255 * (light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055)));
+        }
+        return codes;
     }
     void write_photos(const std::string &family, int count) const {
         int i = 0;

@@ -199,6 +199,8 @@ void modify(const Wrong &self, arhost_observation &seen) {
         seen.decision_margin = -1;
     if (has("negative_corner_sigma"))
         seen.corner_sigma_px = -1;
+    if (has("false_positive_rate_of_two"))
+        seen.false_positive_rate = 2;
     if (has("infinite_margin"))
         seen.decision_margin = std::numeric_limits<double>::infinity();
     if (has("nondeterministic"))
@@ -286,7 +288,7 @@ void modify_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &r
         result.observation_count = 1;
         const double corners[4][2] = {{10, 10}, {20, 10}, {20, 20}, {10, 20}};
         arhost_observation &invented = *result.observations;
-        invented = {invented.struct_size, self.listed[0].id, 0, 0, {}, 1, 0, {}};
+        invented = {invented.struct_size, self.listed[0].id, 0, 0, {}, 1, 0, 0, {}};
         std::copy_n(&corners[0][0], 8, &invented.corners_px[0][0]);
     }
     if (has("reports_a_pose"))
@@ -434,6 +436,7 @@ void modify_expected(const Wrong &self, std::span<const arhost_expected_marker> 
             seen.hamming = 0;
             seen.decision_margin = 0;
             seen.corner_sigma_px = 0;
+            seen.false_positive_rate = 0;
             std::memcpy(seen.corners_px, expected[i].corners_px, sizeof seen.corners_px);
         }
     }

@@ -253,7 +253,7 @@ struct Detector {
 TEST(CppHelper, IgnoresObservationsBeyondTheCapacity) {
     constexpr auto size = static_cast<std::uint32_t>(sizeof(Longer<arhost_observation>));
     constexpr int capacity = ARHOST_MAX_OBSERVATIONS;
-    std::vector<Longer<arhost_observation>> buffer(capacity + 1, {{size, -1, 0, 0, {}, 0, 0, {}}});
+    std::vector<Longer<arhost_observation>> buffer(capacity + 1, {{size, -1, 0, 0, {}, 0, 0, 0, {}}});
     const arhost_tracker &tracker = arhost::detail::tracker_functions<Detector>;
     arhost::detail::Instance<Detector> object(&host, arhost::Options(nullptr, 0));
     for (const int reported : {0, 2, capacity, capacity + 3}) {

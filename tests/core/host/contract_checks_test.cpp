@@ -25,6 +25,7 @@ arhost_observation observation(std::int32_t id, double left_px = 100) {
             {{left_px, 50}, {left_px + 40, 52}, {left_px + 38, 90}, {left_px, 92}},
             1,
             0,
+            0,
             {}};
 }
 

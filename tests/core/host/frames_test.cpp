@@ -132,8 +132,9 @@ TEST(TrackerResult, IsRejectedIfItsNumbersAreInvalid) {
                              +[](TrackerResult &r) { r.observation(0).projected_px[0][0] = nan; }})
         expect(alter, "a coordinate of an observation's corner is not finite");
     for (const auto alter : {+[](TrackerResult &r) { r.observation(0).decision_margin = nan; },
-                             +[](TrackerResult &r) { r.observation(1).corner_sigma_px = nan; }})
-        expect(alter, "an observation's decision margin or corner noise is not finite");
+                             +[](TrackerResult &r) { r.observation(1).corner_sigma_px = nan; },
+                             +[](TrackerResult &r) { r.observation(1).false_positive_rate = nan; }})
+        expect(alter, "an observation's decision margin, corner noise or false positive rate is not finite");
 }
 
 TEST(DeviceTime, IsIgnoredIfLongerThanTheRenderCall) {

@@ -97,6 +97,14 @@ TEST_F(Outcome, NamesTargetsThatWereNeverSeenAlthoughOthersWere) {
     statistics.strangers = {{"D 8", 30}};
     EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets),
               "never seen in 30 frames: 'cup' (D 7); it saw D 8 (30 frames)");
+    statistics.unconfirmed = {{"D 7", 2}};
+    EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets),
+              "never seen in 30 frames: 'cup' (D 7); it saw D 8 (30 frames); it saw D 7 (2 frames) but got "
+              "no pose: corners were hidden, or a small family was not seen in successive frames (see "
+              "'tracker.confirm' in docs/config.md)");
+    statistics.unconfirmed = {{"D 23", 2}};
+    EXPECT_THAT(unseen_targets(*configuration, statistics, configuration->tracker->targets), Not(HasSubstr("D 23")))
+        << "its target was seen";
     statistics.targets["cup"].frames = 1;
     EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets), "");
 }

@@ -100,16 +100,19 @@ TEST(JsonAbi, RejectsInvalidFormatsAndIntrinsics) {
                    {"yuv_matrix", ARHOST_YUV_MATRIX_BT601},
                    {"yuv_range", ARHOST_YUV_RANGE_LIMITED},
                    {"fps", 30.0},
-                   {"has_depth", true}};
+                   {"has_depth", true},
+                   {"transfer", ARHOST_TRANSFER_LINEAR}};
     const arhost_frame_format parsed = format_from_json(format);
     EXPECT_EQ(parsed.stride[0], 1280u);
     EXPECT_EQ(parsed.depth_stride, 1280u);
+    EXPECT_EQ(parsed.transfer, ARHOST_TRANSFER_LINEAR);
     EXPECT_EQ(parsed.byte_size, parsed.depth_offset + 1280u * 480);
     for (const auto &[key, value] : std::map<std::string, Json>{{"pixel_format", 99},
                                                                 {"width", 641},
                                                                 {"height", 0},
                                                                 {"width", 1 << 20},
                                                                 {"yuv_matrix", 0},
+                                                                {"transfer", 2},
                                                                 {"fps", -1}}) {
         Json wrong = format;
         wrong[key] = value;

@@ -59,12 +59,13 @@ TEST(Messages, PreserveTheSetupOfEachKind) {
     EXPECT_EQ(source_setup.fps, 29.97);
     EXPECT_TRUE(source_setup.paced);
     EXPECT_EQ(source_setup.intrinsics.value().fx, 60);
-    const auto tracker = sent(messages::Create{{}, messages::TrackerSetup{format(), lens(), 7, true}});
+    const auto tracker = sent(messages::Create{{}, messages::TrackerSetup{format(), lens(), 7, true, false}});
     const auto &tracker_setup = std::get<messages::TrackerSetup>(tracker.setup);
     EXPECT_EQ(tracker_setup.format.byte_size, 64u * 48);
     EXPECT_EQ(tracker_setup.intrinsics.fx, 60);
     EXPECT_EQ(tracker_setup.full_search_every, 7u);
     EXPECT_TRUE(tracker_setup.smooth);
+    EXPECT_FALSE(tracker_setup.confirm);
     const auto raytracer = sent(messages::Create{{}, messages::RaytracerSetup{64, 48, lens()}});
     EXPECT_EQ(std::get<messages::RaytracerSetup>(raytracer.setup).height, 48u);
     const auto sink = sent(messages::Create{{}, messages::SinkSetup{format(), 25, 12, {}}});

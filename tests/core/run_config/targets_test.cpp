@@ -199,6 +199,12 @@ TEST_F(TargetsTest, PosesAreFilteredOnRequest) {
                 HasSubstr("tracker.filter: 'kalman' is not one of none, adaptive"));
 }
 
+TEST_F(TargetsTest, AreConfirmedByDefault) {
+    const std::string targets = "targets: [{name: head, body: head}]";
+    EXPECT_TRUE(parse_tracker("{plugin: tracker_x, " + targets + "}").tracker->confirm);
+    EXPECT_FALSE(parse_tracker("{plugin: tracker_x, confirm: false, " + targets + "}").tracker->confirm);
+}
+
 TEST_F(TargetsTest, ArePatternsAndPicturesThatTheTrackerMayRead) {
     write("hiro.patt", "");
     write("poster.png", "");

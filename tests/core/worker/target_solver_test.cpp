@@ -49,7 +49,7 @@ enum Index { cup, board, box, head };
 
 arhost_observation observed(const ObservedMarker &seen, std::int32_t id, std::uint32_t family = 0,
                             double margin = 1) {
-    arhost_observation observation{sizeof observation, id, family, 0, {}, margin, 0, {}};
+    arhost_observation observation{sizeof observation, id, family, 0, {}, margin, 0, 0, {}};
     for (int i = 0; i < 4; ++i) {
         observation.corners_px[i][0] = seen.corners_px[i].x();
         observation.corners_px[i][1] = seen.corners_px[i].y();
@@ -59,7 +59,7 @@ arhost_observation observed(const ObservedMarker &seen, std::int32_t id, std::ui
 
 class TargetSolverTest : public testing::Test {
 protected:
-    TargetSolverTest() : solver(pinhole, targets, full_search_every), before(solver.state_size()), after(before) {}
+    TargetSolverTest() : solver(pinhole, targets, {full_search_every}), before(solver.state_size()), after(before) {}
 
     arhost_observation see(const Rigid &truth, std::int32_t id, const Corners &corners = single, double noise_px = 0,
                            std::uint32_t family = 0, double margin = 1) {
@@ -383,14 +383,14 @@ TEST_F(TargetSolverTest, RequestsAFullSearchFirstAtIntervalsAndAfterALoss) {
     const std::vector<bool> expected = {true, false, false, false, false, false, true, false, false, true,
                                         true, false, false, false, false, false, true, false, false, false};
     EXPECT_EQ(full, expected) << "lost in frame 8, found again in frame 10";
-    TargetSolver always(pinhole, targets, 1);
+    TargetSolver always(pinhole, targets, {1});
     EXPECT_TRUE(always.expect(20 * frame_ns, before.data()).search_everywhere);
 }
 
 TEST_F(TargetSolverTest, FiltersPosesOnRequest) {
     const Rigid truth = pose_at({20, 10, 900}, 30);
     const auto jitter_mm = [&](bool smooth) {
-        const TargetSolver own(pinhole, targets, full_search_every, smooth);
+        const TargetSolver own(pinhole, targets, {full_search_every, smooth});
         Camera noisy(pinhole, 4);
         std::vector<std::byte> state, next(own.state_size());
         double sum = 0;
@@ -412,6 +412,141 @@ TEST_F(TargetSolverTest, FiltersPosesOnRequest) {
     EXPECT_LT(jitter_mm(true), 0.6 * jitter_mm(false));
 }
 
+// The rate of tag16h5 without corrected bits.
+constexpr double small_family = 6e-5;
+
+TEST_F(TargetSolverTest, ReportsAMarkerThatMayBeChanceInTheSecondFrame) {
+    const auto seen = [&](const Rigid &at) {
+        arhost_observation observation = see(at, 5);
+        observation.false_positive_rate = small_family;
+        return observation;
+    };
+    const Rigid truth = pose_at({20, 10, 900}, 30);
+    solve({seen(truth)});
+    EXPECT_EQ(solved[cup].state, 0) << "it may be chance";
+    EXPECT_EQ(solved[cup].observation_count, 1u);
+    solve({seen(truth)}, 1);
+    ASSERT_EQ(expectation.markers.size(), 1u) << "it is searched there, too";
+    EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
+    expect_near(pose_of(cup), truth);
+    solve({}, 2);
+    EXPECT_EQ(solved[cup].state, ARHOST_TARGET_LOST);
+    solve({seen(truth)}, 3);
+    EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED) << "it is where it was";
+    solve({}, 4);
+    solve({seen(pose_at({-200, 10, 900}, 30))}, 5);
+    EXPECT_EQ(solved[cup].state, ARHOST_TARGET_LOST) << "it jumped";
+    EXPECT_EQ(solved[cup].age_frames, 2u);
+    expect_near(pose_of(cup), truth);
+    solve({seen(truth)}, 6);
+    EXPECT_EQ(solved[cup].state, ARHOST_TARGET_LOST) << "it jumped back";
+    solve({seen(truth)}, 7);
+    EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
+}
+
+TEST_F(TargetSolverTest, ForgetsAMarkerThatMayBeChanceAfterAGap) {
+    arhost_observation seen = see(pose_at({20, 10, 900}, 30), 5);
+    seen.false_positive_rate = small_family;
+    solve({seen});
+    solve({}, 1);
+    solve({seen}, 2);
+    EXPECT_EQ(solved[cup].state, 0);
+    solve({seen}, 3);
+    EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
+}
+
+TEST_F(TargetSolverTest, CountsTheListedMarkersAgainAfterAGap) {
+    arhost_observation seen = see(pose_at({20, 10, 900}, 30), 5);
+    seen.false_positive_rate = 3e-6; // of one of five listed markers: 1.5e-5
+    solve({seen});
+    solve({}, 1);
+    solve({seen}, 2);
+    EXPECT_EQ(solved[cup].state, 0);
+}
+
+TEST_F(TargetSolverTest, WithoutConfirmationAJumpKeepsTheBranch) {
+    const TargetSolver own(pinhole, targets, {.full_search_every = full_search_every, .confirm = false});
+    const auto branches_after_a_jump = [&](double rate) {
+        std::vector<std::byte> state(own.state_size()), next(own.state_size());
+        Camera noisy(pinhole, 7);
+        for (int frame = 0; frame < 4; ++frame) {
+            arhost_observation seen =
+                observed(noisy.observe(pose_at({frame < 3 ? 0.0 : 150.0, 0, 2500}, 20), single, 0.1), 5);
+            seen.false_positive_rate = rate;
+            arhost_tracker_result result{};
+            result.observations = &seen;
+            result.observation_count = 1;
+            arhost_observation sorted;
+            own.solve(result, true, frame * frame_ns, frame == 0 ? nullptr : state.data(), next.data(),
+                      {solved, {&sorted, 1}});
+            state.swap(next);
+        }
+        return state;
+    };
+    const auto certain = branches_after_a_jump(0), doubtful = branches_after_a_jump(small_family);
+    EXPECT_EQ(certain, doubtful);
+}
+
+TEST_F(TargetSolverTest, NeedsMoreSightingsTheMoreLikelyChanceIs) {
+    const auto frames_needed = [&](double rate) {
+        arhost_observation seen = see(pose_at({20, 10, 900}, 30), 5);
+        seen.false_positive_rate = rate;
+        solved = {};
+        is_first = true;
+        int frames = 0;
+        for (; frames < 20 && solved[cup].state != ARHOST_TARGET_DETECTED; ++frames)
+            solve({seen}, frames);
+        return frames;
+    };
+    EXPECT_EQ(frames_needed(0), 1) << "unknown";
+    EXPECT_EQ(frames_needed(1e-6), 1) << "five markers of the family are listed";
+    EXPECT_EQ(frames_needed(3e-6), 2);
+    EXPECT_EQ(frames_needed(8e-3), 3);
+    EXPECT_EQ(frames_needed(1), 20) << "never";
+}
+
+TEST_F(TargetSolverTest, ReportsSeveralMarkersThatAgreeAtOnce) {
+    const Rigid truth = pose_at({20, 10, 900}, 30);
+    std::vector<arhost_observation> seen = see_board(truth);
+    for (arhost_observation &one : seen)
+        one.false_positive_rate = small_family;
+    solve({seen[0], seen[1]});
+    EXPECT_EQ(solved[board].state, ARHOST_TARGET_DETECTED);
+    is_first = true;
+    solve({seen[0]});
+    EXPECT_EQ(solved[board].state, 0);
+    is_first = true;
+    const Rigid elsewhere = pose_at({-300, 150, 900}, -10);
+    arhost_observation stray = see(elsewhere, 11, on_board(11));
+    stray.false_positive_rate = small_family;
+    solve({seen[0], stray});
+    EXPECT_EQ(solved[board].state, 0) << "they do not agree";
+}
+
+TEST_F(TargetSolverTest, AFalseMarkerDoesNotHideTheTrueOneOfAMap) {
+    const Rigid truth = pose_at({20, 10, 900}, 30);
+    const auto doubtful = [&](const Rigid &at, std::int32_t id) {
+        arhost_observation observation = see(at, id, on_board(id));
+        observation.false_positive_rate = small_family;
+        return observation;
+    };
+    solve({doubtful(truth, 12), doubtful(truth, 13)});
+    solve({doubtful(truth, 12), doubtful(truth, 13), doubtful(pose_at({-300, 150, 900}, -10), 10)}, 1);
+    EXPECT_EQ(solved[board].state, ARHOST_TARGET_DETECTED);
+    expect_near(pose_of(board), truth);
+}
+
+TEST_F(TargetSolverTest, ReportsEachMarkerAtOnceOnRequest) {
+    arhost_observation seen = see(pose_at({20, 10, 900}, 30), 5), sorted;
+    seen.false_positive_rate = small_family;
+    const TargetSolver own(pinhole, targets, {.full_search_every = full_search_every, .confirm = false});
+    arhost_tracker_result result{};
+    result.observations = &seen;
+    result.observation_count = 1;
+    own.solve(result, true, 0, nullptr, after.data(), {solved, {&sorted, 1}});
+    EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
+}
+
 TEST_F(TargetSolverTest, ExpectsNoMarkerThatIsOutOfView) {
     solve({see(pose_at({560, 0, 800}, 0), 5)}); // at the right border of the frame
     solve({see(pose_at({640, 0, 900}, 0), 5)}, 1);
@@ -431,6 +566,9 @@ TEST_F(TargetSolverTest, RejectsAReportThatViolatesTheContract) {
                 HasSubstr("marker 5 with a corner that is not finite"));
     EXPECT_THAT(violation(altered(good, [](auto &o) { o.decision_margin = -1; })), HasSubstr("decision margin"));
     EXPECT_THAT(violation(altered(good, [](auto &o) { o.corner_sigma_px = nan; })), HasSubstr("corner noise"));
+    for (const double rate : {-0.1, 1.1, nan})
+        EXPECT_THAT(violation(altered(good, [&](auto &o) { o.false_positive_rate = rate; })),
+                    HasSubstr("false positive rate"));
     EXPECT_THAT(violation(std::vector(ARHOST_MAX_OBSERVATIONS + 1, good)),
                 HasSubstr("1025 observations; the limit is 1024"));
     EXPECT_THAT(violation({}, {body_pose(cup)}), HasSubstr("the target 0, which is not a body"));
@@ -463,8 +601,11 @@ TEST_F(TargetSolverTest, SurvivesAStateOfArbitraryBytes) {
                 track.log_odds = std::nan("");
             std::memcpy(&before[at], &track, sizeof track);
         }
-        solve({see(pose_at({0, 0, 1500}, 30), 5)}, 1);
-        EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
+        arhost_observation seen = see(pose_at({0, 0, 1500}, 30), 5);
+        if (round % 5 == 0)
+            seen.false_positive_rate = 0.5;
+        solve({seen}, 1);
+        EXPECT_EQ(solved[cup].state == ARHOST_TARGET_DETECTED, round % 5 != 0) << "0.5 needs several sightings";
         EXPECT_TRUE(pose_of(cup).rotation.allFinite());
         EXPECT_EQ(solved[board].state, 0) << "its pose is none";
     }

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
 #include <random>
 
 namespace {
@@ -39,7 +40,7 @@ Errors errors(bool inverted) {
         Corners rough = truth;
         for (auto &corner : rough)
             corner += cv::Point2d(offset(generator), offset(generator));
-        const Corners fine = refine_edges(picture, rough, lens, cells).value().corners_px;
+        const Corners fine = refine_edges(picture, ARHOST_TRANSFER_LINEAR, rough, lens, cells).value().corners_px;
         for (int k = 0; k < 4; ++k, ++count) {
             sum.before_px += cv::norm(rough[k] - truth[k]);
             sum.after_px += cv::norm(fine[k] - truth[k]);
@@ -57,6 +58,40 @@ TEST(EdgeRefinement, MovesRoughCornersToTheProjectedOnes) {
         // Fails if the refinement does not put pixel centres at integers: the bias would then be half a pixel.
         EXPECT_LT(cv::norm(e.bias_px), 0.02);
     }
+}
+
+// Mean distance by which a camera that encodes light as sRGB moves the edges of a tag into its black, if the edges
+// are searched in codes or in linear light.
+double inward_bias_px(arhost_transfer transfer) {
+    double sum = 0;
+    constexpr int count = 20;
+    std::mt19937 generator(7);
+    std::uniform_real_distribution<double> tilt(-30, 30), turn(-180, 180);
+    for (int i = 0; i < count; ++i) {
+        const Mt mt = pose_of(0, 0, 400, tilt(generator), tilt(generator), turn(generator));
+        cv::Mat light, encoded;
+        render(camera, {{april_tag("tag36h11", i).with_margin(2), 100, mt}})
+            .convertTo(light, CV_32F, 0.85 / 255, 0.02);
+        cv::GaussianBlur(light, light, {}, 0.7);
+        cv::pow(light, 1 / 2.4, encoded); // sRGB above 0.003
+        encoded = 255 * (1.055 * encoded - 0.055);
+        cv::Mat picture;
+        encoded.convertTo(picture, CV_8U);
+        add_noise(picture, 1.5, i + 1);
+        const auto truth = corners_of(mt, camera, 100);
+        const Corners fine = refine_edges(picture, transfer, truth, lens, cells).value().corners_px;
+        const cv::Point2d centre = (truth[0] + truth[1] + truth[2] + truth[3]) / 4;
+        for (int k = 0; k < 4; ++k) {
+            const cv::Point2d inward = (centre - truth[k]) / cv::norm(centre - truth[k]);
+            sum += (fine[k] - truth[k]).dot(inward) / std::numbers::sqrt2; // of both edges at the corner
+        }
+    }
+    return sum / (4 * count);
+}
+
+TEST(EdgeRefinement, FindsEdgesInLinearLight) {
+    EXPECT_NEAR(inward_bias_px(ARHOST_TRANSFER_SRGB), 0, 0.02);
+    EXPECT_GT(inward_bias_px(ARHOST_TRANSFER_LINEAR), 0.1) << "the codes do not have the middle of the edge";
 }
 
 TEST(EdgeRefinement, TellsTheNoiseOfTheCorners) {
@@ -79,7 +114,7 @@ TEST(EdgeRefinement, TellsTheNoiseOfTheCorners) {
             cv::GaussianBlur(picture, picture, {}, blur_px);
             add_noise(picture, noise, i + 1);
             const auto truth = corners_of(mt, curved, 100);
-            const auto fine = refine_edges(picture, truth, curved_lens, cells);
+            const auto fine = refine_edges(picture, ARHOST_TRANSFER_LINEAR, truth, curved_lens, cells);
             ASSERT_TRUE(fine) << i;
             for (int k = 0; k < 4; ++k) {
                 const cv::Point2d error = fine->corners_px[k] - truth[k];
@@ -99,7 +134,7 @@ TEST(EdgeRefinement, FindsAHiddenCorner) {
         cv::circle(picture, truth[2], 12, cv::Scalar(grey), cv::FILLED);
         Corners rough = truth;
         rough[2] += (truth[0] - truth[2]) / cv::norm(truth[0] - truth[2]) * 6;
-        const auto fine = refine_edges(picture, rough, lens, cells);
+        const auto fine = refine_edges(picture, ARHOST_TRANSFER_LINEAR, rough, lens, cells);
         ASSERT_TRUE(fine);
         for (int k = 0; k < 4; ++k)
             EXPECT_LT(cv::norm(fine->corners_px[k] - truth[k]), 0.2) << grey << " " << k;
@@ -110,11 +145,13 @@ TEST(EdgeRefinement, ReturnsNothingWithoutEdges) {
     const Corners corners{{{100, 80}, {160, 80}, {160, 140}, {100, 140}}};
     for (const cv::Size size :
          {cv::Size(320, 240), cv::Size(130, 120), cv::Size(1, 1)}) // inside, partly and entirely outside
-        EXPECT_FALSE(refine_edges(cv::Mat(size, CV_8U, cv::Scalar(90)), corners, lens, cells));
+        EXPECT_FALSE(refine_edges(cv::Mat(size, CV_8U, cv::Scalar(90)), ARHOST_TRANSFER_SRGB, corners, lens, cells));
     const double nan = std::numeric_limits<double>::quiet_NaN();
     const cv::Mat plain(240, 320, CV_8U, cv::Scalar(90));
-    EXPECT_FALSE(refine_edges(plain, {{{100, 80}, {100, 80}, {100, 80}, {100, 80}}}, lens, cells));
-    EXPECT_FALSE(refine_edges(plain, {{{nan, 80}, {160, 80}, {160, 140}, {100, 140}}}, lens, cells));
+    EXPECT_FALSE(
+        refine_edges(plain, ARHOST_TRANSFER_LINEAR, {{{100, 80}, {100, 80}, {100, 80}, {100, 80}}}, lens, cells));
+    EXPECT_FALSE(
+        refine_edges(plain, ARHOST_TRANSFER_LINEAR, {{{nan, 80}, {160, 80}, {160, 140}, {100, 140}}}, lens, cells));
 }
 
 TEST(EdgeRefinement, NeverMovesACornerFar) {
@@ -126,7 +163,7 @@ TEST(EdgeRefinement, NeverMovesACornerFar) {
         Corners corners;
         for (auto &corner : corners)
             corner = {at(generator), at(generator)};
-        if (const auto refined = refine_edges(noise, corners, lens, cells)) {
+        if (const auto refined = refine_edges(noise, ARHOST_TRANSFER_LINEAR, corners, lens, cells)) {
             for (int k = 0; k < 4; ++k)
                 EXPECT_LT(cv::norm(refined->corners_px[k] - corners[k]),
                           cv::norm(corners[(k + 1) % 4] - corners[k]) / 4);

@@ -352,15 +352,6 @@ TEST_P(FiducialTracker, GivesTheSameResultWithAnyNumberOfThreads) {
 }
 
 // A request that expects the corners of a marker here.
-inline arhost_expected_marker expected_at(uint32_t marker, const std::array<cv::Point2d, 4> &corners_px) {
-    arhost_expected_marker expected{sizeof expected, marker, {}, 6};
-    for (int i = 0; i < 4; ++i) {
-        expected.corners_px[i][0] = corners_px[i].x;
-        expected.corners_px[i][1] = corners_px[i].y;
-    }
-    return expected;
-}
-
 TEST_P(FiducialTracker, SearchesOnlyWhereMarkersAreExpected) {
     const Mt here = pose_of(-83, 40, 600, 30, 20, 15), there = pose_of(97, -60, 620, -20, 10, 200);
     const cv::Mat picture = picture_of({{tag(4), 80, here}, {tag(9), 80, there}});

@@ -10,6 +10,7 @@ namespace {
 
 using arhost::fiducial::april_tag_name;
 using arhost::fiducial::Corners;
+using arhost::fiducial::false_positive_rate;
 using arhost::fiducial::Family;
 using testing::ElementsAre;
 using testing::Pair;
@@ -169,6 +170,12 @@ TEST(Report, EndsAtTheGreatestNumberOfObservations) {
     const auto reported = report(seen);
     ASSERT_EQ(reported.size(), static_cast<std::size_t>(ARHOST_MAX_OBSERVATIONS));
     EXPECT_EQ(reported[7].id, 6) << "id 7 is in another family";
+}
+
+TEST(Observations, FalsePositiveRateIsTheShareOfWordsThatReadAsTheCode) {
+    EXPECT_DOUBLE_EQ(false_positive_rate(16, 0), 4.0 / 65536);
+    EXPECT_DOUBLE_EQ(false_positive_rate(16, 2), 4.0 * (1 + 16 + 120) / 65536);
+    EXPECT_DOUBLE_EQ(false_positive_rate(9, 9), 1) << "at most";
 }
 
 } // namespace

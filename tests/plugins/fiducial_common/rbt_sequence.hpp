@@ -28,7 +28,7 @@ public:
         for (std::size_t k = 0; k < truth_["grid"].size(); ++k) {
             char name[48];
             std::snprintf(name, sizeof name, "color_image_%04zu.png", k);
-            frames_.emplace_back(read_grey(folder / name));
+            frames_.emplace_back(read_grey(folder / name), ARHOST_TRANSFER_SRGB);
             for (const auto &[id, detection] : truth_["detections"][k].items())
                 ids_.push_back(std::stoi(id));
         }

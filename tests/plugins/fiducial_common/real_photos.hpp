@@ -20,7 +20,7 @@ inline std::map<int, arhost_observation> markers_in(Tracker &tracker, const std:
     if (tracker.start(plain_camera(picture.size()), listed) != ARHOST_STATUS_OK)
         throw std::runtime_error(tracker.log());
     std::map<int, arhost_observation> by_id;
-    for (const arhost_observation &marker : tracker.track(GreyFrame(picture)))
+    for (const arhost_observation &marker : tracker.track(GreyFrame(picture, ARHOST_TRANSFER_SRGB)))
         if (std::ranges::find(listed, marker.id, &Listed::id) != listed.end())
             by_id[marker.id] = marker;
     return by_id;
@@ -47,7 +47,7 @@ inline void expect_april_tag_photo(Tracker &tracker) {
     const auto photo = read_grey(folder / "AprilTag.png");
     const auto camera = intrinsics_of(photo.size(), 615.1674805, 615.1675415, 312.1889954, 243.4373779);
     ASSERT_EQ(tracker.start(camera, ids_to(30)), ARHOST_STATUS_OK);
-    const auto found = tracker.track(GreyFrame(photo));
+    const auto found = tracker.track(GreyFrame(photo, ARHOST_TRANSFER_SRGB));
     EXPECT_EQ(found.size(), 12u);
     std::ifstream corners(folder / "ground_truth_detection.txt"), poses(folder / "ground_truth_pose.txt");
     for (const arhost_observation &marker : found) {

@@ -49,10 +49,13 @@ inline cv::Mat read_grey(const std::filesystem::path &file) {
     return grey;
 }
 
-// A grey frame with padded rows, as a tracker may receive it.
+// A grey frame with padded rows, as a tracker may receive it. Rendered pictures average the codes of their samples,
+// so by default the codes are linear light.
 class GreyFrame {
 public:
-    explicit GreyFrame(const cv::Mat &picture) : format_(layout(picture.size())), slot_(format_.byte_size) {
+    explicit GreyFrame(const cv::Mat &picture, arhost_transfer transfer = ARHOST_TRANSFER_LINEAR)
+        : format_(layout(picture.size())), slot_(format_.byte_size) {
+        format_.transfer = transfer;
         for (int y = 0; y < picture.rows; ++y)
             std::memcpy(slot_.data() + std::size_t{format_.grey_stride} * y, picture.ptr(y), picture.cols);
     }
@@ -90,6 +93,17 @@ struct Listed {
     std::string file{}; // of a pattern
     double pattern_ratio = 0;
 };
+
+// `marker`: its index in the list.
+inline arhost_expected_marker expected_at(std::uint32_t marker, const std::array<cv::Point2d, 4> &corners_px) {
+    constexpr double margin_px = 6;
+    arhost_expected_marker expected{sizeof expected, marker, {}, margin_px};
+    for (std::size_t i = 0; i < 4; ++i) {
+        expected.corners_px[i][0] = corners_px[i].x;
+        expected.corners_px[i][1] = corners_px[i].y;
+    }
+    return expected;
+}
 
 using Options = std::map<std::string, std::string>;
 

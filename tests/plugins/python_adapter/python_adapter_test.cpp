@@ -100,14 +100,16 @@ TEST_F(PythonAdapter, TheRecordNamesTargetsAndTheirObservations) {
 import arhost
 class Source:
     def __init__(self, host): pass
-    def start(self, setup): return {"width": 64, "height": 48, "fps": 25}
+    def start(self, setup): return {"width": 64, "height": 48, "fps": 25, "transfer": arhost.TRANSFER_LINEAR}
     def read(self, buffer): return None if buffer.sequence > 2 else 40_000_000 * buffer.sequence
 class Tracker:
     def __init__(self, host): pass
-    def start(self, setup): assert setup.families == ["tag25h9", "tag36h11"]
+    def start(self, setup):
+        assert setup.families == ["tag25h9", "tag36h11"]
+        assert setup.format.transfer == arhost.TRANSFER_LINEAR
     def track(self, frame):
         x = frame.sequence
-        yield arhost.Observation(3, [[20, 15], [40, 15], [40, 35], [20, 35]], 1, 2, 0.5, 0.25)
+        yield arhost.Observation(3, [[20, 15], [40, 15], [40, 35], [20, 35]], 1, 2, 0.5, 0.25, 1e-9)
         yield arhost.Observation(9, [[x, 1], [x + 2, 1], [x + 2, 3], [x, 3]], 0) # no target lists it
 class Sink:
     def __init__(self, host): pass
@@ -117,7 +119,7 @@ class Sink:
         assert r.families == ["tag25h9", "tag36h11"] and r.has_truth == 0 and r.truth_target == ""
         print(r.sequence, [(t.name, round(t.mt[14]), t.state == arhost.TARGET_DETECTED, t.first_observation,
                             t.observation_count, t.covariance.shape) for t in r.targets], file=self.file)
-        print([(o.id, o.family, o.hamming, o.decision_margin, o.corner_sigma_px, o.corners_px[0].tolist()) for o in r.observations],
+        print([(o.id, o.family, o.hamming, o.decision_margin, o.corner_sigma_px, o.false_positive_rate, o.corners_px[0].tolist()) for o in r.observations],
               file=self.file)
         self.kept = r # a copy: no warning
     def stop(self): self.file.close()
@@ -126,10 +128,10 @@ class Sink:
         << run.output();
     std::string expected;
     for (int i = 0; i < 3; ++i)
-        expected +=
-            std::to_string(i) +
-            " [('tag36h11-3', -240, True, 0, 1, (36,))]\n[(3, 1, 2, 0.5, 0.25, [20.0, 15.0]), (9, 0, 0, 0.0, 0.0, [" +
-            std::to_string(i) + ".0, 1.0])]\n";
+        expected += std::to_string(i) +
+                    " [('tag36h11-3', -240, True, 0, 1, (36,))]\n[(3, 1, 2, 0.5, 0.25, 1e-09, [20.0, 15.0]), (9, 0, "
+                    "0, 0.0, 0.0, 0.0, [" +
+                    std::to_string(i) + ".0, 1.0])]\n";
     EXPECT_EQ(run.read("out.txt"), expected);
     EXPECT_THAT(run.output(), Not(HasSubstr("kept an array")));
 }

@@ -21,7 +21,8 @@ constexpr const char *description =
 class Frames {
 public:
     Frames(arhost_pixel_format pixels, std::uint32_t width, std::uint32_t height,
-           arhost_yuv_range range = ARHOST_YUV_RANGE_LIMITED) {
+           arhost_yuv_range range = ARHOST_YUV_RANGE_LIMITED, arhost_transfer transfer = ARHOST_TRANSFER_SRGB) {
+        format_.transfer = transfer;
         format_.struct_size = sizeof format_;
         format_.pixel_format = pixels;
         format_.width = width;
@@ -187,6 +188,16 @@ TEST_F(Session, Ffv1KeepsGrey) {
     const Frames frames(ARHOST_PIXEL_FORMAT_GREY8, 37, 23);
     ASSERT_NO_FATAL_FAILURE(record(frames, 2));
     expect_pixels(frames, 2, {37});
+}
+
+TEST_F(Session, Ffv1KeepsTheTransfer) {
+    for (const arhost_transfer transfer : {ARHOST_TRANSFER_SRGB, ARHOST_TRANSFER_LINEAR}) {
+        const Frames frames(ARHOST_PIXEL_FORMAT_BGR8, 36, 22, ARHOST_YUV_RANGE_FULL, transfer);
+        ASSERT_NO_FATAL_FAILURE(record(frames, 2, {{"replace", "true"}}));
+        SourceUnderTest source("source_file");
+        ASSERT_EQ(source.start({{"path", folder() / "video.mkv"}}), ARHOST_STATUS_OK);
+        EXPECT_EQ(source.format().transfer, transfer);
+    }
 }
 
 TEST_F(Session, Ffv1KeepsYuyvOfBothRanges) {

@@ -37,7 +37,7 @@ struct Picture {
 // `colours`: the colour planes; `is_separate`: each in a plane of memory of its own, otherwise all in one.
 Picture make_picture(std::uint32_t fourcc, const std::vector<MemoryPlane> &colours, bool is_separate = false) {
     Picture picture;
-    picture.format = {fourcc, width, height, V4L2_COLORSPACE_SRGB, 0, 0, {}};
+    picture.format = {fourcc, width, height, V4L2_COLORSPACE_SRGB, 0, 0, 0, {}};
     for (std::size_t p = 0; p < colours.size(); ++p) {
         // In one plane of memory, the stride of a chroma plane follows from that of the first plane.
         const std::uint32_t stride =
@@ -160,7 +160,7 @@ TEST(V4l2Pixels, OfATruncatedPictureAreRejected) {
 }
 
 TEST(V4l2Pixels, WithTooShortRowsAreADefectOfTheDriver) {
-    PictureFormat format{V4L2_PIX_FMT_YUV420M, width, height, 0, 0, 0, {width, width / 2, width / 2 - 1}};
+    PictureFormat format{V4L2_PIX_FMT_YUV420M, width, height, 0, 0, 0, 0, {width, width / 2, width / 2 - 1}};
     EXPECT_EQ(defect_of(format), "rows of 2 bytes for 6 px");
     format.strides.back() = width / 2;
     EXPECT_EQ(defect_of(format), "");
@@ -168,7 +168,7 @@ TEST(V4l2Pixels, WithTooShortRowsAreADefectOfTheDriver) {
 
 TEST(V4l2Pixels, HaveTheMatrixAndRangeOfTheDriver) {
     arhost_frame_format format{};
-    ASSERT_TRUE(describe({V4L2_PIX_FMT_NV12, width, height, V4L2_COLORSPACE_REC709, 0, 0, {width}}, format));
+    ASSERT_TRUE(describe({V4L2_PIX_FMT_NV12, width, height, V4L2_COLORSPACE_REC709, 0, 0, 0, {width}}, format));
     EXPECT_EQ(format.yuv_matrix, ARHOST_YUV_MATRIX_BT709);
     EXPECT_EQ(format.yuv_range, ARHOST_YUV_RANGE_LIMITED);
     ASSERT_TRUE(describe({V4L2_PIX_FMT_NV12,
@@ -177,12 +177,19 @@ TEST(V4l2Pixels, HaveTheMatrixAndRangeOfTheDriver) {
                           V4L2_COLORSPACE_REC709,
                           V4L2_YCBCR_ENC_601,
                           V4L2_QUANTIZATION_FULL_RANGE,
+                          0,
                           {width}},
                          format));
     EXPECT_EQ(format.yuv_matrix, ARHOST_YUV_MATRIX_BT601);
     EXPECT_EQ(format.yuv_range, ARHOST_YUV_RANGE_FULL);
-    EXPECT_TRUE(has_known_matrix({V4L2_PIX_FMT_NV12, width, height, V4L2_COLORSPACE_REC709, 0, 0, {width}}));
-    EXPECT_FALSE(has_known_matrix({V4L2_PIX_FMT_NV12, width, height, V4L2_COLORSPACE_BT2020, 0, 0, {width}}));
-    EXPECT_TRUE(has_known_matrix({V4L2_PIX_FMT_RGB24, width, height, V4L2_COLORSPACE_BT2020, 0, 0, {width}}));
-    EXPECT_FALSE(describe({V4L2_PIX_FMT_MJPEG, width, height, 0, 0, 0, {}}, format));
+    EXPECT_EQ(format.transfer, ARHOST_TRANSFER_SRGB);
+    ASSERT_TRUE(describe({V4L2_PIX_FMT_GREY, width, height, V4L2_COLORSPACE_RAW, 0, 0, 0, {width}}, format));
+    EXPECT_EQ(format.transfer, ARHOST_TRANSFER_LINEAR);
+    ASSERT_TRUE(describe({V4L2_PIX_FMT_GREY, width, height, V4L2_COLORSPACE_SRGB, 0, 0, V4L2_XFER_FUNC_NONE, {width}},
+                         format));
+    EXPECT_EQ(format.transfer, ARHOST_TRANSFER_LINEAR);
+    EXPECT_TRUE(has_known_matrix({V4L2_PIX_FMT_NV12, width, height, V4L2_COLORSPACE_REC709, 0, 0, 0, {width}}));
+    EXPECT_FALSE(has_known_matrix({V4L2_PIX_FMT_NV12, width, height, V4L2_COLORSPACE_BT2020, 0, 0, 0, {width}}));
+    EXPECT_TRUE(has_known_matrix({V4L2_PIX_FMT_RGB24, width, height, V4L2_COLORSPACE_BT2020, 0, 0, 0, {width}}));
+    EXPECT_FALSE(describe({V4L2_PIX_FMT_MJPEG, width, height, 0, 0, 0, 0, {}}, format));
 }

@@ -70,6 +70,9 @@ TEST(AprilTagTracker, FindsTagsOfAllFamiliesInOneRun) {
     for (std::size_t i = 0; i < seen.size(); ++i) {
         EXPECT_EQ(seen[i].family, i);
         EXPECT_EQ(seen[i].id, listed[i].id);
+        const auto &type = arhost::apriltag::family_types[i];
+        const std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t *)> tags(type.create(), type.destroy);
+        EXPECT_EQ(seen[i].false_positive_rate, std::ldexp(4, -static_cast<int>(tags->nbits)));
         EXPECT_LT(greatest_distance_px(seen[i], corners_of(placed[i].mt, test_camera, 45)), 0.3) << listed[i].family;
     }
 }

@@ -57,6 +57,8 @@ TEST_P(ArucoDictionary, FindsUnlistedMarkers) {
     ASSERT_EQ(seen.size(), 1u);
     EXPECT_EQ(seen[0].id, 21);
     EXPECT_EQ(seen[0].hamming, 0u);
+    const int bits = (print.corner_cells - 2) * (print.corner_cells - 2);
+    EXPECT_EQ(seen[0].false_positive_rate, std::ldexp(4, -bits));
     EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 80)), 2.5);
 }
 
@@ -277,7 +279,7 @@ TEST(ArucoTracker, FindsTheMarkerOfTheUbiquityPhotoAndItsDistance) {
     const auto camera = intrinsics_of({1280, 960}, k[0], k[4], k[2], k[5], ARHOST_DISTORTION_BROWN, d);
     Tracker tracker("tracker_aruco", {{"corner_refinement", "subpix"}});
     ASSERT_EQ(tracker.start(camera, {{1, 145, "DICT_5X5_1000"}}), ARHOST_STATUS_OK);
-    const GreyFrame photo(read_grey(folder / "tag_01_d7_14cm.png"));
+    const GreyFrame photo(read_grey(folder / "tag_01_d7_14cm.png"), ARHOST_TRANSFER_SRGB);
     const auto seen = tracker.track(photo);
     ASSERT_EQ(seen.size(), 1u);
     const std::vector<double> expected = golden["corners"]["tag_01_d7_14cm.png"]["1"];

@@ -85,15 +85,6 @@ inline void add_sensor(cv::Mat &frame, std::uint64_t seed) {
     cv::add(frame, noise, frame, cv::noArray(), CV_8U);
 }
 
-inline arhost_expected_marker expected_at(std::uint32_t marker, const Quad &corners) {
-    arhost_expected_marker expected{sizeof expected, marker, {}, 8};
-    for (std::size_t i = 0; i < 4; ++i) {
-        expected.corners_px[i][0] = corners[i].x;
-        expected.corners_px[i][1] = corners[i].y;
-    }
-    return expected;
-}
-
 inline double mean_error_px(const arhost_observation &seen, const Quad &truth) {
     double sum = 0;
     for (int i = 0; i < 4; ++i)

@@ -147,13 +147,8 @@ TEST(MatrixReader, FindsSeveralFamiliesAndPatternsInOnePicture) {
     EXPECT_EQ(tracker.family(all[0]), small.name);
     EXPECT_EQ(tracker.family(all[1]), large.name);
     EXPECT_EQ(all[1].id, 300);
-    arhost_expected_marker expected{sizeof expected, 0, {}, 6};
     const auto corners = corners_of(left, camera, side_mm);
-    for (std::size_t i = 0; i < 4; ++i) {
-        expected.corners_px[i][0] = corners[i].x;
-        expected.corners_px[i][1] = corners[i].y;
-    }
-    const auto near = tracker.track(frame, {expected}, false);
+    const auto near = tracker.track(frame, {expected_at(0, corners)}, false);
     ASSERT_EQ(near.size(), 1u);
     EXPECT_EQ(near[0].id, 3);
     EXPECT_LT(greatest_distance_px(near[0], corners), 0.2);

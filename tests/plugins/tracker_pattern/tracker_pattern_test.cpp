@@ -77,13 +77,8 @@ TEST(PatternTracker, SearchesOnlyWherePatternsAreExpected) {
     ASSERT_EQ(tracker.start(camera, both()), ARHOST_STATUS_OK) << tracker.log();
     const Mt hiro = pose_of(-75, 0, 500, 20, 10, 5), kanji = pose_of(75, 0, 500);
     const GreyFrame frame(picture_of({{print_of("hiro"), 80, hiro}, {print_of("kanji"), 80, kanji}}));
-    arhost_expected_marker expected{sizeof expected, 0, {}, 6};
     const auto corners = corners_of(hiro, camera, 80);
-    for (std::size_t i = 0; i < 4; ++i) {
-        expected.corners_px[i][0] = corners[i].x;
-        expected.corners_px[i][1] = corners[i].y;
-    }
-    const auto seen = tracker.track(frame, {expected}, false);
+    const auto seen = tracker.track(frame, {expected_at(0, corners)}, false);
     ASSERT_EQ(seen.size(), 1u);
     EXPECT_EQ(seen[0].id, 0);
     EXPECT_LT(greatest_distance_px(seen[0], corners), 0.2);

@@ -807,6 +807,7 @@ static arhost_status track(arhost_instance *self, const arhost_track_request *re
     seen->hamming = 0;
     seen->decision_margin = 0;
     seen->corner_sigma_px = 0;
+    seen->false_positive_rate = 0;
     for (i = 0; i < 4; ++i) {
         const double *corner = self->marker.corners_mm[i], depth = 500 + number - corner[2];
         seen->corners_px[i][0] = self->lens.cx + self->lens.fx * corner[0] / depth;

@@ -30,6 +30,15 @@ enum { ARHOST_YUV_MATRIX_BT601 = 1, ARHOST_YUV_MATRIX_BT709 = 2 };
 typedef int32_t arhost_yuv_range;
 enum { ARHOST_YUV_RANGE_LIMITED = 1, ARHOST_YUV_RANGE_FULL = 2 };
 
+/* How the codes of the pixels relate to light. Only trackers take it into account, to locate blurred edges;
+ * composites and outputs use the codes as if they were sRGB. */
+typedef int32_t arhost_transfer;
+enum {
+    ARHOST_TRANSFER_SRGB = 0,  /* sRGB's curve, or one that is nearly the same: BT.601, BT.709; most cameras */
+    ARHOST_TRANSFER_LINEAR = 1 /* proportional to the light, as from some machine-vision cameras; or rendered by
+                                  averaging codes */
+};
+
 /* The clock that measured a capture time. */
 typedef int32_t arhost_clock;
 enum {
@@ -53,6 +62,7 @@ typedef struct arhost_frame_format {
     arhost_yuv_range yuv_range;
     double fps;        /* nominal frame rate, 1/s; 0: unknown */
     int32_t has_depth; /* non-zero: frames have a depth plane */
+    arhost_transfer transfer;
 
     uint32_t plane_count;
     uint32_t stride[ARHOST_MAX_PLANES]; /* bytes per row, a multiple of 64 */

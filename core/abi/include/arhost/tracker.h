@@ -74,15 +74,18 @@ typedef struct arhost_tracker_setup {
 typedef struct arhost_observation {
     uint32_t struct_size;
     int32_t id;
-    uint32_t family;           /* index in arhost_tracker_setup.families */
-    uint32_t hamming;          /* bits of the code that were corrected */
-    double corners_px[4][2];   /* in pixels of the distorted frame */
-    double decision_margin;    /* how clearly the bits were read, >= 0: larger is better, on a scale of the tracker's
-                                  own; 0: unknown */
-    double corner_sigma_px;    /* standard deviation of the noise of each coordinate of corners_px, >= 0; 0: unknown.
-                                  The covariance of a target with a single marker follows from it */
-    double projected_px[4][2]; /* for sinks: where the pose of the marker's target projects the corners; all 0 if it
-                                  does not. The worker sets it */
+    uint32_t family;            /* index in arhost_tracker_setup.families */
+    uint32_t hamming;           /* bits of the code that were corrected */
+    double corners_px[4][2];    /* in pixels of the distorted frame */
+    double decision_margin;     /* how clearly the bits were read, >= 0: larger is better, on a scale of the tracker's
+                                   own; 0: unknown */
+    double corner_sigma_px;     /* standard deviation of the noise of each coordinate of corners_px, >= 0; 0: unknown.
+                                   The covariance of a target with a single marker follows from it */
+    double false_positive_rate; /* the probability that a square with random bits reads as this marker, with at most
+                                   `hamming` corrected bits: 0 to 1; 0: negligible or unknown. The worker reports a
+                                   target only when its sightings are too unlikely to be chance */
+    double projected_px[4][2];  /* for sinks: where the pose of the marker's target projects the corners; all 0 if it
+                                   does not. The worker sets it */
 } arhost_observation;
 
 typedef int32_t arhost_target_state;

@@ -312,6 +312,9 @@ pub const ARHOST_YUV_MATRIX_BT709: arhost_yuv_matrix = 2;
 pub type arhost_yuv_range = i32;
 pub const ARHOST_YUV_RANGE_LIMITED: arhost_yuv_range = 1;
 pub const ARHOST_YUV_RANGE_FULL: arhost_yuv_range = 2;
+pub type arhost_transfer = i32;
+pub const ARHOST_TRANSFER_SRGB: arhost_transfer = 0;
+pub const ARHOST_TRANSFER_LINEAR: arhost_transfer = 1;
 pub type arhost_clock = i32;
 pub const ARHOST_CLOCK_MONOTONIC: arhost_clock = 1;
 pub const ARHOST_CLOCK_MEDIA: arhost_clock = 2;
@@ -329,6 +332,7 @@ pub struct arhost_frame_format {
     pub yuv_range: arhost_yuv_range,
     pub fps: f64,
     pub has_depth: i32,
+    pub transfer: arhost_transfer,
     pub plane_count: u32,
     pub stride: [u32; ARHOST_MAX_PLANES],
     pub offset: [u64; ARHOST_MAX_PLANES],
@@ -507,9 +511,10 @@ pub struct arhost_observation {
     pub corners_px: [[f64; 2]; 4],
     pub decision_margin: f64,
     pub corner_sigma_px: f64,
+    pub false_positive_rate: f64,
     pub projected_px: [[f64; 2]; 4],
 }
-const _: () = assert!(size_of::<arhost_observation>() == 160);
+const _: () = assert!(size_of::<arhost_observation>() == 168);
 pub type arhost_target_state = i32;
 pub const ARHOST_TARGET_DETECTED: arhost_target_state = 1;
 pub const ARHOST_TARGET_PREDICTED: arhost_target_state = 2;

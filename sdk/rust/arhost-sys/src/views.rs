@@ -95,8 +95,19 @@ impl Default for arhost_observation {
     fn default() -> Self {
         let struct_size = std::mem::size_of::<Self>() as u32;
         let (corners_px, projected_px) = ([[0.0; 2]; 4], [[0.0; 2]; 4]);
-        let (id, family, hamming, decision_margin, corner_sigma_px) = (0, 0, 0, 0.0, 0.0);
-        arhost_observation { struct_size, id, family, hamming, corners_px, decision_margin, corner_sigma_px, projected_px }
+        let (id, family, hamming) = (0, 0, 0);
+        let (decision_margin, corner_sigma_px, false_positive_rate) = (0.0, 0.0, 0.0);
+        arhost_observation {
+            struct_size,
+            id,
+            family,
+            hamming,
+            corners_px,
+            decision_margin,
+            corner_sigma_px,
+            false_positive_rate,
+            projected_px,
+        }
     }
 }
 

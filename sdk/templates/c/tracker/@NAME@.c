@@ -44,6 +44,7 @@ static arhost_status track(arhost_instance *self, const arhost_track_request *re
     seen->hamming = 0;
     seen->decision_margin = 0;
     seen->corner_sigma_px = 0;
+    seen->false_positive_rate = 0;
     for (i = 0; i < 4; ++i) { /* top left, top right, bottom right, bottom left on the upright print */
         seen->corners_px[i][0] = sum_x / area + (i == 1 || i == 2 ? half : -half);
         seen->corners_px[i][1] = sum_y / area + (i >= 2 ? half : -half);
