@@ -14,6 +14,7 @@ namespace {
 // Names the markers with the most frames.
 std::string frames_text(const std::map<std::string, std::uint64_t> &frames_of_marker) {
     std::vector<std::pair<std::uint64_t, std::string>> most_frequent;
+    most_frequent.reserve(frames_of_marker.size());
     for (const auto &[name, frames] : frames_of_marker)
         most_frequent.emplace_back(frames, name);
     std::ranges::stable_sort(most_frequent, std::greater{}, &std::pair<std::uint64_t, std::string>::first);
