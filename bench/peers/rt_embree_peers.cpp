@@ -8,6 +8,7 @@
 #include "bunny.hpp"
 #include "renderer.hpp"
 
+#include <directories.hpp>
 #include <glm/trigonometric.hpp>
 
 #include <atomic>
@@ -205,7 +206,7 @@ void write_scene(const std::filesystem::path &folder, const TriangleMesh &mesh, 
 }
 
 void serve(const std::filesystem::path &folder, unsigned threads) {
-    const auto [mesh, mesh_name] = arhost::bench::bunny(ARHOST_SHARED_DATA);
+    const auto [mesh, mesh_name] = arhost::bench::bunny(arhost::test::shared_data_directory());
     write_scene(folder, mesh, mesh_name);
     std::printf(R"({"name": "arhost rt_embree", "version": "Embree %d.%d"})"
                 "\n",

@@ -5,6 +5,7 @@
 #include "bunny.hpp"
 #include "renderer.hpp"
 
+#include <directories.hpp>
 #include <glm/trigonometric.hpp>
 
 #include <algorithm>
@@ -178,7 +179,7 @@ int main(int argc, char **argv) {
     if (argc > 2)
         settings.instruction_set = argv[2];
 
-    const auto [mesh, name] = arhost::bench::bunny(ARHOST_SHARED_DATA);
+    const auto [mesh, name] = arhost::bench::bunny(arhost::test::shared_data_directory());
     arhost_material diffuse = make_material(ARHOST_MATERIAL_DIFFUSE), mirror = make_material(ARHOST_MATERIAL_MIRROR);
     for (int i = 0; i < 3; ++i) {
         diffuse.ambient[i] = diffuse.diffuse[i] = 0.7f - 0.1f * static_cast<float>(i);

@@ -20,6 +20,7 @@
 #include "spirv/plain.comp.h"
 #include "spirv/query.comp.h"
 
+#include <directories.hpp>
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -56,7 +57,7 @@ void sort_along_morton_curve(scene::TriangleMesh &mesh) {
 // Returns a scene of the bunny without lights, whose render time is dominated by ray traversal, as in the case
 // `primary` of rt_embree_bench.cpp.
 scene::Arena unlit_bunny() {
-    auto [mesh, name] = bench::bunny(ARHOST_SHARED_DATA);
+    auto [mesh, name] = bench::bunny(arhost::test::shared_data_directory());
     mesh.normals.clear();
     sort_along_morton_curve(mesh);
     scene::ArenaBuilder builder;

@@ -4,8 +4,10 @@
 // what they take for markers: sightings in a frame, and poses that the worker reports.
 #include "solving_tracker.hpp"
 
+#include <fiducial_common/aruco_dictionaries.hpp>
 #include <fiducial_common/clutter.hpp>
 #include <fiducial_common/matrix_codes.hpp>
+#include <fiducial_common/opencv_aruco.hpp>
 
 #include <opencv2/imgcodecs.hpp>
 
@@ -87,6 +89,24 @@ std::vector<Setup> setups() {
     return all;
 }
 
+// Whether framed cells are a marker of one of the families with up to 6×6 bits that the trackers search.
+bool is_marker(const cv::Mat_<std::uint8_t> &white) {
+    static const std::vector<cv::aruco::Dictionary> dictionaries = [] {
+        std::vector<cv::aruco::Dictionary> all;
+        for (const aruco::DictionaryType &type : aruco::dictionary_types)
+            all.push_back(aruco::predefined(type.name));
+        return all;
+    }();
+    int id = 0, rotation = 0;
+    return std::ranges::any_of(dictionaries, [&](const cv::aruco::Dictionary &dictionary) {
+        return dictionary.markerSize == white.rows && dictionary.identify(white, id, rotation, 0);
+    });
+}
+
+cv::Mat frame_of_clutter(cv::Size frame_size, int seed) {
+    return test::clutter(frame_size, static_cast<std::uint64_t>(seed), is_marker);
+}
+
 // Shows frames of the same size to a tracker, one after the other.
 class Watch {
 public:
@@ -139,7 +159,7 @@ void show_pictures(const std::vector<Setup> &setups, int first, int last, Counts
     for (const Setup &setup : setups)
         watches.emplace_back(setup, size, counts);
     for (int i = first; i < last; ++i) {
-        const cv::Mat picture = test::clutter(size, static_cast<std::uint64_t>(i) + 1000);
+        const cv::Mat picture = frame_of_clutter(size, i + 1000);
         for (Watch &watch : watches)
             watch.show(picture);
     }
@@ -156,7 +176,7 @@ void show_video(const std::vector<Setup> &setups, double step_px, int first, int
         const double margin_px = step_px * scene_frames;
         cv::RNG random(static_cast<std::uint64_t>(i) + 1);
         const cv::Size wide(size.width + static_cast<int>(margin_px) + 1, size.height);
-        const cv::Mat scene = test::clutter(wide, static_cast<std::uint64_t>(i / scene_frames) + 100'000);
+        const cv::Mat scene = frame_of_clutter(wide, i / scene_frames + 100'000);
         const double x = step_px * (i % scene_frames);
         cv::Mat picture, noise(size, CV_16S);
         cv::getRectSubPix(

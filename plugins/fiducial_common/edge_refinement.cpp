@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "edge_refinement.hpp"
 
+#include <arhost/shading/scalar.hpp>
+
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
@@ -38,11 +40,8 @@ const LightOfCode &light_of_code(arhost_transfer transfer) {
     }();
     static const LightOfCode srgb = [] {
         LightOfCode light;
-        for (int code = 0; code < 256; ++code) {
-            const double encoded = code / 255.0; // IEC 61966-2-1
-            light[code] = static_cast<float>(
-                255 * (encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4)));
-        }
+        for (int code = 0; code < 256; ++code)
+            light[code] = static_cast<float>(255 * shading::srgb_decode(code / 255.0));
         return light;
     }();
     return transfer == ARHOST_TRANSFER_LINEAR ? linear : srgb;

@@ -2,6 +2,7 @@
 // arhost-conform: options, reports and exit status.
 #include "conform_run.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 #include <png.h>
 
@@ -19,7 +20,7 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string rt_embree = ARHOST_PLUGIN_DIRECTORY "/rt_embree.so";
+const std::string rt_embree = arhost::test::plugin_directory() + "/rt_embree.so";
 
 TEST(Conform, ListsTheTestsThatAPatternMatches) {
     ConformRun run;
@@ -84,12 +85,12 @@ TEST(Conform, FailsIfTheReferenceCannotBeUsed) {
     run.write("text.so", "no library");
     const std::string crashing = run.link_wrong("crash_in_render").string();
     for (const auto &[reference, why] :
-         {std::pair<std::string, std::string>{ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so",
+         {std::pair<std::string, std::string>{arhost::test::plugin_directory() + "/tracker_aruco.so",
                                               "tracker_aruco.so' is a tracker but must be a ray tracer"},
           {"text.so", "text.so' cannot be used: abi.load failed: "},
           {crashing, "cannot be used: raytracer.render failed: SIGSEGV in render"}}) {
         EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.reference", "--reference", reference, "--reads",
-                           ARHOST_PLUGIN_DIRECTORY}),
+                           arhost::test::plugin_directory()}),
                   2);
         EXPECT_THAT(run.output(), HasSubstr("error    raytracer.reference\n"));
         EXPECT_THAT(run.output(), HasSubstr(why));
@@ -99,12 +100,13 @@ TEST(Conform, FailsIfTheReferenceCannotBeUsed) {
 TEST(Conform, PrintsTheCommandWithAllOptions) {
     ConformRun run;
     const std::string plugin = run.link_wrong("no_licence").string(), reference = run.link_wrong("none").string();
-    EXPECT_EQ(run.run({plugin, "--only", "abi.descriptor", "--reads", ARHOST_PLUGIN_DIRECTORY, "--reference",
+    EXPECT_EQ(run.run({plugin, "--only", "abi.descriptor", "--reads", arhost::test::plugin_directory(), "--reference",
                        reference, "--timeout-factor", "2.5"}),
               1);
     EXPECT_THAT(run.output(),
                 HasSubstr("to repeat: arhost conform " + plugin + " --only abi.descriptor --seed 1 --reads " +
-                          ARHOST_PLUGIN_DIRECTORY + " --reference " + reference + " --timeout-factor 2.5\n"));
+                          arhost::test::plugin_directory() + " --reference " + reference +
+                          " --timeout-factor 2.5\n"));
 }
 
 TEST(Conform, RejectsInvalidOptions) {
@@ -468,8 +470,8 @@ TEST(Conform, FailsOnAnUnknownOption) {
 
 TEST(Conform, FailsOnAnInvalidAddressOfASocket) {
     ConformRun run;
-    EXPECT_EQ(run.run({ARHOST_PLUGIN_DIRECTORY "/sink_web.so", "--allow", "listen", "--only", "abi.create", "--set",
-                       "listen=local host"}),
+    EXPECT_EQ(run.run({arhost::test::plugin_directory() + "/sink_web.so", "--allow", "listen", "--only", "abi.create",
+                       "--set", "listen=local host"}),
               2);
     EXPECT_THAT(run.output(), HasSubstr("option 'listen': 'local host' must be a name"));
 }
@@ -484,9 +486,9 @@ TEST(Conform, FailsAFileThatIsNotAPlugin) {
 TEST(Conform, PassesTheTrackers) {
     for (const std::string name : {"tracker_apriltag", "tracker_aruco"}) {
         ConformRun run;
-        EXPECT_EQ(
-            run.run({ARHOST_PLUGIN_DIRECTORY "/" + name + ".so", "--timeout-factor", "3", "--json", "results.json"}),
-            0)
+        EXPECT_EQ(run.run({arhost::test::plugin_directory() + "/" + name + ".so", "--timeout-factor", "3", "--json",
+                           "results.json"}),
+                  0)
             << run.output();
         const nlohmann::json report = run.json("results.json");
         EXPECT_THAT(report.at("results"), testing::SizeIs(testing::Gt(40)));
@@ -508,8 +510,8 @@ TEST(Conform, ReportsAMissingFunction) {
 
 TEST(Conform, ReportsFrameTimesOfPassedTests) {
     ConformRun run;
-    run.run({ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so", "--timeout-factor", "3", "--only", "tracker.speed",
-             "--json", "results.json", "--html", "page.html"});
+    run.run({arhost::test::plugin_directory() + "/tracker_aruco.so", "--timeout-factor", "3", "--only",
+             "tracker.speed", "--json", "results.json", "--html", "page.html"});
     const auto measured = testing::ContainsRegex("640×480: p50 [0-9.]+ ms, p99 [0-9.]+ ms, of [0-9]+ frames");
     EXPECT_THAT(run.output(), measured);
     EXPECT_THAT(run.json("results.json").at("results")[0].at("message").get<std::string>(), measured);
@@ -518,7 +520,7 @@ TEST(Conform, ReportsFrameTimesOfPassedTests) {
 
 TEST(Conform, RunsOnlyTestsOfThePluginsKind) {
     ConformRun run;
-    run.run({ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so", "--only", "*.start", "--json", "results.json"});
+    run.run({arhost::test::plugin_directory() + "/tracker_aruco.so", "--only", "*.start", "--json", "results.json"});
     const nlohmann::json report = run.json("results.json");
     ASSERT_EQ(report.at("results").size(), 1u);
     EXPECT_EQ(report.at("results")[0].at("test"), "tracker.start");
@@ -546,7 +548,7 @@ void write_tag(const std::filesystem::path &file) {
 TEST(Conform, DrawsTheUsersMarkers) {
     ConformRun run;
     write_tag(run.path("tag.png"));
-    const std::string tracker = ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so", tag = run.path("tag.png");
+    const std::string tracker = arhost::test::plugin_directory() + "/tracker_apriltag.so", tag = run.path("tag.png");
     EXPECT_EQ(run.run({tracker, "--print", "0=" + tag, "--only", "tracker.*s"}), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("pass     tracker.corners"));
     EXPECT_EQ(run.run({tracker, "--print", "0=" + tag, "--only", "tracker.several"}), 2);
@@ -559,8 +561,8 @@ TEST(Conform, DrawsTheUsersMarkers) {
 
 TEST(Conform, DrawsMarkersOfTheFamilyThatTheTrackerKnows) {
     ConformRun run;
-    const std::string aruco = ARHOST_PLUGIN_DIRECTORY "/tracker_aruco.so",
-                      apriltag = ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so";
+    const std::string aruco = arhost::test::plugin_directory() + "/tracker_aruco.so",
+                      apriltag = arhost::test::plugin_directory() + "/tracker_apriltag.so";
     for (const char *family : {"tag36h11", "DICT_6X6_250"}) {
         EXPECT_EQ(run.run({aruco, "--family", family, "--only", "tracker.start,tracker.corners"}), 0) << run.output();
         EXPECT_THAT(run.output(), HasSubstr(std::string("with a marker of ") + family));
@@ -577,7 +579,7 @@ TEST(Conform, DrawsMarkersOfTheFamilyThatTheTrackerKnows) {
 
 TEST(Conform, TestsATrackerOfBodies) {
     ConformRun run;
-    const std::string tracker = ARHOST_TEST_PLUGIN_DIRECTORY "/tracker_body.so";
+    const std::string tracker = arhost::test::test_plugin_directory() + "/tracker_body.so";
     EXPECT_EQ(run.run({tracker, "--body", "head", "--only", "tracker.*"}), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("pass     tracker.body-pose"));
     EXPECT_THAT(run.output(), HasSubstr("skip     tracker.start"));
@@ -602,7 +604,7 @@ TEST(Conform, ReportsTheOrderOfCornersAndTheirOffset) {
 
 TEST(Conform, FailsIfAMarkersPictureCannotBeRead) {
     ConformRun run;
-    const std::string tracker = ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so";
+    const std::string tracker = arhost::test::plugin_directory() + "/tracker_apriltag.so";
     EXPECT_EQ(run.run({tracker, "--print", "one=tag.png"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("--print one=tag.png: must be ID=FILE"));
     EXPECT_EQ(run.run({tracker, "--print", "1=none.png", "--only", "tracker.track"}), 2);
@@ -611,16 +613,16 @@ TEST(Conform, FailsIfAMarkersPictureCannotBeRead) {
 
 TEST(Conform, SkipsTestsThatNeedAMissingDevice) {
     ConformRun run;
-    EXPECT_EQ(
-        run.run({ARHOST_PLUGIN_DIRECTORY "/source_v4l2.so", "--allow", "video", "--set", "device=/dev/arhost-none"}),
-        0);
+    EXPECT_EQ(run.run({arhost::test::plugin_directory() + "/source_v4l2.so", "--allow", "video", "--set",
+                       "device=/dev/arhost-none"}),
+              0);
     EXPECT_THAT(run.output(), HasSubstr("skip     source.start\n         it needs 'video', and start returned "));
     EXPECT_THAT(run.output(), HasSubstr("source.read\n         needs source.start, which has not passed"));
 }
 
 TEST(Conform, SkipsTestsWithInstancesIfANeedIsNotAllowed) {
     ConformRun run;
-    const std::string camera = ARHOST_PLUGIN_DIRECTORY "/source_v4l2.so";
+    const std::string camera = arhost::test::plugin_directory() + "/source_v4l2.so";
     EXPECT_EQ(run.run({camera}), 0);
     const std::string why = "it needs 'video', which the sandbox does not allow: give --allow video";
     EXPECT_THAT(run.output(), HasSubstr("pass     abi.descriptor"));
@@ -677,10 +679,11 @@ TEST(Conform, RemovesASinksFiles) {
 
 TEST(Conform, ReportsAFullDiskAsAnErrorOfTheSuite) {
     ConformRun run;
-    run.start({ARHOST_PLUGIN_DIRECTORY "/sink_images.so", "--set", "path=%d.png", "--only", "sink.start"}, [] {
-        const rlimit full{1 << 20, 1 << 20}; // acts like a full disk
-        ::setrlimit(RLIMIT_FSIZE, &full);
-    });
+    run.start({arhost::test::plugin_directory() + "/sink_images.so", "--set", "path=%d.png", "--only", "sink.start"},
+              [] {
+                  const rlimit full{1 << 20, 1 << 20}; // acts like a full disk
+                  ::setrlimit(RLIMIT_FSIZE, &full);
+              });
     EXPECT_EQ(run.wait(), 2);
     EXPECT_THAT(run.output(), HasSubstr("error    sink.start\n"));
     EXPECT_THAT(run.output(), HasSubstr("has no space for 16 MiB: File too large; free some, or set TMPDIR"));

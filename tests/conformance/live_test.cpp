@@ -4,6 +4,7 @@
 #include "arhost_run.hpp"
 
 #include <arhost/sink.h>
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -55,8 +56,8 @@ struct Parts {
 
 // The suite's wrong plugin with this defect, with read access to the shipped plugin that it wraps.
 std::string wrong(const std::string &kind, const std::string &defect, const std::string &more) {
-    return "{plugin: ./" + kind + "_" + defect + ".so, conform: true, reads: [" ARHOST_PLUGIN_DIRECTORY "], " + more +
-           "}";
+    return "{plugin: ./" + kind + "_" + defect + ".so, conform: true, reads: [" + arhost::test::plugin_directory() +
+           "], " + more + "}";
 }
 Parts with_raytracer(const std::string &defect) {
     Parts parts;
@@ -91,7 +92,8 @@ public:
                                          std::pair("body", "wrong_body"), std::pair("source", "wrong_source")}) {
             const std::string text = parts.text(), begin = std::string("./") + kind + "_";
             if (const std::size_t at = text.find(begin); at != std::string::npos)
-                std::filesystem::create_symlink(std::string(ARHOST_WRONG_PLUGIN_DIRECTORY "/") + file + ".so",
+                std::filesystem::create_symlink(std::string(arhost::test::wrong_plugin_directory() + "/") + file +
+                                                    ".so",
                                                 path(text.substr(at, text.find(',', at) - at)));
         }
     }

@@ -6,6 +6,7 @@
 #include "matrix_sources.hpp"
 #include "matrix_trackers.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <set>
@@ -75,7 +76,8 @@ TEST(MatrixTable, HasAWrongPluginForEveryTest) {
 
 TEST(MatrixTable, ListsEveryDefectOfTheWrongPlugins) {
     for (const Table &table : tables) {
-        const std::string source = read_file(ARHOST_SOURCE_DIRECTORY "/tests/conformance/wrong/" + table.source);
+        const std::string source =
+            read_file(arhost::test::source_directory() + "/tests/conformance/wrong/" + table.source);
         for (std::size_t at = 0; (at = source.find("has(\"", at)) != std::string::npos;) {
             at += 5;
             const std::string defect = source.substr(at, source.find('"', at) - at);
@@ -95,7 +97,7 @@ TEST(ConformanceDocument, HasTheMatrix) {
                 tests += (tests.empty() ? "`" : ", `") + test + "`";
             text += "| " + wrong.description + " | " + wrong.verdict + " | " + tests + " |\n";
         }
-        EXPECT_THAT(read_file(ARHOST_SOURCE_DIRECTORY "/docs/conformance.md"), HasSubstr(text));
+        EXPECT_THAT(read_file(arhost::test::source_directory() + "/docs/conformance.md"), HasSubstr(text));
     }
 }
 
@@ -106,7 +108,7 @@ TEST(ConformanceDocument, HasEveryTestAndItsRequirement) {
     std::string table = "| test | requirement |\n| --- | --- |\n";
     for (std::string name, requirement; lines >> name >> std::ws && std::getline(lines, requirement);)
         table += "| `" + name + "` | " + requirement + " |\n";
-    EXPECT_THAT(read_file(ARHOST_SOURCE_DIRECTORY "/docs/conformance.md"), HasSubstr(table));
+    EXPECT_THAT(read_file(arhost::test::source_directory() + "/docs/conformance.md"), HasSubstr(table));
 }
 
 } // namespace

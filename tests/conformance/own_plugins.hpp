@@ -5,6 +5,7 @@
 
 #include "conform_run.hpp"
 
+#include <directories.hpp>
 #include <gtest/gtest.h>
 
 namespace arhost::test {
@@ -27,7 +28,7 @@ inline void expect_to_pass(const OwnPlugin &configuration) {
         ASSERT_EQ(run.run(), 0) << run.output();
     }
     std::vector<std::string> arguments = {
-        "conform",          ARHOST_PLUGIN_DIRECTORY "/" + configuration.plugin + ".so",
+        "conform",          arhost::test::plugin_directory() + "/" + configuration.plugin + ".so",
         "--jobs",           "1",
         "--timeout-factor", "3",
         "--json",           "results.json"};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "arhost_run.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 #include <opencv2/aruco.hpp>
 
@@ -11,7 +12,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const fs::path root = ARHOST_SOURCE_DIRECTORY;
+const fs::path root = arhost::test::source_directory();
 
 std::vector<fs::path> documents() {
     std::vector<fs::path> found = {root / "README.md", root / "CONTRIBUTING.md", root / "CHANGELOG.md"};

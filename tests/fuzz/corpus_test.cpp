@@ -5,6 +5,7 @@
 #include "mutator.hpp"
 #include "targets.hpp"
 
+#include <directories.hpp>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -19,8 +20,8 @@ namespace {
 
 std::vector<std::filesystem::path> corpus_of(const Target &target) {
     std::vector<std::filesystem::path> files;
-    for (const auto &entry :
-         std::filesystem::directory_iterator(std::filesystem::path(ARHOST_FUZZ_CORPUS) / target.name))
+    for (const auto &entry : std::filesystem::directory_iterator(
+             std::filesystem::path(arhost::test::source_directory() + "/tests/fuzz/corpus") / target.name))
         files.push_back(entry.path());
     std::ranges::sort(files);
     return files;

@@ -4,6 +4,7 @@
 // but without child processes and shared memory. The tests in tests/system test the entire pipeline.
 #pragma once
 
+#include "directories.hpp"
 #include <arhost/arhost.h>
 
 #include <dlfcn.h>
@@ -28,7 +29,7 @@ namespace arhost::test {
 // Returns a path in the folder of real photos and meshes, which are not in the repository. A test that needs them
 // must begin with, for example, ARHOST_REQUIRE_SHARED_DATA("markers/julia").
 inline std::filesystem::path shared_data(const std::string &relative) {
-    return std::filesystem::path(ARHOST_SHARED_DATA) / relative;
+    return std::filesystem::path(arhost::test::shared_data_directory()) / relative;
 }
 #define ARHOST_REQUIRE_SHARED_DATA(relative)                                                                         \
     if (!std::filesystem::exists(::arhost::test::shared_data(relative)))                                             \
@@ -83,7 +84,7 @@ private:
 class PluginUnderTest {
 public:
     explicit PluginUnderTest(const std::string &id) {
-        const std::string file = std::string(ARHOST_PLUGIN_DIRECTORY) + "/" + id + ".so";
+        const std::string file = arhost::test::plugin_directory() + "/" + id + ".so";
         library_ = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
         if (!library_)
             throw std::runtime_error(dlerror());

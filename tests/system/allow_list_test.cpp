@@ -6,6 +6,7 @@
 #include "arhost_run.hpp"
 #include "camera_server.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -38,9 +39,10 @@ std::string obstacle() {
 // Returns the calls that failed with ENOSYS or EPERM in a run of run.yaml, with their arguments.
 std::set<std::string> blocked_calls(ArhostRun &run) {
     run.start({}, [] {
-        ::setenv("ARHOST_PLUGIN_PATH", ARHOST_TEST_PLUGIN_DIRECTORY, 1);
+        ::setenv("ARHOST_PLUGIN_PATH", arhost::test::test_plugin_directory().c_str(), 1);
         ::execlp("strace", "strace", "-f", "-qq", "-o", "trace.txt", "-e", "status=failed",
-                 ARHOST_BINARY_DIRECTORY "/bin/arhost", "--config", "run.yaml", "--allow-no-target", nullptr);
+                 arhost::test::build_directory() + "/bin/arhost", "--config", "run.yaml", "--allow-no-target",
+                 nullptr);
         ::_exit(127);
     });
     EXPECT_EQ(run.wait(std::chrono::seconds(100)), 0) << run.output();

@@ -6,6 +6,7 @@
 #include "plugin_under_test.hpp"
 #include "processes.hpp"
 
+#include <directories.hpp>
 #include <nlohmann/json.hpp>
 
 #include <chrono>
@@ -62,8 +63,8 @@ public:
             ::dup2(out, STDOUT_FILENO);
             ::dup2(out, STDERR_FILENO);
             prepare();
-            ::setenv("ARHOST_PLUGIN_PATH", ARHOST_TEST_PLUGIN_DIRECTORY, 1);
-            arguments.insert(arguments.begin(), ARHOST_BINARY_DIRECTORY "/bin/arhost");
+            ::setenv("ARHOST_PLUGIN_PATH", arhost::test::test_plugin_directory().c_str(), 1);
+            arguments.insert(arguments.begin(), arhost::test::build_directory() + "/bin/arhost");
             std::vector<char *> argv;
             for (std::string &argument : arguments)
                 argv.push_back(argument.data());

@@ -3,6 +3,7 @@
 // Tests that bad input results in a message that names the position and the fix, exit status 2, and no output file.
 #include "arhost_run.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <sys/stat.h>
@@ -374,8 +375,8 @@ TEST(BadInput, OfAPluginIsReportedOnce) {
 TEST(BadInput, DoesNotOverwriteArhostItself) {
     for (const char *file : {"/bin/arhost-worker", "/lib/arhost/plugins/sink_window.so"}) {
         ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 5}}\n"
-                      "outputs: [{plugin: sink_poses, path: " ARHOST_BINARY_DIRECTORY +
-                      std::string(file) + "}]\n");
+                      "outputs: [{plugin: sink_poses, path: " +
+                      arhost::test::build_directory() + std::string(file) + "}]\n");
         EXPECT_EQ(run.run(), 2);
         EXPECT_THAT(run.output(), HasSubstr("run.yaml:3:38: outputs[0].path: '"));
         EXPECT_THAT(run.output(), HasSubstr("' belongs to arhost; choose another path"));

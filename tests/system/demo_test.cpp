@@ -3,6 +3,7 @@
 // Tests of the demonstration (config/demo.yaml), and of videos that the real plugins write and read.
 #include "arhost_run.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <opencv2/imgcodecs.hpp>
@@ -38,7 +39,7 @@ std::string video_yaml(const std::string &outputs) {
 
 TEST(Demo, WritesItsFourFiles) {
     ArhostRun run;
-    std::filesystem::copy(ARHOST_SOURCE_DIRECTORY "/config", run.path("config"),
+    std::filesystem::copy(arhost::test::source_directory() + "/config", run.path("config"),
                           std::filesystem::copy_options::recursive);
     ASSERT_EQ(run.run({"--config", "config/demo.yaml", "--frames", "42"}), 0) << run.output();
     EXPECT_EQ(frames_of(run.path("out/demo.mp4")), 42);

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Validates the output of `arhost devices --json`. Needs ARHOST_SOURCE_DIRECTORY.
+// Validates the output of `arhost devices --json`.
 #pragma once
 
 #include "arhost_run.hpp"
 
 #include <cstdlib>
+#include <directories.hpp>
 #include <fstream>
 #include <string>
 
@@ -27,8 +28,8 @@ inline std::string schema_violation(const nlohmann::json &json) {
         "for error in jsonschema.Draft202012Validator(schema).iter_errors(json.load(open(sys.argv[2]))):\n"
         "    print(error.message)\n";
     std::ofstream(folder.path() / "validate.py") << program;
-    const std::string command = "python3 '" + (folder.path() / "validate.py").string() +
-                                "' '" ARHOST_SOURCE_DIRECTORY "/docs/devices.schema.json' '" +
+    const std::string command = "python3 '" + (folder.path() / "validate.py").string() + "' '" +
+                                arhost::test::source_directory() + "/docs/devices.schema.json' '" +
                                 (folder.path() / "devices.json").string() + "' >'" + violations + "' 2>&1";
     const int status = std::system(command.c_str());
     return read_file(violations) + (status == 0 ? "" : "the validation failed");

@@ -4,6 +4,7 @@
 #include "arhost_run.hpp"
 #include "device_schema.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -177,7 +178,7 @@ TEST(Devices, OfAnUnknownPluginAreAnInvalidCommandLine) {
 TEST(Lab, SaysOnceWhatToUseWithoutACamera) {
     if (std::filesystem::exists("/dev/video0"))
         GTEST_SKIP() << "this machine has a camera";
-    const std::string lab = ARHOST_SOURCE_DIRECTORY "/config/lab.yaml";
+    const std::string lab = arhost::test::source_directory() + "/config/lab.yaml";
     for (const std::vector<std::string> &arguments : {std::vector{lab}, std::vector<std::string>{"check", lab}}) {
         ArhostRun run;
         EXPECT_EQ(run.run(arguments), 2);

@@ -3,6 +3,7 @@
 // Tests of mode live: stages process the newest frame, and the video never waits for a tracker or ray tracer.
 #include "arhost_run.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <functional>
@@ -95,7 +96,8 @@ TEST(Live, ShownFramesEqualThoseOfLockstep) {
         "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 45, width: 320, height: 180}}\n"
         "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: "
         "80}]}\n"
-        "raytracer: {plugin: rt_embree, scene: " ARHOST_SOURCE_DIRECTORY
+        "raytracer: {plugin: rt_embree, scene: " +
+        arhost::test::source_directory() +
         "/config/scenes/demo.yaml, options: {samples: 64}, deadline_ms: 60000}\n"
         "outputs: [{plugin: sink_images, path: \"%04d.png\"}]\nlive: {max_latency_ms: 60000}\nstats: stats.json\n";
     ArhostRun live(yaml), lockstep(yaml);

@@ -4,6 +4,7 @@
 // (shared/data/markers/rbt_sequence).
 #include "arhost_run.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <map>
@@ -20,7 +21,9 @@ std::string configuration(const std::string &tracker, const std::string &more = 
            "tracker:\n  plugin: " +
            tracker +
            "\n  targets: [{ids: 0-19, family: tag36h11, side_mm: 95.5}]\n"
-           "raytracer: {plugin: rt_embree, scene: " ARHOST_SOURCE_DIRECTORY "/config/scenes/optix-cs.yaml}\n"
+           "raytracer: {plugin: rt_embree, scene: " +
+           arhost::test::source_directory() +
+           "/config/scenes/optix-cs.yaml}\n"
            "outputs:\n- {plugin: sink_poses, path: poses.jsonl}\n- {plugin: sink_images, path: \"frames/%04d.png\"}\n"
            "stats: stats.json\n" +
            more;

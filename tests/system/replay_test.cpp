@@ -3,6 +3,7 @@
 // Tests that record the camera poses of a run and replay them.
 #include "arhost_run.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 using namespace arhost::test;
@@ -11,7 +12,7 @@ using testing::HasSubstr;
 
 namespace {
 
-const std::string scene = ARHOST_SOURCE_DIRECTORY "/config/scenes/optix-cs.yaml";
+const std::string scene = arhost::test::source_directory() + "/config/scenes/optix-cs.yaml";
 
 // Returns a configuration of the real plugins for a small synthetic video. The marker is occluded for some frames.
 std::string recording(const std::string &frames = "40") {

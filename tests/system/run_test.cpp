@@ -3,6 +3,7 @@
 // Tests of complete runs in mode lockstep.
 #include "arhost_run.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -464,7 +465,7 @@ TEST(CommandLine, CompletesInBash) {
     const auto completed = [&](const std::string &words) {
         EXPECT_EQ(
             run_shell(run, "bash -c \"$SCRIPT\"",
-                      "source '" ARHOST_BINARY_DIRECTORY "/pages/arhost.bash'; COMP_WORDS=(" + words +
+                      "source '" + arhost::test::build_directory() + "/pages/arhost.bash'; COMP_WORDS=(" + words +
                           "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _arhost; printf '%s ' \"${COMPREPLY[@]}\""),
             0);
         return run.output();
@@ -499,7 +500,8 @@ TEST(CommandLine, CompletesInFish) {
     run.write("lab.yaml", "");
     const auto completed = [&](const std::string &words) {
         EXPECT_EQ(run_shell(run, "fish -c \"$SCRIPT\"",
-                            "source '" ARHOST_BINARY_DIRECTORY "/pages/arhost.fish'; complete -C '" + words + "'"),
+                            "source '" + arhost::test::build_directory() + "/pages/arhost.fish'; complete -C '" +
+                                words + "'"),
                   0);
         return run.output();
     };
@@ -520,7 +522,7 @@ TEST(CommandLine, CompletesInZsh) {
     if (run_shell(run, "zsh --version") != 0)
         GTEST_SKIP() << "zsh is not installed";
     run.write("folder/lab.yaml", "");
-    run.write("functions/_arhost", read_file(ARHOST_BINARY_DIRECTORY "/pages/arhost.zsh"));
+    run.write("functions/_arhost", read_file(arhost::test::build_directory() + "/pages/arhost.zsh"));
     // Types `words` and a tab on a pseudo-terminal, and waits until zsh adds `rest`.
     const auto completes = [&](const std::string &words, const std::string &rest) {
         return run_shell(run, "timeout 20 zsh -f -c \"$SCRIPT\"",
@@ -544,7 +546,7 @@ TEST(CommandLine, CompletesInZsh) {
 }
 
 TEST(CommandLine, HasAManPageForEachProgram) {
-    const std::filesystem::path pages = ARHOST_BINARY_DIRECTORY "/pages";
+    const std::filesystem::path pages = arhost::test::build_directory() + "/pages";
     for (const char *program : {"arhost", "arhost-calibrate", "arhost-conform", "arhost-inprocess", "arhost-launcher",
                                 "arhost-map", "arhost-marker", "arhost-worker", "render-scene"})
         EXPECT_TRUE(std::filesystem::is_regular_file(pages / (std::string(program) + ".1.gz"))) << program;

@@ -5,6 +5,7 @@
 #include "arhost_run.hpp"
 #include "attacks.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -250,7 +251,8 @@ void expect_ended(HostileRun &run, const std::string &reason, std::uint64_t befo
 
 // Returns a path at or above arhost that ordinary users cannot access, or "".
 fs::path closed_folder() {
-    for (fs::path path = ARHOST_BINARY_DIRECTORY "/bin/arhost"; path.has_relative_path(); path = path.parent_path())
+    for (fs::path path = arhost::test::build_directory() + "/bin/arhost"; path.has_relative_path();
+         path = path.parent_path())
         if ((fs::status(path).permissions() & fs::perms::others_exec) == fs::perms::none)
             return path;
     return {};
@@ -466,14 +468,14 @@ TEST(SecurityDocumentation, ListsTheAttacks) {
         table += std::string("| `") + attack.group + "` | " + attack.what + " | " + layers + " | `" +
                  name_of(attack) + "` |\n";
     }
-    EXPECT_THAT(read_file(ARHOST_SOURCE_DIRECTORY "/docs/security.md"), HasSubstr(table));
+    EXPECT_THAT(read_file(arhost::test::source_directory() + "/docs/security.md"), HasSubstr(table));
 }
 
 // The plugin, a link to it, or a folder in LD_LIBRARY_PATH is in the home folder, beside a secret.
 TEST(Sandbox, APluginInTheHomeFolderReadsOnlyItself) {
     if (!has("mount"))
         REQUIRE_LAYER("landlock");
-    const fs::path library = ARHOST_TEST_PLUGIN_DIRECTORY "/hostile.so";
+    const fs::path library = arhost::test::test_plugin_directory() + "/hostile.so";
     for (const std::string where : {"itself", "link", "library path"}) {
         SCOPED_TRACE(where);
         HostileRun run("read");
@@ -845,7 +847,7 @@ TEST(Sandbox, ReadsGrantsALibraryInAnotherFolder) {
     run.run({"plugins"});
     EXPECT_THAT(run.output(), ContainsRegex("linked_elsewhere +cannot be used: .*cannot open shared object file.*"
                                             "'--reads FOLDER' to plugins and conform"));
-    run.run({"plugins", "--reads", ARHOST_BINARY_DIRECTORY "/tests/elsewhere"});
+    run.run({"plugins", "--reads", arhost::test::build_directory() + "/tests/elsewhere"});
     EXPECT_THAT(run.output(), ContainsRegex("linked_elsewhere +cannot be used: .*exports no symbol 'arhost_entry'"));
     EXPECT_EQ(run.run({"plugins", "--reads", "/"}), 2);
     EXPECT_THAT(run.output(), HasSubstr("the sandbox cannot grant '/'"));

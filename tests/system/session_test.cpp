@@ -3,6 +3,7 @@
 // Tests that record sessions with the real plugins and replay them.
 #include "arhost_run.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <map>
@@ -16,7 +17,7 @@ using Json = nlohmann::json;
 
 namespace {
 
-const std::string scenes = ARHOST_SOURCE_DIRECTORY "/config/scenes/";
+const std::string scenes = arhost::test::source_directory() + "/config/scenes/";
 
 // Returns a configuration of a small synthetic video in which the marker is occluded for some frames, and an output
 // that records the session `take`. The folder `recorded` gets the images and poses.
@@ -307,8 +308,8 @@ TEST(Sessions, TheCommandRecordStartsAndStopsThem) {
     std::filesystem::create_directories(run.path("runtime"));
     run.start({"--config", "run.yaml", "--set", "outputs[0]={plugin: sink_null}"}, prepare);
     const auto command = [&](const std::string &text) {
-        const std::string line = "XDG_RUNTIME_DIR='" + run.path("runtime").string() +
-                                 "' " ARHOST_BINARY_DIRECTORY "/bin/arhost ctl " + text + " >>'" +
+        const std::string line = "XDG_RUNTIME_DIR='" + run.path("runtime").string() + "' " +
+                                 arhost::test::build_directory() + "/bin/arhost ctl " + text + " >>'" +
                                  run.path("ctl.txt").string() + "' 2>&1";
         return std::system(line.c_str());
     };

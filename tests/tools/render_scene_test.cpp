@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plugin_under_test.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <cstdlib>
@@ -15,7 +16,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 using testing::Not;
 
-const std::string counter = ARHOST_TEST_PLUGIN_DIRECTORY "/rt_counter.so";
+const std::string counter = arhost::test::test_plugin_directory() + "/rt_counter.so";
 
 class RenderScene : public testing::Test {
 protected:
@@ -24,16 +25,16 @@ protected:
                         const std::string &samples = "--samples 1") const {
         const fs::path file = scratch_.path() / "picture.ppm";
         fs::remove(file);
-        const std::string command = ARHOST_BINARY_DIRECTORY "/bin/render-scene " ARHOST_SOURCE_DIRECTORY
-                                                            "/config/scenes/" +
-                                    scene + ".yaml --size 80x60 --output " + file.string() + " " + samples + " " +
-                                    options + " > " + (scratch_.path() / "output.txt").string() + " 2>&1";
+        const std::string command = arhost::test::build_directory() + "/bin/render-scene " +
+                                    arhost::test::source_directory() + "/config/scenes/" + scene +
+                                    ".yaml --size 80x60 --output " + file.string() + " " + samples + " " + options +
+                                    " > " + (scratch_.path() / "output.txt").string() + " 2>&1";
         status_ = std::system(command.c_str());
         return read(file);
     }
     const fs::path &folder() const { return scratch_.path(); }
     int status_of(const std::string &arguments) const {
-        const int status = std::system((ARHOST_BINARY_DIRECTORY "/bin/render-scene" + arguments + " > " +
+        const int status = std::system((arhost::test::build_directory() + "/bin/render-scene" + arguments + " > " +
                                         (scratch_.path() / "output.txt").string() + " 2>&1")
                                            .c_str());
         return WEXITSTATUS(status);
@@ -110,7 +111,8 @@ TEST_F(RenderScene, RunsAnyRayTracerByNameOrFile) {
     const std::string embree = picture("demo", "");
     ASSERT_FALSE(embree.empty()) << printed();
     EXPECT_EQ(picture("demo", "--raytracer rt_embree"), embree) << printed();
-    EXPECT_EQ(picture("demo", "--raytracer " ARHOST_PLUGIN_DIRECTORY "/rt_embree.so"), embree) << printed();
+    EXPECT_EQ(picture("demo", "--raytracer " + arhost::test::plugin_directory() + "/rt_embree.so"), embree)
+        << printed();
 
     // rt_counter draws a square in the corner whose colour encodes the camera distance; the rest is checkerboard.
     const std::string counted = picture("demo", "--eye 0,0,513 --raytracer " + counter, "");
@@ -119,7 +121,7 @@ TEST_F(RenderScene, RunsAnyRayTracerByNameOrFile) {
     ASSERT_EQ(counted.size(), header.size() + 80 * 60 * 3);
     EXPECT_EQ(counted.substr(0, header.size() + 3), header + std::string("\x0d\x00\xaa", 3));
     EXPECT_EQ(counted.substr(counted.size() - 3), "\xb0\xb0\xb0");
-    ::setenv("ARHOST_PLUGIN_PATH", ARHOST_TEST_PLUGIN_DIRECTORY, 1);
+    ::setenv("ARHOST_PLUGIN_PATH", arhost::test::test_plugin_directory().c_str(), 1);
     EXPECT_EQ(picture("demo", "--eye 0,0,513 --raytracer rt_counter", ""), counted) << printed();
     ::unsetenv("ARHOST_PLUGIN_PATH");
 }
@@ -145,7 +147,7 @@ TEST_F(RenderScene, ReportsErrorsOfThePluginAndItsOptions) {
                 HasSubstr("--raytracer: there is no plugin 'rt_embre'; did you mean 'rt_embree'?"));
     EXPECT_THAT(rejected("--raytracer ./nowhere.so"), HasSubstr("--raytracer: there is no plugin '"));
     EXPECT_THAT(rejected("--raytracer sink_null"), HasSubstr("--raytracer: 'sink_null' is a sink, not a ray tracer"));
-    EXPECT_THAT(rejected("--raytracer " ARHOST_TEST_PLUGIN_DIRECTORY "/no_plugin.so"),
+    EXPECT_THAT(rejected("--raytracer " + arhost::test::test_plugin_directory() + "/no_plugin.so"),
                 HasSubstr("is not an arhost plugin"));
     EXPECT_THAT(rejected("--set sampels=4"), HasSubstr("--set: sampels: unknown key; did you mean 'samples'?"));
     EXPECT_THAT(rejected("--set samples=1000"), HasSubstr("--set: samples: "));

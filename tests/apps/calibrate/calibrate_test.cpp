@@ -5,6 +5,7 @@
 #include "plugin_under_test.hpp"
 #include "rendered_board.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
@@ -48,7 +49,7 @@ protected:
         return WEXITSTATUS(status);
     }
     int calibrate(const std::string &arguments) const {
-        return execute(ARHOST_BINARY_DIRECTORY "/bin/arhost-calibrate " + arguments);
+        return execute(arhost::test::build_directory() + "/bin/arhost-calibrate " + arguments);
     }
     std::string read(const fs::path &file) const {
         std::ifstream stream(folder() / file, std::ios::binary);
@@ -187,8 +188,8 @@ TEST_F(Calibrate, AdvisesWhichViewACameraNeeds) {
 
 TEST_F(Calibrate, ShowsAWindowIfThereIsADisplay) {
     write_video(brown_camera(), charuco, poses_for(charuco));
-    const std::string command =
-        ARHOST_BINARY_DIRECTORY "/bin/arhost-calibrate " + charuco_arguments + "--camera video.avi -o camera.yaml";
+    const std::string command = arhost::test::build_directory() + "/bin/arhost-calibrate " + charuco_arguments +
+                                "--camera video.avi -o camera.yaml";
     EXPECT_EQ(execute("DISPLAY=:9977 " + command), 0) << printed();
     EXPECT_THAT(printed(), HasSubstr("warning: the display cannot be opened, so there is no window"));
     EXPECT_EQ(execute("DISPLAY=:9977 " + command + " --no-window"), 0) << printed();
@@ -365,7 +366,7 @@ TEST_F(Calibrate, FailsIfTheDiskIsFull) {
 }
 
 TEST_F(Calibrate, FindsTheBoardThatArhostPrints) {
-    std::ifstream document(ARHOST_SOURCE_DIRECTORY "/docs/calibration.md");
+    std::ifstream document(arhost::test::source_directory() + "/docs/calibration.md");
     std::string print, calibrate;
     for (std::string line; std::getline(document, line);) {
         const std::size_t at = line.find_first_not_of(' ');
@@ -380,14 +381,14 @@ TEST_F(Calibrate, FindsTheBoardThatArhostPrints) {
     ASSERT_NE(calibrate.find("--camera /dev/video0 --size 1280x720"), std::string::npos);
     print.replace(print.find("board.pdf"), 9, "board.png --dpi 150");
     calibrate.replace(calibrate.find("--camera"), 36, "--images board.png");
-    ASSERT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/" + print), 0) << printed();
-    EXPECT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/" + calibrate), 2);
+    ASSERT_EQ(execute(arhost::test::build_directory() + "/bin/" + print), 0) << printed();
+    EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/" + calibrate), 2);
     EXPECT_THAT(printed(), HasSubstr("the board was found in 1 view, but"));
 }
 
 TEST_F(Calibrate, IsACommandOfArhost) {
-    EXPECT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/arhost calibrate --chessboard 9x6 -o a.yaml"), 2);
+    EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/arhost calibrate --chessboard 9x6 -o a.yaml"), 2);
     EXPECT_THAT(printed(), HasSubstr("error: --square is missing"));
-    EXPECT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/arhost help calibrate"), 0);
+    EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/arhost help calibrate"), 0);
     EXPECT_THAT(printed(), HasSubstr("Usage: arhost calibrate [OPTIONS]"));
 }

@@ -5,6 +5,8 @@
 #include "plugin_under_test.hpp"
 #include "simulated_markers.hpp"
 
+#include <arhost/shading/srgb8.hpp>
+#include <directories.hpp>
 #include <fiducial_common/rbt_sequence.hpp>
 
 #include <fmt/format.h>
@@ -48,7 +50,7 @@ protected:
         return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     }
     int learn(const std::string &arguments) const {
-        return execute(ARHOST_BINARY_DIRECTORY "/bin/arhost-map " + arguments);
+        return execute(arhost::test::build_directory() + "/bin/arhost-map " + arguments);
     }
     std::string read(const fs::path &file) const {
         std::ifstream stream(folder() / file, std::ios::binary);
@@ -72,7 +74,7 @@ protected:
 
     // Prints a board and its map, and returns the print.
     cv::Mat print_board(const std::string &family) const {
-        EXPECT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/arhost-marker " + family +
+        EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/arhost-marker " + family +
                           " --grid 3x2 --side 40 --gap 12 --paper 280x230 --margin 5 --dpi 150 -o board.png --map "
                           "board.map.yaml"),
                   0)
@@ -114,11 +116,8 @@ protected:
     // A camera averages light and then encodes it.
     static cv::Mat srgb_of_light() {
         cv::Mat_<std::uint8_t> codes(1, 256);
-        for (int i = 0; i < 256; ++i) {
-            const double light = i / 255.0;
-            codes(0, i) = static_cast<std::uint8_t>(
-                std::lround(255 * (light <= 0.0031308 ? 12.92 * light : 1.055 * std::pow(light, 1 / 2.4) - 0.055)));
-        }
+        for (int light = 0; light < 256; ++light)
+            codes(0, light) = static_cast<std::uint8_t>(arhost::shading::srgb8_exact(light / 255.0));
         return codes;
     }
     void write_photos(const std::string &family, int count) const {
@@ -188,12 +187,13 @@ TEST_F(MapProgram, ReadsAVideo) {
 
 TEST_F(MapProgram, IsACommandOfArhost) {
     write_photos("tag36h11", 6);
-    ASSERT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/arhost map --images photo-*.png --camera camera.yaml --family "
-                                              "DICT_APRILTAG_36h11 --side 40 -o desk.map.yaml"),
+    ASSERT_EQ(execute(arhost::test::build_directory() +
+                      "/bin/arhost map --images photo-*.png --camera camera.yaml --family "
+                      "DICT_APRILTAG_36h11 --side 40 -o desk.map.yaml"),
               0)
         << printed();
     EXPECT_THAT(read("desk.map.yaml"), HasSubstr("family: tag36h11"));
-    EXPECT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/arhost help map"), 0);
+    EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/arhost help map"), 0);
     EXPECT_THAT(printed(), HasSubstr("Usage: arhost map [OPTIONS]"));
 }
 
@@ -303,8 +303,9 @@ TEST_F(MapProgram, LeavesTheOldMapIfItIsInterrupted) {
     std::string images;
     for (int i = 0; i < 3000; ++i)
         images += " photo-00.png";
-    EXPECT_EQ(execute("timeout --preserve-status -s INT 0.3 " ARHOST_BINARY_DIRECTORY "/bin/arhost-map --images" +
-                      images + " --camera camera.yaml --family tag36h11 --side 40 -o desk.map.yaml"),
+    EXPECT_EQ(execute("timeout --preserve-status -s INT 0.3 " + arhost::test::build_directory() +
+                      "/bin/arhost-map --images" + images +
+                      " --camera camera.yaml --family tag36h11 --side 40 -o desk.map.yaml"),
               128 + SIGINT)
         << printed();
     EXPECT_EQ(files(), before);

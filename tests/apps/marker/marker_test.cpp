@@ -5,6 +5,7 @@
 #include "plugin_under_test.hpp"
 #include "run_config/targets.hpp"
 
+#include <directories.hpp>
 #include <fiducial_common/apriltag_families.hpp>
 #include <fiducial_common/aruco_dictionaries.hpp>
 #include <fiducial_common/matrix_codes.hpp>
@@ -150,7 +151,7 @@ protected:
         return WEXITSTATUS(status);
     }
     int print(const std::string &arguments) const {
-        return execute(ARHOST_BINARY_DIRECTORY "/bin/arhost-marker " + arguments);
+        return execute(arhost::test::build_directory() + "/bin/arhost-marker " + arguments);
     }
     std::string read(const fs::path &file) const {
         std::ifstream stream(folder() / file, std::ios::binary);
@@ -456,22 +457,22 @@ TEST_F(Marker, TurnsThePaperIfThatSavesPages) {
 
 TEST_F(Marker, IsACommandOfArhost) {
     const std::string arguments = " tag36h11:7 --side 12 --paper 60x60 -o ";
-    ASSERT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/arhost marker" + arguments + "a.png"), 0) << printed();
+    ASSERT_EQ(execute(arhost::test::build_directory() + "/bin/arhost marker" + arguments + "a.png"), 0) << printed();
     ASSERT_EQ(print(arguments + "b.png"), 0) << printed();
     EXPECT_EQ(read("a.png"), read("b.png"));
-    EXPECT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/arhost marker tag36h11:7 --side 0 -o c.png"), 2);
-    EXPECT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/arhost help marker"), 0);
+    EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/arhost marker tag36h11:7 --side 0 -o c.png"), 2);
+    EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/arhost help marker"), 0);
     for (const char *text : {"Usage: arhost marker [OPTIONS] MARKERS", "tagStandard52h13", "DICT_ARUCO_ORIGINAL"})
         EXPECT_THAT(printed(), HasSubstr(text));
 }
 
 TEST_F(Marker, RunsTheCommandsOfItsDocumentation) {
     write_pattern();
-    std::ifstream document(ARHOST_SOURCE_DIRECTORY "/docs/markers.md");
+    std::ifstream document(arhost::test::source_directory() + "/docs/markers.md");
     int count = 0;
     for (std::string line; std::getline(document, line);)
         if (line.starts_with("arhost marker ")) {
-            EXPECT_EQ(execute(ARHOST_BINARY_DIRECTORY "/bin/" + line), 0) << line << "\n" << printed();
+            EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/" + line), 0) << line << "\n" << printed();
             ++count;
         }
     EXPECT_GE(count, 4);

@@ -43,8 +43,8 @@ inline void leak_memory(std::size_t bytes) {
 }
 
 // Opens a shipped plugin, to modify its behaviour.
-inline const arhost_plugin &open_plugin(const char *file) {
-    void *library = ::dlopen(file, RTLD_NOW | RTLD_LOCAL);
+inline const arhost_plugin &open_plugin(const std::string &file) {
+    void *library = ::dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     const auto *entry = static_cast<const arhost_entry_point *>(::dlsym(library, "arhost_entry"));
     const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
     arhost_answer answer{sizeof answer, 0, nullptr};

@@ -5,6 +5,7 @@
 
 #include <arhost/arhost.h>
 #include <arhost/shading/srgb8.hpp>
+#include <directories.hpp>
 
 #include <algorithm>
 #include <array>
@@ -39,7 +40,7 @@ struct AtEnds {
 } at_ends;
 
 const arhost_plugin &embree() {
-    static const arhost_plugin &plugin = open_plugin(ARHOST_PLUGIN_DIRECTORY "/rt_embree.so");
+    static const arhost_plugin &plugin = open_plugin(arhost::test::plugin_directory() + "/rt_embree.so");
     return plugin;
 }
 const arhost_raytracer &embree_functions() {

@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <directories.hpp>
 #include <fcntl.h>
 #include <fstream>
 #include <sstream>
@@ -280,7 +281,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
 
 // sink_video, which gets a black picture instead of every fifth frame.
 const arhost_plugin &black_video() {
-    static const arhost_plugin &video = open_plugin(ARHOST_PLUGIN_DIRECTORY "/sink_video.so");
+    static const arhost_plugin &video = open_plugin(arhost::test::plugin_directory() + "/sink_video.so");
     static arhost_option_descriptor video_options[8];
     static arhost_descriptor named = *video.descriptor;
     static arhost_sink functions = *static_cast<const arhost_sink *>(video.functions);

@@ -5,6 +5,7 @@
 
 #include <arhost-cpp/plugin.hpp>
 #include <arhost/shading/lens.hpp>
+#include <directories.hpp>
 
 #include <algorithm>
 #include <chrono>
@@ -27,7 +28,7 @@ using namespace arhost::test;
 // ---- The modified tracker ---------------------------------------------------------------------------
 
 const arhost_plugin &real() {
-    static const arhost_plugin &plugin = open_plugin(ARHOST_PLUGIN_DIRECTORY "/tracker_apriltag.so");
+    static const arhost_plugin &plugin = open_plugin(arhost::test::plugin_directory() + "/tracker_apriltag.so");
     return plugin;
 }
 const arhost_tracker &real_functions() {

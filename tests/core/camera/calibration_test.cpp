@@ -7,6 +7,7 @@
 #include "errors.hpp"
 #include "plugin_under_test.hpp"
 
+#include <directories.hpp>
 #include <gtest/gtest.h>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
@@ -435,7 +436,7 @@ TEST(CameraBlock, RequiresWidthAndHeightTogether) {
 TEST(CameraDocumentation, HasValidExamples) {
     const test::ScratchFolder folder;
     std::ofstream(folder.path() / "camera.yaml") << "K: [600, 0, 320, 0, 601, 240, 0, 0, 1]\nD: [0, 0, 0, 0]\n";
-    std::ifstream page(std::string(ARHOST_SOURCE_DIRECTORY) + "/docs/camera.md");
+    std::ifstream page(arhost::test::source_directory() + "/docs/camera.md");
     std::size_t cameras = 0, coordinates = 0;
     for (std::string line, example; std::getline(page, line);) {
         if (line != "```yaml")

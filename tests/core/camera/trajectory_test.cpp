@@ -4,6 +4,7 @@
 #include "errors.hpp"
 #include "plugin_under_test.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -208,7 +209,7 @@ TEST_F(Trajectories, DissertationFormatErrorsNamePositionAndFix) {
 }
 
 TEST_F(Trajectories, ReadTheExampleOfTheDocumentation) {
-    std::ifstream stream(ARHOST_SOURCE_DIRECTORY "/docs/trajectories.md");
+    std::ifstream stream(arhost::test::source_directory() + "/docs/trajectories.md");
     const std::string document{std::istreambuf_iterator<char>(stream), {}};
     const std::size_t begin = document.find("```json\n") + 8;
     const Trajectory trajectory = read(document.substr(begin, document.find("```", begin) - begin));

@@ -5,6 +5,7 @@
 
 #include "plugin_under_test.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -17,7 +18,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const fs::path prefix = ARHOST_BINARY_DIRECTORY;
+const fs::path prefix = arhost::test::build_directory();
 
 std::string text_of(const fs::path &file) {
     std::ostringstream text;

@@ -4,6 +4,7 @@
 #include "host/probe.hpp"
 #include "plugin_under_test.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 using namespace arhost;
@@ -31,14 +32,14 @@ struct Probe : testing::Test {
         return std::get<std::string>(devices(plugin, {}, timeout));
     }
     static std::filesystem::path file(const std::string &plugin) {
-        return ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so";
+        return arhost::test::test_plugin_directory() + "/" + plugin + ".so";
     }
     supervise::Context &context() {
         if (!context_)
-            context_.emplace(supervise::Context{reactor_,
-                                                launcher_.emplace(ARHOST_BINARY_DIRECTORY "/bin/arhost-launcher"),
-                                                ARHOST_BINARY_DIRECTORY "/bin/arhost-worker",
-                                                [](arhost_severity, const std::string &, const std::string &) {}});
+            context_.emplace(supervise::Context{
+                reactor_, launcher_.emplace(arhost::test::build_directory() + "/bin/arhost-launcher"),
+                arhost::test::build_directory() + "/bin/arhost-worker",
+                [](arhost_severity, const std::string &, const std::string &) {}});
         return *context_;
     }
 

@@ -3,6 +3,7 @@
 // Tests that arhost-inprocess behaves like arhost, except for separate processes and deadlines.
 #include "arhost_run.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -17,9 +18,9 @@ namespace {
 // output.txt.
 int run_program(const ArhostRun &run, const std::string &program, const std::string &before = "FILE=run.yaml") {
     const std::string command = "cd " + run.path("").string() + " && (" + before +
-                                "; ARHOST_PLUGIN_PATH=" ARHOST_TEST_PLUGIN_DIRECTORY
-                                " timeout 60 " ARHOST_BINARY_DIRECTORY "/bin/" +
-                                program + " --config \"$FILE\") >output.txt 2>&1";
+                                "; ARHOST_PLUGIN_PATH=" + arhost::test::test_plugin_directory() + " timeout 60 " +
+                                arhost::test::build_directory() + "/bin/" + program +
+                                " --config \"$FILE\") >output.txt 2>&1";
     const int status = std::system(command.c_str());
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }

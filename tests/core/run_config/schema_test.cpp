@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_config/schema.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -12,7 +13,7 @@ using namespace arhost::run_config;
 namespace {
 
 std::string document(const std::string &name) {
-    std::ifstream stream(ARHOST_SOURCE_DIRECTORY "/docs/" + name);
+    std::ifstream stream(arhost::test::source_directory() + "/docs/" + name);
     std::ostringstream text;
     text << stream.rdbuf();
     return text.str();

@@ -3,6 +3,7 @@
 #include "scene/loader.hpp"
 #include "scene_samples.hpp"
 
+#include <directories.hpp>
 #include <glm/geometric.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -563,7 +564,7 @@ TEST(SceneLoading, RejectsInvalidStandIns) {
 }
 
 TEST(SceneDocumentation, ExampleLoads) {
-    std::ifstream stream(std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / "docs/scenes.md");
+    std::ifstream stream(std::filesystem::path(arhost::test::source_directory()) / "docs/scenes.md");
     const std::string text(std::istreambuf_iterator<char>(stream), {});
     const std::size_t begin = text.find("```yaml\n");
     ASSERT_NE(begin, std::string::npos);

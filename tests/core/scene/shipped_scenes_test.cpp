@@ -7,6 +7,7 @@
 #include "scene/mesh_loader.hpp"
 #include "scene/motion.hpp"
 
+#include <directories.hpp>
 #include <glm/common.hpp>
 #include <gtest/gtest.h>
 
@@ -20,7 +21,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-const fs::path folder = fs::path(ARHOST_SOURCE_DIRECTORY) / "config/scenes";
+const fs::path folder = fs::path(arhost::test::source_directory()) / "config/scenes";
 
 // Scenes of the dissertation (tables 3 and 4, figures 14 to 20) and additional ones. The number is the triangle count
 // of the mesh according to table 1 of the dissertation, or 0 if the table does not have it.
@@ -147,8 +148,9 @@ TEST(MovingScene, LoopsWithoutAJump) {
 TEST(GetModels, WritesNormalizedMeshes) {
     ARHOST_REQUIRE_SHARED_DATA("meshes");
     const arhost::test::ScratchFolder scratch;
-    const std::string command = ARHOST_SOURCE_DIRECTORY "/tools/get-models " ARHOST_SHARED_DATA "/meshes " +
-                                scratch.path().string() + " > /dev/null";
+    const std::string command = arhost::test::source_directory() + "/tools/get-models " +
+                                arhost::test::shared_data_directory() + "/meshes " + scratch.path().string() +
+                                " > /dev/null";
     ASSERT_EQ(std::system(command.c_str()), 0);
     for (const auto &[name, triangles] : {std::pair("bunny", 4968),
                                           {"bunny_69k", 69'451},

@@ -4,6 +4,7 @@
 // generates the shader from the declarations, so that it covers all functions.
 #include "plugin_under_test.hpp"
 
+#include <directories.hpp>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +19,7 @@
 
 namespace {
 
-const std::filesystem::path include_folder = ARHOST_SOURCE_DIRECTORY "/core/shading/include";
+const std::filesystem::path include_folder = arhost::test::source_directory() + "/core/shading/include";
 const std::filesystem::path shading = include_folder / "arhost" / "shading";
 
 std::string contents(const std::filesystem::path &path) {
@@ -130,8 +131,9 @@ TEST(LeafFiles, HaveNoBranches) {
 }
 
 TEST(LeafFiles, AreAllIncludedByEveryImplementation) {
-    for (const auto &path : {shading / "scalar.hpp", shading / "glsl.h",
-                             std::filesystem::path(ARHOST_SOURCE_DIRECTORY "/plugins/rt_embree/kernel/packet.hpp")})
+    for (const auto &path :
+         {shading / "scalar.hpp", shading / "glsl.h",
+          std::filesystem::path(arhost::test::source_directory() + "/plugins/rt_embree/kernel/packet.hpp")})
         for (const auto &[name, code] : leaf_files())
             EXPECT_NE(contents(path).find("leaf/" + name), std::string::npos) << path << " lacks " << name;
 }

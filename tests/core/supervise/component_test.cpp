@@ -3,6 +3,7 @@
 // Tests start, commands, death and stop of a component without a pipeline.
 #include "supervise/component.hpp"
 
+#include <directories.hpp>
 #include <gtest/gtest.h>
 
 #include <csignal>
@@ -15,9 +16,9 @@ namespace {
 
 struct Bench {
     Reactor reactor;
-    Launcher launcher{ARHOST_BINARY_DIRECTORY "/bin/arhost-launcher"};
+    Launcher launcher{arhost::test::build_directory() + "/bin/arhost-launcher"};
     std::string log;
-    Context context{reactor, launcher, ARHOST_BINARY_DIRECTORY "/bin/arhost-worker",
+    Context context{reactor, launcher, arhost::test::build_directory() + "/bin/arhost-worker",
                     [this](arhost_severity, const std::string &component, const std::string &text) {
                         log += component + ": " + text + "\n";
                     }};
@@ -58,8 +59,9 @@ struct Bench {
         };
         callbacks.stopped = [this](arhost_status, const std::string &) { events.push_back("stopped"); };
         component = std::make_unique<Component>(
-            context, "source", std::vector<std::filesystem::path>{ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so"},
-            limits, arhost::sandbox::Policy{}, std::move(callbacks));
+            context, "source",
+            std::vector<std::filesystem::path>{arhost::test::test_plugin_directory() + "/" + plugin + ".so"}, limits,
+            arhost::sandbox::Policy{}, std::move(callbacks));
         component->start();
     }
     // Runs the reactor until `event` has occurred `times` times. Returns false after 20 s.

@@ -4,6 +4,7 @@
 #include "plugin_under_test.hpp"
 #include "processes.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <csignal>
@@ -31,7 +32,7 @@ std::string all_output(const Spawned &spawned) {
     return text;
 }
 
-constexpr const char *program = ARHOST_BINARY_DIRECTORY "/bin/arhost-launcher";
+const std::string program = arhost::test::build_directory() + "/bin/arhost-launcher";
 const LogFunction no_log = [](arhost_severity, const std::string &, const std::string &) {};
 
 pid_t parent_of(pid_t pid) {

@@ -7,6 +7,7 @@
 #include "plugin_under_test.hpp"
 #include "sandbox/sandbox.hpp"
 
+#include <directories.hpp>
 #include <gtest/gtest.h>
 
 using namespace arhost;
@@ -16,8 +17,8 @@ namespace {
 
 struct Conversation {
     Reactor reactor;
-    supervise::Launcher launcher{ARHOST_BINARY_DIRECTORY "/bin/arhost-launcher"};
-    supervise::Context context{reactor, launcher, ARHOST_BINARY_DIRECTORY "/bin/arhost-worker",
+    supervise::Launcher launcher{arhost::test::build_directory() + "/bin/arhost-launcher"};
+    supervise::Context context{reactor, launcher, arhost::test::build_directory() + "/bin/arhost-worker",
                                [](arhost_severity, const std::string &, const std::string &) {}};
     std::vector<Json> received;
     std::string death;
@@ -29,7 +30,7 @@ struct Conversation {
           process(context, budget,
                   {[this](Message &message) { received.push_back(message.body); }, [](const Result &) {},
                    [this](const supervise::Death &how) { death = how.how; }},
-                  messages::Open{ARHOST_TEST_PLUGIN_DIRECTORY "/" + plugin + ".so", sandbox::Policy{}}) {}
+                  messages::Open{arhost::test::test_plugin_directory() + "/" + plugin + ".so", sandbox::Policy{}}) {}
 
     // Returns the next message of the worker, which must be a T, or nullopt if the worker has died.
     template <class T> std::optional<T> next() {

@@ -10,9 +10,13 @@
 
 namespace arhost::test {
 
+// Whether a square of cells, 0 or 1 for white, is the code of a marker.
+using IsMarker = std::function<bool(const cv::Mat_<uint8_t> &white)>;
+
 // Draws quadrilaterals over each other: plain ones, framed text, framed random cells, and noise. The same seed gives
-// the same picture.
-inline cv::Mat clutter(cv::Size size, uint64_t seed) {
+// the same picture. A few of the framed cells are markers by chance: a grid of 4×4 cells is one of DICT_4X4_1000 with
+// a probability of 6 %. Those for which `is_marker` is true get other cells.
+inline cv::Mat clutter(cv::Size size, uint64_t seed, const IsMarker &is_marker = nullptr) {
     constexpr int shapes = 60, texture_px = 60;
     cv::RNG random(seed);
     cv::Mat picture(size, CV_8U, cv::Scalar(random.uniform(60, 220)));
@@ -33,10 +37,12 @@ inline cv::Mat clutter(cv::Size size, uint64_t seed) {
         }
         case 2: {
             const int cells = random.uniform(2, 7);
-            cv::Mat_<uint8_t> grid(cells, cells);
-            for (uint8_t &cell : grid)
-                cell = static_cast<uint8_t>(random.uniform(0, 2) ? dark : bright);
-            cv::resize(grid, texture(inner), inner.size(), 0, 0, cv::INTER_NEAREST);
+            cv::Mat_<uint8_t> white(cells, cells);
+            do {
+                for (uint8_t &cell : white)
+                    cell = static_cast<uint8_t>(random.uniform(0, 2) ? 0 : 1);
+            } while (is_marker && is_marker(white));
+            cv::resize(white * (bright - dark) + dark, texture(inner), inner.size(), 0, 0, cv::INTER_NEAREST);
             break;
         }
         default:

@@ -3,6 +3,7 @@
 // Runs Python scripts in the real arhost. Checks the data that the scripts receive and how their errors are reported.
 #include "arhost_run.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <cstdlib>
@@ -353,7 +354,8 @@ TEST_F(PythonAdapter, TheRayTracersScriptDeclaresItsCapabilities) {
 TEST_F(PythonAdapter, TheTypeStubDescribesTheObjectsOfTheMethods) {
     const std::string check = R"(
 import ast, arhost
-stub = ast.parse(open(")" ARHOST_SOURCE_DIRECTORY R"(/sdk/templates/python/arhost.pyi").read())
+stub = ast.parse(open(")" + arhost::test::source_directory() +
+                              R"(/sdk/templates/python/arhost.pyi").read())
 declared = {c.name: {f.target.id for f in c.body if isinstance(f, ast.AnnAssign)}
             for c in stub.body if isinstance(c, ast.ClassDef)}
 missing = [f.target.id for f in stub.body if isinstance(f, ast.AnnAssign) and not hasattr(arhost, f.target.id)]

@@ -10,6 +10,7 @@
 #include "scene/motion.hpp"
 #include "tracer.hpp"
 
+#include <directories.hpp>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
@@ -18,7 +19,7 @@
 namespace arhost::test {
 namespace {
 
-const std::filesystem::path folder = ARHOST_SOURCE_DIRECTORY "/tests/plugins/rt_embree/golden";
+const std::filesystem::path folder = arhost::test::source_directory() + "/tests/plugins/rt_embree/golden";
 
 struct View {
     const char *name, *scene;
@@ -35,7 +36,7 @@ void PrintTo(const View &view, std::ostream *stream) {
 class Golden : public testing::TestWithParam<View> {};
 
 cv::Mat render(const View &view) {
-    const std::filesystem::path scene = std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / view.scene;
+    const std::filesystem::path scene = std::filesystem::path(arhost::test::source_directory()) / view.scene;
     Tracer tracer(scene::load_scene(scene), {{"samples", view.samples}});
     const arhost_camera from = camera(view.eye, view.look_at, view.up);
     EXPECT_EQ(tracer.start(from.intrinsics), ARHOST_STATUS_OK);

@@ -4,6 +4,7 @@
 #include "leaf_packets.hpp"
 
 #include <arhost/shading/scalar.hpp>
+#include <directories.hpp>
 
 #include <gtest/gtest.h>
 
@@ -98,8 +99,8 @@ TEST_P(LeafPackets, MatchTheScalarFunctions) {
 
 TEST(LeafCalls, ListEveryLeafFunction) {
     std::size_t declared = 0;
-    for (const auto &entry :
-         std::filesystem::directory_iterator(ARHOST_SOURCE_DIRECTORY "/core/shading/include/arhost/shading/leaf")) {
+    for (const auto &entry : std::filesystem::directory_iterator(arhost::test::source_directory() +
+                                                                 "/core/shading/include/arhost/shading/leaf")) {
         std::ifstream file(entry.path());
         for (std::string line; std::getline(file, line);)
             declared += line.starts_with("ARHOST_LEAF ");

@@ -5,13 +5,14 @@
 #include "long_run.hpp"
 #include "two_tracers.hpp"
 
+#include <directories.hpp>
 #include <gtest/gtest.h>
 
 namespace arhost::test {
 namespace {
 
-const std::vector<std::filesystem::path> scenes{ARHOST_SOURCE_DIRECTORY "/config/scenes/demo.yaml",
-                                                ARHOST_SOURCE_DIRECTORY "/config/scenes/moving.yaml"};
+const std::vector<std::filesystem::path> scenes{arhost::test::source_directory() + "/config/scenes/demo.yaml",
+                                                arhost::test::source_directory() + "/config/scenes/moving.yaml"};
 
 struct Length {
     int changes, images; // scene changes; images per scene

@@ -10,6 +10,7 @@
 #include "scene/motion.hpp"
 #include "two_tracers.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/mman.h>
@@ -150,7 +151,7 @@ arhost_camera moving_camera(const arhost_intrinsics &intrinsics = small) {
     return camera({25, -330, 150}, {0, 0, 50}, {0, 0, 1}, intrinsics);
 }
 
-const std::string moving_scene = ARHOST_SOURCE_DIRECTORY "/config/scenes/moving.yaml";
+const std::string moving_scene = arhost::test::source_directory() + "/config/scenes/moving.yaml";
 const auto all_paths = testing::Values("plain", "query", "pipeline");
 
 // Holds the objects that are needed to construct a Renderer for a path.
@@ -494,7 +495,7 @@ TEST(Device, IsListedByTheHost) {
 #endif
     ARHOST_REQUIRE_VULKAN();
     const std::unique_ptr<FILE, int (*)(FILE *)> pipe(
-        ::popen(ARHOST_BINARY_DIRECTORY "/bin/arhost devices rt_vulkan 2>&1", "r"), ::pclose);
+        ::popen((arhost::test::build_directory() + "/bin/arhost devices rt_vulkan 2>&1").c_str(), "r"), ::pclose);
     std::string text;
     for (char part[4096]; const std::size_t size = std::fread(part, 1, sizeof part, pipe.get());)
         text.append(part, size);

@@ -7,6 +7,7 @@
 #include "scene/motion.hpp"
 #include "two_tracers.hpp"
 
+#include <directories.hpp>
 #include <gtest/gtest.h>
 #include <opencv2/imgcodecs.hpp>
 
@@ -41,7 +42,7 @@ inline arhost_camera camera_for(const arhost_scene &scene, double nearness, cons
 inline const double nearnesses[] = {1.0, 0.45};
 
 inline std::filesystem::path file_of(const View &view) {
-    return std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / view.scene;
+    return std::filesystem::path(arhost::test::source_directory()) / view.scene;
 }
 
 // If the environment variable ARHOST_KEEP_PICTURES names a folder, writes the picture there for inspection.

@@ -2,6 +2,7 @@
 #include "sink_under_test.hpp"
 #include "tracked_record.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
@@ -406,7 +407,7 @@ TEST_F(SinkPoses, AFolderAsPathIsRejected) {
 
 TEST_F(SinkPoses, TheReadmeExampleHasTheSameKeys) {
     const std::string readme =
-        read_text(std::filesystem::path(ARHOST_SOURCE_DIRECTORY) / "plugins/sink_poses/README.md");
+        read_text(std::filesystem::path(arhost::test::source_directory()) / "plugins/sink_poses/README.md");
     const std::size_t begin = readme.find("```json\n") + 8;
     const Json example = Json::parse(readme.substr(begin, readme.find("```", begin) - begin));
     TrackedRecord record = full_record(0);

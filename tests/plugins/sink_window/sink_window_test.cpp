@@ -3,6 +3,7 @@
 #include "tracked_record.hpp"
 #include "x_server.hpp"
 
+#include <directories.hpp>
 #include <gmock/gmock.h>
 
 #include <dlfcn.h>
@@ -447,7 +448,7 @@ TEST_F(SinkWindow, HasAScreenThatTheHostLists) {
     GTEST_SKIP() << "the leak checker would report leaks of OpenGL drivers, and arhost would fail";
 #endif
     const std::unique_ptr<FILE, int (*)(FILE *)> pipe(
-        ::popen(ARHOST_BINARY_DIRECTORY "/bin/arhost devices sink_window 2>&1", "r"), ::pclose);
+        ::popen((arhost::test::build_directory() + "/bin/arhost devices sink_window 2>&1").c_str(), "r"), ::pclose);
     std::string text;
     for (char part[4096]; const std::size_t size = std::fread(part, 1, sizeof part, pipe.get());)
         text.append(part, size);

@@ -5,6 +5,7 @@
 
 #include "plugin_under_test.hpp"
 
+#include <directories.hpp>
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/wait.h>
@@ -74,8 +75,9 @@ public:
         pid_ = ::fork();
         if (pid_ == 0) {
             ::dup2(out[1], STDOUT_FILENO);
-            ::execl("/usr/bin/python3", "python3", "-B", ARHOST_CAMERA_SERVER, protocol_.c_str(), place.c_str(),
-                    folder_.c_str(), nullptr);
+            ::execl("/usr/bin/python3", "python3", "-B",
+                    (arhost::test::source_directory() + "/tests/plugins/source_network/server.py").c_str(),
+                    protocol_.c_str(), place.c_str(), folder_.c_str(), nullptr);
             ::_exit(127);
         }
         ::close(out[1]);
