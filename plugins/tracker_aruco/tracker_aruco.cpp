@@ -134,28 +134,60 @@ cv::aruco::Dictionary read_dictionary(const std::string &file) {
                   "string of markersize² digits 0 or 1");
 }
 
+// Samples the square of a marker at the centres of `count`² equal parts.
+cv::Mat_<std::uint8_t> unwarped(const cv::Mat &grey, const Corners &corners_px, int count) {
+    const float first = -0.5F, last = static_cast<float>(count) - 0.5F;
+    const cv::Point2f square[] = {{first, first}, {last, first}, {last, last}, {first, last}};
+    cv::Point2f corners[4];
+    std::ranges::copy(corners_px, corners);
+    cv::Mat_<std::uint8_t> samples;
+    cv::warpPerspective(grey, samples, cv::getPerspectiveTransform(corners, square), {count, count}, cv::INTER_LINEAR,
+                        cv::BORDER_REPLICATE);
+    return samples;
+}
+
+// Whether the cells of a marker are uniform around their centres: on the side of the threshold that `white` tells.
+bool is_uniform(const cv::Mat &grey, const Corners &corners_px, const cv::Mat_<std::uint8_t> &white,
+                double threshold) {
+    const cv::Mat_<std::uint8_t> samples = unwarped(grey, corners_px, 4 * white.rows);
+    for (int row = 0; row < white.rows; ++row)
+        for (int column = 0; column < white.cols; ++column)
+            for (const int y : {4 * row + 1, 4 * row + 2})
+                for (const int x : {4 * column + 1, 4 * column + 2})
+                    if ((samples(y, x) > threshold) != (white(row, column) != 0))
+                        return false;
+    return true;
+}
+
 struct Reading {
     std::uint32_t wrong_bits;
-    double contrast; // half of the difference between the mean grey levels of white and of black cells
+    double contrast;            // half of the difference between the mean grey levels of white and of black cells
+    double false_positive_rate; // as arhost_observation has it
 };
 
 // Reads the bits of a detected marker once more, because OpenCV does not tell how many of them it has corrected.
 Reading read(const cv::Mat &grey, const Corners &corners_px, const cv::aruco::Dictionary &dictionary, int id,
              int border_bits) {
-    const int cells = dictionary.markerSize + 2 * border_bits;
-    const float first = -0.5F, last = static_cast<float>(cells) - 0.5F;
-    const cv::Point2f square[] = {{first, first}, {last, first}, {last, last}, {first, last}};
-    cv::Point2f corners[4];
-    std::ranges::copy(corners_px, corners);
-    cv::Mat levels, white; // one pixel for each cell
-    cv::warpPerspective(grey, levels, cv::getPerspectiveTransform(corners, square), {cells, cells}, cv::INTER_LINEAR,
-                        cv::BORDER_REPLICATE);
+    const int cells = dictionary.markerSize + 2 * border_bits, bits = dictionary.markerSize * dictionary.markerSize;
+    const cv::Mat_<std::uint8_t> levels = unwarped(grey, corners_px, cells);
+    cv::Mat_<std::uint8_t> white;
     cv::threshold(levels, white, 0, 1, cv::THRESH_BINARY | cv::THRESH_OTSU);
     const cv::Mat black = 1 - white;
+    const double white_level = cv::mean(levels, white)[0], black_level = cv::mean(levels, black)[0];
     const cv::Rect code(border_bits, border_bits, dictionary.markerSize, dictionary.markerSize);
-    const int wrong_bits = std::min(dictionary.getDistanceToId(white(code), id),
-                                    dictionary.getDistanceToId(black(code), id)); // of an inverted marker
-    return {static_cast<std::uint32_t>(wrong_bits), (cv::mean(levels, white)[0] - cv::mean(levels, black)[0]) / 2};
+    const int wrong_bits = dictionary.getDistanceToId(white(code), id),
+              wrong_bits_inverted = dictionary.getDistanceToId(black(code), id);
+    Reading reading{static_cast<std::uint32_t>(std::min(wrong_bits, wrong_bits_inverted)),
+                    (white_level - black_level) / 2, 0};
+    reading.false_positive_rate = arhost::fiducial::false_positive_rate(bits, reading.wrong_bits);
+    // Squares in clutter often read as a code of 4×4 bits, but most of their cells are not uniform.
+    if (bits <= 16) {
+        cv::Mat_<std::uint8_t> expected(cells, cells, wrong_bits_inverted < wrong_bits ? 1 : 0); // the border
+        white(code).copyTo(expected(code));
+        if (!is_uniform(grey, corners_px, expected, (white_level + black_level) / 2))
+            reading.false_positive_rate = 1;
+    }
+    return reading;
 }
 
 struct Dictionary {
@@ -275,13 +307,12 @@ private:
                                                          cells_of(table))
                               .value_or(corners);
             const Reading reading = read(grey, corners.corners_px, table, found.ids[i], parameters.markerBorderBits);
-            if (!is_listed && reading.wrong_bits > 0) // in large dictionaries, it may be anything
+            if (!is_listed && (reading.wrong_bits > 0 || reading.false_positive_rate == 1)) // it may be anything
                 continue;
             arhost_observation &one = seen.emplace_back(detectable.family.observation(found.ids[i], corners));
             one.hamming = reading.wrong_bits;
             one.decision_margin = reading.contrast;
-            one.false_positive_rate =
-                arhost::fiducial::false_positive_rate(table.markerSize * table.markerSize, one.hamming);
+            one.false_positive_rate = reading.false_positive_rate;
         }
     }
 

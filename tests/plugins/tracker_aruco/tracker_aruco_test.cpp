@@ -62,6 +62,24 @@ TEST_P(ArucoDictionary, FindsUnlistedMarkers) {
     EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 80)), 2.5);
 }
 
+// A dot in a cell does not change the bit, but squares in clutter have such cells, and prints have not.
+TEST(TrackerAruco, SmallMarkersWithSpottedCellsAreNoEvidence) {
+    const Mt truth = pose_of(10, 5, 400);
+    const auto rate_with_dot = [&](const std::string &dictionary, int cells) {
+        cv::Mat picture = picture_of({{aruco_marker(dictionary, 21), 80, truth}});
+        const auto corners = corners_of(truth, test_camera, 80);
+        const double cell_px = cv::norm(corners[1] - corners[0]) / cells;
+        const cv::Point2d dot = corners[0] + (corners[2] - corners[0]) * (0.375 / cells); // in the border
+        cv::circle(picture, dot, static_cast<int>(0.2 * cell_px), cv::Scalar(255), cv::FILLED);
+        Tracker tracker("tracker_aruco");
+        EXPECT_EQ(tracker.start(test_camera, {{21, 80, dictionary}}), ARHOST_STATUS_OK) << tracker.log();
+        const auto seen = tracker.track(GreyFrame(picture));
+        return seen.size() == 1 ? seen[0].false_positive_rate : -1;
+    };
+    EXPECT_EQ(rate_with_dot("DICT_4X4_50", 6), 1);
+    EXPECT_EQ(rate_with_dot("DICT_6X6_50", 8), std::ldexp(4, -36));
+}
+
 ClutterCounts find_markers_in_clutter(const std::string &dictionary, const Options &options) {
     const std::string family = april_tag_family(dictionary);
     Tracker tracker("tracker_aruco", options);
