@@ -8,7 +8,7 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 using CovarianceMap = Eigen::Map<Matrix6d>;
 
 // Standard deviations of the accelerations of a hand, and of its unknown speed in the first frame.
-constexpr double turn_acceleration_rad_s2 = 10, shift_acceleration_mm_s2 = 3000;
+constexpr double turn_acceleration_rad_s2 = 5, shift_acceleration_mm_s2 = 3000;
 constexpr double first_turn_rad_s = 2, first_shift_mm_s = 500;
 
 Eigen::Matrix3d rotation_covariance(const Estimate &estimate) {

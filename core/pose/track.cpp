@@ -24,35 +24,32 @@ double log_likelihood(const Estimate &estimate) {
     return -(tail + static_cast<double>(estimate.freedom)) / 2 * std::log1p(estimate.normalized_error / tail);
 }
 
-// Which of two poses continues branch[0], and the logarithm of the odds for this.
-struct Continuation {
-    std::size_t pose;
-    double log_odds;
+// The branch from which a pose most likely follows, and the log-likelihood of this path.
+struct Path {
+    std::size_t branch;
+    double log_likelihood;
 };
-Continuation continuation(std::span<const Motion> branches, std::span<const Estimate> poses) {
-    double straight = rotation_distance2(branches[0], poses[0]), crossed = rotation_distance2(branches[0], poses[1]);
+Path best_path(std::span<const Motion> branches, double log_odds, const Estimate &pose) {
+    constexpr double jump = -30; // log-likelihood of a motion to anywhere
+    Path best{0, std::max(-rotation_distance2(branches[0], pose) / 2, jump)};
     if (branches.size() == 2) {
-        straight += rotation_distance2(branches[1], poses[1]);
-        crossed += rotation_distance2(branches[1], poses[0]);
+        const double second = std::max(-rotation_distance2(branches[1], pose) / 2, jump) - log_odds;
+        if (second > best.log_likelihood)
+            best = {1, second};
     }
-    return {straight <= crossed ? 0U : 1U, std::min(std::abs(straight - crossed) / 2, 30.0)};
-}
-
-// Log-odds that branch[0] is the true one, from those before (`a`) and those that the branches were not exchanged
-// since (`b`): P = P(a)·P(b) + (1 − P(a))·(1 − P(b)).
-double combined_log_odds(double a, double b) {
-    return std::log1p(std::exp(a + b)) - std::log(std::exp(a) + std::exp(b));
+    return best;
 }
 
 } // namespace
 
 Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_t capture_ns) {
-    // Evidence is damped, because the errors of successive frames have common causes.
-    constexpr double damping = 0.9, max_evidence = 4, switch_log_odds = 14;
+    // Evidence is damped and limited, because the errors of successive frames have common causes.
+    constexpr double damping = 0.95, max_evidence = 8;
+    // Log-odds: from where on a branch is established, and against which an established one and another are left.
+    constexpr double established_log_odds = 10, switch_log_odds = 14, early_switch_log_odds = 2;
     // A switch between branches that are closer is hardly visible and needs less evidence.
     constexpr double distinct_rad = 30 * std::numbers::pi / 180;
-    // Squared distances from a predicted rotation: of another branch, and of another motion.
-    constexpr double distinct_distance2 = 25, max_distance2 = 100;
+    constexpr double max_distance2 = 100; // of a pose that continues a motion
 
     std::array<Motion, 2> branches{};
     std::size_t known = 0;
@@ -61,37 +58,33 @@ Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_
             branches[known] = predicted(before.branch[known], *seconds);
 
     Step step{{}, 0};
-    step.track.capture_ns = capture_ns;
-    step.track.branches = poses.size() > 1 ? 2 : 1;
-    // Whether branch[0] of the new track continues the second branch of the old one. A single pose does so if it is
-    // clearly not on the first branch; where the branches meet, it is on both.
-    bool switches = false;
-    if (poses.size() == 1 && known == 2) {
-        const double from_first = rotation_distance2(branches[0], poses[0]);
-        switches = from_first > distinct_distance2 && rotation_distance2(branches[1], poses[0]) < from_first;
-    }
+    Track &track = step.track;
+    track.capture_ns = capture_ns;
+    track.branches = poses.size() > 1 ? 2 : 1;
+    std::array<Path, 2> paths{};
+    for (std::size_t i = 0; known > 0 && i < track.branches; ++i)
+        paths[i] = best_path({branches.data(), known}, known == 2 ? damping * before.log_odds : 0, poses[i]);
     if (poses.size() > 1) {
-        double log_odds = 0;
-        if (known > 0) {
-            const Continuation found = continuation({branches.data(), known}, poses);
-            step.chosen = found.pose;
-            if (known == 2) // where the branches meet, it is uncertain which is which afterwards
-                log_odds = damping * combined_log_odds(before.log_odds, found.log_odds);
-        }
-        const double evidence = log_likelihood(poses[step.chosen]) - log_likelihood(poses[1 - step.chosen]);
-        log_odds += std::clamp(evidence, -max_evidence, max_evidence);
+        const double evidence = log_likelihood(poses[0]) - log_likelihood(poses[1]),
+                     log_odds = paths[0].log_likelihood - paths[1].log_likelihood +
+                                std::clamp(evidence, -max_evidence, max_evidence); // that poses[0] is the true one
+        // Where the branches meet, both poses may follow from the same branch.
+        const bool is_fork = paths[0].branch == paths[1].branch, is_established = !is_fork && before.is_established;
         const double apart_rad =
             angle_between_rad(poses[0].camera_from_target.rotation, poses[1].camera_from_target.rotation);
-        switches = log_odds < -switch_log_odds * std::min(apart_rad / distinct_rad, 1.0);
-        if (switches)
-            step.chosen = 1 - step.chosen;
-        step.track.log_odds = switches ? -log_odds : log_odds;
+        const double limit = is_fork ? 0
+                                     : (is_established ? switch_log_odds : early_switch_log_odds) *
+                                           std::min(apart_rad / distinct_rad, 1.0);
+        const std::size_t first = paths[1].branch < paths[0].branch ? 1 : 0; // the one that follows from branch[0]
+        const bool switches = (first == 0 ? log_odds : -log_odds) < -limit;
+        step.chosen = switches ? 1 - first : first;
+        track.log_odds = step.chosen == 0 ? log_odds : -log_odds;
+        track.is_established = track.log_odds > established_log_odds || (is_established && track.log_odds >= 0);
     }
-    for (std::uint32_t i = 0; i < step.track.branches; ++i) {
-        const Estimate &pose = poses[i == 0 ? step.chosen : 1 - step.chosen];
-        const std::uint32_t last = switches ? 1 - i : i;
-        const bool continues = last < known && rotation_distance2(branches[last], pose) < max_distance2;
-        step.track.branch[i] = continues ? corrected(branches[last], pose) : begin_motion(pose);
+    for (std::uint32_t i = 0; i < track.branches; ++i) {
+        const std::size_t pose = i == 0 ? step.chosen : 1 - step.chosen, last = paths[pose].branch;
+        const bool continues = last < known && rotation_distance2(branches[last], poses[pose]) < max_distance2;
+        track.branch[i] = continues ? corrected(branches[last], poses[pose]) : begin_motion(poses[pose]);
     }
     return step;
 }

@@ -15,18 +15,19 @@ namespace arhost::pose {
 // The memory of one target. Plain data without pointers, because it is kept in shared memory across restarts;
 // all zero if the target was never seen.
 struct Track {
-    std::int64_t capture_ns; // of the last frame in which the target was detected
-    std::uint32_t branches;  // 0: never seen; 2 if the last frame permitted two poses, else 1
-    std::uint32_t reserved;
+    std::int64_t capture_ns;      // of the last frame in which the target was detected
+    std::uint32_t branches;       // 0: never seen; 2 if the last frame permitted two poses, else 1
+    std::uint32_t is_established; // whether much spoke for branch[0] since the branches last met
     double log_odds;  // log of P(branch[0] is the true one) / P(branch[1] is the true one), damped over time
     Motion branch[2]; // branch[0] is the chosen one
 };
 
 // Chooses among the poses of one frame (from estimate_poses; at least one), and returns the track for the next frame
-// and the index of the chosen pose. A pose stays on its branch, which moves continuously, until the reprojection
-// errors of several frames speak for the other branch: a single frame's errors often are noise, and each switch is a
-// visible flip. The first frame takes the pose of smallest error. A track continues if at most 1 s passed since its
-// last frame.
+// and the index of the chosen pose. The reprojection errors of several frames and the continuity of the motion
+// decide: each pose is the end of the most likely path (Viterbi's algorithm). An established branch is left only if
+// much speaks against it: a single frame's errors often are noise, and each switch is a visible flip. Where the
+// branches meet, in a frontal view, the choice is open again. The first frame takes the pose of smallest error. A
+// track continues if at most 1 s passed since its last frame.
 struct Step {
     Track track;
     std::size_t chosen;
