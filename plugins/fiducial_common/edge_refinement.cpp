@@ -114,6 +114,8 @@ struct Slope {
     int averaged = 1;
 };
 
+constexpr std::size_t min_positions = 16, max_positions = 100; // on an edge
+
 constexpr double contained = 0.35; // greatest rise at the rim relative to the peak, if the slope ends before the rim
 
 // Doubles the steps, up to `max_step_px`, until they contain the whole slope, which blur widens.
@@ -229,13 +231,14 @@ std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size
     }
 }
 
-// Returns positions on the line between two corners in undistorted pixels, which are in clockwise order. Keeps
-// `margin_px` away from the corners, where the search would hit the adjacent edges. Returns std::nullopt if the lens
-// does not see the edge.
-std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &lens, double margin_px) {
+// Returns at most `max_count` positions on the line between two corners in undistorted pixels, which are in clockwise
+// order. Keeps `margin_px` away from the corners, where the search would hit the adjacent edges. Returns std::nullopt
+// if the lens does not see the edge.
+std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &lens, double margin_px,
+                                 std::size_t max_count) {
     const double length = cv::norm(to - from);
     const double margin = std::min(margin_px, length / 4) / length;
-    const std::size_t count = std::clamp<std::size_t>(static_cast<std::size_t>(length / 2), 16, 100);
+    const std::size_t count = std::clamp(static_cast<std::size_t>(length / 2), min_positions, max_count);
     std::vector<cv::Point2d> straight;
     for (std::size_t i = 0; i < count; ++i)
         straight.push_back(from + (margin + (1 - 2 * margin) * static_cast<double>(i) / (count - 1)) * (to - from));
@@ -325,13 +328,15 @@ std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer
     const double min_step_px = std::min(sharp_step_px, max_step_px), converged_px = 0.8 * min_step_px;
 
     // +1 if the square is darker than its surroundings, otherwise −1
-    double sign = 0, rough_strength = 0, strength = 0, moved = converged_px, margin_px = reach * min_step_px,
+    double sign = 0, rough_strength = 0, strength = 0, moved = 0, margin_px = reach * min_step_px,
            variance = 0; // of a coordinate of a corner
     bool is_unclear = false;
-    for (int pass = 0; pass < max_passes && moved >= converged_px; ++pass) {
+    // The first pass corrects most of the error, for which few positions suffice.
+    for (int pass = 0; pass < max_passes && (pass < 2 || moved >= converged_px); ++pass) {
         std::array<Edge, 4> edges;
         for (int i = 0; i < 4; ++i) {
-            auto edge = edge_between(corners[i], corners[(i + 1) % 4], lens, margin_px);
+            auto edge = edge_between(corners[i], corners[(i + 1) % 4], lens, margin_px,
+                                     pass == 0 ? min_positions : max_positions);
             if (!edge)
                 return std::nullopt;
             edges[i] = std::move(*edge);
