@@ -41,8 +41,8 @@ std::set<std::string> blocked_calls(ArhostRun &run) {
     run.start({}, [] {
         ::setenv("ARHOST_PLUGIN_PATH", arhost::test::test_plugin_directory().c_str(), 1);
         ::execlp("strace", "strace", "-f", "-qq", "-o", "trace.txt", "-e", "status=failed",
-                 arhost::test::build_directory() + "/bin/arhost", "--config", "run.yaml", "--allow-no-target",
-                 nullptr);
+                 (arhost::test::build_directory() + "/bin/arhost").c_str(), "--config", "run.yaml",
+                 "--allow-no-target", nullptr);
         ::_exit(127);
     });
     EXPECT_EQ(run.wait(std::chrono::seconds(100)), 0) << run.output();
