@@ -115,7 +115,8 @@ std::vector<Family> families_of(const arhost_tracker_setup &setup,
 void report(std::vector<arhost_observation> seen, Observations &observations) {
     std::erase_if(seen, [](const arhost_observation &one) { return !is_convex_front(one); });
     std::ranges::sort(seen, {}, [](const arhost_observation &one) {
-        return std::tuple(one.hamming, -one.decision_margin, one.family, one.id, place(one));
+        return std::tuple(one.hamming, one.corner_sigma_px == 0, -one.decision_margin, one.family, one.id,
+                          place(one));
     });
     std::vector<arhost_observation> kept;
     for (const arhost_observation &one : seen)

@@ -63,7 +63,8 @@ std::vector<Family> families_of(const arhost_tracker_setup &setup,
 
 // Reports what was seen, by family, id and place, so the order does not depend on the detector's threads. Leaves out
 // corners that are not those of a convex quadrilateral seen from the front. Detections of the same marker that
-// overlap are of the same print: reports only the one with the fewest wrong bits, then the highest decision margin.
+// overlap are of the same print: reports only the one with the fewest wrong bits, then one with refined corners (a
+// detector may also find the inside of the border), then the one with the highest decision margin.
 void report(std::vector<arhost_observation> seen, Observations &observations);
 
 } // namespace arhost::fiducial

@@ -155,6 +155,9 @@ TEST(Report, HasOverlappingDetectionsOfAMarkerOnce) {
     EXPECT_EQ(report({first, second}).size(), 1u);
     EXPECT_EQ(report({first, second})[0].decision_margin, 60);
     EXPECT_EQ(report({second, first})[0].decision_margin, 60);
+    first.corner_sigma_px = 0.05;
+    EXPECT_EQ(report({first, second})[0].decision_margin, 50) << "the corners of only the first one were refined";
+    first.corner_sigma_px = 0;
     second.hamming = 1;
     EXPECT_EQ(report({first, second})[0].decision_margin, 50);
     EXPECT_EQ(report({at(4, 10), at(5, 10), at(4, 80)}).size(), 3u) << "another marker, and a copy beside the first";
