@@ -38,8 +38,8 @@ using pose::Rigid;
 constexpr double marker_sigma_px = 0.1, map_sigma_px = 0.5;
 
 // A target is reported if the probability that its sightings are chance is lower. A cluttered frame has dozens of
-// squares that look random, so at this limit, one of some thousand frames has a false marker.
-const double confirmed_log_chance = std::log(1e-5), certain_log_chance = std::log(1e-30),
+// squares that look random, so at this limit, one of some hundred thousand frames has a false marker.
+const double confirmed_log_chance = std::log(1e-7), certain_log_chance = std::log(1e-30),
              max_log_chance = std::log(double{ARHOST_MAX_MARKERS});
 
 // The noise of the corners of a tracker that does not know it.

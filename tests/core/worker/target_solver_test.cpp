@@ -457,7 +457,7 @@ TEST_F(TargetSolverTest, ForgetsAMarkerThatMayBeChanceAfterAGap) {
 
 TEST_F(TargetSolverTest, CountsTheListedMarkersAgainAfterAGap) {
     arhost_observation seen = see(pose_at({20, 10, 900}, 30), 5);
-    seen.false_positive_rate = 3e-6; // of one of five listed markers: 1.5e-5
+    seen.false_positive_rate = 3e-8; // of one of five listed markers: 1.5e-7
     solve({seen});
     solve({}, 1);
     solve({seen}, 2);
@@ -499,9 +499,9 @@ TEST_F(TargetSolverTest, NeedsMoreSightingsTheMoreLikelyChanceIs) {
         return frames;
     };
     EXPECT_EQ(frames_needed(0), 1) << "unknown";
-    EXPECT_EQ(frames_needed(1e-6), 1) << "five markers of the family are listed";
-    EXPECT_EQ(frames_needed(3e-6), 2);
-    EXPECT_EQ(frames_needed(8e-3), 3);
+    EXPECT_EQ(frames_needed(1e-8), 1) << "five markers of the family are listed";
+    EXPECT_EQ(frames_needed(3e-8), 2);
+    EXPECT_EQ(frames_needed(8e-3), 4);
     EXPECT_EQ(frames_needed(1), 20) << "never";
 }
 
