@@ -24,16 +24,22 @@ double log_likelihood(const Estimate &estimate) {
     return -(tail + static_cast<double>(estimate.freedom)) / 2 * std::log1p(estimate.normalized_error / tail);
 }
 
-// The branch from which a pose most likely follows, and the log-likelihood of this path.
+// Squared Mahalanobis distance from which on a rotation does not continue a motion, but begins a new one.
+constexpr double max_distance2 = 60;
+
+// The branch from which a pose most likely follows, and the log-likelihood of this path (not normalized, so that a
+// branch whose motion is uncertain is not at a disadvantage).
 struct Path {
     std::size_t branch;
     double log_likelihood;
 };
 Path best_path(std::span<const Motion> branches, double log_odds, const Estimate &pose) {
-    constexpr double jump = -30; // log-likelihood of a motion to anywhere
-    Path best{0, std::max(-rotation_distance2(branches[0], pose) / 2, jump)};
+    const auto of_motion = [&](const Motion &motion) {
+        return -std::min(rotation_distance2(motion, pose), max_distance2) / 2;
+    };
+    Path best{0, of_motion(branches[0])};
     if (branches.size() == 2) {
-        const double second = std::max(-rotation_distance2(branches[1], pose) / 2, jump) - log_odds;
+        const double second = of_motion(branches[1]) - log_odds;
         if (second > best.log_likelihood)
             best = {1, second};
     }
@@ -45,11 +51,12 @@ Path best_path(std::span<const Motion> branches, double log_odds, const Estimate
 Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_t capture_ns) {
     // Evidence is damped and limited, because the errors of successive frames have common causes.
     constexpr double damping = 0.95, max_evidence = 8;
+    // Below max_distance2 / 2, so that a branch rather goes on than follows from a jump of the likelier one.
+    constexpr double max_log_odds = 20;
     // Log-odds: from where on a branch is established, and against which an established one and another are left.
     constexpr double established_log_odds = 10, switch_log_odds = 14, early_switch_log_odds = 2;
     // A switch between branches that are closer is hardly visible and needs less evidence.
     constexpr double distinct_rad = 30 * std::numbers::pi / 180;
-    constexpr double max_distance2 = 100; // of a pose that continues a motion
 
     std::array<Motion, 2> branches{};
     std::size_t known = 0;
@@ -61,9 +68,10 @@ Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_
     Track &track = step.track;
     track.capture_ns = capture_ns;
     track.branches = poses.size() > 1 ? 2 : 1;
+    const double log_odds_before = known == 2 ? std::min(damping * before.log_odds, max_log_odds) : 0;
     std::array<Path, 2> paths{};
     for (std::size_t i = 0; known > 0 && i < track.branches; ++i)
-        paths[i] = best_path({branches.data(), known}, known == 2 ? damping * before.log_odds : 0, poses[i]);
+        paths[i] = best_path({branches.data(), known}, log_odds_before, poses[i]);
     if (poses.size() > 1) {
         const double evidence = log_likelihood(poses[0]) - log_likelihood(poses[1]),
                      log_odds = paths[0].log_likelihood - paths[1].log_likelihood +
@@ -79,7 +87,7 @@ Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_
         const bool switches = (first == 0 ? log_odds : -log_odds) < -limit;
         step.chosen = switches ? 1 - first : first;
         track.log_odds = step.chosen == 0 ? log_odds : -log_odds;
-        track.is_established = track.log_odds > established_log_odds || (is_established && track.log_odds >= 0);
+        track.is_established = track.log_odds > established_log_odds || (is_established && !switches);
     }
     for (std::uint32_t i = 0; i < track.branches; ++i) {
         const std::size_t pose = i == 0 ? step.chosen : 1 - step.chosen, last = paths[pose].branch;

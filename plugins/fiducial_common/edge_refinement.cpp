@@ -298,11 +298,9 @@ std::optional<Line> fit_edge(const Picture &picture, const Edge &edge, Slope &sl
     return line;
 }
 
-} // namespace
-
-std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
-                                            const Lens &lens, int cells, bool is_subpixel) {
-    const Picture picture{grey, light_of_code(transfer)};
+// As refine_edges(), with so many positions on each edge in the first pass.
+std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
+                                       bool is_subpixel, std::size_t first_positions) {
     constexpr int max_passes = 8;
     constexpr double sharp_step_px = 0.25; // suffices for a sharp edge
     constexpr double min_strength = 0.9;   // of the refined edges, relative to the rough ones
@@ -331,12 +329,11 @@ std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer
     double sign = 0, rough_strength = 0, strength = 0, moved = 0, margin_px = reach * min_step_px,
            variance = 0; // of a coordinate of a corner
     bool is_unclear = false;
-    // The first pass corrects most of the error, for which few positions suffice.
     for (int pass = 0; pass < max_passes && (pass < 2 || moved >= converged_px); ++pass) {
         std::array<Edge, 4> edges;
         for (int i = 0; i < 4; ++i) {
             auto edge = edge_between(corners[i], corners[(i + 1) % 4], lens, margin_px,
-                                     pass == 0 ? min_positions : max_positions);
+                                     pass == 0 ? first_positions : max_positions);
             if (!edge)
                 return std::nullopt;
             edges[i] = std::move(*edge);
@@ -395,6 +392,16 @@ std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer
     // The distortion scales the noise as it scales the square.
     const double sigma_px = std::sqrt(variance) * perimeter_px(result.corners_px) / perimeter_px(corners);
     return MeasuredCorners{result.corners_px, std::isfinite(sigma_px) ? sigma_px : 0};
+}
+
+} // namespace
+
+std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
+                                            const Lens &lens, int cells, bool is_subpixel) {
+    const Picture picture{grey, light_of_code(transfer)};
+    // The first pass corrects most of the error, for which few positions suffice, unless noise has to be averaged.
+    auto result = refined(picture, rough_px, lens, cells, is_subpixel, min_positions);
+    return result ? result : refined(picture, rough_px, lens, cells, is_subpixel, max_positions);
 }
 
 } // namespace arhost::fiducial

@@ -93,8 +93,8 @@ TEST(Track, LeavesAnEstablishedBranchIfTheErrorsOfSeveralFramesSpeakAgainstIt) {
         if (step.chosen == 0)
             break;
     }
-    EXPECT_GE(frames, 2) << "one frame is not enough evidence";
-    EXPECT_LT(frames, 15);
+    EXPECT_GE(frames, 3) << "a few frames are not enough evidence";
+    EXPECT_LE(frames, 6);
 }
 
 TEST(Track, KeepsItsBranchIfASingleFrameSpeaksForTheOther) {
