@@ -418,8 +418,9 @@ TEST(Supervision, ATrackersStateSurvivesItsWorker) {
         ArhostRun run(with_state("frames: 400, delay_ms: 1", std::string("state_size: ") + size));
         run.start();
         for (std::size_t lines = 0; lines < frames - 60;) {
+            // More lines than frames can be in the pipeline: a frame that two workers die with is given up.
             const std::string log = run.exists("poses.jsonl") ? run.read("poses.jsonl") : "";
-            if (const auto now = static_cast<std::size_t>(std::ranges::count(log, '\n')); now >= lines + 20) {
+            if (const auto now = static_cast<std::size_t>(std::ranges::count(log, '\n')); now >= lines + 40) {
                 lines = now;
                 if (const pid_t worker = run.worker("tracker_counter"))
                     send_signal(worker, SIGKILL);
