@@ -38,7 +38,12 @@ Process::Process(Context &context, WorkerBudget &budget, Callbacks callbacks, co
       results_(worker_page_.as<WorkerPage>().results, host_page_.as<HostPage>().results) {
     host_memory_.seal_future_writes(); // the worker can map this page only read-only
     Reactor &reactor = context_.reactor;
-    channel_watch_ = reactor.watch(spawned_.channel.fd(), [this] { receive_messages(16); });
+    channel_watch_ = reactor.watch(spawned_.channel.fd(), [this] {
+        WorkerBudget &of_component = budget_; // outlives this process, which a message may end
+        const auto begin = WorkerBudget::Clock::now();
+        receive_messages(16);
+        of_component.exclude(WorkerBudget::Clock::now() - begin);
+    });
     doorbell_watch_ = reactor.watch(spawned_.doorbell.get(), [this] { on_doorbell(); });
     watch_output();
     death_watch_ = reactor.watch(spawned_.pidfd.get(), [this] { on_death(); });

@@ -39,6 +39,9 @@ public:
     // Deducts the cost of a message. Returns false if the budget is exhausted: it holds max_cost, and regains
     // cost_per_second.
     bool spend(std::size_t message_bytes, Clock::time_point now = Clock::now());
+    // The budget regains nothing for the time in which the host handled messages: so a flood also exhausts it if the
+    // host is slower than the flood.
+    void exclude(Clock::duration handling) { last_spent_ += handling; }
 
 private:
     struct LineCount { // lines within the current second

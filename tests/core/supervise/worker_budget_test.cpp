@@ -59,6 +59,17 @@ TEST(WorkerBudget, CutsLongLines) {
     EXPECT_THAT(lines.all.at(1), testing::EndsWith("; restarting it"));
 }
 
+TEST(WorkerBudget, RegainsNothingWhileTheHostHandlesMessages) {
+    Lines lines;
+    std::size_t left = WorkerBudget::max_cost;
+    auto now = start;
+    for (; left >= WorkerBudget::cost_per_second; left -= WorkerBudget::cost_per_second, now += 1s) {
+        ASSERT_TRUE(lines.budget.spend(WorkerBudget::cost_per_second - WorkerBudget::cost_per_message, now));
+        lines.budget.exclude(1s);
+    }
+    EXPECT_FALSE(lines.budget.spend(WorkerBudget::cost_per_second, now));
+}
+
 TEST(WorkerBudget, LimitsTheNumberAndTheBytesOfMessages) {
     for (const std::size_t size : {std::size_t{0}, std::size_t{120 << 10}}) {
         Lines lines;
