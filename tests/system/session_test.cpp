@@ -221,7 +221,7 @@ TEST(Sessions, AKilledHostLosesNoFrameThatWasLogged) {
 }
 
 TEST(Sessions, AKilledSinkContinuesTheSession) {
-    ArhostRun run(recording("live", "60"));
+    ArhostRun run(recording("live", "200"));
     run.start();
     for (const std::size_t lines : {10, 25}) {
         wait_for_lines(run, lines);
