@@ -143,7 +143,7 @@ TEST(PipeRun, APausedReaderDoesNotEndALockstepRun) {
 
 TEST(PipeRun, APausedReaderOnlyDropsItsOwnFramesOfALiveRun) {
     ArhostRun run("version: 1\nmode: live\n"
-                  "source: {plugin: source_synthetic, fps: 100, options: {width: 160, height: 120, frames: 200}}\n"
+                  "source: {plugin: source_synthetic, fps: 100, options: {width: 160, height: 120, frames: 600}}\n"
                   "outputs: [{plugin: sink_pipe, path: out/fifo}, {plugin: sink_poses, path: out/poses.jsonl}]\n"
                   "stats: stats.json\n");
     make_fifo(run.path("out/fifo"));
@@ -152,9 +152,9 @@ TEST(PipeRun, APausedReaderOnlyDropsItsOwnFramesOfALiveRun) {
     const auto lines = [&] {
         return count_of(run.exists("out/poses.jsonl") ? run.read("out/poses.jsonl") : "", "\n");
     };
-    for (int i = 0; run.running() && lines() < 50 && i < 6000; ++i)
+    for (int i = 0; run.running() && lines() < 150 && i < 6000; ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
-    EXPECT_GE(lines(), 50u) << "the paused reader holds up the run";
+    EXPECT_GE(lines(), 150u) << "the paused reader holds up the run";
     const std::string video = reader.read_all();
     EXPECT_EQ(run.wait(), 0) << run.output();
     EXPECT_EQ(count_of(video, "YUV4MPEG2"), 1u);
