@@ -186,7 +186,8 @@ inline std::vector<CountedLine> counted(const ArhostRun &run, const std::string 
     return lines;
 }
 
-// The column shown_s of a timeline.
+// The column shown_s of a timeline: the times since the first frame arrived. Differences between them would depend on
+// how long the composition of the earlier frame took.
 inline std::vector<double> shown_seconds(const std::string &csv) {
     std::istringstream text(csv);
     std::vector<double> seconds;

@@ -91,8 +91,8 @@ TEST(Run, ShowsAFilmAtItsOwnRateIfPaced) {
     ASSERT_EQ(run.run({"run.yaml", "--set", "source.fps=20"}), 0) << run.output();
     const std::vector<double> shown = shown_seconds(run.read("times.csv"));
     ASSERT_EQ(shown.size(), 10u);
-    for (std::size_t i = 1; i < shown.size(); ++i)
-        EXPECT_GE(shown[i] - shown[0], static_cast<double>(i) / 20 - 1e-3);
+    for (std::size_t i = 0; i < shown.size(); ++i)
+        EXPECT_GE(shown[i], static_cast<double>(i) / 20);
 }
 
 TEST(Run, DoesNotWaitForADistantFrameOfAPacedFilmOnCtrlC) {

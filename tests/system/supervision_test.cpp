@@ -475,17 +475,22 @@ TEST(Supervision, SurvivesRandomKillsAndStops) {
     const std::string plugins[] = {"source_counter", "tracker_counter", "rt_counter", "sink_counter"};
     int faults = 0;
     while (run.running()) {
-        if (const pid_t worker = run.worker(plugins[random() % 4])) {
-            if (random() % 4 == 0) {
-                send_signal(worker, SIGSTOP);
-                std::this_thread::sleep_for(std::chrono::milliseconds(random() % 20));
-                send_signal(worker, SIGCONT);
-            } else {
-                send_signal(worker, SIGKILL);
+        // Up to three faults in quick succession: a worker that fails five times in a row is disabled.
+        for (std::uint32_t burst = 1 + random() % 3; burst > 0; --burst) {
+            if (const pid_t worker = run.worker(plugins[random() % 4])) {
+                if (random() % 4 == 0) {
+                    send_signal(worker, SIGSTOP);
+                    std::this_thread::sleep_for(std::chrono::milliseconds(random() % 20));
+                    send_signal(worker, SIGCONT);
+                } else {
+                    send_signal(worker, SIGKILL);
+                }
+                ++faults;
             }
-            ++faults;
+            std::this_thread::sleep_for(std::chrono::milliseconds(random() % 40));
         }
-        std::this_thread::sleep_for(std::chrono::milliseconds(30 + random() % 40));
+        // More frames than can be in the pipeline: every worker processes a frame.
+        wait_for_frames(run, counted(run).size() + 40 + random() % 20);
     }
     ASSERT_EQ(run.wait(), 0) << run.output();
     EXPECT_GT(faults, 15);
