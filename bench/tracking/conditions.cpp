@@ -84,7 +84,11 @@ public:
 private:
     static cv::Mat picture(const Conditions &conditions, const test::Print &print, const test::Mt &truth,
                            std::uint64_t seed) {
-        cv::Mat grey = test::render(camera, {{print, side_mm, truth}});
+        // Rendered at four times the resolution: 512 rays per pixel.
+        cv::Mat grey = test::render(
+            test::intrinsics_of(size * 4, 4 * camera.fx, 4 * camera.fy, 4 * camera.cx + 1.5, 4 * camera.cy + 1.5),
+            {{print, side_mm, truth}});
+        cv::resize(grey, grey, size, 0, 0, cv::INTER_AREA);
         if (conditions.hidden > 0) {
             const double far = side_mm / 2 + 10, near = side_mm * (0.5 - conditions.hidden);
             std::vector<cv::Point> cover;
@@ -99,7 +103,7 @@ private:
             cv::warpAffine(grey, grey, shear, size, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
         }
         cv::GaussianBlur(grey, grey, {}, conditions.blur_px);
-        grey *= conditions.exposure;
+        grey.convertTo(grey, CV_16S, conditions.exposure); // the sensor's noise comes before saturation
         test::add_noise(grey, conditions.noise, seed);
         return grey;
     }
@@ -210,10 +214,13 @@ private:
 
 int main(int argc, char **argv) try {
     bool is_quick = false;
+    std::string only; // the name of a dimension; empty: all
     std::ofstream csv;
     for (int i = 1; i < argc; ++i)
         if (std::string(argv[i]) == "--quick")
             is_quick = true;
+        else if (std::string(argv[i]) == "--only" && i + 1 < argc)
+            only = argv[++i];
         else
             csv.open(argv[i]);
     csv << "dimension,value,detector,found,corner_px,rotation_p50,rotation_p95,rotation_p99,translation_p50,"
@@ -226,6 +233,8 @@ int main(int argc, char **argv) try {
         "else is said; errors of poses relative to the Cramer-Rao bound at the corners' noise\n",
         count);
     for (const Dimension &dimension : dimensions) {
+        if (!only.empty() && dimension.name != only)
+            continue;
         std::printf("\n%-8s | %31s | %35s | %41s\n%-8s | %7s %7s %7s %7s | %8s %8s %8s %8s | %20s %20s\n",
                     dimension.name, "found, %", "noise of corners, px",
                     "rotation p50/p99, translation p50/p99, covered", dimension.unit, "apriltag", "bare", "aruco",

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "edge_refinement.hpp"
 
-#include <arhost/shading/scalar.hpp>
+#include "light_of_code.hpp"
 
 #include <opencv2/imgproc.hpp>
 
@@ -10,7 +10,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -28,24 +27,6 @@ struct Line {
         return offset_variance * (1 + along * along / spread);
     }
 };
-
-// The light of each code, 0 to 255.
-using LightOfCode = std::array<float, 256>;
-
-const LightOfCode &light_of_code(arhost_transfer transfer) {
-    static const LightOfCode linear = [] {
-        LightOfCode light;
-        std::iota(light.begin(), light.end(), 0.0F);
-        return light;
-    }();
-    static const LightOfCode srgb = [] {
-        LightOfCode light;
-        for (int code = 0; code < 256; ++code)
-            light[code] = static_cast<float>(255 * shading::srgb_decode(code / 255.0));
-        return light;
-    }();
-    return transfer == ARHOST_TRANSFER_LINEAR ? linear : srgb;
-}
 
 struct Picture {
     const cv::Mat &grey;
@@ -326,7 +307,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     const double min_step_px = std::min(sharp_step_px, max_step_px), converged_px = 0.8 * min_step_px;
 
     // +1 if the square is darker than its surroundings, otherwise −1
-    double sign = 0, rough_strength = 0, strength = 0, moved = 0, margin_px = reach * min_step_px,
+    double sign = 0, rough_strength = 0, strength = 0, moved = 0, margin_px = reach * min_step_px, blur_cells = 0,
            variance = 0; // of a coordinate of a corner
     bool is_unclear = false;
     for (int pass = 0; pass < max_passes && (pass < 2 || moved >= converged_px); ++pass) {
@@ -345,7 +326,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
             sign = rise < 0 ? -1 : 1;
         }
         std::array<Line, 4> lines;
-        strength = margin_px = 0;
+        strength = margin_px = blur_cells = 0;
         is_unclear = false;
         for (int i = 0; i < 4; ++i) {
             Slope slope = find_slope(picture, edges[i], min_step_px, max_step_px, sign);
@@ -355,6 +336,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
             lines[i] = *line;
             strength += slope.on_line;
             margin_px = std::max(margin_px, reach * slope.step_px);
+            blur_cells = std::max(blur_cells, slope.width_px / cells_px[i]);
             const bool is_noisy = min_step_px < sharp_step_px && slope.noise > max_noise;
             const bool is_blurred = slope.step_px > min_step_px &&
                                     (slope.at_rim > contained * slope.peak || slope.width_px > max_blur * cell_px);
@@ -391,7 +373,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     };
     // The distortion scales the noise as it scales the square.
     const double sigma_px = std::sqrt(variance) * perimeter_px(result.corners_px) / perimeter_px(corners);
-    return MeasuredCorners{result.corners_px, std::isfinite(sigma_px) ? sigma_px : 0};
+    return MeasuredCorners{result.corners_px, std::isfinite(sigma_px) ? sigma_px : 0, blur_cells};
 }
 
 } // namespace

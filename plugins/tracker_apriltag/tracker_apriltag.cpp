@@ -5,6 +5,7 @@
 #include <fiducial_common/edge_refinement.hpp>
 #include <fiducial_common/lens.hpp>
 #include <fiducial_common/observations.hpp>
+#include <fiducial_common/print_alignment.hpp>
 #include <fiducial_common/search_regions.hpp>
 
 #include <arhost-cpp/plugin.hpp>
@@ -239,8 +240,8 @@ private:
                 corners.corners_px[corner] = {tag->p[3 - corner][0] - 0.5 + region.x,
                                               tag->p[3 - corner][1] - 0.5 + region.y};
             if (fit_edges_ && part.is_listed())
-                corners = arhost::fiducial::refine_edges(grey, frame.format->transfer, corners.corners_px, *lens_,
-                                                         tag->family->width_at_border, refine_edges_)
+                corners = arhost::fiducial::refine_corners(grey, frame.format->transfer, corners.corners_px, *lens_,
+                                                           print_of(*tag->family, tag->id), refine_edges_)
                               .value_or(corners);
             arhost_observation &one = seen.emplace_back(part.family().observation(part.id(tag->id), corners));
             one.hamming = static_cast<std::uint32_t>(tag->hamming);
@@ -248,6 +249,15 @@ private:
             one.false_positive_rate =
                 arhost::fiducial::false_positive_rate(static_cast<int>(tag->family->nbits), one.hamming);
         }
+    }
+
+    static arhost::fiducial::Print print_of(apriltag_family_t &family, int index) {
+        image_u8_t *drawn = apriltag_to_image(&family, static_cast<std::uint32_t>(index));
+        arhost::fiducial::Print print{{}, (family.total_width - family.width_at_border) / 2};
+        cv::Mat(drawn->height, drawn->width, CV_8UC1, drawn->buf, static_cast<std::size_t>(drawn->stride))
+            .convertTo(print.cells, CV_32F, 1 / 255.0);
+        image_u8_destroy(drawn);
+        return print;
     }
 
     // The library's threshold is that of 4×4 px tiles of the decimated image. Regions on this grid have the tiles of

@@ -6,6 +6,7 @@
 #include <fiducial_common/lens.hpp>
 #include <fiducial_common/observations.hpp>
 #include <fiducial_common/opencv_aruco.hpp>
+#include <fiducial_common/print_alignment.hpp>
 #include <fiducial_common/search_regions.hpp>
 
 #include <arhost-cpp/plugin.hpp>
@@ -303,8 +304,8 @@ private:
                     cv::Point2d(found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner]) +
                     offset;
             if (refine_edges_ && is_listed)
-                corners = arhost::fiducial::refine_edges(grey, frame.format->transfer, corners.corners_px, *lens_,
-                                                         cells_of(table))
+                corners = arhost::fiducial::refine_corners(grey, frame.format->transfer, corners.corners_px, *lens_,
+                                                           print_of(detectable.dictionary, found.ids[i]))
                               .value_or(corners);
             const Reading reading = read(grey, corners.corners_px, table, found.ids[i], parameters.markerBorderBits);
             if (!is_listed && (reading.wrong_bits > 0 || reading.false_positive_rate == 1)) // it may be anything
@@ -314,6 +315,17 @@ private:
             one.decision_margin = reading.contrast;
             one.false_positive_rate = reading.false_positive_rate;
         }
+    }
+
+    arhost::fiducial::Print print_of(const Dictionary &dictionary, int id) const {
+        cv::Mat drawn;
+        arhost::aruco::draw(dictionary.table, id, cells_of(dictionary.table), drawn, parameters_.markerBorderBits);
+        cv::copyMakeBorder(drawn, drawn, 1, 1, 1, 1, cv::BORDER_CONSTANT, 255);
+        if (dictionary.rotated_180)
+            cv::rotate(drawn, drawn, cv::ROTATE_180);
+        arhost::fiducial::Print print{{}, 1};
+        drawn.convertTo(print.cells, CV_32F, 1 / 255.0);
+        return print;
     }
 
     // The side of a marker's square in cells.

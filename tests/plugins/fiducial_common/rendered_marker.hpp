@@ -117,11 +117,13 @@ inline cv::Mat render(const arhost_intrinsics &camera, const std::vector<Placed>
     return cv::Mat(static_cast<int>(drawn.height), static_cast<int>(drawn.width), CV_8U, drawn.codes.data()).clone();
 }
 
-// Adds normally distributed noise; the same seed gives the same noise.
+// Adds normally distributed noise, and saturates the result to 8 bits; the same seed gives the same noise.
 inline void add_noise(cv::Mat &picture, double sigma, uint64_t seed) {
     cv::Mat noise(picture.size(), CV_16S);
     cv::RNG(seed).fill(noise, cv::RNG::NORMAL, 0, sigma);
-    cv::add(picture, noise, picture, cv::noArray(), CV_8U);
+    cv::Mat noisy; // not `picture`, whose type may differ
+    cv::add(picture, noise, noisy, cv::noArray(), CV_8U);
+    picture = noisy;
 }
 
 } // namespace arhost::test

@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "print_alignment.hpp"
+
+#include "edge_refinement.hpp"
+#include "light_of_code.hpp"
+
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+namespace arhost::fiducial {
+namespace {
+
+using Homography = cv::Matx33d;
+
+cv::Vec2d transform(const Homography &h, const cv::Vec2d &at) {
+    const cv::Vec3d v = h * cv::Vec3d(at[0], at[1], 1);
+    return {v[0] / v[2], v[1] / v[2]};
+}
+
+// How the result of transform() changes with `at`.
+cv::Matx22d derivative(const Homography &h, const cv::Vec2d &at) {
+    const cv::Vec3d v = h * cv::Vec3d(at[0], at[1], 1);
+    const double x = v[0] / v[2], y = v[1] / v[2];
+    return cv::Matx22d(h(0, 0) - x * h(2, 0), h(0, 1) - x * h(2, 1), h(1, 0) - y * h(2, 0), h(1, 1) - y * h(2, 1)) *
+           (1 / v[2]);
+}
+
+// What is fitted.
+struct Model {
+    cv::Vec<double, 8> corners_px; // undistorted
+    double blur_px;                // standard deviation
+    double black, contrast;        // light of black, and how much more white has; negative if the print is inverted
+};
+constexpr int unknowns = 11; // in this order
+
+// Maps cells to undistorted px.
+Homography px_from_cells(const cv::Vec<double, 8> &corners_px, const Print &print) {
+    const auto first = static_cast<float>(print.margin), last = first + static_cast<float>(print.side());
+    const cv::Point2f square[] = {{first, first}, {last, first}, {last, last}, {first, last}};
+    // Relative to the first corner, so the precision of float suffices.
+    const cv::Point2d origin(corners_px[0], corners_px[1]);
+    cv::Point2f corners[4];
+    for (int i = 0; i < 4; ++i)
+        corners[i] = cv::Point2d(corners_px[2 * i], corners_px[2 * i + 1]) - origin;
+    const Homography relative = cv::getPerspectiveTransform(square, corners);
+    return Homography(1, 0, origin.x, 0, 1, origin.y, 0, 0, 1) * relative;
+}
+
+double perimeter_px(const std::vector<cv::Point2d> &square) {
+    return cv::arcLength(std::vector<cv::Point2f>(square.begin(), square.end()), true);
+}
+
+constexpr std::uint8_t saturated = 254; // the smallest code of a pixel that may be brighter than its code tells
+
+// A pixel whose light the print determines.
+struct Pixel {
+    cv::Vec2d place; // undistorted
+    double light;
+    bool is_saturated;
+};
+
+// Returns the pixels of the print, of large prints only some of them. Returns none if the lens does not see all of
+// its surroundings.
+std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_code, const Corners &corners_px,
+                             const Lens &lens, const Homography &cells_from_px, const Print &print) {
+    constexpr double reach = 0.5; // into the margin, in cells; blur mixes the rest with what is around it
+    constexpr double max_pixels = 8'000;
+    const std::vector<cv::Point2f> points(corners_px.begin(), corners_px.end());
+    cv::Rect part = cv::boundingRect(points);
+    const int margin_px = 1 + static_cast<int>(std::max(part.width, part.height) * reach / 2);
+    part = cv::Rect(part.x - margin_px, part.y - margin_px, part.width + 2 * margin_px, part.height + 2 * margin_px) &
+           cv::Rect({}, grey.size());
+    const int stride = 1 + static_cast<int>(std::sqrt(part.area() / max_pixels));
+    std::vector<cv::Point2d> at;
+    at.reserve(static_cast<std::size_t>(part.area()));
+    for (int y = part.y; y < part.y + part.height; y += stride)
+        for (int x = part.x; x < part.x + part.width; x += stride)
+            at.emplace_back(x, y);
+    const auto places = lens.undistort(at);
+    std::vector<Pixel> pixels;
+    if (!places)
+        return pixels;
+    pixels.reserve(at.size());
+    for (std::size_t i = 0; i < at.size(); ++i) {
+        const cv::Vec2d place = (*places)[i], cell = transform(cells_from_px, place);
+        const std::uint8_t code = grey.at<std::uint8_t>(at[i]);
+        if (std::min({cell[0], cell[1], print.cells.rows - cell[0], print.cells.rows - cell[1]}) >=
+            print.margin - reach)
+            pixels.push_back({place, light_of_code[code], code >= saturated});
+    }
+    return pixels;
+}
+
+// The blurred print: its whiteness, the derivatives with respect to the column and the row in cells, and with respect
+// to the blur in px.
+struct Table {
+    cv::Mat_<cv::Vec4f> values;
+    int per_cell; // samples along each axis
+
+    cv::Vec4f at(const cv::Vec2d &cell) const { // interpolates bilinearly
+        const double x = std::clamp(cell[0] * per_cell - 0.5, 0.0, values.cols - 1.001);
+        const double y = std::clamp(cell[1] * per_cell - 0.5, 0.0, values.rows - 1.001);
+        const int column = static_cast<int>(x), row = static_cast<int>(y);
+        const auto a = static_cast<float>(x - column), b = static_cast<float>(y - row);
+        const cv::Vec4f *upper = &values(row, column), *lower = upper + values.cols;
+        return (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
+    }
+};
+
+// The blur is round in the frame, and taken as the same ellipse everywhere in the print.
+Table blurred(const Print &print, const cv::Matx22d &cells_from_px, double blur_px) {
+    constexpr double min_sigma = 1.2, cutoff = 3; // samples; standard deviations
+    constexpr int max_per_cell = 12, max_radius = 40;
+    const cv::Matx22d covariance_cells2 = blur_px * blur_px * cells_from_px * cells_from_px.t();
+    const double half_trace = cv::trace(covariance_cells2) / 2;
+    const double smallest =
+        half_trace - std::sqrt(std::max(half_trace * half_trace - cv::determinant(covariance_cells2), 0.0));
+    Table table;
+    table.per_cell =
+        static_cast<int>(std::clamp(std::ceil(min_sigma / std::sqrt(smallest)), 3.0, double(max_per_cell)));
+    const cv::Matx22d covariance = double(table.per_cell * table.per_cell) * covariance_cells2 +
+                                   1e-3 * cv::Matx22d::eye(); // in samples; invertible
+    const cv::Matx22d inverse = covariance.inv();
+    const auto radius = [&](int axis) {
+        return std::min(static_cast<int>(std::ceil(cutoff * std::sqrt(covariance(axis, axis)))), max_radius);
+    };
+    const int columns = radius(0), rows = radius(1);
+    cv::Mat_<float> kernel(2 * rows + 1, 2 * columns + 1);
+    for (int y = -rows; y <= rows; ++y)
+        for (int x = -columns; x <= columns; ++x) {
+            const cv::Vec2d d(x, y);
+            kernel(y + rows, x + columns) = static_cast<float>(std::exp(-0.5 * d.dot(inverse * d)));
+        }
+    kernel /= cv::sum(kernel)[0];
+    cv::Mat_<float> drawn, white;
+    cv::resize(print.cells, drawn, {}, table.per_cell, table.per_cell, cv::INTER_NEAREST);
+    cv::filter2D(drawn, white, -1, kernel, {-1, -1}, 0, cv::BORDER_REPLICATE);
+
+    // Central differences. The blur spreads as heat does: its derivative is that of the covariance times the second
+    // derivatives, divided by 2.
+    const float n = static_cast<float>(table.per_cell);
+    const cv::Matx22f heat = covariance_cells2 * (1 / blur_px);
+    table.values.create(white.size());
+    for (int y = 0; y < white.rows; ++y) {
+        const float *above = white[std::max(y - 1, 0)], *row = white[y],
+                    *below = white[std::min(y + 1, white.rows - 1)];
+        for (int x = 0; x < white.cols; ++x) {
+            const int left = std::max(x - 1, 0), right = std::min(x + 1, white.cols - 1);
+            const float xx = row[left] - 2 * row[x] + row[right], yy = above[x] - 2 * row[x] + below[x],
+                        xy = (above[left] - above[right] - below[left] + below[right]) / 4;
+            table.values(y, x) = {row[x], (row[right] - row[left]) * n / 2, (below[x] - above[x]) * n / 2,
+                                  n * n * (heat(0, 0) * xx + 2 * heat(0, 1) * xy + heat(1, 1) * yy)};
+        }
+    }
+    return table;
+}
+
+struct Fit {
+    cv::Matx<double, unknowns, unknowns> normal; // JᵀJ, where J are the derivatives of the light
+    cv::Vec<double, unknowns> gradient;          // Jᵀ·residuals
+    double cost = 0; // sum of the squared residuals; infinite if the corners are not those
+                     // of a square seen from the front
+};
+
+Fit linearize(std::span<const Pixel> pixels, const Print &print, const Model &model) {
+    const Homography to_px = px_from_cells(model.corners_px, print), to_cells = to_px.inv();
+    Fit fit;
+    const double middle = print.cells.rows / 2.0;
+    const cv::Matx22d px_per_cell = derivative(to_px, {middle, middle});
+    if (!(cv::determinant(px_per_cell) > 0)) { // also for NaN
+        fit.cost = std::numeric_limits<double>::infinity();
+        return fit;
+    }
+    const Table table = blurred(print, px_per_cell.inv(), model.blur_px);
+
+    // First with respect to the nine elements of the homography, the blur, the black and the contrast.
+    constexpr int count = 12;
+    std::array<double, count * count> normal{};
+    std::array<double, count> gradient{};
+    for (const Pixel &pixel : pixels) {
+        const cv::Vec3d h = to_cells * cv::Vec3d(pixel.place[0], pixel.place[1], 1);
+        if (!(h[2] > 0)) {
+            fit.cost = std::numeric_limits<double>::infinity();
+            return fit;
+        }
+        const cv::Vec2d cell(h[0] / h[2], h[1] / h[2]);
+        const cv::Vec4f white = table.at(cell);
+        // The derivative of the light with respect to a motion of the print in undistorted px.
+        const double by_u = -model.contrast * white[1] / h[2], by_v = -model.contrast * white[2] / h[2];
+        const double x = by_u * (to_cells(0, 0) - cell[0] * to_cells(2, 0)) +
+                         by_v * (to_cells(1, 0) - cell[1] * to_cells(2, 0)),
+                     y = by_u * (to_cells(0, 1) - cell[0] * to_cells(2, 1)) +
+                         by_v * (to_cells(1, 1) - cell[1] * to_cells(2, 1));
+        // The homography maps `h` to (pixel.place, 1).
+        const double w = -(x * pixel.place[0] + y * pixel.place[1]);
+        const std::array<double, count> j = {x * h[0], x * h[1], x * h[2], y * h[0], y * h[1],
+                                             y * h[2], w * h[0], w * h[1], w * h[2], model.contrast * white[3],
+                                             1,        white[0]};
+        const double residual = pixel.light - model.black - model.contrast * white[0];
+        if (pixel.is_saturated && residual < 0) // the pixel does not tell how much brighter it would be
+            continue;
+#pragma GCC unroll 12
+        for (int a = 0; a < count; ++a) {
+            gradient[a] += j[a] * residual;
+            for (int b = a / 2 * 2; b < count; ++b) // the upper triangle
+                normal[a * count + b] += j[a] * j[b];
+        }
+        fit.cost += residual * residual;
+    }
+
+    for (int a = 0; a < count; ++a)
+        for (int b = 0; b < a; ++b)
+            normal[a * count + b] = normal[b * count + a];
+
+    // Then with respect to the corners, on which the homography depends.
+    cv::Matx<double, count, unknowns> by_unknown = cv::Matx<double, count, unknowns>::zeros();
+    for (int i = 0; i < 8; ++i) {
+        constexpr double step_px = 1e-2;
+        cv::Vec<double, 8> corners_px = model.corners_px;
+        corners_px[i] += step_px;
+        const Homography moved = px_from_cells(corners_px, print);
+        for (int element = 0; element < 9; ++element)
+            by_unknown(element, i) = (moved.val[element] - to_px.val[element]) / step_px;
+    }
+    for (int i = 9; i < count; ++i)
+        by_unknown(i, i - 1) = 1;
+    fit.normal = by_unknown.t() * cv::Matx<double, count, count>(normal.data()) * by_unknown;
+    fit.gradient = by_unknown.t() * cv::Vec<double, count>(gradient.data());
+    return fit;
+}
+
+double sum_of_squared_differences_from_mean(std::span<const Pixel> pixels) {
+    double sum = 0, squares = 0;
+    for (const Pixel &pixel : pixels) {
+        sum += pixel.light;
+        squares += pixel.light * pixel.light;
+    }
+    return squares - sum * sum / static_cast<double>(pixels.size());
+}
+
+// Returns the variance of the independent noise of 8 coordinates whose 95 % ellipsoid contains noise with this
+// covariance as often (Satterthwaite's approximation: a sum of squares with unequal variances is a scaled chi-squared
+// with fewer degrees of freedom).
+double equivalent_variance(const cv::Matx<double, 8, 8> &covariance) {
+    const double sum = cv::trace(covariance), sum_of_squares = covariance.dot(covariance);
+    const double freedom = sum * sum / sum_of_squares;
+    // 95 % quantile of the chi-squared distribution (Wilson–Hilferty)
+    const auto quantile = [](double n) { return n * std::pow(1 - 2 / (9 * n) + 1.645 * std::sqrt(2 / (9 * n)), 3); };
+    return sum_of_squares / sum * quantile(freedom) / quantile(8);
+}
+
+} // namespace
+
+std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
+                                           const Lens &lens, const Print &print) {
+    constexpr double first_blur_px = 0.7, min_blur_px = 0.3, converged_px = 0.01, min_resemblance = 0.7,
+                     min_cell_px = 0.5;
+    constexpr int max_steps = 12;
+    const auto corners = lens.undistort({corners_px.begin(), corners_px.end()});
+    if (!corners || print.margin < 1 || !std::ranges::all_of(corners_px, [&](const cv::Point2d &corner) {
+            return std::abs(corner.x) < 2 * grey.cols && std::abs(corner.y) < 2 * grey.rows;
+        }))
+        return std::nullopt;
+    Model model{{}, first_blur_px, 0, 1};
+    double shortest = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < 4; ++i) {
+        model.corners_px[2 * i] = (*corners)[i].x;
+        model.corners_px[2 * i + 1] = (*corners)[i].y;
+        shortest = std::min(shortest, cv::norm((*corners)[(i + 1) % 4] - (*corners)[i]));
+    }
+    if (!(shortest >= min_cell_px * print.side())) // false for NaN
+        return std::nullopt;
+    const Homography cells_from_px = px_from_cells(model.corners_px, print).inv();
+    const std::vector<Pixel> pixels =
+        pixels_of(grey, light_of_code(transfer), corners_px, lens, cells_from_px, print);
+    if (pixels.size() < 4 * unknowns)
+        return std::nullopt;
+
+    // First the light, on which the other derivatives depend: it is linear.
+    Fit fit = linearize(pixels, print, model);
+    if (!std::isfinite(fit.cost))
+        return std::nullopt;
+    const auto light = fit.normal.get_minor<2, 2>(9, 9).inv() * cv::Vec2d(fit.gradient[9], fit.gradient[10]);
+    model.black += light[0];
+    model.contrast += light[1];
+    fit = linearize(pixels, print, model);
+    double damping = 1e-3;
+    for (int step = 0; step < max_steps; ++step) {
+        auto damped = fit.normal;
+        for (int i = 0; i < unknowns; ++i)
+            damped(i, i) *= 1 + damping;
+        const cv::Vec<double, unknowns> change = damped.solve(fit.gradient, cv::DECOMP_CHOLESKY);
+        Model next = model;
+        for (int i = 0; i < 8; ++i)
+            next.corners_px[i] += change[i];
+        next.blur_px =
+            std::clamp(model.blur_px + change[8], std::max(min_blur_px, model.blur_px / 2), 2 * model.blur_px);
+        next.black += change[9];
+        next.contrast += change[10];
+        const Fit candidate = linearize(pixels, print, next);
+        const double changed_px = std::max(cv::norm(next.corners_px, model.corners_px, cv::NORM_INF),
+                                           std::abs(next.blur_px - model.blur_px));
+        const bool is_better = candidate.cost < fit.cost;
+        damping *= is_better ? 0.1 : 10;
+        if (is_better) {
+            model = next;
+            fit = candidate;
+        }
+        if (changed_px < converged_px)
+            break;
+    }
+    if (!(fit.cost < (1 - min_resemblance) * sum_of_squared_differences_from_mean(pixels)))
+        return std::nullopt;
+    std::vector<cv::Point2d> found;
+    for (int i = 0; i < 4; ++i) {
+        found.emplace_back(model.corners_px[2 * i], model.corners_px[2 * i + 1]);
+        if (!(cv::norm(found[i] - (*corners)[i]) < shortest / 4))
+            return std::nullopt;
+    }
+    const auto distorted = lens.distort(found);
+    if (!distorted)
+        return std::nullopt;
+    const auto covariance =
+        fit.normal.inv(cv::DECOMP_CHOLESKY) * (fit.cost / static_cast<double>(pixels.size() - unknowns));
+    MeasuredCorners result;
+    std::ranges::copy(*distorted, result.corners_px.begin());
+    // The distortion scales the noise as it scales the square.
+    const double scale = perimeter_px(*distorted) / perimeter_px(found);
+    const double sigma_px = scale * std::sqrt(equivalent_variance(covariance.get_minor<8, 8>(0, 0)));
+    result.sigma_px = std::isfinite(sigma_px) ? sigma_px : 0;
+    return result;
+}
+
+namespace {
+
+// Whether most of the margin is too bright for the camera, which shifts the edges into the black.
+bool is_overexposed(const cv::Mat &grey, const Corners &corners_px, int cells) {
+    const cv::Point2d centre = (corners_px[0] + corners_px[1] + corners_px[2] + corners_px[3]) / 4;
+    int bright = 0, all = 0;
+    for (int i = 0; i < 4; ++i)
+        for (const double part : {0.2, 0.4, 0.6, 0.8}) {
+            const cv::Point2d on_edge = corners_px[i] + part * (corners_px[(i + 1) % 4] - corners_px[i]);
+            const cv::Point2d outside = on_edge + (on_edge - centre) / cells; // half a cell
+            if (!cv::Rect2d(0, 0, grey.cols - 1, grey.rows - 1).contains(outside))
+                continue;
+            bright += grey.at<std::uint8_t>(outside) >= saturated;
+            ++all;
+        }
+    return 2 * bright > all;
+}
+
+} // namespace
+
+std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
+                                              const Lens &lens, const Print &print, bool is_subpixel) {
+    constexpr double max_blur_cells = 0.5;
+    const auto edges = refine_edges(grey, transfer, rough_px, lens, print.side(), is_subpixel);
+    if (edges && edges->blur_cells <= max_blur_cells && !is_overexposed(grey, edges->corners_px, print.side()))
+        return edges;
+    const auto aligned = align_print(grey, transfer, edges ? edges->corners_px : rough_px, lens, print);
+    return aligned ? aligned : edges;
+}
+
+} // namespace arhost::fiducial

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Corners of markers whose cells are so narrow or blurred that their edges cannot be located one by one.
+#pragma once
+
+#include "lens.hpp"
+#include "observations.hpp"
+
+namespace arhost::fiducial {
+
+// The cells of a print from the top left: 1 is white, 0 is black. `margin` cells around the square are known.
+struct Print {
+    cv::Mat_<float> cells;
+    int margin = 0;
+
+    int side() const { return cells.rows - 2 * margin; } // of the square
+};
+
+// Fits a picture of the whole print to the frame: its corners, its blur, and the light of black and of white, by the
+// method of least squares (Levenberg–Marquardt). All cells contribute, so this is accurate where blur mixes an edge
+// with the cells beside it. `corners_px` are correct to about half a cell. The noise of the corners follows from the
+// residuals. It is not independent, so `sigma_px` is that of the independent noise whose 95 % ellipsoid contains the
+// errors as often. Returns std::nullopt if the picture does not resemble the frame.
+std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
+                                           const Lens &lens, const Print &print);
+
+// Refines corners by the edges of the square (refine_edges) or, where these are blurred over half a cell, not found,
+// or shifted because white is saturated, by the whole print. Returns std::nullopt if neither succeeds. `is_subpixel`:
+// as refine_edges() has it.
+std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
+                                              const Lens &lens, const Print &print, bool is_subpixel = false);
+
+} // namespace arhost::fiducial

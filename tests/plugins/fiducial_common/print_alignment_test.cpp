@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fiducial_common/edge_refinement.hpp>
+#include <fiducial_common/print_alignment.hpp>
+
+#include "prints.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+namespace {
+
+using namespace arhost::test;
+using arhost::fiducial::align_print;
+using arhost::fiducial::Corners;
+using arhost::fiducial::Lens;
+using arhost::fiducial::MeasuredCorners;
+using arhost::fiducial::refine_corners;
+using arhost::fiducial::refine_edges;
+
+const cv::Size size(320, 240);
+const arhost_intrinsics camera = intrinsics_of(size, 300, 300, 159.5, 119.5);
+
+arhost::fiducial::Print print_of(const Print &tag) {
+    arhost::fiducial::Print print{{}, (tag.cells.rows - tag.corner_cells) / 2};
+    tag.cells.convertTo(print.cells, CV_32F, 1 / 255.0);
+    return print;
+}
+
+// Rendered at four times the resolution, because the renderer has only 32 rays per pixel.
+cv::Mat finely_rendered(const arhost_intrinsics &intrinsics, const Placed &marker) {
+    arhost_intrinsics fine = intrinsics;
+    fine.width *= 4;
+    fine.height *= 4;
+    for (double *value : {&fine.fx, &fine.fy, &fine.cx, &fine.cy})
+        *value *= 4;
+    fine.cx += 1.5;
+    fine.cy += 1.5;
+    cv::Mat picture;
+    cv::resize(render(fine, {marker}), picture, size, 0, 0, cv::INTER_AREA);
+    return picture;
+}
+
+struct Case {
+    double distance_mm, tilt_degrees, blur_px, noise;
+    arhost_intrinsics intrinsics = camera;
+    double x_mm = 0;
+    bool is_inverted = false;
+    arhost_transfer transfer = ARHOST_TRANSFER_LINEAR;
+    double exposure = 1;
+};
+
+struct Errors {
+    double aligned_px = 0, edges_px = 0; // RMS of each coordinate
+    double told_px = 0;                  // the standard deviation that align_print tells
+    int without_edges = 0;
+};
+
+// Of tags whose rough corners are wrong by up to 0.3 px.
+Errors errors(const Case &one) {
+    constexpr int count = 30;
+    const Lens lens(one.intrinsics);
+    std::mt19937 generator(5);
+    std::uniform_real_distribution<double> turn(-180, 180), shift(-20, 20), wrong(-0.3, 0.3);
+    Errors sum;
+    for (int i = 0; i < count; ++i) {
+        const Mt mt = pose_of(one.x_mm + shift(generator), shift(generator), one.distance_mm, one.tilt_degrees, 0,
+                              turn(generator));
+        const Print tag = april_tag("tag36h11", i);
+        cv::Mat picture = finely_rendered(one.intrinsics, {tag.with_margin(1), 100, mt});
+        if (one.is_inverted)
+            picture = 255 - picture;
+        cv::GaussianBlur(picture, picture, {}, one.blur_px);
+        if (one.transfer == ARHOST_TRANSFER_SRGB) {
+            cv::Mat light;
+            picture.convertTo(light, CV_32F, 0.85 / 255, 0.02);
+            cv::pow(light, 1 / 2.4, light); // sRGB above 0.003
+            light.convertTo(picture, CV_8U, 255 * 1.055, -255 * 0.055);
+        }
+        picture.convertTo(picture, CV_16S, one.exposure); // noise comes before saturation
+        add_noise(picture, one.noise, i + 1);
+        const auto truth = corners_of(mt, one.intrinsics, 100);
+        Corners rough = truth;
+        for (cv::Point2d &corner : rough)
+            corner += cv::Point2d(wrong(generator), wrong(generator));
+        const auto squares = [&](const MeasuredCorners &found) {
+            double squares = 0;
+            for (int k = 0; k < 4; ++k)
+                squares += (found.corners_px[k] - truth[k]).dot(found.corners_px[k] - truth[k]) / 8 / count;
+            return squares;
+        };
+        const auto aligned = align_print(picture, one.transfer, rough, lens, print_of(tag));
+        if (!aligned) {
+            ADD_FAILURE() << i;
+            continue;
+        }
+        sum.aligned_px += squares(*aligned);
+        sum.told_px += aligned->sigma_px * aligned->sigma_px / count;
+        const auto edges = refine_edges(picture, one.transfer, rough, lens, 8);
+        sum.edges_px += edges ? squares(*edges) : 0;
+        sum.without_edges += !edges;
+    }
+    return {std::sqrt(sum.aligned_px), std::sqrt(sum.edges_px), std::sqrt(sum.told_px), sum.without_edges};
+}
+
+TEST(PrintAlignment, IsMorePreciseThanEdgesWhereCellsAreNarrow) {
+    for (const Case &one : {Case{1800, 20, 0.6, 1.5}, Case{600, 75, 0.6, 1.5}, Case{600, 20, 2.5, 1.5}}) {
+        const Errors e = errors(one);
+        EXPECT_LT(e.aligned_px, 0.03) << one.distance_mm << " " << one.tilt_degrees << " " << one.blur_px;
+        EXPECT_TRUE(e.without_edges > 0 || e.edges_px > 2.5 * e.aligned_px) << e.edges_px;
+    }
+}
+
+TEST(PrintAlignment, TellsTheNoiseOfTheCorners) {
+    const auto curved = intrinsics_of(size, 200, 200, 159.5, 119.5, ARHOST_DISTORTION_BROWN, {-0.3, 0, 0, 0});
+    for (const Case &one : {Case{1400, 20, 0.7, 3}, Case{1400, 20, 0.7, 12}, Case{600, 40, 2.5, 6},
+                            Case{700, 20, 0.7, 6, curved, 220}, Case{1000, 20, 0.7, 6, camera, 0, true}}) {
+        const Errors e = errors(one);
+        EXPECT_NEAR(e.told_px / e.aligned_px, 1.05, 0.25)
+            << one.distance_mm << " " << one.blur_px << " " << one.noise;
+    }
+}
+
+TEST(PrintAlignment, WorksInLinearLight) {
+    EXPECT_LT(errors({1000, 20, 0.7, 1.5, camera, 0, false, ARHOST_TRANSFER_SRGB}).aligned_px, 0.03);
+}
+
+TEST(PrintAlignment, IsNotShiftedBySaturatedWhite) {
+    Case bright{600, 20, 0.7, 1.5};
+    bright.exposure = 2;
+    const Errors e = errors(bright);
+    EXPECT_LT(e.aligned_px, 0.03);
+    EXPECT_GT(e.edges_px, 0.2) << "the picture does not have the difficulty";
+}
+
+TEST(PrintAlignment, ReturnsNothingForAnotherPrint) {
+    const Lens lens(camera);
+    const Mt mt = pose_of(5, -3, 1000, 20, 15, 25);
+    cv::Mat picture = render(camera, {{april_tag("tag36h11", 4).with_margin(1), 100, mt}});
+    cv::GaussianBlur(picture, picture, {}, 0.7);
+    const auto corners = corners_of(mt, camera, 100);
+    EXPECT_TRUE(align_print(picture, ARHOST_TRANSFER_LINEAR, corners, lens, print_of(april_tag("tag36h11", 4))));
+    EXPECT_FALSE(align_print(picture, ARHOST_TRANSFER_LINEAR, corners, lens, print_of(april_tag("tag36h11", 5))));
+    EXPECT_FALSE(align_print(cv::Mat(size, CV_8U, cv::Scalar(90)), ARHOST_TRANSFER_LINEAR, corners, lens,
+                             print_of(april_tag("tag36h11", 4))));
+}
+
+TEST(PrintAlignment, ReturnsNothingWithoutASquare) {
+    const Lens lens(camera);
+    cv::Mat noise(size, CV_8U, cv::Scalar(128));
+    add_noise(noise, 60, 5);
+    const arhost::fiducial::Print print = print_of(april_tag("tag36h11", 4));
+    const double nan = std::numeric_limits<double>::quiet_NaN(), huge = 1e12;
+    for (const Corners &corners : {Corners{{{100, 80}, {100, 80}, {100, 80}, {100, 80}}},
+                                   Corners{{{nan, 80}, {160, 80}, {160, 140}, {100, 140}}},
+                                   Corners{{{100, 80}, {160, 80}, {100, 80}, {160, 80}}},
+                                   Corners{{{100, 80}, {160, 140}, {160, 80}, {100, 140}}},
+                                   Corners{{{400, 80}, {460, 80}, {460, 140}, {400, 140}}},
+                                   Corners{{{-huge, -huge}, {huge, -huge}, {huge, huge}, {-huge, huge}}},
+                                   Corners{{{100, 80}, {101, 80}, {101, 81}, {100, 81}}}})
+        EXPECT_FALSE(align_print(noise, ARHOST_TRANSFER_SRGB, corners, lens, print)) << corners[0];
+    EXPECT_FALSE(align_print(cv::Mat(1, 1, CV_8U, cv::Scalar(0)), ARHOST_TRANSFER_SRGB,
+                             {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}}, lens, print));
+}
+
+TEST(PrintAlignment, FitsAPrintThatTheFrameCuts) {
+    const Lens lens(camera);
+    const Mt mt = pose_of(0, 0, 1500, 0, 0, 20);
+    const Print tag = april_tag("tag36h11", 4);
+    cv::Mat picture = finely_rendered(camera, {tag.with_margin(1), 100, mt});
+    const auto truth = corners_of(mt, camera, 100);
+    const double left = std::min({truth[0].x, truth[1].x, truth[2].x, truth[3].x});
+    const int cut = static_cast<int>(left) + 1;
+    const auto found = align_print(picture.colRange(cut, size.width).clone(), ARHOST_TRANSFER_LINEAR,
+                                   {truth[0] - cv::Point2d(cut, 0), truth[1] - cv::Point2d(cut, 0),
+                                    truth[2] - cv::Point2d(cut, 0), truth[3] - cv::Point2d(cut, 0)},
+                                   lens, print_of(tag));
+    ASSERT_TRUE(found);
+    for (int k = 0; k < 4; ++k)
+        EXPECT_LT(cv::norm(found->corners_px[k] + cv::Point2d(cut, 0) - truth[k]), 0.05);
+}
+
+TEST(CornerRefinement, AlignsThePrintOnlyWhereCellsAreNarrow) {
+    const Lens lens(camera);
+    const Print tag = april_tag("tag36h11", 4);
+    for (const auto &[distance_mm, is_narrow] : {std::pair(400.0, false), {1600.0, true}}) {
+        const Mt mt = pose_of(5, -3, distance_mm, 20, 15, 25);
+        cv::Mat picture = finely_rendered(camera, {tag.with_margin(1), 100, mt});
+        cv::GaussianBlur(picture, picture, {}, 0.6);
+        const auto rough = corners_of(mt, camera, 100);
+        const auto found = refine_corners(picture, ARHOST_TRANSFER_LINEAR, rough, lens, print_of(tag));
+        const auto edges = refine_edges(picture, ARHOST_TRANSFER_LINEAR, rough, lens, 8);
+        ASSERT_TRUE(found && edges);
+        EXPECT_EQ(found->corners_px != edges->corners_px, is_narrow);
+    }
+}
+
+TEST(CornerRefinement, KeepsTheEdgesOfAPrintThatDoesNotFit) {
+    const Lens lens(camera);
+    const Mt mt = pose_of(5, -3, 1600, 20, 15, 25);
+    cv::Mat picture = finely_rendered(camera, {april_tag("tag36h11", 4).with_margin(1), 100, mt});
+    cv::GaussianBlur(picture, picture, {}, 0.6);
+    const auto rough = corners_of(mt, camera, 100);
+    const auto found =
+        refine_corners(picture, ARHOST_TRANSFER_LINEAR, rough, lens, print_of(april_tag("tag36h11", 5)));
+    const auto edges = refine_edges(picture, ARHOST_TRANSFER_LINEAR, rough, lens, 8);
+    ASSERT_TRUE(found && edges);
+    EXPECT_EQ(found->corners_px, edges->corners_px);
+}
+
+} // namespace
