@@ -42,7 +42,9 @@ const char *problem_with(const arhost_observation &observation, std::size_t fami
     return nullptr;
 }
 
-const char *problem_with(const arhost_expected_marker &expected) {
+const char *problem_with(const arhost_expected_marker &expected, std::size_t marker_count) {
+    if (expected.marker >= marker_count)
+        return "an expected marker's index is out of range";
     for (const auto &corner : expected.corners_px)
         if (!all_finite(corner))
             return "a coordinate of an expected marker's corner is not finite";
@@ -78,11 +80,14 @@ const char *accept_tracker_result(std::span<const std::byte> slot, const std::ve
         if (const char *problem = problem_with(observation, family_count))
             return problem;
     }
+    std::size_t marker_count = 0;
+    for (const ipc::Target &target : configured)
+        marker_count += target.markers.size();
     std::vector<arhost_expected_marker> expected(expected_count);
     copy_array(slot, layout.expected_offset, expected);
     for (arhost_expected_marker &marker : expected) {
         marker.struct_size = sizeof marker;
-        if (const char *problem = problem_with(marker))
+        if (const char *problem = problem_with(marker, marker_count))
             return problem;
     }
     for (std::size_t i = 0; i < targets.size(); ++i) {

@@ -77,7 +77,8 @@ struct OutputFrame {
 using OutputFramePointer = std::shared_ptr<const OutputFrame>;
 
 // Copies a tracker's result into the frame and validates the copy. Returns nullptr if the copy is valid (finite
-// numbers, valid poses), otherwise a description of the contract violation. Does not set `search.unlisted_count`.
+// numbers, valid poses, indices in range), otherwise a description of the contract violation. Does not set
+// `search.unlisted_count`.
 const char *accept_tracker_result(std::span<const std::byte> slot, const std::vector<ipc::Target> &configured,
                                   std::size_t family_count, Frame &frame);
 

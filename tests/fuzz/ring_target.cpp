@@ -26,7 +26,7 @@ void require(bool condition, const char *message) {
 }
 
 void take_result(Input &input) {
-    const std::vector<ipc::Target> configured(2, {"target", {}, ""});
+    const std::vector<ipc::Target> configured(2, {"target", {{7, "D", {}}}, ""});
     const ipc::TrackerSlot layout(configured.size());
     std::vector<std::byte> slot(layout.byte_size(0));
     *reinterpret_cast<ipc::TrackerSlot::Header *>(slot.data()) = {2, 2, 1, 0};
@@ -50,8 +50,10 @@ void take_result(Input &input) {
             require(std::isfinite(number), "a pose is not finite");
     }
     require(frame.record.search.missed_count <= frame.expected.size(), "more markers are missed than expected");
-    for (const arhost_expected_marker &expected : frame.expected)
+    for (const arhost_expected_marker &expected : frame.expected) {
+        require(expected.marker < configured.size(), "the index of an expected marker is out of range");
         require(std::isfinite(expected.margin_px), "a margin is not finite");
+    }
 }
 
 void overlay(const arhost_render_info &info) {

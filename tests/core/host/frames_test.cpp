@@ -36,6 +36,7 @@ struct TrackerResult {
     TrackerResult() : bytes(layout.byte_size(0)) {
         header() = {.observation_count = 2, .expected_count = 2, .missed_count = 1, .searched_everywhere = -1};
         expected(0).margin_px = expected(1).margin_px = 4;
+        expected(1).marker = 1;
         expected(1).corners_px[3][1] = 20;
         for (const int index : {1, 2}) {
             target(index).state = index == 1 ? ARHOST_TARGET_DETECTED : ARHOST_TARGET_LOST;
@@ -79,6 +80,7 @@ TEST(TrackerResult, IsCopiedWithTheConfiguredNamesOfTheTargets) {
     EXPECT_EQ(result.frame.observations[1].id, 99);
     EXPECT_EQ(result.frame.observations[1].struct_size, sizeof(arhost_observation));
     ASSERT_EQ(result.frame.expected.size(), 2u);
+    EXPECT_EQ(result.frame.expected[1].marker, 1u);
     EXPECT_EQ(result.frame.expected[1].corners_px[3][1], 20);
     EXPECT_EQ(result.frame.expected[1].struct_size, sizeof(arhost_expected_marker));
     const arhost_search &search = result.frame.record.search;
@@ -105,6 +107,9 @@ TEST(TrackerResult, IsRejectedIfItsNumbersAreInvalid) {
                              +[](TrackerResult &r) { r.header().expected_count = UINT32_MAX; },
                              +[](TrackerResult &r) { r.header().missed_count = 3; }})
         expect(alter, "the number of expected or missed markers is out of range");
+    for (const auto alter : {+[](TrackerResult &r) { r.expected(0).marker = 2; },
+                             +[](TrackerResult &r) { r.expected(1).marker = UINT32_MAX; }})
+        expect(alter, "an expected marker's index is out of range");
     for (const double number : {nan, std::numeric_limits<double>::infinity()}) {
         TrackerResult result;
         result.expected(1).corners_px[0][1] = number;
