@@ -597,14 +597,14 @@ void check_scene(const run_config::Configuration &configuration, supervise::Cont
                  const std::vector<ipc::PluginDescription> &raytracers) {
     std::optional<std::string> outcome;
     std::uint32_t needed = 0;
-    const SceneLoading loading(context, configuration.raytracer->scene, configuration.sandbox,
-                               configuration.raytracer->limits, configuration.files,
-                               {[&](const ipc::SharedMemory &arena, const auto &) {
-                                    needed = scene::needed_capabilities(
-                                        arena.map(ipc::Access::read_only).as<const arhost_scene>());
-                                    outcome = "";
-                                },
-                                [&](const std::string &reason, const auto &) { outcome = reason; }});
+    const SceneLoading loading(
+        context, configuration.raytracer->scene, configuration.sandbox, configuration.raytracer->limits,
+        configuration.files,
+        {[&](const ipc::SharedMemory &arena, const std::vector<Anchor> &anchors, const auto &) {
+             needed = scene::needed_capabilities(arena.map(ipc::Access::read_only).as<const arhost_scene>());
+             outcome = problem_with(anchors, configuration.tracker ? &*configuration.tracker : nullptr);
+         },
+         [&](const std::string &reason, const auto &) { outcome = reason; }});
     while (!outcome)
         context.reactor.run_once();
     if (!outcome->empty())

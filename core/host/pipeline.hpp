@@ -93,7 +93,7 @@ private:
     void expect_distinct_files(const run_config::ComponentConfiguration &output,
                                const ipc::PluginDescription &plugin);
     void load_scene();
-    std::string problem_with_anchors(const std::vector<std::string> &anchors) const;
+    const run_config::TrackerConfiguration *tracker_of_anchors() const;
     void write_anchors(const Frame &frame, std::span<std::byte> slot) const;
     std::unique_ptr<SceneLoading> load(const run_config::Scene &scene,
                                        const run_config::RaytracerConfiguration &raytracer,

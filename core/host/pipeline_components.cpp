@@ -144,34 +144,13 @@ void Pipeline::load_scene() {
         });
 }
 
-// The names of the targets that objects belong to. The arena is valid.
-static std::vector<std::string> anchors_of(const arhost_scene &scene) {
-    const auto *arena = reinterpret_cast<const char *>(&scene);
-    std::vector<std::string> names;
-    for (std::uint32_t i = 0; i < scene.anchors.count; ++i)
-        names.emplace_back(arena + scene.names.offset +
-                           reinterpret_cast<const arhost_anchor *>(arena + scene.anchors.offset)[i].target);
-    return names;
-}
-
-// Returns why objects cannot belong to these targets; empty if they can.
-std::string Pipeline::problem_with_anchors(const std::vector<std::string> &anchors) const {
+// Returns the tracker whose targets objects can belong to; null if there is none.
+const run_config::TrackerConfiguration *Pipeline::tracker_of_anchors() const {
     // A session contains the poses of the targets, so its replay needs no tracker.
     const bool replays_poses = configuration_.recording && configuration_.recording->repeats_decisions;
-    const run_config::TrackerConfiguration *tracker = latest_->tracker ? &*latest_->tracker
-                                                      : replays_poses && !latest_->trackers.empty()
-                                                          ? &latest_->trackers.front()
-                                                          : nullptr;
-    for (const std::string &name : anchors) {
-        if (!tracker)
-            return "an object is 'on: " + base::printable(name) +
-                   "', but no tracker runs; remove this key, or run a tracker with this target";
-        if (std::ranges::find(tracker->targets, name, &ipc::Target::name) == tracker->targets.end())
-            return "there is no target '" + base::printable(name) +
-                   "', which an object is 'on'; the tracker looks for " + describe_targets(tracker->targets) +
-                   "; correct the name, or add the target";
-    }
-    return "";
+    return latest_->tracker                              ? &*latest_->tracker
+           : replays_poses && !latest_->trackers.empty() ? &latest_->trackers.front()
+                                                         : nullptr;
 }
 
 // Starts to load a scene. Calls one of the two functions, which may destroy the returned object.
@@ -182,14 +161,14 @@ std::unique_ptr<SceneLoading> Pipeline::load(const run_config::Scene &scene,
     auto loaded = std::make_shared<LoadedScene>();
     loaded->source = scene;
     SceneLoading::Callbacks callbacks;
-    callbacks.loaded = [this, loaded, conform = raytracer.conform, on_loaded,
-                        on_failed](SharedMemory arena, const FileWatch::Files &files) {
+    callbacks.loaded = [this, loaded, conform = raytracer.conform, on_loaded, on_failed](
+                           SharedMemory arena, const std::vector<Anchor> &anchors, const FileWatch::Files &files) {
         const Mapping mapping = arena.map(Access::read_only);
         const auto &content = mapping.as<const arhost_scene>();
         loaded->files = files;
-        loaded->anchors = anchors_of(content);
-        if (const std::string problem = problem_with_anchors(loaded->anchors); !problem.empty())
-            return on_failed(loaded->source.file.string() + ": " + problem);
+        loaded->anchors = anchors;
+        if (const std::string problem = problem_with(anchors, tracker_of_anchors()); !problem.empty())
+            return on_failed(problem);
         loaded->coordinates = latest_->coordinates.value_or(camera::default_for(content.axes));
         if (conform)
             loaded->overlay_checks.emplace(content);

@@ -404,8 +404,9 @@ void Pipeline::write_anchors(const Frame &frame, std::span<std::byte> slot) cons
     const LoadedScene &scene = *raytracer_->scene;
     auto *poses = reinterpret_cast<AnchorPose *>(slot.data());
     for (std::size_t i = 0; i < scene.anchors.size(); ++i) {
-        const auto target = std::ranges::find_if(
-            frame.targets, [&](const arhost_target &one) { return is_visible(one) && one.name == scene.anchors[i]; });
+        const auto target = std::ranges::find_if(frame.targets, [&](const arhost_target &one) {
+            return is_visible(one) && one.name == scene.anchors[i].target;
+        });
         poses[i] = {};
         if (target == frame.targets.end())
             continue;

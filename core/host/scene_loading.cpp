@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/scene_loading.hpp"
 
+#include "base/text.hpp"
+#include "host/outcome.hpp"
 #include "scene/arena.hpp"
+
+#include <arhost/tracker.h>
+
+#include <algorithm>
 
 namespace arhost::host {
 
@@ -25,6 +31,19 @@ sandbox::Policy policy_of(sandbox::Mode mode) {
 }
 
 } // namespace
+
+std::string problem_with(const std::vector<Anchor> &anchors, const run_config::TrackerConfiguration *tracker) {
+    for (const Anchor &anchor : anchors) {
+        if (!tracker)
+            return anchor.where + ": no tracker runs that could find the target '" + base::printable(anchor.target) +
+                   "'; remove this key, or run a tracker with this target";
+        if (std::ranges::find(tracker->targets, anchor.target, &ipc::Target::name) == tracker->targets.end())
+            return anchor.where + ": there is no target '" + base::printable(anchor.target) +
+                   "'; the tracker looks for " + describe_targets(tracker->targets) +
+                   "; correct the name, or add the target";
+    }
+    return "";
+}
 
 SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
                            const base::Limits &limits, run_config::FilesInUse files, Callbacks callbacks)
@@ -52,6 +71,9 @@ void SceneLoading::on_message(Message &message) {
     } else if (is<messages::Reads>(message)) {
         const auto reads = parse<messages::Reads>(message);
         check_read({reads.path, reads.node});
+    } else if (is<messages::AnchorOrigin>(message)) {
+        if (anchor_origins_.size() < ARHOST_MAX_TARGETS)
+            anchor_origins_.push_back(base::printable(parse<messages::AnchorOrigin>(message).text));
     } else if (is<messages::Progress>(message)) {
         budget_.log(ARHOST_SEVERITY_DEBUG, parse<messages::Progress>(message).what);
     }
@@ -80,6 +102,17 @@ void SceneLoading::fail(const std::string &reason) {
         failure_ = reason;
 }
 
+// The arena is valid.
+std::vector<Anchor> SceneLoading::anchors_of(const arhost_scene &scene) const {
+    const auto *arena = reinterpret_cast<const char *>(&scene);
+    const auto *anchors = reinterpret_cast<const arhost_anchor *>(arena + scene.anchors.offset);
+    std::vector<Anchor> all;
+    for (std::uint32_t i = 0; i < scene.anchors.count; ++i)
+        all.push_back({arena + scene.names.offset + anchors[i].target,
+                       i < anchor_origins_.size() ? anchor_origins_[i] : scene_});
+    return all;
+}
+
 void SceneLoading::on_died(const supervise::Death &death) {
     deadline_.cancel();
     total_deadline_.cancel();
@@ -96,7 +129,7 @@ void SceneLoading::on_died(const supervise::Death &death) {
         if (const std::string fault = scene::validate(mapping.bytes()); !fault.empty())
             return callbacks.failed(scene_ + ": the loaded scene is invalid, which is a bug in arhost: " + fault,
                                     files);
-        callbacks.loaded(std::move(arena), files);
+        callbacks.loaded(std::move(arena), anchors_of(mapping.as<const arhost_scene>()), files);
     } catch (const std::exception &error) {
         callbacks.failed(std::string("the scene loader's memory cannot be used: ") + error.what(), files);
     }

@@ -5,7 +5,7 @@
 #pragma once
 
 #include "base/limits.hpp"
-#include "run_config/files_in_use.hpp"
+#include "run_config/configuration.hpp"
 #include "sandbox/sandbox.hpp"
 #include "supervise/process.hpp"
 
@@ -19,6 +19,15 @@
 
 namespace arhost::host {
 
+// A target that objects belong to.
+struct Anchor {
+    std::string target;
+    std::string where; // of the first object's key `on`: "scene.yaml:6:40: objects[0].on"
+};
+
+// Returns why objects cannot belong to the targets of a tracker; empty if they can. `tracker`: null if none runs.
+std::string problem_with(const std::vector<Anchor> &anchors, const run_config::TrackerConfiguration *tracker);
+
 class SceneLoading {
 public:
     // The reactor calls exactly one of these callbacks, which may destroy the SceneLoading.
@@ -26,7 +35,8 @@ public:
         // The files that the loader has read: the scene and those to which it refers. The loader is not trusted, so
         // these may be any absolute paths.
         using Files = std::set<std::filesystem::path>;
-        std::function<void(ipc::SharedMemory arena, const Files &files)> loaded; // `arena` is frozen and validated
+        // `arena` is frozen and validated.
+        std::function<void(ipc::SharedMemory arena, const std::vector<Anchor> &anchors, const Files &files)> loaded;
         std::function<void(const std::string &reason, const Files &files)> failed;
     };
     // `limits.start` is the maximum time between two messages of the loader, `limits.start_total` the maximum time of
@@ -39,12 +49,14 @@ private:
     void on_message(ipc::Message &message);
     void check_read(const base::FileIdentity &file);
     void fail(const std::string &reason);
+    std::vector<Anchor> anchors_of(const arhost_scene &scene) const;
     void on_died(const supervise::Death &death);
 
     supervise::Context &context_;
     Callbacks callbacks_;
     run_config::FilesInUse files_;
     std::set<std::filesystem::path> files_read_;
+    std::vector<std::string> anchor_origins_; // from the loader
     std::string scene_, failure_;
     base::UniqueFd arena_;
     std::chrono::milliseconds timeout_;

@@ -8,6 +8,7 @@
 #include "host/contract_checks.hpp"
 #include "host/control.hpp"
 #include "host/quality.hpp"
+#include "host/scene_loading.hpp"
 #include "host/slots.hpp"
 #include "run_config/configuration.hpp"
 
@@ -71,7 +72,7 @@ struct LoadedScene {
     run_config::Scene source;
     std::set<std::filesystem::path> files; // as in SceneLoading::Callbacks
     ipc::SharedMemory arena;
-    std::vector<std::string> anchors;            // names of the targets that objects belong to
+    std::vector<Anchor> anchors;
     camera::Coordinates coordinates;             // from the configuration or from the scene's axes
     std::optional<OverlayChecks> overlay_checks; // only for `conform: true`
 };

@@ -75,6 +75,7 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Log, severity, text)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Progress, fraction, what)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Failed, status, text)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Reads, path, node)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(AnchorOrigin, text)
 
 void to_json(Json &json, const Create &create) {
     json["options"] = create.options;
@@ -158,6 +159,7 @@ ARHOST_MESSAGE(OptionSet)
 ARHOST_MESSAGE(CountersChanged)
 ARHOST_MESSAGE(End)
 ARHOST_MESSAGE(Reads)
+ARHOST_MESSAGE(AnchorOrigin)
 ARHOST_MESSAGE(Loaded)
 #undef ARHOST_MESSAGE
 

@@ -223,6 +223,13 @@ struct Reads {
     std::string path, node; // as in base::FileIdentity
 };
 
+// Where the scene file has the first object of an anchor, as "scene.yaml:6:40: objects[0].on". Sent for each anchor
+// of the scene, in their order, before Loaded.
+struct AnchorOrigin {
+    static constexpr const char *type = "anchor-origin";
+    std::string text;
+};
+
 // The scene is loaded. The descriptor of its arena accompanies this message.
 struct Loaded {
     static constexpr const char *type = "loaded";

@@ -166,6 +166,13 @@ Arena::Arena(std::size_t byte_size)
         throw std::bad_alloc();
 }
 
+std::vector<std::string> Origins::all(Table table) const {
+    std::vector<std::string> origins;
+    for (const std::size_t text : tables_[static_cast<std::size_t>(table)])
+        origins.push_back(text == 0 ? "" : texts_[text - 1]);
+    return origins;
+}
+
 std::string Origins::message(const Fault &fault) const {
     const std::vector<std::size_t> &origins = tables_[static_cast<std::size_t>(fault.table)];
     const std::size_t text = fault.index < origins.size() ? origins[fault.index] : 0;

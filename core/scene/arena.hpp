@@ -117,6 +117,8 @@ public:
     // Sets the origin of the elements that are added from now on.
     void set(std::string origin) { texts_.push_back(std::move(origin)); }
     void add(Table table) { of_table(table).push_back(texts_.size()); }
+    // Returns the origins of all elements of a table; "": unknown.
+    std::vector<std::string> all(Table table) const;
     // Returns the fault's text after its origin, or only the text if the origin is unknown.
     std::string message(const Fault &fault) const;
 

@@ -657,8 +657,11 @@ private:
             target->fail("must be the name of a target, of up to " + std::to_string(ARHOST_MAX_NAME - 1) +
                          " characters");
         const auto [anchor, is_new] = anchors_.try_emplace(name, ARHOST_NONE);
-        if (is_new)
+        if (is_new) {
+            set_origin(*target);
             anchor->second = builder_.add_anchor(name);
+            set_origin(object);
+        }
         return anchor->second;
     }
 

@@ -29,6 +29,8 @@ int load_scene(Link &link, const ipc::messages::Load &load) {
         if (const auto fault = scene::find_fault(mapping.bytes()))
             throw yaml::Error(origins.message(*fault));
     } // unmaps the memory, because the host can freeze it only if no writable mapping exists
+    for (const std::string &origin : origins.all(scene::Table::anchors))
+        link.send(ipc::messages::AnchorOrigin{origin});
     link.send(ipc::messages::Loaded{}, {memory.fd()});
     return EXIT_SUCCESS;
 }

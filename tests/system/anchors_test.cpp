@@ -106,13 +106,35 @@ TEST_P(Anchors, ObjectsStayOnTheirTargetsWhileTheWorldIsLost) {
 INSTANTIATE_TEST_SUITE_P(RayTracers, Anchors, testing::Values("rt_embree", "rt_vulkan"),
                          [](const auto &info) { return std::string(info.param); });
 
-TEST(AnchorErrors, ATargetThatDoesNotExistIsAnError) {
+TEST(AnchorErrors, ATargetThatDoesNotExistIsAnErrorAtTheKeyOfTheObject) {
     ArhostRun run(configuration("rt_embree"));
-    run.write("scene.yaml", "version: 1\naxes: z-up\nmaterials: {grey: {model: diffuse, diffuse: 1}}\n"
-                            "objects: [{sphere: {radius: 8}, material: grey, on: cup}]\n");
-    EXPECT_EQ(run.run(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("scene.yaml: there is no target 'cup', which an object is 'on'; the tracker "
-                                        "looks for 'visor'"));
+    run.write("scene.yaml", "version: 1\naxes: z-up\nmaterials: {grey: {model: diffuse, diffuse: 1}}\nobjects:\n"
+                            "  - {sphere: {radius: 8}, material: grey, on: glove}\n"
+                            "  - {sphere: {radius: 8}, material: grey, on: cup}\n");
+    for (const std::vector<std::string> &arguments :
+         {std::vector<std::string>{"run.yaml"}, {"check", "run.yaml"}, {"check", "--no-open", "run.yaml"}}) {
+        EXPECT_EQ(run.run(arguments), 2) << run.output();
+        EXPECT_THAT(run.output(), HasSubstr("scene.yaml:6:47: objects[1].on: there is no target 'cup'; the tracker "
+                                            "looks for 'visor' (body 'head'), 'glove' (body 'hand'); correct the "
+                                            "name, or add the target"));
+    }
+    run.write("scene.yaml", scene);
+    EXPECT_EQ(run.run({"check", "--no-open", "run.yaml"}), 0) << run.output();
+}
+
+TEST(AnchorErrors, AnObjectOnATargetNeedsATracker) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 2}}\ntrajectory: path.jsonl\n"
+                  "raytracer: {plugin: rt_embree, scene: scene.yaml}\noutputs: [{plugin: sink_null}]\n");
+    run.write("path.jsonl",
+              R"({"format": "arhost-trajectory", "version": 1, "unit": "mm", "clock": "media", "fps": 30, )"
+              R"("camera": {"width": 320, "height": 240, "fx": 320, "fy": 320}})"
+              "\n"
+              R"({"frame": 0, "capture_ns": 0, "eye": null, "look_at": null, "up": null})"
+              "\n");
+    run.write("scene.yaml", scene);
+    EXPECT_EQ(run.run({"check", "--no-open", "run.yaml"}), 2) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("scene.yaml:9:68: objects[1].on: no tracker runs that could find the target "
+                                        "'glove'; remove this key, or run a tracker with this target"));
 }
 
 TEST(AnchorErrors, AKilledRayTracerKeepsObjectsOnTheirTargets) {

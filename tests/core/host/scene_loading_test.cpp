@@ -44,7 +44,7 @@ struct SceneLoadingTest : testing::Test {
             files.write(yaml::Node::parse("{path: '" + (folder / name).string() + "'}", "run.yaml").require("path"));
         std::string failure;
         host::SceneLoading loading(context, folder / "scene.yaml", sandbox::Mode::permissive, limits, files,
-                                   {[&](const SharedMemory &, const auto &) { failure = "none"; },
+                                   {[&](const SharedMemory &, const auto &, const auto &) { failure = "none"; },
                                     [&](const std::string &reason, const auto &) { failure = reason; }});
         for (const Json &message : messages)
             loader.channel.send(message);
@@ -86,7 +86,7 @@ TEST_F(SceneLoadingTest, EndsALoaderThatReportsProgressForever) {
     limits.start_total = std::chrono::milliseconds(30);
     std::string failure;
     host::SceneLoading loading(context, folder / "scene.yaml", sandbox::Mode::permissive, limits, {},
-                               {[&](const SharedMemory &, const auto &) { failure = "none"; },
+                               {[&](const SharedMemory &, const auto &, const auto &) { failure = "none"; },
                                 [&](const std::string &reason, const auto &) { failure = reason; }});
     const Json progress = encode(messages::Progress{0.5, "still busy"});
     Reactor::Registration next;

@@ -118,6 +118,7 @@ TEST(Messages, PreserveWhatAWorkerReports) {
     EXPECT_EQ(sent(messages::Stopped{ARHOST_STATUS_ERROR_IO, "disk"}).status, ARHOST_STATUS_ERROR_IO);
     EXPECT_EQ(sent(messages::Failed{ARHOST_STATUS_ERROR_CONFIGURATION, "why"}).text, "why");
     EXPECT_EQ(sent(messages::Reads{"/a", "1:2"}).node, "1:2");
+    EXPECT_EQ(sent(messages::AnchorOrigin{"scene.yaml:6:40: objects[0].on"}).text, "scene.yaml:6:40: objects[0].on");
     const Counters counters = {{"lost", 3}, {"superseded", 0}};
     EXPECT_EQ(sent(messages::CountersChanged{counters}).counters, counters);
 }

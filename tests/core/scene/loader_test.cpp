@@ -444,6 +444,18 @@ TEST(SceneErrors, OfTheArenaNameTheirOrigin) {
               "here: material 1: exponent is 0, outside 1 to 1e+09");
     EXPECT_EQ(origins.message({"x", Table::materials, 0}), "x") << "it was added before the origin was set";
     EXPECT_EQ(origins.message({"x", Table::scene, 0}), "x");
+    EXPECT_THAT(origins.all(Table::materials), ElementsAre("", "here"));
+}
+
+TEST(SceneErrors, OfAnAnchorNameTheFirstObject) {
+    const auto on = [](const std::string &target) {
+        return "  - {sphere: {radius: 1}, material: grey, on: " + target + "}\n";
+    };
+    const ArenaBuilder builder =
+        load_scene(Node::parse(start + "objects:\n" + on("cup") + on("lid") + on("cup"), "s.yaml"));
+    EXPECT_THAT(builder.origins().all(Table::anchors),
+                ElementsAre("s.yaml:6:47: objects[0].on", "s.yaml:7:47: objects[1].on"));
+    EXPECT_EQ(builder.origins().all(Table::objects)[1], "s.yaml:7:5: objects[1]");
 }
 
 TEST(SceneErrors, NameTheStepOfATransform) {
