@@ -119,9 +119,10 @@ private:
                          const control::Done &done);
     void watch_files(const FileWatch::Files &files);
     void apply_edits();
-    void apply(const run_config::Configuration &edited, const run_config::Configuration &previous,
-               bool scene_changed);
+    void apply(const run_config::Configuration &edited, const run_config::Configuration &previous, bool scene_changed,
+               bool print_changed);
     bool finish_swaps();
+    void warn_of_hidden_objects() const; // those on targets that the tracker does not look for
     void abandon_swap(std::unique_ptr<Stage> next, const std::string &reason);
     void retire(std::unique_ptr<Stage> stage);
     void recompute_cameras();
@@ -265,6 +266,7 @@ private:
         run_config::Scene scene;
     };
     bool tracker_edit_failed_ = false;
+    bool has_new_targets_ = false; // a swap has changed the targets; warn_of_hidden_objects has not been called since
     std::optional<RaytracerEdit> failed_raytracer_edit_;
     FileWatch::Files edited_files_;                                      // to be applied
     std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // with the number of its frame

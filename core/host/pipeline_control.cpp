@@ -139,7 +139,10 @@ bool Pipeline::finish_swaps() {
         current->swapped("", members);
         return true;
     };
+    const bool targets_change =
+        next_tracker_ && next_tracker_->configuration->targets != tracker_->configuration->targets;
     const bool tracker = finish(tracker_, next_tracker_);
+    has_new_targets_ |= tracker && targets_change;
     const std::shared_ptr<LoadedScene> scene = raytracer_ ? raytracer_->scene : nullptr;
     const bool raytracer = finish(raytracer_, next_raytracer_);
     if (raytracer && raytracer_->scene != scene)
@@ -148,7 +151,19 @@ bool Pipeline::finish_swaps() {
     tracker_edit_failed_ = tracker_edit_failed_ && !tracker;
     if (raytracer)
         failed_raytracer_edit_.reset();
+    if (has_new_targets_ && !raytracer_swap_in_progress()) { // the same edit may have changed the scene
+        has_new_targets_ = false;
+        warn_of_hidden_objects();
+    }
     return tracker || raytracer;
+}
+
+void Pipeline::warn_of_hidden_objects() const {
+    if (!raytracer_)
+        return;
+    for (const Anchor &anchor : raytracer_->scene->anchors)
+        if (const std::string problem = problem_with({anchor}, tracker_->configuration.get()); !problem.empty())
+            context_.log(ARHOST_SEVERITY_WARNING, "arhost", problem + "; until then, objects on it are hidden");
 }
 
 void Pipeline::abandon_swap(std::unique_ptr<Stage> next, const std::string &reason) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Applies edits of the configuration's file, of the maps and of the scene's files while the video runs (`--watch`).
+// Applies edits of the configuration's file, of the targets' files and of the scene's files while the video runs
+// (`--watch`).
 #include "host/pipeline.hpp"
 
 #include <spdlog/fmt/fmt.h>
@@ -47,13 +48,23 @@ FileWatch::Files paths_to(const std::filesystem::path &file) {
     return {file, base::real_path(file)};
 }
 
-// The configuration's file and the maps of the targets.
+// The configuration's file, and the maps and prints of the targets.
 FileWatch::Files configuration_files(const run_config::Configuration &configuration) {
     FileWatch::Files files = paths_to(std::filesystem::absolute(configuration.node.file()));
     if (configuration.tracker)
         for (const std::filesystem::path &map : configuration.tracker->map_files)
             files.merge(paths_to(map));
     return files;
+}
+
+// Whether the file of a pattern or picture was edited. The targets contain only its path.
+bool has_edited_print(const run_config::TrackerConfiguration &tracker, const FileWatch::Files &edited) {
+    for (const ipc::Target &target : tracker.targets)
+        for (const ipc::TargetMarker &marker : target.markers)
+            if (!marker.file.empty() &&
+                std::ranges::any_of(paths_to(marker.file), [&](const auto &path) { return edited.contains(path); }))
+                return true;
+    return false;
 }
 
 } // namespace
@@ -100,15 +111,16 @@ void Pipeline::apply_edits() {
         raytracer_ && std::ranges::any_of(files, [&](const auto &each) {
             return each == raytracer_->scene->source.file || raytracer_->scene->files.contains(each);
         });
+    const bool print_changed = latest_->tracker && has_edited_print(*latest_->tracker, files);
     try {
-        apply(*latest_, *previous, scene_changed);
+        apply(*latest_, *previous, scene_changed, print_changed);
     } catch (const std::exception &error) {
         context_.log(ARHOST_SEVERITY_WARNING, "arhost", std::string(error.what()) + "; the edit is not applied");
     }
 }
 
 void Pipeline::apply(const run_config::Configuration &edited, const run_config::Configuration &previous,
-                     bool scene_changed) {
+                     bool scene_changed, bool print_changed) {
     if (const auto keys = unapplied_edits(edited, previous); !keys.empty())
         context_.log(ARHOST_SEVERITY_WARNING, "arhost",
                      fmt::format("the edit of '{}' takes effect in the next run", fmt::join(keys, "', '")));
@@ -117,7 +129,7 @@ void Pipeline::apply(const run_config::Configuration &edited, const run_config::
     };
     // An edit that fails is tried again with the next one. The run logs the outcome of each.
     if (tracker_ && edited.tracker &&
-        (differs("tracker") || edited.tracker->targets != previous.tracker->targets ||
+        (differs("tracker") || edited.tracker->targets != previous.tracker->targets || print_changed ||
          std::exchange(tracker_edit_failed_, false)))
         start_next_tracker(shared(edited.trackers.front()),
                            [this](const std::string &error, const auto &) { tracker_edit_failed_ = !error.empty(); });

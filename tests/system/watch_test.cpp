@@ -195,6 +195,68 @@ TEST(Watch, ACorrectedSceneThatACommandHasLoadedStays) {
     EXPECT_GT(run.output().rfind("with the scene scene"), run.output().rfind("with the scene other"));
 }
 
+constexpr const char *tracker_with_cup = "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, "
+                                         "side_mm: 80}, {name: cup, marker: 1, family: tag36h11, side_mm: 40}]}\n";
+
+TEST(Watch, AnEditThatRemovesTheTargetOfAnObjectWarns) {
+    WatchedRun run(scene_with("sphere: {centre: [0, 0, 10], radius: 10}, on: cup"));
+    run.write("run.yaml", WatchedRun::configuration(tracker_with_cup));
+    run.start_watching();
+    run.replace("run.yaml", WatchedRun::configuration());
+    run.wait_for("scene.yaml:4:58: objects[0].on: there is no target 'cup'; the tracker looks for 'tag36h11-0' "
+                 "(tag36h11 0); correct the name, or add the target; until then, objects on it are hidden");
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+}
+
+TEST(Watch, AnEditThatRemovesATargetTogetherWithItsObjectsDoesNotWarn) {
+    WatchedRun run(scene_with("sphere: {centre: [0, 0, 10], radius: 10}, on: cup"));
+    run.write("other.yaml", small_sphere);
+    run.write("run.yaml", WatchedRun::configuration(tracker_with_cup));
+    run.start_watching();
+    run.replace("run.yaml",
+                WatchedRun::configuration(tracker, "raytracer: {plugin: rt_embree, scene: other.yaml}\n"));
+    run.wait_for("tracker is now tracker_aruco");
+    run.wait_for("raytracer is now rt_embree with the scene other");
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+    EXPECT_THAT(run.output(), Not(HasSubstr("there is no target")));
+}
+
+TEST(Watch, AnEditedPatternRestartsTheTracker) {
+    const auto pattern = [](int side) {
+        std::string text;
+        for (int i = 0; i < 12 * side * side; ++i)
+            text += i % side < side / 2 ? "0 " : "255 ";
+        return text;
+    };
+    WatchedRun run;
+    run.write("a.patt", pattern(16));
+    run.write("run.yaml", WatchedRun::configuration("tracker: {plugin: tracker_pattern, targets: [{name: a, pattern: "
+                                                    "a.patt, side_mm: 80}]}\n"));
+    run.start_watching();
+    run.replace("a.patt", pattern(8));
+    run.wait_for("tracker is now tracker_pattern");
+    run.replace("a.patt", "no pattern");
+    run.wait_for("a.patt' is not a pattern of ARToolKit");
+    run.wait_for("the previous tracker stays");
+    run.write("a.patt", pattern(16));
+    run.wait_for("tracker is now tracker_pattern", 2);
+    run.interrupt();
+}
+
+TEST(Watch, AnEditedPictureOfATargetRestartsTheTracker) {
+    const std::filesystem::path pictures = source_directory() + "/docs/images";
+    WatchedRun run;
+    std::filesystem::copy_file(pictures / "board.jpg", run.path("a.jpg"));
+    std::filesystem::create_symlink("a.jpg", run.path("link.jpg"));
+    run.write("run.yaml", WatchedRun::configuration("tracker: {plugin: tracker_image, targets: [{name: a, image: "
+                                                    "link.jpg, width_mm: 200}]}\n"));
+    run.start_watching();
+    std::filesystem::copy_file(pictures / "demo.jpg", run.path("a.jpg"),
+                               std::filesystem::copy_options::overwrite_existing);
+    run.wait_for("tracker is now tracker_image");
+    run.interrupt();
+}
+
 TEST(Watch, AnEditOfTheSandboxNeedsANewRun) {
     WatchedRun run;
     run.start_watching();
