@@ -78,6 +78,11 @@ std::string unseen_targets(const run_config::Configuration &configuration, const
                        seen_instead(statistics, unseen));
 }
 
+std::string marker_name(const ipc::TargetMarker &marker) {
+    return marker.family + " " +
+           (marker.file.empty() ? std::to_string(marker.id) : std::filesystem::path(marker.file).filename().string());
+}
+
 std::string describe_targets(const std::vector<ipc::Target> &targets) {
     constexpr std::size_t max_named = 8;
     std::string text;
@@ -88,10 +93,7 @@ std::string describe_targets(const std::vector<ipc::Target> &targets) {
         if (!target.body.empty())
             text += "(body '" + target.body + "')";
         else if (target.markers.size() == 1)
-            text += fmt::format("({} {})", target.markers[0].family,
-                                target.markers[0].file.empty()
-                                    ? std::to_string(target.markers[0].id)
-                                    : std::filesystem::path(target.markers[0].file).filename().string());
+            text += "(" + marker_name(target.markers[0]) + ")";
         else
             text += fmt::format("(map of {} markers of {})", target.markers.size(), target.markers[0].family);
     }
@@ -104,7 +106,7 @@ std::string seen_instead(const Statistics &statistics, const std::vector<ipc::Ta
     std::map<std::string, std::uint64_t> unconfirmed;
     for (const ipc::Target &target : unseen)
         for (const ipc::TargetMarker &marker : target.markers)
-            if (const auto found = statistics.unconfirmed.find(fmt::format("{} {}", marker.family, marker.id));
+            if (const auto found = statistics.unconfirmed.find(marker_name(marker));
                 found != statistics.unconfirmed.end())
                 unconfirmed.insert(*found);
     std::string text;

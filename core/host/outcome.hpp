@@ -25,6 +25,9 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
 std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics,
                            const std::vector<ipc::Target> &targets);
 
+// Names a marker by its family and its id or, if it has one, its file: "tag36h11 23", "pattern hiro.patt".
+std::string marker_name(const ipc::TargetMarker &marker);
+
 // Describes what a tracker looks for, such as "desk (tag36h11 23), board (map of 12 markers)".
 std::string describe_targets(const std::vector<ipc::Target> &targets);
 

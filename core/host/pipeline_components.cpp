@@ -192,7 +192,7 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(TrackerPointer configuratio
     stage->targets = to_memory(configuration->targets);
     for (const ipc::Target &target : configuration->targets)
         for (const ipc::TargetMarker &marker : target.markers)
-            stage->listed.emplace(marker.family, marker.id);
+            stage->listed.try_emplace({marker.family, marker.id}, marker_name(marker));
     Component::Callbacks callbacks = common_callbacks("tracker", configuration->node);
     callbacks.hello = [this, stage](const PluginDescription &plugin, std::size_t candidate) {
         const run_config::TrackerConfiguration &own = *stage->configuration;

@@ -290,11 +290,12 @@ void Pipeline::count_strangers(Frame &frame) {
     for (std::size_t i = 0; i < frame.observations.size(); ++i) {
         const arhost_observation &observation = frame.observations[i];
         const std::string &family = tracker_->families[observation.family];
-        const bool is_listed = tracker_->listed.contains({family, observation.id});
+        const auto listed = tracker_->listed.find({family, observation.id});
+        const bool is_listed = listed != tracker_->listed.end();
         frame.record.search.unlisted_count += !is_listed;
         std::set<std::string> &names = is_listed ? unconfirmed : strangers;
         if (!has_pose[i] && names.size() < Statistics::max_strangers)
-            names.insert(family + " " + std::to_string(observation.id));
+            names.insert(is_listed ? listed->second : family + " " + std::to_string(observation.id));
     }
     const auto add = [](const std::set<std::string> &names, std::map<std::string, std::uint64_t> &frames) {
         for (const std::string &name : names)

@@ -14,6 +14,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -63,9 +64,10 @@ struct TrackerStage : Stage {
         state = std::move(previous.state);
         state_is_of_solver_only = true;
     }
-    std::vector<std::string> families;                     // of the targets' markers
-    std::set<std::pair<std::string, std::int32_t>> listed; // family and id of the targets' markers
-    std::optional<ipc::SharedMemory> targets;              // those of the configuration, for its workers
+    std::vector<std::string> families; // of the targets' markers
+    std::map<std::pair<std::string, std::int32_t>, std::string>
+        listed;                               // names of the targets' markers, by family and id
+    std::optional<ipc::SharedMemory> targets; // those of the configuration, for its workers
 };
 
 struct LoadedScene {

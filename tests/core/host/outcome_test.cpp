@@ -109,6 +109,13 @@ TEST_F(Outcome, NamesTargetsThatWereNeverSeenAlthoughOthersWere) {
     EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets), "");
 }
 
+TEST_F(Outcome, NamesAPatternByItsFile) {
+    ipc::TargetMarker marker{3, "pattern", {}, "/lab/hiro.patt"};
+    statistics.unconfirmed = {{"pattern hiro.patt", 2}};
+    EXPECT_THAT(seen_instead(statistics, {{"card", {marker}, ""}}),
+                testing::StartsWith("; it saw pattern hiro.patt (2 frames) but got no pose"));
+}
+
 TEST(Targets, AreDescribedByTheirMarkers) {
     const ipc::Target cup{"cup", {{7, "D", {}}}, ""}, head{"head", {}, "skull"};
     ipc::Target board{"board", {}, ""};
