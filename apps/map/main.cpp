@@ -21,6 +21,7 @@
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <numbers>
 #include <unistd.h>
 
@@ -309,7 +310,8 @@ int main(int argc, char **argv) {
     app.option("--ids", arguments.ids, "The markers of the map, such as 0-19,25 (default: all that are seen)")
         .type_name("IDS");
     app.option("--origin", arguments.origin, "The map's frame is that of this marker (default: the smallest id)")
-        .type_name("ID");
+        .type_name("ID")
+        .range(0, std::numeric_limits<int>::max());
     app.flag("--plane", arguments.plane, "Turn the map's frame so that z = 0 is the plane of the markers");
     app.option("--layout", arguments.layout, "Begin with the places in this map, and keep its frame and its sides")
         .type_name("FILE");

@@ -89,7 +89,7 @@ Paper paper_of(const Arguments &arguments) {
     const std::size_t x = text.find('x');
     const double width = number_in(text.substr(0, x)),
                  height = number_in(text.substr(std::min(x, text.size() - 1) + 1));
-    if (!(std::min(width, height) >= 30 && std::max(width, height) <= 2000))
+    if (!(width >= 30 && height >= 30 && width <= 2000 && height <= 2000)) // the comparisons reject NaN
         throw std::runtime_error(
             fmt::format("--paper {}: use a4, a3, letter, or WIDTHxHEIGHT in mm, each from 30 to 2000", text));
     return {width, height, arguments.margin_mm};

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <cstdio>
 
@@ -101,7 +102,12 @@ Option Option::range(int minimum, int maximum) {
     return Option(option_->check(CLI::Range(minimum, maximum)));
 }
 Option Option::range(double minimum, double maximum) {
-    return Option(option_->check(CLI::Range(minimum, maximum)));
+    // CLI::Range accepts NaN.
+    const auto problem = [](const std::string &text) -> std::string {
+        double value = 0;
+        return CLI::detail::lexical_cast(text, value) && std::isnan(value) ? text + " is not a number" : "";
+    };
+    return Option(option_->check(problem)->check(CLI::Range(minimum, maximum)));
 }
 Option Option::one_of(const std::vector<std::string> &choices) {
     return Option(option_->check(CLI::IsMember(choices)));
