@@ -85,6 +85,7 @@ void read_target(const Line &line, const nlohmann::json &object, RecordedFrame &
         observation.id = seen.at("id").get<std::int32_t>();
         observation.hamming = seen.at("hamming").get<std::uint32_t>();
         observation.decision_margin = seen.at("decision_margin").get<double>();
+        observation.corner_sigma_px = seen.value("corner_sigma_px", 0.0);
         const auto corners = seen.at("corners_px").get<std::array<std::array<double, 2>, 4>>();
         for (std::size_t i = 0; i < 4; ++i)
             std::ranges::copy(corners[i], observation.corners_px[i]);

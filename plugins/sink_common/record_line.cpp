@@ -69,6 +69,8 @@ void append(std::string &text, const arhost_observation &observation) {
     }
     text += "], \"decision_margin\": ";
     append(text, observation.decision_margin);
+    text += ", \"corner_sigma_px\": ";
+    append(text, observation.corner_sigma_px);
     text += ", \"hamming\": ";
     append_number(text, observation.hamming);
     text += '}';

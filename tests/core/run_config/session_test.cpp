@@ -25,7 +25,7 @@ const std::string rendered =
     R"({"name": "cup", "state": "detected", "age_frames": 0, "mt": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 4, 3, 2, 1], )"
     R"("covariance": [9, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 8], )"
     R"("reprojection_px": 0.25, "ambiguity": 0.5, "observations": [{"id": 7, "corners_px": [[1, 2], [3, 2], [3, 4], [1, 4]], )"
-    R"("decision_margin": 60, "hamming": 1}]}, )"
+    R"("decision_margin": 60, "corner_sigma_px": 0.05, "hamming": 1}]}, )"
     R"({"name": "lid", "state": "lost", "age_frames": 5, "mt": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -9, 1]}], )"
     R"("search": {"everywhere": true, "observations": 3, "unlisted": 2, "expected": 4, "missed": 1}, )"
     R"("camera": {"eye": [1, 2, 3.5], "look_at": [1, 2, 2.5], )"
@@ -92,6 +92,7 @@ TEST_F(SessionFolder, HasTheFactsOfEachFrame) {
     EXPECT_EQ(full.observations[0].id, 7);
     EXPECT_EQ(full.observations[0].hamming, 1u);
     EXPECT_EQ(full.observations[0].decision_margin, 60);
+    EXPECT_EQ(full.observations[0].corner_sigma_px, 0.05);
     EXPECT_EQ(full.observations[0].corners_px[2][1], 4);
     EXPECT_EQ(full.search.everywhere, 1);
     EXPECT_EQ(full.search.observation_count, 3u);
@@ -103,6 +104,14 @@ TEST_F(SessionFolder, HasTheFactsOfEachFrame) {
     EXPECT_EQ(full.view->eye_mm[2], 3.5);
     EXPECT_EQ(full.truth->first, "cup");
     EXPECT_EQ(full.truth->second[13], 6);
+}
+
+TEST_F(SessionFolder, ARecordingWithoutTheNoiseOfCornersIsAccepted) {
+    std::string without = rendered;
+    const std::string member = R"("corner_sigma_px": 0.05, )";
+    without.erase(without.find(member), member.size());
+    write("frames.jsonl", line(0) + line(1, without) + end);
+    EXPECT_EQ(read_session(folder()).recording.frames[1].observations.at(0).corner_sigma_px, 0);
 }
 
 TEST_F(SessionFolder, PathsHaveTheMeaningOfTheRecordedRun) {

@@ -35,6 +35,7 @@ TrackedRecord full_record(std::uint64_t sequence) {
     record.add_target("board", ARHOST_TARGET_DETECTED, {});
     record.add_observation(0, corners).decision_margin = 50 + seed;
     record.add_observation(-3, corners).hamming = 2;
+    record.observations.back().corner_sigma_px = seed / 9;
     record.add_target("cup", ARHOST_TARGET_PREDICTED, {}).age_frames = 4;
     record.add_observation(7, corners);
     record.add_observation(99, corners, false);
@@ -133,7 +134,7 @@ TEST_F(SinkPoses, WritesTheDocumentedKeysInTheirOrder) {
     EXPECT_THAT(keys_of(line["targets"][1]), ElementsAre("name", "state", "age_frames", "mt", "mt_alternative",
                                                          "reprojection_px", "ambiguity", "observations"));
     EXPECT_THAT(keys_of(line["targets"][0]["observations"][0]),
-                ElementsAre("id", "corners_px", "decision_margin", "hamming"));
+                ElementsAre("id", "corners_px", "decision_margin", "corner_sigma_px", "hamming"));
     EXPECT_THAT(keys_of(line["camera"]), ElementsAre("eye", "look_at", "up"));
     EXPECT_THAT(keys_of(line["truth"]), ElementsAre("target", "mt"));
 }
@@ -156,6 +157,7 @@ TEST_F(SinkPoses, EveryNumberReadsBackAsTheSameDouble) {
             EXPECT_EQ(written["id"], observation.id);
             EXPECT_EQ(written["corners_px"], array(observation.corners_px));
             EXPECT_EQ(written["decision_margin"], observation.decision_margin);
+            EXPECT_EQ(written["corner_sigma_px"], observation.corner_sigma_px);
             EXPECT_EQ(written["hamming"], observation.hamming);
         }
     }

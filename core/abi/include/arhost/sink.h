@@ -73,7 +73,7 @@ typedef struct arhost_record {
     /* Where markers were expected: those that the tracker has reported, then those that it has missed. Their
      * `marker` is an index in the setup of the tracker, which a sink does not have. A replay of a session has the
      * numbers in `search`, but not these places, nor the observations that no target lists, nor `projected_px` and
-     * `corner_sigma_px` of the others. */
+     * `false_positive_rate` of the others. */
     const arhost_expected_marker *expected;
     uint32_t expected_count;
     uint32_t reserved; /* 0 */
