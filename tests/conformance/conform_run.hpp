@@ -35,7 +35,7 @@ public:
     // Creates a link to the wrong plugin; the link's name selects the defect.
     std::filesystem::path link_wrong(const std::string &defect, const std::string &kind = "rt") const {
         const std::filesystem::path link = path(kind + "_" + defect + ".so");
-        std::filesystem::create_symlink(std::string(arhost::test::wrong_plugin_directory() + "/") +
+        std::filesystem::create_symlink(arhost::test::wrong_plugin_directory() + "/" +
                                             (defect == "exports_more" ? "wrong_exports_more.so"
                                              : kind == "rt"           ? "wrong.so"
                                                                       : "wrong_" + kind + ".so"),

@@ -92,8 +92,7 @@ public:
                                          std::pair("body", "wrong_body"), std::pair("source", "wrong_source")}) {
             const std::string text = parts.text(), begin = std::string("./") + kind + "_";
             if (const std::size_t at = text.find(begin); at != std::string::npos)
-                std::filesystem::create_symlink(std::string(arhost::test::wrong_plugin_directory() + "/") + file +
-                                                    ".so",
+                std::filesystem::create_symlink(arhost::test::wrong_plugin_directory() + "/" + file + ".so",
                                                 path(text.substr(at, text.find(',', at) - at)));
         }
     }

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The folders that the tests use, as absolute paths. They are functions and not macros, so that only directories.cpp
-// depends on the place of the clone: the compiler cache serves all other files to every clone.
+// The folders that the tests use, as absolute paths. They are functions and not macros, so that the compiler cache
+// serves the sources of the tests to every clone. Besides directories.cpp, only the folder of rt_vulkan's failing
+// layer (failures_test.cpp) and the three files that sink_web and source_synthetic embed depend on the path of the
+// clone.
 #pragma once
 
 #include <string>
