@@ -23,7 +23,7 @@ using Corners = std::array<cv::Point2d, 4>;
 
 struct MeasuredCorners {
     Corners corners_px;
-    double sigma_px = 0; // standard deviation of each coordinate, RMS over the corners; 0: unknown
+    double sigma_px = 0;   // standard deviation of each coordinate, RMS over the corners; 0: unknown
     double blur_cells = 0; // width of the slope of the most blurred edge, in cells of the print; 0: unknown
 };
 

@@ -32,7 +32,7 @@ cv::Matx22d derivative(const Homography &h, const cv::Vec2d &at) {
            (1 / v[2]);
 }
 
-// What is fitted.
+// The unknowns of the fit.
 struct Model {
     cv::Vec<double, 8> corners_px; // undistorted
     double blur_px;                // standard deviation

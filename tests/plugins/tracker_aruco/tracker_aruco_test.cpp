@@ -47,6 +47,20 @@ TEST_P(ArucoDictionary, FindsTheMarkerUpright) {
     }
 }
 
+TEST_P(ArucoDictionary, RefinesBlurredMarkersByTheWholePrint) {
+    const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
+    Tracker tracker("tracker_aruco");
+    ASSERT_EQ(tracker.start(test_camera, {{21, 80, dictionary}}), ARHOST_STATUS_OK) << tracker.log();
+    const Mt truth = pose_of(-20, 10, 600, 15, -10, 160);
+    const Print print = family.empty() ? aruco_marker(dictionary, 21) : april_tag(family, 21).with_margin(1);
+    cv::Mat picture = render(test_camera, {{print, 80, truth}});
+    cv::GaussianBlur(picture, picture, {}, 0.3 * 60 / print.corner_cells);
+    add_noise(picture, 1.5, 1);
+    const auto seen = tracker.track(GreyFrame(picture));
+    ASSERT_EQ(seen.size(), 1u);
+    EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 80)), 0.1);
+}
+
 TEST_P(ArucoDictionary, FindsUnlistedMarkers) {
     const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
     Tracker tracker("tracker_aruco");
