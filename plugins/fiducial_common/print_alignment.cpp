@@ -71,13 +71,13 @@ struct Pixel {
 std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_code, const Corners &corners_px,
                              const Lens &lens, const Homography &cells_from_px, const Print &print) {
     constexpr double reach = 0.5; // into the margin, in cells; blur mixes the rest with what is around it
-    constexpr double max_pixels = 8'000;
+    constexpr double max_pixels = 10'000;
     const std::vector<cv::Point2f> points(corners_px.begin(), corners_px.end());
     cv::Rect part = cv::boundingRect(points);
     const int margin_px = 1 + static_cast<int>(std::max(part.width, part.height) * reach / 2);
     part = cv::Rect(part.x - margin_px, part.y - margin_px, part.width + 2 * margin_px, part.height + 2 * margin_px) &
            cv::Rect({}, grey.size());
-    const int stride = 1 + static_cast<int>(std::sqrt(part.area() / max_pixels));
+    const int stride = 1 + static_cast<int>(std::sqrt(cv::contourArea(points) / max_pixels));
     std::vector<cv::Point2d> at;
     at.reserve(static_cast<std::size_t>(part.area()));
     for (int y = part.y; y < part.y + part.height; y += stride)
