@@ -100,7 +100,9 @@ TEST(RealFrames, KillingTheTrackerDoesNotChangeFilteredPoses) {
         ArhostRun clean(filtered), killed(filtered), plain(configuration(tracker));
         ASSERT_EQ(clean.run(), 0) << clean.output();
         killed.start();
-        for (const char *frame : {"frames/0006.png", "frames/0016.png", "frames/0026.png"}) {
+        // The second kill comes later than the frames that are in the pipeline at the first one (8 slots before and 8
+        // after the composition): a frame that two workers die with is given up.
+        for (const char *frame : {"frames/0001.png", "frames/0020.png"}) {
             while (killed.running() && !killed.exists(frame))
                 std::this_thread::sleep_for(std::chrono::milliseconds(1));
             const pid_t worker = killed.worker(tracker);
@@ -109,7 +111,7 @@ TEST(RealFrames, KillingTheTrackerDoesNotChangeFilteredPoses) {
         }
         ASSERT_EQ(killed.wait(), 0) << killed.output();
         expect_same_results(clean, killed);
-        EXPECT_EQ(killed.stats()["restarts"]["tracker"], 3) << killed.output();
+        EXPECT_EQ(killed.stats()["restarts"]["tracker"], 2) << killed.output();
         ASSERT_EQ(plain.run(), 0) << plain.output();
         EXPECT_NE(clean.read("poses.jsonl"), plain.read("poses.jsonl")) << "the poses are not filtered";
     }
