@@ -75,7 +75,7 @@ public:
     }
     // Waits for arhost to exit. Returns its exit status, 128 + the number of the signal that killed it, or -1 if it
     // is still running after `limit`.
-    int wait(std::chrono::seconds limit = std::chrono::seconds(60)) {
+    int wait(std::chrono::seconds limit = std::chrono::seconds(100)) {
         const auto end = std::chrono::steady_clock::now() + limit;
         while (std::chrono::steady_clock::now() < end) {
             int status = 0;
