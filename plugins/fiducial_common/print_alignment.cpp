@@ -37,8 +37,9 @@ struct Model {
     cv::Vec<double, 8> corners_px; // undistorted
     double blur_px;                // standard deviation
     double black, contrast;        // light of black, and how much more white has; negative if the print is inverted
+    cv::Vec2d slope;               // of the illumination: relative change across the print along its columns and rows
 };
-constexpr int unknowns = 11; // in this order
+constexpr int unknowns = 13; // in this order
 
 // Maps cells to undistorted px.
 Homography px_from_cells(const cv::Vec<double, 8> &corners_px, const Print &print) {
@@ -57,7 +58,8 @@ double perimeter_px(const std::vector<cv::Point2d> &square) {
     return cv::arcLength(std::vector<cv::Point2f>(square.begin(), square.end()), true);
 }
 
-constexpr std::uint8_t saturated = 254; // the smallest code of a pixel that may be brighter than its code tells
+// The smallest code of a pixel that may be brighter than its code tells; video compression turns some 255 into 254.
+constexpr std::uint8_t saturated = 254;
 
 // A pixel whose light the print determines.
 struct Pixel {
@@ -70,14 +72,15 @@ struct Pixel {
 // its surroundings.
 std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_code, const Corners &corners_px,
                              const Lens &lens, const Homography &cells_from_px, const Print &print) {
-    constexpr double reach = 0.5; // into the margin, in cells; blur mixes the rest with what is around it
-    constexpr double max_pixels = 10'000;
+    constexpr double reach = 0.25; // into the margin, in cells; blur mixes the rest with what is around it
+    constexpr double max_pixels = 4'000;
     const std::vector<cv::Point2f> points(corners_px.begin(), corners_px.end());
     cv::Rect part = cv::boundingRect(points);
     const int margin_px = 1 + static_cast<int>(std::max(part.width, part.height) * reach / 2);
     part = cv::Rect(part.x - margin_px, part.y - margin_px, part.width + 2 * margin_px, part.height + 2 * margin_px) &
            cv::Rect({}, grey.size());
-    const int stride = 1 + static_cast<int>(std::sqrt(cv::contourArea(points) / max_pixels));
+    const double area_px = std::max(cv::contourArea(points), part.area() / 4.0);
+    const int stride = 1 + static_cast<int>(std::sqrt(area_px / max_pixels));
     std::vector<cv::Point2d> at;
     at.reserve(static_cast<std::size_t>(part.area()));
     for (int y = part.y; y < part.y + part.height; y += stride)
@@ -98,38 +101,44 @@ std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_co
     return pixels;
 }
 
-// The blurred print: its whiteness, the derivatives with respect to the column and the row in cells, and with respect
-// to the blur in px.
+// Whiteness and its derivatives with respect to u and v, the column and the row in cells.
+struct Whiteness {
+    float value, u, v, uu, uv, vv;
+};
+using Sample = cv::Vec<float, 6>; // a Whiteness
+
+// The blurred print.
 struct Table {
-    cv::Mat_<cv::Vec4f> values;
+    cv::Mat_<Sample> values;
     int per_cell; // samples along each axis
 
-    cv::Vec4f at(const cv::Vec2d &cell) const { // interpolates bilinearly
+    Whiteness at(const cv::Vec2d &cell) const { // interpolates bilinearly
         const double x = std::clamp(cell[0] * per_cell - 0.5, 0.0, values.cols - 1.001);
         const double y = std::clamp(cell[1] * per_cell - 0.5, 0.0, values.rows - 1.001);
         const int column = static_cast<int>(x), row = static_cast<int>(y);
         const auto a = static_cast<float>(x - column), b = static_cast<float>(y - row);
-        const cv::Vec4f *upper = &values(row, column), *lower = upper + values.cols;
-        return (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
+        const Sample *upper = &values(row, column), *lower = upper + values.cols;
+        const Sample w = (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
+        return {w[0], w[1], w[2], w[3], w[4], w[5]};
     }
 };
 
-// The blur is round in the frame, and taken as the same ellipse everywhere in the print.
+// With the ellipse that the blur, which is round in the frame, is at the centre of the print.
 Table blurred(const Print &print, const cv::Matx22d &cells_from_px, double blur_px) {
-    constexpr double min_sigma = 1.2, cutoff = 3; // samples; standard deviations
-    constexpr int max_per_cell = 12, max_radius = 40;
+    constexpr double min_sigma = 1.2, cutoff = 3;                        // samples; standard deviations
+    constexpr double max_per_cell = 12, max_size = 240, max_radius = 40; // samples
     const cv::Matx22d covariance_cells2 = blur_px * blur_px * cells_from_px * cells_from_px.t();
     const double half_trace = cv::trace(covariance_cells2) / 2;
     const double smallest =
         half_trace - std::sqrt(std::max(half_trace * half_trace - cv::determinant(covariance_cells2), 0.0));
     Table table;
-    table.per_cell =
-        static_cast<int>(std::clamp(std::ceil(min_sigma / std::sqrt(smallest)), 3.0, double(max_per_cell)));
+    table.per_cell = static_cast<int>(std::clamp(std::ceil(min_sigma / std::sqrt(std::max(smallest, 1e-9))), 3.0,
+                                                 std::clamp(max_size / print.cells.rows, 3.0, max_per_cell)));
     const cv::Matx22d covariance = double(table.per_cell * table.per_cell) * covariance_cells2 +
                                    1e-3 * cv::Matx22d::eye(); // in samples; invertible
     const cv::Matx22d inverse = covariance.inv();
     const auto radius = [&](int axis) {
-        return std::min(static_cast<int>(std::ceil(cutoff * std::sqrt(covariance(axis, axis)))), max_radius);
+        return static_cast<int>(std::min(std::ceil(cutoff * std::sqrt(covariance(axis, axis))), max_radius));
     };
     const int columns = radius(0), rows = radius(1);
     cv::Mat_<float> kernel(2 * rows + 1, 2 * columns + 1);
@@ -143,10 +152,7 @@ Table blurred(const Print &print, const cv::Matx22d &cells_from_px, double blur_
     cv::resize(print.cells, drawn, {}, table.per_cell, table.per_cell, cv::INTER_NEAREST);
     cv::filter2D(drawn, white, -1, kernel, {-1, -1}, 0, cv::BORDER_REPLICATE);
 
-    // Central differences. The blur spreads as heat does: its derivative is that of the covariance times the second
-    // derivatives, divided by 2.
-    const float n = static_cast<float>(table.per_cell);
-    const cv::Matx22f heat = covariance_cells2 * (1 / blur_px);
+    const auto n = static_cast<float>(table.per_cell); // central differences
     table.values.create(white.size());
     for (int y = 0; y < white.rows; ++y) {
         const float *above = white[std::max(y - 1, 0)], *row = white[y],
@@ -155,8 +161,9 @@ Table blurred(const Print &print, const cv::Matx22d &cells_from_px, double blur_
             const int left = std::max(x - 1, 0), right = std::min(x + 1, white.cols - 1);
             const float xx = row[left] - 2 * row[x] + row[right], yy = above[x] - 2 * row[x] + below[x],
                         xy = (above[left] - above[right] - below[left] + below[right]) / 4;
-            table.values(y, x) = {row[x], (row[right] - row[left]) * n / 2, (below[x] - above[x]) * n / 2,
-                                  n * n * (heat(0, 0) * xx + 2 * heat(0, 1) * xy + heat(1, 1) * yy)};
+            table.values(y, x) = {
+                row[x],    (row[right] - row[left]) * n / 2, (below[x] - above[x]) * n / 2, n * n * xx, n * n * xy,
+                n * n * yy};
         }
     }
     return table;
@@ -165,6 +172,7 @@ Table blurred(const Print &print, const cv::Matx22d &cells_from_px, double blur_
 struct Fit {
     cv::Matx<double, unknowns, unknowns> normal; // JᵀJ, where J are the derivatives of the light
     cv::Vec<double, unknowns> gradient;          // Jᵀ·residuals
+    int pixels = 0;                              // without saturated ones that tell nothing
     double cost = 0; // sum of the squared residuals; infinite if the corners are not those
                      // of a square seen from the front
 };
@@ -178,10 +186,11 @@ Fit linearize(std::span<const Pixel> pixels, const Print &print, const Model &mo
         fit.cost = std::numeric_limits<double>::infinity();
         return fit;
     }
-    const Table table = blurred(print, px_per_cell.inv(), model.blur_px);
+    const cv::Matx22d cells_per_px = px_per_cell.inv(), ellipse = cells_per_px * cells_per_px.t();
+    const Table table = blurred(print, cells_per_px, model.blur_px);
 
-    // First with respect to the nine elements of the homography, the blur, the black and the contrast.
-    constexpr int count = 12;
+    // First with respect to the nine elements of the homography and the other unknowns.
+    constexpr int count = 14;
     std::array<double, count * count> normal{};
     std::array<double, count> gradient{};
     for (const Pixel &pixel : pixels) {
@@ -191,28 +200,45 @@ Fit linearize(std::span<const Pixel> pixels, const Print &print, const Model &mo
             return fit;
         }
         const cv::Vec2d cell(h[0] / h[2], h[1] / h[2]);
-        const cv::Vec4f white = table.at(cell);
-        // The derivative of the light with respect to a motion of the print in undistorted px.
-        const double by_u = -model.contrast * white[1] / h[2], by_v = -model.contrast * white[2] / h[2];
-        const double x = by_u * (to_cells(0, 0) - cell[0] * to_cells(2, 0)) +
-                         by_v * (to_cells(1, 0) - cell[1] * to_cells(2, 0)),
-                     y = by_u * (to_cells(0, 1) - cell[0] * to_cells(2, 1)) +
-                         by_v * (to_cells(1, 1) - cell[1] * to_cells(2, 1));
-        // The homography maps `h` to (pixel.place, 1).
-        const double w = -(x * pixel.place[0] + y * pixel.place[1]);
-        const std::array<double, count> j = {x * h[0], x * h[1], x * h[2], y * h[0], y * h[1],
-                                             y * h[2], w * h[0], w * h[1], w * h[2], model.contrast * white[3],
-                                             1,        white[0]};
-        const double residual = pixel.light - model.black - model.contrast * white[0];
+        Whiteness white = table.at(cell);
+        const cv::Vec2d u_by_px = cv::Vec2d(to_cells(0, 0) - cell[0] * to_cells(2, 0),
+                                            to_cells(0, 1) - cell[0] * to_cells(2, 1)) /
+                                  h[2],
+                        v_by_px = cv::Vec2d(to_cells(1, 0) - cell[1] * to_cells(2, 0),
+                                            to_cells(1, 1) - cell[1] * to_cells(2, 1)) /
+                                  h[2];
+        // A blur spreads as heat does: it changes the whiteness by half of the change of its covariance times the
+        // second derivatives. So the ellipse of the blur at this cell is corrected to the first order.
+        const double uu = u_by_px.dot(u_by_px), uv = u_by_px.dot(v_by_px), vv = v_by_px.dot(v_by_px);
+        const double by_blur = model.blur_px * (uu * white.uu + 2 * uv * white.uv + vv * white.vv);
+        white.value +=
+            static_cast<float>((by_blur - model.blur_px * (ellipse(0, 0) * white.uu + 2 * ellipse(0, 1) * white.uv +
+                                                           ellipse(1, 1) * white.vv)) *
+                               model.blur_px / 2);
+        const double u = cell[0] / print.cells.cols - 0.5, v = cell[1] / print.cells.rows - 0.5;
+        const double illumination = 1 + model.slope[0] * u + model.slope[1] * v;
+        const double light = model.black + model.contrast * white.value,
+                     residual = pixel.light - illumination * light;
         if (pixel.is_saturated && residual < 0) // the pixel does not tell how much brighter it would be
             continue;
-#pragma GCC unroll 12
+        // The derivative of the light with respect to a motion of the print in undistorted px.
+        const double contrast = illumination * model.contrast;
+        const cv::Vec2d by_px = -contrast * (white.u * u_by_px + white.v * v_by_px);
+        const double x = by_px[0], y = by_px[1];
+        // The homography maps `h` to (pixel.place, 1).
+        const double w = -(x * pixel.place[0] + y * pixel.place[1]);
+        const std::array<double, count> j = {x * h[0],  x * h[1],           x * h[2],     y * h[0],
+                                             y * h[1],  y * h[2],           w * h[0],     w * h[1],
+                                             w * h[2],  contrast * by_blur, illumination, illumination * white.value,
+                                             light * u, light * v};
+#pragma GCC unroll 14
         for (int a = 0; a < count; ++a) {
             gradient[a] += j[a] * residual;
             for (int b = a / 2 * 2; b < count; ++b) // the upper triangle
                 normal[a * count + b] += j[a] * j[b];
         }
         fit.cost += residual * residual;
+        ++fit.pixels;
     }
 
     for (int a = 0; a < count; ++a)
@@ -222,7 +248,7 @@ Fit linearize(std::span<const Pixel> pixels, const Print &print, const Model &mo
     // Then with respect to the corners, on which the homography depends.
     cv::Matx<double, count, unknowns> by_unknown = cv::Matx<double, count, unknowns>::zeros();
     for (int i = 0; i < 8; ++i) {
-        constexpr double step_px = 1e-2;
+        constexpr double step_px = 0.1;
         cv::Vec<double, 8> corners_px = model.corners_px;
         corners_px[i] += step_px;
         const Homography moved = px_from_cells(corners_px, print);
@@ -262,13 +288,13 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
                                            const Lens &lens, const Print &print) {
     constexpr double first_blur_px = 0.7, min_blur_px = 0.3, converged_px = 0.01, min_resemblance = 0.7,
                      min_cell_px = 0.5;
-    constexpr int max_steps = 12;
+    constexpr int max_steps = 20;
     const auto corners = lens.undistort({corners_px.begin(), corners_px.end()});
     if (!corners || print.margin < 1 || !std::ranges::all_of(corners_px, [&](const cv::Point2d &corner) {
             return std::abs(corner.x) < 2 * grey.cols && std::abs(corner.y) < 2 * grey.rows;
         }))
         return std::nullopt;
-    Model model{{}, first_blur_px, 0, 1};
+    Model model{{}, first_blur_px, 0, 1, {}};
     double shortest = std::numeric_limits<double>::infinity();
     for (int i = 0; i < 4; ++i) {
         model.corners_px[2 * i] = (*corners)[i].x;
@@ -288,15 +314,19 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
     if (!std::isfinite(fit.cost))
         return std::nullopt;
     const auto light = fit.normal.get_minor<2, 2>(9, 9).inv() * cv::Vec2d(fit.gradient[9], fit.gradient[10]);
+    const cv::Vec<double, 8> first = model.corners_px;
     model.black += light[0];
     model.contrast += light[1];
     fit = linearize(pixels, print, model);
     double damping = 1e-3;
-    for (int step = 0; step < max_steps; ++step) {
+    bool is_converged = false;
+    for (int step = 0; step < max_steps && !is_converged; ++step) {
         auto damped = fit.normal;
         for (int i = 0; i < unknowns; ++i)
             damped(i, i) *= 1 + damping;
-        const cv::Vec<double, unknowns> change = damped.solve(fit.gradient, cv::DECOMP_CHOLESKY);
+        cv::Vec<double, unknowns> change;
+        if (!cv::solve(damped, fit.gradient, change, cv::DECOMP_CHOLESKY))
+            return std::nullopt;
         Model next = model;
         for (int i = 0; i < 8; ++i)
             next.corners_px[i] += change[i];
@@ -304,53 +334,56 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
             std::clamp(model.blur_px + change[8], std::max(min_blur_px, model.blur_px / 2), 2 * model.blur_px);
         next.black += change[9];
         next.contrast += change[10];
-        const Fit candidate = linearize(pixels, print, next);
-        const double changed_px = std::max(cv::norm(next.corners_px, model.corners_px, cv::NORM_INF),
-                                           std::abs(next.blur_px - model.blur_px));
-        const bool is_better = candidate.cost < fit.cost;
+        next.slope += cv::Vec2d(change[11], change[12]);
+        const double moved_px = std::max(cv::norm(next.corners_px, model.corners_px, cv::NORM_INF),
+                                         std::abs(next.blur_px - model.blur_px));
+        const bool is_near = cv::norm(next.corners_px, first, cv::NORM_INF) < shortest / 4; // false for NaN
+        const Fit candidate = is_near ? linearize(pixels, print, next) : Fit{};
+        const bool is_better = is_near && candidate.cost < fit.cost;
+        // At the minimum, the resolution of the table decides whether a small step is better.
+        is_converged = moved_px < converged_px && (is_better || damping <= 1);
         damping *= is_better ? 0.1 : 10;
         if (is_better) {
             model = next;
             fit = candidate;
         }
-        if (changed_px < converged_px)
-            break;
     }
-    if (!(fit.cost < (1 - min_resemblance) * sum_of_squared_differences_from_mean(pixels)))
+    if (!is_converged || fit.pixels < 4 * unknowns ||
+        !(fit.cost < (1 - min_resemblance) * sum_of_squared_differences_from_mean(pixels)))
         return std::nullopt;
     std::vector<cv::Point2d> found;
-    for (int i = 0; i < 4; ++i) {
+    for (int i = 0; i < 4; ++i)
         found.emplace_back(model.corners_px[2 * i], model.corners_px[2 * i + 1]);
-        if (!(cv::norm(found[i] - (*corners)[i]) < shortest / 4))
-            return std::nullopt;
-    }
     const auto distorted = lens.distort(found);
     if (!distorted)
         return std::nullopt;
-    const auto covariance =
-        fit.normal.inv(cv::DECOMP_CHOLESKY) * (fit.cost / static_cast<double>(pixels.size() - unknowns));
+    const auto covariance = fit.normal.inv(cv::DECOMP_CHOLESKY) * (fit.cost / (fit.pixels - unknowns));
     MeasuredCorners result;
     std::ranges::copy(*distorted, result.corners_px.begin());
     // The distortion scales the noise as it scales the square.
     const double scale = perimeter_px(*distorted) / perimeter_px(found);
     const double sigma_px = scale * std::sqrt(equivalent_variance(covariance.get_minor<8, 8>(0, 0)));
-    result.sigma_px = std::isfinite(sigma_px) ? sigma_px : 0;
+    if (!(sigma_px > 0) || !std::isfinite(sigma_px))
+        return std::nullopt;
+    result.sigma_px = sigma_px;
     return result;
 }
 
 namespace {
 
-// Whether most of the margin is too bright for the camera, which shifts the edges into the black.
+// Whether the white at most of the edges is too bright for the camera, which shifts the edges into the black.
 bool is_overexposed(const cv::Mat &grey, const Corners &corners_px, int cells) {
     const cv::Point2d centre = (corners_px[0] + corners_px[1] + corners_px[2] + corners_px[3]) / 4;
+    const cv::Rect2d inside(0, 0, grey.cols - 1, grey.rows - 1);
     int bright = 0, all = 0;
     for (int i = 0; i < 4; ++i)
         for (const double part : {0.2, 0.4, 0.6, 0.8}) {
             const cv::Point2d on_edge = corners_px[i] + part * (corners_px[(i + 1) % 4] - corners_px[i]);
-            const cv::Point2d outside = on_edge + (on_edge - centre) / cells; // half a cell
-            if (!cv::Rect2d(0, 0, grey.cols - 1, grey.rows - 1).contains(outside))
-                continue;
-            bright += grey.at<std::uint8_t>(outside) >= saturated;
+            const cv::Point2d half_cell = (on_edge - centre) / cells;
+            const auto is_bright = [&](const cv::Point2d &at) {
+                return inside.contains(at) && grey.at<std::uint8_t>(at) >= saturated;
+            };
+            bright += is_bright(on_edge + half_cell) || is_bright(on_edge - half_cell); // the border may be white
             ++all;
         }
     return 2 * bright > all;
