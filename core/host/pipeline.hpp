@@ -266,7 +266,8 @@ private:
         run_config::Scene scene;
     };
     bool tracker_edit_failed_ = false;
-    bool has_new_targets_ = false; // a swap has changed the targets; warn_of_hidden_objects has not been called since
+    // A swap has changed the targets or the scene, and warn_of_hidden_objects has not been called since.
+    bool anchors_unchecked_ = false;
     std::optional<RaytracerEdit> failed_raytracer_edit_;
     FileWatch::Files edited_files_;                                      // to be applied
     std::optional<std::pair<std::uint64_t, arhost_camera>> last_camera_; // with the number of its frame

@@ -142,17 +142,20 @@ bool Pipeline::finish_swaps() {
     const bool targets_change =
         next_tracker_ && next_tracker_->configuration->targets != tracker_->configuration->targets;
     const bool tracker = finish(tracker_, next_tracker_);
-    has_new_targets_ |= tracker && targets_change;
+    anchors_unchecked_ |= tracker && targets_change;
     const std::shared_ptr<LoadedScene> scene = raytracer_ ? raytracer_->scene : nullptr;
     const bool raytracer = finish(raytracer_, next_raytracer_);
-    if (raytracer && raytracer_->scene != scene)
+    if (raytracer && raytracer_->scene != scene) {
         recompute_cameras();
+        anchors_unchecked_ = true; // the edit of the tracker that it was checked with may have been abandoned
+    }
     // An edit that failed before is not tried again.
     tracker_edit_failed_ = tracker_edit_failed_ && !tracker;
     if (raytracer)
         failed_raytracer_edit_.reset();
-    if (has_new_targets_ && !raytracer_swap_in_progress()) { // the same edit may have changed the scene
-        has_new_targets_ = false;
+    // The same edit may have changed both.
+    if (anchors_unchecked_ && !next_tracker_ && !raytracer_swap_in_progress()) {
+        anchors_unchecked_ = false;
         warn_of_hidden_objects();
     }
     return tracker || raytracer;

@@ -16,17 +16,18 @@ struct Print {
     int side() const { return cells.rows - 2 * margin; } // of the square
 };
 
-// Fits a picture of the whole print to the frame: its corners, its blur, and the light of black and of white, by the
-// method of least squares (Levenberg–Marquardt). All cells contribute, so this is accurate where blur mixes an edge
-// with the cells beside it. `corners_px` are correct to about half a cell. The noise of the corners follows from the
-// residuals. It is not independent, so `sigma_px` is that of the independent noise whose 95 % ellipsoid contains the
-// errors as often. Returns std::nullopt if the picture does not resemble the frame.
+// Fits a picture of the whole print to the frame: its corners, its blur, the light of black and of white, and how the
+// illumination changes across it, by the method of least squares (Levenberg–Marquardt). All cells contribute, so this
+// is accurate where blur mixes an edge with the cells beside it. `corners_px` are correct to about half a cell. The
+// errors of the coordinates depend on each other, so `sigma_px` is the standard deviation of independent noise of
+// which as much lies in its 95 % ellipsoid as of these errors; it follows from the residuals. Returns std::nullopt if
+// the picture does not resemble the frame.
 std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
                                            const Lens &lens, const Print &print);
 
-// Refines corners by the edges of the square (refine_edges) or, where these are blurred over half a cell, not found,
-// or shifted because white is saturated, by the whole print. Returns std::nullopt if neither succeeds. `is_subpixel`:
-// as refine_edges() has it.
+// Refines corners by the edges of the square (refine_edges) or, where the blur of these is wider than half a cell,
+// white is saturated, or they are not found, by the whole print. Returns std::nullopt if neither succeeds.
+// `is_subpixel`: as refine_edges() has it.
 std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
                                               const Lens &lens, const Print &print, bool is_subpixel = false);
 
