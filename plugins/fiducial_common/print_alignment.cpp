@@ -286,7 +286,7 @@ double equivalent_variance(const cv::Matx<double, 8, 8> &covariance) {
 
 std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
                                            const Lens &lens, const Print &print) {
-    constexpr double first_blur_px = 0.7, min_blur_px = 0.3, converged_px = 0.01, min_resemblance = 0.7,
+    constexpr double first_blur_px = 0.7, min_blur_px = 0.3, converged_px = 0.01, min_resemblance = 0.85,
                      min_cell_px = 0.5;
     constexpr int max_steps = 20;
     const auto corners = lens.undistort({corners_px.begin(), corners_px.end()});
