@@ -164,8 +164,9 @@ bool Pipeline::finish_swaps() {
 void Pipeline::warn_of_hidden_objects() const {
     if (!raytracer_)
         return;
+    const auto *tracker = tracker_ ? tracker_->configuration.get() : tracker_of_anchors(); // a replay has no tracker
     for (const Anchor &anchor : raytracer_->scene->anchors)
-        if (const std::string problem = problem_with({anchor}, tracker_->configuration.get()); !problem.empty())
+        if (const std::string problem = problem_with({anchor}, tracker); !problem.empty())
             context_.log(ARHOST_SEVERITY_WARNING, "arhost", problem + "; until then, objects on it are hidden");
 }
 
