@@ -364,16 +364,10 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     const auto distorted = lens.distort(corners);
     if (!distorted)
         return std::nullopt;
-    const MeasuredCorners result{{(*distorted)[0], (*distorted)[1], (*distorted)[2], (*distorted)[3]}};
-    const auto perimeter_px = [](const auto &square) {
-        double sum = 0;
-        for (std::size_t i = 0; i < 4; ++i)
-            sum += cv::norm(square[(i + 1) % 4] - square[i]);
-        return sum;
-    };
-    // The distortion scales the noise as it scales the square.
-    const double sigma_px = std::sqrt(variance) * perimeter_px(result.corners_px) / perimeter_px(corners);
-    return MeasuredCorners{result.corners_px, std::isfinite(sigma_px) ? sigma_px : 0, blur_cells};
+    const double sigma_px = std::sqrt(variance) * noise_scale(corners, *distorted);
+    return MeasuredCorners{{(*distorted)[0], (*distorted)[1], (*distorted)[2], (*distorted)[3]},
+                           std::isfinite(sigma_px) ? sigma_px : 0,
+                           blur_cells};
 }
 
 } // namespace

@@ -52,4 +52,14 @@ std::optional<std::vector<cv::Point2d>> Lens::distort(const std::vector<cv::Poin
     return pixels;
 }
 
+double noise_scale(const std::vector<cv::Point2d> &undistorted_px, const std::vector<cv::Point2d> &distorted_px) {
+    const auto perimeter_px = [](const std::vector<cv::Point2d> &square) {
+        double sum = 0;
+        for (std::size_t i = 0; i < square.size(); ++i)
+            sum += cv::norm(square[(i + 1) % square.size()] - square[i]);
+        return sum;
+    };
+    return perimeter_px(distorted_px) / perimeter_px(undistorted_px);
+}
+
 } // namespace arhost::fiducial

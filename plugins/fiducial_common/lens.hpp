@@ -27,4 +27,7 @@ private:
     shading::Lens lens_;
 };
 
+// Returns by how much the distortion enlarges the noise of a square's corners: as much as it enlarges the square.
+double noise_scale(const std::vector<cv::Point2d> &undistorted_px, const std::vector<cv::Point2d> &distorted_px);
+
 } // namespace arhost::fiducial

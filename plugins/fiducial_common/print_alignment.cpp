@@ -24,9 +24,8 @@ cv::Vec2d transform(const Homography &h, const cv::Vec2d &at) {
     return {v[0] / v[2], v[1] / v[2]};
 }
 
-// How the result of transform() changes with `at`.
-cv::Matx22d derivative(const Homography &h, const cv::Vec2d &at) {
-    const cv::Vec3d v = h * cv::Vec3d(at[0], at[1], 1);
+// How the result of transform() changes with `at`. `v`: h * (at, 1).
+cv::Matx22d derivative(const Homography &h, const cv::Vec3d &v) {
     const double x = v[0] / v[2], y = v[1] / v[2];
     return cv::Matx22d(h(0, 0) - x * h(2, 0), h(0, 1) - x * h(2, 1), h(1, 0) - y * h(2, 0), h(1, 1) - y * h(2, 1)) *
            (1 / v[2]);
@@ -54,10 +53,6 @@ Homography px_from_cells(const cv::Vec<double, 8> &corners_px, const Print &prin
     return Homography(1, 0, origin.x, 0, 1, origin.y, 0, 0, 1) * relative;
 }
 
-double perimeter_px(const std::vector<cv::Point2d> &square) {
-    return cv::arcLength(std::vector<cv::Point2f>(square.begin(), square.end()), true);
-}
-
 // The smallest code of a pixel that may be brighter than its code tells; video compression turns some 255 into 254.
 constexpr std::uint8_t saturated = 254;
 
@@ -82,7 +77,7 @@ std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_co
     const double area_px = std::max(cv::contourArea(points), part.area() / 4.0);
     const int stride = 1 + static_cast<int>(std::sqrt(area_px / max_pixels));
     std::vector<cv::Point2d> at;
-    at.reserve(static_cast<std::size_t>(part.area()));
+    at.reserve(static_cast<std::size_t>((part.width / stride + 1) * (part.height / stride + 1)));
     for (int y = part.y; y < part.y + part.height; y += stride)
         for (int x = part.x; x < part.x + part.width; x += stride)
             at.emplace_back(x, y);
@@ -123,11 +118,10 @@ struct Table {
     }
 };
 
-// With the ellipse that the blur, which is round in the frame, is at the centre of the print.
-Table blurred(const Print &print, const cv::Matx22d &cells_from_px, double blur_px) {
+// `covariance_cells2`: of the blur.
+Table blurred(const Print &print, const cv::Matx22d &covariance_cells2) {
     constexpr double min_sigma = 1.2, cutoff = 3;                        // samples; standard deviations
     constexpr double max_per_cell = 12, max_size = 240, max_radius = 40; // samples
-    const cv::Matx22d covariance_cells2 = blur_px * blur_px * cells_from_px * cells_from_px.t();
     const double half_trace = cv::trace(covariance_cells2) / 2;
     const double smallest =
         half_trace - std::sqrt(std::max(half_trace * half_trace - cv::determinant(covariance_cells2), 0.0));
@@ -181,13 +175,13 @@ Fit linearize(std::span<const Pixel> pixels, const Print &print, const Model &mo
     const Homography to_px = px_from_cells(model.corners_px, print), to_cells = to_px.inv();
     Fit fit;
     const double middle = print.cells.rows / 2.0;
-    const cv::Matx22d px_per_cell = derivative(to_px, {middle, middle});
+    const cv::Matx22d px_per_cell = derivative(to_px, to_px * cv::Vec3d(middle, middle, 1));
     if (!(cv::determinant(px_per_cell) > 0)) { // also for NaN
         fit.cost = std::numeric_limits<double>::infinity();
         return fit;
     }
     const cv::Matx22d cells_per_px = px_per_cell.inv(), ellipse = cells_per_px * cells_per_px.t();
-    const Table table = blurred(print, cells_per_px, model.blur_px);
+    const Table table = blurred(print, model.blur_px * model.blur_px * ellipse);
 
     // First with respect to the nine elements of the homography and the other unknowns.
     constexpr int count = 14;
@@ -201,20 +195,15 @@ Fit linearize(std::span<const Pixel> pixels, const Print &print, const Model &mo
         }
         const cv::Vec2d cell(h[0] / h[2], h[1] / h[2]);
         Whiteness white = table.at(cell);
-        const cv::Vec2d u_by_px = cv::Vec2d(to_cells(0, 0) - cell[0] * to_cells(2, 0),
-                                            to_cells(0, 1) - cell[0] * to_cells(2, 1)) /
-                                  h[2],
-                        v_by_px = cv::Vec2d(to_cells(1, 0) - cell[1] * to_cells(2, 0),
-                                            to_cells(1, 1) - cell[1] * to_cells(2, 1)) /
-                                  h[2];
+        const cv::Matx22d cells_per_px_here = derivative(to_cells, h);
         // A blur spreads as heat does: it changes the whiteness by half of the change of its covariance times the
         // second derivatives. So the ellipse of the blur at this cell is corrected to the first order.
-        const double uu = u_by_px.dot(u_by_px), uv = u_by_px.dot(v_by_px), vv = v_by_px.dot(v_by_px);
-        const double by_blur = model.blur_px * (uu * white.uu + 2 * uv * white.uv + vv * white.vv);
-        white.value +=
-            static_cast<float>((by_blur - model.blur_px * (ellipse(0, 0) * white.uu + 2 * ellipse(0, 1) * white.uv +
-                                                           ellipse(1, 1) * white.vv)) *
-                               model.blur_px / 2);
+        const auto spread = [&](const cv::Matx22d &covariance) {
+            return covariance(0, 0) * white.uu + 2 * covariance(0, 1) * white.uv + covariance(1, 1) * white.vv;
+        };
+        const cv::Matx22d ellipse_here = cells_per_px_here * cells_per_px_here.t();
+        const double by_blur = model.blur_px * spread(ellipse_here);
+        white.value += static_cast<float>(spread(ellipse_here - ellipse) * model.blur_px * model.blur_px / 2);
         const double u = cell[0] / print.cells.cols - 0.5, v = cell[1] / print.cells.rows - 0.5;
         const double illumination = 1 + model.slope[0] * u + model.slope[1] * v;
         const double light = model.black + model.contrast * white.value,
@@ -223,7 +212,7 @@ Fit linearize(std::span<const Pixel> pixels, const Print &print, const Model &mo
             continue;
         // The derivative of the light with respect to a motion of the print in undistorted px.
         const double contrast = illumination * model.contrast;
-        const cv::Vec2d by_px = -contrast * (white.u * u_by_px + white.v * v_by_px);
+        const cv::Vec2d by_px = -contrast * (cells_per_px_here.t() * cv::Vec2d(white.u, white.v));
         const double x = by_px[0], y = by_px[1];
         // The homography maps `h` to (pixel.place, 1).
         const double w = -(x * pixel.place[0] + y * pixel.place[1]);
@@ -360,9 +349,8 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
     const auto covariance = fit.normal.inv(cv::DECOMP_CHOLESKY) * (fit.cost / (fit.pixels - unknowns));
     MeasuredCorners result;
     std::ranges::copy(*distorted, result.corners_px.begin());
-    // The distortion scales the noise as it scales the square.
-    const double scale = perimeter_px(*distorted) / perimeter_px(found);
-    const double sigma_px = scale * std::sqrt(equivalent_variance(covariance.get_minor<8, 8>(0, 0)));
+    const double sigma_px =
+        noise_scale(found, *distorted) * std::sqrt(equivalent_variance(covariance.get_minor<8, 8>(0, 0)));
     if (!(sigma_px > 0) || !std::isfinite(sigma_px))
         return std::nullopt;
     result.sigma_px = sigma_px;
@@ -392,12 +380,13 @@ bool is_overexposed(const cv::Mat &grey, const Corners &corners_px, int cells) {
 } // namespace
 
 std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
-                                              const Lens &lens, const Print &print, bool is_subpixel) {
+                                              const Lens &lens, int cells, const std::function<Print()> &print,
+                                              bool is_subpixel) {
     constexpr double max_blur_cells = 0.5;
-    const auto edges = refine_edges(grey, transfer, rough_px, lens, print.side(), is_subpixel);
-    if (edges && edges->blur_cells <= max_blur_cells && !is_overexposed(grey, edges->corners_px, print.side()))
+    const auto edges = refine_edges(grey, transfer, rough_px, lens, cells, is_subpixel);
+    if (edges && edges->blur_cells <= max_blur_cells && !is_overexposed(grey, edges->corners_px, cells))
         return edges;
-    const auto aligned = align_print(grey, transfer, edges ? edges->corners_px : rough_px, lens, print);
+    const auto aligned = align_print(grey, transfer, edges ? edges->corners_px : rough_px, lens, print());
     return aligned ? aligned : edges;
 }
 

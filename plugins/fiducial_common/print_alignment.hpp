@@ -6,6 +6,8 @@
 #include "lens.hpp"
 #include "observations.hpp"
 
+#include <functional>
+
 namespace arhost::fiducial {
 
 // The cells of a print from the top left: 1 is white, 0 is black. `margin` cells around the square are known.
@@ -27,8 +29,10 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
 
 // Refines corners by the edges of the square (refine_edges) or, where the blur of these is wider than half a cell,
 // white is saturated, or they are not found, by the whole print. Returns std::nullopt if neither succeeds.
-// `is_subpixel`: as refine_edges() has it.
+// `cells` and
+// `is_subpixel`: as refine_edges() has them. Calls `print` only if it is needed.
 std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
-                                              const Lens &lens, const Print &print, bool is_subpixel = false);
+                                              const Lens &lens, int cells, const std::function<Print()> &print,
+                                              bool is_subpixel = false);
 
 } // namespace arhost::fiducial

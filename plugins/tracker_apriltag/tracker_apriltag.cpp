@@ -240,8 +240,9 @@ private:
                 corners.corners_px[corner] = {tag->p[3 - corner][0] - 0.5 + region.x,
                                               tag->p[3 - corner][1] - 0.5 + region.y};
             if (fit_edges_ && part.is_listed())
-                corners = arhost::fiducial::refine_corners(grey, frame.format->transfer, corners.corners_px, *lens_,
-                                                           print_of(*tag->family, tag->id), refine_edges_)
+                corners = arhost::fiducial::refine_corners(
+                              grey, frame.format->transfer, corners.corners_px, *lens_, tag->family->width_at_border,
+                              [&] { return print_of(*tag->family, tag->id); }, refine_edges_)
                               .value_or(corners);
             arhost_observation &one = seen.emplace_back(part.family().observation(part.id(tag->id), corners));
             one.hamming = static_cast<std::uint32_t>(tag->hamming);

@@ -304,8 +304,9 @@ private:
                     cv::Point2d(found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner]) +
                     offset;
             if (refine_edges_ && is_listed)
-                corners = arhost::fiducial::refine_corners(grey, frame.format->transfer, corners.corners_px, *lens_,
-                                                           print_of(detectable.dictionary, found.ids[i]))
+                corners = arhost::fiducial::refine_corners(
+                              grey, frame.format->transfer, corners.corners_px, *lens_, cells_of(table),
+                              [&] { return print_of(detectable.dictionary, found.ids[i]); })
                               .value_or(corners);
             const Reading reading = read(grey, corners.corners_px, table, found.ids[i], parameters.markerBorderBits);
             if (!is_listed && (reading.wrong_bits > 0 || reading.false_positive_rate == 1)) // it may be anything

@@ -207,7 +207,8 @@ TEST(CornerRefinement, AlignsThePrintOnlyWhereCellsAreNarrow) {
         cv::Mat picture = finely_rendered(camera, {tag.with_margin(1), 100, mt});
         cv::GaussianBlur(picture, picture, {}, 0.6);
         const auto rough = corners_of(mt, camera, 100);
-        const auto found = refine_corners(picture, ARHOST_TRANSFER_LINEAR, rough, lens, print_of(tag));
+        const auto found = refine_corners(picture, ARHOST_TRANSFER_LINEAR, rough, lens, tag.corner_cells,
+                                          [&] { return print_of(tag); });
         const auto edges = refine_edges(picture, ARHOST_TRANSFER_LINEAR, rough, lens, 8);
         ASSERT_TRUE(found && edges);
         EXPECT_EQ(found->corners_px != edges->corners_px, is_narrow);
@@ -223,7 +224,8 @@ TEST(CornerRefinement, AlignsThePrintBesideSaturatedWhite) {
         cv::GaussianBlur(picture, picture, {}, 0.7);
         picture *= 2;
         const auto truth = corners_of(mt, camera, 100);
-        const auto found = refine_corners(picture, ARHOST_TRANSFER_LINEAR, truth, lens, print_of(tag));
+        const auto found = refine_corners(picture, ARHOST_TRANSFER_LINEAR, truth, lens, tag.corner_cells,
+                                          [&] { return print_of(tag); });
         ASSERT_TRUE(found) << family;
         for (int k = 0; k < 4; ++k)
             EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.15) << family;
@@ -238,7 +240,8 @@ TEST(CornerRefinement, AlignsThePrintIfEdgesAreNotFound) {
     cv::GaussianBlur(picture, picture, {}, 4);
     const auto truth = corners_of(mt, camera, 100);
     ASSERT_FALSE(refine_edges(picture, ARHOST_TRANSFER_LINEAR, truth, lens, 8, true));
-    const auto found = refine_corners(picture, ARHOST_TRANSFER_LINEAR, truth, lens, print_of(tag), true);
+    const auto found = refine_corners(
+        picture, ARHOST_TRANSFER_LINEAR, truth, lens, 8, [&] { return print_of(tag); }, true);
     ASSERT_TRUE(found);
     for (int k = 0; k < 4; ++k)
         EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.1);
@@ -250,8 +253,8 @@ TEST(CornerRefinement, KeepsTheEdgesOfAPrintThatDoesNotFit) {
     cv::Mat picture = finely_rendered(camera, {april_tag("tag36h11", 4).with_margin(1), 100, mt});
     cv::GaussianBlur(picture, picture, {}, 0.6);
     const auto rough = corners_of(mt, camera, 100);
-    const auto found =
-        refine_corners(picture, ARHOST_TRANSFER_LINEAR, rough, lens, print_of(april_tag("tag36h11", 5)));
+    const auto found = refine_corners(picture, ARHOST_TRANSFER_LINEAR, rough, lens, 8,
+                                      [] { return print_of(april_tag("tag36h11", 5)); });
     const auto edges = refine_edges(picture, ARHOST_TRANSFER_LINEAR, rough, lens, 8);
     ASSERT_TRUE(found && edges);
     EXPECT_EQ(found->corners_px, edges->corners_px);
