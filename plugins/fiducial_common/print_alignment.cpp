@@ -77,7 +77,8 @@ std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_co
     const double area_px = std::max(cv::contourArea(points), part.area() / 4.0);
     const int stride = 1 + static_cast<int>(std::sqrt(area_px / max_pixels));
     std::vector<cv::Point2d> at;
-    at.reserve(static_cast<std::size_t>((part.width / stride + 1) * (part.height / stride + 1)));
+    const int columns = part.width / stride + 1, rows = part.height / stride + 1;
+    at.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
     for (int y = part.y; y < part.y + part.height; y += stride)
         for (int x = part.x; x < part.x + part.width; x += stride)
             at.emplace_back(x, y);
@@ -341,6 +342,7 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
         !(fit.cost < (1 - min_resemblance) * sum_of_squared_differences_from_mean(pixels)))
         return std::nullopt;
     std::vector<cv::Point2d> found;
+    found.reserve(4);
     for (int i = 0; i < 4; ++i)
         found.emplace_back(model.corners_px[2 * i], model.corners_px[2 * i + 1]);
     const auto distorted = lens.distort(found);
