@@ -161,9 +161,9 @@ void UsbCamera::change(std::uint8_t unit, std::uint8_t selector, const std::func
     change(controls_.at({unit, selector}));
 }
 
-std::int64_t UsbCamera::captured_ns(std::uint32_t number) {
+std::int64_t UsbCamera::sent_ns(std::uint32_t number) {
     const std::lock_guard lock(mutex_);
-    return captured_ns_.at(number);
+    return sent_ns_.at(number);
 }
 
 Octets UsbCamera::picture(std::uint32_t number, bool is_nv12, std::size_t pixels) {
@@ -372,7 +372,7 @@ Octets UsbCamera::next_payload(std::size_t limit) {
             if (now < due_ns_ || setup_.is_silent)
                 return {};
             due_ns_ = std::max(due_ns_ + setup_.interval_ns, now - 3 * setup_.interval_ns);
-            captured_ns_[number_] = due_ns_ - setup_.interval_ns;
+            sent_ns_[number_] = now;
             frame_ = make_frame();
             frame_fault_ = std::exchange(fault_, Fault::none);
             if (frame_fault_ == Fault::shortened)

@@ -54,8 +54,8 @@ public:
 
     // The picture of a frame in YUY2 or NV12. Its first four bytes have the number of the frame.
     static Octets picture(std::uint32_t number, bool is_nv12, std::size_t pixels = std::size_t{width} * height);
-    // When a frame was captured, in ns of CLOCK_MONOTONIC.
-    std::int64_t captured_ns(std::uint32_t number);
+    // When the camera began to send a frame, in ns of CLOCK_MONOTONIC.
+    std::int64_t sent_ns(std::uint32_t number);
     // Mean luma of the picture of a frame in MJPEG.
     static int luma_of(std::uint32_t number) { return 40 + 10 * static_cast<int>(number % 16); }
 
@@ -96,7 +96,7 @@ private:
     std::uint8_t format_ = 1;
     Fault fault_ = Fault::none;
     std::map<Key, CameraControl> controls_;
-    std::map<std::uint32_t, std::int64_t> captured_ns_; // by number of the frame
+    std::map<std::uint32_t, std::int64_t> sent_ns_; // by number of the frame
 
     // used by the stream's thread only
     Octets frame_;
