@@ -6,6 +6,7 @@
 #include "opencv_aruco.hpp"
 
 #include <array>
+#include <string_view>
 
 namespace arhost::aruco {
 
@@ -19,6 +20,15 @@ struct DictionaryType {
 
     // OpenCV's AprilTag dictionaries are rotated by 180° relative to AprilTag's own library.
     constexpr bool is_april_tag() const { return april_tag_bits > 0; }
+
+    // Whether it is this dictionary or one of the same size of markers, of which the larger begins with the smaller:
+    // "DICT_4X4_1000" and "DICT_4X4_50".
+    constexpr bool is_of_series(std::string_view other) const {
+        constexpr std::size_t length = std::string_view("DICT_4X4_").size();
+        const std::string_view own = family;
+        return own == other ||
+               (own.size() > length && own[6] == 'X' && other.substr(0, length) == own.substr(0, length));
+    }
 };
 
 inline constexpr std::array dictionary_types {

@@ -5,6 +5,7 @@
 #include <fiducial_common/edge_refinement.hpp>
 #include <fiducial_common/lens.hpp>
 #include <fiducial_common/observations.hpp>
+#include <fiducial_common/other_families.hpp>
 #include <fiducial_common/print_alignment.hpp>
 #include <fiducial_common/search_regions.hpp>
 
@@ -146,8 +147,8 @@ double print_margin(const std::string &name) {
 
 class AprilTagTracker {
 public:
-    AprilTagTracker(const arhost::Host &, const arhost::Options &options)
-        : threads_(static_cast<int>(options.integer("threads"))) {
+    AprilTagTracker(const arhost::Host &host, const arhost::Options &options)
+        : host_(host), threads_(static_cast<int>(options.integer("threads"))) {
         set(options);
     }
 
@@ -191,6 +192,7 @@ public:
                 if (part->tags()->ncodes > 0) // the library divides by the number of tags
                     parts_.push_back(std::move(part));
             }
+        others_.emplace(host_, setup, [&](const cv::Mat &grey) { return tags_of_other_families(grey); });
         detector_.reset(apriltag_detector_create());
         detector_->nthreads = threads_;
         configure_detector();
@@ -198,26 +200,35 @@ public:
         // (AprilRobotics/apriltag, pull request 339). Process a small frame with few tasks first: after it, the
         // threads wait for a signal before they take tasks.
         if (threads_ > 1)
-            detect(cv::Mat::zeros(min_image_side(), min_image_side(), CV_8UC1));
+            detect(*detector_, cv::Mat::zeros(min_image_side(), min_image_side(), CV_8UC1));
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
         const arhost::fiducial::Pass pass{
             nullptr, [&](const cv::Rect &region, auto &seen) { observe(*request.frame, region, seen); }};
-        arhost::fiducial::report(regions_->search(request, {grid_px(), min_image_side()}, {&pass, 1}), observations);
+        std::vector<arhost_observation> seen = regions_->search(request, {grid_px(), min_image_side()}, {&pass, 1});
+        others_->frame(arhost::fiducial::grey_of(*request.frame), seen);
+        arhost::fiducial::report(std::move(seen), observations);
     }
 
     void stop() {
+        if (others_)
+            others_->finish();
+        others_.reset();
         detector_.reset();
         parts_.clear();
     }
 
 private:
+    void configure(apriltag_detector_t &detector) const {
+        detector.quad_decimate = static_cast<float>(decimate_);
+        detector.quad_sigma = static_cast<float>(sigma_);
+        detector.refine_edges = refine_edges_;
+        detector.decode_sharpening = sharpening_;
+    }
+
     void configure_detector() {
-        detector_->quad_decimate = static_cast<float>(decimate_);
-        detector_->quad_sigma = static_cast<float>(sigma_);
-        detector_->refine_edges = refine_edges_;
-        detector_->decode_sharpening = sharpening_;
+        configure(*detector_);
         apriltag_detector_clear_families(detector_.get());
         for (const auto &part : parts_)
             apriltag_detector_add_family_bits(detector_.get(), part->tags(), part->max_hamming(max_hamming_));
@@ -226,7 +237,7 @@ private:
     // Adds the tags of a region of the frame to `seen`.
     void observe(const arhost_frame &frame, const cv::Rect &region, std::vector<arhost_observation> &seen) {
         const cv::Mat grey = arhost::fiducial::grey_of(frame);
-        const Detections tags = detect(grey(region));
+        const Detections tags = detect(*detector_, grey(region));
         for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
             apriltag_detection_t *tag = nullptr;
             zarray_get(tags.get(), i, &tag);
@@ -252,6 +263,27 @@ private:
         }
     }
 
+    arhost::fiducial::OtherFamilies::Markers tags_of_other_families(const cv::Mat &grey) const {
+        std::vector<std::pair<const char *, WholeFamily>> others;
+        for (const FamilyType &type : family_types)
+            if (std::ranges::none_of(families_, [&](const Family &used) { return used.name == type.name; }))
+                others.emplace_back(type.name, whole_family(type.name));
+        const Detector detector(apriltag_detector_create(),
+                                apriltag_detector_destroy); // destroyed before the families
+        configure(*detector);
+        for (const auto &[name, family] : others)
+            apriltag_detector_add_family_bits(detector.get(), family.get(), 0);
+        arhost::fiducial::OtherFamilies::Markers markers;
+        const Detections tags = detect(*detector, grey);
+        for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
+            apriltag_detection_t *tag = nullptr;
+            zarray_get(tags.get(), i, &tag);
+            if (tag->decision_margin >= min_margin_)
+                markers[tag->family->name].insert(tag->id);
+        }
+        return markers;
+    }
+
     static arhost::fiducial::Print print_of(apriltag_family_t &family, int index) {
         image_u8_t *drawn = apriltag_to_image(&family, static_cast<std::uint32_t>(index));
         arhost::fiducial::Print print{{}, (family.total_width - family.width_at_border) / 2};
@@ -268,16 +300,17 @@ private:
     // The library reads out of bounds in images smaller than one of its 4×4 px tiles.
     int min_image_side() const { return static_cast<int>(8 * decimate_); }
 
-    Detections detect(const cv::Mat &grey) {
+    Detections detect(apriltag_detector_t &detector, const cv::Mat &grey) const {
         if (std::min(grey.cols, grey.rows) < min_image_side())
             return {nullptr, apriltag_detections_destroy};
         cv::Mat pixels = grey;
         if (sigma_ != 0 && decimate_ == 1) // make a copy: the library would blur in place, but the frame is read-only
             pixels = grey.clone();
         image_u8_t image{pixels.cols, pixels.rows, static_cast<int>(pixels.step), pixels.data};
-        return {apriltag_detector_detect(detector_.get(), &image), apriltag_detections_destroy};
+        return {apriltag_detector_detect(&detector, &image), apriltag_detections_destroy};
     }
 
+    arhost::Host host_;
     const int threads_;
     bool fit_edges_ = true;
     double decimate_ = 1, sigma_ = 0;
@@ -288,6 +321,7 @@ private:
 
     std::optional<arhost::fiducial::Lens> lens_;
     std::optional<arhost::fiducial::SearchRegions> regions_;
+    std::optional<arhost::fiducial::OtherFamilies> others_;
     std::vector<Family> families_;
     std::vector<std::unique_ptr<PartOfFamily>> parts_;
     Detector detector_{

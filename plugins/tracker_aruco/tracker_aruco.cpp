@@ -6,6 +6,7 @@
 #include <fiducial_common/lens.hpp>
 #include <fiducial_common/observations.hpp>
 #include <fiducial_common/opencv_aruco.hpp>
+#include <fiducial_common/other_families.hpp>
 #include <fiducial_common/print_alignment.hpp>
 #include <fiducial_common/search_regions.hpp>
 
@@ -18,6 +19,7 @@
 #include <filesystem>
 #include <fstream>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -205,7 +207,7 @@ struct Detectable {
 
 class ArucoTracker {
 public:
-    ArucoTracker(const arhost::Host &, const arhost::Options &options) {
+    ArucoTracker(const arhost::Host &host, const arhost::Options &options) : host_(host) {
         if (const std::string file = options.text("dictionary_file"); !file.empty()) {
             file_table_ = read_dictionary(file);
             file_name_ = arhost::fiducial::april_tag_name(std::filesystem::path(file).stem().string());
@@ -271,24 +273,32 @@ public:
         }
         make_parameters();
         regions_.emplace(setup, [&](const std::string &name) { return 1.0 / cells_of(dictionary_of(name).table); });
+        others_.emplace(host_, setup, [&](const cv::Mat &grey) { return markers_of_other_dictionaries(grey); });
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
+        const cv::Mat grey = arhost::fiducial::grey_of(*request.frame);
         std::vector<arhost::fiducial::Pass> passes;
         for (const Detectable &detectable : detectables_)
             passes.push_back({&detectable.family, [&](const cv::Rect &region, auto &seen) {
-                                  observe(*request.frame, region, detectable, seen);
+                                  observe(grey, request.frame->format->transfer, region, detectable, seen);
                               }});
-        arhost::fiducial::report(regions_->search(request, {}, passes), observations);
+        std::vector<arhost_observation> seen = regions_->search(request, {}, passes);
+        others_->frame(grey, seen);
+        arhost::fiducial::report(std::move(seen), observations);
     }
 
-    void stop() { detectables_.clear(); }
+    void stop() {
+        if (others_)
+            others_->finish();
+        others_.reset();
+        detectables_.clear();
+    }
 
 private:
     // Adds the markers of a dictionary in a region of the frame to `seen`.
-    void observe(const arhost_frame &frame, const cv::Rect &region, const Detectable &detectable,
+    void observe(const cv::Mat &grey, arhost_transfer transfer, const cv::Rect &region, const Detectable &detectable,
                  std::vector<arhost_observation> &seen) const {
-        const cv::Mat grey = arhost::fiducial::grey_of(frame);
         const cv::aruco::Dictionary &table = detectable.dictionary.table;
         cv::aruco::DetectorParameters parameters = detectable.parameters;
         // OpenCV takes the perimeter relative to the longer side of the image that it gets.
@@ -304,10 +314,10 @@ private:
                     cv::Point2d(found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner]) +
                     offset;
             if (refine_edges_ && is_listed)
-                corners = arhost::fiducial::refine_corners(
-                              grey, frame.format->transfer, corners.corners_px, *lens_, cells_of(table),
-                              [&] { return print_of(detectable.dictionary, found.ids[i]); })
-                              .value_or(corners);
+                corners =
+                    arhost::fiducial::refine_corners(grey, transfer, corners.corners_px, *lens_, cells_of(table),
+                                                     [&] { return print_of(detectable.dictionary, found.ids[i]); })
+                        .value_or(corners);
             const Reading reading = read(grey, corners.corners_px, table, found.ids[i], parameters.markerBorderBits);
             if (!is_listed && (reading.wrong_bits > 0 || reading.false_positive_rate == 1)) // it may be anything
                 continue;
@@ -316,6 +326,34 @@ private:
             one.decision_margin = reading.contrast;
             one.false_positive_rate = reading.false_positive_rate;
         }
+    }
+
+    // Each dictionary of "DICT_4X4_50", "DICT_4X4_100" and so on begins with the markers of the smaller ones: detects
+    // those of the largest, and names the smallest that has all that were found.
+    arhost::fiducial::OtherFamilies::Markers markers_of_other_dictionaries(const cv::Mat &grey) const {
+        arhost::fiducial::OtherFamilies::Markers markers;
+        for (auto largest = dictionary_types.begin(); largest != dictionary_types.end(); ++largest) {
+            if (const auto next = largest + 1; next != dictionary_types.end() && next->is_of_series(largest->family))
+                continue;
+            Detectable detectable{{largest->family, 0, 0, {}}, dictionary_of(largest->family), parameters_};
+            detectable.parameters.errorCorrectionRate = 0;
+            std::vector<arhost_observation> seen;
+            observe(grey, ARHOST_TRANSFER_SRGB, {0, 0, grey.cols, grey.rows}, detectable, seen);
+            std::set<int> ids;
+            for (const arhost_observation &one : seen)
+                if (std::ranges::none_of(detectables_, [&](const Detectable &used) {
+                        return largest->is_of_series(used.family.name) && one.id < used.family.id_count;
+                    }))
+                    ids.insert(one.id);
+            if (ids.empty())
+                continue;
+            const auto smallest = std::ranges::find_if(dictionary_types, [&](const DictionaryType &type) {
+                return largest->is_of_series(type.family) &&
+                       *ids.rbegin() < dictionary_of(type.family).table.bytesList.rows;
+            });
+            markers[smallest->family] = std::move(ids);
+        }
+        return markers;
     }
 
     arhost::fiducial::Print print_of(const Dictionary &dictionary, int id) const {
@@ -361,6 +399,7 @@ private:
         }
     }
 
+    arhost::Host host_;
     cv::aruco::Dictionary file_table_;
     std::string file_name_; // the name of file_table_; empty: there is none
     bool refine_edges_ = false;
@@ -370,6 +409,7 @@ private:
 
     std::optional<arhost::fiducial::Lens> lens_;
     std::optional<arhost::fiducial::SearchRegions> regions_;
+    std::optional<arhost::fiducial::OtherFamilies> others_;
     std::vector<Detectable> detectables_;
 };
 

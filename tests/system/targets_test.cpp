@@ -131,3 +131,14 @@ TEST(Targets, MarkersOfNoTargetAreNamedIfTargetsAreMissing) {
     EXPECT_THAT(run.output(), HasSubstr("it looked for 'tag36h11-5' (tag36h11 5); it saw tag36h11 4 (10 frames)"));
     EXPECT_EQ(run.stats()["unlisted_markers"]["tag36h11 4"], 10);
 }
+
+TEST(Targets, MarkersOfOtherDictionariesAreNamedIfTargetsAreMissing) {
+    ArhostRun run(
+        "version: 1\nsource: {plugin: source_synthetic, options: {frames: 3, family: DICT_5X5_250, id: 104}}\n"
+        "tracker: {plugin: tracker_aruco, targets: [{marker: 5, family: tag36h11, side_mm: 80}]}\n"
+        "outputs: [{plugin: sink_null}]\n");
+    EXPECT_EQ(run.run(), 1);
+    EXPECT_THAT(run.output(),
+                HasSubstr("info: tracker: no listed marker was seen in 3 frames, but this one has markers "
+                          "of other families: DICT_5X5_250 104\n"));
+}

@@ -72,6 +72,15 @@ inline std::string case_name(const testing::TestParamInfo<TrackerCase> &info) {
     return info.param.name;
 }
 
+// Returns the log of a tracker after it has looked for a family in a picture of another one.
+inline std::string log_after(const std::string &plugin, const std::string &family, const Print &seen) {
+    Tracker tracker(plugin);
+    EXPECT_EQ(tracker.start(test_camera, {{3, 80, family}}), ARHOST_STATUS_OK) << tracker.log();
+    tracker.track(GreyFrame(picture_of({{seen, 80, pose_of(10, 5, 400, 10, -20, 160)}})));
+    tracker.stop();
+    return tracker.log();
+}
+
 TEST_P(FiducialTracker, PutsCornersWhereTheyWereRendered) {
     cv::Point2d bias;
     const std::vector<Mt> poses{pose_of(0, 0, 500), pose_of(60, 40, 450, 30, 20, 15),
@@ -153,6 +162,28 @@ TEST_P(FiducialTracker, ReportsListedAndUnlistedMarkersByTheirIds) {
         }
         EXPECT_THAT(ids, testing::ElementsAre(2, 5, 586)) << "with " << listed.size() << " listed";
     }
+}
+
+TEST_P(FiducialTracker, NamesMarkersOfOtherFamiliesOnceIfNoListedOneAppears) {
+    const GreyFrame other(picture_of({{april_tag("tag25h9", 7).with_margin(1), 80, pose_of(-60, 0, 400)},
+                                      {april_tag("tag25h9", 9).with_margin(1), 80, pose_of(60, 0, 400)}}));
+    const GreyFrame listed(picture_of({{tag(5), 80, pose_of(0, 0, 400)}})), empty(picture_of({}));
+    ASSERT_EQ(tracker_.start(test_camera, {{5}}), ARHOST_STATUS_OK) << tracker_.log();
+    for (int frame = 1; frame < 60; ++frame)
+        tracker_.track(frame == 59 ? other : empty);
+    EXPECT_EQ(tracker_.log(), "");
+    tracker_.track(other);
+    EXPECT_THAT(tracker_.log(), testing::HasSubstr("no listed marker was seen in 60 frames, but this one has markers "
+                                                   "of other families: tag25h9 7, 9"));
+    const std::string log = tracker_.log();
+    tracker_.stop();
+    EXPECT_EQ(tracker_.log(), log);
+
+    ASSERT_EQ(tracker_.start(test_camera, {{5}}), ARHOST_STATUS_OK);
+    tracker_.track(listed);
+    tracker_.track(other);
+    tracker_.stop();
+    EXPECT_EQ(tracker_.log(), log);
 }
 
 TEST_P(FiducialTracker, ReportsAllCopiesOfAMarkerByTheirPlaces) {

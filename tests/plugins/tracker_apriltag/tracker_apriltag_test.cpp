@@ -95,6 +95,12 @@ ClutterCounts find_tags_in_clutter(const std::string &family, const Options &opt
     return find_in_clutter(tracker, family, [&](int id) { return april_tag(family, id).with_margin(1); });
 }
 
+TEST_P(AprilTagFamily, IsNamedIfTagsOfAnotherOneAreListed) {
+    const std::string listed = GetParam() == "tag36h11" ? "tag25h9" : "tag36h11";
+    EXPECT_THAT(log_after("tracker_apriltag", listed, april_tag(GetParam(), 20).with_margin(1)),
+                HasSubstr("of other families: " + GetParam() + " 20"));
+}
+
 TEST_P(AprilTagFamily, DefaultsFindTagsAndNoFalseOnesInClutter) {
     const ClutterCounts counts = find_tags_in_clutter(GetParam(), {});
     EXPECT_EQ(counts.false_positives, 0);

@@ -8,6 +8,7 @@
 namespace {
 
 using namespace arhost::test;
+using testing::EndsWith;
 using testing::HasSubstr;
 
 const std::vector<TrackerCase> cases{{"Defaults", "tracker_aruco", {}, {}}};
@@ -74,6 +75,26 @@ TEST_P(ArucoDictionary, FindsUnlistedMarkers) {
     const int bits = (print.corner_cells - 2) * (print.corner_cells - 2);
     EXPECT_EQ(seen[0].false_positive_rate, std::ldexp(4, -bits));
     EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 80)), 2.5);
+}
+
+TEST_P(ArucoDictionary, IsNamedIfMarkersOfAnotherOneAreListed) {
+    const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
+    const std::string listed = family == "tag36h11" ? "tag25h9" : "tag36h11";
+    const Print print = family.empty() ? aruco_marker(dictionary, 21) : april_tag(family, 21).with_margin(1);
+    // All of DICT_4X4_50, DICT_4X4_100 and so on have the marker 21.
+    const std::string count = dictionary.substr(dictionary.rfind('_') + 1);
+    const bool is_of_series = dictionary[6] == 'X';
+    const std::string named = !family.empty() ? family
+                              : is_of_series  ? dictionary.substr(0, dictionary.size() - count.size()) + "50"
+                                              : dictionary;
+    EXPECT_THAT(log_after("tracker_aruco", listed, print), EndsWith("of other families: " + named + " 21\n"));
+}
+
+TEST(TrackerAruco, NamesTheSmallestDictionaryWithAllMarkersOfASeries) {
+    EXPECT_THAT(log_after("tracker_aruco", "DICT_6X6_50", aruco_marker("DICT_6X6_1000", 249)),
+                EndsWith("of other families: DICT_6X6_250 249\n"));
+    EXPECT_EQ(log_after("tracker_aruco", "DICT_6X6_50", aruco_marker("DICT_6X6_1000", 49)), "")
+        << "it is a marker of the listed dictionary";
 }
 
 // A dot in a cell does not change the bit, but squares in clutter have such cells, and prints have not.
