@@ -58,8 +58,10 @@ private:
     static void draw(int id, const test::Mt &pose, cv::Mat &picture) {
         constexpr int cell_px = 40;
         const test::Print print = test::april_tag("tag36h11", id).with_margin(1);
-        cv::Mat texture, warped, mask;
+        constexpr double black = 30, white = 220; // grey levels of a well exposed print
+        cv::Mat texture;
         cv::resize(print.cells, texture, {}, cell_px, cell_px, cv::INTER_NEAREST);
+        texture.convertTo(texture, -1, (white - black) / 255, black);
         const double half_mm = side_mm / 2 * print.cells.cols / print.corner_cells;
         const auto last = static_cast<float>(texture.cols) - 0.5F;
         const std::vector<cv::Point2f> from{{-0.5F, -0.5F}, {last, -0.5F}, {last, last}, {-0.5F, last}};

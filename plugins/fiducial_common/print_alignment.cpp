@@ -68,7 +68,7 @@ struct Pixel {
 std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_code, const Corners &corners_px,
                              const Lens &lens, const Homography &cells_from_px, const Print &print) {
     constexpr double reach = 0.25; // into the margin, in cells; blur mixes the rest with what is around it
-    constexpr double max_pixels = 4'000;
+    constexpr double max_pixels = 1'000;
     const std::vector<cv::Point2f> points(corners_px.begin(), corners_px.end());
     cv::Rect part = cv::boundingRect(points);
     const int margin_px = 1 + static_cast<int>(std::max(part.width, part.height) * reach / 2);
@@ -103,66 +103,82 @@ struct Whiteness {
 };
 using Sample = cv::Vec<float, 6>; // a Whiteness
 
-// The blurred print.
-struct Table {
-    cv::Mat_<Sample> values;
-    int per_cell; // samples along each axis
-
-    Whiteness at(const cv::Vec2d &cell) const { // interpolates bilinearly
-        const double x = std::clamp(cell[0] * per_cell - 0.5, 0.0, values.cols - 1.001);
-        const double y = std::clamp(cell[1] * per_cell - 0.5, 0.0, values.rows - 1.001);
-        const int column = static_cast<int>(x), row = static_cast<int>(y);
-        const auto a = static_cast<float>(x - column), b = static_cast<float>(y - row);
-        const Sample *upper = &values(row, column), *lower = upper + values.cols;
-        const Sample w = (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
-        return {w[0], w[1], w[2], w[3], w[4], w[5]};
-    }
-};
-
-// `covariance_cells2`: of the blur.
-Table blurred(const Print &print, const cv::Matx22d &covariance_cells2) {
-    constexpr double min_sigma = 1.2, cutoff = 3;                        // samples; standard deviations
-    constexpr double max_per_cell = 12, max_size = 240, max_radius = 40; // samples
+// Samples per cell that resolve a blur of this covariance.
+int samples_per_cell(const Print &print, const cv::Matx22d &covariance_cells2) {
+    constexpr double min_sigma = 1.2, max_per_cell = 12, max_size = 240; // samples
     const double half_trace = cv::trace(covariance_cells2) / 2;
     const double smallest =
         half_trace - std::sqrt(std::max(half_trace * half_trace - cv::determinant(covariance_cells2), 0.0));
-    Table table;
-    table.per_cell = static_cast<int>(std::clamp(std::ceil(min_sigma / std::sqrt(std::max(smallest, 1e-9))), 3.0,
-                                                 std::clamp(max_size / print.cells.rows, 3.0, max_per_cell)));
-    const cv::Matx22d covariance = double(table.per_cell * table.per_cell) * covariance_cells2 +
-                                   1e-3 * cv::Matx22d::eye(); // in samples; invertible
-    const cv::Matx22d inverse = covariance.inv();
-    const auto radius = [&](int axis) {
-        return static_cast<int>(std::min(std::ceil(cutoff * std::sqrt(covariance(axis, axis))), max_radius));
-    };
-    const int columns = radius(0), rows = radius(1);
-    cv::Mat_<float> kernel(2 * rows + 1, 2 * columns + 1);
-    for (int y = -rows; y <= rows; ++y)
-        for (int x = -columns; x <= columns; ++x) {
-            const cv::Vec2d d(x, y);
-            kernel(y + rows, x + columns) = static_cast<float>(std::exp(-0.5 * d.dot(inverse * d)));
-        }
-    kernel /= cv::sum(kernel)[0];
-    cv::Mat_<float> drawn, white;
-    cv::resize(print.cells, drawn, {}, table.per_cell, table.per_cell, cv::INTER_NEAREST);
-    cv::filter2D(drawn, white, -1, kernel, {-1, -1}, 0, cv::BORDER_REPLICATE);
+    return static_cast<int>(std::clamp(std::ceil(min_sigma / std::sqrt(std::fmax(smallest, 1e-9))), 3.0,
+                                       std::clamp(max_size / print.cells.rows, 3.0, max_per_cell)));
+}
 
-    const auto n = static_cast<float>(table.per_cell); // central differences
-    table.values.create(white.size());
-    for (int y = 0; y < white.rows; ++y) {
-        const float *above = white[std::max(y - 1, 0)], *row = white[y],
-                    *below = white[std::min(y + 1, white.rows - 1)];
-        for (int x = 0; x < white.cols; ++x) {
-            const int left = std::max(x - 1, 0), right = std::min(x + 1, white.cols - 1);
-            const float xx = row[left] - 2 * row[x] + row[right], yy = above[x] - 2 * row[x] + below[x],
-                        xy = (above[left] - above[right] - below[left] + below[right]) / 4;
-            table.values(y, x) = {
-                row[x],    (row[right] - row[left]) * n / 2, (below[x] - above[x]) * n / 2, n * n * xx, n * n * xy,
-                n * n * yy};
+// A table of the blurred print. It is kept for all steps of a fit, because the errors of the interpolation depend on
+// the number of samples.
+class BlurredPrint {
+public:
+    BlurredPrint(const Print &print, int per_cell) : per_cell_(per_cell) {
+        cv::resize(print.cells, sharp_, {}, per_cell, per_cell, cv::INTER_NEAREST);
+        values_.create(sharp_.size());
+    }
+
+    // `covariance_cells2`: of the blur.
+    void blur(const cv::Matx22d &covariance_cells2) {
+        constexpr double cutoff = 3, max_radius = 40; // standard deviations; samples
+        const cv::Matx22d covariance =
+            double(per_cell_ * per_cell_) * covariance_cells2 + 1e-3 * cv::Matx22d::eye(); // in samples; invertible
+        const cv::Matx22d inverse = covariance.inv();
+        const auto radius = [&](int axis) {
+            return static_cast<int>(std::min(std::ceil(cutoff * std::sqrt(covariance(axis, axis))), max_radius));
+        };
+        const int columns = radius(0), rows = radius(1);
+        cv::Mat_<float> kernel(2 * rows + 1, 2 * columns + 1);
+        for (int y = -rows; y <= rows; ++y)
+            for (int x = -columns; x <= columns; ++x) {
+                const cv::Vec2d d(x, y);
+                kernel(y + rows, x + columns) = static_cast<float>(std::exp(-0.5 * d.dot(inverse * d)));
+            }
+        kernel /= cv::sum(kernel)[0];
+        cv::filter2D(sharp_, white_, -1, kernel, {-1, -1}, 0, cv::BORDER_REPLICATE);
+        differentiate();
+    }
+
+    Whiteness at(const cv::Vec2d &cell) const { // interpolates bilinearly
+        const double x = std::clamp(cell[0] * per_cell_ - 0.5, 0.0, values_.cols - 1.001);
+        const double y = std::clamp(cell[1] * per_cell_ - 0.5, 0.0, values_.rows - 1.001);
+        const int column = static_cast<int>(x), row = static_cast<int>(y);
+        const auto a = static_cast<float>(x - column), b = static_cast<float>(y - row);
+        const Sample *upper = &values_(row, column), *lower = upper + values_.cols;
+        const Sample w = (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
+        return {w[0], w[1], w[2], w[3], w[4], w[5]};
+    }
+
+private:
+    // By differences of the fourth order, because a blur is hardly wider than a sample where cells are large.
+    void differentiate() {
+        const auto first = static_cast<float>(per_cell_) / 12, second = first * static_cast<float>(per_cell_);
+        for (int y = 0; y < white_.rows; ++y) {
+            const auto row = [&](int offset) { return white_[std::clamp(y + offset, 0, white_.rows - 1)]; };
+            const float *const rows[] = {row(-2), row(-1), row(0), row(1), row(2)};
+            for (int x = 0; x < white_.cols; ++x) {
+                const int left = std::max(x - 1, 0), right = std::min(x + 1, white_.cols - 1),
+                          left2 = std::max(x - 2, 0), right2 = std::min(x + 2, white_.cols - 1);
+                const float *const r = rows[2];
+                const float here = r[x];
+                values_(y, x) = {here,
+                                 first * (8 * (r[right] - r[left]) - (r[right2] - r[left2])),
+                                 first * (8 * (rows[3][x] - rows[1][x]) - (rows[4][x] - rows[0][x])),
+                                 second * (16 * (r[left] + r[right]) - (r[left2] + r[right2]) - 30 * here),
+                                 second * 3 * (rows[1][left] - rows[1][right] - rows[3][left] + rows[3][right]),
+                                 second * (16 * (rows[1][x] + rows[3][x]) - (rows[0][x] + rows[4][x]) - 30 * here)};
+            }
         }
     }
-    return table;
-}
+
+    int per_cell_; // samples along each axis
+    cv::Mat_<float> sharp_, white_;
+    cv::Mat_<Sample> values_;
+};
 
 struct Fit {
     cv::Matx<double, unknowns, unknowns> normal; // JᵀJ, where J are the derivatives of the light
@@ -172,17 +188,22 @@ struct Fit {
                      // of a square seen from the front
 };
 
-Fit linearize(std::span<const Pixel> pixels, const Print &print, const Model &model) {
+// How px change with cells, at the centre of the print.
+cv::Matx22d px_per_cell_at_centre(const Homography &to_px, const Print &print) {
+    const double middle = print.cells.rows / 2.0;
+    return derivative(to_px, to_px * cv::Vec3d(middle, middle, 1));
+}
+
+Fit linearize(std::span<const Pixel> pixels, const Print &print, BlurredPrint &blurred, const Model &model) {
     const Homography to_px = px_from_cells(model.corners_px, print), to_cells = to_px.inv();
     Fit fit;
-    const double middle = print.cells.rows / 2.0;
-    const cv::Matx22d px_per_cell = derivative(to_px, to_px * cv::Vec3d(middle, middle, 1));
+    const cv::Matx22d px_per_cell = px_per_cell_at_centre(to_px, print);
     if (!(cv::determinant(px_per_cell) > 0)) { // also for NaN
         fit.cost = std::numeric_limits<double>::infinity();
         return fit;
     }
     const cv::Matx22d cells_per_px = px_per_cell.inv(), ellipse = cells_per_px * cells_per_px.t();
-    const Table table = blurred(print, model.blur_px * model.blur_px * ellipse);
+    blurred.blur(model.blur_px * model.blur_px * ellipse);
 
     // First with respect to the nine elements of the homography and the other unknowns.
     constexpr int count = 14;
@@ -195,7 +216,7 @@ Fit linearize(std::span<const Pixel> pixels, const Print &print, const Model &mo
             return fit;
         }
         const cv::Vec2d cell(h[0] / h[2], h[1] / h[2]);
-        Whiteness white = table.at(cell);
+        Whiteness white = blurred.at(cell);
         const cv::Matx22d cells_per_px_here = derivative(to_cells, h);
         // A blur spreads as heat does: it changes the whiteness by half of the change of its covariance times the
         // second derivatives. So the ellipse of the blur at this cell is corrected to the first order.
@@ -293,21 +314,27 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
     }
     if (!(shortest >= min_cell_px * print.side())) // false for NaN
         return std::nullopt;
-    const Homography cells_from_px = px_from_cells(model.corners_px, print).inv();
+    const Homography px_from_cell = px_from_cells(model.corners_px, print), cells_from_px = px_from_cell.inv();
     const std::vector<Pixel> pixels =
         pixels_of(grey, light_of_code(transfer), corners_px, lens, cells_from_px, print);
     if (pixels.size() < 4 * unknowns)
         return std::nullopt;
 
+    const cv::Matx22d px_per_cell = px_per_cell_at_centre(px_from_cell, print);
+    if (!(cv::determinant(px_per_cell) > 0)) // no square seen from the front; also for NaN
+        return std::nullopt;
+    const cv::Matx22d cells_per_px = px_per_cell.inv();
+    BlurredPrint blurred(print,
+                         samples_per_cell(print, first_blur_px * first_blur_px * (cells_per_px * cells_per_px.t())));
     // First the light, on which the other derivatives depend: it is linear.
-    Fit fit = linearize(pixels, print, model);
+    Fit fit = linearize(pixels, print, blurred, model);
     if (!std::isfinite(fit.cost))
         return std::nullopt;
     const auto light = fit.normal.get_minor<2, 2>(9, 9).inv() * cv::Vec2d(fit.gradient[9], fit.gradient[10]);
     const cv::Vec<double, 8> first = model.corners_px;
     model.black += light[0];
     model.contrast += light[1];
-    fit = linearize(pixels, print, model);
+    fit = linearize(pixels, print, blurred, model);
     double damping = 1e-3;
     bool is_converged = false;
     for (int step = 0; step < max_steps && !is_converged; ++step) {
@@ -328,7 +355,7 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
         const double moved_px = std::max(cv::norm(next.corners_px, model.corners_px, cv::NORM_INF),
                                          std::abs(next.blur_px - model.blur_px));
         const bool is_near = cv::norm(next.corners_px, first, cv::NORM_INF) < shortest / 4; // false for NaN
-        const Fit candidate = is_near ? linearize(pixels, print, next) : Fit{};
+        const Fit candidate = is_near ? linearize(pixels, print, blurred, next) : Fit{};
         const bool is_better = is_near && candidate.cost < fit.cost;
         // At the minimum, the resolution of the table decides whether a small step is better.
         is_converged = moved_px < converged_px && (is_better || damping <= 1);
