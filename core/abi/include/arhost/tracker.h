@@ -82,8 +82,9 @@ typedef struct arhost_observation {
     double corner_sigma_px;     /* standard deviation of the noise of each coordinate of corners_px, >= 0; 0: unknown.
                                    The covariance of a target with a single marker follows from it */
     double false_positive_rate; /* the probability that a square with random bits reads as this marker, with at most
-                                   `hamming` corrected bits: 0 to 1; 0: negligible or unknown. The worker reports a
-                                   target only when its sightings are too unlikely to be chance */
+                                   `hamming` corrected bits: 0 to 1; 0: negligible or unknown; 1: the sighting is no
+                                   evidence. The worker reports a target only when its sightings are too unlikely to
+                                   be chance */
     double projected_px[4][2];  /* for sinks: where the pose of the marker's target projects the corners; all 0 if it
                                    does not. The worker sets it */
 } arhost_observation;
