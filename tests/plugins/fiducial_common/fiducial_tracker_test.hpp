@@ -72,6 +72,21 @@ inline std::string case_name(const testing::TestParamInfo<TrackerCase> &info) {
     return info.param.name;
 }
 
+// Expects that a tracker locates the corners of a print that is blurred by so many of its cells.
+inline void expect_refined_if_blurred(const std::string &plugin, const Listed &listed, const Print &print,
+                                      double blur_cells, double max_error_px) {
+    Tracker tracker(plugin);
+    ASSERT_EQ(tracker.start(test_camera, {listed}), ARHOST_STATUS_OK) << tracker.log();
+    const Mt truth = pose_of(-20, 10, 600, 15, -10, 160);
+    cv::Mat picture = render(test_camera, {{print, listed.side_mm, truth}});
+    const double cell_px = 60.0 / print.corner_cells;
+    cv::GaussianBlur(picture, picture, {}, blur_cells * cell_px);
+    add_noise(picture, 1.5, 1);
+    const auto seen = tracker.track(GreyFrame(picture));
+    ASSERT_EQ(seen.size(), 1u);
+    EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, listed.side_mm)), max_error_px);
+}
+
 // Returns the log of a tracker after it has looked for a family in a picture of another one.
 inline std::string log_after(const std::string &plugin, const std::string &family, const Print &seen) {
     Tracker tracker(plugin);

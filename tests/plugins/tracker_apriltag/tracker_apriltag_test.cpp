@@ -40,16 +40,8 @@ TEST_P(AprilTagFamily, FindsTheTagUprightWithTheSideBetweenItsCorners) {
 }
 
 TEST_P(AprilTagFamily, RefinesBlurredTagsByTheWholePrint) {
-    Tracker tracker("tracker_apriltag");
-    ASSERT_EQ(tracker.start(test_camera, {{20, 80, GetParam()}}), ARHOST_STATUS_OK) << tracker.log();
-    const Mt truth = pose_of(-20, 10, 600, 15, -10, 160);
-    const Print print = april_tag(GetParam(), 20).with_margin(1);
-    cv::Mat picture = render(test_camera, {{print, 80, truth}});
-    cv::GaussianBlur(picture, picture, {}, 0.35 * 60 / print.corner_cells);
-    add_noise(picture, 1.5, 1);
-    const auto seen = tracker.track(GreyFrame(picture));
-    ASSERT_EQ(seen.size(), 1u);
-    EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 80)), 0.15);
+    expect_refined_if_blurred("tracker_apriltag", {20, 80, GetParam()}, april_tag(GetParam(), 20).with_margin(1),
+                              0.35, 0.15);
 }
 
 TEST_P(AprilTagFamily, FindsUnlistedTagsWithoutWrongBits) {

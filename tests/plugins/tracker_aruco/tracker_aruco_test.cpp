@@ -20,6 +20,12 @@ std::string april_tag_family(const std::string &dictionary) {
     return dictionary.starts_with(prefix) ? "tag" + dictionary.substr(prefix.size()) : "";
 }
 
+// Markers of AprilTag families are drawn by the AprilTag library, other markers by OpenCV.
+Print print_of(const std::string &dictionary, int id) {
+    const std::string family = april_tag_family(dictionary);
+    return family.empty() ? aruco_marker(dictionary, id) : april_tag(family, id).with_margin(1);
+}
+
 std::vector<std::string> dictionary_names() {
     std::vector<std::string> names;
     for (const auto &type : arhost::aruco::dictionary_types)
@@ -32,12 +38,11 @@ INSTANTIATE_TEST_SUITE_P(Dictionaries, ArucoDictionary, testing::ValuesIn(dictio
                          [](const auto &info) { return info.param; });
 
 TEST_P(ArucoDictionary, FindsTheMarkerUpright) {
-    const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
+    const std::string dictionary = GetParam();
     Tracker tracker("tracker_aruco");
     ASSERT_EQ(tracker.start(test_camera, {{7, 80, dictionary}, {21, 80, dictionary}}), ARHOST_STATUS_OK)
         << tracker.log();
-    // Markers of AprilTag families are drawn by the AprilTag library, other markers by OpenCV.
-    const Print print = family.empty() ? aruco_marker(dictionary, 21) : april_tag(family, 21).with_margin(1);
+    const Print print = print_of(dictionary, 21);
     for (const Mt &truth : {pose_of(10, 5, 400), pose_of(-20, 10, 450, 25, -20, 110)}) {
         const auto seen = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
         ASSERT_EQ(seen.size(), 1u);
@@ -49,24 +54,15 @@ TEST_P(ArucoDictionary, FindsTheMarkerUpright) {
 }
 
 TEST_P(ArucoDictionary, RefinesBlurredMarkersByTheWholePrint) {
-    const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
-    Tracker tracker("tracker_aruco");
-    ASSERT_EQ(tracker.start(test_camera, {{21, 80, dictionary}}), ARHOST_STATUS_OK) << tracker.log();
-    const Mt truth = pose_of(-20, 10, 600, 15, -10, 160);
-    const Print print = family.empty() ? aruco_marker(dictionary, 21) : april_tag(family, 21).with_margin(1);
-    cv::Mat picture = render(test_camera, {{print, 80, truth}});
-    cv::GaussianBlur(picture, picture, {}, 0.3 * 60 / print.corner_cells);
-    add_noise(picture, 1.5, 1);
-    const auto seen = tracker.track(GreyFrame(picture));
-    ASSERT_EQ(seen.size(), 1u);
-    EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 80)), 0.1);
+    const std::string dictionary = GetParam();
+    expect_refined_if_blurred("tracker_aruco", {21, 80, dictionary}, print_of(dictionary, 21), 0.3, 0.1);
 }
 
 TEST_P(ArucoDictionary, FindsUnlistedMarkers) {
-    const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
+    const std::string dictionary = GetParam();
     Tracker tracker("tracker_aruco");
     ASSERT_EQ(tracker.start(test_camera, {{7, 80, dictionary}}), ARHOST_STATUS_OK) << tracker.log();
-    const Print print = family.empty() ? aruco_marker(dictionary, 21) : april_tag(family, 21).with_margin(1);
+    const Print print = print_of(dictionary, 21);
     const Mt truth = pose_of(10, 5, 400, 10, -20, 160);
     const auto seen = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
     ASSERT_EQ(seen.size(), 1u);
@@ -80,7 +76,7 @@ TEST_P(ArucoDictionary, FindsUnlistedMarkers) {
 TEST_P(ArucoDictionary, IsNamedIfMarkersOfAnotherOneAreListed) {
     const std::string dictionary = GetParam(), family = april_tag_family(dictionary);
     const std::string listed = family == "tag36h11" ? "tag25h9" : "tag36h11";
-    const Print print = family.empty() ? aruco_marker(dictionary, 21) : april_tag(family, 21).with_margin(1);
+    const Print print = print_of(dictionary, 21);
     // All of DICT_4X4_50, DICT_4X4_100 and so on have the marker 21.
     const std::string count = dictionary.substr(dictionary.rfind('_') + 1);
     const bool is_of_series = dictionary[6] == 'X';
