@@ -21,7 +21,7 @@ def axis(values, is_logarithmic):
     """Returns the ends of an axis and its ticks."""
     if not is_logarithmic:
         return 0, 100, (0, 25, 50, 75, 100)
-    low, high = math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)))
+    low, high = math.floor(math.log10(min(values))), math.floor(math.log10(max(values))) + 1
     return low, high, tuple(10.0 ** power for power in range(low, high + 1))
 
 
@@ -76,7 +76,7 @@ def draw(rows):
                         continue
                     # a cell in which nothing is found has neither errors nor noise
                     points = [f'{across(row["value"]):.1f} {level(float(row[name])):.1f}' for row in own
-                              if name == "found" or float(row["found"]) > 0 and float(row[name]) > 0]
+                              if name == "found" or float(row["found"]) > 0 and (float(row[name]) > 0 or not is_logarithmic)]
                     if points:
                         svg.append(f'<path d="M{"L".join(points)}" fill="none" stroke="{COLOURS[detector]}" {style}/>')
             if number == len(ROWS) - 1:

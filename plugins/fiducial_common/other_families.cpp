@@ -2,27 +2,51 @@
 #include "other_families.hpp"
 
 #include <algorithm>
+#include <exception>
 
 namespace arhost::fiducial {
+namespace {
+
+OtherFamilies::Markers in_both(OtherFamilies::Markers first, const OtherFamilies::Markers &second) {
+    for (auto &[family, ids] : first) {
+        const auto found = second.find(family);
+        std::erase_if(ids, [&](int id) { return found == second.end() || !found->second.contains(id); });
+    }
+    return first;
+}
+
+std::string text_of(const std::set<int> &ids) {
+    constexpr std::size_t max_named = 5;
+    std::size_t named = 0;
+    std::string text;
+    for (const int id : ids) {
+        if (named == max_named)
+            return text + " and " + std::to_string(ids.size() - max_named) + " more";
+        text += (named++ == 0 ? "" : ", ") + std::to_string(id);
+    }
+    return text;
+}
+
+} // namespace
 
 OtherFamilies::OtherFamilies(const Host &host, const arhost_tracker_setup &setup,
                              std::function<Markers(const cv::Mat &grey)> find)
     : host_(host), find_(std::move(find)) {
-    for (std::uint32_t i = 0; i < setup.marker_count; ++i)
-        listed_.emplace(setup.markers[i].family, setup.markers[i].id);
+    for (const arhost_marker_config &marker : elements(setup.markers, setup.marker_count))
+        listed_.emplace(marker.family, marker.id);
 }
 
 void OtherFamilies::frame(const cv::Mat &grey, std::span<const arhost_observation> seen) {
     if (is_done_)
         return;
     ++frames_;
-    is_done_ = std::ranges::any_of(seen, [&](const arhost_observation &one) {
-        return listed_.contains({one.family, one.id});
-    });
+    is_done_ = shows_listed(seen);
     if (is_done_) {
+        previous_.release();
         last_.release();
         return;
     }
+    std::swap(previous_, last_);
     grey.copyTo(last_);
     if (frames_ == next_search_) {
         next_search_ *= 2;
@@ -36,28 +60,41 @@ void OtherFamilies::finish() {
     is_done_ = true;
 }
 
-void OtherFamilies::search() {
-    std::string text;
-    for (const auto &[family, ids] : find_(last_)) {
-        if (ids.empty())
+bool OtherFamilies::shows_listed(std::span<const arhost_observation> seen) {
+    constexpr double max_chance = 1e-7;
+    std::map<Id, double> chances;
+    for (const arhost_observation &one : seen) {
+        const Id id{one.family, one.id};
+        if (!listed_.contains(id))
             continue;
-        constexpr std::size_t max_named = 5;
-        std::size_t named = 0;
-        text += (text.empty() ? "" : "; ") + family + " ";
-        for (const int id : ids) {
-            if (named == max_named) {
-                text += " and " + std::to_string(ids.size() - max_named) + " more";
-                break;
-            }
-            text += (named++ == 0 ? "" : ", ") + std::to_string(id);
-        }
+        const auto before = chances_.find(id);
+        chances[id] = one.false_positive_rate *
+                      (before == chances_.end() ? static_cast<double>(listed_.size()) : before->second);
+        if (chances[id] < max_chance)
+            return true;
     }
-    if (text.empty())
-        return;
-    host_.info("no listed marker was seen in " + std::to_string(frames_) +
-               " frames, but this one has markers of other families: " + text);
-    is_done_ = true;
-    last_.release();
+    chances_ = std::move(chances);
+    return false;
+}
+
+void OtherFamilies::search() {
+    Markers markers;
+    try {
+        markers = find_(last_);
+        if (!markers.empty() && !previous_.empty())
+            markers = in_both(std::move(markers), find_(previous_));
+    } catch (const std::exception &error) {
+        host_.warn(std::string("the search for markers of other families failed: ") + error.what());
+        is_done_ = true;
+    }
+    last_.release(); // it need not be searched again
+    std::string text;
+    for (const auto &[family, ids] : markers)
+        if (!ids.empty() && named_.insert(family).second)
+            text += (text.empty() ? "" : "; ") + family + " " + text_of(ids);
+    if (!text.empty())
+        host_.info("no listed marker was seen so far, but frame " + std::to_string(frames_) +
+                   " has markers of other families: " + text);
 }
 
 } // namespace arhost::fiducial

@@ -26,21 +26,27 @@ public:
     OtherFamilies(const Host &host, const arhost_tracker_setup &setup,
                   std::function<Markers(const cv::Mat &grey)> find);
 
-    // To be called with each frame and what the tracker has seen in it. Until a listed marker appears, searches
-    // frames 30, 60, 120 and so on, and logs the markers that it finds, once.
+    // To be called with each frame and what the tracker has seen in it. Until a listed marker appears that is no
+    // chance, searches frames 30, 60, 120 and so on, and logs each family once of which it finds markers in this
+    // frame and in the one before.
     void frame(const cv::Mat &grey, std::span<const arhost_observation> seen);
     // To be called at the end. Searches the last frame if no listed marker has appeared.
     void finish();
 
 private:
+    using Id = std::pair<std::uint32_t, std::int32_t>; // family and id
+
+    bool shows_listed(std::span<const arhost_observation> seen);
     void search();
 
     Host host_;
-    std::set<std::pair<std::uint32_t, std::int32_t>> listed_; // family and id
+    std::set<Id> listed_;
     std::function<Markers(const cv::Mat &)> find_;
+    std::map<Id, double> chances_; // that all sightings of a marker in successive frames are chance
+    std::set<std::string> named_;  // families
     std::uint64_t frames_ = 0, next_search_ = 30;
     bool is_done_ = false;
-    cv::Mat last_;
+    cv::Mat previous_, last_; // frames
 };
 
 } // namespace arhost::fiducial

@@ -74,14 +74,16 @@ std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_co
     const int margin_px = 1 + static_cast<int>(std::max(part.width, part.height) * reach / 2);
     part = cv::Rect(part.x - margin_px, part.y - margin_px, part.width + 2 * margin_px, part.height + 2 * margin_px) &
            cv::Rect({}, grey.size());
-    const double area_px = std::max(cv::contourArea(points), part.area() / 4.0);
-    const int stride = 1 + static_cast<int>(std::sqrt(area_px / max_pixels));
+    // The print fills at least so much of its bounding box, or fewer pixels have to do.
+    constexpr double min_filled = 0.1;
+    const double area_px = std::max(cv::contourArea(points), part.area() * min_filled);
+    const double stride = std::max(std::sqrt(area_px / max_pixels), 1.0);
+    const int columns = static_cast<int>(part.width / stride), rows = static_cast<int>(part.height / stride);
     std::vector<cv::Point2d> at;
-    const int columns = part.width / stride + 1, rows = part.height / stride + 1;
     at.reserve(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows));
-    for (int y = part.y; y < part.y + part.height; y += stride)
-        for (int x = part.x; x < part.x + part.width; x += stride)
-            at.emplace_back(x, y);
+    for (int row = 0; row < rows; ++row)
+        for (int column = 0; column < columns; ++column)
+            at.emplace_back(part.x + std::floor(column * stride), part.y + std::floor(row * stride));
     const auto places = lens.undistort(at);
     std::vector<Pixel> pixels;
     if (!places)
@@ -103,7 +105,7 @@ struct Whiteness {
 };
 using Sample = cv::Vec<float, 6>; // a Whiteness
 
-// Samples per cell that resolve a blur of this covariance.
+// Samples per cell that resolve a blur of this covariance, within limits.
 int samples_per_cell(const Print &print, const cv::Matx22d &covariance_cells2) {
     constexpr double min_sigma = 1.2, max_per_cell = 12, max_size = 240; // samples
     const double half_trace = cv::trace(covariance_cells2) / 2;
@@ -113,8 +115,8 @@ int samples_per_cell(const Print &print, const cv::Matx22d &covariance_cells2) {
                                        std::clamp(max_size / print.cells.rows, 3.0, max_per_cell)));
 }
 
-// A table of the blurred print. It is kept for all steps of a fit, because the errors of the interpolation depend on
-// the number of samples.
+// A table of the blurred print. Its number of samples stays the same from step to step of a fit, because the errors
+// of the interpolation depend on it.
 class BlurredPrint {
 public:
     BlurredPrint(const Print &print, int per_cell) : per_cell_(per_cell) {
@@ -154,7 +156,8 @@ public:
     }
 
 private:
-    // By differences of the fourth order, because a blur is hardly wider than a sample where cells are large.
+    // By differences of the fourth order (the mixed one is of the second): those of the second are up to 40 % too
+    // small for a blur of less than a sample, which large cells have, and the steps of the fit then too long.
     void differentiate() {
         const auto first = static_cast<float>(per_cell_) / 12, second = first * static_cast<float>(per_cell_);
         for (int y = 0; y < white_.rows; ++y) {
@@ -299,6 +302,7 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
                                            const Lens &lens, const Print &print) {
     constexpr double first_blur_px = 0.7, min_blur_px = 0.3, converged_px = 0.01, min_resemblance = 0.85,
                      min_cell_px = 0.5;
+    constexpr double max_blur_ratio = 1.8; // of the blur and the one that its table was made for
     constexpr int max_steps = 20;
     const auto corners = lens.undistort({corners_px.begin(), corners_px.end()});
     if (!corners || print.margin < 1 || !std::ranges::all_of(corners_px, [&](const cv::Point2d &corner) {
@@ -324,8 +328,12 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
     if (!(cv::determinant(px_per_cell) > 0)) // no square seen from the front; also for NaN
         return std::nullopt;
     const cv::Matx22d cells_per_px = px_per_cell.inv();
-    BlurredPrint blurred(print,
-                         samples_per_cell(print, first_blur_px * first_blur_px * (cells_per_px * cells_per_px.t())));
+    double table_blur_px = first_blur_px;
+    const auto table = [&] {
+        return BlurredPrint(
+            print, samples_per_cell(print, table_blur_px * table_blur_px * (cells_per_px * cells_per_px.t())));
+    };
+    BlurredPrint blurred = table();
     // First the light, on which the other derivatives depend: it is linear.
     Fit fit = linearize(pixels, print, blurred, model);
     if (!std::isfinite(fit.cost))
@@ -363,6 +371,13 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
         if (is_better) {
             model = next;
             fit = candidate;
+        }
+        // A table that is too fine for the blur would need a large kernel, a coarse one would not resolve it.
+        if (std::max(model.blur_px, table_blur_px) > max_blur_ratio * std::min(model.blur_px, table_blur_px)) {
+            table_blur_px = model.blur_px;
+            blurred = table();
+            fit = linearize(pixels, print, blurred, model);
+            is_converged = false;
         }
     }
     if (!is_converged || fit.pixels < 4 * unknowns ||

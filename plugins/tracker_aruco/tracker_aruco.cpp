@@ -335,21 +335,22 @@ private:
         for (auto largest = dictionary_types.begin(); largest != dictionary_types.end(); ++largest) {
             if (const auto next = largest + 1; next != dictionary_types.end() && next->is_of_series(largest->family))
                 continue;
-            Detectable detectable{{largest->family, 0, 0, {}}, dictionary_of(largest->family), parameters_};
+            Detectable detectable{{largest->family, 0, 0, {}}, predefined(*largest), parameters_};
             detectable.parameters.errorCorrectionRate = 0;
             std::vector<arhost_observation> seen;
-            observe(grey, ARHOST_TRANSFER_SRGB, {0, 0, grey.cols, grey.rows}, detectable, seen);
+            constexpr arhost_transfer any = ARHOST_TRANSFER_LINEAR; // only listed markers are refined, which need it
+            observe(grey, any, {0, 0, grey.cols, grey.rows}, detectable, seen);
             std::set<int> ids;
             for (const arhost_observation &one : seen)
                 if (std::ranges::none_of(detectables_, [&](const Detectable &used) {
-                        return largest->is_of_series(used.family.name) && one.id < used.family.id_count;
+                        return used.family.name != file_name_ && largest->is_of_series(used.family.name) &&
+                               one.id < used.family.id_count;
                     }))
                     ids.insert(one.id);
             if (ids.empty())
                 continue;
             const auto smallest = std::ranges::find_if(dictionary_types, [&](const DictionaryType &type) {
-                return largest->is_of_series(type.family) &&
-                       *ids.rbegin() < dictionary_of(type.family).table.bytesList.rows;
+                return largest->is_of_series(type.family) && *ids.rbegin() < predefined(type).table.bytesList.rows;
             });
             markers[smallest->family] = std::move(ids);
         }
@@ -372,17 +373,20 @@ private:
         return table.markerSize + 2 * parameters_.markerBorderBits;
     }
 
+    static Dictionary predefined(const DictionaryType &type) {
+        Dictionary dictionary{arhost::aruco::predefined(type.name), type.is_april_tag()};
+        if (type.is_april_tag())
+            dictionary.table.maxCorrectionBits = type.april_tag_bits;
+        return dictionary;
+    }
+
     Dictionary dictionary_of(const std::string &name) const {
         if (!file_name_.empty() && name == file_name_)
             return {file_table_};
         std::string names;
         for (const DictionaryType &type : dictionary_types) {
-            if (name == type.family) {
-                Dictionary dictionary{arhost::aruco::predefined(type.name), type.is_april_tag()};
-                if (type.is_april_tag())
-                    dictionary.table.maxCorrectionBits = type.april_tag_bits;
-                return dictionary;
-            }
+            if (name == type.family)
+                return predefined(type);
             names += std::string(names.empty() ? "" : ", ") + type.family;
         }
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,

@@ -138,7 +138,6 @@ TEST(Targets, MarkersOfOtherDictionariesAreNamedIfTargetsAreMissing) {
         "tracker: {plugin: tracker_aruco, targets: [{marker: 5, family: tag36h11, side_mm: 80}]}\n"
         "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run(), 1);
-    EXPECT_THAT(run.output(),
-                HasSubstr("info: tracker: no listed marker was seen in 3 frames, but this one has markers "
-                          "of other families: DICT_5X5_250 104\n"));
+    EXPECT_THAT(run.output(), HasSubstr("info: tracker: no listed marker was seen so far, but frame 3 has markers of "
+                                        "other families: DICT_5X5_250 104\n"));
 }

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fiducial_common/other_families.hpp>
+
+#include <gmock/gmock.h>
+
+#include <array>
+#include <stdexcept>
+#include <vector>
+
+namespace {
+
+using arhost::fiducial::OtherFamilies;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+// Looks for the markers 3 and 5 of the first family, in pictures of one pixel whose code is the number of the frame.
+class OtherFamiliesTest : public testing::Test {
+protected:
+    OtherFamiliesTest() {
+        host_.struct_size = sizeof host_;
+        host_.context = this;
+        host_.log = [](const arhost_host *host, arhost_severity, const char *text) {
+            static_cast<OtherFamiliesTest *>(host->context)->log_.emplace_back(text);
+        };
+    }
+    void run(int frames, const std::vector<arhost_observation> &seen = {}) {
+        for (int i = 0; i < frames; ++i)
+            others_.frame(cv::Mat(1, 1, CV_8U, cv::Scalar(++frame_)), seen);
+    }
+    static arhost_observation sighting(std::int32_t id, double false_positive_rate) {
+        arhost_observation one{};
+        one.id = id;
+        one.false_positive_rate = false_positive_rate;
+        return one;
+    }
+
+    std::vector<std::string> log_;
+    std::vector<int> searched_; // frames
+    std::function<OtherFamilies::Markers(int frame)> markers_ = [](int) { return OtherFamilies::Markers{}; };
+
+private:
+    arhost_tracker_setup setup() {
+        for (std::size_t i = 0; i < markers_of_setup_.size(); ++i)
+            markers_of_setup_[i] = {sizeof(arhost_marker_config), i == 0 ? 3 : 5, 0, 0, {}, nullptr, 0};
+        arhost_tracker_setup setup{};
+        setup.struct_size = sizeof setup;
+        setup.markers = markers_of_setup_.data();
+        setup.marker_count = static_cast<std::uint32_t>(markers_of_setup_.size());
+        return setup;
+    }
+
+    std::array<arhost_marker_config, 2> markers_of_setup_{};
+    arhost_host host_{};
+    int frame_ = 0;
+
+protected:
+    OtherFamilies others_{arhost::Host(&host_), setup(), [this](const cv::Mat &grey) {
+                              searched_.push_back(grey.at<std::uint8_t>(0, 0));
+                              return markers_(searched_.back());
+                          }};
+};
+
+TEST_F(OtherFamiliesTest, SearchesEverRarerAndAtTheEnd) {
+    run(100);
+    EXPECT_THAT(searched_, ElementsAre(30, 60));
+    others_.finish();
+    others_.finish();
+    EXPECT_THAT(searched_, ElementsAre(30, 60, 100));
+    EXPECT_THAT(log_, IsEmpty());
+}
+
+TEST_F(OtherFamiliesTest, DoesNotSearchAFrameTwiceAtTheEnd) {
+    run(30);
+    others_.finish();
+    EXPECT_THAT(searched_, ElementsAre(30));
+}
+
+TEST_F(OtherFamiliesTest, NamesMarkersThatAreInTwoSuccessiveFrames) {
+    markers_ = [](int frame) {
+        return frame == 29 ? OtherFamilies::Markers{{"a", {1, 2}}, {"b", {7}}}
+                           : OtherFamilies::Markers{{"a", {2, 4}}, {"b", {7}}, {"c", {9}}};
+    };
+    run(30);
+    EXPECT_THAT(searched_, ElementsAre(30, 29));
+    EXPECT_THAT(log_, ElementsAre("no listed marker was seen so far, but frame 30 has markers of other families: "
+                                  "a 2; b 7"));
+}
+
+TEST_F(OtherFamiliesTest, NamesEachFamilyOnceAndFiveOfItsMarkers) {
+    markers_ = [](int frame) {
+        return frame <= 30 ? OtherFamilies::Markers{{"a", {1, 2, 3, 4, 5, 6, 7}}}
+                           : OtherFamilies::Markers{{"a", {1}}, {"b", {1}}};
+    };
+    run(60);
+    EXPECT_THAT(log_, ElementsAre(testing::EndsWith("frame 30 has markers of other families: a 1, 2, 3, 4, 5 and 2 "
+                                                    "more"),
+                                  testing::EndsWith("frame 60 has markers of other families: b 1")));
+}
+
+TEST_F(OtherFamiliesTest, ASingleFrameSufficesIfThereIsNoOther) {
+    markers_ = [](int) { return OtherFamilies::Markers{{"a", {1}}}; };
+    run(1);
+    others_.finish();
+    EXPECT_THAT(log_, ElementsAre(testing::EndsWith("frame 1 has markers of other families: a 1")));
+}
+
+TEST_F(OtherFamiliesTest, StopsWhenAListedMarkerIsSeen) {
+    run(1, {sighting(5, 1e-9)});
+    run(60);
+    others_.finish();
+    EXPECT_THAT(searched_, IsEmpty());
+}
+
+TEST_F(OtherFamiliesTest, StopsWhenAListedMarkerOfASmallFamilyIsSeenInSuccessiveFrames) {
+    run(1, {sighting(5, 1e-4)});
+    run(28, {sighting(3, 1)});
+    run(1, {sighting(5, 1e-4)});
+    EXPECT_THAT(searched_, ElementsAre(30)) << "the sightings were not successive";
+    run(1, {sighting(5, 1e-4)});
+    run(60);
+    EXPECT_THAT(searched_, ElementsAre(30));
+}
+
+TEST_F(OtherFamiliesTest, IgnoresMarkersThatAreNotListed) {
+    run(30, {sighting(4, 0)});
+    EXPECT_THAT(searched_, ElementsAre(30));
+}
+
+TEST_F(OtherFamiliesTest, ReportsASearchThatFails) {
+    markers_ = [](int) -> OtherFamilies::Markers { throw std::runtime_error("no memory"); };
+    run(100);
+    others_.finish();
+    EXPECT_THAT(log_, ElementsAre("the search for markers of other families failed: no memory"));
+}
+
+TEST_F(OtherFamiliesTest, DoesNothingWithoutAFrame) {
+    others_.finish();
+    EXPECT_THAT(searched_, IsEmpty());
+}
+
+} // namespace
