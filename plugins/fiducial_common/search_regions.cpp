@@ -79,10 +79,17 @@ SearchRegions::SearchRegions(const arhost_tracker_setup &setup,
 }
 
 std::vector<arhost_observation> SearchRegions::search(const arhost_track_request &request, const RegionLimits &limits,
-                                                      std::span<const Pass> passes) const {
-    std::vector<arhost_observation> seen;
+                                                      std::span<const Pass> passes, const Verify &verify) const {
+    std::vector<arhost_observation> verified;
+    if (verify && !request.search_everywhere)
+        for (const arhost_expected_marker &expected : elements(request.expected, request.expected_count)) {
+            const Marker &marker = markers_.at(expected.marker);
+            if (const auto one = verify(expected, marker.id, marker.family))
+                verified.push_back(*one);
+        }
+    std::vector<arhost_observation> seen = verified;
     for (const Pass &pass : passes)
-        for (const cv::Rect &region : of(request, limits, pass.family))
+        for (const cv::Rect &region : of(request, limits, pass.family, verified))
             pass.detect(region, seen);
     if (miss_a_target(request, seen)) {
         seen.clear();
@@ -93,14 +100,14 @@ std::vector<arhost_observation> SearchRegions::search(const arhost_track_request
 }
 
 std::vector<cv::Rect> SearchRegions::of(const arhost_track_request &request, const RegionLimits &limits,
-                                        const Family *family) const {
+                                        const Family *family, std::span<const arhost_observation> seen) const {
     const cv::Rect whole = whole_of(request);
     if (request.search_everywhere)
         return {whole};
     std::vector<cv::Rect> regions;
     for (const arhost_expected_marker &expected : elements(request.expected, request.expected_count)) {
         const Marker &marker = markers_.at(expected.marker);
-        if (family && !family->lists(marker.id, marker.family))
+        if ((family && !family->lists(marker.id, marker.family)) || marker.is_in(seen))
             continue;
         if (const cv::Rect region = region_of(expected, marker.margin, whole.size(), limits); !region.empty())
             add(regions, region);
@@ -118,8 +125,7 @@ bool SearchRegions::miss_a_target(const arhost_track_request &request,
     std::map<std::uint32_t, bool> is_seen; // targets
     for (const arhost_expected_marker &expected : elements(request.expected, request.expected_count)) {
         const Marker &marker = markers_.at(expected.marker);
-        is_seen[marker.target] |= std::ranges::any_of(
-            seen, [&](const arhost_observation &one) { return one.id == marker.id && one.family == marker.family; });
+        is_seen[marker.target] |= marker.is_in(seen);
     }
     return std::ranges::any_of(is_seen, [](const auto &target) { return !target.second; });
 }

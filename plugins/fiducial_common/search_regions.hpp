@@ -5,6 +5,9 @@
 
 #include "observations.hpp"
 
+#include <algorithm>
+#include <functional>
+#include <optional>
 #include <span>
 
 namespace arhost::fiducial {
@@ -24,20 +27,25 @@ struct Pass {
     Detect detect;
 };
 
+// Returns an observation if the marker of this id and family is where it is expected. Takes less time than detection.
+using Verify = std::function<std::optional<arhost_observation>(const arhost_expected_marker &expected,
+                                                               std::int32_t id, std::uint32_t family)>;
+
 // Derives rectangles from the markers that a request expects, and searches them.
 class SearchRegions {
 public:
     // `margin`: what must be visible around a square of a family to detect it, relative to its side.
     SearchRegions(const arhost_tracker_setup &setup, const std::function<double(const std::string &family)> &margin);
 
-    // Returns what the passes detect where markers are expected, or in the whole frame if a target is not there.
+    // Returns the expected markers that `verify` confirms and what the passes detect where the others are expected,
+    // or what they detect in the whole frame if a target is not there.
     std::vector<arhost_observation> search(const arhost_track_request &request, const RegionLimits &limits,
-                                           std::span<const Pass> passes) const;
+                                           std::span<const Pass> passes, const Verify &verify = {}) const;
 
-    // Returns rectangles that do not overlap and contain all expected markers, or those of `family`. They are the
-    // whole frame if the request says so, or if they would cover most of it.
+    // Returns rectangles that do not overlap and contain all expected markers, or those of `family`, except those
+    // that `seen` has. They are the whole frame if the request says so, or if they would cover most of it.
     std::vector<cv::Rect> of(const arhost_track_request &request, const RegionLimits &limits,
-                             const Family *family = nullptr) const;
+                             const Family *family = nullptr, std::span<const arhost_observation> seen = {}) const;
 
     // Returns whether a target is not where it is expected: none of its expected markers has been seen. The tracker
     // must then search the whole frame.
@@ -48,6 +56,11 @@ private:
         std::int32_t id;
         std::uint32_t family, target; // indices in the setup
         double margin;                // relative to its side
+
+        bool is_in(std::span<const arhost_observation> seen) const {
+            return std::ranges::any_of(
+                seen, [&](const arhost_observation &one) { return one.id == id && one.family == family; });
+        }
     };
     std::vector<Marker> markers_; // as in the setup
 };

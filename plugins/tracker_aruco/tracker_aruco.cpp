@@ -164,13 +164,15 @@ bool is_uniform(const cv::Mat &grey, const Corners &corners_px, const cv::Mat_<s
 
 struct Reading {
     std::uint32_t wrong_bits;
+    bool has_whole_border;      // each of its cells is black, or white if the marker is inverted
     double contrast;            // half of the difference between the mean grey levels of white and of black cells
     double false_positive_rate; // as arhost_observation has it
 };
 
 // Reads the bits of a detected marker once more, because OpenCV does not tell how many of them it has corrected.
+// `is_oriented`: the corners begin at the top left of the drawn marker; otherwise at any of its corners.
 Reading read(const cv::Mat &grey, const Corners &corners_px, const cv::aruco::Dictionary &dictionary, int id,
-             int border_bits) {
+             int border_bits, bool is_oriented) {
     const int cells = dictionary.markerSize + 2 * border_bits, bits = dictionary.markerSize * dictionary.markerSize;
     const cv::Mat_<std::uint8_t> levels = unwarped(grey, corners_px, cells);
     cv::Mat_<std::uint8_t> white;
@@ -178,14 +180,17 @@ Reading read(const cv::Mat &grey, const Corners &corners_px, const cv::aruco::Di
     const cv::Mat black = 1 - white;
     const double white_level = cv::mean(levels, white)[0], black_level = cv::mean(levels, black)[0];
     const cv::Rect code(border_bits, border_bits, dictionary.markerSize, dictionary.markerSize);
-    const int wrong_bits = dictionary.getDistanceToId(white(code), id),
-              wrong_bits_inverted = dictionary.getDistanceToId(black(code), id);
+    const int wrong_bits = dictionary.getDistanceToId(white(code), id, !is_oriented),
+              wrong_bits_inverted = dictionary.getDistanceToId(black(code), id, !is_oriented);
+    const bool is_inverted = wrong_bits_inverted < wrong_bits;
+    const cv::Mat unlike_border = is_inverted ? black : white;
     Reading reading{static_cast<std::uint32_t>(std::min(wrong_bits, wrong_bits_inverted)),
+                    cv::countNonZero(unlike_border) == cv::countNonZero(unlike_border(code)),
                     (white_level - black_level) / 2, 0};
     reading.false_positive_rate = arhost::fiducial::false_positive_rate(bits, reading.wrong_bits);
     // Squares in clutter often read as a code of 4×4 bits, but most of their cells are not uniform.
     if (bits <= 16) {
-        cv::Mat_<std::uint8_t> expected(cells, cells, wrong_bits_inverted < wrong_bits ? 1 : 0); // the border
+        cv::Mat_<std::uint8_t> expected(cells, cells, is_inverted ? 1 : 0); // the border
         white(code).copyTo(expected(code));
         if (!is_uniform(grey, corners_px, expected, (white_level + black_level) / 2))
             reading.false_positive_rate = 1;
@@ -283,7 +288,10 @@ public:
             passes.push_back({&detectable.family, [&](const cv::Rect &region, auto &seen) {
                                   observe(grey, request.frame->format->transfer, region, detectable, seen);
                               }});
-        std::vector<arhost_observation> seen = regions_->search(request, {}, passes);
+        std::vector<arhost_observation> seen = regions_->search(
+            request, {}, passes, [&](const arhost_expected_marker &expected, std::int32_t id, std::uint32_t family) {
+                return verified(grey, request.frame->format->transfer, expected, id, family);
+            });
         others_->frame(grey, seen);
         arhost::fiducial::report(std::move(seen), observations);
     }
@@ -314,18 +322,63 @@ private:
                     cv::Point2d(found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner]) +
                     offset;
             if (refine_edges_ && is_listed)
-                corners =
-                    arhost::fiducial::refine_corners(grey, transfer, corners.corners_px, *lens_, cells_of(table),
-                                                     [&] { return print_of(detectable.dictionary, found.ids[i]); })
-                        .value_or(corners);
-            const Reading reading = read(grey, corners.corners_px, table, found.ids[i], parameters.markerBorderBits);
-            if (!is_listed && (reading.wrong_bits > 0 || reading.false_positive_rate == 1)) // it may be anything
-                continue;
-            arhost_observation &one = seen.emplace_back(detectable.family.observation(found.ids[i], corners));
-            one.hamming = reading.wrong_bits;
-            one.decision_margin = reading.contrast;
-            one.false_positive_rate = reading.false_positive_rate;
+                corners = refined(grey, transfer, detectable.dictionary, found.ids[i], corners.corners_px)
+                              .value_or(corners);
+            const Reading reading =
+                read(grey, corners.corners_px, table, found.ids[i], parameters.markerBorderBits, false);
+            if (is_listed || (reading.wrong_bits == 0 && reading.false_positive_rate < 1)) // else it may be anything
+                seen.push_back(observation_of(detectable, found.ids[i], corners, reading));
         }
+    }
+
+    // Returns an expected marker if it can be read where it is expected, without detection.
+    std::optional<arhost_observation> verified(const cv::Mat &grey, arhost_transfer transfer,
+                                               const arhost_expected_marker &expected, std::int32_t id,
+                                               std::uint32_t family) const {
+        const auto found =
+            std::ranges::find_if(detectables_, [&](const Detectable &one) { return one.family.lists(id, family); });
+        if (!refine_edges_ || found == detectables_.end())
+            return std::nullopt;
+        Corners corners;
+        for (int i = 0; i < 4; ++i)
+            corners[i] = {expected.corners_px[i][0], expected.corners_px[i][1]};
+        // Proves that the corners are correct to less than half a cell, too.
+        const auto is_there = [](const Reading &reading) {
+            return reading.wrong_bits == 0 && reading.has_whole_border && reading.false_positive_rate < 1;
+        };
+        const cv::Rect2d frame(0, 0, grey.cols, grey.rows); // does not contain NaN
+        if (!std::ranges::all_of(corners, [&](const cv::Point2d &corner) { return frame.contains(corner); }) ||
+            !is_there(read_upright(grey, corners, found->dictionary, id)))
+            return std::nullopt;
+        const auto measured = refined(grey, transfer, found->dictionary, id, corners);
+        if (!measured)
+            return std::nullopt;
+        const Reading reading = read_upright(grey, measured->corners_px, found->dictionary, id);
+        return is_there(reading) ? std::optional(observation_of(*found, id, *measured, reading)) : std::nullopt;
+    }
+
+    // `corners_px`: as reported.
+    Reading read_upright(const cv::Mat &grey, Corners corners_px, const Dictionary &dictionary, int id) const {
+        if (dictionary.rotated_180)
+            std::ranges::rotate(corners_px, corners_px.begin() + 2);
+        return read(grey, corners_px, dictionary.table, id, parameters_.markerBorderBits, true);
+    }
+
+    static arhost_observation observation_of(const Detectable &detectable, int id,
+                                             const arhost::fiducial::MeasuredCorners &corners,
+                                             const Reading &reading) {
+        arhost_observation one = detectable.family.observation(id, corners);
+        one.hamming = reading.wrong_bits;
+        one.decision_margin = reading.contrast;
+        one.false_positive_rate = reading.false_positive_rate;
+        return one;
+    }
+
+    std::optional<arhost::fiducial::MeasuredCorners> refined(const cv::Mat &grey, arhost_transfer transfer,
+                                                             const Dictionary &dictionary, int id,
+                                                             const Corners &rough_px) const {
+        return arhost::fiducial::refine_corners(grey, transfer, rough_px, *lens_, cells_of(dictionary.table),
+                                                [&] { return print_of(dictionary, id); });
     }
 
     // Each dictionary of "DICT_4X4_50", "DICT_4X4_100" and so on begins with the markers of the smaller ones: detects

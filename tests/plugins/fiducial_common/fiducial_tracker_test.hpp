@@ -409,9 +409,9 @@ TEST_P(FiducialTracker, SearchesOnlyWhereMarkersAreExpected) {
     EXPECT_EQ(seen[0].id, 4);
     EXPECT_EQ(seen[0].hamming, everywhere[0].hamming);
     EXPECT_NEAR(seen[0].decision_margin, everywhere[0].decision_margin, 0.5);
-    for (int i = 0; i < 4; ++i)
+    for (int i = 0; i < 4; ++i) // a refinement that begins elsewhere samples other pixels
         EXPECT_LT(corner_distance_px(seen[0], i, {everywhere[0].corners_px[i][0], everywhere[0].corners_px[i][1]}),
-                  0.02);
+                  3 * seen[0].corner_sigma_px);
 }
 
 TEST_P(FiducialTracker, SearchesTheWholeFrameIfATargetIsNotWhereItIsExpected) {

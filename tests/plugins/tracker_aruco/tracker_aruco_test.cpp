@@ -93,6 +93,49 @@ TEST(TrackerAruco, NamesTheSmallestDictionaryWithAllMarkersOfASeries) {
         << "it is a marker of the listed dictionary";
 }
 
+// Expected markers are read at their places before they are searched for.
+TEST_P(ArucoDictionary, IsReportedInTheSameWayWhereverAndHoweverItIsExpected) {
+    const std::string dictionary = GetParam();
+    const Mt truth = pose_of(10, 5, 400, 10, -20, 160);
+    const GreyFrame frame(picture_of({{print_of(dictionary, 21), 80, truth}}));
+    Tracker tracker("tracker_aruco");
+    ASSERT_EQ(tracker.start(test_camera, {{21, 80, dictionary}, {7, 80, dictionary}}), ARHOST_STATUS_OK)
+        << tracker.log();
+    const auto corners = corners_of(truth, test_camera, 80);
+    const cv::Point2d cell_px = (corners[1] - corners[0]) / print_of(dictionary, 21).corner_cells;
+    for (const std::uint32_t marker : {0U, 1U}) // 1: where it is, marker 7 is expected
+        for (const double cells : {0.0, 0.3, 0.6, 1.5})
+            for (const int turn : {0, 1, 2, 3}) {
+                auto expected_corners = corners;
+                for (int i = 0; i < 4; ++i)
+                    expected_corners[i] = corners[(i + turn) % 4] + cells * cell_px;
+                auto expected = expected_at(marker, expected_corners);
+                expected.margin_px = 2 * cv::norm(cell_px);
+                const auto seen = tracker.track(frame, {expected}, false);
+                ASSERT_EQ(seen.size(), 1u) << marker << ' ' << cells << ' ' << turn;
+                EXPECT_EQ(seen[0].id, 21);
+                EXPECT_EQ(seen[0].hamming, 0u);
+                EXPECT_LT(greatest_distance_px(seen[0], corners), 0.1) << marker << ' ' << cells << ' ' << turn;
+            }
+}
+
+TEST(TrackerAruco, AnExpectedMarkerWithAWrongCellIsNotReadButDetected) {
+    const Mt truth = pose_of(10, 5, 400);
+    Tracker tracker("tracker_aruco");
+    ASSERT_EQ(tracker.start(test_camera, {{5}}), ARHOST_STATUS_OK) << tracker.log();
+    const auto expected = expected_at(0, corners_of(truth, test_camera, 80));
+    const GreyFrame frame(picture_of({{with_wrong_bits(tag(5), 1), 80, truth}}));
+    const auto seen = tracker.track(frame, {expected}, false);
+    ASSERT_EQ(seen.size(), 1u);
+    EXPECT_EQ(seen[0].hamming, 1u);
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    for (const double outside : {-50.0, 1e9, nan}) {
+        auto moved = expected;
+        moved.corners_px[2][0] = outside;
+        EXPECT_LE(tracker.track(frame, {moved}, false).size(), 1u);
+    }
+}
+
 // A dot in a cell does not change the bit, but squares in clutter have such cells, and prints have not.
 TEST(TrackerAruco, SmallMarkersWithSpottedCellsAreNoEvidence) {
     const Mt truth = pose_of(10, 5, 400);
