@@ -360,7 +360,7 @@ private:
     // `corners_px`: as reported.
     Reading read_upright(const cv::Mat &grey, Corners corners_px, const Dictionary &dictionary, int id) const {
         if (dictionary.rotated_180)
-            std::ranges::rotate(corners_px, corners_px.begin() + 2);
+            std::rotate(corners_px.begin(), corners_px.begin() + 2, corners_px.end());
         return read(grey, corners_px, dictionary.table, id, parameters_.markerBorderBits, true);
     }
 
