@@ -10,8 +10,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <iterator>
 #include <limits>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace arhost::fiducial {
@@ -61,6 +63,7 @@ struct Pixel {
     cv::Vec2d place; // undistorted
     double light;
     bool is_saturated;
+    double residual = 0; // light less that of the model that was linearized last
 };
 
 // Returns the pixels of the print, of large prints only some of them. Returns none if the lens does not see all of
@@ -94,7 +97,7 @@ std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_co
         const std::uint8_t code = grey.at<std::uint8_t>(at[i]);
         if (std::min({cell[0], cell[1], print.cells.rows - cell[0], print.cells.rows - cell[1]}) >=
             print.margin - reach)
-            pixels.push_back({place, light_of_code[code], code >= saturated});
+            pixels.push_back({place, light_of_code[code], code >= saturated, 0});
     }
     return pixels;
 }
@@ -197,7 +200,7 @@ cv::Matx22d px_per_cell_at_centre(const Homography &to_px, const Print &print) {
     return derivative(to_px, to_px * cv::Vec3d(middle, middle, 1));
 }
 
-Fit linearize(std::span<const Pixel> pixels, const Print &print, BlurredPrint &blurred, const Model &model) {
+Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred, const Model &model) {
     const Homography to_px = px_from_cells(model.corners_px, print), to_cells = to_px.inv();
     Fit fit;
     const cv::Matx22d px_per_cell = px_per_cell_at_centre(to_px, print);
@@ -212,7 +215,7 @@ Fit linearize(std::span<const Pixel> pixels, const Print &print, BlurredPrint &b
     constexpr int count = 14;
     std::array<double, count * count> normal{};
     std::array<double, count> gradient{};
-    for (const Pixel &pixel : pixels) {
+    for (Pixel &pixel : pixels) {
         const cv::Vec3d h = to_cells * cv::Vec3d(pixel.place[0], pixel.place[1], 1);
         if (!(h[2] > 0)) {
             fit.cost = std::numeric_limits<double>::infinity();
@@ -233,6 +236,7 @@ Fit linearize(std::span<const Pixel> pixels, const Print &print, BlurredPrint &b
         const double illumination = 1 + model.slope[0] * u + model.slope[1] * v;
         const double light = model.black + model.contrast * white.value,
                      residual = pixel.light - illumination * light;
+        pixel.residual = residual;
         if (pixel.is_saturated && residual < 0) // the pixel does not tell how much brighter it would be
             continue;
         // The derivative of the light with respect to a motion of the print in undistorted px.
@@ -285,6 +289,44 @@ double sum_of_squared_differences_from_mean(std::span<const Pixel> pixels) {
     return squares - sum * sum / static_cast<double>(pixels.size());
 }
 
+// Returns the pixels without those where something hides the print or a highlight is, and those that blur mixes with
+// them. `max_error`: of other pixels, relative to the contrast of the print, unless noise is stronger.
+std::vector<Pixel> without_outliers(std::span<const Pixel> pixels, const LightOfCode &light_of_code,
+                                    const Model &model, double max_error) {
+    constexpr double max_deviations = 4, reach = 4; // standard deviations of the noise, of the blur
+    // In codes, whose noise depends less on the brightness than that of light.
+    const auto code_of = [&](double light) {
+        const auto above = std::clamp(std::ranges::upper_bound(light_of_code, light), light_of_code.begin() + 1,
+                                      light_of_code.end() - 1);
+        const double below = *(above - 1);
+        return static_cast<double>(above - light_of_code.begin() - 1) + (light - below) / (*above - below);
+    };
+    std::vector<double> errors;
+    errors.reserve(pixels.size());
+    for (const Pixel &pixel : pixels)
+        errors.push_back(pixel.is_saturated && pixel.residual < 0
+                             ? 0
+                             : std::abs(code_of(pixel.light) - code_of(pixel.light - pixel.residual)));
+    std::vector<double> sorted = errors;
+    const auto median = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+    std::ranges::nth_element(sorted, median);
+    const double deviation = 1.4826 * *median; // of a normal distribution
+    const double contrast = std::abs(code_of(model.black + model.contrast) - code_of(model.black));
+    const double bound = std::max(max_deviations * deviation, max_error * contrast);
+    std::vector<cv::Vec2d> outliers;
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+        if (errors[i] > bound)
+            outliers.push_back(pixels[i].place);
+    std::vector<Pixel> kept;
+    kept.reserve(pixels.size());
+    std::ranges::copy_if(pixels, std::back_inserter(kept), [&](const Pixel &pixel) {
+        return std::ranges::none_of(outliers, [&](const cv::Vec2d &outlier) {
+            return cv::norm(pixel.place - outlier) <= reach * model.blur_px;
+        });
+    });
+    return kept;
+}
+
 // Returns the variance of the independent noise of 8 coordinates whose 95 % ellipsoid contains noise with this
 // covariance as often (Satterthwaite's approximation: a sum of squares with unequal variances is a scaled chi-squared
 // with fewer degrees of freedom).
@@ -296,105 +338,182 @@ double equivalent_variance(const cv::Matx<double, 8, 8> &covariance) {
     return sum_of_squares / sum * quantile(freedom) / quantile(8);
 }
 
+// The fit of a print to pixels.
+class PrintFit {
+public:
+    // `pixels`: without outliers yet. `shortest_px`: side of the square.
+    PrintFit(const Print &print, const LightOfCode &light_of_code, std::vector<Pixel> pixels,
+             const cv::Vec<double, 8> &corners_px, double shortest_px)
+        : print_(print), light_of_code_(light_of_code), all_(std::move(pixels)), pixels_(all_),
+          cells_per_px_(px_per_cell_at_centre(px_from_cells(corners_px, print), print).inv()), first_px_(corners_px),
+          shortest_px_(shortest_px), model_{corners_px, first_blur_px, 0, 1, {}} {
+        linearize_model();
+    }
+
+    // Returns whether the fit has converged to a picture that resembles the pixels. Call it once.
+    bool run() {
+        constexpr double max_hidden = 0.25, max_left_out = 0.5; // of the pixels, at the end and before
+        constexpr double least_max_error = 0.05;
+        constexpr int max_rounds = 8;
+        if (!std::isfinite(fit_.cost))
+            return false;
+        // First the light, on which the other derivatives depend: it is linear.
+        const auto light = fit_.normal.get_minor<2, 2>(9, 9).inv() * cv::Vec2d(fit_.gradient[9], fit_.gradient[10]);
+        model_.black += light[0];
+        model_.contrast += light[1];
+        linearize_model();
+        // A hidden part shifts the first fits, so only the largest errors are outliers at first.
+        double max_error = 0.4;
+        for (int round = 0;; ++round) {
+            const bool is_converged = minimize();
+            linearize(all_, print_, blurred_, model_);
+            std::vector<Pixel> kept;
+            do
+                kept = without_outliers(all_, light_of_code_, model_, max_error);
+            while (kept.size() == pixels_.size() && (max_error /= 2) >= least_max_error);
+            const double left_out = 1 - static_cast<double>(kept.size()) / static_cast<double>(all_.size());
+            if (kept.size() == pixels_.size() || round == max_rounds)
+                return is_converged && left_out <= max_hidden && resembles();
+            if (left_out > max_left_out)
+                return false;
+            max_error = std::max(max_error / 2, least_max_error);
+            pixels_ = std::move(kept);
+            linearize_model();
+        }
+    }
+
+    const cv::Vec<double, 8> &corners_px() const { return model_.corners_px; }
+    cv::Matx<double, 8, 8> covariance_px2() const {
+        const auto covariance = fit_.normal.inv(cv::DECOMP_CHOLESKY) * (fit_.cost / (fit_.pixels - unknowns));
+        return covariance.get_minor<8, 8>(0, 0);
+    }
+
+private:
+    static constexpr double first_blur_px = 0.7;
+
+    void linearize_model() { fit_ = linearize(pixels_, print_, blurred_, model_); }
+
+    BlurredPrint table() const {
+        return {print_,
+                samples_per_cell(print_, table_blur_px_ * table_blur_px_ * cells_per_px_ * cells_per_px_.t())};
+    }
+
+    // Returns whether the fit has converged.
+    bool minimize() {
+        constexpr double converged_px = 0.01;
+        constexpr int max_steps = 20;
+        double damping = 1e-3;
+        bool is_converged = false;
+        for (int step = 0; step < max_steps && !is_converged; ++step) {
+            const std::optional<Model> next = step_from_model(damping);
+            if (!next)
+                return false;
+            const double moved_px = std::max(cv::norm(next->corners_px, model_.corners_px, cv::NORM_INF),
+                                             std::abs(next->blur_px - model_.blur_px));
+            if (!(cv::norm(next->corners_px, first_px_, cv::NORM_INF) < shortest_px_ / 4)) // also for NaN
+                return false;
+            const Fit candidate = linearize(pixels_, print_, blurred_, *next);
+            const bool is_better = candidate.cost < fit_.cost;
+            // At the minimum, the resolution of the table decides whether a small step is better.
+            is_converged = moved_px < converged_px && (is_better || damping <= 1);
+            damping *= is_better ? 0.1 : 10;
+            if (is_better) {
+                model_ = *next;
+                fit_ = candidate;
+            }
+            is_converged &= !renew_table();
+        }
+        return is_converged;
+    }
+
+    bool resembles() const {
+        constexpr double min_resemblance = 0.85;
+        return fit_.pixels >= 4 * unknowns &&
+               fit_.cost < (1 - min_resemblance) * sum_of_squared_differences_from_mean(pixels_);
+    }
+
+    std::optional<Model> step_from_model(double damping) const {
+        constexpr double min_blur_px = 0.3;
+        auto damped = fit_.normal;
+        for (int i = 0; i < unknowns; ++i)
+            damped(i, i) *= 1 + damping;
+        cv::Vec<double, unknowns> change;
+        if (!cv::solve(damped, fit_.gradient, change, cv::DECOMP_CHOLESKY))
+            return std::nullopt;
+        Model next = model_;
+        for (int i = 0; i < 8; ++i)
+            next.corners_px[i] += change[i];
+        next.blur_px =
+            std::clamp(model_.blur_px + change[8], std::max(min_blur_px, model_.blur_px / 2), 2 * model_.blur_px);
+        next.black += change[9];
+        next.contrast += change[10];
+        next.slope += cv::Vec2d(change[11], change[12]);
+        return next;
+    }
+
+    // A table that is too fine for the blur would need a large kernel, a coarse one would not resolve it. Returns
+    // whether another one was necessary.
+    bool renew_table() {
+        constexpr double max_ratio = 1.8; // of the blur and the one that the table was made for
+        if (std::max(model_.blur_px, table_blur_px_) <= max_ratio * std::min(model_.blur_px, table_blur_px_))
+            return false;
+        table_blur_px_ = model_.blur_px;
+        blurred_ = table();
+        linearize_model();
+        return true;
+    }
+
+    const Print &print_;
+    const LightOfCode &light_of_code_;
+    std::vector<Pixel> all_, pixels_; // with outliers and without
+    cv::Matx22d cells_per_px_;        // at the centre
+    cv::Vec<double, 8> first_px_;
+    double shortest_px_;
+    double table_blur_px_ = first_blur_px;
+    BlurredPrint blurred_ = table();
+    Model model_;
+    Fit fit_;
+};
+
 } // namespace
 
 std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
                                            const Lens &lens, const Print &print) {
-    constexpr double first_blur_px = 0.7, min_blur_px = 0.3, converged_px = 0.01, min_resemblance = 0.85,
-                     min_cell_px = 0.5;
-    constexpr double max_blur_ratio = 1.8; // of the blur and the one that its table was made for
-    constexpr int max_steps = 20;
+    constexpr double min_cell_px = 0.5;
     const auto corners = lens.undistort({corners_px.begin(), corners_px.end()});
     if (!corners || print.margin < 1 || !std::ranges::all_of(corners_px, [&](const cv::Point2d &corner) {
             return std::abs(corner.x) < 2 * grey.cols && std::abs(corner.y) < 2 * grey.rows;
         }))
         return std::nullopt;
-    Model model{{}, first_blur_px, 0, 1, {}};
-    double shortest = std::numeric_limits<double>::infinity();
+    cv::Vec<double, 8> first_px;
+    double shortest_px = std::numeric_limits<double>::infinity();
     for (int i = 0; i < 4; ++i) {
-        model.corners_px[2 * i] = (*corners)[i].x;
-        model.corners_px[2 * i + 1] = (*corners)[i].y;
-        shortest = std::min(shortest, cv::norm((*corners)[(i + 1) % 4] - (*corners)[i]));
+        first_px[2 * i] = (*corners)[i].x;
+        first_px[2 * i + 1] = (*corners)[i].y;
+        shortest_px = std::min(shortest_px, cv::norm((*corners)[(i + 1) % 4] - (*corners)[i]));
     }
-    if (!(shortest >= min_cell_px * print.side())) // false for NaN
+    if (!(shortest_px >= min_cell_px * print.side())) // false for NaN
         return std::nullopt;
-    const Homography px_from_cell = px_from_cells(model.corners_px, print), cells_from_px = px_from_cell.inv();
-    const std::vector<Pixel> pixels =
-        pixels_of(grey, light_of_code(transfer), corners_px, lens, cells_from_px, print);
+    const Homography px_from_cell = px_from_cells(first_px, print);
+    if (!(cv::determinant(px_per_cell_at_centre(px_from_cell, print)) > 0)) // no square seen from the front; NaN
+        return std::nullopt;
+    const LightOfCode &light = light_of_code(transfer);
+    std::vector<Pixel> pixels = pixels_of(grey, light, corners_px, lens, px_from_cell.inv(), print);
     if (pixels.size() < 4 * unknowns)
         return std::nullopt;
-
-    const cv::Matx22d px_per_cell = px_per_cell_at_centre(px_from_cell, print);
-    if (!(cv::determinant(px_per_cell) > 0)) // no square seen from the front; also for NaN
-        return std::nullopt;
-    const cv::Matx22d cells_per_px = px_per_cell.inv();
-    double table_blur_px = first_blur_px;
-    const auto table = [&] {
-        return BlurredPrint(
-            print, samples_per_cell(print, table_blur_px * table_blur_px * (cells_per_px * cells_per_px.t())));
-    };
-    BlurredPrint blurred = table();
-    // First the light, on which the other derivatives depend: it is linear.
-    Fit fit = linearize(pixels, print, blurred, model);
-    if (!std::isfinite(fit.cost))
-        return std::nullopt;
-    const auto light = fit.normal.get_minor<2, 2>(9, 9).inv() * cv::Vec2d(fit.gradient[9], fit.gradient[10]);
-    const cv::Vec<double, 8> first = model.corners_px;
-    model.black += light[0];
-    model.contrast += light[1];
-    fit = linearize(pixels, print, blurred, model);
-    double damping = 1e-3;
-    bool is_converged = false;
-    for (int step = 0; step < max_steps && !is_converged; ++step) {
-        auto damped = fit.normal;
-        for (int i = 0; i < unknowns; ++i)
-            damped(i, i) *= 1 + damping;
-        cv::Vec<double, unknowns> change;
-        if (!cv::solve(damped, fit.gradient, change, cv::DECOMP_CHOLESKY))
-            return std::nullopt;
-        Model next = model;
-        for (int i = 0; i < 8; ++i)
-            next.corners_px[i] += change[i];
-        next.blur_px =
-            std::clamp(model.blur_px + change[8], std::max(min_blur_px, model.blur_px / 2), 2 * model.blur_px);
-        next.black += change[9];
-        next.contrast += change[10];
-        next.slope += cv::Vec2d(change[11], change[12]);
-        const double moved_px = std::max(cv::norm(next.corners_px, model.corners_px, cv::NORM_INF),
-                                         std::abs(next.blur_px - model.blur_px));
-        const bool is_near = cv::norm(next.corners_px, first, cv::NORM_INF) < shortest / 4; // false for NaN
-        const Fit candidate = is_near ? linearize(pixels, print, blurred, next) : Fit{};
-        const bool is_better = is_near && candidate.cost < fit.cost;
-        // At the minimum, the resolution of the table decides whether a small step is better.
-        is_converged = moved_px < converged_px && (is_better || damping <= 1);
-        damping *= is_better ? 0.1 : 10;
-        if (is_better) {
-            model = next;
-            fit = candidate;
-        }
-        // A table that is too fine for the blur would need a large kernel, a coarse one would not resolve it.
-        if (std::max(model.blur_px, table_blur_px) > max_blur_ratio * std::min(model.blur_px, table_blur_px)) {
-            table_blur_px = model.blur_px;
-            blurred = table();
-            fit = linearize(pixels, print, blurred, model);
-            is_converged = false;
-        }
-    }
-    if (!is_converged || fit.pixels < 4 * unknowns ||
-        !(fit.cost < (1 - min_resemblance) * sum_of_squared_differences_from_mean(pixels)))
+    PrintFit fit(print, light, std::move(pixels), first_px, shortest_px);
+    if (!fit.run())
         return std::nullopt;
     std::vector<cv::Point2d> found;
     found.reserve(4);
     for (int i = 0; i < 4; ++i)
-        found.emplace_back(model.corners_px[2 * i], model.corners_px[2 * i + 1]);
+        found.emplace_back(fit.corners_px()[2 * i], fit.corners_px()[2 * i + 1]);
     const auto distorted = lens.distort(found);
     if (!distorted)
         return std::nullopt;
-    const auto covariance = fit.normal.inv(cv::DECOMP_CHOLESKY) * (fit.cost / (fit.pixels - unknowns));
     MeasuredCorners result;
     std::ranges::copy(*distorted, result.corners_px.begin());
-    const double sigma_px =
-        noise_scale(found, *distorted) * std::sqrt(equivalent_variance(covariance.get_minor<8, 8>(0, 0)));
+    const double sigma_px = noise_scale(found, *distorted) * std::sqrt(equivalent_variance(fit.covariance_px2()));
     if (!(sigma_px > 0) || !std::isfinite(sigma_px))
         return std::nullopt;
     result.sigma_px = sigma_px;
@@ -426,12 +545,23 @@ bool is_overexposed(const cv::Mat &grey, const Corners &corners_px, int cells) {
 std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
                                               const Lens &lens, int cells, const std::function<Print()> &print,
                                               bool is_subpixel) {
-    constexpr double max_blur_cells = 0.5;
+    constexpr double max_blur_cells = 0.5, max_sigma_px = 0.05;
     const auto edges = refine_edges(grey, transfer, rough_px, lens, cells, is_subpixel);
-    if (edges && edges->blur_cells <= max_blur_cells && !is_overexposed(grey, edges->corners_px, cells))
+    if (edges && edges->blur_cells <= max_blur_cells && edges->sigma_px <= max_sigma_px &&
+        !is_overexposed(grey, edges->corners_px, cells))
         return edges;
-    const auto aligned = align_print(grey, transfer, edges ? edges->corners_px : rough_px, lens, print());
-    return aligned ? aligned : edges;
+    const Print known = print();
+    const Corners start = edges ? edges->corners_px : rough_px;
+    if (const auto aligned = align_print(grey, transfer, start, lens, known))
+        return aligned;
+    // A detector takes the end of what hides a corner for the corner. The others nearly tell where it is.
+    for (std::size_t i = 0; i < 4 && (!edges || edges->sigma_px > max_sigma_px); ++i) {
+        Corners corners_px = rough_px;
+        corners_px[i] = rough_px[(i + 1) % 4] - rough_px[(i + 2) % 4] + rough_px[(i + 3) % 4];
+        if (const auto aligned = align_print(grey, transfer, corners_px, lens, known))
+            return aligned;
+    }
+    return edges;
 }
 
 } // namespace arhost::fiducial

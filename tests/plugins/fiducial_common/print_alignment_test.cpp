@@ -28,18 +28,26 @@ arhost::fiducial::Print print_of(const Print &tag) {
     return print;
 }
 
+// Of a camera with four times the resolution.
+arhost_intrinsics finer(arhost_intrinsics intrinsics) {
+    intrinsics.width *= 4;
+    intrinsics.height *= 4;
+    for (double *value : {&intrinsics.fx, &intrinsics.fy, &intrinsics.cx, &intrinsics.cy})
+        *value *= 4;
+    intrinsics.cx += 1.5;
+    intrinsics.cy += 1.5;
+    return intrinsics;
+}
+
+cv::Mat reduced(const cv::Mat &fine) {
+    cv::Mat picture;
+    cv::resize(fine, picture, size, 0, 0, cv::INTER_AREA);
+    return picture;
+}
+
 // Rendered at four times the resolution, because the renderer has only 32 rays per pixel.
 cv::Mat finely_rendered(const arhost_intrinsics &intrinsics, const Placed &marker) {
-    arhost_intrinsics fine = intrinsics;
-    fine.width *= 4;
-    fine.height *= 4;
-    for (double *value : {&fine.fx, &fine.fy, &fine.cx, &fine.cy})
-        *value *= 4;
-    fine.cx += 1.5;
-    fine.cy += 1.5;
-    cv::Mat picture;
-    cv::resize(render(fine, {marker}), picture, size, 0, 0, cv::INTER_AREA);
-    return picture;
+    return reduced(render(finer(intrinsics), {marker}));
 }
 
 struct Case {
@@ -197,6 +205,70 @@ TEST(PrintAlignment, FitsAPrintThatTheFrameCuts) {
     ASSERT_TRUE(found);
     for (int k = 0; k < 4; ++k)
         EXPECT_LT(cv::norm(found->corners_px[k] + cv::Point2d(cut, 0) - truth[k]), 0.05);
+}
+
+// A tag whose first corner something of one grey level hides.
+struct HiddenCorner {
+    Mt mt;
+    cv::Mat picture;
+
+    // `hidden`: side of the cover relative to that of the tag.
+    HiddenCorner(const Print &tag, double hidden, int level, double turn_degrees)
+        : mt(pose_of(5, -3, 500, 25, 15, turn_degrees)) {
+        const arhost_intrinsics fine = finer(camera);
+        cv::Mat sharp = render(fine, {{tag.with_margin(1), 100, mt}});
+        const double far = 65, near = 100 * (0.5 - hidden); // mm
+        std::vector<cv::Point> cover;
+        for (const auto &[x, y] : {std::pair(-far, far), {-near, far}, {-near, near}, {-far, near}})
+            cover.emplace_back(pixel_of(mt, fine, x, y));
+        cv::fillConvexPoly(sharp, cover, cv::Scalar(level));
+        cv::GaussianBlur(sharp, sharp, {}, 4 * 0.7);
+        reduced(sharp).convertTo(picture, CV_16S);
+        add_noise(picture, 1.5, 1);
+    }
+    Corners corners_px() const { return corners_of(mt, camera, 100); }
+};
+
+TEST(PrintAlignment, IgnoresWhatHidesACorner) {
+    const Lens lens(camera);
+    const Print tag = april_tag("tag36h11", 4);
+    for (const double hidden : {0.1, 0.2, 0.3})
+        for (const int level : {0, 120, 255})
+            for (const double turn_degrees : {0, 50, 190}) {
+                const HiddenCorner view(tag, hidden, level, turn_degrees);
+                const Corners truth = view.corners_px();
+                const auto found = align_print(view.picture, ARHOST_TRANSFER_LINEAR, truth, lens, print_of(tag));
+                ASSERT_TRUE(found) << hidden << " " << level << " " << turn_degrees;
+                for (int k = 0; k < 4; ++k)
+                    EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.06)
+                        << k << ": " << hidden << " " << level << " " << turn_degrees;
+                EXPECT_LT(found->sigma_px, 0.03);
+            }
+}
+
+TEST(PrintAlignment, ReturnsNothingIfHalfOfThePrintIsHidden) {
+    const Print tag = april_tag("tag36h11", 4);
+    for (const int level : {0, 120, 255}) {
+        const HiddenCorner view(tag, 0.75, level, 20);
+        EXPECT_FALSE(
+            align_print(view.picture, ARHOST_TRANSFER_LINEAR, view.corners_px(), Lens(camera), print_of(tag)));
+    }
+}
+
+TEST(CornerRefinement, FindsACornerThatTheDetectorTakesForTheEndOfItsCover) {
+    const Lens lens(camera);
+    const Print tag = april_tag("tag36h11", 4);
+    for (const double turn_degrees : {0, 50, 190}) {
+        const HiddenCorner view(tag, 0.3, 120, turn_degrees);
+        const Corners truth = view.corners_px();
+        Corners rough = truth;
+        rough[0] = pixel_of(view.mt, camera, -35, 35);
+        const auto found = refine_corners(view.picture, ARHOST_TRANSFER_LINEAR, rough, lens, tag.corner_cells,
+                                          [&] { return print_of(tag); });
+        ASSERT_TRUE(found) << turn_degrees;
+        for (int k = 0; k < 4; ++k)
+            EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.06) << k << ": " << turn_degrees;
+    }
 }
 
 TEST(CornerRefinement, AlignsThePrintOnlyWhereCellsAreNarrow) {
