@@ -3,7 +3,7 @@
 
 #include <fiducial_common/apriltag_families.hpp>
 #include <fiducial_common/aruco_dictionaries.hpp>
-#include <fiducial_common/edge_refinement.hpp>
+#include <fiducial_common/print_alignment.hpp>
 
 #include <algorithm>
 #include <map>
@@ -79,10 +79,12 @@ public:
             // AprilTag's corners begin at the bottom left and are counter-clockwise; pixel centres are at +0.5.
             for (int corner = 0; corner < 4; ++corner)
                 candidate.corners_px[corner] = {tag->p[3 - corner][0] - 0.5, tag->p[3 - corner][1] - 0.5};
-            candidate.corners_px = fiducial::refine_edges(grey, ARHOST_TRANSFER_SRGB, candidate.corners_px, lens_,
-                                                          family_->width_at_border, true)
-                                       .value_or(fiducial::MeasuredCorners{candidate.corners_px})
-                                       .corners_px;
+            candidate.corners_px =
+                fiducial::refine_corners(
+                    grey, ARHOST_TRANSFER_SRGB, candidate.corners_px, lens_, family_->width_at_border,
+                    [&] { return apriltag::print_of(*family_, tag->id); }, true)
+                    .value_or(fiducial::MeasuredCorners{candidate.corners_px})
+                    .corners_px;
             candidates.push_back(candidate);
         }
         return best_of_each(candidates);
@@ -123,16 +125,20 @@ public:
                                 {},
                                 cv::norm(found.corners[i][2] - found.corners[i][0])};
             std::ranges::copy(found.corners[i], candidate.corners_px.begin());
-            candidate.corners_px = fiducial::refine_edges(grey, ARHOST_TRANSFER_SRGB, candidate.corners_px, lens_,
-                                                          dictionary_.markerSize + 2)
-                                       .value_or(fiducial::MeasuredCorners{candidate.corners_px})
-                                       .corners_px;
+            candidate.corners_px =
+                fiducial::refine_corners(grey, ARHOST_TRANSFER_SRGB, candidate.corners_px, lens_,
+                                         dictionary_.markerSize + 2 * border_bits,
+                                         [&] { return aruco::print_of(dictionary_, found.ids[i], border_bits); })
+                    .value_or(fiducial::MeasuredCorners{candidate.corners_px})
+                    .corners_px;
             candidates.push_back(candidate);
         }
         return best_of_each(candidates);
     }
 
 private:
+    static constexpr int border_bits = 1;
+
     std::vector<int> ids_;
     fiducial::Lens lens_;
     cv::aruco::Dictionary dictionary_;

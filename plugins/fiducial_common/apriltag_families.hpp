@@ -3,6 +3,8 @@
 // The tag families of the AprilTag library.
 #pragma once
 
+#include "print.hpp"
+
 #include <apriltag.h>
 #include <tag16h5.h>
 #include <tag25h9.h>
@@ -15,6 +17,8 @@
 #include <tagStandard52h13.h>
 
 #include <array>
+#include <cstddef>
+#include <cstdint>
 
 namespace arhost::apriltag {
 
@@ -39,5 +43,15 @@ inline constexpr std::array family_types{
     FamilyType{"tagStandard41h12", tagStandard41h12_create, tagStandard41h12_destroy},
     FamilyType{"tagStandard52h13", tagStandard52h13_create, tagStandard52h13_destroy},
 };
+
+// `index`: of the tag in the family's table.
+inline fiducial::Print print_of(apriltag_family_t &family, int index) {
+    image_u8_t *drawn = apriltag_to_image(&family, static_cast<std::uint32_t>(index));
+    fiducial::Print print{{}, (family.total_width - family.width_at_border) / 2};
+    cv::Mat(drawn->height, drawn->width, CV_8UC1, drawn->buf, static_cast<std::size_t>(drawn->stride))
+        .convertTo(print.cells, CV_32F, 1 / 255.0);
+    image_u8_destroy(drawn);
+    return print;
+}
 
 } // namespace arhost::apriltag

@@ -4,6 +4,8 @@
 // from 4.7.
 #pragma once
 
+#include "print.hpp"
+
 #include <opencv2/core.hpp>
 #define ARHOST_OPENCV_HAS_ARUCO_DETECTOR (CV_VERSION_MAJOR * 100 + CV_VERSION_MINOR >= 407)
 #if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
@@ -42,6 +44,15 @@ inline void draw(const cv::aruco::Dictionary &dictionary, int id, int side_px, c
 #else
     dictionary.drawMarker(id, side_px, image, border_bits);
 #endif
+}
+
+inline fiducial::Print print_of(const cv::aruco::Dictionary &dictionary, int id, int border_bits) {
+    cv::Mat drawn;
+    draw(dictionary, id, dictionary.markerSize + 2 * border_bits, drawn, border_bits);
+    cv::copyMakeBorder(drawn, drawn, 1, 1, 1, 1, cv::BORDER_CONSTANT, 255);
+    fiducial::Print print{{}, 1};
+    drawn.convertTo(print.cells, CV_32F, 1 / 255.0);
+    return print;
 }
 
 inline DetectedMarkers detect(const cv::Mat &grey, const cv::aruco::Dictionary &dictionary,

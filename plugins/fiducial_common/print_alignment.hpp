@@ -5,18 +5,11 @@
 
 #include "lens.hpp"
 #include "observations.hpp"
+#include "print.hpp"
 
 #include <functional>
 
 namespace arhost::fiducial {
-
-// The cells of a print from the top left: 1 is white, 0 is black. `margin` cells around the square are known.
-struct Print {
-    cv::Mat_<float> cells;
-    int margin = 0;
-
-    int side() const { return cells.rows - 2 * margin; } // of the square
-};
 
 // Fits a picture of the whole print to the frame: its corners, its blur, the light of black and of white, and how the
 // illumination changes across it, by the method of least squares (Levenberg–Marquardt). All cells contribute, so this

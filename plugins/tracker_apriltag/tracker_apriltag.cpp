@@ -253,7 +253,7 @@ private:
             if (fit_edges_ && part.is_listed())
                 corners = arhost::fiducial::refine_corners(
                               grey, frame.format->transfer, corners.corners_px, *lens_, tag->family->width_at_border,
-                              [&] { return print_of(*tag->family, tag->id); }, refine_edges_)
+                              [&] { return arhost::apriltag::print_of(*tag->family, tag->id); }, refine_edges_)
                               .value_or(corners);
             arhost_observation &one = seen.emplace_back(part.family().observation(part.id(tag->id), corners));
             one.hamming = static_cast<std::uint32_t>(tag->hamming);
@@ -282,15 +282,6 @@ private:
                 markers[tag->family->name].insert(tag->id);
         }
         return markers;
-    }
-
-    static arhost::fiducial::Print print_of(apriltag_family_t &family, int index) {
-        image_u8_t *drawn = apriltag_to_image(&family, static_cast<std::uint32_t>(index));
-        arhost::fiducial::Print print{{}, (family.total_width - family.width_at_border) / 2};
-        cv::Mat(drawn->height, drawn->width, CV_8UC1, drawn->buf, static_cast<std::size_t>(drawn->stride))
-            .convertTo(print.cells, CV_32F, 1 / 255.0);
-        image_u8_destroy(drawn);
-        return print;
     }
 
     // The library's threshold is that of 4×4 px tiles of the decimated image. Regions on this grid have the tiles of

@@ -411,13 +411,9 @@ private:
     }
 
     arhost::fiducial::Print print_of(const Dictionary &dictionary, int id) const {
-        cv::Mat drawn;
-        arhost::aruco::draw(dictionary.table, id, cells_of(dictionary.table), drawn, parameters_.markerBorderBits);
-        cv::copyMakeBorder(drawn, drawn, 1, 1, 1, 1, cv::BORDER_CONSTANT, 255);
+        arhost::fiducial::Print print = arhost::aruco::print_of(dictionary.table, id, parameters_.markerBorderBits);
         if (dictionary.rotated_180)
-            cv::rotate(drawn, drawn, cv::ROTATE_180);
-        arhost::fiducial::Print print{{}, 1};
-        drawn.convertTo(print.cells, CV_32F, 1 / 255.0);
+            cv::rotate(print.cells, print.cells, cv::ROTATE_180);
         return print;
     }
 
