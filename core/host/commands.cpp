@@ -793,7 +793,7 @@ int list_plugins(const Arguments &arguments, const PluginsArguments &plugins, su
     Console console(arguments.verbose);
     ipc::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
-    const std::vector<fs::path> files = plugin_files({});
+    const std::vector<fs::path> files = plugin_files(plugins.plugins);
     const sandbox::Policy policy = reading(plugins.reads);
     int status = success;
     std::string level;

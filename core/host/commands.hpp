@@ -40,6 +40,7 @@ struct ReplayArguments {
 // Command-line options of `arhost plugins`.
 struct PluginsArguments {
     bool with_options = false;
+    std::vector<std::string> plugins; // names; empty: all plugins
     std::vector<std::filesystem::path> reads;
 };
 

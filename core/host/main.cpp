@@ -123,6 +123,7 @@ int main(int argc, char **argv) {
 
     PluginsArguments plugins_arguments;
     CommandLine plugins_command = app.subcommand("plugins", "List the plugins; for unusable ones, print the reason");
+    plugins_command.option("PLUGIN", plugins_arguments.plugins, "List only these plugins");
     plugins_command.flag("--options", plugins_arguments.with_options, "Also list the options of each plugin");
     const auto add_reads = [](CommandLine &command, std::vector<std::filesystem::path> &reads) {
         command.option("--reads", reads, "A folder with libraries that the plugins need (repeatable)")

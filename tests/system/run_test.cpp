@@ -400,6 +400,10 @@ TEST(CommandLine, PrintsVersionHelpAndPlugins) {
     EXPECT_THAT(run.output(), HasSubstr("first                The first of three (default '1')"));
     EXPECT_THAT(run.output(), HasSubstr("Attempts attacks,  [2Jfor tests."));
     EXPECT_THAT(run.output(), HasSubstr("third                The third of three (default 'c')"));
+    EXPECT_EQ(run.run({"plugins", "--options", "rt_counter"}), 0) << run.output();
+    EXPECT_THAT(run.output(), AllOf(HasSubstr("delay_ms"), Not(HasSubstr("tracker"))));
+    EXPECT_EQ(run.run({"plugins", "rt_counted"}), 2);
+    EXPECT_THAT(run.output(), HasSubstr("there is no plugin 'rt_counted'"));
     EXPECT_EQ(run.run({}), 2);
     EXPECT_EQ(run.run({"--nonsense"}), 2);
 }
