@@ -279,10 +279,11 @@ std::optional<Line> fit_edge(const Picture &picture, const Edge &edge, Slope &sl
     return line;
 }
 
-// As refine_edges(), with so many positions on each edge in the first pass.
+// As refine_edges(), with so many positions on each edge until the corners move by less than half of `converged_px`:
+// a line beside the edge shifts its offsets by up to a tenth of its distance.
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
                                        bool is_subpixel, std::size_t first_positions) {
-    constexpr int max_passes = 8;
+    constexpr int max_passes = 8, max_first_passes = 3;
     constexpr double sharp_step_px = 0.25; // suffices for a sharp edge
     constexpr double min_strength = 0.9;   // of the refined edges, relative to the rough ones
     constexpr double max_noise = 0.12;     // relative to the peak, for tags too small to average it out
@@ -310,11 +311,11 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     double sign = 0, rough_strength = 0, strength = 0, moved = 0, margin_px = reach * min_step_px, blur_cells = 0,
            variance = 0; // of a coordinate of a corner
     bool is_unclear = false;
-    for (int pass = 0; pass < max_passes && (pass < 2 || moved >= converged_px); ++pass) {
+    std::size_t positions = first_positions;
+    for (int pass = 0; pass < max_passes; ++pass) {
         std::array<Edge, 4> edges;
         for (int i = 0; i < 4; ++i) {
-            auto edge = edge_between(corners[i], corners[(i + 1) % 4], lens, margin_px,
-                                     pass == 0 ? first_positions : max_positions);
+            auto edge = edge_between(corners[i], corners[(i + 1) % 4], lens, margin_px, positions);
             if (!edge)
                 return std::nullopt;
             edges[i] = std::move(*edge);
@@ -358,6 +359,10 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
             if (!(cv::norm(crossing - (*rough)[i]) < shortest / 4)) // the comparison is false for NaN
                 return std::nullopt;
         }
+        if (pass > 0 && positions == max_positions && moved < converged_px)
+            break;
+        if (moved < converged_px / 2 || pass == max_first_passes - 1)
+            positions = max_positions;
     }
     if (is_unclear || strength < min_strength * rough_strength)
         return std::nullopt;
@@ -375,7 +380,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
 std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
                                             const Lens &lens, int cells, bool is_subpixel) {
     const Picture picture{grey, light_of_code(transfer)};
-    // The first pass corrects most of the error, for which few positions suffice, unless noise has to be averaged.
+    // The first passes correct most of the error, for which few positions suffice, unless noise has to be averaged.
     auto result = refined(picture, rough_px, lens, cells, is_subpixel, min_positions);
     return result ? result : refined(picture, rough_px, lens, cells, is_subpixel, max_positions);
 }

@@ -60,6 +60,34 @@ TEST(EdgeRefinement, MovesRoughCornersToTheProjectedOnes) {
     }
 }
 
+// OpenCV's corners are wrong by so much.
+TEST(EdgeRefinement, DoesNotDependOnTheRoughCorners) {
+    constexpr double rough_px = 0.6;
+    double squares = 0;
+    constexpr int count = 30;
+    std::mt19937 generator(3);
+    std::uniform_real_distribution<double> turn(-180, 180), tilt(-35, 35);
+    std::normal_distribution<double> wrong(0, rough_px);
+    for (int i = 0; i < count; ++i) {
+        const Mt mt = pose_of(0, 0, 500, tilt(generator), tilt(generator), turn(generator));
+        cv::Mat picture = render(camera, {{april_tag("tag36h11", i).with_margin(1), 100, mt}});
+        cv::GaussianBlur(picture, picture, {}, 0.6);
+        add_noise(picture, 1.5, i + 1);
+        const Corners truth = corners_of(mt, camera, 100);
+        Corners rough = truth;
+        for (cv::Point2d &corner : rough)
+            corner += cv::Point2d(wrong(generator), wrong(generator));
+        const auto from_truth = refine_edges(picture, ARHOST_TRANSFER_LINEAR, truth, lens, cells),
+                   from_rough = refine_edges(picture, ARHOST_TRANSFER_LINEAR, rough, lens, cells);
+        ASSERT_TRUE(from_truth && from_rough) << i;
+        for (int k = 0; k < 4; ++k) {
+            const cv::Point2d difference = from_rough->corners_px[k] - from_truth->corners_px[k];
+            squares += difference.dot(difference) / 8 / count;
+        }
+    }
+    EXPECT_LT(std::sqrt(squares), 0.004);
+}
+
 // Mean distance by which a camera that encodes light as sRGB moves the edges of a tag into its black, if the edges
 // are searched in codes or in linear light.
 double inward_bias_px(arhost_transfer transfer) {
