@@ -63,7 +63,8 @@ struct Pixel {
     cv::Vec2d place; // undistorted
     double light;
     bool is_saturated;
-    double residual = 0; // light less that of the model that was linearized last
+    // Of the model that was linearized last: the light of the pixel less its own, and how this changes with a motion.
+    double residual = 0, change_per_px = 0;
 };
 
 // Returns the pixels of the print, of large prints only some of them. Returns none if the lens does not see all of
@@ -97,7 +98,7 @@ std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_co
         const std::uint8_t code = grey.at<std::uint8_t>(at[i]);
         if (std::min({cell[0], cell[1], print.cells.rows - cell[0], print.cells.rows - cell[1]}) >=
             print.margin - reach)
-            pixels.push_back({place, light_of_code[code], code >= saturated, 0});
+            pixels.push_back({place, light_of_code[code], code >= saturated});
     }
     return pixels;
 }
@@ -237,11 +238,12 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
         const double light = model.black + model.contrast * white.value,
                      residual = pixel.light - illumination * light;
         pixel.residual = residual;
+        const double contrast = illumination * model.contrast;
+        // The derivative of the light with respect to a motion of the print in undistorted px.
+        const cv::Vec2d by_px = -contrast * (cells_per_px_here.t() * cv::Vec2d(white.u, white.v));
+        pixel.change_per_px = cv::norm(by_px);
         if (pixel.is_saturated && residual < 0) // the pixel does not tell how much brighter it would be
             continue;
-        // The derivative of the light with respect to a motion of the print in undistorted px.
-        const double contrast = illumination * model.contrast;
-        const cv::Vec2d by_px = -contrast * (cells_per_px_here.t() * cv::Vec2d(white.u, white.v));
         const double x = by_px[0], y = by_px[1];
         // The homography maps `h` to (pixel.place, 1).
         const double w = -(x * pixel.place[0] + y * pixel.place[1]);
@@ -294,6 +296,7 @@ double sum_of_squared_differences_from_mean(std::span<const Pixel> pixels) {
 std::vector<Pixel> without_outliers(std::span<const Pixel> pixels, const LightOfCode &light_of_code,
                                     const Model &model, double max_error) {
     constexpr double max_deviations = 4, reach = 4; // standard deviations of the noise, of the blur
+    constexpr double max_edge_px = 0.1; // displacement; a lens does not blur an edge exactly as the model does
     // In codes, whose noise depends less on the brightness than that of light.
     const auto code_of = [&](double light) {
         const auto above = std::clamp(std::ranges::upper_bound(light_of_code, light), light_of_code.begin() + 1,
@@ -301,12 +304,15 @@ std::vector<Pixel> without_outliers(std::span<const Pixel> pixels, const LightOf
         const double below = *(above - 1);
         return static_cast<double>(above - light_of_code.begin() - 1) + (light - below) / (*above - below);
     };
-    std::vector<double> errors;
+    std::vector<double> errors, edge_errors;
     errors.reserve(pixels.size());
-    for (const Pixel &pixel : pixels)
-        errors.push_back(pixel.is_saturated && pixel.residual < 0
-                             ? 0
-                             : std::abs(code_of(pixel.light) - code_of(pixel.light - pixel.residual)));
+    edge_errors.reserve(pixels.size());
+    for (const Pixel &pixel : pixels) {
+        const double expected = pixel.light - pixel.residual, edge = max_edge_px * pixel.change_per_px;
+        errors.push_back(
+            pixel.is_saturated && pixel.residual < 0 ? 0 : std::abs(code_of(pixel.light) - code_of(expected)));
+        edge_errors.push_back((code_of(expected + edge) - code_of(expected - edge)) / 2);
+    }
     std::vector<double> sorted = errors;
     const auto median = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::ranges::nth_element(sorted, median);
@@ -315,7 +321,7 @@ std::vector<Pixel> without_outliers(std::span<const Pixel> pixels, const LightOf
     const double bound = std::max(max_deviations * deviation, max_error * contrast);
     std::vector<cv::Vec2d> outliers;
     for (std::size_t i = 0; i < pixels.size(); ++i)
-        if (errors[i] > bound)
+        if (errors[i] > bound + edge_errors[i])
             outliers.push_back(pixels[i].place);
     std::vector<Pixel> kept;
     kept.reserve(pixels.size());
@@ -382,6 +388,7 @@ public:
         }
     }
 
+    double white() const { return model_.black + std::max(model_.contrast, 0.0); } // its light
     const cv::Vec<double, 8> &corners_px() const { return model_.corners_px; }
     cv::Matx<double, 8, 8> covariance_px2() const {
         const auto covariance = fit_.normal.inv(cv::DECOMP_CHOLESKY) * (fit_.cost / (fit_.pixels - unknowns));
@@ -475,10 +482,14 @@ private:
     Fit fit_;
 };
 
-} // namespace
+struct AlignedPrint {
+    MeasuredCorners corners;
+    double white; // its light
+};
 
-std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
-                                           const Lens &lens, const Print &print) {
+// As align_print().
+std::optional<AlignedPrint> aligned(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
+                                    const Lens &lens, const Print &print) {
     constexpr double min_cell_px = 0.5;
     const auto corners = lens.undistort({corners_px.begin(), corners_px.end()});
     if (!corners || print.margin < 1 || !std::ranges::all_of(corners_px, [&](const cv::Point2d &corner) {
@@ -511,16 +522,14 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
     const auto distorted = lens.distort(found);
     if (!distorted)
         return std::nullopt;
-    MeasuredCorners result;
-    std::ranges::copy(*distorted, result.corners_px.begin());
+    AlignedPrint result{{}, fit.white()};
+    std::ranges::copy(*distorted, result.corners.corners_px.begin());
     const double sigma_px = noise_scale(found, *distorted) * std::sqrt(equivalent_variance(fit.covariance_px2()));
     if (!(sigma_px > 0) || !std::isfinite(sigma_px))
         return std::nullopt;
-    result.sigma_px = sigma_px;
+    result.corners.sigma_px = sigma_px;
     return result;
 }
-
-namespace {
 
 // Whether the white at most of the edges is too bright for the camera, which shifts the edges into the black.
 bool is_overexposed(const cv::Mat &grey, const Corners &corners_px, int cells) {
@@ -542,24 +551,31 @@ bool is_overexposed(const cv::Mat &grey, const Corners &corners_px, int cells) {
 
 } // namespace
 
+std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
+                                           const Lens &lens, const Print &print) {
+    const auto result = aligned(grey, transfer, corners_px, lens, print);
+    return result ? std::optional(result->corners) : std::nullopt;
+}
+
 std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
                                               const Lens &lens, int cells, const std::function<Print()> &print,
                                               bool is_subpixel) {
     constexpr double max_blur_cells = 0.5, max_sigma_px = 0.05;
+    constexpr double max_light = 255, max_clipped = 0.05; // of the light of white
     const auto edges = refine_edges(grey, transfer, rough_px, lens, cells, is_subpixel);
-    if (edges && edges->blur_cells <= max_blur_cells && edges->sigma_px <= max_sigma_px &&
-        !is_overexposed(grey, edges->corners_px, cells))
+    const bool is_doubtful = !edges || edges->sigma_px > max_sigma_px,
+               is_unreliable = is_doubtful || edges->blur_cells > max_blur_cells;
+    if (!is_unreliable && !is_overexposed(grey, edges->corners_px, cells))
         return edges;
     const Print known = print();
-    const Corners start = edges ? edges->corners_px : rough_px;
-    if (const auto aligned = align_print(grey, transfer, start, lens, known))
-        return aligned;
+    if (const auto found = aligned(grey, transfer, edges ? edges->corners_px : rough_px, lens, known))
+        return is_unreliable || found->white > (1 + max_clipped) * max_light ? found->corners : *edges;
     // A detector takes the end of what hides a corner for the corner. The others nearly tell where it is.
-    for (std::size_t i = 0; i < 4 && (!edges || edges->sigma_px > max_sigma_px); ++i) {
+    for (std::size_t i = 0; is_doubtful && i < 4; ++i) {
         Corners corners_px = rough_px;
         corners_px[i] = rough_px[(i + 1) % 4] - rough_px[(i + 2) % 4] + rough_px[(i + 3) % 4];
-        if (const auto aligned = align_print(grey, transfer, corners_px, lens, known))
-            return aligned;
+        if (const auto found = aligned(grey, transfer, corners_px, lens, known))
+            return found->corners;
     }
     return edges;
 }
