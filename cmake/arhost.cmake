@@ -47,8 +47,8 @@ include(${CMAKE_CURRENT_LIST_DIR}/arhost_add_plugin.cmake)
 
 # arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…] [STATISTICAL filter]
 # [EXHAUSTIVE]): a GoogleTest program; each of its tests is a CTest test. STATISTICAL: these tests measure over many
-# samples or check all values; sanitizers omit them, because other tests execute the same code. With EXHAUSTIVE, those of
-# instantiations named `Exhaustive` are registered, too, with that label and ten times the timeout.
+# samples, check all values or repeat others; sanitizers omit them, because other tests execute the same code. With
+# EXHAUSTIVE, those of instantiations named `Exhaustive` are registered, too, with that label and ten times the timeout.
 function(arhost_add_test name)
   cmake_parse_arguments(ARG "EXHAUSTIVE" "TIMEOUT;STATISTICAL" "SOURCES;LIBRARIES;LABELS;DEPENDS" ${ARGN})
   if(NOT ARG_TIMEOUT)

@@ -57,64 +57,83 @@ const std::vector<Dimension> dimensions = {
     {"rolling", "px", {0, 1, 2, 4, 8, 16}, &Conditions::rolling_px},
 };
 
-struct View {
-    GreyFrame frame;
+// Four times the resolution, so 512 rays per pixel. A lens blurs before the sensor samples.
+constexpr int fine = 4;
+const arhost_intrinsics fine_camera =
+    test::intrinsics_of(size * fine, fine *camera.fx, fine *camera.fy, fine *camera.cx + 1.5, fine *camera.cy + 1.5);
+
+struct SharpView {
+    cv::Mat picture; // of the fine camera
     test::Mt truth;
 };
 
-// A tag at a random place near the centre, turned at random and tilted about a random axis.
-class Views {
+// Tags at random places near the centre, turned at random and tilted about random axes.
+class SharpViews {
 public:
-    Views(const Conditions &conditions, int count) {
+    // Draws them anew only if the conditions need others.
+    const std::vector<SharpView> &of(const Conditions &conditions, int count) {
+        if (!views_.empty() && conditions.tilt_degrees == tilt_degrees_ && conditions.side_px == side_px_)
+            return views_;
+        views_.clear();
+        tilt_degrees_ = conditions.tilt_degrees;
+        side_px_ = conditions.side_px;
         std::mt19937 random(1);
         std::uniform_real_distribution<double> turn(-180, 180), shift(-30, 30);
         const test::Print print = test::april_tag("tag36h11", 0).with_margin(1);
         for (int i = 0; i < count; ++i) {
-            const double z = camera.fx * side_mm / conditions.side_px;
+            const double z = camera.fx * side_mm / side_px_;
             const double axis = turn(random) * std::numbers::pi / 180;
-            const Eigen::Matrix3d rotation = pose::rotation_by(conditions.tilt_degrees * std::numbers::pi / 180 *
+            const Eigen::Matrix3d rotation = pose::rotation_by(tilt_degrees_ * std::numbers::pi / 180 *
                                                                Eigen::Vector3d(std::cos(axis), std::sin(axis), 0)) *
                                              pose::rotation_by({0, 0, turn(random) * std::numbers::pi / 180}) *
                                              Eigen::Vector3d(1, -1, -1).asDiagonal();
             const double x = shift(random) * z / camera.fx, y = shift(random) * z / camera.fy;
             const test::Mt truth = matrix_of(Rigid{rotation, {x, y, z}});
-            views_.emplace_back(
-                View{GreyFrame(picture(conditions, print, truth, static_cast<std::uint64_t>(i) + 1)), truth});
+            views_.push_back({test::render(fine_camera, {{print, side_mm, truth}}), truth});
         }
+        return views_;
     }
-    const std::deque<View> &all() const { return views_; }
 
 private:
-    static cv::Mat picture(const Conditions &conditions, const test::Print &print, const test::Mt &truth,
-                           std::uint64_t seed) {
-        // Drawn and blurred at four times the resolution: 512 rays per pixel, and a lens blurs before the sensor
-        // samples.
-        const arhost_intrinsics fine =
-            test::intrinsics_of(size * 4, 4 * camera.fx, 4 * camera.fy, 4 * camera.cx + 1.5, 4 * camera.cy + 1.5);
-        cv::Mat_<float> grey = test::render(fine, {{print, side_mm, truth}});
-        if (conditions.hidden > 0) {
-            const double far = side_mm / 2 + 10, near = side_mm * (0.5 - conditions.hidden);
-            std::vector<cv::Point> cover;
-            for (const auto &[x, y] : {std::pair(-far, far), {-near, far}, {-near, near}, {-far, near}})
-                cover.emplace_back(test::pixel_of(truth, fine, x, y));
-            cv::fillConvexPoly(grey, cover, cv::Scalar(120));
-        }
-        if (conditions.rolling_px > 0) {
-            const cv::Point2d centre = test::pixel_of(truth, fine, 0, 0);
-            const double skew = conditions.rolling_px / conditions.side_px;
-            const cv::Matx23d shear(1, skew, -skew * centre.y, 0, 1, 0);
-            cv::warpAffine(grey, grey, shear, grey.size(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
-        }
-        cv::GaussianBlur(grey, grey, {}, 4 * conditions.blur_px);
-        cv::Mat reduced;
-        cv::resize(grey, reduced, size, 0, 0, cv::INTER_AREA);
-        reduced.convertTo(reduced, CV_16S, conditions.exposure); // the sensor's noise comes before saturation
-        test::add_noise(reduced, conditions.noise, seed);
-        return reduced;
-    }
-
-    std::deque<View> views_;
+    std::vector<SharpView> views_;
+    double tilt_degrees_ = 0, side_px_ = 0;
 };
+
+struct View {
+    GreyFrame frame;
+    test::Mt truth;
+};
+using Views = std::deque<View>;
+
+cv::Mat photo(const Conditions &conditions, const SharpView &sharp, std::uint64_t seed) {
+    cv::Mat_<float> grey = sharp.picture;
+    if (conditions.hidden > 0) {
+        const double far = side_mm / 2 + 10, near = side_mm * (0.5 - conditions.hidden);
+        std::vector<cv::Point> cover;
+        for (const auto &[x, y] : {std::pair(-far, far), {-near, far}, {-near, near}, {-far, near}})
+            cover.emplace_back(test::pixel_of(sharp.truth, fine_camera, x, y));
+        cv::fillConvexPoly(grey, cover, cv::Scalar(120));
+    }
+    if (conditions.rolling_px > 0) {
+        const cv::Point2d centre = test::pixel_of(sharp.truth, fine_camera, 0, 0);
+        const double skew = conditions.rolling_px / conditions.side_px;
+        const cv::Matx23d shear(1, skew, -skew * centre.y, 0, 1, 0);
+        cv::warpAffine(grey, grey, shear, grey.size(), cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+    }
+    cv::GaussianBlur(grey, grey, {}, fine * conditions.blur_px);
+    cv::Mat reduced;
+    cv::resize(grey, reduced, size, 0, 0, cv::INTER_AREA);
+    reduced.convertTo(reduced, CV_16S, conditions.exposure); // the sensor's noise comes before saturation
+    test::add_noise(reduced, conditions.noise, seed);
+    return reduced;
+}
+
+Views views_of(const Conditions &conditions, const std::vector<SharpView> &sharp) {
+    Views views;
+    for (std::size_t i = 0; i < sharp.size(); ++i)
+        views.emplace_back(View{GreyFrame(photo(conditions, sharp[i], i + 1)), sharp[i].truth});
+    return views;
+}
 
 double percentile(std::vector<double> values, double fraction) {
     return values.empty() ? 0 : test::percentile(std::move(values), fraction);
@@ -153,7 +172,7 @@ Result measure(const Views &views, const Detect &detect) {
     Result result;
     double sum = 0;
     std::vector<std::pair<Rigid, pose::Estimate>> poses; // truth, and the nearest of the two solutions
-    for (const View &view : views.all()) {
+    for (const View &view : views) {
         const std::optional<Detection> detection = detect(view.frame);
         if (!detection)
             continue;
@@ -279,6 +298,7 @@ int main(int argc, char **argv) try {
     csv << ",covered,flips\n";
     const int count = is_quick ? 20 : 300;
     Detectors detectors;
+    SharpViews sharp;
     std::vector<std::string> missed;
     std::printf(
         "%d pictures of a tag for each row, tilt 30 degrees, 60 px, blur 0.6 px, noise 1.5 levels where nothing "
@@ -294,7 +314,7 @@ int main(int argc, char **argv) try {
         for (const double value : dimension.values) {
             Conditions conditions;
             conditions.*dimension.field = value;
-            const Views views(conditions, count);
+            const Views views = views_of(conditions, sharp.of(conditions, count));
             std::array<Result, 4> results;
             for (std::size_t which = 0; which < results.size(); ++which) {
                 const Result &result = results[which] =

@@ -279,7 +279,8 @@ std::optional<Line> fit_edge(const Picture &picture, const Edge &edge, Slope &sl
     return line;
 }
 
-// As refine_edges(), with so many positions on each edge until the corners move by less than half of `converged_px`:
+// As refine_edges(), with so many positions on each edge until the corners move by less than half of
+// `converged_px`, or for three passes:
 // a line beside the edge shifts its offsets by up to a tenth of its distance.
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
                                        bool is_subpixel, std::size_t first_positions) {
@@ -308,7 +309,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     const double min_step_px = std::min(sharp_step_px, max_step_px), converged_px = 0.8 * min_step_px;
 
     // +1 if the square is darker than its surroundings, otherwise −1
-    double sign = 0, rough_strength = 0, strength = 0, moved = 0, margin_px = reach * min_step_px, blur_cells = 0,
+    double sign = 0, rough_strength = 0, strength = 0, margin_px = reach * min_step_px, blur_cells = 0,
            variance = 0; // of a coordinate of a corner
     bool is_unclear = false;
     std::size_t positions = first_positions;
@@ -345,7 +346,8 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
         }
         if (pass == 0)
             rough_strength = strength;
-        moved = variance = 0;
+        double moved = 0;
+        variance = 0;
         for (int i = 0; i < 4; ++i) {
             const Line &before = lines[(i + 3) % 4], &after = lines[i];
             const cv::Point2d crossing = before.point + (after.point - before.point).cross(after.direction) /

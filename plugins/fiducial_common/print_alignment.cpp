@@ -10,7 +10,6 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <iterator>
 #include <limits>
 #include <span>
 #include <utility>
@@ -291,46 +290,45 @@ double sum_of_squared_differences_from_mean(std::span<const Pixel> pixels) {
     return squares - sum * sum / static_cast<double>(pixels.size());
 }
 
-// Returns the pixels without those where something hides the print or a highlight is, and those that blur mixes with
-// them. `max_error`: of other pixels, relative to the contrast of the print, unless noise is stronger.
-std::vector<Pixel> without_outliers(std::span<const Pixel> pixels, const LightOfCode &light_of_code,
-                                    const Model &model, double max_error) {
+// Returns which pixels show the print: not those where something hides it or a highlight is, and not those that blur
+// mixes with them. `max_error`: of a pixel, relative to the contrast of the print.
+std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &light_of_code, const Model &model,
+                          double max_error) {
     constexpr double max_deviations = 4, reach = 4; // standard deviations of the noise, of the blur
     constexpr double max_edge_px = 0.1; // displacement; a lens does not blur an edge exactly as the model does
-    // In codes, whose noise depends less on the brightness than that of light.
+    // Noise depends less on the brightness in codes than in light.
     const auto code_of = [&](double light) {
-        const auto above = std::clamp(std::ranges::upper_bound(light_of_code, light), light_of_code.begin() + 1,
-                                      light_of_code.end() - 1);
+        const double within = std::clamp<double>(light, light_of_code.front(), light_of_code.back());
+        const auto above =
+            std::min(std::ranges::upper_bound(light_of_code, within), light_of_code.end() - 1); // not the first
         const double below = *(above - 1);
-        return static_cast<double>(above - light_of_code.begin() - 1) + (light - below) / (*above - below);
+        return static_cast<double>(above - light_of_code.begin() - 1) + (within - below) / (*above - below);
     };
-    std::vector<double> errors, edge_errors;
-    errors.reserve(pixels.size());
-    edge_errors.reserve(pixels.size());
-    for (const Pixel &pixel : pixels) {
-        const double expected = pixel.light - pixel.residual, edge = max_edge_px * pixel.change_per_px;
-        errors.push_back(
-            pixel.is_saturated && pixel.residual < 0 ? 0 : std::abs(code_of(pixel.light) - code_of(expected)));
-        edge_errors.push_back((code_of(expected + edge) - code_of(expected - edge)) / 2);
-    }
-    std::vector<double> sorted = errors;
-    const auto median = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::ranges::nth_element(sorted, median);
+    std::vector<double> code_errors(pixels.size()), known;
+    known.reserve(pixels.size());
+    for (std::size_t i = 0; i < pixels.size(); ++i)
+        if (const Pixel &pixel = pixels[i]; !pixel.is_saturated || pixel.residual > 0) {
+            code_errors[i] = std::abs(code_of(pixel.light) - code_of(pixel.light - pixel.residual));
+            known.push_back(code_errors[i]);
+        }
+    if (known.empty())
+        return std::vector<bool>(pixels.size(), true);
+    const auto median = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
+    std::ranges::nth_element(known, median);
     const double deviation = 1.4826 * *median; // of a normal distribution
-    const double contrast = std::abs(code_of(model.black + model.contrast) - code_of(model.black));
-    const double bound = std::max(max_deviations * deviation, max_error * contrast);
     std::vector<cv::Vec2d> outliers;
     for (std::size_t i = 0; i < pixels.size(); ++i)
-        if (errors[i] > bound + edge_errors[i])
+        if (code_errors[i] > max_deviations * deviation &&
+            std::abs(pixels[i].residual) >
+                max_error * std::abs(model.contrast) + max_edge_px * pixels[i].change_per_px)
             outliers.push_back(pixels[i].place);
-    std::vector<Pixel> kept;
-    kept.reserve(pixels.size());
-    std::ranges::copy_if(pixels, std::back_inserter(kept), [&](const Pixel &pixel) {
-        return std::ranges::none_of(outliers, [&](const cv::Vec2d &outlier) {
+    std::vector<bool> result;
+    result.reserve(pixels.size());
+    for (const Pixel &pixel : pixels)
+        result.push_back(std::ranges::none_of(outliers, [&](const cv::Vec2d &outlier) {
             return cv::norm(pixel.place - outlier) <= reach * model.blur_px;
-        });
-    });
-    return kept;
+        }));
+    return result;
 }
 
 // Returns the variance of the independent noise of 8 coordinates whose 95 % ellipsoid contains noise with this
@@ -370,25 +368,36 @@ public:
         linearize_model();
         // A hidden part shifts the first fits, so only the largest errors are outliers at first.
         double max_error = 0.4;
+        std::vector<bool> kept(all_.size(), true);
         for (int round = 0;; ++round) {
             const bool is_converged = minimize();
-            linearize(all_, print_, blurred_, model_);
-            std::vector<Pixel> kept;
+            if (!std::isfinite(linearize(all_, print_, blurred_, model_).cost))
+                return false;
+            std::vector<bool> next;
             do
-                kept = without_outliers(all_, light_of_code_, model_, max_error);
-            while (kept.size() == pixels_.size() && (max_error /= 2) >= least_max_error);
-            const double left_out = 1 - static_cast<double>(kept.size()) / static_cast<double>(all_.size());
-            if (kept.size() == pixels_.size() || round == max_rounds)
+                next = inliers(all_, light_of_code_, model_, max_error);
+            while (next == kept && (max_error /= 2) >= least_max_error);
+            const double left_out =
+                static_cast<double>(std::ranges::count(next, false)) / static_cast<double>(all_.size());
+            if (next == kept || round == max_rounds || steps_left_ == 0)
                 return is_converged && left_out <= max_hidden && resembles();
             if (left_out > max_left_out)
                 return false;
             max_error = std::max(max_error / 2, least_max_error);
-            pixels_ = std::move(kept);
+            kept = std::move(next);
+            pixels_.clear();
+            for (std::size_t i = 0; i < all_.size(); ++i)
+                if (kept[i])
+                    pixels_.push_back(all_[i]);
             linearize_model();
         }
     }
 
-    double white() const { return model_.black + std::max(model_.contrast, 0.0); } // its light
+    // The light of white where the illumination is brightest.
+    double white() const {
+        return (model_.black + std::max(model_.contrast, 0.0)) *
+               (1 + (std::abs(model_.slope[0]) + std::abs(model_.slope[1])) / 2);
+    }
     const cv::Vec<double, 8> &corners_px() const { return model_.corners_px; }
     cv::Matx<double, 8, 8> covariance_px2() const {
         const auto covariance = fit_.normal.inv(cv::DECOMP_CHOLESKY) * (fit_.cost / (fit_.pixels - unknowns));
@@ -410,19 +419,23 @@ private:
         constexpr double converged_px = 0.01;
         constexpr int max_steps = 20;
         double damping = 1e-3;
-        bool is_converged = false;
-        for (int step = 0; step < max_steps && !is_converged; ++step) {
+        bool is_converged = false, is_limited = false; // by the distance from the first corners
+        for (int step = 0; step < max_steps && steps_left_ > 0 && !is_converged; ++step, --steps_left_) {
             const std::optional<Model> next = step_from_model(damping);
             if (!next)
                 return false;
             const double moved_px = std::max(cv::norm(next->corners_px, model_.corners_px, cv::NORM_INF),
                                              std::abs(next->blur_px - model_.blur_px));
-            if (!(cv::norm(next->corners_px, first_px_, cv::NORM_INF) < shortest_px_ / 4)) // also for NaN
-                return false;
+            if (cv::norm(next->corners_px, first_px_, cv::NORM_INF) >= shortest_px_ / 4) {
+                is_limited = true;
+                damping *= 10;
+                continue;
+            }
+            is_limited &= damping > 1;
             const Fit candidate = linearize(pixels_, print_, blurred_, *next);
             const bool is_better = candidate.cost < fit_.cost;
             // At the minimum, the resolution of the table decides whether a small step is better.
-            is_converged = moved_px < converged_px && (is_better || damping <= 1);
+            is_converged = moved_px < converged_px && (is_better || damping <= 1) && !is_limited;
             damping *= is_better ? 0.1 : 10;
             if (is_better) {
                 model_ = *next;
@@ -455,7 +468,7 @@ private:
         next.black += change[9];
         next.contrast += change[10];
         next.slope += cv::Vec2d(change[11], change[12]);
-        return next;
+        return std::isfinite(cv::norm(change, cv::NORM_L2)) ? std::optional(next) : std::nullopt;
     }
 
     // A table that is too fine for the blur would need a large kernel, a coarse one would not resolve it. Returns
@@ -476,6 +489,7 @@ private:
     cv::Matx22d cells_per_px_;        // at the centre
     cv::Vec<double, 8> first_px_;
     double shortest_px_;
+    int steps_left_ = 60; // fits that succeed need fewer
     double table_blur_px_ = first_blur_px;
     BlurredPrint blurred_ = table();
     Model model_;
@@ -562,8 +576,9 @@ std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transf
                                               bool is_subpixel) {
     constexpr double max_blur_cells = 0.5, max_sigma_px = 0.05;
     constexpr double max_light = 255, max_clipped = 0.05; // of the light of white
+    constexpr double max_skew_cells = 0.5;
     const auto edges = refine_edges(grey, transfer, rough_px, lens, cells, is_subpixel);
-    const bool is_doubtful = !edges || edges->sigma_px > max_sigma_px,
+    const bool is_doubtful = !edges || !(edges->sigma_px > 0 && edges->sigma_px <= max_sigma_px),
                is_unreliable = is_doubtful || edges->blur_cells > max_blur_cells;
     if (!is_unreliable && !is_overexposed(grey, edges->corners_px, cells))
         return edges;
@@ -571,12 +586,14 @@ std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transf
     if (const auto found = aligned(grey, transfer, edges ? edges->corners_px : rough_px, lens, known))
         return is_unreliable || found->white > (1 + max_clipped) * max_light ? found->corners : *edges;
     // A detector takes the end of what hides a corner for the corner. The others nearly tell where it is.
-    for (std::size_t i = 0; is_doubtful && i < 4; ++i) {
-        Corners corners_px = rough_px;
-        corners_px[i] = rough_px[(i + 1) % 4] - rough_px[(i + 2) % 4] + rough_px[(i + 3) % 4];
-        if (const auto found = aligned(grey, transfer, corners_px, lens, known))
-            return found->corners;
-    }
+    const cv::Point2d skew_px = rough_px[0] - rough_px[1] + rough_px[2] - rough_px[3];
+    if (is_doubtful && cv::norm(skew_px) * cells > max_skew_cells * cv::norm(rough_px[2] - rough_px[0]))
+        for (std::size_t i = 0; i < 4; ++i) {
+            Corners corners_px = rough_px;
+            corners_px[i] = rough_px[(i + 1) % 4] - rough_px[(i + 2) % 4] + rough_px[(i + 3) % 4];
+            if (const auto found = aligned(grey, transfer, corners_px, lens, known))
+                return found->corners;
+        }
     return edges;
 }
 

@@ -82,7 +82,7 @@ protected:
         return cv::imread(folder() / "board.png", cv::IMREAD_GRAYSCALE);
     }
     // Pictures of a print from different directions.
-    static std::vector<cv::Mat> photos(const cv::Mat &print, int count) {
+    static std::vector<cv::Mat> photos(const cv::Mat &print, int count, double blur_px = 0) {
         constexpr int samples = 4; // per pixel and axis
         std::vector<cv::Mat> result;
         for (int i = 0; i < count; ++i) {
@@ -108,6 +108,8 @@ protected:
                                 cv::Size(samples * width, samples * height), cv::INTER_LINEAR, cv::BORDER_CONSTANT,
                                 cv::Scalar(200));
             cv::resize(fine, photo, cv::Size(width, height), 0, 0, cv::INTER_AREA);
+            if (blur_px > 0)
+                cv::GaussianBlur(photo, photo, {}, blur_px);
             cv::LUT(photo, srgb_of_light(), photo);
             result.push_back(photo);
         }
@@ -120,9 +122,9 @@ protected:
             codes(0, light) = static_cast<std::uint8_t>(arhost::shading::srgb8_exact(light / 255.0));
         return codes;
     }
-    void write_photos(const std::string &family, int count) const {
+    void write_photos(const std::string &family, int count, double blur_px = 0) const {
         int i = 0;
-        for (const cv::Mat &photo : photos(print_board(family), count))
+        for (const cv::Mat &photo : photos(print_board(family), count, blur_px))
             cv::imwrite(folder() / fmt::format("photo-{:02}.png", i++), photo);
         write_camera();
     }
@@ -165,6 +167,13 @@ TEST_P(MapOfFamily, IsThatOfThePrintedBoard) {
     EXPECT_THAT(read("desk.map.yaml"),
                 HasSubstr("\nversion: 1\n" + std::string(family.starts_with("DICT") ? "dictionary" : "family") +
                           ": " + family));
+}
+
+TEST_F(MapProgram, IsPreciseInBlurredImages) {
+    write_photos("tag36h11", 12, 2);
+    const std::string arguments = "--images photo-*.png --camera camera.yaml --family tag36h11 --ids 1-4 --side 40";
+    ASSERT_EQ(learn(arguments + " -o desk.map.yaml"), 0) << printed();
+    EXPECT_THAT(printed(), HasSubstr("4 markers from 12 of 12 frames; RMS reprojection error 0.0"));
 }
 
 TEST_F(MapProgram, ReadsAVideo) {
