@@ -70,7 +70,7 @@ struct SharpView {
 // Tags at random places near the centre, turned at random and tilted about random axes.
 class SharpViews {
 public:
-    // Draws them anew only if the conditions need others.
+    // Draws only if the conditions differ from the last ones in tilt or size.
     const std::vector<SharpView> &of(const Conditions &conditions, int count) {
         if (!views_.empty() && conditions.tilt_degrees == tilt_degrees_ && conditions.side_px == side_px_)
             return views_;
