@@ -67,7 +67,7 @@ struct SharpView {
     test::Mt truth;
 };
 
-// Tags at random places near the centre, turned at random and tilted about random axes.
+// Tags at random places near the centre, turned at random and tilted about random axes: 3 MB each.
 class SharpViews {
 public:
     // Draws only if the conditions differ from the last ones in tilt or size.
@@ -106,7 +106,8 @@ struct View {
 using Views = std::deque<View>;
 
 cv::Mat photo(const Conditions &conditions, const SharpView &sharp, std::uint64_t seed) {
-    cv::Mat_<float> grey = sharp.picture;
+    cv::Mat_<float> grey;
+    sharp.picture.convertTo(grey, CV_32F);
     if (conditions.hidden > 0) {
         const double far = side_mm / 2 + 10, near = side_mm * (0.5 - conditions.hidden);
         std::vector<cv::Point> cover;

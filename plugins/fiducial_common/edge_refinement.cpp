@@ -279,9 +279,8 @@ std::optional<Line> fit_edge(const Picture &picture, const Edge &edge, Slope &sl
     return line;
 }
 
-// As refine_edges(), with so many positions on each edge until the corners move by less than half of
-// `converged_px`, or for three passes:
-// a line beside the edge shifts its offsets by up to a tenth of its distance.
+// As refine_edges(), with so many positions on each edge until the corners move by less than half of `converged_px`,
+// or for three passes: a line beside the edge shifts its offsets by up to a tenth of its distance.
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
                                        bool is_subpixel, std::size_t first_positions) {
     constexpr int max_passes = 8, max_first_passes = 3;

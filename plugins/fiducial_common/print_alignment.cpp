@@ -309,7 +309,8 @@ std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &ligh
     for (std::size_t i = 0; i < pixels.size(); ++i)
         if (const Pixel &pixel = pixels[i]; !pixel.is_saturated || pixel.residual > 0) {
             code_errors[i] = std::abs(code_of(pixel.light) - code_of(pixel.light - pixel.residual));
-            known.push_back(code_errors[i]);
+            if (pixel.light > light_of_code.front()) // black may be clipped, too
+                known.push_back(code_errors[i]);
         }
     if (known.empty())
         return std::vector<bool>(pixels.size(), true);
@@ -380,7 +381,7 @@ public:
             const double left_out =
                 static_cast<double>(std::ranges::count(next, false)) / static_cast<double>(all_.size());
             if (next == kept || round == max_rounds || steps_left_ == 0)
-                return is_converged && left_out <= max_hidden && resembles();
+                return is_converged && (next == kept || round == max_rounds) && left_out <= max_hidden && resembles();
             if (left_out > max_left_out)
                 return false;
             max_error = std::max(max_error / 2, least_max_error);
@@ -419,7 +420,7 @@ private:
         constexpr double converged_px = 0.01;
         constexpr int max_steps = 20;
         double damping = 1e-3;
-        bool is_converged = false, is_limited = false; // by the distance from the first corners
+        bool is_converged = false, is_limited = false; // an undamped step would leave the square
         for (int step = 0; step < max_steps && steps_left_ > 0 && !is_converged; ++step, --steps_left_) {
             const std::optional<Model> next = step_from_model(damping);
             if (!next)
@@ -433,6 +434,7 @@ private:
             }
             is_limited &= damping > 1;
             const Fit candidate = linearize(pixels_, print_, blurred_, *next);
+            is_limited |= !std::isfinite(candidate.cost);
             const bool is_better = candidate.cost < fit_.cost;
             // At the minimum, the resolution of the table decides whether a small step is better.
             is_converged = moved_px < converged_px && (is_better || damping <= 1) && !is_limited;
@@ -576,7 +578,7 @@ std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transf
                                               bool is_subpixel) {
     constexpr double max_blur_cells = 0.5, max_sigma_px = 0.05;
     constexpr double max_light = 255, max_clipped = 0.05; // of the light of white
-    constexpr double max_skew_cells = 0.5;
+    constexpr double max_skew_cells = 0.25;               // of a square that is seen in perspective
     const auto edges = refine_edges(grey, transfer, rough_px, lens, cells, is_subpixel);
     const bool is_doubtful = !edges || !(edges->sigma_px > 0 && edges->sigma_px <= max_sigma_px),
                is_unreliable = is_doubtful || edges->blur_cells > max_blur_cells;
@@ -587,7 +589,8 @@ std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transf
         return is_unreliable || found->white > (1 + max_clipped) * max_light ? found->corners : *edges;
     // A detector takes the end of what hides a corner for the corner. The others nearly tell where it is.
     const cv::Point2d skew_px = rough_px[0] - rough_px[1] + rough_px[2] - rough_px[3];
-    if (is_doubtful && cv::norm(skew_px) * cells > max_skew_cells * cv::norm(rough_px[2] - rough_px[0]))
+    const double diagonal_px = std::min(cv::norm(rough_px[2] - rough_px[0]), cv::norm(rough_px[3] - rough_px[1]));
+    if (is_doubtful && cv::norm(skew_px) * cells > max_skew_cells * diagonal_px)
         for (std::size_t i = 0; i < 4; ++i) {
             Corners corners_px = rough_px;
             corners_px[i] = rough_px[(i + 1) % 4] - rough_px[(i + 2) % 4] + rough_px[(i + 3) % 4];

@@ -214,8 +214,9 @@ struct HiddenCorner {
     cv::Mat picture;
 
     // `hidden`: side of the cover relative to that of the tag.
-    HiddenCorner(const Print &tag, double hidden, int level, double turn_degrees, int corner = 0)
-        : mt(pose_of(5, -3, 500, 25, 15, turn_degrees)) {
+    HiddenCorner(const Print &tag, double hidden, int level, double turn_degrees, int corner = 0,
+                 double tilt_degrees = 25)
+        : mt(pose_of(5, -3, 500, tilt_degrees, 15, turn_degrees)) {
         const arhost_intrinsics fine = finer(camera);
         cv::Mat sharp = render(fine, {{tag.with_margin(1), 100, mt}});
         const double far = 65, near = 100 * (0.5 - hidden); // mm
@@ -277,6 +278,20 @@ TEST(PrintAlignment, ToleratesFlareBesideDeepBlack) {
         EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.04) << k;
 }
 
+TEST(PrintAlignment, ToleratesNoiseBesideClippedBlack) {
+    const Print tag = april_tag("tag36h11", 4);
+    const Mt mt = pose_of(5, -3, 500, 20, 15, 25);
+    cv::Mat picture = finely_rendered(camera, {tag.with_margin(1), 100, mt});
+    cv::GaussianBlur(picture, picture, {}, 0.7);
+    picture.convertTo(picture, CV_16S, 1, -40); // black is below 0
+    add_noise(picture, 8, 1);
+    const Corners truth = corners_of(mt, camera, 100);
+    const auto found = align_print(picture, ARHOST_TRANSFER_LINEAR, truth, Lens(camera), print_of(tag));
+    ASSERT_TRUE(found);
+    for (int k = 0; k < 4; ++k)
+        EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.25) << k; // clipped black shifts edges
+}
+
 TEST(PrintAlignment, ReturnsNothingIfHalfOfThePrintIsHidden) {
     const Print tag = april_tag("tag36h11", 4);
     for (const int level : {0, 120, 255}) {
@@ -289,16 +304,17 @@ TEST(PrintAlignment, ReturnsNothingIfHalfOfThePrintIsHidden) {
 TEST(CornerRefinement, FindsACornerThatTheDetectorTakesForTheEndOfItsCover) {
     const Lens lens(camera);
     const Print tag = april_tag("tag36h11", 4);
-    for (int corner = 0; corner < 4; ++corner) {
-        const HiddenCorner view(tag, 0.3, 120, 50, corner);
+    for (int i = 0; i < 8; ++i) {
+        const int corner = i % 4;
+        const HiddenCorner view(tag, 0.3, 120, 50, corner, i < 4 ? 25 : 55);
         const Corners truth = view.corners_px();
         Corners rough = truth;
         rough[corner] = pixel_of(view.mt, camera, corner == 1 || corner == 2 ? 35 : -35, corner < 2 ? 35 : -35);
         const auto found = refine_corners(view.picture, ARHOST_TRANSFER_LINEAR, rough, lens, tag.corner_cells,
                                           [&] { return print_of(tag); });
-        ASSERT_TRUE(found) << corner;
+        ASSERT_TRUE(found) << i;
         for (int k = 0; k < 4; ++k)
-            EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.06) << k << ": " << corner;
+            EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.06) << k << ": " << i;
     }
 }
 
