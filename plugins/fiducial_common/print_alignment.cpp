@@ -296,6 +296,15 @@ std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &ligh
                           double max_error) {
     constexpr double max_deviations = 4, reach = 4; // standard deviations of the noise, of the blur
     constexpr double max_edge_px = 0.1; // displacement; a lens does not blur an edge exactly as the model does
+    const auto tells_its_light = [](const Pixel &pixel) { return !pixel.is_saturated || pixel.residual > 0; };
+    std::vector<const Pixel *> outliers;
+    for (const Pixel &pixel : pixels)
+        if (tells_its_light(pixel) &&
+            std::abs(pixel.residual) > max_error * std::abs(model.contrast) + max_edge_px * pixel.change_per_px)
+            outliers.push_back(&pixel);
+    if (outliers.empty())
+        return std::vector<bool>(pixels.size(), true);
+
     // Noise depends less on the brightness in codes than in light.
     const auto code_of = [&](double light) {
         const double within = std::clamp<double>(light, light_of_code.front(), light_of_code.back());
@@ -304,30 +313,22 @@ std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &ligh
         const double below = *(above - 1);
         return static_cast<double>(above - light_of_code.begin() - 1) + (within - below) / (*above - below);
     };
-    std::vector<double> code_errors(pixels.size()), known;
-    known.reserve(pixels.size());
-    for (std::size_t i = 0; i < pixels.size(); ++i)
-        if (const Pixel &pixel = pixels[i]; !pixel.is_saturated || pixel.residual > 0) {
-            code_errors[i] = std::abs(code_of(pixel.light) - code_of(pixel.light - pixel.residual));
-            if (pixel.light > light_of_code.front()) // black may be clipped, too
-                known.push_back(code_errors[i]);
-        }
-    if (known.empty())
-        return std::vector<bool>(pixels.size(), true);
-    const auto median = known.begin() + static_cast<std::ptrdiff_t>(known.size() / 2);
-    std::ranges::nth_element(known, median);
+    const auto code_error = [&](const Pixel &pixel) {
+        return std::abs(code_of(pixel.light) - code_of(pixel.light - pixel.residual));
+    };
+    std::vector<double> errors{0}; // never empty
+    for (const Pixel &pixel : pixels)
+        if (tells_its_light(pixel) && pixel.light > light_of_code.front()) // black may be clipped, too
+            errors.push_back(code_error(pixel));
+    const auto median = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+    std::ranges::nth_element(errors, median);
     const double deviation = 1.4826 * *median; // of a normal distribution
-    std::vector<cv::Vec2d> outliers;
-    for (std::size_t i = 0; i < pixels.size(); ++i)
-        if (code_errors[i] > max_deviations * deviation &&
-            std::abs(pixels[i].residual) >
-                max_error * std::abs(model.contrast) + max_edge_px * pixels[i].change_per_px)
-            outliers.push_back(pixels[i].place);
+    std::erase_if(outliers, [&](const Pixel *one) { return code_error(*one) <= max_deviations * deviation; });
     std::vector<bool> result;
     result.reserve(pixels.size());
     for (const Pixel &pixel : pixels)
-        result.push_back(std::ranges::none_of(outliers, [&](const cv::Vec2d &outlier) {
-            return cv::norm(pixel.place - outlier) <= reach * model.blur_px;
+        result.push_back(std::ranges::none_of(outliers, [&](const Pixel *outlier) {
+            return cv::norm(pixel.place - outlier->place) <= reach * model.blur_px;
         }));
     return result;
 }
