@@ -59,8 +59,7 @@ const std::vector<Dimension> dimensions = {
 
 // Four times the resolution, so 512 rays per pixel. A lens blurs before the sensor samples.
 constexpr int fine = 4;
-const arhost_intrinsics fine_camera =
-    test::intrinsics_of(size * fine, fine *camera.fx, fine *camera.fy, fine *camera.cx + 1.5, fine *camera.cy + 1.5);
+const arhost_intrinsics fine_camera = test::enlarged(camera, fine);
 
 struct SharpView {
     cv::Mat picture; // of the fine camera
@@ -108,13 +107,8 @@ using Views = std::deque<View>;
 cv::Mat photo(const Conditions &conditions, const SharpView &sharp, std::uint64_t seed) {
     cv::Mat_<float> grey;
     sharp.picture.convertTo(grey, CV_32F);
-    if (conditions.hidden > 0) {
-        const double far = side_mm / 2 + 10, near = side_mm * (0.5 - conditions.hidden);
-        std::vector<cv::Point> cover;
-        for (const auto &[x, y] : {std::pair(-far, far), {-near, far}, {-near, near}, {-far, near}})
-            cover.emplace_back(test::pixel_of(sharp.truth, fine_camera, x, y));
-        cv::fillConvexPoly(grey, cover, cv::Scalar(120));
-    }
+    if (conditions.hidden > 0)
+        test::hide_corner(grey, fine_camera, sharp.truth, side_mm, conditions.hidden, 120);
     if (conditions.rolling_px > 0) {
         const cv::Point2d centre = test::pixel_of(sharp.truth, fine_camera, 0, 0);
         const double skew = conditions.rolling_px / conditions.side_px;

@@ -347,11 +347,11 @@ double equivalent_variance(const cv::Matx<double, 8, 8> &covariance) {
 // The fit of a print to pixels.
 class PrintFit {
 public:
-    // `pixels`: without outliers yet. `shortest_px`: side of the square.
+    // `pixels`: with outliers. `cells_per_px`: at the centre. `shortest_px`: side of the square.
     PrintFit(const Print &print, const LightOfCode &light_of_code, std::vector<Pixel> pixels,
-             const cv::Vec<double, 8> &corners_px, double shortest_px)
+             const cv::Vec<double, 8> &corners_px, const cv::Matx22d &cells_per_px, double shortest_px)
         : print_(print), light_of_code_(light_of_code), all_(std::move(pixels)), pixels_(all_),
-          cells_per_px_(px_per_cell_at_centre(px_from_cells(corners_px, print), print).inv()), first_px_(corners_px),
+          cells_per_px_(cells_per_px), first_px_(corners_px),
           shortest_px_(shortest_px), model_{corners_px, first_blur_px, 0, 1, {}} {
         linearize_model();
     }
@@ -523,13 +523,14 @@ std::optional<AlignedPrint> aligned(const cv::Mat &grey, arhost_transfer transfe
     if (!(shortest_px >= min_cell_px * print.side())) // false for NaN
         return std::nullopt;
     const Homography px_from_cell = px_from_cells(first_px, print);
-    if (!(cv::determinant(px_per_cell_at_centre(px_from_cell, print)) > 0)) // no square seen from the front; NaN
+    const cv::Matx22d px_per_cell = px_per_cell_at_centre(px_from_cell, print);
+    if (!(cv::determinant(px_per_cell) > 0)) // no square seen from the front; also for NaN
         return std::nullopt;
     const LightOfCode &light = light_of_code(transfer);
     std::vector<Pixel> pixels = pixels_of(grey, light, corners_px, lens, px_from_cell.inv(), print);
     if (pixels.size() < 4 * unknowns)
         return std::nullopt;
-    PrintFit fit(print, light, std::move(pixels), first_px, shortest_px);
+    PrintFit fit(print, light, std::move(pixels), first_px, px_per_cell.inv(), shortest_px);
     if (!fit.run())
         return std::nullopt;
     std::vector<cv::Point2d> found;

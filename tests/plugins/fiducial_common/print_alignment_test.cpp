@@ -29,26 +29,21 @@ arhost::fiducial::Print print_of(const Print &tag) {
     return print;
 }
 
-// Of a camera with four times the resolution.
-arhost_intrinsics finer(arhost_intrinsics intrinsics) {
-    intrinsics.width *= 4;
-    intrinsics.height *= 4;
-    for (double *value : {&intrinsics.fx, &intrinsics.fy, &intrinsics.cx, &intrinsics.cy})
-        *value *= 4;
-    intrinsics.cx += 1.5;
-    intrinsics.cy += 1.5;
-    return intrinsics;
-}
+constexpr int fine = 4; // times the resolution, because the renderer has only 32 rays per pixel
 
-cv::Mat reduced(const cv::Mat &fine) {
+cv::Mat reduced(const cv::Mat &fine_picture) {
     cv::Mat picture;
-    cv::resize(fine, picture, size, 0, 0, cv::INTER_AREA);
+    cv::resize(fine_picture, picture, size, 0, 0, cv::INTER_AREA);
     return picture;
 }
 
-// Rendered at four times the resolution, because the renderer has only 32 rays per pixel.
 cv::Mat finely_rendered(const arhost_intrinsics &intrinsics, const Placed &marker) {
-    return reduced(render(finer(intrinsics), {marker}));
+    return reduced(render(enlarged(intrinsics, fine), {marker}));
+}
+
+void expect_near(const MeasuredCorners &found, const Corners &truth, double max_px) {
+    for (int k = 0; k < 4; ++k)
+        EXPECT_LT(cv::norm(found.corners_px[k] - truth[k]), max_px) << k;
 }
 
 struct Case {
@@ -217,15 +212,10 @@ struct HiddenCorner {
     HiddenCorner(const Print &tag, double hidden, int level, double turn_degrees, int corner = 0,
                  double tilt_degrees = 25)
         : mt(pose_of(5, -3, 500, tilt_degrees, 15, turn_degrees)) {
-        const arhost_intrinsics fine = finer(camera);
-        cv::Mat sharp = render(fine, {{tag.with_margin(1), 100, mt}});
-        const double far = 65, near = 100 * (0.5 - hidden); // mm
-        std::vector<cv::Point> cover;
-        const double right = corner == 1 || corner == 2 ? 1 : -1, up = corner < 2 ? 1 : -1;
-        for (const auto &[x, y] : {std::pair(far, far), {near, far}, {near, near}, {far, near}})
-            cover.emplace_back(pixel_of(mt, fine, right * x, up * y));
-        cv::fillConvexPoly(sharp, cover, cv::Scalar(level));
-        cv::GaussianBlur(sharp, sharp, {}, 4 * 0.7);
+        const arhost_intrinsics fine_camera = enlarged(camera, fine);
+        cv::Mat sharp = render(fine_camera, {{tag.with_margin(1), 100, mt}});
+        hide_corner(sharp, fine_camera, mt, 100, hidden, level, corner);
+        cv::GaussianBlur(sharp, sharp, {}, fine * 0.7);
         reduced(sharp).convertTo(picture, CV_16S);
         add_noise(picture, 1.5, 1);
     }
@@ -241,10 +231,9 @@ TEST(PrintAlignment, IgnoresWhatHidesACorner) {
                 const HiddenCorner view(tag, hidden, level, turn_degrees);
                 const Corners truth = view.corners_px();
                 const auto found = align_print(view.picture, ARHOST_TRANSFER_LINEAR, truth, lens, print_of(tag));
-                ASSERT_TRUE(found) << hidden << " " << level << " " << turn_degrees;
-                for (int k = 0; k < 4; ++k)
-                    EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.06)
-                        << k << ": " << hidden << " " << level << " " << turn_degrees;
+                SCOPED_TRACE(testing::Message() << hidden << " " << level << " " << turn_degrees);
+                ASSERT_TRUE(found);
+                expect_near(*found, truth, 0.06);
                 EXPECT_LT(found->sigma_px, 0.03);
             }
 }
@@ -274,8 +263,7 @@ TEST(PrintAlignment, ToleratesFlareBesideDeepBlack) {
     const Corners truth = corners_of(mt, camera, 100);
     const auto found = align_print(picture, ARHOST_TRANSFER_SRGB, truth, lens, print_of(tag));
     ASSERT_TRUE(found);
-    for (int k = 0; k < 4; ++k)
-        EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.04) << k;
+    expect_near(*found, truth, 0.04);
 }
 
 TEST(PrintAlignment, ToleratesNoiseBesideClippedBlack) {
@@ -288,8 +276,7 @@ TEST(PrintAlignment, ToleratesNoiseBesideClippedBlack) {
     const Corners truth = corners_of(mt, camera, 100);
     const auto found = align_print(picture, ARHOST_TRANSFER_LINEAR, truth, Lens(camera), print_of(tag));
     ASSERT_TRUE(found);
-    for (int k = 0; k < 4; ++k)
-        EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.25) << k; // clipped black shifts edges
+    expect_near(*found, truth, 0.25); // clipped black shifts edges
 }
 
 TEST(PrintAlignment, ReturnsNothingIfHalfOfThePrintIsHidden) {
@@ -312,9 +299,9 @@ TEST(CornerRefinement, FindsACornerThatTheDetectorTakesForTheEndOfItsCover) {
         rough[corner] = pixel_of(view.mt, camera, corner == 1 || corner == 2 ? 35 : -35, corner < 2 ? 35 : -35);
         const auto found = refine_corners(view.picture, ARHOST_TRANSFER_LINEAR, rough, lens, tag.corner_cells,
                                           [&] { return print_of(tag); });
-        ASSERT_TRUE(found) << i;
-        for (int k = 0; k < 4; ++k)
-            EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.06) << k << ": " << i;
+        SCOPED_TRACE(i);
+        ASSERT_TRUE(found);
+        expect_near(*found, truth, 0.06);
     }
 }
 
@@ -363,9 +350,9 @@ TEST(CornerRefinement, AlignsThePrintBesideSaturatedWhite) {
         const auto truth = corners_of(mt, camera, 100);
         const auto found = refine_corners(picture, ARHOST_TRANSFER_LINEAR, truth, lens, tag.corner_cells,
                                           [&] { return print_of(tag); });
-        ASSERT_TRUE(found) << family;
-        for (int k = 0; k < 4; ++k)
-            EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.15) << family;
+        SCOPED_TRACE(family);
+        ASSERT_TRUE(found);
+        expect_near(*found, truth, 0.15);
     }
 }
 
@@ -380,8 +367,7 @@ TEST(CornerRefinement, AlignsThePrintIfEdgesAreNotFound) {
     const auto found = refine_corners(
         picture, ARHOST_TRANSFER_LINEAR, truth, lens, 8, [&] { return print_of(tag); }, true);
     ASSERT_TRUE(found);
-    for (int k = 0; k < 4; ++k)
-        EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), 0.1);
+    expect_near(*found, truth, 0.1);
 }
 
 TEST(CornerRefinement, KeepsTheEdgesOfAPrintThatDoesNotFit) {

@@ -12,7 +12,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 namespace arhost::test {
@@ -93,6 +95,29 @@ inline std::array<cv::Point2d, 4> corners_of(const Mt &mt, const arhost_intrinsi
     const double h = side_mm / 2;
     return {pixel_of(mt, camera, -h, h), pixel_of(mt, camera, h, h), pixel_of(mt, camera, h, -h),
             pixel_of(mt, camera, -h, -h)};
+}
+
+// Returns the camera with so many times the resolution.
+inline arhost_intrinsics enlarged(arhost_intrinsics camera, int times) {
+    camera.width *= static_cast<std::uint32_t>(times);
+    camera.height *= static_cast<std::uint32_t>(times);
+    for (double *value : {&camera.fx, &camera.fy, &camera.cx, &camera.cy})
+        *value *= times;
+    for (double *centre : {&camera.cx, &camera.cy})
+        *centre += (times - 1) / 2.0; // pixel centres are at integers
+    return camera;
+}
+
+// Covers a corner of a marker, and what is beside it, with one grey level. `hidden`: side of the cover inside the
+// marker, relative to that of the marker. `corner`: index in corners_of().
+inline void hide_corner(cv::Mat &picture, const arhost_intrinsics &camera, const Mt &mt, double side_mm,
+                        double hidden, int level, int corner = 0) {
+    const double far = 0.6 * side_mm, near = side_mm * (0.5 - hidden);
+    const double right = corner == 1 || corner == 2 ? 1 : -1, up = corner < 2 ? 1 : -1;
+    std::vector<cv::Point> cover;
+    for (const auto &[x, y] : {std::pair(far, far), {near, far}, {near, near}, {far, near}})
+        cover.emplace_back(pixel_of(mt, camera, right * x, up * y));
+    cv::fillConvexPoly(picture, cover, cv::Scalar(level));
 }
 
 struct Placed {
