@@ -75,6 +75,18 @@ cv::Mat_<float> rises(const Picture &picture, const Edge &edge, double step_px, 
     return result;
 }
 
+// Returns the sum of how much the light rises from so far inside to so far outside.
+double rise_across(const Picture &picture, const Edge &edge, double distance_px) {
+    double sum = 0;
+    for (std::size_t i = 0; i < edge.at_px.size(); ++i) {
+        const cv::Point2d step = distance_px * edge.outward[i], inside = edge.at_px[i] - step,
+                          outside = edge.at_px[i] + step;
+        if (picture.contains(inside) && picture.contains(outside))
+            sum += picture.light_at(outside) - picture.light_at(inside);
+    }
+    return sum;
+}
+
 cv::Mat_<float> mean_of_rows(const cv::Mat_<float> &rises) {
     cv::Mat_<float> mean;
     cv::reduce(rises, mean, 0, cv::REDUCE_AVG);
@@ -95,7 +107,8 @@ struct Slope {
     int averaged = 1;
 };
 
-constexpr std::size_t min_positions = 16, max_positions = 100; // on an edge
+// On an edge: in the first passes, and at least and at most in the last ones.
+constexpr std::size_t first_positions = 8, min_positions = 16, max_positions = 100;
 
 constexpr double contained = 0.35; // greatest rise at the rim relative to the peak, if the slope ends before the rim
 
@@ -219,7 +232,7 @@ std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &l
                                  std::size_t max_count) {
     const double length = cv::norm(to - from);
     const double margin = std::min(margin_px, length / 4) / length;
-    const std::size_t count = std::clamp(static_cast<std::size_t>(length / 2), min_positions, max_count);
+    const std::size_t count = std::min(std::max(static_cast<std::size_t>(length / 2), min_positions), max_count);
     std::vector<cv::Point2d> straight;
     for (std::size_t i = 0; i < count; ++i)
         straight.push_back(from + (margin + (1 - 2 * margin) * static_cast<double>(i) / (count - 1)) * (to - from));
@@ -282,7 +295,7 @@ std::optional<Line> fit_edge(const Picture &picture, const Edge &edge, Slope &sl
 // As refine_edges(), with so many positions on each edge until the corners move by less than half of `converged_px`,
 // or for three passes: a line beside the edge shifts its offsets by up to a tenth of its distance.
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
-                                       bool is_subpixel, std::size_t first_positions) {
+                                       bool is_subpixel, std::size_t positions_at_first) {
     constexpr int max_passes = 8, max_first_passes = 3;
     constexpr double sharp_step_px = 0.25; // suffices for a sharp edge
     constexpr double min_strength = 0.9;   // of the refined edges, relative to the rough ones
@@ -311,7 +324,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     double sign = 0, rough_strength = 0, strength = 0, margin_px = reach * min_step_px, blur_cells = 0,
            variance = 0; // of a coordinate of a corner
     bool is_unclear = false;
-    std::size_t positions = first_positions;
+    std::size_t positions = positions_at_first;
     for (int pass = 0; pass < max_passes; ++pass) {
         std::array<Edge, 4> edges;
         for (int i = 0; i < 4; ++i) {
@@ -323,7 +336,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
         if (pass == 0) {
             double rise = 0;
             for (const Edge &edge : edges)
-                rise += cv::sum(rises(picture, edge, min_step_px, 1))[0];
+                rise += rise_across(picture, edge, reach * min_step_px);
             sign = rise < 0 ? -1 : 1;
         }
         std::array<Line, 4> lines;
@@ -382,7 +395,7 @@ std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer
                                             const Lens &lens, int cells, bool is_subpixel) {
     const Picture picture{grey, light_of_code(transfer)};
     // The first passes correct most of the error, for which few positions suffice, unless noise has to be averaged.
-    auto result = refined(picture, rough_px, lens, cells, is_subpixel, min_positions);
+    auto result = refined(picture, rough_px, lens, cells, is_subpixel, first_positions);
     return result ? result : refined(picture, rough_px, lens, cells, is_subpixel, max_positions);
 }
 
