@@ -9,8 +9,10 @@
 #include <fiducial_common/prints.hpp>
 #include <fiducial_common/rendered_marker.hpp>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <deque>
 #include <exception>
@@ -19,6 +21,7 @@
 #include <memory>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace {
