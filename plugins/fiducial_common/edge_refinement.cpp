@@ -232,7 +232,9 @@ std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &l
                                  std::size_t max_count) {
     const double length = cv::norm(to - from);
     const double margin = std::min(margin_px, length / 4) / length;
-    const std::size_t count = std::min(std::max(static_cast<std::size_t>(length / 2), min_positions), max_count);
+    // Clamped first: corners may be so far apart that no integer holds their distance.
+    const auto count =
+        std::min(static_cast<std::size_t>(std::clamp<double>(length / 2, min_positions, max_positions)), max_count);
     std::vector<cv::Point2d> straight;
     for (std::size_t i = 0; i < count; ++i)
         straight.push_back(from + (margin + (1 - 2 * margin) * static_cast<double>(i) / (count - 1)) * (to - from));
