@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "edge_refinement.hpp"
 
+#include "blurred_edge.hpp"
 #include "light_of_code.hpp"
 
 #include <opencv2/imgproc.hpp>
@@ -10,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -17,15 +19,7 @@ namespace arhost::fiducial {
 namespace {
 
 struct Line {
-    cv::Point2d point, direction; // `point` is the centroid of the points that the line was fitted to
-    double offset_variance;       // px², of the distance between the line and the true one at `point`
-    double spread;                // px², variance of the points along the line
-
-    // Variance of the distance between the line and the true one, beside `at`.
-    double variance_at(cv::Point2d at) const {
-        const double along = direction.dot(at - point);
-        return offset_variance * (1 + along * along / spread);
-    }
+    cv::Point2d point, direction;
 };
 
 struct Picture {
@@ -93,22 +87,25 @@ cv::Mat_<float> mean_of_rows(const cv::Mat_<float> &rises) {
     return mean;
 }
 
-// Neighbouring positions on an edge share pixels, and rows of rises that were averaged. This is the distance in px at
-// which positions get independent, if pixels are: the integral of the autocorrelation of bilinear samples.
-constexpr double correlation_px = 1.5;
-
 // The rises near an edge. `peak` and `at_rim` are the greatest mean rises at any offset and at the greatest offsets,
 // `on_line` is the mean at offset 0 with steps of the smallest size; `width_px` is the width of a slope of constant
-// rise that is as high, `noise` the standard deviation of a rise before averaging, relative to the peak, and
-// `averaged` the number of rows that each was averaged from.
+// rise that is as high, and `noise` the standard deviation of a rise before averaging, relative to the peak.
 struct Slope {
     cv::Mat_<float> rises;
     double step_px, peak = 0, at_rim = 0, on_line = 0, width_px = 0, noise = 0;
-    int averaged = 1;
+
+    // Standard deviation of the blur, including that by the averages over pixels. The baseline (a uniform
+    // distribution) and the interpolation (a triangular one) widen the slope, too.
+    double blur_px() const {
+        constexpr double min_blur_px = 0.3, interpolation_variance = 1.0 / 6;
+        const double baseline_px = 2 * half_baseline * step_px;
+        return std::sqrt(std::max(width_px * width_px / (2 * std::numbers::pi) - baseline_px * baseline_px / 12 -
+                                      interpolation_variance,
+                                  min_blur_px * min_blur_px));
+    }
 };
 
-// On an edge: in the first passes, and at least and at most in the last ones.
-constexpr std::size_t first_positions = 8, min_positions = 16, max_positions = 100;
+constexpr std::size_t few_positions = 8, min_positions = 16, max_positions = 100; // on an edge
 
 constexpr double contained = 0.35; // greatest rise at the rim relative to the peak, if the slope ends before the rim
 
@@ -130,8 +127,7 @@ Slope find_slope(const Picture &picture, const Edge &edge, double min_step_px, d
     }
 }
 
-// Averages the rises of neighbouring positions until their noise is small relative to the slope. Sets `noise` and
-// `averaged`.
+// Averages the rises of neighbouring positions until their noise is small relative to the slope. Sets `noise`.
 void reduce_noise(Slope &slope) {
     constexpr double max_noise = 0.08; // relative to the peak
     std::vector<float> steps; // differences between neighbours contain little of the picture, but all the noise
@@ -143,10 +139,8 @@ void reduce_noise(Slope &slope) {
     const double noise = 1.05 * *median; // standard deviation of a rise, if it is normally distributed
     const double ratio = noise / (max_noise * slope.peak);
     const int averaged = static_cast<int>(std::min(ratio * ratio, slope.rises.rows / 4.0));
-    if (averaged > 1) {
-        slope.averaged = averaged | 1;
-        cv::blur(slope.rises, slope.rises, {1, slope.averaged});
-    }
+    if (averaged > 2) // an odd number
+        cv::blur(slope.rises, slope.rises, {1, (averaged - 1) | 1});
     slope.noise = noise / slope.peak;
 }
 
@@ -160,24 +154,6 @@ std::optional<double> edge_offset_px(const Slope &slope, int row, double min_ris
             weights += above * above;
         }
     return weights > 0 ? std::optional(weighted / weights * slope.step_px) : std::nullopt;
-}
-
-// `dependent`: the number of neighbouring points whose errors are the same.
-Line fit_line(const std::vector<cv::Point2f> &points, double dependent) {
-    cv::Vec4f fitted;
-    cv::fitLine(points, fitted, cv::DIST_L2, 0, 0, 0);
-    Line line{cv::Point2d(fitted[2], fitted[3]), cv::Point2d(fitted[0], fitted[1]), 0, 0};
-    const double independent = static_cast<double>(points.size()) / dependent;
-    for (const cv::Point2f &point : points) {
-        const cv::Point2d from_centroid = cv::Point2d(point) - line.point;
-        const double across = line.direction.cross(from_centroid), along = line.direction.dot(from_centroid);
-        line.offset_variance += across * across;
-        line.spread += along * along;
-    }
-    const auto count = static_cast<double>(points.size());
-    line.spread /= count;
-    line.offset_variance /= count * std::max(independent - 2, 1.0); // a line has two degrees of freedom
-    return line;
 }
 
 // Returns the points that are closer than `tolerance_px` to the line through two of the points that has most of them.
@@ -200,13 +176,14 @@ std::vector<cv::Point2f> most_collinear(const std::vector<cv::Point2f> &points, 
 
 // Fits a line without outliers. `sampled` is the number of positions at which an edge was searched. Returns
 // std::nullopt if fewer than half of them remain, or if half of these are further than `max_median_px` from the line.
-std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size_t sampled, double max_median_px,
-                                      double dependent) {
+std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size_t sampled, double max_median_px) {
     constexpr double min_inlier_px = 0.3;
     for (int round = 0;; ++round) {
         if (points.size() < std::max<std::size_t>(sampled / 2, 2))
             return std::nullopt;
-        const Line line = fit_line(points, dependent);
+        cv::Vec4f fitted;
+        cv::fitLine(points, fitted, cv::DIST_L2, 0, 0, 0);
+        const Line line{cv::Point2d(fitted[2], fitted[3]), cv::Point2d(fitted[0], fitted[1])};
         std::vector<double> residuals;
         residuals.reserve(points.size());
         for (const cv::Point2f &point : points)
@@ -225,16 +202,13 @@ std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size
     }
 }
 
-// Returns at most `max_count` positions on the line between two corners in undistorted pixels, which are in clockwise
-// order. Keeps `margin_px` away from the corners, where the search would hit the adjacent edges. Returns std::nullopt
-// if the lens does not see the edge.
+// Returns `count` positions on the line between two corners in undistorted pixels, which are in clockwise order.
+// Keeps `margin_px` away from the corners, where the search would hit the adjacent edges. Returns std::nullopt if the
+// lens does not see the edge.
 std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &lens, double margin_px,
-                                 std::size_t max_count) {
+                                 std::size_t count) {
     const double length = cv::norm(to - from);
     const double margin = std::min(margin_px, length / 4) / length;
-    // Clamped first: corners may be so far apart that no integer holds their distance.
-    const auto count =
-        std::min(static_cast<std::size_t>(std::clamp<double>(length / 2, min_positions, max_positions)), max_count);
     std::vector<cv::Point2d> straight;
     for (std::size_t i = 0; i < count; ++i)
         straight.push_back(from + (margin + (1 - 2 * margin) * static_cast<double>(i) / (count - 1)) * (to - from));
@@ -247,6 +221,12 @@ std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &l
         edge.outward.push_back(cv::Point2d(along.y, -along.x) / cv::norm(along));
     }
     return edge;
+}
+
+// Returns a number of positions between two points.
+std::size_t count_of(cv::Point2d from, cv::Point2d to, double per_px) {
+    // Clamped first: corners may be so far apart that no integer holds their distance.
+    return static_cast<std::size_t>(std::clamp<double>(per_px * cv::norm(to - from), min_positions, max_positions));
 }
 
 // Returns the light of a step from one code to the next, at the mean code along an edge.
@@ -268,9 +248,8 @@ std::optional<Line> fit_edge(const Picture &picture, const Edge &edge, Slope &sl
         return std::nullopt;
     reduce_noise(slope);
     // Relative to the peak. The wider the slope is relative to the cell, the more its flanks depend on what is beside
-    // the border and the margin, and the less of them is used. In noise, the flanks are needed for averaging.
-    const double noise = slope.noise / std::sqrt(slope.averaged);
-    const double min_rise = std::clamp(slope.width_px / cell_px - 0.2, 0.1, std::max(0.1, 0.6 - 75 * noise * noise));
+    // the border and the margin, and the less of them is used.
+    const double min_rise = std::clamp(slope.width_px / cell_px - 0.2, 0.1, 0.6);
     std::vector<cv::Point2d> found;
     for (std::size_t i = 0; i < edge.at_px.size(); ++i)
         if (const auto offset = edge_offset_px(slope, static_cast<int>(i), min_rise * slope.peak))
@@ -282,23 +261,143 @@ std::optional<Line> fit_edge(const Picture &picture, const Edge &edge, Slope &sl
     for (const cv::Point2d &point : *straight)
         relative.push_back(point - from);
     const double max_median_px = max_median_steps * slope.step_px;
-    const double spacing_px =
-        cv::norm(edge.at_px.back() - edge.at_px.front()) / static_cast<double>(edge.at_px.size() - 1);
-    const double dependent = std::max<double>(slope.averaged, correlation_px / std::min(spacing_px, correlation_px));
-    auto line = fit_line_robustly(relative, edge.at_px.size(), max_median_px, dependent);
+    auto line = fit_line_robustly(relative, edge.at_px.size(), max_median_px);
     if (!line)
-        line = fit_line_robustly(most_collinear(relative, max_median_px / 2), edge.at_px.size(), max_median_px,
-                                 dependent);
+        line = fit_line_robustly(most_collinear(relative, max_median_px / 2), edge.at_px.size(), max_median_px);
     if (line)
         line->point += from;
     return line;
 }
 
-// As refine_edges(), with so many positions on each edge until the corners move by less than half of `converged_px`,
-// or for three passes: a line beside the edge shifts its offsets by up to a tenth of its distance.
+// Returns the pixels near an edge whose distance from `line` is at most `reach_px`, in undistorted pixels relative to
+// the line, ordered by columns, or by rows if the edge is steep.
+std::vector<EdgePixel> pixels_beside(const Picture &picture, const Edge &edge, const Line &line, cv::Point2d outward,
+                                     double blur_px, double reach_px, const Lens &lens) {
+    const cv::Point2d along = edge.at_px.back() - edge.at_px.front();
+    const bool is_steep = std::abs(along.y) > std::abs(along.x);
+    const cv::Point step = is_steep ? cv::Point(1, 0) : cv::Point(0, 1);
+    const int stride = std::max(static_cast<int>(blur_px / 2), 1); // resolves the blur
+    std::vector<cv::Point2d> places; // three of each column: the first pixel, the middle one and the last one
+    int last = std::numeric_limits<int>::min();
+    for (std::size_t i = 0; i < edge.at_px.size(); ++i) {
+        if (!picture.contains(edge.at_px[i]))
+            continue;
+        const cv::Point middle(cvRound(edge.at_px[i].x), cvRound(edge.at_px[i].y));
+        // One px more, because the middle is rounded and the line is not exactly at the position.
+        const int half = static_cast<int>(reach_px / std::max(std::abs(edge.outward[i].dot(step)), 0.5) + 1.5);
+        const int column = is_steep ? middle.y : middle.x;
+        const cv::Rect inside({}, picture.grey.size());
+        if (column == last || !inside.contains(middle - half * step) || !inside.contains(middle + half * step))
+            continue;
+        last = column;
+        for (const int offset : {-half, 0, half})
+            places.emplace_back(middle + offset * step);
+    }
+    const auto straight = lens.undistort(places);
+    std::vector<EdgePixel> result;
+    if (!straight)
+        return result;
+    for (std::size_t i = 0; i < places.size(); i += 3) {
+        const cv::Point middle(places[i + 1]);
+        const int half = cvRound((places[i + 2] - places[i + 1]).dot(step));
+        // Over so few px, the distortion is a quadratic function.
+        const cv::Point2d constant = (*straight)[i + 1], linear = ((*straight)[i + 2] - (*straight)[i]) / (2 * half),
+                          square = ((*straight)[i + 2] + (*straight)[i] - 2 * constant) / (2 * half * half);
+        for (int k = -half; k <= half; k += stride) {
+            const cv::Point2d place = constant - line.point + k * (linear + k * square);
+            const double across_px = outward.dot(place);
+            if (std::abs(across_px) <= reach_px)
+                result.push_back({line.direction.dot(place), across_px,
+                                  picture.light[picture.grey.at<std::uint8_t>(middle + k * step)],
+                                  static_cast<int>(i / 3)});
+        }
+    }
+    return result;
+}
+
+struct FittedEdge {
+    Line line; // `point`: where the errors of the offset and of the direction are independent
+    double offset_variance, turn_variance; // px², rad²
+    double blur_px;                        // standard deviation
+
+    // Variance of the distance between the line and the true one, beside `at`.
+    double variance_at(cv::Point2d at) const {
+        const double along_px = line.direction.dot(at - line.point);
+        return offset_variance + along_px * along_px * turn_variance;
+    }
+};
+
+// Fits an edge to the pixels beside it. `line` is close to it, and `from` and `to` are the corners.
+std::optional<FittedEdge> fit_pixels(const Picture &picture, Line line, cv::Point2d from, cv::Point2d to,
+                                     double cell_px, double blur_px, const Lens &lens) {
+    // Farther pixels tell little more. What is beside the border and the margin must not
+    // contribute.
+    const double reach_px = std::min(std::max(std::min(3.5 * blur_px, cell_px - 2.5 * blur_px), 1.6), 0.9 * cell_px);
+    const auto edge = edge_between(from, to, lens, 3 * blur_px + 1, count_of(from, to, 1));
+    if (!edge)
+        return std::nullopt;
+    if (line.direction.dot(to - from) < 0)
+        line.direction = -line.direction;
+    const cv::Point2d outward(line.direction.y, -line.direction.x);
+    const auto fitted =
+        fit_blurred_edge(pixels_beside(picture, *edge, line, outward, blur_px, reach_px, lens), blur_px);
+    if (!fitted)
+        return std::nullopt;
+    const cv::Point2d direction = line.direction + fitted->turn * outward;
+    return FittedEdge{{line.point + fitted->pivot_px * line.direction + fitted->offset_px * outward,
+                       direction / cv::norm(direction)},
+                      fitted->offset_variance,
+                      fitted->turn_variance,
+                      fitted->blur_px};
+}
+
+// Where the line crosses the next one.
+cv::Point2d crossing(const Line &line, const Line &next) {
+    return line.point +
+           (next.point - line.point).cross(next.direction) / line.direction.cross(next.direction) * line.direction;
+}
+
+// The square in undistorted pixels.
+struct Square {
+    std::array<cv::Point2d, 4> rough, corners;
+    double shortest_px;
+    std::array<double, 4> cells_px; // the uniform part beside each edge: the border and the margin of the print
+
+    Square(const std::vector<cv::Point2d> &rough_px, int cells)
+        : rough{rough_px[0], rough_px[1], rough_px[2], rough_px[3]}, corners(rough),
+          shortest_px(std::numeric_limits<double>::infinity()) {
+        for (std::size_t i = 0; i < 4; ++i) {
+            const cv::Point2d edge = next(i) - corners[i];
+            const double length = cv::norm(edge);
+            shortest_px = std::min(shortest_px, length);
+            const auto height = [&](std::size_t other) {
+                return std::abs(edge.cross(corners[other % 4] - corners[i])) / length;
+            };
+            cells_px[i] = std::min(height(i + 2), height(i + 3)) / cells;
+        }
+    }
+    const cv::Point2d &next(std::size_t i) const { return corners[(i + 1) % 4]; }
+
+    // Moves the corners to the crossings of lines. Returns how far, or std::nullopt if one is now far from the rough
+    // one.
+    std::optional<double> move_to(const std::array<Line, 4> &lines) {
+        double moved_px = 0;
+        for (std::size_t i = 0; i < 4; ++i) {
+            const cv::Point2d corner = crossing(lines[(i + 3) % 4], lines[i]);
+            moved_px = std::max(moved_px, cv::norm(corner - corners[i]));
+            corners[i] = corner;
+            if (!(cv::norm(corner - rough[i]) < shortest_px / 4)) // the comparison is false for NaN
+                return std::nullopt;
+        }
+        return moved_px;
+    }
+};
+
+// As refine_edges(). Searches the edges at no more than so many positions on each, and then fits them to the pixels.
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
-                                       bool is_subpixel, std::size_t positions_at_first) {
-    constexpr int max_passes = 8, max_first_passes = 3;
+                                       bool is_subpixel, std::size_t max_count) {
+    constexpr int max_passes = 8, max_fits = 3;
+    constexpr double max_moved_px = 0.2;   // by the last fit; its pixels are those near the line of the one before
     constexpr double sharp_step_px = 0.25; // suffices for a sharp edge
     constexpr double min_strength = 0.9;   // of the refined edges, relative to the rough ones
     constexpr double max_noise = 0.12;     // relative to the peak, for tags too small to average it out
@@ -306,31 +405,22 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     const auto rough = lens.undistort({rough_px.begin(), rough_px.end()});
     if (!rough)
         return std::nullopt;
-    std::vector<cv::Point2d> corners = *rough;
-    double shortest = std::numeric_limits<double>::infinity();
-    // One cell on each side of an edge is uniform: the border and the margin of the print.
-    std::array<double, 4> cells_px;
-    for (int i = 0; i < 4; ++i) {
-        const cv::Point2d edge = corners[(i + 1) % 4] - corners[i];
-        const double length = cv::norm(edge);
-        shortest = std::min(shortest, length);
-        const auto height = [&](int other) { return std::abs(edge.cross(corners[other % 4] - corners[i])) / length; };
-        cells_px[i] = std::min(height(i + 2), height(i + 3)) / cells;
-    }
-    const double cell_px = *std::ranges::min_element(cells_px), max_step_px = cell_px / reach;
+    Square square(*rough, cells);
+    const double cell_px = *std::ranges::min_element(square.cells_px), max_step_px = cell_px / reach;
     if (!(cell_px >= 1))
         return std::nullopt;
     const double min_step_px = std::min(sharp_step_px, max_step_px), converged_px = 0.8 * min_step_px;
 
     // +1 if the square is darker than its surroundings, otherwise −1
-    double sign = 0, rough_strength = 0, strength = 0, margin_px = reach * min_step_px, blur_cells = 0,
-           variance = 0; // of a coordinate of a corner
+    double sign = 0, rough_strength = 0, strength = 0, margin_px = reach * min_step_px;
     bool is_unclear = false;
-    std::size_t positions = positions_at_first;
+    std::array<Line, 4> lines;
+    std::array<double, 4> blurs_px{};
     for (int pass = 0; pass < max_passes; ++pass) {
         std::array<Edge, 4> edges;
-        for (int i = 0; i < 4; ++i) {
-            auto edge = edge_between(corners[i], corners[(i + 1) % 4], lens, margin_px, positions);
+        for (std::size_t i = 0; i < 4; ++i) {
+            const std::size_t count = std::min(count_of(square.corners[i], square.next(i), 0.5), max_count);
+            auto edge = edge_between(square.corners[i], square.next(i), lens, margin_px, count);
             if (!edge)
                 return std::nullopt;
             edges[i] = std::move(*edge);
@@ -341,18 +431,17 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
                 rise += rise_across(picture, edge, reach * min_step_px);
             sign = rise < 0 ? -1 : 1;
         }
-        std::array<Line, 4> lines;
-        strength = margin_px = blur_cells = 0;
+        strength = margin_px = 0;
         is_unclear = false;
-        for (int i = 0; i < 4; ++i) {
+        for (std::size_t i = 0; i < 4; ++i) {
             Slope slope = find_slope(picture, edges[i], min_step_px, max_step_px, sign);
-            const auto line = fit_edge(picture, edges[i], slope, cells_px[i], corners[i], lens);
+            const auto line = fit_edge(picture, edges[i], slope, square.cells_px[i], square.corners[i], lens);
             if (!line)
                 return std::nullopt;
             lines[i] = *line;
+            blurs_px[i] = slope.blur_px();
             strength += slope.on_line;
             margin_px = std::max(margin_px, reach * slope.step_px);
-            blur_cells = std::max(blur_cells, slope.width_px / cells_px[i]);
             const bool is_noisy = min_step_px < sharp_step_px && slope.noise > max_noise;
             const bool is_blurred = slope.step_px > min_step_px &&
                                     (slope.at_rim > contained * slope.peak || slope.width_px > max_blur * cell_px);
@@ -360,28 +449,41 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
         }
         if (pass == 0)
             rough_strength = strength;
-        double moved = 0;
-        variance = 0;
-        for (int i = 0; i < 4; ++i) {
-            const Line &before = lines[(i + 3) % 4], &after = lines[i];
-            const cv::Point2d crossing = before.point + (after.point - before.point).cross(after.direction) /
-                                                            before.direction.cross(after.direction) *
-                                                            before.direction;
-            // An error of a line moves the crossing along the other line.
-            const double sine = before.direction.cross(after.direction);
-            variance += (before.variance_at(crossing) + after.variance_at(crossing)) / (sine * sine) / (2 * 4);
-            moved = std::max(moved, cv::norm(crossing - corners[i]));
-            corners[i] = crossing;
-            if (!(cv::norm(crossing - (*rough)[i]) < shortest / 4)) // the comparison is false for NaN
-                return std::nullopt;
-        }
-        if (pass > 0 && positions == max_positions && moved < converged_px)
+        const auto moved_px = square.move_to(lines);
+        if (!moved_px)
+            return std::nullopt;
+        if (pass > 0 && *moved_px < converged_px)
             break;
-        if (moved < converged_px / 2 || pass == max_first_passes - 1)
-            positions = max_positions;
     }
     if (is_unclear || strength < min_strength * rough_strength)
         return std::nullopt;
+    std::array<FittedEdge, 4> fitted;
+    for (int pass = 0; pass < max_fits; ++pass) {
+        for (std::size_t i = 0; i < 4; ++i) {
+            const auto edge = fit_pixels(picture, lines[i], square.corners[i], square.next(i), square.cells_px[i],
+                                         blurs_px[i], lens);
+            if (!edge)
+                return std::nullopt;
+            fitted[i] = *edge;
+            lines[i] = edge->line;
+            blurs_px[i] = edge->blur_px;
+        }
+        const auto moved_px = square.move_to(lines);
+        if (!moved_px)
+            return std::nullopt;
+        if (*moved_px < max_moved_px)
+            break;
+    }
+    double variance = 0, blur_cells = 0; // of a coordinate; at the most blurred edge
+    for (std::size_t i = 0; i < 4; ++i) {
+        const FittedEdge &before = fitted[(i + 3) % 4], &after = fitted[i];
+        // An error of a line moves the crossing along the other line.
+        const double sine = before.line.direction.cross(after.line.direction);
+        variance +=
+            (before.variance_at(square.corners[i]) + after.variance_at(square.corners[i])) / (sine * sine) / (2 * 4);
+        blur_cells = std::max(blur_cells, after.blur_px / square.cells_px[i]);
+    }
+    const std::vector<cv::Point2d> corners(square.corners.begin(), square.corners.end());
     const auto distorted = lens.distort(corners);
     if (!distorted)
         return std::nullopt;
@@ -396,8 +498,8 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
 std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
                                             const Lens &lens, int cells, bool is_subpixel) {
     const Picture picture{grey, light_of_code(transfer)};
-    // The first passes correct most of the error, for which few positions suffice, unless noise has to be averaged.
-    auto result = refined(picture, rough_px, lens, cells, is_subpixel, first_positions);
+    // Few positions suffice to find where to fit the pixels, unless noise has to be averaged.
+    const auto result = refined(picture, rough_px, lens, cells, is_subpixel, few_positions);
     return result ? result : refined(picture, rough_px, lens, cells, is_subpixel, max_positions);
 }
 

@@ -578,12 +578,11 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
 std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
                                               const Lens &lens, int cells, const std::function<Print()> &print,
                                               bool is_subpixel) {
-    constexpr double max_blur_cells = 0.5, max_sigma_px = 0.05;
+    constexpr double max_blur_cells = 0.2;
     constexpr double max_light = 255, max_clipped = 0.05; // of the light of white
     constexpr double max_skew_cells = 0.25;               // of a square that is seen in perspective
     const auto edges = refine_edges(grey, transfer, rough_px, lens, cells, is_subpixel);
-    const bool is_doubtful = !edges || !(edges->sigma_px > 0 && edges->sigma_px <= max_sigma_px),
-               is_unreliable = is_doubtful || edges->blur_cells > max_blur_cells;
+    const bool is_unreliable = !edges || edges->sigma_px == 0 || edges->blur_cells > max_blur_cells;
     if (!is_unreliable && !is_overexposed(grey, edges->corners_px, cells))
         return edges;
     const Print known = print();
@@ -592,7 +591,7 @@ std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transf
     // A detector takes the end of what hides a corner for the corner. The others nearly tell where it is.
     const cv::Point2d skew_px = rough_px[0] - rough_px[1] + rough_px[2] - rough_px[3];
     const double diagonal_px = std::min(cv::norm(rough_px[2] - rough_px[0]), cv::norm(rough_px[3] - rough_px[1]));
-    if (is_doubtful && cv::norm(skew_px) * cells > max_skew_cells * diagonal_px)
+    if (is_unreliable && cv::norm(skew_px) * cells > max_skew_cells * diagonal_px)
         for (std::size_t i = 0; i < 4; ++i) {
             Corners corners_px = rough_px;
             corners_px[i] = rough_px[(i + 1) % 4] - rough_px[(i + 2) % 4] + rough_px[(i + 3) % 4];

@@ -135,11 +135,10 @@ TEST(EdgeRefinement, TellsTheNoiseOfTheCorners) {
                     : intrinsics_of({320, 240}, 200, 200, 159.5, 119.5, ARHOST_DISTORTION_BROWN, {k1, 0, 0, 0});
         const arhost::fiducial::Lens curved_lens(curved);
         double squares = 0, told = 0;
-        constexpr int count = 60;
+        constexpr int count = 30;
         for (int i = 0; i < count; ++i) {
             const Mt mt = pose_of(x_mm, 0, distance_mm, tilt(generator), tilt(generator), turn(generator));
-            cv::Mat picture = render(curved, {{april_tag("tag36h11", i).with_margin(2), 100, mt}});
-            cv::GaussianBlur(picture, picture, {}, blur_px);
+            cv::Mat picture = render_blurred(curved, {{april_tag("tag36h11", i).with_margin(2), 100, mt}}, blur_px);
             add_noise(picture, noise, i + 1);
             const auto truth = corners_of(mt, curved, 100);
             const auto fine = refine_edges(picture, ARHOST_TRANSFER_LINEAR, truth, curved_lens, cells);

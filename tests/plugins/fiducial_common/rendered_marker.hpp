@@ -142,6 +142,17 @@ inline cv::Mat render(const arhost_intrinsics &camera, const std::vector<Placed>
     return cv::Mat(static_cast<int>(drawn.height), static_cast<int>(drawn.width), CV_8U, drawn.codes.data()).clone();
 }
 
+// Renders markers at four times the resolution, blurs them and reduces the picture, because a lens blurs before the
+// pixels sample: a blur of the reduced picture would keep the aliasing of sharp edges.
+inline cv::Mat render_blurred(const arhost_intrinsics &camera, const std::vector<Placed> &markers, double blur_px) {
+    constexpr int fine = 4;
+    cv::Mat picture = render(enlarged(camera, fine), markers), reduced;
+    cv::GaussianBlur(picture, picture, {}, fine * blur_px);
+    cv::resize(picture, reduced, {static_cast<int>(camera.width), static_cast<int>(camera.height)}, 0, 0,
+               cv::INTER_AREA);
+    return reduced;
+}
+
 // Adds normally distributed noise, and saturates the result to 8 bits; the same seed gives the same noise.
 inline void add_noise(cv::Mat &picture, double sigma, uint64_t seed) {
     cv::Mat noise(picture.size(), CV_16S);

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// A straight blurred edge between two uniform areas.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+namespace arhost::fiducial {
+
+// A pixel near an edge. Its place is relative to a line near the edge.
+struct EdgePixel {
+    double along_px, across_px;
+    double light;
+    int column;          // ascending; pixels of a column are near the same place on the edge
+    double residual = 0; // of the light, for fit_blurred_edge()
+};
+
+// At `along_px`, the edge is where across_px is offset_px + turn * (along_px - pivot_px). The errors of `offset_px`
+// and `turn` are independent.
+struct BlurredEdge {
+    double pivot_px, offset_px, turn;
+    double offset_variance, turn_variance;
+    double blur_px; // standard deviation of the Gaussian blur
+};
+
+// Fits the edge, its blur and the light of both areas to the pixels by the method of least squares (Gauss–Newton):
+// light(across_px) = before + (after - before) * Φ(distance from the edge / blur_px), where Φ is the distribution
+// function of the standard normal distribution. Pixels average light over squares, which widens the blur.
+// Unlike a search along profiles, this interpolates nothing, so it has no error that repeats along an edge whose
+// slope is a simple fraction. Leaves out columns that do not fit, for example because something hides them, up to
+// half of all. `blur_px`: where to start, greater than 0. Returns std::nullopt if the fit does not converge near the
+// line.
+std::optional<BlurredEdge> fit_blurred_edge(std::vector<EdgePixel> pixels, double blur_px);
+
+} // namespace arhost::fiducial

@@ -1,0 +1,111 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fiducial_common/blurred_edge.hpp>
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+
+namespace {
+
+using arhost::fiducial::BlurredEdge;
+using arhost::fiducial::EdgePixel;
+using arhost::fiducial::fit_blurred_edge;
+
+struct Edge {
+    double offset_px = 0.2, turn = 0.01, blur_px = 0.7, before = 20, after = 180;
+
+    double at_px(double along_px) const { return offset_px + turn * along_px; }
+    double light(double along_px, double across_px) const {
+        const double z = (across_px - at_px(along_px)) / blur_px;
+        return before + (after - before) * 0.5 * std::erfc(-z / std::numbers::sqrt2);
+    }
+};
+
+// Pixels of 40 columns, one px apart, whose places within the columns differ.
+std::vector<EdgePixel> pixels_of(const Edge &edge, double noise = 0, std::uint32_t seed = 1) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    std::vector<EdgePixel> pixels;
+    for (int column = 0; column < 40; ++column)
+        for (int i = -3; i <= 3; ++i) {
+            const double along_px = column - 12.0, across_px = i + 0.37 * column - std::round(0.37 * column);
+            pixels.push_back({along_px, across_px, edge.light(along_px, across_px) + noise * normal(random), column});
+        }
+    return pixels;
+}
+
+double at_px(const BlurredEdge &found, double along_px) {
+    return found.offset_px + found.turn * (along_px - found.pivot_px);
+}
+
+TEST(BlurredEdge, IsWhereThePixelsShowIt) {
+    for (const Edge &edge : {Edge{}, Edge{-0.4, -0.02, 0.7}, Edge{0.3, 0, 0.4}, Edge{0.1, 0.01, 1.2},
+                             Edge{0.2, 0.01, 0.7, 180, 20}, Edge{0.2, 0.01, 0.7, 3, 5}}) {
+        const auto found = fit_blurred_edge(pixels_of(edge), 0.8);
+        ASSERT_TRUE(found);
+        for (const double along_px : {-12.0, 27.0})
+            EXPECT_NEAR(at_px(*found, along_px), edge.at_px(along_px), 1e-3);
+        EXPECT_NEAR(found->blur_px, edge.blur_px, 1e-2);
+    }
+}
+
+TEST(BlurredEdge, TellsItsVariance) {
+    constexpr int count = 400;
+    const Edge edge;
+    double offset_squares = 0, turn_squares = 0, products = 0, told_offset = 0, told_turn = 0;
+    for (int i = 0; i < count; ++i) {
+        const auto found = fit_blurred_edge(pixels_of(edge, 8, i), 0.7);
+        ASSERT_TRUE(found);
+        const double offset = found->offset_px - edge.at_px(found->pivot_px), turn = found->turn - edge.turn;
+        offset_squares += offset * offset / count;
+        turn_squares += turn * turn / count;
+        products += offset * turn / count;
+        told_offset += found->offset_variance / count;
+        told_turn += found->turn_variance / count;
+    }
+    EXPECT_NEAR(std::sqrt(told_offset / offset_squares), 1, 0.1);
+    EXPECT_NEAR(std::sqrt(told_turn / turn_squares), 1, 0.1);
+    EXPECT_LT(std::abs(products), 0.2 * std::sqrt(offset_squares * turn_squares)) << "the errors are independent";
+}
+
+TEST(BlurredEdge, LeavesOutWhatHidesIt) {
+    const Edge edge;
+    for (const int hidden : {5, 12, 16})
+        for (const double light : {0, 100, 255}) {
+            auto pixels = pixels_of(edge, 2);
+            for (EdgePixel &pixel : pixels)
+                if (pixel.column >= 40 - hidden)
+                    pixel.light = light;
+            const auto found = fit_blurred_edge(pixels, 0.7);
+            SCOPED_TRACE(testing::Message() << hidden << " " << light);
+            ASSERT_TRUE(found);
+            EXPECT_NEAR(at_px(*found, 0), edge.at_px(0), 0.02);
+        }
+}
+
+// A camera that sharpens makes edges narrower than pixels.
+TEST(BlurredEdge, MayBeSharperThanPixels) {
+    const Edge edge{0.2, 0.03, 0.02};
+    const auto found = fit_blurred_edge(pixels_of(edge, 1), 0.3);
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(at_px(*found, 8), edge.at_px(8), 0.05);
+}
+
+TEST(BlurredEdge, IsNotFoundWithoutOne) {
+    EXPECT_FALSE(fit_blurred_edge({}, 0.7));
+    EXPECT_FALSE(fit_blurred_edge(pixels_of({.before = 90, .after = 90}), 0.7));
+    auto few = pixels_of({});
+    few.resize(15);
+    EXPECT_FALSE(fit_blurred_edge(few, 0.7));
+    auto one_side = pixels_of({});
+    std::erase_if(one_side, [](const EdgePixel &pixel) { return pixel.across_px > -1.5; });
+    EXPECT_FALSE(fit_blurred_edge(one_side, 0.7));
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
+    for (const double wrong : {nan, inf, 0.0})
+        EXPECT_FALSE(fit_blurred_edge(pixels_of({}), wrong)) << wrong;
+}
+
+} // namespace
