@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <numeric>
 #include <span>
 
 namespace arhost::fiducial {
@@ -63,7 +64,7 @@ struct Linearized {
     double cost = 0;                 // sum of the squared residuals
 };
 
-// Sets the residuals of the pixels.
+// Sets the residuals and derivatives of the pixels.
 Linearized linearize(std::span<EdgePixel> pixels, const Model &model) {
     static const BlurredStep step;
     Linearized sum;
@@ -72,8 +73,9 @@ Linearized linearize(std::span<EdgePixel> pixels, const Model &model) {
         const double z = (pixel.across_px - model.offset_px - model.turn * pixel.along_px) * per_px;
         const auto [value, slope] = step.at(z);
         pixel.residual = pixel.light - model.before - model.contrast * value;
-        const double by_offset = by_slope * slope;
-        const std::array<double, unknowns> j = {by_offset, by_offset * pixel.along_px, by_offset * z, 1, value};
+        pixel.by_offset = by_slope * slope;
+        const std::array<double, unknowns> j = {pixel.by_offset, pixel.by_offset * pixel.along_px,
+                                                pixel.by_offset * z, 1, value};
 #pragma GCC unroll 5
         for (int a = 0; a < unknowns; ++a) {
             sum.gradient[a] += j[a] * pixel.residual;
@@ -113,6 +115,23 @@ bool remove_outliers(std::vector<EdgePixel> &pixels, double min_error) {
     const double bound = std::max(max_ratio * *median, min_error * min_error);
     return std::erase_if(pixels,
                          [&](const EdgePixel &pixel) { return columns[pixel.column].mean_square() > bound; }) > 0;
+}
+
+// Returns the correlation of what neighbouring columns contribute to the derivative of the cost by the offset.
+double correlation(std::span<const EdgePixel> pixels) {
+    double products = 0, squares = 0, last = 0;
+    for (auto first = pixels.begin(); first != pixels.end();) {
+        const auto next =
+            std::find_if(first, pixels.end(), [&](const EdgePixel &one) { return one.column != first->column; });
+        const double sum = std::accumulate(first, next, 0.0, [](double total, const EdgePixel &one) {
+            return total + one.by_offset * one.residual;
+        });
+        products += sum * last;
+        squares += sum * sum;
+        last = sum;
+        first = next;
+    }
+    return products / squares;
 }
 
 // Where to start: most pixels beside the slope show the light of the two areas.
@@ -199,12 +218,13 @@ std::optional<BlurredEdge> fit_blurred_edge(std::vector<EdgePixel> pixels, doubl
             sum = linearize(pixels, model);
             continue;
         }
-        const Normal covariance =
-            sum.normal.inv(cv::DECOMP_CHOLESKY) * (sum.cost / static_cast<double>(pixels.size() - unknowns));
+        const double variance = sum.cost / static_cast<double>(pixels.size() - unknowns);
+        const Normal covariance = variance * sum.normal.inv(cv::DECOMP_CHOLESKY);
         const double pivot_px = -covariance(0, 1) / covariance(1, 1);
-        return BlurredEdge{pivot_px,         model.offset_px + model.turn * pivot_px,
-                           model.turn,       covariance(0, 0) + pivot_px * covariance(0, 1),
-                           covariance(1, 1), model.blur_px};
+        return BlurredEdge{pivot_px,           model.offset_px + model.turn * pivot_px,
+                           model.turn,         covariance(0, 0) + pivot_px * covariance(0, 1),
+                           covariance(1, 1),   model.blur_px,
+                           correlation(pixels)};
     }
     return std::nullopt;
 }

@@ -12,8 +12,8 @@ namespace arhost::fiducial {
 struct EdgePixel {
     double along_px, across_px;
     double light;
-    int column;          // ascending; pixels of a column are near the same place on the edge
-    double residual = 0; // of the light, for fit_blurred_edge()
+    int column;                         // ascending; pixels of a column are near the same place on the edge
+    double residual = 0, by_offset = 0; // for fit_blurred_edge(): of the light, and its derivative
 };
 
 // At `along_px`, the edge is where across_px is offset_px + turn * (along_px - pivot_px). The errors of `offset_px`
@@ -21,7 +21,8 @@ struct EdgePixel {
 struct BlurredEdge {
     double pivot_px, offset_px, turn;
     double offset_variance, turn_variance;
-    double blur_px; // standard deviation of the Gaussian blur
+    double blur_px;     // standard deviation of the Gaussian blur
+    double correlation; // of the offsets that neighbouring columns show: about 0 if only noise moves them
 };
 
 // Fits the edge, its blur and the light of both areas to the pixels by the method of least squares (Gauss–Newton):

@@ -318,7 +318,7 @@ std::vector<EdgePixel> pixels_beside(const Picture &picture, const Edge &edge, c
 struct FittedEdge {
     Line line; // `point`: where the errors of the offset and of the direction are independent
     double offset_variance, turn_variance; // px², rad²
-    double blur_px;                        // standard deviation
+    double blur_px, correlation;           // as BlurredEdge has them
 
     // Variance of the distance between the line and the true one, beside `at`.
     double variance_at(cv::Point2d at) const {
@@ -348,7 +348,8 @@ std::optional<FittedEdge> fit_pixels(const Picture &picture, Line line, cv::Poin
                        direction / cv::norm(direction)},
                       fitted->offset_variance,
                       fitted->turn_variance,
-                      fitted->blur_px};
+                      fitted->blur_px,
+                      fitted->correlation};
 }
 
 // Where the line crosses the next one.
@@ -397,6 +398,7 @@ struct Square {
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
                                        bool is_subpixel, std::size_t max_count) {
     constexpr int max_passes = 8, max_fits = 3;
+    constexpr double max_sigma_px = 0.05, max_correlation = 0.5; // unless noise is the reason
     constexpr double max_moved_px = 0.2;   // by the last fit; its pixels are those near the line of the one before
     constexpr double sharp_step_px = 0.25; // suffices for a sharp edge
     constexpr double min_strength = 0.9;   // of the refined edges, relative to the rough ones
@@ -475,6 +477,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
             break;
     }
     double variance = 0, blur_cells = 0; // of a coordinate; at the most blurred edge
+    bool is_misfit = false;
     for (std::size_t i = 0; i < 4; ++i) {
         const FittedEdge &before = fitted[(i + 3) % 4], &after = fitted[i];
         // An error of a line moves the crossing along the other line.
@@ -482,6 +485,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
         variance +=
             (before.variance_at(square.corners[i]) + after.variance_at(square.corners[i])) / (sine * sine) / (2 * 4);
         blur_cells = std::max(blur_cells, after.blur_px / square.cells_px[i]);
+        is_misfit |= after.correlation > max_correlation;
     }
     const std::vector<cv::Point2d> corners(square.corners.begin(), square.corners.end());
     const auto distorted = lens.distort(corners);
@@ -490,7 +494,8 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     const double sigma_px = std::sqrt(variance) * noise_scale(corners, *distorted);
     return MeasuredCorners{{(*distorted)[0], (*distorted)[1], (*distorted)[2], (*distorted)[3]},
                            std::isfinite(sigma_px) ? sigma_px : 0,
-                           blur_cells};
+                           blur_cells,
+                           is_misfit && sigma_px > max_sigma_px};
 }
 
 } // namespace

@@ -578,24 +578,28 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
 std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
                                               const Lens &lens, int cells, const std::function<Print()> &print,
                                               bool is_subpixel) {
-    constexpr double max_blur_cells = 0.2;
-    constexpr double max_light = 255, max_clipped = 0.05; // of the light of white
-    constexpr double max_skew_cells = 0.25;               // of a square that is seen in perspective
+    constexpr double max_blur_cells = 0.2, max_sigma_ratio = 0.3; // of the print and doubtful edges
+    constexpr double max_light = 255, max_clipped = 0.05;         // of the light of white
+    constexpr double max_skew_cells = 0.25;                       // of a square that is seen in perspective
     const auto edges = refine_edges(grey, transfer, rough_px, lens, cells, is_subpixel);
     const bool is_unreliable = !edges || edges->sigma_px == 0 || edges->blur_cells > max_blur_cells;
-    if (!is_unreliable && !is_overexposed(grey, edges->corners_px, cells))
+    if (!is_unreliable && !edges->is_doubtful && !is_overexposed(grey, edges->corners_px, cells))
         return edges;
+    const auto is_better = [&](const AlignedPrint &found) {
+        return is_unreliable || found.white > (1 + max_clipped) * max_light ||
+               (edges->is_doubtful && found.corners.sigma_px < max_sigma_ratio * edges->sigma_px);
+    };
     const Print known = print();
     if (const auto found = aligned(grey, transfer, edges ? edges->corners_px : rough_px, lens, known))
-        return is_unreliable || found->white > (1 + max_clipped) * max_light ? found->corners : *edges;
+        return is_better(*found) ? found->corners : *edges;
     // A detector takes the end of what hides a corner for the corner. The others nearly tell where it is.
     const cv::Point2d skew_px = rough_px[0] - rough_px[1] + rough_px[2] - rough_px[3];
     const double diagonal_px = std::min(cv::norm(rough_px[2] - rough_px[0]), cv::norm(rough_px[3] - rough_px[1]));
-    if (is_unreliable && cv::norm(skew_px) * cells > max_skew_cells * diagonal_px)
+    if ((is_unreliable || edges->is_doubtful) && cv::norm(skew_px) * cells > max_skew_cells * diagonal_px)
         for (std::size_t i = 0; i < 4; ++i) {
             Corners corners_px = rough_px;
             corners_px[i] = rough_px[(i + 1) % 4] - rough_px[(i + 2) % 4] + rough_px[(i + 3) % 4];
-            if (const auto found = aligned(grey, transfer, corners_px, lens, known))
+            if (const auto found = aligned(grey, transfer, corners_px, lens, known); found && is_better(*found))
                 return found->corners;
         }
     return edges;

@@ -21,10 +21,11 @@ namespace arhost::fiducial {
 std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
                                            const Lens &lens, const Print &print);
 
-// Refines corners by the edges of the square (refine_edges) or, where the standard deviation of their blur is more
-// than 0.2 of a cell, more than 5 % of the light of white is clipped, or they are not found, by the whole print. If
-// it is not found there either, one of the rough corners may be wrong: that of a hidden corner. Returns std::nullopt
-// if neither succeeds. `cells` and `is_subpixel`: as refine_edges() has them. Calls `print` only if it is needed.
+// Refines corners by the edges of the square (refine_edges) or by the whole print: where the standard deviation of
+// the blur is more than 0.2 of a cell, more than 5 % of the light of white is clipped, the edges are not found, or
+// they are doubtful and the print is clearly more precise. If the print is not found near the edges either, one of
+// the rough corners may be wrong: that of a hidden corner. Returns std::nullopt if neither succeeds. `cells` and
+// `is_subpixel`: as refine_edges() has them. Calls `print` only if it is needed.
 std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
                                               const Lens &lens, int cells, const std::function<Print()> &print,
                                               bool is_subpixel = false);

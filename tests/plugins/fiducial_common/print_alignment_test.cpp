@@ -339,6 +339,36 @@ TEST(CornerRefinement, AlignsThePrintOnlyWhereCellsAreNarrow) {
     }
 }
 
+TEST(CornerRefinement, NeedsNoPrintIfMarkersAreDarkNoisyOrPartlyHidden) {
+    const Lens lens(camera);
+    const Print tag = april_tag("tag36h11", 4);
+    struct View {
+        double hidden, exposure, noise, max_px;
+    };
+    for (const auto &[hidden, exposure, noise, max_px] :
+         {View{0, 1, 1.5, 0.03}, View{0, 0.1, 1.5, 0.2}, View{0, 1, 20, 0.25}, View{0.1, 1, 1.5, 0.03},
+          View{0.2, 1, 1.5, 0.03}}) {
+        const Mt mt = pose_of(5, -3, 500, 25, 15, 50);
+        const arhost_intrinsics fine_camera = enlarged(camera, fine);
+        cv::Mat picture = render(fine_camera, {{tag.with_margin(1), 100, mt}});
+        if (hidden > 0)
+            hide_corner(picture, fine_camera, mt, 100, hidden, 120);
+        cv::GaussianBlur(picture, picture, {}, fine * 0.6);
+        reduced(picture).convertTo(picture, CV_16S, exposure);
+        add_noise(picture, noise, 1);
+        const Corners truth = corners_of(mt, camera, 100);
+        Corners rough = truth;
+        rough[0] += hidden / 2 * (truth[2] - truth[0]);
+        const auto found = refine_corners(picture, ARHOST_TRANSFER_LINEAR, rough, lens, tag.corner_cells, [&] {
+            ADD_FAILURE() << "needs the print";
+            return print_of(tag);
+        });
+        SCOPED_TRACE(testing::Message() << hidden << " " << exposure << " " << noise);
+        ASSERT_TRUE(found);
+        expect_near(*found, truth, max_px);
+    }
+}
+
 TEST(CornerRefinement, AlignsThePrintBesideSaturatedWhite) {
     const Lens lens(camera);
     for (const char *family : {"tag36h11", "tagStandard41h12"}) { // the border of the second is white
