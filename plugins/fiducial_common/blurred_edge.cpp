@@ -45,8 +45,8 @@ public:
 private:
     static constexpr int per_unit = 16;
     static constexpr double limit = 6;
-    static constexpr int count = 2 * 6 * per_unit + 1;
-    std::array<Step, count> nodes_; // slopes: per interval
+    static constexpr int count = 2 * 6 * per_unit + 2; // one more, because a sum may be rounded to 2 * limit
+    std::array<Step, count> nodes_;                    // slopes: per interval
 };
 
 struct Model {
@@ -68,12 +68,12 @@ struct Linearized {
 Linearized linearize(std::span<EdgePixel> pixels, const Model &model) {
     static const BlurredStep step;
     Linearized sum;
-    const double per_px = 1 / model.blur_px, by_slope = -model.contrast * per_px;
+    const double per_px = 1 / model.blur_px;
     for (EdgePixel &pixel : pixels) {
         const double z = (pixel.across_px - model.offset_px - model.turn * pixel.along_px) * per_px;
         const auto [value, slope] = step.at(z);
         pixel.residual = pixel.light - model.before - model.contrast * value;
-        pixel.by_offset = by_slope * slope;
+        pixel.by_offset = -model.contrast * per_px * slope;
         const std::array<double, unknowns> j = {pixel.by_offset, pixel.by_offset * pixel.along_px,
                                                 pixel.by_offset * z, 1, value};
 #pragma GCC unroll 5
@@ -149,6 +149,28 @@ Model first_model(std::span<const EdgePixel> pixels, double blur_px) {
     return {0, 0, blur_px, before, after - before};
 }
 
+// Whether the light of the bright area, at some distance from the edge, clearly changes along it. The fit would take
+// that for a change of the direction.
+bool is_uneven(std::span<const EdgePixel> pixels, const Model &model, double half_length_px) {
+    constexpr double min_deviations = 4,
+                     min_change = 0.005; // standard deviations; relative, from the middle to an end
+    const double min_distance_px = 2 * model.blur_px, bright = model.contrast > 0 ? 1 : -1;
+    double count = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+    for (const EdgePixel &pixel : pixels)
+        if (bright * (pixel.across_px - model.offset_px - model.turn * pixel.along_px) > min_distance_px) {
+            ++count;
+            x += pixel.along_px;
+            y += pixel.light;
+            xx += pixel.along_px * pixel.along_px;
+            xy += pixel.along_px * pixel.light;
+            yy += pixel.light * pixel.light;
+        }
+    xx -= x * x / count, xy -= x * y / count, yy -= y * y / count;
+    const double slope = xy / xx, variance = (yy - slope * xy) / (count - 2) / xx; // of a line fit
+    return std::abs(slope) * half_length_px > min_change * y / count &&
+           slope * slope > min_deviations * min_deviations * variance; // false for NaN
+}
+
 // Minimizes the squared residuals by the method of Levenberg and Marquardt: edges that are sharper than pixels have
 // hardly any slope, so undamped steps may lead far away. `sum` is that of `model` and the pixels; afterwards, its
 // derivatives and the residuals of the pixels may be those beside the last, small step. Returns whether the fit has
@@ -218,6 +240,8 @@ std::optional<BlurredEdge> fit_blurred_edge(std::vector<EdgePixel> pixels, doubl
             sum = linearize(pixels, model);
             continue;
         }
+        if (is_uneven(pixels, model, half_length_px))
+            return std::nullopt;
         const double variance = sum.cost / static_cast<double>(pixels.size() - unknowns);
         const Normal covariance = variance * sum.normal.inv(cv::DECOMP_CHOLESKY);
         const double pivot_px = -covariance(0, 1) / covariance(1, 1);

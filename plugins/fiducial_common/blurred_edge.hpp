@@ -30,8 +30,8 @@ struct BlurredEdge {
 // function of the standard normal distribution. Pixels average light over squares, which widens the blur.
 // Unlike a search along profiles, this interpolates nothing, so it has no error that repeats along an edge whose
 // slope is a simple fraction. Leaves out columns that do not fit, for example because something hides them, up to
-// half of all. `blur_px`: where to start, greater than 0. Returns std::nullopt if the fit does not converge near the
-// line.
+// half of all. `blur_px`: where to start, greater than 0. Returns std::nullopt if the fit does not converge near
+// the line, or if the light changes along the edge.
 std::optional<BlurredEdge> fit_blurred_edge(std::vector<EdgePixel> pixels, double blur_px);
 
 } // namespace arhost::fiducial

@@ -87,12 +87,18 @@ cv::Mat_<float> mean_of_rows(const cv::Mat_<float> &rises) {
     return mean;
 }
 
+// Neighbouring positions on an edge share pixels, and rows of rises that were averaged. This is the distance in px at
+// which positions get independent, if pixels are: the integral of the autocorrelation of bilinear samples.
+constexpr double correlation_px = 1.5;
+
 // The rises near an edge. `peak` and `at_rim` are the greatest mean rises at any offset and at the greatest offsets,
 // `on_line` is the mean at offset 0 with steps of the smallest size; `width_px` is the width of a slope of constant
-// rise that is as high, and `noise` the standard deviation of a rise before averaging, relative to the peak.
+// rise that is as high, `noise` the standard deviation of a rise before averaging, relative to the peak, and
+// `averaged` the number of rows that each was averaged from.
 struct Slope {
     cv::Mat_<float> rises;
     double step_px, peak = 0, at_rim = 0, on_line = 0, width_px = 0, noise = 0;
+    int averaged = 1;
 
     // Standard deviation of the blur, including that by the averages over pixels. The baseline (a uniform
     // distribution) and the interpolation (a triangular one) widen the slope, too.
@@ -139,8 +145,10 @@ void reduce_noise(Slope &slope) {
     const double noise = 1.05 * *median; // standard deviation of a rise, if it is normally distributed
     const double ratio = noise / (max_noise * slope.peak);
     const int averaged = static_cast<int>(std::min(ratio * ratio, slope.rises.rows / 4.0));
-    if (averaged > 2) // an odd number
-        cv::blur(slope.rises, slope.rises, {1, (averaged - 1) | 1});
+    if (averaged > 2) {
+        slope.averaged = (averaged - 1) | 1; // an odd number
+        cv::blur(slope.rises, slope.rises, {1, slope.averaged});
+    }
     slope.noise = noise / slope.peak;
 }
 
@@ -154,6 +162,36 @@ std::optional<double> edge_offset_px(const Slope &slope, int row, double min_ris
             weights += above * above;
         }
     return weights > 0 ? std::optional(weighted / weights * slope.step_px) : std::nullopt;
+}
+
+struct FittedEdge {
+    Line line; // `point`: where the errors of the offset and of the direction are independent
+    double offset_variance, turn_variance; // px², rad²
+    double blur_px, correlation;           // as BlurredEdge has them
+
+    // Variance of the distance between the line and the true one, beside `at`.
+    double variance_at(cv::Point2d at) const {
+        const double along_px = line.direction.dot(at - line.point);
+        return offset_variance + along_px * along_px * turn_variance;
+    }
+};
+
+// `dependent`: the number of neighbouring points whose errors are the same.
+FittedEdge fit_line(const std::vector<cv::Point2f> &points, double dependent) {
+    cv::Vec4f fitted;
+    cv::fitLine(points, fitted, cv::DIST_L2, 0, 0, 0);
+    FittedEdge edge{{cv::Point2d(fitted[2], fitted[3]), cv::Point2d(fitted[0], fitted[1])}, 0, 0, 0, 0};
+    const auto count = static_cast<double>(points.size());
+    double across_squares = 0, along_squares = 0;
+    for (const cv::Point2f &point : points) {
+        const cv::Point2d from_centroid = cv::Point2d(point) - edge.line.point;
+        across_squares += std::pow(edge.line.direction.cross(from_centroid), 2);
+        along_squares += std::pow(edge.line.direction.dot(from_centroid), 2);
+    }
+    // A line has two degrees of freedom.
+    edge.offset_variance = across_squares / count / std::max(count / dependent - 2, 1.0);
+    edge.turn_variance = edge.offset_variance * count / along_squares;
+    return edge;
 }
 
 // Returns the points that are closer than `tolerance_px` to the line through two of the points that has most of them.
@@ -176,14 +214,14 @@ std::vector<cv::Point2f> most_collinear(const std::vector<cv::Point2f> &points, 
 
 // Fits a line without outliers. `sampled` is the number of positions at which an edge was searched. Returns
 // std::nullopt if fewer than half of them remain, or if half of these are further than `max_median_px` from the line.
-std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size_t sampled, double max_median_px) {
+std::optional<FittedEdge> fit_line_robustly(std::vector<cv::Point2f> points, std::size_t sampled,
+                                            double max_median_px, double dependent) {
     constexpr double min_inlier_px = 0.3;
     for (int round = 0;; ++round) {
         if (points.size() < std::max<std::size_t>(sampled / 2, 2))
             return std::nullopt;
-        cv::Vec4f fitted;
-        cv::fitLine(points, fitted, cv::DIST_L2, 0, 0, 0);
-        const Line line{cv::Point2d(fitted[2], fitted[3]), cv::Point2d(fitted[0], fitted[1])};
+        const FittedEdge edge = fit_line(points, dependent);
+        const Line &line = edge.line;
         std::vector<double> residuals;
         residuals.reserve(points.size());
         for (const cv::Point2f &point : points)
@@ -197,7 +235,7 @@ std::optional<Line> fit_line_robustly(std::vector<cv::Point2f> points, std::size
             if (residuals[i] <= bound)
                 kept.push_back(points[i]);
         if (kept.size() == points.size() || round == 5)
-            return *median < max_median_px ? std::optional(line) : std::nullopt;
+            return *median < max_median_px ? std::optional(edge) : std::nullopt;
         points = std::move(kept);
     }
 }
@@ -241,8 +279,8 @@ double code_step(const Picture &picture, const Edge &edge) {
 }
 
 // Fits a line in undistorted pixels to the slope of an edge. `from` is a corner near it.
-std::optional<Line> fit_edge(const Picture &picture, const Edge &edge, Slope &slope, double cell_px, cv::Point2d from,
-                             const Lens &lens) {
+std::optional<FittedEdge> fit_edge(const Picture &picture, const Edge &edge, Slope &slope, double cell_px,
+                                   cv::Point2d from, const Lens &lens) {
     constexpr double max_median_steps = 4;
     if (!(slope.peak >= code_step(picture, edge)))
         return std::nullopt;
@@ -261,12 +299,18 @@ std::optional<Line> fit_edge(const Picture &picture, const Edge &edge, Slope &sl
     for (const cv::Point2d &point : *straight)
         relative.push_back(point - from);
     const double max_median_px = max_median_steps * slope.step_px;
-    auto line = fit_line_robustly(relative, edge.at_px.size(), max_median_px);
-    if (!line)
-        line = fit_line_robustly(most_collinear(relative, max_median_px / 2), edge.at_px.size(), max_median_px);
-    if (line)
-        line->point += from;
-    return line;
+    const double spacing_px =
+        cv::norm(edge.at_px.back() - edge.at_px.front()) / static_cast<double>(edge.at_px.size() - 1);
+    const double dependent = std::max<double>(slope.averaged, correlation_px / std::min(spacing_px, correlation_px));
+    auto fitted = fit_line_robustly(relative, edge.at_px.size(), max_median_px, dependent);
+    if (!fitted)
+        fitted = fit_line_robustly(most_collinear(relative, max_median_px / 2), edge.at_px.size(), max_median_px,
+                                   dependent);
+    if (fitted) {
+        fitted->line.point += from;
+        fitted->blur_px = slope.blur_px();
+    }
+    return fitted;
 }
 
 // Returns the pixels near an edge whose distance from `line` is at most `reach_px`, in undistorted pixels relative to
@@ -314,18 +358,6 @@ std::vector<EdgePixel> pixels_beside(const Picture &picture, const Edge &edge, c
     }
     return result;
 }
-
-struct FittedEdge {
-    Line line; // `point`: where the errors of the offset and of the direction are independent
-    double offset_variance, turn_variance; // px², rad²
-    double blur_px, correlation;           // as BlurredEdge has them
-
-    // Variance of the distance between the line and the true one, beside `at`.
-    double variance_at(cv::Point2d at) const {
-        const double along_px = line.direction.dot(at - line.point);
-        return offset_variance + along_px * along_px * turn_variance;
-    }
-};
 
 // Fits an edge to the pixels beside it. `line` is close to it, and `from` and `to` are the corners.
 std::optional<FittedEdge> fit_pixels(const Picture &picture, Line line, cv::Point2d from, cv::Point2d to,
@@ -395,6 +427,7 @@ struct Square {
 };
 
 // As refine_edges(). Searches the edges at no more than so many positions on each, and then fits them to the pixels.
+// Where that fails, the search at max_positions is the result.
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
                                        bool is_subpixel, std::size_t max_count) {
     constexpr int max_passes = 8, max_fits = 3;
@@ -417,7 +450,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     double sign = 0, rough_strength = 0, strength = 0, margin_px = reach * min_step_px;
     bool is_unclear = false;
     std::array<Line, 4> lines;
-    std::array<double, 4> blurs_px{};
+    std::array<FittedEdge, 4> fitted;
     for (int pass = 0; pass < max_passes; ++pass) {
         std::array<Edge, 4> edges;
         for (std::size_t i = 0; i < 4; ++i) {
@@ -437,11 +470,11 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
         is_unclear = false;
         for (std::size_t i = 0; i < 4; ++i) {
             Slope slope = find_slope(picture, edges[i], min_step_px, max_step_px, sign);
-            const auto line = fit_edge(picture, edges[i], slope, square.cells_px[i], square.corners[i], lens);
-            if (!line)
+            const auto edge = fit_edge(picture, edges[i], slope, square.cells_px[i], square.corners[i], lens);
+            if (!edge)
                 return std::nullopt;
-            lines[i] = *line;
-            blurs_px[i] = slope.blur_px();
+            fitted[i] = *edge;
+            lines[i] = edge->line;
             strength += slope.on_line;
             margin_px = std::max(margin_px, reach * slope.step_px);
             const bool is_noisy = min_step_px < sharp_step_px && slope.noise > max_noise;
@@ -459,16 +492,16 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     }
     if (is_unclear || strength < min_strength * rough_strength)
         return std::nullopt;
-    std::array<FittedEdge, 4> fitted;
     for (int pass = 0; pass < max_fits; ++pass) {
         for (std::size_t i = 0; i < 4; ++i) {
             const auto edge = fit_pixels(picture, lines[i], square.corners[i], square.next(i), square.cells_px[i],
-                                         blurs_px[i], lens);
-            if (!edge)
+                                         fitted[i].blur_px, lens);
+            if (!edge && max_count < max_positions)
                 return std::nullopt;
-            fitted[i] = *edge;
-            lines[i] = edge->line;
-            blurs_px[i] = edge->blur_px;
+            if (edge) {
+                fitted[i] = *edge;
+                lines[i] = edge->line;
+            }
         }
         const auto moved_px = square.move_to(lines);
         if (!moved_px)

@@ -52,6 +52,16 @@ TEST(BlurredEdge, IsWhereThePixelsShowIt) {
     }
 }
 
+// It would be taken for a change of the direction.
+TEST(BlurredEdge, IsNotFittedInUnevenLight) {
+    for (const double slope : {0.001, 0.01}) { // 4 % and 40 % from end to end
+        auto pixels = pixels_of(Edge{}, 1);
+        for (EdgePixel &pixel : pixels)
+            pixel.light *= 1 + slope * pixel.along_px;
+        EXPECT_FALSE(fit_blurred_edge(pixels, 0.8)) << slope;
+    }
+}
+
 TEST(BlurredEdge, TellsItsVariance) {
     constexpr int count = 400;
     const Edge edge;

@@ -165,6 +165,24 @@ TEST(EdgeRefinement, LocatesEdgesOfSimpleSlopes) {
         }
 }
 
+TEST(EdgeRefinement, ToleratesUnevenLight) {
+    const Mt mt = pose_of(5, -3, 400, 20, 15, 25);
+    const cv::Mat even = render_blurred(camera, {{april_tag("tag36h11", 4).with_margin(2), 100, mt}}, 0.6);
+    const Corners truth = corners_of(mt, camera, 100);
+    for (const double slope : {0.1, 0.3}) { // relative change per 100 px
+        cv::Mat picture;
+        even.convertTo(picture, CV_32F, 0.7);
+        for (int x = 0; x < picture.cols; ++x)
+            picture.col(x) *= 1 + slope * (x - 160) / 100;
+        picture.convertTo(picture, CV_16S);
+        add_noise(picture, 1, 1);
+        const auto fine = refine_edges(picture, ARHOST_TRANSFER_LINEAR, truth, lens, cells);
+        ASSERT_TRUE(fine);
+        for (int k = 0; k < 4; ++k)
+            EXPECT_LT(cv::norm(fine->corners_px[k] - truth[k]), 0.03) << slope;
+    }
+}
+
 TEST(EdgeRefinement, TellsTheNoiseOfTheCorners) {
     std::mt19937 generator(5);
     std::uniform_real_distribution<double> tilt(-30, 30), turn(-180, 180);
