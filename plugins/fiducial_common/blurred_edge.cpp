@@ -160,14 +160,14 @@ bool is_uneven(std::span<const EdgePixel> pixels, const Model &model, double hal
         if (bright * (pixel.across_px - model.offset_px - model.turn * pixel.along_px) > min_distance_px) {
             ++count;
             x += pixel.along_px;
-            y += pixel.light;
+            y += pixel.residual;
             xx += pixel.along_px * pixel.along_px;
-            xy += pixel.along_px * pixel.light;
-            yy += pixel.light * pixel.light;
+            xy += pixel.along_px * pixel.residual;
+            yy += pixel.residual * pixel.residual;
         }
     xx -= x * x / count, xy -= x * y / count, yy -= y * y / count;
     const double slope = xy / xx, variance = (yy - slope * xy) / (count - 2) / xx; // of a line fit
-    return std::abs(slope) * half_length_px > min_change * y / count &&
+    return std::abs(slope) * half_length_px > min_change * std::max(model.before, model.before + model.contrast) &&
            slope * slope > min_deviations * min_deviations * variance; // false for NaN
 }
 
