@@ -152,8 +152,8 @@ Model first_model(std::span<const EdgePixel> pixels, double blur_px) {
 // Whether the light of the bright area, at some distance from the edge, clearly changes along it. The fit would take
 // that for a change of the direction.
 bool is_uneven(std::span<const EdgePixel> pixels, const Model &model, double half_length_px) {
-    constexpr double min_deviations = 4,
-                     min_change = 0.005; // standard deviations; relative, from the middle to an end
+    constexpr double min_deviations = 4; // standard deviations
+    constexpr double min_change = 0.005; // relative, from the middle to an end
     const double min_distance_px = 2 * model.blur_px, bright = model.contrast > 0 ? 1 : -1;
     double count = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
     for (const EdgePixel &pixel : pixels)
@@ -198,7 +198,7 @@ bool minimize(std::vector<EdgePixel> &pixels, double half_length_px, double max_
         const bool is_converged =
             std::abs(change[0]) + half_length_px * std::abs(change[1]) + std::abs(change[2]) < converged_px &&
             std::abs(change[3]) + std::abs(change[4]) < converged_light * std::abs(model.contrast);
-        if (is_converged && damping <= first_damping) { // all steps were good ones
+        if (is_converged && damping <= first_damping) { // hardly damped
             model = next;
             sum.cost += change.dot(sum.normal * change) - 2 * change.dot(sum.gradient); // as the derivatives tell
             return true;

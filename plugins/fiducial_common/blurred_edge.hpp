@@ -25,12 +25,12 @@ struct BlurredEdge {
     double correlation; // of the offsets that neighbouring columns show: about 0 if only noise moves them
 };
 
-// Fits the edge, its blur and the light of both areas to the pixels by the method of least squares (Gauss–Newton):
-// light(across_px) = before + (after - before) * Φ(distance from the edge / blur_px), where Φ is the distribution
-// function of the standard normal distribution. Pixels average light over squares, which widens the blur.
-// Unlike a search along profiles, this interpolates nothing, so it has no error that repeats along an edge whose
-// slope is a simple fraction. Leaves out columns that do not fit, for example because something hides them, up to
-// half of all. `blur_px`: where to start, greater than 0. Returns std::nullopt if the fit does not converge near
+// Fits the edge, its blur and the light of both areas to the pixels by the method of least squares
+// (Levenberg–Marquardt): light(across_px) = before + (after - before) * Φ(distance from the edge / blur_px), where Φ
+// is the distribution function of the standard normal distribution. Pixels average light over squares, which widens
+// the blur. Unlike a search along profiles, this interpolates nothing, so it has no error that repeats along an edge
+// whose slope is a simple fraction. Leaves out columns that do not fit, for example because something hides them, up
+// to half of all. `blur_px`: where to start, greater than 0. Returns std::nullopt if the fit does not converge near
 // the line, or if the light changes along the edge.
 std::optional<BlurredEdge> fit_blurred_edge(std::vector<EdgePixel> pixels, double blur_px);
 

@@ -362,8 +362,8 @@ std::vector<EdgePixel> pixels_beside(const Picture &picture, const Edge &edge, c
 // Fits an edge to the pixels beside it. `line` is close to it, and `from` and `to` are the corners.
 std::optional<FittedEdge> fit_pixels(const Picture &picture, Line line, cv::Point2d from, cv::Point2d to,
                                      double cell_px, double blur_px, const Lens &lens) {
-    // Farther pixels tell little more. What is beside the border and the margin must not
-    // contribute.
+    // Farther pixels tell little more. What is beside the border and the margin contributes little up to there,
+    // unless cells are so narrow that 1.6 px reach farther.
     const double reach_px = std::min(std::max(std::min(3.5 * blur_px, cell_px - 2.5 * blur_px), 1.6), 0.9 * cell_px);
     const auto edge = edge_between(from, to, lens, 3 * blur_px + 1, count_of(from, to, 1));
     if (!edge)
@@ -413,10 +413,10 @@ struct Square {
 
     // Moves the corners to the crossings of lines. Returns how far, or std::nullopt if one is now far from the rough
     // one.
-    std::optional<double> move_to(const std::array<Line, 4> &lines) {
+    std::optional<double> move_to(const std::array<FittedEdge, 4> &edges) {
         double moved_px = 0;
         for (std::size_t i = 0; i < 4; ++i) {
-            const cv::Point2d corner = crossing(lines[(i + 3) % 4], lines[i]);
+            const cv::Point2d corner = crossing(edges[(i + 3) % 4].line, edges[i].line);
             moved_px = std::max(moved_px, cv::norm(corner - corners[i]));
             corners[i] = corner;
             if (!(cv::norm(corner - rough[i]) < shortest_px / 4)) // the comparison is false for NaN
@@ -449,7 +449,6 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     // +1 if the square is darker than its surroundings, otherwise −1
     double sign = 0, rough_strength = 0, strength = 0, margin_px = reach * min_step_px;
     bool is_unclear = false;
-    std::array<Line, 4> lines;
     std::array<FittedEdge, 4> fitted;
     for (int pass = 0; pass < max_passes; ++pass) {
         std::array<Edge, 4> edges;
@@ -474,7 +473,6 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
             if (!edge)
                 return std::nullopt;
             fitted[i] = *edge;
-            lines[i] = edge->line;
             strength += slope.on_line;
             margin_px = std::max(margin_px, reach * slope.step_px);
             const bool is_noisy = min_step_px < sharp_step_px && slope.noise > max_noise;
@@ -484,7 +482,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
         }
         if (pass == 0)
             rough_strength = strength;
-        const auto moved_px = square.move_to(lines);
+        const auto moved_px = square.move_to(fitted);
         if (!moved_px)
             return std::nullopt;
         if (pass > 0 && *moved_px < converged_px)
@@ -494,16 +492,14 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
         return std::nullopt;
     for (int pass = 0; pass < max_fits; ++pass) {
         for (std::size_t i = 0; i < 4; ++i) {
-            const auto edge = fit_pixels(picture, lines[i], square.corners[i], square.next(i), square.cells_px[i],
-                                         fitted[i].blur_px, lens);
+            const auto edge = fit_pixels(picture, fitted[i].line, square.corners[i], square.next(i),
+                                         square.cells_px[i], fitted[i].blur_px, lens);
             if (!edge && max_count < max_positions)
                 return std::nullopt;
-            if (edge) {
+            if (edge)
                 fitted[i] = *edge;
-                lines[i] = edge->line;
-            }
         }
-        const auto moved_px = square.move_to(lines);
+        const auto moved_px = square.move_to(fitted);
         if (!moved_px)
             return std::nullopt;
         if (*moved_px < max_moved_px)
