@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
-#include <numeric>
 #include <span>
 
 namespace arhost::fiducial {
@@ -43,10 +42,13 @@ public:
     }
 
 private:
-    static constexpr int per_unit = 16;
-    static constexpr double limit = 6;
-    static constexpr int count = 2 * 6 * per_unit + 2; // one more, because a sum may be rounded to 2 * limit
-    std::array<Step, count> nodes_;                    // slopes: per interval
+    static constexpr int per_unit = 16, limit = 6;
+    static constexpr int count = 2 * limit * per_unit + 2; // one more, because a sum may be rounded to 2 * limit
+    std::array<Step, count> nodes_;                        // slopes: per interval
+};
+
+struct Pixel : EdgePixel {
+    double residual = 0, by_offset = 0; // of the light, and its derivative
 };
 
 struct Model {
@@ -65,11 +67,11 @@ struct Linearized {
 };
 
 // Sets the residuals and derivatives of the pixels.
-Linearized linearize(std::span<EdgePixel> pixels, const Model &model) {
+Linearized linearize(std::span<Pixel> pixels, const Model &model) {
     static const BlurredStep step;
     Linearized sum;
     const double per_px = 1 / model.blur_px;
-    for (EdgePixel &pixel : pixels) {
+    for (Pixel &pixel : pixels) {
         const double z = (pixel.across_px - model.offset_px - model.turn * pixel.along_px) * per_px;
         const auto [value, slope] = step.at(z);
         pixel.residual = pixel.light - model.before - model.contrast * value;
@@ -93,7 +95,7 @@ Linearized linearize(std::span<EdgePixel> pixels, const Model &model) {
 
 // Removes the columns whose residuals are greater than those of most columns, and than `min_error`. Returns whether
 // there were any.
-bool remove_outliers(std::vector<EdgePixel> &pixels, double min_error) {
+bool remove_outliers(std::vector<Pixel> &pixels, double min_error) {
     constexpr double max_ratio = 6; // of the mean squared residuals of a column and the median column
     struct Column {
         double squares = 0;
@@ -101,7 +103,7 @@ bool remove_outliers(std::vector<EdgePixel> &pixels, double min_error) {
         double mean_square() const { return squares / std::max(pixels, 1); }
     };
     std::vector<Column> columns(static_cast<std::size_t>(pixels.back().column) + 1);
-    for (const EdgePixel &pixel : pixels) {
+    for (const Pixel &pixel : pixels) {
         columns[pixel.column].squares += pixel.residual * pixel.residual;
         ++columns[pixel.column].pixels;
     }
@@ -113,32 +115,51 @@ bool remove_outliers(std::vector<EdgePixel> &pixels, double min_error) {
     const auto median = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
     std::ranges::nth_element(sorted, median);
     const double bound = std::max(max_ratio * *median, min_error * min_error);
-    return std::erase_if(pixels,
-                         [&](const EdgePixel &pixel) { return columns[pixel.column].mean_square() > bound; }) > 0;
+    return std::erase_if(pixels, [&](const Pixel &pixel) { return columns[pixel.column].mean_square() > bound; }) > 0;
 }
 
-// Returns the correlation of what neighbouring columns contribute to the derivative of the cost by the offset.
-double correlation(std::span<const EdgePixel> pixels) {
-    double products = 0, squares = 0, last = 0;
-    for (auto first = pixels.begin(); first != pixels.end();) {
-        const auto next =
-            std::find_if(first, pixels.end(), [&](const EdgePixel &one) { return one.column != first->column; });
-        const double sum = std::accumulate(first, next, 0.0, [](double total, const EdgePixel &one) {
-            return total + one.by_offset * one.residual;
-        });
-        products += sum * last;
-        squares += sum * sum;
-        last = sum;
-        first = next;
+// What columns contribute to the derivative of the cost by the offset.
+struct Contributions {
+    double squares = 0, independent = 0; // sum of their squares, and its expectation if the errors were independent
+    double correlation = 0;              // of neighbouring columns
+    double columns = 0;                  // their number
+
+    // By how much the variance of the offset is greater than if the errors of pixels were independent: the
+    // contributions are greater, because the errors within a column are similar, and those of columns resemble an
+    // autoregressive process of the first order. 1 if the correlation may be due to chance.
+    double variance_ratio() const {
+        constexpr double min_deviations = 2, max_correlation = 0.9;
+        if (!(correlation * std::sqrt(columns) > min_deviations))
+            return 1;
+        const double known = std::min(correlation, max_correlation);
+        return std::max(squares / independent, 1.0) * (1 + known) / (1 - known);
     }
-    return products / squares;
+};
+
+Contributions contributions(std::span<const Pixel> pixels) {
+    Contributions all;
+    double products = 0, last = 0, residuals = 0, derivatives = 0;
+    for (auto first = pixels.begin(); first != pixels.end(); ++all.columns) {
+        double sum = 0;
+        for (const int column = first->column; first != pixels.end() && first->column == column; ++first) {
+            sum += first->by_offset * first->residual;
+            residuals += first->residual * first->residual;
+            derivatives += first->by_offset * first->by_offset;
+        }
+        products += sum * last;
+        all.squares += sum * sum;
+        last = sum;
+    }
+    all.independent = residuals * derivatives / static_cast<double>(pixels.size());
+    all.correlation = all.squares > 0 ? products / all.squares : 0;
+    return all;
 }
 
 // Where to start: most pixels beside the slope show the light of the two areas.
-Model first_model(std::span<const EdgePixel> pixels, double blur_px) {
+Model first_model(std::span<const Pixel> pixels, double blur_px) {
     const auto median_light = [&](double sign) {
         std::vector<double> light;
-        for (const EdgePixel &pixel : pixels)
+        for (const Pixel &pixel : pixels)
             if (sign * pixel.across_px > blur_px)
                 light.push_back(pixel.light);
         const auto median = light.begin() + static_cast<std::ptrdiff_t>(light.size() / 2);
@@ -149,14 +170,25 @@ Model first_model(std::span<const EdgePixel> pixels, double blur_px) {
     return {0, 0, blur_px, before, after - before};
 }
 
-// Whether the light of the bright area, at some distance from the edge, clearly changes along it. The fit would take
-// that for a change of the direction.
-bool is_uneven(std::span<const EdgePixel> pixels, const Model &model, double half_length_px) {
-    constexpr double min_deviations = 4; // standard deviations
-    constexpr double min_change = 0.005; // relative, from the middle to an end
-    const double min_distance_px = 2 * model.blur_px, bright = model.contrast > 0 ? 1 : -1;
+// How the light changes along an edge: relative to its mean, per px.
+struct LightSlope {
+    double per_px = 0, variance = 0;
+
+    bool is_clear(double half_length_px) const {
+        constexpr double min_change = 0.002; // from the middle to an end
+        constexpr double min_deviations = 3; // standard deviations
+        return std::abs(per_px) * half_length_px > min_change &&
+               per_px * per_px > min_deviations * min_deviations * variance;
+    }
+};
+
+// Fits a line to the residuals in the bright area, so far from the edge that they do not depend on its direction.
+LightSlope light_slope(std::span<const Pixel> pixels, const Model &model) {
+    constexpr double min_pixels = 10;
+    // A pixel and its interpolated neighbours, of a renderer or of a Bayer pattern, reach 1.2 px.
+    const double min_distance_px = std::max(2 * model.blur_px, 1.2), bright = model.contrast > 0 ? 1 : -1;
     double count = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
-    for (const EdgePixel &pixel : pixels)
+    for (const Pixel &pixel : pixels)
         if (bright * (pixel.across_px - model.offset_px - model.turn * pixel.along_px) > min_distance_px) {
             ++count;
             x += pixel.along_px;
@@ -165,37 +197,54 @@ bool is_uneven(std::span<const EdgePixel> pixels, const Model &model, double hal
             xy += pixel.along_px * pixel.residual;
             yy += pixel.residual * pixel.residual;
         }
+    if (count < min_pixels)
+        return {};
     xx -= x * x / count, xy -= x * y / count, yy -= y * y / count;
-    const double slope = xy / xx, variance = (yy - slope * xy) / (count - 2) / xx; // of a line fit
-    return std::abs(slope) * half_length_px > min_change * std::max(model.before, model.before + model.contrast) &&
-           slope * slope > min_deviations * min_deviations * variance; // false for NaN
+    const double slope = xy / xx, light = std::max(model.before, model.before + model.contrast);
+    return {slope / light, std::max(yy - slope * xy, 0.0) / (count - 2) / xx / (light * light)};
+}
+
+void remove_slope(std::span<Pixel> pixels, double per_px) {
+    for (Pixel &pixel : pixels)
+        pixel.light /= 1 + per_px * pixel.along_px;
 }
 
 // Minimizes the squared residuals by the method of Levenberg and Marquardt: edges that are sharper than pixels have
 // hardly any slope, so undamped steps may lead far away. `sum` is that of `model` and the pixels; afterwards, its
 // derivatives and the residuals of the pixels may be those beside the last, small step. Returns whether the fit has
 // converged near the line.
-bool minimize(std::vector<EdgePixel> &pixels, double half_length_px, double max_blur_px, Model &model,
-              Linearized &sum) {
-    constexpr double first_damping = 1e-4, max_offset_px = 1, converged_px = 0.02, converged_light = 0.01;
+bool minimize(std::span<Pixel> pixels, double half_length_px, double max_blur_px, Model &model, Linearized &sum) {
+    constexpr double first_damping = 1e-4, max_damping = 1e3; // relative
+    constexpr double max_offset_px = 1, converged_px = 0.02, converged_light = 0.01;
     constexpr int max_steps = 20;
     double damping = first_damping;
-    for (int step = 0; step < max_steps; ++step) {
+    for (int step = 0; step < max_steps && damping <= max_damping; ++step) {
         Normal damped = sum.normal;
         for (int i = 0; i < unknowns; ++i)
             damped(i, i) *= 1 + damping;
         Vector change;
         if (!cv::solve(damped, sum.gradient, change, cv::DECOMP_CHOLESKY))
             return false;
-        change[2] =
-            std::clamp(model.blur_px + change[2], min_blur_px, std::max(max_blur_px, min_blur_px)) - model.blur_px;
+        const double blur_px = std::clamp(model.blur_px + change[2], min_blur_px, std::max(max_blur_px, min_blur_px));
+        if (const double limited = blur_px - model.blur_px; limited != change[2]) { // solve for the other unknowns
+            Vector gradient = sum.gradient;
+            for (int i = 0; i < unknowns; ++i) {
+                gradient[i] -= damped(i, 2) * limited;
+                damped(i, 2) = damped(2, i) = i == 2 ? 1 : 0;
+            }
+            gradient[2] = limited;
+            if (!cv::solve(damped, gradient, change, cv::DECOMP_CHOLESKY))
+                return false;
+        }
         const Model next{model.offset_px + change[0], model.turn + change[1], model.blur_px + change[2],
                          model.before + change[3], model.contrast + change[4]};
         if (!(std::abs(next.offset_px) + half_length_px * std::abs(next.turn) < max_offset_px)) { // also for NaN
             damping *= 10;
             continue;
         }
+        // Strong damping would make any step small.
         const bool is_converged =
+            damping <= 1 &&
             std::abs(change[0]) + half_length_px * std::abs(change[1]) + std::abs(change[2]) < converged_px &&
             std::abs(change[3]) + std::abs(change[4]) < converged_light * std::abs(model.contrast);
         if (is_converged && damping <= first_damping) { // hardly damped
@@ -216,9 +265,17 @@ bool minimize(std::vector<EdgePixel> &pixels, double half_length_px, double max_
     return false;
 }
 
-} // namespace
+struct Fit {
+    Model model;
+    Normal covariance;
+    double correlation; // as BlurredEdge has it
+    LightSlope slope;   // that remains
+};
 
-std::optional<BlurredEdge> fit_blurred_edge(std::vector<EdgePixel> pixels, double blur_px) {
+// Fits the model as fit_blurred_edge() describes it. `is_slope_removed`: from the light of the pixels, as a fit
+// before has told it.
+std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, double blur_px,
+                             bool is_slope_removed) {
     constexpr double max_blur_ratio = 2;
     // Of the contrast, before the fit and afterwards: a lens does not blur an edge exactly as the model does.
     constexpr double min_first_error = 0.4, min_error = 0.06;
@@ -226,9 +283,6 @@ std::optional<BlurredEdge> fit_blurred_edge(std::vector<EdgePixel> pixels, doubl
     const std::size_t min_pixels = std::max<std::size_t>(pixels.size() / 2, 4 * unknowns);
     if (pixels.size() < min_pixels)
         return std::nullopt;
-    double half_length_px = 0;
-    for (const EdgePixel &pixel : pixels)
-        half_length_px = std::max(half_length_px, std::abs(pixel.along_px));
     Model model = first_model(pixels, blur_px);
     Linearized sum = linearize(pixels, model);
     if (remove_outliers(pixels, min_first_error * model.contrast))
@@ -240,15 +294,49 @@ std::optional<BlurredEdge> fit_blurred_edge(std::vector<EdgePixel> pixels, doubl
             sum = linearize(pixels, model);
             continue;
         }
-        if (is_uneven(pixels, model, half_length_px))
+        const double variance = std::max(sum.cost, 0.0) / static_cast<double>(pixels.size() - unknowns);
+        const Normal inverse = sum.normal.inv(cv::DECOMP_CHOLESKY);
+        const Contributions columns = contributions(pixels);
+        Fit fit{model, columns.variance_ratio() * variance * inverse, columns.correlation,
+                light_slope(pixels, model)};
+        if (is_slope_removed) { // an error of the slope moves the edge
+            const Vector gradient = linearize(pixels, model).gradient;
+            remove_slope(pixels, std::sqrt(fit.slope.variance));
+            const Vector moved = inverse * (linearize(pixels, model).gradient - gradient);
+            fit.covariance += moved * moved.t();
+        }
+        return fit;
+    }
+    return std::nullopt;
+}
+
+} // namespace
+
+std::optional<BlurredEdge> fit_blurred_edge(std::span<const EdgePixel> edge_pixels, double blur_px) {
+    constexpr int max_fits = 3;
+    constexpr double max_change = 0.6; // of the light, from the middle to an end
+    std::vector<Pixel> pixels;
+    pixels.reserve(edge_pixels.size());
+    double half_length_px = 0;
+    for (const EdgePixel &pixel : edge_pixels) {
+        pixels.push_back({pixel});
+        half_length_px = std::max(half_length_px, std::abs(pixel.along_px));
+    }
+    bool is_uneven = false;
+    for (int i = 0; i < max_fits; ++i) {
+        const std::optional<Fit> fit = fit_model(pixels, half_length_px, blur_px, is_uneven);
+        if (!fit || !(std::abs(fit->slope.per_px) * half_length_px < max_change))
             return std::nullopt;
-        const double variance = sum.cost / static_cast<double>(pixels.size() - unknowns);
-        const Normal covariance = variance * sum.normal.inv(cv::DECOMP_CHOLESKY);
-        const double pivot_px = -covariance(0, 1) / covariance(1, 1);
-        return BlurredEdge{pivot_px,           model.offset_px + model.turn * pivot_px,
-                           model.turn,         covariance(0, 0) + pivot_px * covariance(0, 1),
-                           covariance(1, 1),   model.blur_px,
-                           correlation(pixels)};
+        if (!fit->slope.is_clear(half_length_px)) {
+            const Normal &covariance = fit->covariance;
+            const double pivot_px = -covariance(0, 1) / covariance(1, 1);
+            return BlurredEdge{pivot_px,         fit->model.offset_px + fit->model.turn * pivot_px,
+                               fit->model.turn,  covariance(0, 0) + pivot_px * covariance(0, 1),
+                               covariance(1, 1), fit->model.blur_px,
+                               fit->correlation};
+        }
+        is_uneven = true;
+        remove_slope(pixels, fit->slope.per_px);
     }
     return std::nullopt;
 }

@@ -4,7 +4,7 @@
 #pragma once
 
 #include <optional>
-#include <vector>
+#include <span>
 
 namespace arhost::fiducial {
 
@@ -12,8 +12,7 @@ namespace arhost::fiducial {
 struct EdgePixel {
     double along_px, across_px;
     double light;
-    int column;                         // ascending; pixels of a column are near the same place on the edge
-    double residual = 0, by_offset = 0; // for fit_blurred_edge(): of the light, and its derivative
+    int column; // ascending; pixels of a column are near the same place on the edge
 };
 
 // At `along_px`, the edge is where across_px is offset_px + turn * (along_px - pivot_px). The errors of `offset_px`
@@ -30,8 +29,9 @@ struct BlurredEdge {
 // is the distribution function of the standard normal distribution. Pixels average light over squares, which widens
 // the blur. Unlike a search along profiles, this interpolates nothing, so it has no error that repeats along an edge
 // whose slope is a simple fraction. Leaves out columns that do not fit, for example because something hides them, up
-// to half of all. `blur_px`: where to start, greater than 0. Returns std::nullopt if the fit does not converge near
-// the line, or if the light changes along the edge.
-std::optional<BlurredEdge> fit_blurred_edge(std::vector<EdgePixel> pixels, double blur_px);
+// to half of all. If the light of the bright area clearly changes along the edge, removes this change first. The
+// variances follow from the residuals, and contain the errors of that change and the correlation of neighbours.
+// `blur_px`: where to start, greater than 0. Returns std::nullopt if the fit does not converge near the line.
+std::optional<BlurredEdge> fit_blurred_edge(std::span<const EdgePixel> pixels, double blur_px);
 
 } // namespace arhost::fiducial

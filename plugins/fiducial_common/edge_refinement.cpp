@@ -313,10 +313,15 @@ std::optional<FittedEdge> fit_edge(const Picture &picture, const Edge &edge, Slo
     return fitted;
 }
 
-// Returns the pixels near an edge whose distance from `line` is at most `reach_px`, in undistorted pixels relative to
-// the line, ordered by columns, or by rows if the edge is steep.
+// What belongs to an edge, in undistorted pixels relative to a line beside it.
+struct Surroundings {
+    double first_px, last_px; // along the line
+    double reach_px;          // to both sides
+};
+
+// Returns the pixels in the surroundings of an edge, ordered by columns, or by rows if the edge is steep.
 std::vector<EdgePixel> pixels_beside(const Picture &picture, const Edge &edge, const Line &line, cv::Point2d outward,
-                                     double blur_px, double reach_px, const Lens &lens) {
+                                     double blur_px, const Surroundings &part, const Lens &lens) {
     const cv::Point2d along = edge.at_px.back() - edge.at_px.front();
     const bool is_steep = std::abs(along.y) > std::abs(along.x);
     const cv::Point step = is_steep ? cv::Point(1, 0) : cv::Point(0, 1);
@@ -328,7 +333,7 @@ std::vector<EdgePixel> pixels_beside(const Picture &picture, const Edge &edge, c
             continue;
         const cv::Point middle(cvRound(edge.at_px[i].x), cvRound(edge.at_px[i].y));
         // One px more, because the middle is rounded and the line is not exactly at the position.
-        const int half = static_cast<int>(reach_px / std::max(std::abs(edge.outward[i].dot(step)), 0.5) + 1.5);
+        const int half = static_cast<int>(part.reach_px / std::max(std::abs(edge.outward[i].dot(step)), 0.5) + 1.5);
         const int column = is_steep ? middle.y : middle.x;
         const cv::Rect inside({}, picture.grey.size());
         if (column == last || !inside.contains(middle - half * step) || !inside.contains(middle + half * step))
@@ -349,9 +354,9 @@ std::vector<EdgePixel> pixels_beside(const Picture &picture, const Edge &edge, c
                           square = ((*straight)[i + 2] + (*straight)[i] - 2 * constant) / (2 * half * half);
         for (int k = -half; k <= half; k += stride) {
             const cv::Point2d place = constant - line.point + k * (linear + k * square);
-            const double across_px = outward.dot(place);
-            if (std::abs(across_px) <= reach_px)
-                result.push_back({line.direction.dot(place), across_px,
+            const double along_px = line.direction.dot(place), across_px = outward.dot(place);
+            if (along_px >= part.first_px && along_px <= part.last_px && std::abs(across_px) <= part.reach_px)
+                result.push_back({along_px, across_px,
                                   picture.light[picture.grey.at<std::uint8_t>(middle + k * step)],
                                   static_cast<int>(i / 3)});
         }
@@ -362,17 +367,20 @@ std::vector<EdgePixel> pixels_beside(const Picture &picture, const Edge &edge, c
 // Fits an edge to the pixels beside it. `line` is close to it, and `from` and `to` are the corners.
 std::optional<FittedEdge> fit_pixels(const Picture &picture, Line line, cv::Point2d from, cv::Point2d to,
                                      double cell_px, double blur_px, const Lens &lens) {
-    // Farther pixels tell little more. What is beside the border and the margin contributes little up to there,
-    // unless cells are so narrow that 1.6 px reach farther.
-    const double reach_px = std::min(std::max(std::min(3.5 * blur_px, cell_px - 2.5 * blur_px), 1.6), 0.9 * cell_px);
-    const auto edge = edge_between(from, to, lens, 3 * blur_px + 1, count_of(from, to, 1));
+    // Farther pixels tell little more. Within `pure_px`, what is beside the border and the margin contributes little.
+    const double useful_px = 3.5 * blur_px, pure_px = cell_px - 2.5 * blur_px, needed_px = 1.6;
+    const double reach_px = std::min(std::max(std::min(useful_px, pure_px), needed_px), 0.9 * cell_px);
+    // The adjacent edges show up to there, and a little farther if the camera sharpens.
+    const double margin_px = std::min(3 * blur_px + 1, cv::norm(to - from) / 4);
+    const auto edge = edge_between(from, to, lens, margin_px, count_of(from, to, 1));
     if (!edge)
         return std::nullopt;
     if (line.direction.dot(to - from) < 0)
         line.direction = -line.direction;
     const cv::Point2d outward(line.direction.y, -line.direction.x);
-    const auto fitted =
-        fit_blurred_edge(pixels_beside(picture, *edge, line, outward, blur_px, reach_px, lens), blur_px);
+    const Surroundings part{line.direction.dot(from - line.point) + margin_px,
+                            line.direction.dot(to - line.point) - margin_px, reach_px};
+    const auto fitted = fit_blurred_edge(pixels_beside(picture, *edge, line, outward, blur_px, part, lens), blur_px);
     if (!fitted)
         return std::nullopt;
     const cv::Point2d direction = line.direction + fitted->turn * outward;
@@ -427,7 +435,7 @@ struct Square {
 };
 
 // As refine_edges(). Searches the edges at no more than so many positions on each, and then fits them to the pixels.
-// Where that fails, the search at max_positions is the result.
+// Where that fails, the line of the search at max_positions remains, and the corners are doubtful.
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
                                        bool is_subpixel, std::size_t max_count) {
     constexpr int max_passes = 8, max_fits = 3;
@@ -490,23 +498,24 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     }
     if (is_unclear || strength < min_strength * rough_strength)
         return std::nullopt;
-    for (int pass = 0; pass < max_fits; ++pass) {
+    bool is_misfit = true;
+    for (int pass = 0; pass < max_fits && is_misfit; ++pass) {
+        is_misfit = false;
         for (std::size_t i = 0; i < 4; ++i) {
             const auto edge = fit_pixels(picture, fitted[i].line, square.corners[i], square.next(i),
                                          square.cells_px[i], fitted[i].blur_px, lens);
-            if (!edge && max_count < max_positions)
-                return std::nullopt;
             if (edge)
                 fitted[i] = *edge;
+            is_misfit |= !edge;
         }
         const auto moved_px = square.move_to(fitted);
         if (!moved_px)
             return std::nullopt;
-        if (*moved_px < max_moved_px)
-            break;
+        is_misfit |= *moved_px >= max_moved_px;
     }
+    if (is_misfit && max_count < max_positions)
+        return std::nullopt;
     double variance = 0, blur_cells = 0; // of a coordinate; at the most blurred edge
-    bool is_misfit = false;
     for (std::size_t i = 0; i < 4; ++i) {
         const FittedEdge &before = fitted[(i + 3) % 4], &after = fitted[i];
         // An error of a line moves the crossing along the other line.

@@ -25,7 +25,7 @@ struct MeasuredCorners {
     Corners corners_px;
     double sigma_px = 0;      // standard deviation of each coordinate, RMS over the corners; 0: unknown
     double blur_cells = 0;    // standard deviation of the blur at the most blurred edge, in cells; 0: unknown
-    bool is_doubtful = false; // they are imprecise, and noise is not the reason; so something may hide an edge
+    bool is_doubtful = false; // they are imprecise, but not because of noise: something may hide an edge
 };
 
 // arhost_observation.false_positive_rate of a code with so many bits, in any of four orientations:

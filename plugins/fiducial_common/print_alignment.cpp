@@ -578,7 +578,7 @@ std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer 
 std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
                                               const Lens &lens, int cells, const std::function<Print()> &print,
                                               bool is_subpixel) {
-    constexpr double max_blur_cells = 0.2, max_sigma_ratio = 0.3; // of the print and doubtful edges
+    constexpr double max_blur_cells = 0.2, max_sigma_ratio = 0.1; // of the print and doubtful edges
     constexpr double max_light = 255, max_clipped = 0.05;         // of the light of white
     constexpr double max_skew_cells = 0.25;                       // of a square that is seen in perspective
     const auto edges = refine_edges(grey, transfer, rough_px, lens, cells, is_subpixel);

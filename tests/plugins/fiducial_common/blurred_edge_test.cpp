@@ -52,14 +52,41 @@ TEST(BlurredEdge, IsWhereThePixelsShowIt) {
     }
 }
 
-// It would be taken for a change of the direction.
-TEST(BlurredEdge, IsNotFittedInUnevenLight) {
-    for (const double slope : {0.001, 0.01}) { // 4 % and 40 % from end to end
-        auto pixels = pixels_of(Edge{}, 1);
+// A change of the light could be taken for one of the direction.
+TEST(BlurredEdge, IsWhereThePixelsShowItInUnevenLight) {
+    const Edge edge;
+    for (const double slope : {0.001, -0.003, 0.01}) { // 4 to 40 % from end to end
+        auto pixels = pixels_of(edge, 1);
         for (EdgePixel &pixel : pixels)
             pixel.light *= 1 + slope * pixel.along_px;
-        EXPECT_FALSE(fit_blurred_edge(pixels, 0.8)) << slope;
+        const auto found = fit_blurred_edge(pixels, 0.8);
+        ASSERT_TRUE(found) << slope;
+        for (const double along_px : {-12.0, 27.0})
+            EXPECT_NEAR(at_px(*found, along_px), edge.at_px(along_px), 0.01) << slope;
     }
+}
+
+// Along edges that nearly follow the rows of pixels, the tail of the blur resembles a change of the light.
+TEST(BlurredEdge, IsWhereThePixelsShowItIfItNearlyFollowsTheirRows) {
+    for (const double degrees : {0.3, 0.6, 1.0, 2.0})
+        for (const double blur_px : {0.4, 0.7}) {
+            const double turn = std::tan(degrees * std::numbers::pi / 180);
+            std::vector<EdgePixel> pixels; // averages over squares, beside a line that follows the edge
+            const Edge edge{0, 0, blur_px};
+            for (int column = 0; column < 40; ++column)
+                for (int row = -4; row <= 4; ++row) {
+                    const double along_px = column - 20.0, across_px = row - std::round(turn * along_px);
+                    double light = 0;
+                    for (const double within : {-0.375, -0.125, 0.125, 0.375})
+                        light += edge.light(0, across_px + within - turn * along_px) / 4;
+                    if (std::abs(across_px - turn * along_px) < 3.5 * blur_px)
+                        pixels.push_back({along_px, across_px - turn * along_px, std::round(light), column});
+                }
+            const auto found = fit_blurred_edge(pixels, blur_px);
+            ASSERT_TRUE(found) << degrees << " " << blur_px;
+            for (const double along_px : {-20.0, 20.0})
+                EXPECT_NEAR(at_px(*found, along_px), 0, 0.005) << degrees << " " << blur_px;
+        }
 }
 
 TEST(BlurredEdge, TellsItsVariance) {
@@ -79,6 +106,31 @@ TEST(BlurredEdge, TellsItsVariance) {
     EXPECT_NEAR(std::sqrt(told_offset / offset_squares), 1, 0.1);
     EXPECT_NEAR(std::sqrt(told_turn / turn_squares), 1, 0.1);
     EXPECT_LT(std::abs(products), 0.2 * std::sqrt(offset_squares * turn_squares)) << "the errors are independent";
+}
+
+// For example, of what hides a part of the edge, and is nearly parallel to it.
+TEST(BlurredEdge, TellsItsVarianceIfErrorsOfNeighboursAreSimilar) {
+    constexpr int count = 200;
+    const Edge edge;
+    double squares = 0, told = 0;
+    std::mt19937 random(3);
+    std::normal_distribution<double> normal;
+    for (int i = 0; i < count; ++i) {
+        double shift = 0;
+        auto pixels = pixels_of(edge);
+        for (std::size_t k = 0; k < pixels.size(); ++k) {
+            EdgePixel &pixel = pixels[k];
+            if (k % 7 == 0) // a new column
+                shift = 0.7 * shift + 0.02 * normal(random);
+            pixel.light = edge.light(pixel.along_px, pixel.across_px - shift);
+        }
+        const auto found = fit_blurred_edge(pixels, 0.7);
+        ASSERT_TRUE(found);
+        EXPECT_GT(found->correlation, 0.1);
+        squares += std::pow(found->offset_px - edge.at_px(found->pivot_px), 2) / count;
+        told += found->offset_variance / count;
+    }
+    EXPECT_NEAR(std::sqrt(told / squares), 1, 0.25);
 }
 
 TEST(BlurredEdge, LeavesOutWhatHidesIt) {
@@ -102,6 +154,13 @@ TEST(BlurredEdge, MayBeSharperThanPixels) {
     const auto found = fit_blurred_edge(pixels_of(edge, 1), 0.3);
     ASSERT_TRUE(found);
     EXPECT_NEAR(at_px(*found, 8), edge.at_px(8), 0.05);
+}
+
+TEST(BlurredEdge, IsNotFoundFarFromTheLine) {
+    for (const double offset_px : {1.1, 1.3, 1.5, 2.0, 2.5, -1.1, -1.5, -2.5})
+        EXPECT_FALSE(fit_blurred_edge(pixels_of({.offset_px = offset_px, .turn = 0}), 0.7)) << offset_px;
+    for (const double turn : {0.06, 0.08, 0.1, -0.06, -0.1}) // 27 px from where the line crosses the edge
+        EXPECT_FALSE(fit_blurred_edge(pixels_of({.offset_px = 0, .turn = turn}), 0.7)) << turn;
 }
 
 TEST(BlurredEdge, IsNotFoundWithoutOne) {
