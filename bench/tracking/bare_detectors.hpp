@@ -4,6 +4,7 @@
 #pragma once
 
 #include <fiducial_common/apriltag_families.hpp>
+#include <fiducial_common/aruco_dictionaries.hpp>
 #include <fiducial_common/observations.hpp>
 #include <fiducial_common/opencv_aruco.hpp>
 #include <fiducial_common/tracker_support.hpp>
@@ -52,6 +53,8 @@ private:
 class BareOpenCv {
 public:
     explicit BareOpenCv(bool refine_corners) {
+        // OpenCV's table of this family corrects no errors; with as many bits as AprilTag's, both correct the same.
+        dictionary_.maxCorrectionBits = aruco::dictionary_types[0].april_tag_bits;
         if (refine_corners)
             parameters_.cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
     }

@@ -302,7 +302,7 @@ arhost_intrinsics dissertation_camera(const Size &size) {
 
 std::string doubt_about_focal_length(const arhost_intrinsics &intrinsics) {
     const double shortest_px = std::min(intrinsics.fx, intrinsics.fy);
-    if (shortest_px >= 100 || shortest_px >= intrinsics.width / 4.0)
+    if (shortest_px >= 100 || shortest_px >= intrinsics.width / 2.0) // at most 90° wide
         return {};
     std::ostringstream message;
     message << "a focal length of " << shortest_px << " px is implausible for an image width of " << intrinsics.width

@@ -48,10 +48,9 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
     if (poses_from_tracker && statistics.tracker_results > 0 && statistics.tracked == 0)
         return Problem{
             "tracker",
-            fmt::format("no target was seen in any of {} frames{}; it looked for {}{}; compare the numbers and the "
-                        "family with the print",
-                        statistics.tracker_results, configuration.raytracer ? ", so no frame has an overlay" : "",
-                        describe_targets(targets), seen_instead(statistics, targets)),
+            fmt::format("no target was seen in any of {} frames{}; it looked for {}{}{}", statistics.tracker_results,
+                        configuration.raytracer ? ", so no frame has an overlay" : "", describe_targets(targets),
+                        seen_instead(statistics, targets), how_to_compare(targets)),
             true};
     if (configuration.mode != run_config::Mode::live || !configuration.raytracer || statistics.composited == 0 ||
         statistics.augmented > 0)
@@ -74,8 +73,8 @@ std::string unseen_targets(const run_config::Configuration &configuration, const
                          [&](const ipc::Target &target) { return !statistics.targets.contains(target.name); });
     if (unseen.empty())
         return {};
-    return fmt::format("never seen in {} frames: {}{}", statistics.tracker_results, describe_targets(unseen),
-                       seen_instead(statistics, unseen));
+    return fmt::format("never seen in {} frames: {}{}{}", statistics.tracker_results, describe_targets(unseen),
+                       seen_instead(statistics, unseen), how_to_compare(unseen));
 }
 
 std::string marker_name(const ipc::TargetMarker &marker) {
@@ -117,6 +116,15 @@ std::string seen_instead(const Statistics &statistics, const std::vector<ipc::Ta
                 " but got no pose: corners were hidden, or a small family was not seen in successive frames (see "
                 "'tracker.confirm' in docs/config.md)";
     return text;
+}
+
+std::string how_to_compare(const std::vector<ipc::Target> &unseen) {
+    bool has_ids = false, has_files = false;
+    for (const ipc::Target &target : unseen)
+        for (const ipc::TargetMarker &marker : target.markers)
+            (marker.file.empty() ? has_ids : has_files) = true;
+    return std::string(has_ids ? "; compare the numbers and the family with the print" : "") +
+           (has_files ? "; compare the files with the prints" : "");
 }
 
 std::string strangers_text(const Statistics &statistics) {

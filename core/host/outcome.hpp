@@ -34,6 +34,10 @@ std::string describe_targets(const std::vector<ipc::Target> &targets);
 // Tells what the tracker saw instead of the unseen targets, as "; it saw tag36h11 5 (30 frames)"; "" if nothing.
 std::string seen_instead(const Statistics &statistics, const std::vector<ipc::Target> &unseen);
 
+// Tells how to find out why targets are not seen, as "; compare the numbers and the family with the print"; "" for
+// bodies.
+std::string how_to_compare(const std::vector<ipc::Target> &unseen);
+
 // Names the most frequent markers that belong to no target, as "tag36h11 5 (30 frames)"; "" if there are none.
 std::string strangers_text(const Statistics &statistics);
 

@@ -94,7 +94,7 @@ std::vector<std::string> Pipeline::findings() const {
         }
     if (const std::string strangers = strangers_text(statistics_); !strangers.empty())
         lines.push_back("markers of no target: " + strangers);
-    lines.push_back("ms p50/p95/p99: " + percentiles_text(statistics_.stages.all(), statistics_.latencies.all()));
+    lines.push_back(percentiles_text(statistics_.stages.all(), statistics_.latencies.all()));
     return lines;
 }
 

@@ -279,8 +279,8 @@ void Pipeline::count_targets(const Frame &frame) {
                 target, observations.subspan(target.first_observation, target.observation_count));
 }
 
-// Counts the markers of no target and those of targets without a pose. If there is no target for a while, tells the
-// user of them.
+// Counts the markers of no target and those of targets without a pose. If targets were not seen for a while, tells
+// the user of them.
 void Pipeline::count_strangers(Frame &frame) {
     std::set<std::string> strangers, unconfirmed;
     std::vector<bool> has_pose(frame.observations.size());
@@ -304,13 +304,16 @@ void Pipeline::count_strangers(Frame &frame) {
     };
     add(strangers, statistics_.strangers);
     add(unconfirmed, statistics_.unconfirmed);
-    if (live_ && statistics_.targets.empty() && !reported_missing_targets_ && !configuration_.time_codes &&
+    if (live_ && !reported_missing_targets_ && !configuration_.time_codes &&
         Clock::now() - statistics_.first_frame > max_time_without_target) {
         reported_missing_targets_ = true;
-        context_.log(ARHOST_SEVERITY_WARNING, "tracker",
-                     "has seen no target yet; it looks for " + describe_targets(tracker_->configuration->targets) +
-                         seen_instead(statistics_, tracker_->configuration->targets) +
-                         "; compare the numbers and the family with the print");
+        const std::vector<ipc::Target> &targets = tracker_->configuration->targets;
+        if (statistics_.targets.empty())
+            context_.log(ARHOST_SEVERITY_WARNING, "tracker",
+                         "has seen no target yet; it looks for " + describe_targets(targets) +
+                             seen_instead(statistics_, targets) + how_to_compare(targets));
+        else if (const std::string unseen = unseen_targets(configuration_, statistics_, targets); !unseen.empty())
+            context_.log(ARHOST_SEVERITY_WARNING, "tracker", unseen);
     }
 }
 

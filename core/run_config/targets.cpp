@@ -17,6 +17,7 @@
 #include <glm/vec3.hpp>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -288,6 +289,34 @@ bool are_at_the_same_place(const Corners &a, const Corners &b) {
            glm::dot(normal_of(a), normal_of(b)) > 0;
 }
 
+// Whether both lie in one plane, and one covers a part of the other. A small marker may be inside a larger one.
+bool overlap(const Corners &a, const Corners &b) {
+    const glm::dvec3 normal = normal_of(a);
+    const double limit = tolerance * std::min(mean_side(a), mean_side(b));
+    constexpr double parallel = 0.9999; // cosine of the angle between the normals, at least
+    if (glm::dot(normal, normal_of(b)) < parallel || std::abs(glm::dot(normal, centre_of(b) - centre_of(a))) > limit)
+        return false;
+    // How far the corners of `of` are outside of an edge of `from`.
+    const auto outside = [&](const Corners &of, const Corners &from, std::size_t edge) {
+        const glm::dvec3 outward = glm::normalize(glm::cross(normal, from[(edge + 1) % 4] - from[edge]));
+        std::array<double, 4> distances{};
+        std::ranges::transform(of, distances.begin(),
+                               [&](const glm::dvec3 &corner) { return glm::dot(outward, corner - from[edge]); });
+        return std::ranges::minmax(distances);
+    };
+    const auto is_apart_or_inside = [&](const Corners &of, const Corners &from) {
+        bool is_inside = true;
+        for (std::size_t edge = 0; edge < 4; ++edge) {
+            const auto [nearest, farthest] = outside(of, from, edge);
+            if (nearest > -limit)
+                return true;
+            is_inside &= farthest < limit;
+        }
+        return is_inside;
+    };
+    return !is_apart_or_inside(a, b) && !is_apart_or_inside(b, a);
+}
+
 // The markers of all targets: a marker belongs to one target.
 class Owners {
 public:
@@ -331,6 +360,11 @@ std::vector<TargetMarker> parse_layout(const yaml::Node &list, const std::string
             if (are_at_the_same_place(layout[i].corners_mm, marker.corners_mm))
                 node.fail("the marker " + std::to_string(marker.id) + " is at the place of marker " +
                           std::to_string(layout[i].id) + ", " + other() + "; correct one of them");
+            if (overlap(layout[i].corners_mm, marker.corners_mm))
+                node.fail("the marker " + std::to_string(marker.id) + " covers a part of marker " +
+                          std::to_string(layout[i].id) + ", " + other() +
+                          "; correct the place or the side of one of "
+                          "them");
         }
         layout.push_back(marker);
         warned = warned || warn_of_side(node, mean_side(marker.corners_mm), warnings);
@@ -399,6 +433,9 @@ std::vector<TargetMarker> markers_of(const std::vector<MultiMarker> &layout, con
                          "; keep one of them");
             if (are_at_the_same_place(places[k], places[i]))
                 one.fail("this marker is at the place of that at " + layout[k].where + "; correct one of them");
+            if (overlap(places[k], places[i]))
+                one.fail("this marker covers a part of that at " + layout[k].where +
+                         "; correct the place or the side of one of them");
         }
         if (const std::string doubt = doubt_of_side(one.side_mm); !warned && !doubt.empty()) {
             warnings.push_back(one.where + ": " + doubt);

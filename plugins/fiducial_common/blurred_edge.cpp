@@ -118,7 +118,7 @@ bool remove_outliers(std::vector<Pixel> &pixels, double min_error) {
     return std::erase_if(pixels, [&](const Pixel &pixel) { return columns[pixel.column].mean_square() > bound; }) > 0;
 }
 
-// What columns contribute to the derivative of the cost by the offset.
+// The contributions of the columns to the derivative of the cost by the offset.
 struct Contributions {
     double squares = 0, independent = 0; // sum of their squares, and its expectation if the errors were independent
     double correlation = 0;              // of neighbouring columns

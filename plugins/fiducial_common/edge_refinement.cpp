@@ -313,7 +313,7 @@ std::optional<FittedEdge> fit_edge(const Picture &picture, const Edge &edge, Slo
     return fitted;
 }
 
-// What belongs to an edge, in undistorted pixels relative to a line beside it.
+// A rectangle around an edge, in undistorted pixels relative to a line beside it.
 struct Surroundings {
     double first_px, last_px; // along the line
     double reach_px;          // to both sides

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 namespace arhost::fiducial {
 namespace {
@@ -82,6 +83,15 @@ arhost_observation observation_of(std::int32_t id, std::uint32_t family, const M
 arhost_observation Family::observation(int id, const MeasuredCorners &corners) const {
     const auto found = listed.find(id);
     return observation_of(id, found == listed.end() ? index : found->second, corners);
+}
+
+void reject_prints_without_ids(std::string_view family, std::string_view tracker) {
+    for (const auto &[known, finder] :
+         {std::pair<std::string_view, std::string_view>("pattern", "tracker_pattern"), {"image", "tracker_image"}})
+        if (family == known)
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, std::string(tracker) + " finds no targets with '" +
+                                                                 std::string(known) + "'; use the plugin " +
+                                                                 std::string(finder));
 }
 
 std::vector<Family> families_of(const arhost_tracker_setup &setup,

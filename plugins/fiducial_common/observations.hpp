@@ -58,6 +58,10 @@ struct Family {
     arhost_observation observation(int id, const MeasuredCorners &corners) const;
 };
 
+// Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION), which names the tracker to use, if the family is that of
+// patterns or of pictures. `tracker`: the one that has no such family.
+void reject_prints_without_ids(std::string_view family, std::string_view tracker);
+
 // Returns the families of the setup. `id_count` returns the number of markers of a family, and throws if it is
 // unknown. Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION) if a listed id is not in its family or is listed twice.
 std::vector<Family> families_of(const arhost_tracker_setup &setup,

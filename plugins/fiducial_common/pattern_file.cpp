@@ -39,8 +39,9 @@ std::vector<int> numbers_in(const std::string &file) {
         int number = 0;
         const auto [after, error] = std::from_chars(at, end, number);
         if (error != std::errc() || number < 0 || number > 255)
-            reject(file, "is not a pattern of ARToolKit: line " + std::to_string(line) +
-                             " has something other than numbers from 0 to 255");
+            reject(file,
+                   "is not a pattern of ARToolKit: line " + std::to_string(line) +
+                       " has something other than numbers from 0 to 255; name a file that ARToolKit's mk_patt wrote");
         numbers.push_back(number);
         at = after;
     }
@@ -56,8 +57,10 @@ cv::Mat_<float> read_pattern(const std::string &file) {
     if (side < min_side || side > max_side ||
         numbers.size() !=
             std::size_t{orientations * planes} * static_cast<std::size_t>(side) * static_cast<std::size_t>(side))
-        reject(file, "is not a pattern of ARToolKit: it has " + std::to_string(numbers.size()) +
-                         " numbers; a pattern of 16 x 16 has 3072: four orientations of three colours");
+        reject(file,
+               "is not a pattern of ARToolKit: it has " + std::to_string(numbers.size()) +
+                   " numbers; a pattern of 16 x 16 has 3072: four orientations of three colours; if the file is cut "
+                   "short, copy it again");
     // The first orientation is the upright one. The others are the same picture, rotated.
     cv::Mat_<float> upright(side, side, 0.0F);
     constexpr float weights[planes] = {0.114F, 0.587F, 0.299F}; // luma of BT.601, as in frames

@@ -127,6 +127,7 @@ const FamilyType &family_type(const std::string &name) {
             return type;
         names += std::string(names.empty() ? "" : ", ") + type.name;
     }
+    arhost::fiducial::reject_prints_without_ids(name, "tracker_apriltag");
     throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                   "unknown family '" + name + "': tracker_apriltag has " + names +
                       (name.starts_with("DICT_") ? "; tracker_aruco has OpenCV's dictionaries" : ""));

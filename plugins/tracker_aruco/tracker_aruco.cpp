@@ -438,10 +438,13 @@ private:
                 return predefined(type);
             names += std::string(names.empty() ? "" : ", ") + type.family;
         }
+        arhost::fiducial::reject_prints_without_ids(name, "tracker_aruco");
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "unknown dictionary '" + name + "': tracker_aruco has " +
                           (file_name_.empty() ? "" : file_name_ + " (dictionary_file), ") + names +
-                          (name.starts_with("tag") ? "; tracker_apriltag has more families of AprilTag" : ""));
+                          (name.starts_with("tag")
+                               ? "; tracker_apriltag has more families of AprilTag"
+                               : "; 'dictionary_file' loads others, also those of newer versions of OpenCV"));
     }
 
     void make_parameters() {

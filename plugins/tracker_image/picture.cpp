@@ -100,8 +100,10 @@ Picture::Picture(const std::string &file) {
         cv::resize(grey, grey, {}, std::numbers::sqrt2 / 2, std::numbers::sqrt2 / 2, cv::INTER_AREA);
     }
     if (levels_[0].points.size() < min_points || features_.points.size() < 2 * min_inliers)
-        reject("has too little texture to be recognised: only " + std::to_string(levels_[0].points.size()) +
-               " points");
+        reject("has too little texture to be recognised: it has " + std::to_string(levels_[0].points.size()) +
+               " corners and " + std::to_string(features_.points.size()) + " features; " +
+               std::to_string(min_points) + " and " + std::to_string(2 * min_inliers) +
+               " are needed; use a picture with more details, or a larger scan of it");
 }
 
 // Returns the smallest level that is not smaller than the picture in the frame.

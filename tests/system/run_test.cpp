@@ -619,7 +619,9 @@ TEST(Run, WarnsOfTargetsThatWereNeverSeen) {
     EXPECT_EQ(run.run(), 0) << run.output();
     EXPECT_THAT(
         run.output(),
-        HasSubstr("tracker: never seen in 10 frames: 'tag36h11-7' (tag36h11 7), 'tag36h11-5' (tag36h11 5)\n"));
+        HasSubstr(
+            "tracker: never seen in 10 frames: 'tag36h11-7' (tag36h11 7), 'tag36h11-5' (tag36h11 5); compare the "
+            "numbers and the family with the print\n"));
 }
 
 TEST(Run, ReportsAMarkerOfASmallFamilyWhenItIsSeenAgain) {
@@ -649,6 +651,16 @@ TEST(Run, InModeLiveWarnsAfterFiveSecondsWithoutTargets) {
     EXPECT_THAT(run.output().substr(run.output().find(warning) + 1), testing::Not(HasSubstr(warning)));
 }
 
+TEST(Run, InModeLiveWarnsAfterFiveSecondsOfTargetsThatWereNotSeen) {
+    ArhostRun run("version: 1\nmode: live\n"
+                  "source: {plugin: source_synthetic, fps: 10, options: {frames: 58, id: 4, side_mm: 80}}\n"
+                  "tracker: {plugin: tracker_aruco, targets: [{ids: 4-5, family: tag36h11, side_mm: 80}]}\n"
+                  "outputs: [{plugin: sink_null}]\n");
+    EXPECT_EQ(run.run(), 0) << run.output();
+    EXPECT_THAT(run.output(), testing::ContainsRegex("never seen in 5[0-9] frames: 'tag36h11-5' \\(tag36h11 5\\); "
+                                                     "compare the numbers and the family with the print"));
+}
+
 TEST(CommandLine, CheckRunsTheFirstFramesOnRequest) {
     const auto yaml = [](const std::string &ids) {
         return "version: 1\nsource: {plugin: source_synthetic, options: {frames: 0, id: 4, side_mm: 80}}\n"
@@ -659,7 +671,7 @@ TEST(CommandLine, CheckRunsTheFirstFramesOnRequest) {
     EXPECT_EQ(run.run({"check", "--run", "10", "run.yaml"}), 0) << run.output();
     EXPECT_THAT(run.output(),
                 HasSubstr("\n10 frames: 10 with a target, 0 with an overlay\ntarget tag36h11-4: in 10 frames, "));
-    EXPECT_THAT(run.output(), HasSubstr("\ntarget tag36h11-5: not seen\nms p50/p95/p99: "));
+    EXPECT_THAT(run.output(), HasSubstr("\ntarget tag36h11-5: not seen\nms p50/p95/p99:  latency "));
     EXPECT_THAT(run.output(), HasSubstr("\nrun.yaml: OK"));
     EXPECT_FALSE(run.exists("poses.jsonl"));
 

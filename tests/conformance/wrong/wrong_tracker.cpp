@@ -237,7 +237,7 @@ template <class Predicate> void keep(arhost_tracker_result &result, Predicate &&
 
 bool has_state() {
     return has("remembers") || has("never_updates_corners") || has("reads_state_after") ||
-           has("remembers_in_its_heap");
+           has("remembers_in_its_heap") || has("writes_state_before") || has("writes_past_its_state");
 }
 
 void modify_all(Wrong &self, const arhost_frame &frame, arhost_tracker_result &result) {
@@ -518,6 +518,10 @@ arhost_status track(arhost_instance *instance, const arhost_track_request *input
         if (input->state_before)
             std::memcpy(self.last.get(), input->state_before, sizeof *self.last);
     }
+    if (has("writes_state_before") && input->state_before)
+        const_cast<Seen *>(static_cast<const Seen *>(input->state_before))->count = 0;
+    if (has("writes_past_its_state"))
+        static_cast<std::uint8_t *>(input->state_after)[(input->state_size + 63) / 64 * 64] = 1; // it is aligned
     modify_all(self, frame, *result);
     if (!request.search_everywhere)
         modify_expected(self, expected, *result);

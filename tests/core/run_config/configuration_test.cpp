@@ -40,6 +40,7 @@ TEST_F(Warnings, AreForImplausibleFocalLengths) {
     EXPECT_THAT(of(camera, "80"), IsEmpty());
     EXPECT_THAT(of("{width: 640, height: 480, fx: 100}", "80"), IsEmpty());
     EXPECT_THAT(of("{width: 64, height: 48, fx: 60}", "80"), IsEmpty()) << "a small image";
+    EXPECT_THAT(of("{width: 320, height: 240, fx: 90}", "80"), testing::SizeIs(1));
     EXPECT_THAT(
         of("{width: 640, height: 480, fx: 600, fy: 35.5}", "80"),
         ElementsAre("lab.yaml:3:9: camera: a focal length of 35.5 px is implausible for an image width of 640 "

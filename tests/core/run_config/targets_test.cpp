@@ -604,6 +604,18 @@ TEST_F(TargetsTest, RejectsContradictionsInMaps) {
                 HasSubstr("is at the place of marker 4"));
     EXPECT_EQ(error_in_marker(first + "{id: 5, side_mm: 8, position_mm: [0, 0, 0]}"), "no error") << "a smaller one";
     EXPECT_EQ(
+        error_in_marker(first + "{id: 5, side_mm: 80, position_mm: [70, 0, 0], rotation_degrees: [0, 0, 45]}"),
+        "board.map.yaml:5:3: markers[1]: the marker 5 covers a part of marker 4, markers[0] (board.map.yaml:4:3); "
+        "correct the place or the side of one of them");
+    for (const char *beside : {"[80, 0, 0]", "[80, 80, 0]", "[0, -80, 0]", "[70, 0, 5]"})
+        EXPECT_EQ(error_in_marker(first + "{id: 5, side_mm: 80, position_mm: " + beside + "}"), "no error") << beside;
+    EXPECT_EQ(
+        error_in_marker(first + "{id: 5, side_mm: 80, position_mm: [90, 0, 0], rotation_degrees: [0, 0, 45]}"),
+        "board.map.yaml:5:3: markers[1]: the marker 5 covers a part of marker 4, markers[0] (board.map.yaml:4:3); "
+        "correct the place or the side of one of them");
+    EXPECT_EQ(error_in_marker(first + "{id: 5, side_mm: 80, position_mm: [97, 0, 0], rotation_degrees: [0, 0, 45]}"),
+              "no error");
+    EXPECT_EQ(
         error_in_marker(first + "{id: 5, side_mm: 80, position_mm: [0, 0, -0.1], rotation_degrees: [180, 0, 0]}"),
         "no error")
         << "on the back";

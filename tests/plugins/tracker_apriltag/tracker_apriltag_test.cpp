@@ -120,6 +120,16 @@ TEST(AprilTagTracker, NamesTheTrackerThatKnowsADictionaryOfOpenCv) {
     EXPECT_THAT(tracker.log(), HasSubstr("tagStandard52h13; tracker_aruco has OpenCV's dictionaries"));
 }
 
+TEST(AprilTagTracker, NamesTheTrackersOfPatternsAndPictures) {
+    Tracker tracker("tracker_apriltag");
+    EXPECT_EQ(tracker.start(test_camera, {{0, 100, "pattern"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(),
+                HasSubstr("tracker_apriltag finds no targets with 'pattern'; use the plugin tracker_pattern"));
+    EXPECT_EQ(tracker.start(test_camera, {{0, 100, "image"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(),
+                HasSubstr("tracker_apriltag finds no targets with 'image'; use the plugin tracker_image"));
+}
+
 TEST(AprilTagTracker, RejectsADecimationThatTheLibraryMishandles) {
     Tracker tracker("tracker_apriltag", {{"quad_decimate", "2.5"}});
     EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION);

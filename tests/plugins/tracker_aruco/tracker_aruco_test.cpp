@@ -258,10 +258,18 @@ TEST(ArucoTracker, NamesTheTrackerThatKnowsMoreFamiliesOfAprilTag) {
     Tracker tracker("tracker_aruco");
     EXPECT_EQ(tracker.start(test_camera, {{0, 100, "DICT_9X9_9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker.log(), testing::Not(HasSubstr("tracker_apriltag")));
+    EXPECT_THAT(tracker.log(), HasSubstr("'dictionary_file' loads others"));
     EXPECT_EQ(tracker.start(test_camera, {{0, 100, "tagStandard41h12"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker.log(),
                 testing::AllOf(HasSubstr("unknown dictionary 'tagStandard41h12': tracker_aruco has tag36h11, "),
                                HasSubstr("DICT_6X6_250"), HasSubstr("; tracker_apriltag has more families")));
+}
+
+TEST(ArucoTracker, NamesTheTrackersOfPatternsAndPictures) {
+    Tracker tracker("tracker_aruco");
+    EXPECT_EQ(tracker.start(test_camera, {{0, 100, "image"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(tracker.log(),
+                HasSubstr("tracker_aruco finds no targets with 'image'; use the plugin tracker_image"));
 }
 
 TEST(ArucoTracker, CorrectsAtMostThreeWrongBitsOf36ByDefault) {

@@ -99,7 +99,10 @@ TEST_F(ImageTracker, FindsNothingElse) {
 TEST_F(ImageTracker, RejectsPicturesWithoutTextureAndOtherFiles) {
     EXPECT_EQ(tracker_.start(camera, {listed(0, cv::Mat(200, 300, CV_8UC1, cv::Scalar(255)))}),
               ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(tracker_.log(), HasSubstr("0.png' has too little texture to be recognised"));
+    EXPECT_THAT(
+        tracker_.log(),
+        HasSubstr("0.png' has too little texture to be recognised: it has 0 corners and 0 features; 24 and 24 "
+                  "are needed; use a picture with more details"));
     const std::filesystem::path text_file = folder_.path() / "a.txt";
     std::ofstream(text_file) << "text";
     const Listed text{0, 210, "image", text_file.string()};
