@@ -10,8 +10,9 @@ TRACKERS = ("tracker_apriltag", "tracker_aruco")
 # Title, column, column of the bound, logarithmic, detectors
 ROWS = (("found, %", "found", None, False, tuple(COLOURS)),
         ("noise of corners, px", "corner_px", None, True, tuple(COLOURS)),
-        ("rotation p99, °", "rotation_degrees_p99", "bound_of_rotation_degrees_p99", True, tuple(COLOURS)),
-        ("translation p99, mm", "translation_mm_p99", "bound_of_translation_mm_p99", True, tuple(COLOURS)),
+        *((f"{name} {share}, {unit}", f"{column}_{share}", f"bound_of_{column}_{share}", True, tuple(COLOURS))
+          for name, unit, column in (("rotation", "°", "rotation_degrees"), ("translation", "mm", "translation_mm"))
+          for share in ("p50", "p95", "p99")),
         ("covered, %", "covered", None, False, TRACKERS))
 TARGET_OF_COVERED = (90, 98)
 LEFT, TOP, WIDTH, HEIGHT, GAP_X, GAP_Y = 70, 60, 130, 110, 14, 16
@@ -40,7 +41,7 @@ def draw(rows):
         svg.append(f'<path d="M{x} 20h22" stroke="{colour}" stroke-width="2"/><text x="{x + 28}" y="24">{label}</text>')
         x += 145
     svg.append(f'<path d="M{x} 20h22" stroke="#555" stroke-width="1.5" stroke-dasharray="4 3"/>'
-               f'<text x="{x + 28}" y="24">p99 of an estimator at the Cramér–Rao bound</text>')
+               f'<text x="{x + 28}" y="24">an estimator at the Cramér–Rao bound</text>')
     for number, (title, column, bound, is_logarithmic, detectors) in enumerate(ROWS):
         top = TOP + number * (HEIGHT + GAP_Y)
         shown = [float(row[name]) for row in rows for name in (column, bound)

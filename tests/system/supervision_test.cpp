@@ -433,6 +433,34 @@ TEST(Supervision, ATrackersStateSurvivesItsWorker) {
     }
 }
 
+// The memory of the filter, of the search and of the prediction survives the tracker.
+TEST(Supervision, KillingARealTrackerEvery20FramesDoesNotChangeItsPoses) {
+    constexpr std::size_t frames = 200;
+    for (const std::string tracker : {"tracker_apriltag", "tracker_aruco"}) {
+        const std::string yaml =
+            "version: 1\nsource: {plugin: source_synthetic, options: {id: 3, width: 320, height: 240, frames: " +
+            std::to_string(frames) + "}}\ntracker: {plugin: " + tracker +
+            ", filter: adaptive, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"
+            "outputs: [{plugin: sink_poses, path: poses.jsonl}]\nstats: stats.json\nrestart: {first_delay_ms: 1}\n";
+        ArhostRun clean(yaml), killed(yaml);
+        ASSERT_EQ(clean.run(), 0) << clean.output();
+        killed.start();
+        for (std::size_t next = 20; killed.running();) {
+            const std::string log = killed.exists("poses.jsonl") ? killed.read("poses.jsonl") : "";
+            const auto now = static_cast<std::size_t>(std::ranges::count(log, '\n'));
+            const pid_t worker = now >= next ? killed.worker(tracker) : 0;
+            if (worker == 0)
+                continue;
+            send_signal(worker, SIGKILL);
+            next = now + 20;
+        }
+        ASSERT_EQ(killed.wait(), 0) << killed.output();
+        EXPECT_GE(killed.stats()["restarts"]["tracker"], 3);
+        EXPECT_EQ(killed.read("poses.jsonl"), clean.read("poses.jsonl"));
+        EXPECT_GT(killed.stats()["search"]["expected"], 0) << "no frame was searched at expected places only";
+    }
+}
+
 TEST(Supervision, AFrameThatATrackerCannotProcessLeavesItsStateAsItWas) {
     ArhostRun run(with_state("frames: 40", "state_size: 8, error_at: 20"));
     EXPECT_EQ(run.run(), 1) << run.output();
