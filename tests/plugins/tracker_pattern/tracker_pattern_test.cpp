@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/rendered_marker.hpp>
+#include <tracker_pattern/printed_patterns.hpp>
 
 #include <gmock/gmock.h>
 
-#include <fstream>
 #include <random>
 
 namespace {
@@ -12,54 +11,15 @@ using namespace arhost::test;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-const arhost_intrinsics camera = intrinsics_of({640, 480}, 600, 600, 319.5, 239.5);
-
-std::string file_of(const std::string &name) {
-    return (shared_data("markers/artoolkit") / (name + ".patt")).string();
-}
-
-// The print of a pattern with a black border, as wide as half of the picture.
-Print print_of(const std::string &name) {
-    std::ifstream stream(file_of(name));
-    constexpr int side = 16, border = 8;
-    Print print{cv::Mat_<std::uint8_t>(side + 2 * border, side + 2 * border, std::uint8_t{0}), side + 2 * border};
-    for (int y = 0; y < side; ++y) // the first of three colours: the patterns are black and white
-        for (int x = 0; x < side; ++x) {
-            int value = 0;
-            stream >> value;
-            print.cells(border + y, border + x) = static_cast<std::uint8_t>(value);
-        }
-    return print.with_margin(4);
-}
-
-const std::vector<Listed> both() {
-    return {{0, 80, "pattern", file_of("hiro"), 0.5}, {1, 80, "pattern", file_of("kanji"), 0.5}};
-}
-
-cv::Mat picture_of(const std::vector<Placed> &markers, std::uint64_t seed = 1) {
-    cv::Mat picture = render(camera, markers);
-    cv::GaussianBlur(picture, picture, {}, 0.6);
-    add_noise(picture, 1.5, seed);
-    return picture;
-}
-
 TEST(PatternTracker, TellsHiroFromKanjiAtTiltsOfUpTo60Degrees) {
     ARHOST_REQUIRE_SHARED_DATA("markers/artoolkit");
     Tracker tracker("tracker_pattern");
     ASSERT_EQ(tracker.start(camera, both()), ARHOST_STATUS_OK) << tracker.log();
     std::mt19937 random(1);
-    std::uniform_real_distribution<double> turn(-180, 180), shift(-20, 20);
-    const char *const names[] = {"hiro", "kanji"};
     double worst_px = 0;
     for (const double tilt : {0.0, 15.0, 30.0, 45.0, 60.0})
         for (int view = 0; view < 10; ++view) {
-            std::vector<Placed> placed;
-            for (int id = 0; id < 2; ++id) {
-                const bool about_x = view % 2 == 0;
-                placed.push_back({print_of(names[id]), 80,
-                                  pose_of(id * 150 - 75 + shift(random), shift(random), 500, about_x ? tilt : 0,
-                                          about_x ? 0 : tilt, turn(random))});
-            }
+            const std::vector<Placed> placed = side_by_side(tilt, view % 2 == 0, random);
             const auto seen = tracker.track(GreyFrame(picture_of(placed, static_cast<std::uint64_t>(view) + 1)));
             ASSERT_EQ(seen.size(), 2u) << "tilt " << tilt << ", view " << view;
             for (int id = 0; id < 2; ++id) {
