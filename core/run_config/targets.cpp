@@ -363,8 +363,7 @@ std::vector<TargetMarker> parse_layout(const yaml::Node &list, const std::string
             if (overlap(layout[i].corners_mm, marker.corners_mm))
                 node.fail("the marker " + std::to_string(marker.id) + " covers a part of marker " +
                           std::to_string(layout[i].id) + ", " + other() +
-                          "; correct the place or the side of one of "
-                          "them");
+                          "; correct the place or the side of one of them");
         }
         layout.push_back(marker);
         warned = warned || warn_of_side(node, mean_side(marker.corners_mm), warnings);

@@ -128,7 +128,8 @@ struct Contributions {
     // contributions are greater, because the errors within a column are similar, and those of columns resemble an
     // autoregressive process of the first order. 1 if the correlation may be due to chance.
     double variance_ratio() const {
-        constexpr double min_deviations = 2, max_correlation = 0.9;
+        // Errors with a higher correlation vary so slowly along the edge that the fit mostly follows them.
+        constexpr double min_deviations = 2, max_correlation = 0.7;
         if (!(correlation * std::sqrt(columns) > min_deviations))
             return 1;
         const double known = std::min(correlation, max_correlation);
@@ -139,9 +140,12 @@ struct Contributions {
 Contributions contributions(std::span<const Pixel> pixels) {
     Contributions all;
     double products = 0, last = 0, residuals = 0, derivatives = 0;
+    int column = -2;
     for (auto first = pixels.begin(); first != pixels.end(); ++all.columns) {
         double sum = 0;
-        for (const int column = first->column; first != pixels.end() && first->column == column; ++first) {
+        if (first->column != column + 1) // what hides the edge is between them
+            last = 0;
+        for (column = first->column; first != pixels.end() && first->column == column; ++first) {
             sum += first->by_offset * first->residual;
             residuals += first->residual * first->residual;
             derivatives += first->by_offset * first->by_offset;
@@ -170,26 +174,29 @@ Model first_model(std::span<const Pixel> pixels, double blur_px) {
     return {0, 0, blur_px, before, after - before};
 }
 
-// How the light changes along an edge: relative to its mean, per px.
-struct LightSlope {
-    double per_px = 0, variance = 0;
+// How the light of an area differs from that of the model: by offset + slope_per_px * along_px.
+struct LightLine {
+    double offset = 0, slope_per_px = 0, slope_variance = 0;
 
-    bool is_clear(double half_length_px) const {
-        constexpr double min_change = 0.002; // from the middle to an end
+    // `light`: of the bright area.
+    bool is_clear(double half_length_px, double light) const {
+        constexpr double min_change = 0.002; // of the light, from the middle to an end
         constexpr double min_deviations = 3; // standard deviations
-        return std::abs(per_px) * half_length_px > min_change &&
-               per_px * per_px > min_deviations * min_deviations * variance;
+        return std::abs(slope_per_px) * half_length_px > min_change * light &&
+               slope_per_px * slope_per_px > min_deviations * min_deviations * slope_variance;
     }
+    double at(double along_px) const { return offset + slope_per_px * along_px; }
 };
 
-// Fits a line to the residuals in the bright area, so far from the edge that they do not depend on its direction.
-LightSlope light_slope(std::span<const Pixel> pixels, const Model &model) {
+// Fits a line to the residuals of the area before the edge (`side` is -1) or after it (+1), so far from the edge that
+// they do not depend on its direction. Returns a line of 0 if there are few pixels.
+LightLine light_line(std::span<const Pixel> pixels, const Model &model, double side) {
     constexpr double min_pixels = 10;
     // A pixel and its interpolated neighbours, of a renderer or of a Bayer pattern, reach 1.2 px.
-    const double min_distance_px = std::max(2 * model.blur_px, 1.2), bright = model.contrast > 0 ? 1 : -1;
+    const double min_distance_px = std::max(2 * model.blur_px, 1.2);
     double count = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
     for (const Pixel &pixel : pixels)
-        if (bright * (pixel.across_px - model.offset_px - model.turn * pixel.along_px) > min_distance_px) {
+        if (side * (pixel.across_px - model.offset_px - model.turn * pixel.along_px) > min_distance_px) {
             ++count;
             x += pixel.along_px;
             y += pixel.residual;
@@ -200,13 +207,21 @@ LightSlope light_slope(std::span<const Pixel> pixels, const Model &model) {
     if (count < min_pixels)
         return {};
     xx -= x * x / count, xy -= x * y / count, yy -= y * y / count;
-    const double slope = xy / xx, light = std::max(model.before, model.before + model.contrast);
-    return {slope / light, std::max(yy - slope * xy, 0.0) / (count - 2) / xx / (light * light)};
+    const double slope = xy / xx;
+    return {(y - slope * x) / count, slope, std::max(yy - slope * xy, 0.0) / (count - 2) / xx};
 }
 
-void remove_slope(std::span<Pixel> pixels, double per_px) {
-    for (Pixel &pixel : pixels)
-        pixel.light /= 1 + per_px * pixel.along_px;
+// Lines of the areas before and after the edge.
+using LightLines = std::array<LightLine, 2>;
+
+// Changes the light of the pixels so that both areas have that of the model, and what is between them remains between
+// them. The light may be multiplied, by uneven illumination, or added to, by glare.
+void remove(const LightLines &lines, const Model &model, std::span<Pixel> pixels) {
+    for (Pixel &pixel : pixels) {
+        const double before = lines[0].at(pixel.along_px), after = lines[1].at(pixel.along_px);
+        pixel.light =
+            model.before + (pixel.light - model.before - before) * model.contrast / (model.contrast + after - before);
+    }
 }
 
 // Minimizes the squared residuals by the method of Levenberg and Marquardt: edges that are sharper than pixels have
@@ -225,7 +240,7 @@ bool minimize(std::span<Pixel> pixels, double half_length_px, double max_blur_px
         Vector change;
         if (!cv::solve(damped, sum.gradient, change, cv::DECOMP_CHOLESKY))
             return false;
-        const double blur_px = std::clamp(model.blur_px + change[2], min_blur_px, std::max(max_blur_px, min_blur_px));
+        const double blur_px = std::clamp(model.blur_px + change[2], min_blur_px, max_blur_px);
         if (const double limited = blur_px - model.blur_px; limited != change[2]) { // solve for the other unknowns
             Vector gradient = sum.gradient;
             for (int i = 0; i < unknowns; ++i) {
@@ -269,41 +284,57 @@ struct Fit {
     Model model;
     Normal covariance;
     double correlation; // as BlurredEdge has it
-    LightSlope slope;   // that remains
+    LightLines lines;   // that remain
 };
 
-// Fits the model as fit_blurred_edge() describes it. `is_slope_removed`: from the light of the pixels, as a fit
-// before has told it.
+// Fits the model as fit_blurred_edge() describes it. `are_lines_removed`: from the light of the pixels, as a fit
+// before has told them.
 std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, double blur_px,
-                             bool is_slope_removed) {
-    constexpr double max_blur_ratio = 2;
+                             bool are_lines_removed) {
+    constexpr double max_blur_ratio = 2, min_variance = 1e-6; // of the light, relative to the squared contrast
     // Of the contrast, before the fit and afterwards: a lens does not blur an edge exactly as the model does.
     constexpr double min_first_error = 0.4, min_error = 0.06;
     constexpr int max_rounds = 10;
     const std::size_t min_pixels = std::max<std::size_t>(pixels.size() / 2, 4 * unknowns);
     if (pixels.size() < min_pixels)
         return std::nullopt;
+    const double max_blur_px = std::max(max_blur_ratio * blur_px, min_blur_px);
     Model model = first_model(pixels, blur_px);
     Linearized sum = linearize(pixels, model);
     if (remove_outliers(pixels, min_first_error * model.contrast))
         sum = linearize(pixels, model);
     for (int round = 0; round < max_rounds && pixels.size() >= min_pixels; ++round) {
-        if (!minimize(pixels, half_length_px, max_blur_ratio * blur_px, model, sum))
+        if (!minimize(pixels, half_length_px, max_blur_px, model, sum))
             return std::nullopt;
         if (remove_outliers(pixels, min_error * model.contrast)) {
             sum = linearize(pixels, model);
             continue;
         }
-        const double variance = std::max(sum.cost, 0.0) / static_cast<double>(pixels.size() - unknowns);
+        const double variance = std::max(sum.cost / static_cast<double>(pixels.size() - unknowns),
+                                         min_variance * model.contrast * model.contrast);
+        if (model.blur_px <= min_blur_px || model.blur_px >= max_blur_px) // it was no unknown
+            for (int i = 0; i < unknowns; ++i)
+                sum.normal(i, 2) = sum.normal(2, i) = i == 2 ? 1 : 0;
         const Normal inverse = sum.normal.inv(cv::DECOMP_CHOLESKY);
-        const Contributions columns = contributions(pixels);
-        Fit fit{model, columns.variance_ratio() * variance * inverse, columns.correlation,
-                light_slope(pixels, model)};
-        if (is_slope_removed) { // an error of the slope moves the edge
+        Contributions columns = contributions(pixels);
+        if (columns.variance_ratio() > 1) { // the last step may be the reason
+            linearize(pixels, model);
+            columns = contributions(pixels);
+        }
+        Fit fit{model,
+                columns.variance_ratio() * variance * inverse,
+                columns.correlation,
+                {light_line(pixels, model, -1), light_line(pixels, model, 1)}};
+        if (are_lines_removed) { // an error of their slopes moves the edge
             const Vector gradient = linearize(pixels, model).gradient;
-            remove_slope(pixels, std::sqrt(fit.slope.variance));
-            const Vector moved = inverse * (linearize(pixels, model).gradient - gradient);
-            fit.covariance += moved * moved.t();
+            for (const std::size_t side : {0U, 1U}) {
+                LightLines error;
+                error[side].slope_per_px = std::sqrt(fit.lines[side].slope_variance);
+                std::vector<Pixel> moved = pixels;
+                remove(error, model, moved);
+                const Vector change = inverse * (linearize(moved, model).gradient - gradient);
+                fit.covariance += change * change.t();
+            }
         }
         return fit;
     }
@@ -313,8 +344,8 @@ std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, d
 } // namespace
 
 std::optional<BlurredEdge> fit_blurred_edge(std::span<const EdgePixel> edge_pixels, double blur_px) {
-    constexpr int max_fits = 3;
-    constexpr double max_change = 0.6; // of the light, from the middle to an end
+    constexpr int max_fits = 5;
+    constexpr double max_change = 0.6; // of the contrast, from the middle to an end
     std::vector<Pixel> pixels;
     pixels.reserve(edge_pixels.size());
     double half_length_px = 0;
@@ -325,18 +356,24 @@ std::optional<BlurredEdge> fit_blurred_edge(std::span<const EdgePixel> edge_pixe
     bool is_uneven = false;
     for (int i = 0; i < max_fits; ++i) {
         const std::optional<Fit> fit = fit_model(pixels, half_length_px, blur_px, is_uneven);
-        if (!fit || !(std::abs(fit->slope.per_px) * half_length_px < max_change))
+        if (!fit)
             return std::nullopt;
-        if (!fit->slope.is_clear(half_length_px)) {
+        const Model &model = fit->model;
+        const double light = std::max(model.before, model.before + model.contrast);
+        const auto is_clear = [&](const LightLine &line) { return line.is_clear(half_length_px, light); };
+        if (std::ranges::none_of(fit->lines, is_clear)) {
             const Normal &covariance = fit->covariance;
             const double pivot_px = -covariance(0, 1) / covariance(1, 1);
-            return BlurredEdge{pivot_px,         fit->model.offset_px + fit->model.turn * pivot_px,
-                               fit->model.turn,  covariance(0, 0) + pivot_px * covariance(0, 1),
-                               covariance(1, 1), fit->model.blur_px,
+            return BlurredEdge{pivot_px,         model.offset_px + model.turn * pivot_px,
+                               model.turn,       covariance(0, 0) + pivot_px * covariance(0, 1),
+                               covariance(1, 1), model.blur_px,
                                fit->correlation};
         }
+        const double change = fit->lines[1].slope_per_px - fit->lines[0].slope_per_px; // of the contrast
+        if (!(std::abs(change) * half_length_px < max_change * std::abs(model.contrast)))
+            return std::nullopt;
         is_uneven = true;
-        remove_slope(pixels, fit->slope.per_px);
+        remove(fit->lines, model, pixels);
     }
     return std::nullopt;
 }

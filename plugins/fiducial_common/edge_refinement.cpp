@@ -435,7 +435,8 @@ struct Square {
 };
 
 // As refine_edges(). Searches the edges at no more than so many positions on each, and then fits them to the pixels.
-// Where that fails, the line of the search at max_positions remains, and the corners are doubtful.
+// Where that fails, the line of the search at max_positions remains, and imprecise
+// corners are doubtful.
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
                                        bool is_subpixel, std::size_t max_count) {
     constexpr int max_passes = 8, max_fits = 3;
@@ -504,6 +505,8 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
         for (std::size_t i = 0; i < 4; ++i) {
             const auto edge = fit_pixels(picture, fitted[i].line, square.corners[i], square.next(i),
                                          square.cells_px[i], fitted[i].blur_px, lens);
+            if (!edge && max_count < max_positions)
+                return std::nullopt;
             if (edge)
                 fitted[i] = *edge;
             is_misfit |= !edge;

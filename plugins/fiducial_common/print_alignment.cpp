@@ -583,10 +583,11 @@ std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transf
     constexpr double max_skew_cells = 0.25;                       // of a square that is seen in perspective
     const auto edges = refine_edges(grey, transfer, rough_px, lens, cells, is_subpixel);
     const bool is_unreliable = !edges || edges->sigma_px == 0 || edges->blur_cells > max_blur_cells;
-    if (!is_unreliable && !edges->is_doubtful && !is_overexposed(grey, edges->corners_px, cells))
+    const bool has_bright_edges = !is_unreliable && is_overexposed(grey, edges->corners_px, cells);
+    if (!is_unreliable && !edges->is_doubtful && !has_bright_edges)
         return edges;
     const auto is_better = [&](const AlignedPrint &found) {
-        return is_unreliable || found.white > (1 + max_clipped) * max_light ||
+        return is_unreliable || (has_bright_edges && found.white > (1 + max_clipped) * max_light) ||
                (edges->is_doubtful && found.corners.sigma_px < max_sigma_ratio * edges->sigma_px);
     };
     const Print known = print();

@@ -445,7 +445,7 @@ TEST(Supervision, KillingARealTrackerEvery20FramesDoesNotChangeItsPoses) {
         ArhostRun clean(yaml), killed(yaml);
         ASSERT_EQ(clean.run(), 0) << clean.output();
         killed.start();
-        for (std::size_t next = 20; killed.running();) {
+        for (std::size_t next = 20; killed.running(); std::this_thread::sleep_for(std::chrono::milliseconds(1))) {
             const std::string log = killed.exists("poses.jsonl") ? killed.read("poses.jsonl") : "";
             const auto now = static_cast<std::size_t>(std::ranges::count(log, '\n'));
             const pid_t worker = now >= next ? killed.worker(tracker) : 0;

@@ -55,15 +55,18 @@ TEST(BlurredEdge, IsWhereThePixelsShowIt) {
 // A change of the light could be taken for one of the direction.
 TEST(BlurredEdge, IsWhereThePixelsShowItInUnevenLight) {
     const Edge edge;
-    for (const double slope : {0.001, -0.003, 0.01}) { // 4 to 40 % from end to end
-        auto pixels = pixels_of(edge, 1);
-        for (EdgePixel &pixel : pixels)
-            pixel.light *= 1 + slope * pixel.along_px;
-        const auto found = fit_blurred_edge(pixels, 0.8);
-        ASSERT_TRUE(found) << slope;
-        for (const double along_px : {-12.0, 27.0})
-            EXPECT_NEAR(at_px(*found, along_px), edge.at_px(along_px), 0.01) << slope;
-    }
+    for (const double slope : {0.001, -0.003, 0.01}) // 4 to 40 % from end to end
+        for (const bool is_glare : {false, true}) {  // adds light, also to the dark area
+            if (is_glare && slope > 0.003)
+                continue; // as much as the contrast
+            auto pixels = pixels_of(edge, 1);
+            for (EdgePixel &pixel : pixels)
+                pixel.light += (is_glare ? edge.after : pixel.light) * slope * pixel.along_px;
+            const auto found = fit_blurred_edge(pixels, 0.8);
+            ASSERT_TRUE(found) << slope << " " << is_glare;
+            for (const double along_px : {-12.0, 27.0})
+                EXPECT_NEAR(at_px(*found, along_px), edge.at_px(along_px), 0.012) << slope << " " << is_glare;
+        }
 }
 
 // Along edges that nearly follow the rows of pixels, the tail of the blur resembles a change of the light.
@@ -146,6 +149,28 @@ TEST(BlurredEdge, LeavesOutWhatHidesIt) {
             ASSERT_TRUE(found);
             EXPECT_NEAR(at_px(*found, 0), edge.at_px(0), 0.02);
         }
+}
+
+TEST(BlurredEdge, TellsItsVarianceWhereItIsTooSharpToTellItsBlur) {
+    const Edge edge{0.2, 0.02, 0.2};
+    constexpr int count = 100;
+    double squares = 0, told = 0;
+    for (int i = 0; i < count; ++i) {
+        const auto found = fit_blurred_edge(pixels_of(edge, 1, i), 0.3);
+        ASSERT_TRUE(found) << i;
+        squares += std::pow(at_px(*found, 8) - edge.at_px(8), 2) / count;
+        told += (found->offset_variance + std::pow(8 - found->pivot_px, 2) * found->turn_variance) / count;
+    }
+    EXPECT_LT(std::sqrt(squares), 0.05);
+    EXPECT_GT(std::sqrt(told / squares), 0.3);
+    EXPECT_LT(std::sqrt(told / squares), 3);
+}
+
+TEST(BlurredEdge, HasAVarianceWithoutNoise) {
+    const auto found = fit_blurred_edge(pixels_of({}), 0.7);
+    ASSERT_TRUE(found);
+    EXPECT_GT(found->offset_variance, 0);
+    EXPECT_GT(found->turn_variance, 0);
 }
 
 // A camera that sharpens makes edges narrower than pixels.
