@@ -197,6 +197,7 @@ arhost_tracker_result Tracker::prepare_result() {
     result.observations = reinterpret_cast<arhost_observation *>(
         prepare(*observation_memory_, observation_size(), ARHOST_MAX_OBSERVATIONS));
     result.poses = reinterpret_cast<arhost_body_pose *>(prepare(*pose_memory_, pose_size(), target_count_));
+    result.candidate_count = -1;
     return result;
 }
 
@@ -279,6 +280,11 @@ std::vector<T> elements_of(const GuardedMemory &memory, std::uint32_t stride, st
 
 std::vector<arhost_observation> Tracker::observations() const {
     const auto &result = *reinterpret_cast<const arhost_tracker_result *>(result_memory_.data());
+    if (result.candidate_count != -1 &&
+        (result.candidate_count < 0 || static_cast<std::uint32_t>(result.candidate_count) < result.observation_count))
+        throw Failure("candidate_count is " + std::to_string(result.candidate_count) + ", but it reports " +
+                      std::to_string(result.observation_count) +
+                      " observations; set it to at least as many, or leave it at -1");
     return elements_of<arhost_observation>(*observation_memory_, observation_size(), result.observation_count,
                                            ARHOST_MAX_OBSERVATIONS, "observations");
 }

@@ -66,11 +66,13 @@ const char *accept_tracker_result(std::span<const std::byte> slot, const std::ve
     const ipc::TrackerSlot layout(configured.size());
     std::vector<ipc::TrackerSlot::Header> header(1);
     copy_array(slot, 0, header);
-    const auto [count, expected_count, missed_count, searched_everywhere] = header.front();
+    const auto [count, expected_count, missed_count, searched_everywhere, candidate_count] = header.front();
     if (count > ARHOST_MAX_OBSERVATIONS)
         return "the tracker reports more observations than ARHOST_MAX_OBSERVATIONS";
     if (expected_count > ARHOST_MAX_MARKERS || missed_count > expected_count)
         return "the number of expected or missed markers is out of range";
+    if (candidate_count < -1)
+        return "the number of candidates is less than -1";
     std::vector<arhost_observation> observations(count);
     copy_array(slot, layout.observations_offset, observations);
     std::vector<arhost_target> targets(configured.size());
@@ -110,7 +112,7 @@ const char *accept_tracker_result(std::span<const std::byte> slot, const std::ve
                            .unlisted_count = 0,
                            .expected_count = expected_count,
                            .missed_count = missed_count,
-                           .reserved = 0};
+                           .candidate_count = candidate_count};
     return nullptr;
 }
 

@@ -115,6 +115,14 @@ std::string seen_instead(const Statistics &statistics, const std::vector<ipc::Ta
         text += "; it saw " + frames_text(unconfirmed) +
                 " but got no pose: corners were hidden, or a small family was not seen in successive frames (see "
                 "'tracker.confirm' in docs/config.md)";
+    if (const SearchStatistics &search = statistics.search;
+        text.empty() && statistics.targets.empty() && search.frames_with_candidate_count > 0)
+        text = search.candidates == 0
+                   ? std::string("; it found no quadrilaterals: check the light, the focus and the size of the print "
+                                 "in the image")
+                   : fmt::format("; of {:.1f} quadrilaterals per frame, none is a marker that it knows",
+                                 static_cast<double>(search.candidates) /
+                                     static_cast<double>(search.frames_with_candidate_count));
     return text;
 }
 

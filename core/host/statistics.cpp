@@ -35,6 +35,10 @@ void SearchStatistics::add(const arhost_search &search) {
         return;
     ++frames;
     everywhere += search.everywhere != 0;
+    if (search.candidate_count >= 0) {
+        ++frames_with_candidate_count;
+        candidates += static_cast<std::uint64_t>(search.candidate_count);
+    }
     observations += search.observation_count;
     unlisted += search.unlisted_count;
     expected += search.expected_count;
@@ -195,9 +199,13 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
                                  {"largest_px", target.largest_px},
                                  {"mean_reprojection_px", target.mean_reprojection_px}};
     const SearchStatistics &search = statistics.search;
-    json["search"] = {
-        {"frames", search.frames},     {"everywhere", search.everywhere}, {"observations", search.observations},
-        {"unlisted", search.unlisted}, {"expected", search.expected},     {"missed", search.missed}};
+    json["search"] = {{"frames", search.frames},
+                      {"everywhere", search.everywhere},
+                      {"observations", search.observations},
+                      {"unlisted", search.unlisted},
+                      {"expected", search.expected},
+                      {"missed", search.missed},
+                      {"candidates", search.frames_with_candidate_count > 0 ? Json(search.candidates) : Json()}};
     json["unlisted_markers"] = statistics.strangers;
     json["unconfirmed_markers"] = statistics.unconfirmed;
     for (const auto &[name, timing] : statistics.stages.all())

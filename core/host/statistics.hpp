@@ -88,6 +88,7 @@ struct TargetStatistics {
 // Totals of arhost_record.search.
 struct SearchStatistics {
     std::uint64_t frames = 0, everywhere = 0; // frames that the tracker has processed; of these, those searched whole
+    std::uint64_t frames_with_candidate_count = 0, candidates = 0; // quadrilaterals that the tracker has examined
     std::uint64_t observations = 0, unlisted = 0, expected = 0, missed = 0; // markers
     void add(const arhost_search &search);
 };

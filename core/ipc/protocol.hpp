@@ -112,7 +112,7 @@ public:
     struct Header {
         std::uint32_t observation_count, expected_count;
         std::uint32_t missed_count; // of the expected markers
-        std::int32_t searched_everywhere;
+        std::int32_t searched_everywhere, candidate_count;
     };
     static constexpr std::uint64_t targets_offset = 64;
 

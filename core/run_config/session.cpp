@@ -117,7 +117,9 @@ RecordedFrame frame_of(const Line &line, const nlohmann::json &object) {
                         .unlisted_count = search->at("unlisted").get<std::uint32_t>(),
                         .expected_count = search->at("expected").get<std::uint32_t>(),
                         .missed_count = search->at("missed").get<std::uint32_t>(),
-                        .reserved = 0};
+                        .candidate_count = search->contains("candidates") && !search->at("candidates").is_null()
+                                               ? search->at("candidates").get<std::int32_t>()
+                                               : -1};
     if (const nlohmann::json &camera = object.at("camera"); !camera.is_null()) {
         camera::View view{};
         read_numbers(camera.at("eye"), view.eye_mm);

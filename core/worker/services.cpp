@@ -228,6 +228,7 @@ public:
         result.struct_size = sizeof result;
         result.observations = observations_.data();
         result.poses = poses_.data();
+        result.candidate_count = -1;
         const arhost_status status = tracker_.track(instance_, &request, &result);
         if (status != ARHOST_STATUS_OK)
             return status;
@@ -241,7 +242,8 @@ public:
         const std::uint32_t missed_count = solver_->move_missed_to_end(expectation, result);
         std::ranges::copy(std::as_bytes(std::span(expectation.markers)), output.data() + layout_->expected_offset);
         *reinterpret_cast<TrackerSlot::Header *>(output.data()) = {result.observation_count, request.expected_count,
-                                                                   missed_count, request.search_everywhere};
+                                                                   missed_count, request.search_everywhere,
+                                                                   result.candidate_count};
         return status;
     }
 

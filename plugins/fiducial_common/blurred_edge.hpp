@@ -29,8 +29,8 @@ struct BlurredEdge {
 // is the distribution function of the standard normal distribution. Pixels average light over squares, which widens
 // the blur. Unlike a search along profiles, this interpolates nothing, so it has no error that repeats along an edge
 // whose slope is a simple fraction. Leaves out columns that do not fit, for example because something hides them, up
-// to half of all. If the light of an area clearly changes along the edge, removes the changes of both areas first. The
-// variances follow from the residuals, and contain the errors of these changes and the correlation of neighbours.
+// to half of all. If the light of an area clearly changes along the edge, removes the changes of both areas first.
+// The variances follow from the residuals, and contain the errors of these changes and the correlation of neighbours.
 // `blur_px`: where to start, greater than 0. Returns std::nullopt if the fit does not converge near the line.
 std::optional<BlurredEdge> fit_blurred_edge(std::span<const EdgePixel> pixels, double blur_px);
 

@@ -27,6 +27,7 @@ using PredefinedDictionary = cv::aruco::PREDEFINED_DICTIONARY_NAME;
 struct DetectedMarkers {
     std::vector<int> ids;
     std::vector<std::vector<cv::Point2f>> corners;
+    std::vector<std::vector<cv::Point2f>> rejected; // quadrilaterals that are none of the dictionary's markers
 };
 
 inline cv::aruco::Dictionary predefined(PredefinedDictionary name) {
@@ -59,10 +60,10 @@ inline DetectedMarkers detect(const cv::Mat &grey, const cv::aruco::Dictionary &
                               const cv::aruco::DetectorParameters &parameters) {
     DetectedMarkers found;
 #if ARHOST_OPENCV_HAS_ARUCO_DETECTOR
-    cv::aruco::ArucoDetector(dictionary, parameters).detectMarkers(grey, found.corners, found.ids);
+    cv::aruco::ArucoDetector(dictionary, parameters).detectMarkers(grey, found.corners, found.ids, found.rejected);
 #else
     cv::aruco::detectMarkers(grey, cv::makePtr<cv::aruco::Dictionary>(dictionary), found.corners, found.ids,
-                             cv::makePtr<cv::aruco::DetectorParameters>(parameters));
+                             cv::makePtr<cv::aruco::DetectorParameters>(parameters), found.rejected);
 #endif
     return found;
 }

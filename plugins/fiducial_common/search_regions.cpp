@@ -78,8 +78,8 @@ SearchRegions::SearchRegions(const arhost_tracker_setup &setup,
         markers_.push_back({marker.id, marker.family, marker.target, margins.at(marker.family)});
 }
 
-std::vector<arhost_observation> SearchRegions::search(const arhost_track_request &request, const RegionLimits &limits,
-                                                      std::span<const Pass> passes, const Verify &verify) const {
+Seen SearchRegions::search(const arhost_track_request &request, const RegionLimits &limits,
+                           std::span<const Pass> passes, const Verify &verify) const {
     std::vector<arhost_observation> verified;
     if (verify && !request.search_everywhere)
         for (const arhost_expected_marker &expected : elements(request.expected, request.expected_count)) {
@@ -87,15 +87,23 @@ std::vector<arhost_observation> SearchRegions::search(const arhost_track_request
             if (const auto one = verify(expected, marker.id, marker.family))
                 verified.push_back(*one);
         }
-    std::vector<arhost_observation> seen = verified;
-    for (const Pass &pass : passes)
-        for (const cv::Rect &region : of(request, limits, pass.family, verified))
-            pass.detect(region, seen);
-    if (miss_a_target(request, seen)) {
-        seen.clear();
-        for (const Pass &pass : passes)
-            pass.detect(whole_of(request), seen);
-    }
+    const auto detected = [&](Seen seen, const auto &regions_of) {
+        const std::size_t before = seen.candidates;
+        std::size_t most = 0;
+        for (const Pass &pass : passes) {
+            seen.candidates = 0;
+            for (const cv::Rect &region : regions_of(pass))
+                pass.detect(region, seen);
+            most = std::max(most, seen.candidates);
+        }
+        seen.candidates = before + most;
+        return seen;
+    };
+    Seen seen = detected({verified, verified.size()},
+                         [&](const Pass &pass) { return of(request, limits, pass.family, verified); });
+    if (miss_a_target(request, seen.markers))
+        seen = detected({}, [&](const Pass &) { return std::vector{whole_of(request)}; });
+    seen.candidates = std::max(seen.candidates, seen.markers.size()); // one may be a marker of several families
     return seen;
 }
 

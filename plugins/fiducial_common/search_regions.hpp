@@ -18,8 +18,13 @@ struct RegionLimits {
     int min_side_px = 1; // in smaller regions, nothing is detected
 };
 
+struct Seen {
+    std::vector<arhost_observation> markers;
+    std::size_t candidates = 0; // quadrilaterals that were examined, those of markers and others
+};
+
 // Detects markers in a region of the frame and adds them to `seen`.
-using Detect = std::function<void(const cv::Rect &region, std::vector<arhost_observation> &seen)>;
+using Detect = std::function<void(const cv::Rect &region, Seen &seen)>;
 
 // How to search for the markers of `family`, or for those of all families if it is null.
 struct Pass {
@@ -38,9 +43,10 @@ public:
     SearchRegions(const arhost_tracker_setup &setup, const std::function<double(const std::string &family)> &margin);
 
     // Returns the expected markers that `verify` confirms and what the passes detect where the others are expected,
-    // or what they detect in the whole frame if a target is not there.
-    std::vector<arhost_observation> search(const arhost_track_request &request, const RegionLimits &limits,
-                                           std::span<const Pass> passes, const Verify &verify = {}) const;
+    // or what they detect in the whole frame if a target is not there. Passes examine the same candidates, so these
+    // are those of the pass with most of them.
+    Seen search(const arhost_track_request &request, const RegionLimits &limits, std::span<const Pass> passes,
+                const Verify &verify = {}) const;
 
     // Returns rectangles that do not overlap and contain all expected markers, or those of `family`, except those
     // that `seen` has. They are the whole frame if the request says so, or if they would cover most of it.

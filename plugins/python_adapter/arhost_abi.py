@@ -409,7 +409,7 @@ SEARCH = _struct(24,
     ("unlisted_count", "u4", 8),
     ("expected_count", "u4", 12),
     ("missed_count", "u4", 16),
-    ("reserved", "u4", 20))
+    ("candidate_count", "i4", 20))
 RECORD = _struct(1048,
     ("struct_size", "u4", 0),
     ("clock", "i4", 4),

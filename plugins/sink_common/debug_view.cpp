@@ -95,7 +95,11 @@ Row row_of(const arhost_target &target) {
 std::string search_text(const arhost_search &search) {
     std::string text =
         fmt::format("{}   {} expected", search.everywhere ? "whole frame" : "expected places", search.expected_count);
-    return search.missed_count > 0 ? text + fmt::format(", {} missed", search.missed_count) : text;
+    if (search.missed_count > 0)
+        text += fmt::format(", {} missed", search.missed_count);
+    if (search.candidate_count >= 0)
+        text += fmt::format("   {} of {} quadrilaterals read", search.observation_count, search.candidate_count);
+    return text;
 }
 
 } // namespace

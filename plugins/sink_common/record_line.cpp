@@ -116,6 +116,11 @@ void append(std::string &text, const arhost_search &search) {
         text += std::string(", \"") + key + "\": ";
         append_number(text, count);
     }
+    text += ", \"candidates\": ";
+    if (search.candidate_count >= 0)
+        append_number(text, search.candidate_count);
+    else
+        text += "null";
     text += "}, ";
 }
 

@@ -207,9 +207,10 @@ public:
     void track(const arhost_track_request &request, arhost::Observations &observations) {
         const arhost::fiducial::Pass pass{
             nullptr, [&](const cv::Rect &region, auto &seen) { observe(*request.frame, region, seen); }};
-        std::vector<arhost_observation> seen = regions_->search(request, {grid_px(), min_image_side()}, {&pass, 1});
-        others_->frame(arhost::fiducial::grey_of(*request.frame), seen);
-        arhost::fiducial::report(std::move(seen), observations);
+        arhost::fiducial::Seen seen = regions_->search(request, {grid_px(), min_image_side()}, {&pass, 1});
+        others_->frame(arhost::fiducial::grey_of(*request.frame), seen.markers);
+        observations.set_candidate_count(seen.candidates);
+        arhost::fiducial::report(std::move(seen.markers), observations);
     }
 
     void stop() {
@@ -236,9 +237,11 @@ private:
     }
 
     // Adds the tags of a region of the frame to `seen`.
-    void observe(const arhost_frame &frame, const cv::Rect &region, std::vector<arhost_observation> &seen) {
+    void observe(const arhost_frame &frame, const cv::Rect &region, arhost::fiducial::Seen &seen) {
         const cv::Mat grey = arhost::fiducial::grey_of(frame);
         const Detections tags = detect(*detector_, grey(region));
+        if (tags)
+            seen.candidates += detector_->nquads;
         for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
             apriltag_detection_t *tag = nullptr;
             zarray_get(tags.get(), i, &tag);
@@ -256,7 +259,7 @@ private:
                               grey, frame.format->transfer, corners.corners_px, *lens_, tag->family->width_at_border,
                               [&] { return arhost::apriltag::print_of(*tag->family, tag->id); }, refine_edges_)
                               .value_or(corners);
-            arhost_observation &one = seen.emplace_back(part.family().observation(part.id(tag->id), corners));
+            arhost_observation &one = seen.markers.emplace_back(part.family().observation(part.id(tag->id), corners));
             one.hamming = static_cast<std::uint32_t>(tag->hamming);
             one.decision_margin = tag->decision_margin;
             one.false_positive_rate =

@@ -288,12 +288,13 @@ public:
             passes.push_back({&detectable.family, [&](const cv::Rect &region, auto &seen) {
                                   observe(grey, request.frame->format->transfer, region, detectable, seen);
                               }});
-        std::vector<arhost_observation> seen = regions_->search(
+        arhost::fiducial::Seen seen = regions_->search(
             request, {}, passes, [&](const arhost_expected_marker &expected, std::int32_t id, std::uint32_t family) {
                 return verified(grey, request.frame->format->transfer, expected, id, family);
             });
-        others_->frame(grey, seen);
-        arhost::fiducial::report(std::move(seen), observations);
+        others_->frame(grey, seen.markers);
+        observations.set_candidate_count(seen.candidates);
+        arhost::fiducial::report(std::move(seen.markers), observations);
     }
 
     void stop() {
@@ -306,7 +307,7 @@ public:
 private:
     // Adds the markers of a dictionary in a region of the frame to `seen`.
     void observe(const cv::Mat &grey, arhost_transfer transfer, const cv::Rect &region, const Detectable &detectable,
-                 std::vector<arhost_observation> &seen) const {
+                 arhost::fiducial::Seen &seen) const {
         const cv::aruco::Dictionary &table = detectable.dictionary.table;
         cv::aruco::DetectorParameters parameters = detectable.parameters;
         // OpenCV takes the perimeter relative to the longer side of the image that it gets.
@@ -314,6 +315,7 @@ private:
             static_cast<double>(std::max(grey.cols, grey.rows)) / std::max(region.width, region.height);
         const cv::Point2d offset(region.x - centre_shift_px_, region.y - centre_shift_px_);
         const arhost::aruco::DetectedMarkers found = arhost::aruco::detect(grey(region), table, parameters);
+        seen.candidates += found.ids.size() + found.rejected.size();
         for (std::size_t i = 0; i < found.ids.size(); ++i) {
             const bool is_listed = detectable.family.lists(found.ids[i]);
             arhost::fiducial::MeasuredCorners corners;
@@ -327,7 +329,7 @@ private:
             const Reading reading =
                 read(grey, corners.corners_px, table, found.ids[i], parameters.markerBorderBits, false);
             if (is_listed || (reading.wrong_bits == 0 && reading.false_positive_rate < 1)) // else it may be anything
-                seen.push_back(observation_of(detectable, found.ids[i], corners, reading));
+                seen.markers.push_back(observation_of(detectable, found.ids[i], corners, reading));
         }
     }
 
@@ -390,11 +392,11 @@ private:
                 continue;
             Detectable detectable{{largest->family, 0, 0, {}}, predefined(*largest), parameters_};
             detectable.parameters.errorCorrectionRate = 0;
-            std::vector<arhost_observation> seen;
+            arhost::fiducial::Seen seen;
             constexpr arhost_transfer any = ARHOST_TRANSFER_LINEAR; // only listed markers are refined, which need it
             observe(grey, any, {0, 0, grey.cols, grey.rows}, detectable, seen);
             std::set<int> ids;
-            for (const arhost_observation &one : seen)
+            for (const arhost_observation &one : seen.markers)
                 if (std::ranges::none_of(detectables_, [&](const Detectable &used) {
                         return used.family.name != file_name_ && largest->is_of_series(used.family.name) &&
                                one.id < used.family.id_count;

@@ -84,7 +84,9 @@ public:
     void track(const arhost_track_request &request, arhost::Observations &observations) const {
         const arhost::fiducial::Pass pass{
             nullptr, [&](const cv::Rect &region, auto &seen) { observe(*request.frame, region, seen); }};
-        arhost::fiducial::report(regions_->search(request, {}, {&pass, 1}), observations);
+        arhost::fiducial::Seen seen = regions_->search(request, {}, {&pass, 1});
+        observations.set_candidate_count(seen.candidates);
+        arhost::fiducial::report(std::move(seen.markers), observations);
     }
 
     void stop() {
@@ -152,9 +154,10 @@ private:
     }
 
     // Adds the markers in a region of the frame to `seen`.
-    void observe(const arhost_frame &frame, const cv::Rect &region, std::vector<arhost_observation> &seen) const {
+    void observe(const arhost_frame &frame, const cv::Rect &region, arhost::fiducial::Seen &seen) const {
         const cv::Mat grey = arhost::fiducial::grey_of(frame);
         for (Corners corners_px : find_squares(grey(region), min_side_px_)) {
+            ++seen.candidates;
             for (cv::Point2d &corner : corners_px)
                 corner += cv::Point2d(region.tl());
             const Best best = recognised(grey, corners_px);
@@ -168,7 +171,7 @@ private:
             std::rotate(corners.corners_px.begin(), corners.corners_px.begin() + best.quarter_turns,
                         corners.corners_px.end());
             arhost_observation &one =
-                seen.emplace_back(arhost::fiducial::observation_of(best.id, best.family, corners));
+                seen.markers.emplace_back(arhost::fiducial::observation_of(best.id, best.family, corners));
             one.hamming = best.wrong_cells;
             one.decision_margin = 100 * best.correlation;
             one.false_positive_rate = best.false_positive_rate;

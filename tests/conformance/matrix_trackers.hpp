@@ -28,6 +28,7 @@ inline const std::vector<WrongPlugin> wrong_trackers = of_kind(
         {"status_0", "returns 0 from track", "fail", {"tracker.track"}},
         {"finds_nothing", "finds nothing", "fail", {"tracker.track"}},
         {"reports_too_many", "reports 1,025 observations", "fail", {"tracker.track"}},
+        {"counts_too_few_candidates", "has examined fewer candidates than it reports", "fail", {"tracker.track"}},
         {"reports_a_pose", "reports a pose without declaring it", "fail", {"tracker.track"}},
         {"each_marker_twice", "reports each marker twice", "fail", {"tracker.track"}},
         {"reads_past_the_frame", "reads a byte past the frame", "crashed", {"tracker.track"}},

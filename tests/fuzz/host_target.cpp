@@ -230,7 +230,7 @@ private:
         if (kind_ == ARHOST_KIND_TRACKER && output_memory_) {
             const auto slot = layout_.slot(output_memory_, command.slot);
             const TrackerSlot layout(2);
-            *reinterpret_cast<TrackerSlot::Header *>(slot.data()) = {1, 1, 0, 0};
+            *reinterpret_cast<TrackerSlot::Header *>(slot.data()) = {1, 1, 0, 0, -1};
             auto &found = *reinterpret_cast<arhost_target *>(slot.data() + TrackerSlot::targets_offset);
             found.state = ARHOST_TARGET_DETECTED;
             found.observation_count = 1;

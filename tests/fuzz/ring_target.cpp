@@ -29,7 +29,7 @@ void take_result(Input &input) {
     const std::vector<ipc::Target> configured(2, {"target", {{7, "D", {}}}, ""});
     const ipc::TrackerSlot layout(configured.size());
     std::vector<std::byte> slot(layout.byte_size(0));
-    *reinterpret_cast<ipc::TrackerSlot::Header *>(slot.data()) = {2, 2, 1, 0};
+    *reinterpret_cast<ipc::TrackerSlot::Header *>(slot.data()) = {2, 2, 1, 0, 9};
     auto *targets = reinterpret_cast<arhost_target *>(slot.data() + ipc::TrackerSlot::targets_offset);
     for (std::uint32_t i = 0; i < 2; ++i) {
         targets[i].state = ARHOST_TARGET_DETECTED;

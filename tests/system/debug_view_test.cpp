@@ -133,19 +133,20 @@ TEST(DebugView, MarkersThatNoTargetListsArePink) {
 TEST(DebugView, TheStatisticsHaveTheTotalsOfThePoseLog) {
     ArhostRun run(configuration("0", poses));
     ASSERT_EQ(run.run(), 0) << run.output();
-    Json totals = {{"frames", 0},   {"everywhere", 0}, {"observations", 0},
-                   {"unlisted", 0}, {"expected", 0},   {"missed", 0}};
+    Json totals = {{"frames", 0},   {"everywhere", 0}, {"observations", 0}, {"unlisted", 0},
+                   {"expected", 0}, {"missed", 0},     {"candidates", 0}};
     for (const Json &record : records_of(run)) {
         const Json &search = record["search"];
         totals["frames"] = totals["frames"].get<int>() + 1;
         totals["everywhere"] = totals["everywhere"].get<int>() + search["everywhere"].get<bool>();
-        for (const char *key : {"observations", "unlisted", "expected", "missed"})
+        for (const char *key : {"observations", "unlisted", "expected", "missed", "candidates"})
             totals[key] = totals[key].get<int>() + search[key].get<int>();
     }
     EXPECT_EQ(run.stats()["search"], totals);
     EXPECT_EQ(totals["observations"], occluded);
     EXPECT_EQ(totals["expected"], occluded) << "in the frames after one with the marker";
     EXPECT_EQ(totals["missed"], 1);
+    EXPECT_GE(totals["candidates"], totals["observations"]);
     EXPECT_EQ(totals["everywhere"], frames - occluded) << "the first one, and those without an expected marker";
 }
 

@@ -640,6 +640,23 @@ TEST(Run, ReportsAMarkerOfASmallFamilyWhenItIsSeenAgain) {
     EXPECT_THAT(output_of(2, ""), Not(HasSubstr("no target")));
 }
 
+TEST(Run, TellsWhetherTheTrackerHasFoundQuadrilaterals) {
+    const auto output_of = [](const std::string &tracker, const std::string &target, const std::string &source) {
+        ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 3, side_mm: 80" + source +
+                      "}}\ntracker: {plugin: " + tracker + ", targets: [" + target + "]}\n" +
+                      "outputs: [{plugin: sink_null}]\n");
+        EXPECT_EQ(run.run(), 1);
+        return run.output();
+    };
+    const std::string known = " quadrilaterals per frame, none is a marker that it knows; compare",
+                      none = "it found no quadrilaterals: check the light";
+    for (const std::string tracker : {"tracker_apriltag", "tracker_aruco"}) {
+        const std::string target = "{marker: 7, family: tag25h9, side_mm: 80}";
+        EXPECT_THAT(output_of(tracker, target, ", id: 4"), HasSubstr(known)) << tracker;
+        EXPECT_THAT(output_of(tracker, target, ", id: 4, width: 16, height: 8"), HasSubstr(none)) << tracker;
+    }
+}
+
 TEST(Run, InModeLiveWarnsAfterFiveSecondsWithoutTargets) {
     ArhostRun run("version: 1\nmode: live\n"
                   "source: {plugin: source_synthetic, fps: 10, options: {frames: 58, id: 4, side_mm: 80}}\n"

@@ -438,7 +438,7 @@ class Search:
     unlisted_count: int
     expected_count: int
     missed_count: int
-    reserved: int
+    candidate_count: int
 RECORD: np.dtype[np.void]
 class Record:
     struct_size: int

@@ -73,7 +73,7 @@ arhost::aruco::DetectedMarkers detected(const std::string &name, const cv::Mat &
 
 Found aruco_markers(const std::string &name, const cv::Mat &picture) {
     Found found;
-    const auto [ids, corners] = detected(name, picture);
+    const auto [ids, corners, rejected] = detected(name, picture);
     for (std::size_t i = 0; i < ids.size(); ++i)
         for (std::size_t k = 0; k < 4; ++k) // pixel centres are at integers
             found[ids[i]][k] = (cv::Point2d(corners[i][k]) + cv::Point2d(0.5, 0.5)) / px_per_mm;
@@ -358,7 +358,7 @@ TEST_F(Marker, PrintsTheChArucoBoardsOfOpenCv) {
         const cv::Point2d origin =
             expect_as_in_map(markers("DICT_6X6_250", picture), positions_in("board.map.yaml", 10));
 
-        const auto [ids, corners] = detected("DICT_6X6_250", picture);
+        const auto [ids, corners, rejected] = detected("DICT_6X6_250", picture);
         const auto board = cv::aruco::CharucoBoard::create(
             columns, rows, 14, 10, cv::makePtr<cv::aruco::Dictionary>(dictionary("DICT_6X6_250")));
         cv::Mat chess_corners, chess_ids;

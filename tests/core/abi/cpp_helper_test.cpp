@@ -260,10 +260,13 @@ TEST(CppHelper, IgnoresObservationsBeyondTheCapacity) {
         Detector::to_report = reported;
         const int expected = std::min(reported, capacity);
         const arhost_track_request request{};
-        arhost_tracker_result result{sizeof result, 0, &buffer[0].known, nullptr, 0, 0};
+        arhost_tracker_result result{sizeof result, 0, &buffer[0].known, nullptr, 0, -1};
         EXPECT_EQ(tracker.track(reinterpret_cast<arhost_instance *>(&object), &request, &result), ARHOST_STATUS_OK);
         EXPECT_EQ(Detector::accepted, expected);
         EXPECT_EQ(result.observation_count, static_cast<std::uint32_t>(expected));
+        EXPECT_EQ(result.candidate_count, -1);
+        arhost::Observations(result).set_candidate_count(std::size_t{1} << 40);
+        EXPECT_EQ(result.candidate_count, INT32_MAX);
     }
     for (int i = 0; i <= capacity; ++i) {
         EXPECT_EQ(buffer[i].known.struct_size, size);

@@ -399,7 +399,7 @@ FIELD(arhost_tracker_result, observation_count, 4, 4);
 FIELD(arhost_tracker_result, observations, 8, 8);
 FIELD(arhost_tracker_result, poses, 16, 8);
 FIELD(arhost_tracker_result, pose_count, 24, 4);
-FIELD(arhost_tracker_result, reserved, 28, 4);
+FIELD(arhost_tracker_result, candidate_count, 28, 4);
 
 STRUCT(arhost_target, 648);
 FIELD(arhost_target, struct_size, 0, 4);
@@ -699,7 +699,7 @@ FIELD(arhost_search, observation_count, 4, 4);
 FIELD(arhost_search, unlisted_count, 8, 4);
 FIELD(arhost_search, expected_count, 12, 4);
 FIELD(arhost_search, missed_count, 16, 4);
-FIELD(arhost_search, reserved, 20, 4);
+FIELD(arhost_search, candidate_count, 20, 4);
 
 STRUCT(arhost_record, 1048);
 FIELD(arhost_record, struct_size, 0, 4);

@@ -34,7 +34,11 @@ const std::vector<ipc::Target> targets = {
 // The result of a tracker: "desk" was never seen, "cup" is detected, "head" is lost.
 struct TrackerResult {
     TrackerResult() : bytes(layout.byte_size(0)) {
-        header() = {.observation_count = 2, .expected_count = 2, .missed_count = 1, .searched_everywhere = -1};
+        header() = {.observation_count = 2,
+                    .expected_count = 2,
+                    .missed_count = 1,
+                    .searched_everywhere = -1,
+                    .candidate_count = 7};
         expected(0).margin_px = expected(1).margin_px = 4;
         expected(1).marker = 1;
         expected(1).corners_px[3][1] = 20;
@@ -88,6 +92,7 @@ TEST(TrackerResult, IsCopiedWithTheConfiguredNamesOfTheTargets) {
     EXPECT_EQ(search.observation_count, 2u);
     EXPECT_EQ(search.expected_count, 2u);
     EXPECT_EQ(search.missed_count, 1u);
+    EXPECT_EQ(search.candidate_count, 7);
 }
 
 TEST(TrackerResult, IsRejectedIfItsNumbersAreInvalid) {
@@ -107,6 +112,7 @@ TEST(TrackerResult, IsRejectedIfItsNumbersAreInvalid) {
                              +[](TrackerResult &r) { r.header().expected_count = UINT32_MAX; },
                              +[](TrackerResult &r) { r.header().missed_count = 3; }})
         expect(alter, "the number of expected or missed markers is out of range");
+    expect([](TrackerResult &r) { r.header().candidate_count = -2; }, "the number of candidates is less than -1");
     for (const auto alter : {+[](TrackerResult &r) { r.expected(0).marker = 2; },
                              +[](TrackerResult &r) { r.expected(1).marker = UINT32_MAX; }})
         expect(alter, "an expected marker's index is out of range");

@@ -27,7 +27,7 @@ const std::string rendered =
     R"("reprojection_px": 0.25, "ambiguity": 0.5, "observations": [{"id": 7, "corners_px": [[1, 2], [3, 2], [3, 4], [1, 4]], )"
     R"("decision_margin": 60, "corner_sigma_px": 0.05, "hamming": 1}]}, )"
     R"({"name": "lid", "state": "lost", "age_frames": 5, "mt": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, -9, 1]}], )"
-    R"("search": {"everywhere": true, "observations": 3, "unlisted": 2, "expected": 4, "missed": 1}, )"
+    R"("search": {"everywhere": true, "observations": 3, "unlisted": 2, "expected": 4, "missed": 1, "candidates": 6}, )"
     R"("camera": {"eye": [1, 2, 3.5], "look_at": [1, 2, 2.5], )"
     R"("up": [0, 1, 0]}, "truth": {"target": "cup", "mt": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]})";
 const std::string end = "{\"end\": true}\n";
@@ -99,6 +99,7 @@ TEST_F(SessionFolder, HasTheFactsOfEachFrame) {
     EXPECT_EQ(full.search.unlisted_count, 2u);
     EXPECT_EQ(full.search.expected_count, 4u);
     EXPECT_EQ(full.search.missed_count, 1u);
+    EXPECT_EQ(full.search.candidate_count, 6);
     EXPECT_EQ(plain.search.observation_count, 0u);
     ASSERT_TRUE(full.view && full.truth);
     EXPECT_EQ(full.view->eye_mm[2], 3.5);

@@ -102,7 +102,7 @@ std::vector<arhost_observation> report(const std::vector<arhost_observation> &se
     arhost_observation empty{};
     empty.struct_size = sizeof empty;
     std::vector<arhost_observation> buffer(ARHOST_MAX_OBSERVATIONS, empty);
-    arhost_tracker_result result{sizeof result, 0, buffer.data(), nullptr, 0, 0};
+    arhost_tracker_result result{sizeof result, 0, buffer.data(), nullptr, 0, -1};
     arhost::Observations observations(result);
     arhost::fiducial::report(seen, observations);
     buffer.resize(result.observation_count);

@@ -153,25 +153,35 @@ TEST_F(Regions, AreSearchedByEachPassAndThenTheWholeFrameIfATargetIsMissed) {
     const Family first{"tag36h11", 0, 587, {{0, 0}, {1, 0}, {2, 0}}}, second{"tag25h9", 1, 35, {{0, 1}, {3, 1}}};
     std::vector<std::pair<int, cv::Rect>> searched; // pass and region
     bool finds_second = true;
+    std::size_t candidates = 3; // of the first pass
     const auto search = [&] {
         searched.clear();
         const Pass passes[] = {{&first,
-                                [&](const cv::Rect &region, auto &seen_markers) {
+                                [&](const cv::Rect &region, auto &all) {
                                     searched.emplace_back(1, region);
-                                    seen_markers.push_back(seen(0));
+                                    all.candidates += candidates;
+                                    all.markers.push_back(seen(0));
                                 }},
-                               {&second, [&](const cv::Rect &region, auto &seen_markers) {
+                               {&second, [&](const cv::Rect &region, auto &all) {
                                     searched.emplace_back(2, region);
+                                    all.candidates += region == whole_frame ? 8 : 2;
                                     if (finds_second)
-                                        seen_markers.push_back(seen(3, 1));
+                                        all.markers.push_back(seen(3, 1));
                                 }}};
         return regions_->search(request_, {}, passes);
     };
     const std::pair near_first(1, cv::Rect(75, 125, 51, 51)), near_second(2, cv::Rect(275, 125, 51, 51));
-    EXPECT_EQ(search().size(), 2u);
+    auto found = search();
+    EXPECT_EQ(found.markers.size(), 2u);
+    EXPECT_EQ(found.candidates, 3u) << "those of the pass with most of them";
+    candidates = 0;
+    EXPECT_EQ(search().candidates, 2u) << "at least as many as markers";
+    candidates = 3;
     EXPECT_THAT(searched, ElementsAre(near_first, near_second));
     finds_second = false;
-    EXPECT_EQ(search().size(), 1u) << "what the first search found is not reported twice";
+    found = search();
+    EXPECT_EQ(found.markers.size(), 1u) << "what the first search found is not reported twice";
+    EXPECT_EQ(found.candidates, 8u);
     EXPECT_THAT(searched, ElementsAre(near_first, near_second, std::pair(1, whole_frame), std::pair(2, whole_frame)));
 }
 

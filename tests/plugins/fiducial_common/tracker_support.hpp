@@ -175,7 +175,7 @@ public:
         arhost_observation empty{};
         empty.struct_size = sizeof empty;
         std::vector<arhost_observation> observations(ARHOST_MAX_OBSERVATIONS, empty);
-        arhost_tracker_result result{sizeof result, 0, observations.data(), nullptr, 0, 0};
+        arhost_tracker_result result{sizeof result, 0, observations.data(), nullptr, 0, -1};
         const arhost_frame frame = picture.frame();
         const arhost_track_request request{sizeof request,
                                            search_everywhere,
@@ -189,8 +189,11 @@ public:
         if (functions().track(plugin_.instance(), &request, &result) != ARHOST_STATUS_OK)
             throw std::runtime_error("track failed: " + log());
         observations.resize(result.observation_count);
+        candidate_count_ = result.candidate_count;
         return observations;
     }
+    // arhost_tracker_result.candidate_count of the last frame.
+    int candidate_count() const { return candidate_count_; }
     // The name under which the family of an observation was listed.
     const std::string &family(const arhost_observation &seen) const { return families_.at(seen.family); }
 
@@ -200,6 +203,7 @@ private:
     std::vector<std::string> families_;
     arhost_status created_ = ARHOST_STATUS_ERROR_INTERNAL;
     bool started_ = false;
+    int candidate_count_ = -1;
 };
 
 inline double percentile(std::vector<double> values, double fraction) {

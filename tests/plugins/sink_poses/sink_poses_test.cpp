@@ -175,14 +175,15 @@ TEST_F(SinkPoses, EveryNumberReadsBackAsTheSameDouble) {
 
 TEST_F(SinkPoses, WritesHowTheTrackerHasSearched) {
     TrackedRecord record = full_record(0);
-    record.fields.search = {1, 5, 1, 6, 2, 0};
+    record.fields.search = {1, 5, 1, 6, 2, 9};
     const Json line = Json::parse(line_of(record));
     EXPECT_THAT(keys_of(line),
                 ElementsAre("frame", "capture_ns", "clock", "overlay", "targets", "search", "camera", "truth"));
-    EXPECT_EQ(line["search"].dump(), R"({"everywhere":true,"observations":5,"unlisted":1,"expected":6,"missed":2})");
-    record.fields.search = {0, 0, 0, 3, 3, 0};
+    EXPECT_EQ(line["search"].dump(),
+              R"({"everywhere":true,"observations":5,"unlisted":1,"expected":6,"missed":2,"candidates":9})");
+    record.fields.search = {0, 0, 0, 3, 3, -1};
     EXPECT_EQ(Json::parse(line_of(record))["search"].dump(),
-              R"({"everywhere":false,"observations":0,"unlisted":0,"expected":3,"missed":3})");
+              R"({"everywhere":false,"observations":0,"unlisted":0,"expected":3,"missed":3,"candidates":null})");
 }
 
 TEST_F(SinkPoses, NamesClockAndOverlay) {

@@ -203,7 +203,8 @@ std::optional<Corners> find_tag36h11(const cv::Mat &picture, int id = 0) {
 }
 
 std::optional<Corners> find_aruco(const cv::Mat &picture, arhost::aruco::PredefinedDictionary dictionary, int id) {
-    const auto [ids, corners] = arhost::aruco::detect(grey_of(picture), arhost::aruco::predefined(dictionary), {});
+    const auto [ids, corners, rejected] =
+        arhost::aruco::detect(grey_of(picture), arhost::aruco::predefined(dictionary), {});
     for (std::size_t i = 0; i < ids.size(); ++i)
         if (ids[i] == id)
             return Corners{corners[i][0], corners[i][1], corners[i][2], corners[i][3]};

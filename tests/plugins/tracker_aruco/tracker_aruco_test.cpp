@@ -265,6 +265,19 @@ TEST(ArucoTracker, NamesTheTrackerThatKnowsMoreFamiliesOfAprilTag) {
                                HasSubstr("DICT_6X6_250"), HasSubstr("; tracker_apriltag has more families")));
 }
 
+// Each begins with the markers of the smaller one, so a print may be a marker of both.
+TEST(ArucoTracker, HasExaminedAtLeastAsManyCandidatesAsItReports) {
+    Tracker tracker("tracker_aruco");
+    ASSERT_EQ(tracker.start(test_camera, {{3, 100, "DICT_6X6_50"}, {3, 100, "DICT_6X6_100"}}), ARHOST_STATUS_OK);
+    const cv::Mat picture =
+        render(test_camera, {{aruco_marker("DICT_6X6_50", 3).with_margin(2), 100, pose_of(0, 0, 400, 20, 10, 30)}});
+    const auto seen = tracker.track(GreyFrame(picture));
+    EXPECT_EQ(seen.size(), 2u);
+    EXPECT_GE(tracker.candidate_count(), 2);
+    EXPECT_TRUE(tracker.track(GreyFrame(cv::Mat(480, 640, CV_8U, cv::Scalar(128)))).empty());
+    EXPECT_EQ(tracker.candidate_count(), 0);
+}
+
 TEST(ArucoTracker, NamesTheTrackersOfPatternsAndPictures) {
     Tracker tracker("tracker_aruco");
     EXPECT_EQ(tracker.start(test_camera, {{0, 100, "image"}}), ARHOST_STATUS_ERROR_CONFIGURATION);

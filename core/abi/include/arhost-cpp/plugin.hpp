@@ -23,6 +23,7 @@
 #include <concepts>
 #include <functional>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -204,6 +205,12 @@ public:
         to = seen;
         to.struct_size = struct_size;
         return true;
+    }
+
+    // arhost_tracker_result.candidate_count.
+    void set_candidate_count(std::size_t count) {
+        result_.candidate_count =
+            static_cast<std::int32_t>(std::min<std::size_t>(count, std::numeric_limits<std::int32_t>::max()));
     }
 
 private:

@@ -44,7 +44,7 @@ typedef struct arhost_search {
     uint32_t unlisted_count;    /* of these, those that no target lists */
     uint32_t expected_count;    /* markers that were expected */
     uint32_t missed_count;      /* of these, those that it has not reported */
-    uint32_t reserved;          /* 0 */
+    int32_t candidate_count;    /* arhost_tracker_result.candidate_count */
 } arhost_search;
 
 /* Metadata of a frame. All numbers that are set are finite. */

@@ -115,7 +115,9 @@ typedef struct arhost_tracker_result {
     arhost_observation *observations; /* ARHOST_MAX_OBSERVATIONS elements */
     arhost_body_pose *poses;          /* arhost_tracker_setup.target_count elements */
     uint32_t pose_count;              /* 0; set by a tracker with ARHOST_CAPABILITY_REPORTS_POSES */
-    uint32_t reserved;                /* 0 */
+    /* -1: unknown. Set by a tracker that knows how many quadrilaterals it has examined, including those that turned
+     * out not to be markers; at least observation_count. Tells the user whether none was there or none was read. */
+    int32_t candidate_count;
 } arhost_tracker_result;
 
 /* A target as the outputs get it (arhost/sink.h). */

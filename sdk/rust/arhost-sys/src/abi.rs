@@ -538,7 +538,7 @@ pub struct arhost_tracker_result {
     pub observations: *mut arhost_observation,
     pub poses: *mut arhost_body_pose,
     pub pose_count: u32,
-    pub reserved: u32,
+    pub candidate_count: i32,
 }
 const _: () = assert!(size_of::<arhost_tracker_result>() == 32);
 unsafe impl Sync for arhost_tracker_result {} // a plugin's statics are immutable
@@ -941,7 +941,7 @@ pub struct arhost_search {
     pub unlisted_count: u32,
     pub expected_count: u32,
     pub missed_count: u32,
-    pub reserved: u32,
+    pub candidate_count: i32,
 }
 const _: () = assert!(size_of::<arhost_search>() == 24);
 #[repr(C)]

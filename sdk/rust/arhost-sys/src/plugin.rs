@@ -701,7 +701,9 @@ mod tests {
         }
         assert!(!result.observe(arhost_observation { family: 1, ..Default::default() }));
         assert!(result.report_pose(pose) && result.report_pose(pose) && !result.report_pose(pose));
+        result.set_candidate_count(u32::MAX);
         assert_eq!((raw.observation_count, raw.pose_count), (ARHOST_MAX_OBSERVATIONS as u32, 2));
+        assert_eq!(raw.candidate_count, i32::MAX);
         let last = &observations[ARHOST_MAX_OBSERVATIONS - 1];
         assert_eq!((last.0.id, last.0.family), (ARHOST_MAX_OBSERVATIONS as i32 - 1, 1));
         assert_eq!(last.0.struct_size, size_of::<Longer<arhost_observation>>() as u32);

@@ -70,6 +70,11 @@ impl TrackResult<'_> {
         let count = &mut result.observation_count;
         unsafe { append(result.observations, count, ARHOST_MAX_OBSERVATIONS as u32, seen) }
     }
+    /// Tells how many quadrilaterals the tracker has examined, including those that turned out not to be markers; at
+    /// least as many as observations.
+    pub fn set_candidate_count(&mut self, count: u32) {
+        self.result.candidate_count = count.min(i32::MAX as u32) as i32;
+    }
     /// Adds the pose of a body, for trackers with `ARHOST_CAPABILITY_REPORTS_POSES`. Returns false, and ignores it, if
     /// there are already as many as targets.
     pub fn report_pose(&mut self, pose: arhost_body_pose) -> bool {
