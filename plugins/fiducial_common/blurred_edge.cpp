@@ -180,8 +180,8 @@ struct LightLine {
 
     // `light`: of the bright area.
     bool is_clear(double half_length_px, double light) const {
-        constexpr double min_change = 0.002; // of the light, from the middle to an end
-        constexpr double min_deviations = 3; // standard deviations
+        constexpr double min_change = 0.002;   // of the light, from the middle to an end
+        constexpr double min_deviations = 3.5; // standard deviations; fewer would often be chance
         return std::abs(slope_per_px) * half_length_px > min_change * light &&
                slope_per_px * slope_per_px > min_deviations * min_deviations * slope_variance;
     }
@@ -291,7 +291,8 @@ struct Fit {
 // before has told them.
 std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, double blur_px,
                              bool are_lines_removed) {
-    constexpr double max_blur_ratio = 2, min_variance = 1e-6; // of the light, relative to the squared contrast
+    constexpr double max_blur_ratio = 2,
+                     min_variance = 1e-20; // not 0; of the light, relative to the squared contrast
     // Of the contrast, before the fit and afterwards: a lens does not blur an edge exactly as the model does.
     constexpr double min_first_error = 0.4, min_error = 0.06;
     constexpr int max_rounds = 10;
