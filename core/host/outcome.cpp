@@ -73,8 +73,8 @@ std::string unseen_targets(const run_config::Configuration &configuration, const
                          [&](const ipc::Target &target) { return !statistics.targets.contains(target.name); });
     if (unseen.empty())
         return {};
-    return fmt::format("never seen in {} frames: {}{}{}", statistics.tracker_results, describe_targets(unseen),
-                       seen_instead(statistics, unseen), how_to_compare(unseen));
+    return fmt::format("never seen in {} frames: {}{}", statistics.tracker_results, describe_targets(unseen),
+                       seen_instead(statistics, unseen));
 }
 
 std::string marker_name(const ipc::TargetMarker &marker) {

@@ -243,7 +243,7 @@ public:
         std::ranges::copy(std::as_bytes(std::span(expectation.markers)), output.data() + layout_->expected_offset);
         *reinterpret_cast<TrackerSlot::Header *>(output.data()) = {result.observation_count, request.expected_count,
                                                                    missed_count, request.search_everywhere,
-                                                                   result.candidate_count};
+                                                                   std::max(result.candidate_count, -1)};
         return status;
     }
 

@@ -197,11 +197,6 @@ void TargetSolver::check(const arhost_tracker_result &reported) const {
     if (reported.observation_count > ARHOST_MAX_OBSERVATIONS)
         violation("reports " + std::to_string(reported.observation_count) + " observations; the limit is " +
                   std::to_string(ARHOST_MAX_OBSERVATIONS));
-    if (reported.candidate_count < -1 ||
-        (reported.candidate_count >= 0 &&
-         static_cast<std::uint32_t>(reported.candidate_count) < reported.observation_count))
-        violation("reports a candidate_count of " + std::to_string(reported.candidate_count) + " for " +
-                  std::to_string(reported.observation_count) + " observations");
     for (const arhost_observation &observation : std::span(reported.observations, reported.observation_count)) {
         const std::string name = "marker " + std::to_string(observation.id);
         if (observation.family >= marker_counts_.size())

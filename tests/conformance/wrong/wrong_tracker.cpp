@@ -527,8 +527,7 @@ arhost_status track(arhost_instance *instance, const arhost_track_request *input
         modify_expected(self, expected, *result);
     if (has("reads_state_after") && result->observation_count > 0)
         result->observations->corners_px[0][0] += 1e-9 * *static_cast<const std::uint8_t *>(input->state_after);
-    if (has("counts_too_few_candidates"))
-        result->candidate_count = static_cast<std::int32_t>(result->observation_count) - 1;
+    result->candidate_count = has("counts_too_few_candidates") ? 0 : -1;
     if (has("reports_too_many"))
         result->observation_count = ARHOST_MAX_OBSERVATIONS + 1;
     if (has("no_struct_size") && result->observation_count > 0)

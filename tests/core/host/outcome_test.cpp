@@ -109,6 +109,26 @@ TEST_F(Outcome, NamesTargetsThatWereNeverSeenAlthoughOthersWere) {
     EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets), "");
 }
 
+TEST_F(Outcome, TellsWhetherThereWereQuadrilateralsIfNothingWasSeen) {
+    const std::vector<ipc::Target> &targets = configuration->tracker->targets;
+    EXPECT_EQ(seen_instead(statistics, targets), "") << "the tracker does not count them";
+    statistics.search.frames_with_candidate_count = 30;
+    EXPECT_THAT(seen_instead(statistics, targets), testing::StartsWith("; it found no quadrilaterals"));
+    statistics.search.candidates = 75;
+    EXPECT_EQ(seen_instead(statistics, targets), "; of 2.5 quadrilaterals per frame, none is a marker that it knows");
+    statistics.strangers = {{"D 8", 30}};
+    EXPECT_EQ(seen_instead(statistics, targets), "; it saw D 8 (30 frames)");
+}
+
+TEST_F(Outcome, TellsWhatToCompare) {
+    const ipc::Target marker{"cup", {{7, "D", {}}}, ""}, pattern{"card", {{3, "pattern", {}, "/lab/hiro.patt"}}, ""},
+        body{"head", {}, "skull"};
+    EXPECT_EQ(how_to_compare({marker, pattern, body}),
+              "; compare the numbers and the family with the print; compare the files with the prints");
+    EXPECT_EQ(how_to_compare({pattern}), "; compare the files with the prints");
+    EXPECT_EQ(how_to_compare({body}), "");
+}
+
 TEST_F(Outcome, NamesAPatternByItsFile) {
     ipc::TargetMarker marker{3, "pattern", {}, "/lab/hiro.patt"};
     statistics.unconfirmed = {{"pattern hiro.patt", 2}};

@@ -75,7 +75,6 @@ protected:
     void solve(std::vector<arhost_observation> seen, std::int64_t frame = 0,
                std::vector<arhost_body_pose> poses = {}) {
         arhost_tracker_result result{};
-        result.candidate_count = candidate_count;
         result.observations = seen.data();
         result.observation_count = static_cast<std::uint32_t>(seen.size());
         result.poses = poses.data();
@@ -106,7 +105,6 @@ protected:
     std::array<arhost_target, 4> solved{};
     TargetSolver::Expectation expectation; // before the last frame
     std::uint32_t missed = 0;              // of it
-    std::int32_t candidate_count = -1;     // to report
     std::vector<arhost_observation> observations;
 };
 
@@ -399,7 +397,6 @@ TEST_F(TargetSolverTest, FiltersPosesOnRequest) {
         for (int frame = 0; frame < 300; ++frame) {
             arhost_observation seen = observed(noisy.observe(truth, single, 0.1), 5);
             arhost_tracker_result result{};
-            result.candidate_count = -1;
             result.observations = &seen;
             result.observation_count = 1;
             std::array<arhost_observation, 1> sorted;
@@ -477,7 +474,6 @@ TEST_F(TargetSolverTest, WithoutConfirmationAJumpKeepsTheBranch) {
                 observed(noisy.observe(pose_at({frame < 3 ? 0.0 : 150.0, 0, 2500}, 20), single, 0.1), 5);
             seen.false_positive_rate = rate;
             arhost_tracker_result result{};
-            result.candidate_count = -1;
             result.observations = &seen;
             result.observation_count = 1;
             arhost_observation sorted;
@@ -545,7 +541,6 @@ TEST_F(TargetSolverTest, ReportsEachMarkerAtOnceOnRequest) {
     seen.false_positive_rate = small_family;
     const TargetSolver own(pinhole, targets, {.full_search_every = full_search_every, .confirm = false});
     arhost_tracker_result result{};
-    result.candidate_count = -1;
     result.observations = &seen;
     result.observation_count = 1;
     own.solve(result, true, 0, nullptr, after.data(), {solved, {&sorted, 1}});
@@ -576,12 +571,6 @@ TEST_F(TargetSolverTest, RejectsAReportThatViolatesTheContract) {
                     HasSubstr("false positive rate"));
     EXPECT_THAT(violation(std::vector(ARHOST_MAX_OBSERVATIONS + 1, good)),
                 HasSubstr("1025 observations; the limit is 1024"));
-    for (candidate_count = -2; candidate_count < 1; candidate_count += 2)
-        EXPECT_THAT(violation({good}),
-                    HasSubstr("candidate_count of " + std::to_string(candidate_count) + " for 1 observations"));
-    candidate_count = 1;
-    EXPECT_EQ(violation({good}), "");
-    candidate_count = -1;
     EXPECT_THAT(violation({}, {body_pose(cup)}), HasSubstr("the target 0, which is not a body"));
     EXPECT_THAT(violation({}, {body_pose(4)}), HasSubstr("the target 4, which is not a body"));
     EXPECT_THAT(violation({}, {body_pose(head), body_pose(head)}), HasSubstr("two poses of the target 3"));
