@@ -435,7 +435,7 @@ TEST(Supervision, ATrackersStateSurvivesItsWorker) {
 
 // The memory of the filter, of the search and of the prediction survives the tracker.
 TEST(Supervision, KillingARealTrackerEvery20FramesDoesNotChangeItsPoses) {
-    constexpr std::size_t frames = 200;
+    constexpr std::size_t frames = 120;
     for (const std::string tracker : {"tracker_apriltag", "tracker_aruco"}) {
         const std::string yaml =
             "version: 1\nsource: {plugin: source_synthetic, options: {id: 3, width: 320, height: 240, frames: " +
