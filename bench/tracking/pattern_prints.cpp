@@ -9,6 +9,8 @@
 #include <cstdio>
 #include <cstring>
 #include <exception>
+#include <filesystem>
+#include <random>
 #include <stdexcept>
 
 int main(int argc, char **argv) try {

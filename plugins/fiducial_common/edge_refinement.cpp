@@ -435,8 +435,7 @@ struct Square {
 };
 
 // As refine_edges(). Searches the edges at no more than so many positions on each, and then fits them to the pixels.
-// Where that fails, the line of the search at max_positions remains, and imprecise
-// corners are doubtful.
+// Where that fails, the line of the search at max_positions remains, and imprecise corners are doubtful.
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
                                        bool is_subpixel, std::size_t max_count) {
     constexpr int max_passes = 8, max_fits = 3;
