@@ -657,7 +657,7 @@ TEST(Run, TellsWhetherTheTrackerHasFoundQuadrilaterals) {
 
 TEST(Run, InModeLiveWarnsAfterFiveSecondsWithoutTargets) {
     ArhostRun run("version: 1\nmode: live\n"
-                  "source: {plugin: source_synthetic, fps: 10, options: {frames: 58, id: 4, side_mm: 80}}\n"
+                  "source: {plugin: source_synthetic, fps: 10, options: {frames: 70, id: 4, side_mm: 80}}\n"
                   "tracker: {plugin: tracker_aruco, targets: [{marker: 7, family: tag36h11, side_mm: 80}]}\n"
                   "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run(), 1) << run.output();
@@ -668,11 +668,13 @@ TEST(Run, InModeLiveWarnsAfterFiveSecondsWithoutTargets) {
 
 TEST(Run, InModeLiveWarnsAfterFiveSecondsOfTargetsThatWereNotSeen) {
     ArhostRun run("version: 1\nmode: live\n"
-                  "source: {plugin: source_synthetic, fps: 10, options: {frames: 58, id: 4, side_mm: 80}}\n"
+                  "source: {plugin: source_synthetic, fps: 10, options: {frames: 70, id: 4, side_mm: 80}}\n"
                   "tracker: {plugin: tracker_aruco, targets: [{ids: 4-5, family: tag36h11, side_mm: 80}]}\n"
                   "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run(), 0) << run.output();
-    EXPECT_THAT(run.output(), testing::ContainsRegex("never seen in 5[0-9] frames: 'tag36h11-5' \\(tag36h11 5\\)"));
+    // A slow tracker skips frames, so their numbers vary.
+    const std::string warning = "never seen in [0-9]+ frames: 'tag36h11-5' \\(tag36h11 5\\)\n";
+    EXPECT_THAT(run.output(), testing::ContainsRegex(warning + "(.*\n)*.*" + warning)) << "after 5 s and at the end";
 }
 
 TEST(CommandLine, CheckRunsTheFirstFramesOnRequest) {
