@@ -87,24 +87,64 @@ Seen SearchRegions::search(const arhost_track_request &request, const RegionLimi
             if (const auto one = verify(expected, marker.id, marker.family))
                 verified.push_back(*one);
         }
-    const auto detected = [&](Seen seen, const auto &regions_of) {
-        const std::size_t before = seen.candidates;
-        std::size_t most = 0;
+    // What the passes detect in the regions of each.
+    const auto detected = [&](Detect Pass::*detect, const auto &regions_of) {
+        Seen all;
         for (const Pass &pass : passes) {
-            seen.candidates = 0;
+            if (!(pass.*detect))
+                continue;
+            Seen seen;
             for (const cv::Rect &region : regions_of(pass))
-                pass.detect(region, seen);
-            most = std::max(most, seen.candidates);
+                (pass.*detect)(region, seen);
+            all.add(seen);
         }
-        seen.candidates = before + most;
-        return seen;
+        return all;
     };
-    Seen seen = detected({verified, verified.size()},
-                         [&](const Pass &pass) { return of(request, limits, pass.family, verified); });
-    if (miss_a_target(request, seen.markers))
-        seen = detected({}, [&](const Pass &) { return std::vector{whole_of(request)}; });
+    const auto expected_places = [&](const Pass &pass) { return of(request, limits, pass.family, verified); };
+    const cv::Rect whole = whole_of(request);
+    Seen seen = detected(&Pass::detect, expected_places);
+    seen.candidates += verified.size();
+    seen.markers.insert(seen.markers.end(), verified.begin(), verified.end());
+    bool is_whole = request.search_everywhere != 0;
+    if (miss_a_target(request, seen.markers)) {
+        const Seen closer = detected(&Pass::detect_closer, [&](const Pass &pass) {
+            std::vector<cv::Rect> regions = of(request, limits, pass.family, seen.markers);
+            std::erase_if(regions, [](const cv::Rect &one) { return one.area() > tile_width_px * tile_height_px; });
+            return regions;
+        });
+        seen.add(closer);
+        if (miss_a_target(request, seen.markers)) {
+            seen = detected(&Pass::detect, [&](const Pass &) { return std::vector{whole}; });
+            seen.add(closer);
+            is_whole = true;
+        }
+    }
+    if (is_whole && !are_all_targets_in(seen.markers))
+        seen.add(detected(&Pass::detect_closer,
+                          [&](const Pass &) { return std::vector{tile_of(whole.size(), request.frame->sequence)}; }));
     seen.candidates = std::max(seen.candidates, seen.markers.size()); // one may be a marker of several families
     return seen;
+}
+
+cv::Rect SearchRegions::tile_of(cv::Size frame, std::uint64_t sequence) {
+    constexpr int overlap_px = 96; // a marker of this size is whole in one of the tiles
+    const cv::Size tile(std::min(frame.width, tile_width_px), std::min(frame.height, tile_height_px));
+    const auto count = [](int length, int tile_length) {
+        return length == tile_length
+                   ? 1U
+                   : 1U + static_cast<unsigned>((length - overlap_px - 1) / (tile_length - overlap_px));
+    };
+    const auto begin = [](unsigned index, unsigned tiles, int length, int tile_length) {
+        return tiles == 1 ? 0 : static_cast<int>(index * static_cast<unsigned>(length - tile_length) / (tiles - 1));
+    };
+    const unsigned columns = count(frame.width, tile.width), rows = count(frame.height, tile.height);
+    // Multiples of the golden ratio modulo 1 are evenly distributed, and so are those of every nth frame.
+    constexpr std::uint64_t golden_ratio = 0x9E3779B97F4A7C15; // · 2^64
+    const std::uint64_t fraction = (sequence * golden_ratio) >> 32;
+    const auto index = static_cast<unsigned>((fraction * columns * rows) >> 32);
+    return {{begin(index % columns, columns, frame.width, tile.width),
+             begin(index / columns, rows, frame.height, tile.height)},
+            tile};
 }
 
 std::vector<cv::Rect> SearchRegions::of(const arhost_track_request &request, const RegionLimits &limits,
@@ -136,6 +176,13 @@ bool SearchRegions::miss_a_target(const arhost_track_request &request,
         is_seen[marker.target] |= marker.is_in(seen);
     }
     return std::ranges::any_of(is_seen, [](const auto &target) { return !target.second; });
+}
+
+bool SearchRegions::are_all_targets_in(std::span<const arhost_observation> seen) const {
+    std::map<std::uint32_t, bool> is_seen; // targets
+    for (const Marker &marker : markers_)
+        is_seen[marker.target] |= marker.is_in(seen);
+    return std::ranges::all_of(is_seen, [](const auto &target) { return target.second; });
 }
 
 } // namespace arhost::fiducial

@@ -21,6 +21,12 @@ struct RegionLimits {
 struct Seen {
     std::vector<arhost_observation> markers;
     std::size_t candidates = 0; // quadrilaterals that were examined, those of markers and others
+
+    // Adds what another search of the same quadrilaterals has found.
+    void add(const Seen &other) {
+        markers.insert(markers.end(), other.markers.begin(), other.markers.end());
+        candidates = std::max(candidates, other.candidates);
+    }
 };
 
 // Detects markers in a region of the frame and adds them to `seen`.
@@ -30,7 +36,13 @@ using Detect = std::function<void(const cv::Rect &region, Seen &seen)>;
 struct Pass {
     const Family *family;
     Detect detect;
+    Detect detect_closer = {}; // takes a closer look: slower, but finds more of the small and faint markers; may be
+                               // empty
 };
+
+// A closer look examines more squares with lower thresholds, so it reports only listed markers whose
+// false_positive_rate is at most this. That leaves out families of up to 25 bits.
+constexpr double max_rate_of_closer_look = 1e-7;
 
 // Returns an observation if the marker of this id and family is where it is expected. Takes less time than detection.
 using Verify = std::function<std::optional<arhost_observation>(const arhost_expected_marker &expected,
@@ -43,8 +55,9 @@ public:
     SearchRegions(const arhost_tracker_setup &setup, const std::function<double(const std::string &family)> &margin);
 
     // Returns the expected markers that `verify` confirms and what the passes detect where the others are expected,
-    // or what they detect in the whole frame if a target is not there. Passes examine the same candidates, so these
-    // are those of the pass with most of them.
+    // or what they detect in the whole frame if a target is not there. Where a target is missed, the passes also
+    // detect closer: at the expected places, and after a search of the whole frame in tile_of(). A marker may be in
+    // the result twice.
     Seen search(const arhost_track_request &request, const RegionLimits &limits, std::span<const Pass> passes,
                 const Verify &verify = {}) const;
 
@@ -57,6 +70,11 @@ public:
     // must then search the whole frame.
     bool miss_a_target(const arhost_track_request &request, std::span<const arhost_observation> seen) const;
 
+    // Returns the part of a frame that is searched closer, at most tile_width_px × tile_height_px: the frames of a
+    // video take turns with the parts, in an order that reaches all of them even if only every nth frame is searched.
+    static cv::Rect tile_of(cv::Size frame, std::uint64_t sequence);
+    static constexpr int tile_width_px = 480, tile_height_px = 360;
+
 private:
     struct Marker {
         std::int32_t id;
@@ -68,6 +86,8 @@ private:
                 seen, [&](const arhost_observation &one) { return one.id == id && one.family == family; });
         }
     };
+    bool are_all_targets_in(std::span<const arhost_observation> seen) const;
+
     std::vector<Marker> markers_; // as in the setup
 };
 

@@ -11,6 +11,8 @@
 
 #include <arhost-cpp/plugin.hpp>
 
+#include <opencv2/imgproc.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -56,6 +58,10 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_REAL, "min_decision_margin", "0",
                    "Minimum bit contrast of a tag, in grey levels from 0 to 255; tags of lower contrast are ignored.",
                    0, 255),
+    arhost::option(
+        ARHOST_OPTION_BOOL, "closer_look", "true",
+        "If a target is not found, searches a part of the frame again at twice the resolution, which finds "
+        "more of the strongly tilted tags."),
     arhost::option(ARHOST_OPTION_INTEGER, "threads", "1",
                    "Number of detector threads; it does not affect the result.", 1, 64),
 };
@@ -105,6 +111,10 @@ public:
     apriltag_family_t *tags() const { return tags_; }
     int id(int index) const { return ids_[index]; } // of the tag that the library numbers so
 
+    bool permits_closer_look() const {
+        return is_listed_ && arhost::fiducial::false_positive_rate(static_cast<int>(tags_->nbits), 0) <=
+                                 arhost::fiducial::max_rate_of_closer_look;
+    }
     // `configured`: −1 for the family's default.
     int max_hamming(int configured) const {
         return !is_listed_ ? 0 : configured < 0 ? type_.default_max_hamming : configured;
@@ -146,6 +156,14 @@ double print_margin(const std::string &name) {
     return (family->total_width - family->width_at_border) / 2.0 / family->width_at_border;
 }
 
+struct Look {
+    int scale = 1;
+    double sharpening = 1; // relative to decode_sharpening; the decision margin increases with it
+
+    bool is_closer() const { return scale > 1 || sharpening > 1; }
+};
+constexpr Look enlarged{2, 1}, sharpened{1, 8};
+
 class AprilTagTracker {
 public:
     AprilTagTracker(const arhost::Host &host, const arhost::Options &options)
@@ -153,9 +171,9 @@ public:
         set(options);
     }
 
-    static constexpr const char *changeable[] = {
-        "corner_refinement", "quad_decimate", "quad_sigma",          "refine_edges",
-        "decode_sharpening", "max_hamming",   "min_decision_margin", nullptr};
+    static constexpr const char *changeable[] = {"corner_refinement",   "quad_decimate",     "quad_sigma",
+                                                 "refine_edges",        "decode_sharpening", "max_hamming",
+                                                 "min_decision_margin", "closer_look",       nullptr};
     // Takes the options that `changed` contains.
     void set(const arhost::Options &changed) {
         const auto take_real = [&](const char *key, double &value) {
@@ -175,6 +193,8 @@ public:
             fit_edges_ = changed.text("corner_refinement") == "edges";
         if (changed.contains("refine_edges"))
             refine_edges_ = changed.boolean("refine_edges");
+        if (changed.contains("closer_look"))
+            looks_closer_ = changed.boolean("closer_look");
         if (changed.contains("max_hamming"))
             max_hamming_ = static_cast<int>(changed.integer("max_hamming"));
         if (detector_)
@@ -205,8 +225,16 @@ public:
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
-        const arhost::fiducial::Pass pass{
-            nullptr, [&](const cv::Rect &region, auto &seen) { observe(*request.frame, region, seen); }};
+        const auto search = [&](const std::vector<Look> &looks) {
+            return [&, looks](const cv::Rect &region, arhost::fiducial::Seen &seen) {
+                for (const Look &look : looks)
+                    observe(*request.frame, region, look, seen);
+            };
+        };
+        arhost::fiducial::Pass pass{nullptr, search({Look()}), {}};
+        if (looks_closer_ &&
+            std::ranges::any_of(parts_, [](const auto &part) { return part->permits_closer_look(); }))
+            pass.detect_closer = min_margin_ > 0 ? search({enlarged}) : search({enlarged, sharpened});
         arhost::fiducial::Seen seen = regions_->search(request, {grid_px(), min_image_side()}, {&pass, 1});
         others_->frame(arhost::fiducial::grey_of(*request.frame), seen.markers);
         observations.set_candidate_count(seen.candidates);
@@ -236,10 +264,14 @@ private:
             apriltag_detector_add_family_bits(detector_.get(), part->tags(), part->max_hamming(max_hamming_));
     }
 
-    // Adds the tags of a region of the frame to `seen`.
-    void observe(const arhost_frame &frame, const cv::Rect &region, arhost::fiducial::Seen &seen) {
+    // Adds the tags of a region of the frame to `seen`, only the listed ones in a closer look.
+    void observe(const arhost_frame &frame, const cv::Rect &region, const Look &look, arhost::fiducial::Seen &seen) {
         const cv::Mat grey = arhost::fiducial::grey_of(frame);
-        const Detections tags = detect(*detector_, grey(region));
+        cv::Mat pixels = grey(region);
+        if (look.scale > 1)
+            cv::resize(grey(region), pixels, {}, look.scale, look.scale, cv::INTER_CUBIC);
+        detector_->decode_sharpening = look.sharpening * sharpening_;
+        const Detections tags = detect(*detector_, pixels);
         if (tags)
             seen.candidates += detector_->nquads;
         for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
@@ -249,11 +281,15 @@ private:
                 continue;
             const PartOfFamily &part =
                 **std::ranges::find(parts_, tag->family, [](const auto &one) { return one->tags(); });
+            const double rate = arhost::fiducial::false_positive_rate(static_cast<int>(tag->family->nbits),
+                                                                      static_cast<std::uint32_t>(tag->hamming));
+            if (look.is_closer() && (!part.is_listed() || rate > arhost::fiducial::max_rate_of_closer_look))
+                continue;
             arhost::fiducial::MeasuredCorners corners;
             // AprilTag's corners begin at the bottom left and are counter-clockwise; pixel centres are at +0.5.
             for (int corner = 0; corner < 4; ++corner)
-                corners.corners_px[corner] = {tag->p[3 - corner][0] - 0.5 + region.x,
-                                              tag->p[3 - corner][1] - 0.5 + region.y};
+                corners.corners_px[corner] = {tag->p[3 - corner][0] / look.scale - 0.5 + region.x,
+                                              tag->p[3 - corner][1] / look.scale - 0.5 + region.y};
             if (fit_edges_ && part.is_listed())
                 corners = arhost::fiducial::refine_corners(
                               grey, frame.format->transfer, corners.corners_px, *lens_, tag->family->width_at_border,
@@ -262,8 +298,7 @@ private:
             arhost_observation &one = seen.markers.emplace_back(part.family().observation(part.id(tag->id), corners));
             one.hamming = static_cast<std::uint32_t>(tag->hamming);
             one.decision_margin = tag->decision_margin;
-            one.false_positive_rate =
-                arhost::fiducial::false_positive_rate(static_cast<int>(tag->family->nbits), one.hamming);
+            one.false_positive_rate = rate;
         }
     }
 
@@ -311,6 +346,7 @@ private:
     double decimate_ = 1, sigma_ = 0;
     bool refine_edges_ = true;
     double sharpening_ = 0.25;
+    bool looks_closer_ = true;
     int max_hamming_ = -1; // −1: that of each family
     double min_margin_ = 0;
 

@@ -66,6 +66,9 @@ constexpr arhost_option_descriptor options[] = {
         "Maximum number of bit errors to correct, as a fraction of the number that the dictionary can correct. "
         "Negative: 0.6, but at most 0 errors in dictionaries of 4x4 bits, 1 of 5x5 and 3 of 6x6.",
         -1, 1),
+    arhost::option(ARHOST_OPTION_BOOL, "closer_look", "true",
+                   "If a target is not found, searches a part of the frame again, smoothed and at twice the "
+                   "resolution, which finds more of the noisy, dim and small markers."),
     arhost::option(ARHOST_OPTION_INTEGER, "border_bits", "1", "Width of the black border in cells.", 1, 8),
     arhost::option(ARHOST_OPTION_BOOL, "inverted", "false", "Also detects white-on-black markers."),
 };
@@ -210,6 +213,26 @@ struct Detectable {
     cv::aruco::DetectorParameters parameters;
 };
 
+// How to prepare pixels for OpenCV's detector. Its thresholds of contrast suit bright pictures without noise; a
+// closer look has lower ones.
+struct Look {
+    int scale = 1;
+    double sigma_px = 0;  // of a Gaussian blur
+    double threshold = 0; // the constant of the adaptive threshold in grey levels; 0: as configured
+
+    bool is_closer() const { return threshold > 0; }
+    cv::Mat prepared(const cv::Mat &grey) const {
+        cv::Mat scaled = grey, blurred; // does not write to `grey`, which is read-only
+        if (scale > 1)
+            cv::resize(grey, scaled, {}, scale, scale, cv::INTER_CUBIC);
+        if (sigma_px == 0)
+            return scaled;
+        cv::GaussianBlur(scaled, blurred, {}, sigma_px);
+        return blurred;
+    }
+};
+constexpr Look smoothed{1, 1.0, 2}, enlarged{2, 0, 3};
+
 class ArucoTracker {
 public:
     ArucoTracker(const arhost::Host &host, const arhost::Options &options) : host_(host) {
@@ -235,6 +258,7 @@ public:
                                                  "min_perimeter_rate",
                                                  "min_distance_rate",
                                                  "error_correction_rate",
+                                                 "closer_look",
                                                  "border_bits",
                                                  "inverted",
                                                  nullptr};
@@ -258,6 +282,8 @@ public:
         double rate = correction_rate_;
         take_real("error_correction_rate", rate);
         take_integer("border_bits", parameters.markerBorderBits);
+        if (changed.contains("closer_look"))
+            looks_closer_ = changed.boolean("closer_look");
         if (changed.contains("inverted"))
             parameters.detectInvertedMarker = changed.boolean("inverted");
         if (parameters.adaptiveThreshWinSizeMax < parameters.adaptiveThreshWinSizeMin)
@@ -284,10 +310,19 @@ public:
     void track(const arhost_track_request &request, arhost::Observations &observations) {
         const cv::Mat grey = arhost::fiducial::grey_of(*request.frame);
         std::vector<arhost::fiducial::Pass> passes;
-        for (const Detectable &detectable : detectables_)
-            passes.push_back({&detectable.family, [&](const cv::Rect &region, auto &seen) {
-                                  observe(grey, request.frame->format->transfer, region, detectable, seen);
-                              }});
+        for (const Detectable &detectable : detectables_) {
+            const auto search = [&](const std::vector<Look> &looks) {
+                return [&, looks](const cv::Rect &region, arhost::fiducial::Seen &seen) {
+                    for (const Look &look : looks)
+                        observe(grey, request.frame->format->transfer, region, look, detectable, seen);
+                };
+            };
+            passes.push_back({&detectable.family, search({Look()}), {}});
+            const int side = detectable.dictionary.table.markerSize;
+            if (looks_closer_ &&
+                arhost::fiducial::false_positive_rate(side * side, 0) <= arhost::fiducial::max_rate_of_closer_look)
+                passes.back().detect_closer = search({smoothed, enlarged});
+        }
         arhost::fiducial::Seen seen = regions_->search(
             request, {}, passes, [&](const arhost_expected_marker &expected, std::int32_t id, std::uint32_t family) {
                 return verified(grey, request.frame->format->transfer, expected, id, family);
@@ -305,30 +340,40 @@ public:
     }
 
 private:
-    // Adds the markers of a dictionary in a region of the frame to `seen`.
-    void observe(const cv::Mat &grey, arhost_transfer transfer, const cv::Rect &region, const Detectable &detectable,
-                 arhost::fiducial::Seen &seen) const {
+    // Adds the markers of a dictionary in a region of the frame to `seen`, only the listed ones in a closer look.
+    void observe(const cv::Mat &grey, arhost_transfer transfer, const cv::Rect &region, const Look &look,
+                 const Detectable &detectable, arhost::fiducial::Seen &seen) const {
         const cv::aruco::Dictionary &table = detectable.dictionary.table;
         cv::aruco::DetectorParameters parameters = detectable.parameters;
+        if (look.is_closer()) {
+            parameters.adaptiveThreshConstant = look.threshold;
+            parameters.minOtsuStdDev = 1;
+        }
         // OpenCV takes the perimeter relative to the longer side of the image that it gets.
         parameters.minMarkerPerimeterRate *=
             static_cast<double>(std::max(grey.cols, grey.rows)) / std::max(region.width, region.height);
-        const cv::Point2d offset(region.x - centre_shift_px_, region.y - centre_shift_px_);
-        const arhost::aruco::DetectedMarkers found = arhost::aruco::detect(grey(region), table, parameters);
+        const cv::Point2d shift(0.5 - centre_shift_px_, 0.5 - centre_shift_px_),
+            offset(region.x - 0.5, region.y - 0.5);
+        const arhost::aruco::DetectedMarkers found =
+            arhost::aruco::detect(look.prepared(grey(region)), table, parameters);
         seen.candidates += found.ids.size() + found.rejected.size();
         for (std::size_t i = 0; i < found.ids.size(); ++i) {
             const bool is_listed = detectable.family.lists(found.ids[i]);
             arhost::fiducial::MeasuredCorners corners;
-            for (int corner = 0; corner < 4; ++corner)
-                corners.corners_px[corner] =
-                    cv::Point2d(found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner]) +
-                    offset;
+            for (int corner = 0; corner < 4; ++corner) {
+                const cv::Point2d at =
+                    found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner];
+                corners.corners_px[corner] = (at + shift) / look.scale + offset;
+            }
             if (refine_edges_ && is_listed)
                 corners = refined(grey, transfer, detectable.dictionary, found.ids[i], corners.corners_px)
                               .value_or(corners);
             const Reading reading =
                 read(grey, corners.corners_px, table, found.ids[i], parameters.markerBorderBits, false);
-            if (is_listed || (reading.wrong_bits == 0 && reading.false_positive_rate < 1)) // else it may be anything
+            const double max_rate = look.is_closer() ? arhost::fiducial::max_rate_of_closer_look : 1;
+            if (is_listed ? reading.false_positive_rate <= max_rate
+                          : !look.is_closer() && reading.wrong_bits == 0 &&
+                                reading.false_positive_rate < 1) // else it may be anything
                 seen.markers.push_back(observation_of(detectable, found.ids[i], corners, reading));
         }
     }
@@ -394,7 +439,7 @@ private:
             detectable.parameters.errorCorrectionRate = 0;
             arhost::fiducial::Seen seen;
             constexpr arhost_transfer any = ARHOST_TRANSFER_LINEAR; // only listed markers are refined, which need it
-            observe(grey, any, {0, 0, grey.cols, grey.rows}, detectable, seen);
+            observe(grey, any, {0, 0, grey.cols, grey.rows}, {}, detectable, seen);
             std::set<int> ids;
             for (const arhost_observation &one : seen.markers)
                 if (std::ranges::none_of(detectables_, [&](const Detectable &used) {
@@ -460,7 +505,7 @@ private:
     arhost::Host host_;
     cv::aruco::Dictionary file_table_;
     std::string file_name_; // the name of file_table_; empty: there is none
-    bool refine_edges_ = false;
+    bool refine_edges_ = false, looks_closer_ = true;
     cv::aruco::DetectorParameters parameters_;
     double correction_rate_ = -1;
     double centre_shift_px_ = 0; // for CORNER_REFINE_APRILTAG, whose pixel centres are at +0.5

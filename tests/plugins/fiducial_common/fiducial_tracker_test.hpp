@@ -72,6 +72,31 @@ inline std::string case_name(const testing::TestParamInfo<TrackerCase> &info) {
     return info.param.name;
 }
 
+// A marker with sides of 100 mm that is difficult to detect.
+struct Difficult {
+    const char *name;
+    double side_px, tilt_degrees = 30, blur_px = 0.6, exposure = 1, noise = 1.5;
+
+    Mt truth() const { return pose_of(20, 10, 450 * 100 / side_px, tilt_degrees, 0, 20); }
+    cv::Mat picture(const Print &print) const {
+        cv::Mat picture = render(test_camera, {{print, 100, truth()}});
+        cv::GaussianBlur(picture, picture, {}, blur_px);
+        picture *= exposure;
+        add_noise(picture, noise, 2);
+        return picture;
+    }
+};
+
+// Expects that a tracker finds the marker only in a closer look.
+inline void expect_found_in_closer_look(const std::string &plugin, const Difficult &marker) {
+    const GreyFrame frame(marker.picture(tag(3)));
+    for (const auto &[closer_look, count] : {std::pair{"true", 1u}, {"false", 0u}}) {
+        Tracker tracker(plugin, {{"closer_look", closer_look}});
+        ASSERT_EQ(tracker.start(test_camera, {{3}}), ARHOST_STATUS_OK) << tracker.log();
+        EXPECT_EQ(tracker.track(frame).size(), count) << closer_look;
+    }
+}
+
 // Expects that a tracker locates the corners of a print that is blurred by so many of its cells.
 inline void expect_refined_if_blurred(const std::string &plugin, const Listed &listed, const Print &print,
                                       double blur_cells, double max_error_px) {
@@ -363,7 +388,7 @@ TEST_P(FiducialTracker, RefinedCornersAreNoWorseThanThoseOfTheLibrary) {
         SCOPED_TRACE(testing::Message() << conditions.name << ", " << conditions.side_px << " px");
         const TagPictures pictures(conditions, tags);
         const auto [refined, plain] = refined_and_plain(pictures);
-        EXPECT_EQ(refined.found, plain.found);
+        EXPECT_GE(refined.found, plain.found) << "a closer look reads the bits at the reported corners";
         EXPECT_LE(refined.wrong, plain.wrong);
         if (plain.found > 0) {
             EXPECT_LE(percentile(refined.corner_px, 0.99), percentile(plain.corner_px, 0.99));
@@ -395,6 +420,28 @@ TEST_P(FiducialTracker, GivesTheSameResultWithAnyNumberOfThreads) {
     }
     EXPECT_EQ(single.size(), 12u);
     cv::setNumThreads(threads);
+}
+
+TEST_P(FiducialTracker, FindsSmallTiltedBlurredDimAndNoisyMarkers) {
+    for (const Difficult &one : {Difficult{"small", 13},
+                                 {"tilted", 60, 77},
+                                 {"blurred", 60, 30, 3.8},
+                                 {"dim", 60, 30, 0.6, 0.06},
+                                 {"noisy", 60, 30, 0.6, 1, 40}}) {
+        const auto seen = track(one.picture(tag(3)), {{3}});
+        ASSERT_EQ(seen.size(), 1u) << one.name;
+        EXPECT_LT(greatest_distance_px(seen[0], corners_of(one.truth(), test_camera, 100)), 0.5) << one.name;
+    }
+}
+
+TEST_P(FiducialTracker, TakesACloserLookWhereASmallMarkerIsExpected) {
+    const Mt small = pose_of(-700, 500, 3200, 20, -15, 10), large = pose_of(60, -20, 500);
+    const cv::Mat picture = picture_of({{tag(3), 100, small}, {tag(5), 100, large}});
+    ASSERT_EQ(track(picture, {{3}, {5}}).size(), 2u);
+    const auto seen =
+        tracker_.track(GreyFrame(picture), {expected_at(0, corners_of(small, test_camera, 100))}, false);
+    ASSERT_EQ(seen.size(), 1u) << "not by a search of the whole frame";
+    EXPECT_EQ(seen[0].id, 3);
 }
 
 // A request that expects the corners of a marker here.
@@ -453,6 +500,9 @@ TEST_P(FiducialTracker, DoesNotModifyTheFrame) {
     const GreyFrame frame(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}));
     const std::vector<uint8_t> before(frame.slot().data(), frame.slot().data() + frame.slot().size());
     ASSERT_EQ(tracker_.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+    EXPECT_EQ(tracker_.track(frame).size(), 1u);
+    EXPECT_TRUE(std::equal(before.begin(), before.end(), frame.slot().data()));
+    ASSERT_EQ(tracker_.start(test_camera, {{3, 100}, {4, 100}}), ARHOST_STATUS_OK); // a closer look for marker 4
     EXPECT_EQ(tracker_.track(frame).size(), 1u);
     EXPECT_TRUE(std::equal(before.begin(), before.end(), frame.slot().data()));
     EXPECT_TRUE(frame.slot().intact());

@@ -3,7 +3,11 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <functional>
 #include <limits>
+#include <set>
+#include <string>
 
 namespace {
 
@@ -183,6 +187,87 @@ TEST_F(Regions, AreSearchedByEachPassAndThenTheWholeFrameIfATargetIsMissed) {
     EXPECT_EQ(found.markers.size(), 1u) << "what the first search found is not reported twice";
     EXPECT_EQ(found.candidates, 8u);
     EXPECT_THAT(searched, ElementsAre(near_first, near_second, std::pair(1, whole_frame), std::pair(2, whole_frame)));
+}
+
+// A pass whose closer look alone finds marker 3, in the regions that `finds` accepts.
+TEST_F(Regions, AreExaminedCloserWhereATargetIsMissed) {
+    expect(0, 100, 150);
+    expect(3, 300, 150);
+    std::vector<std::pair<std::string, cv::Rect>> searched;
+    std::function<bool(const cv::Rect &)> finds = [](const cv::Rect &) { return true; };
+    const auto search = [&] {
+        searched.clear();
+        const Pass pass{nullptr,
+                        [&](const cv::Rect &region, auto &all) {
+                            searched.emplace_back("normal", region);
+                            if (region.contains({100, 150}))
+                                all.markers.push_back(seen(0));
+                            all.candidates += 2;
+                        },
+                        [&](const cv::Rect &region, auto &all) {
+                            searched.emplace_back("closer", region);
+                            if (finds(region))
+                                all.markers.push_back(seen(3, 1));
+                            all.candidates += 5;
+                        }};
+        return regions_->search(request_, {}, {&pass, 1});
+    };
+    const std::pair near_first("normal", cv::Rect(75, 125, 51, 51)),
+        near_second("normal", cv::Rect(275, 125, 51, 51)), closer("closer", cv::Rect(275, 125, 51, 51)),
+        everywhere("normal", whole_frame), closer_everywhere("closer", whole_frame);
+    auto found = search();
+    EXPECT_THAT(searched, ElementsAre(near_first, near_second, closer)) << "the marker that is missed, not the other";
+    EXPECT_EQ(found.markers.size(), 2u);
+    EXPECT_EQ(found.candidates, 5u);
+
+    finds = [](const cv::Rect &) { return false; };
+    EXPECT_EQ(search().markers.size(), 1u);
+    EXPECT_THAT(searched, ElementsAre(near_first, near_second, closer, everywhere, closer_everywhere));
+
+    request_.search_everywhere = 1;
+    finds = [](const cv::Rect &) { return true; };
+    EXPECT_EQ(search().markers.size(), 2u);
+    EXPECT_THAT(searched, ElementsAre(everywhere, closer_everywhere)) << "targets 1 and 2 are missed";
+}
+
+TEST_F(Regions, AreNotExaminedCloserIfAllTargetsAreSeen) {
+    request_.search_everywhere = 1;
+    int looks = 0;
+    const Pass pass{nullptr,
+                    [&](const cv::Rect &, auto &all) {
+                        all.markers = {seen(1), seen(2), seen(3, 1)};
+                    },
+                    [&](const cv::Rect &, auto &) { ++looks; }};
+    EXPECT_EQ(regions_->search(request_, {}, {&pass, 1}).markers.size(), 3u);
+    EXPECT_EQ(looks, 0) << "one marker of the first target is enough";
+}
+
+TEST(Tiles, AreTheWholeOfASmallFrame) {
+    for (const cv::Size size : {cv::Size(1, 1), cv::Size(300, 20), cv::Size(480, 360)})
+        for (const std::uint64_t sequence : {0, 1, 1000})
+            EXPECT_EQ(SearchRegions::tile_of(size, sequence), cv::Rect({}, size));
+}
+
+TEST(Tiles, ContainEveryMarkerOf96PxWithinAMinuteHoweverOftenFramesAreSearched) {
+    for (const cv::Size size : {cv::Size(481, 361), cv::Size(640, 480), cv::Size(1280, 720), cv::Size(3840, 2160)})
+        for (const std::uint64_t every : {1, 2, 5, 6, 10, 30}) {
+            std::set<std::pair<int, int>> begins;
+            for (std::uint64_t sequence = 0; sequence < 1800 * every; sequence += every) {
+                const cv::Rect tile = SearchRegions::tile_of(size, sequence);
+                ASSERT_EQ(tile & cv::Rect({}, size), tile);
+                ASSERT_EQ(tile.size(), cv::Size(480, 360));
+                begins.emplace(tile.x, tile.y);
+            }
+            for (int y = 0; y <= size.height - 96; y += 24)
+                for (int x = 0; x <= size.width - 96; x += 24)
+                    EXPECT_TRUE(std::ranges::any_of(
+                        begins,
+                        [&](const auto &begin) {
+                            const cv::Rect marker(x, y, 96, 96);
+                            return (cv::Rect({begin.first, begin.second}, cv::Size(480, 360)) & marker) == marker;
+                        }))
+                        << x << ' ' << y << " in " << size << ", every " << every;
+        }
 }
 
 } // namespace

@@ -142,6 +142,10 @@ TEST(AprilTagTracker, FindsEveryTagOf28PxByDefault) {
     EXPECT_EQ(pictures.show_to(tracker).found, pictures.shown());
 }
 
+TEST(AprilTagTracker, FindsABlurredTagInACloserLook) {
+    expect_found_in_closer_look("tracker_apriltag", {"blurred", 60, 30, 4.2});
+}
+
 TEST(AprilTagTracker, IgnoresTagsBelowTheDecisionMargin) {
     const GreyFrame frame(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}));
     for (const auto &[margin, count] : {std::pair{"20", 1u}, std::pair{"200", 0u}}) {

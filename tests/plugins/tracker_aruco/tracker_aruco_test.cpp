@@ -327,6 +327,22 @@ TEST(ArucoTracker, RejectsAFileThatIsNotADictionary) {
     EXPECT_THAT(absent.log(), HasSubstr("absent.yml' cannot be read"));
 }
 
+TEST(ArucoTracker, FindsADimMarkerInACloserLook) {
+    expect_found_in_closer_look("tracker_aruco", {"dim", 60, 30, 0.6, 0.06});
+}
+
+TEST(ArucoTracker, FindsSmallMarkersInACloserLook) {
+    expect_found_in_closer_look("tracker_aruco", {"small", 13});
+}
+
+// By chance, clutter looks like a marker of a small family more often the closer the tracker looks.
+TEST(ArucoTracker, TakesNoCloserLookForASmallFamily) {
+    Tracker tracker("tracker_aruco");
+    ASSERT_EQ(tracker.start(test_camera, {{3, 100, "DICT_5X5_50"}}), ARHOST_STATUS_OK);
+    const Difficult dim{"dim", 60, 30, 0.6, 0.06};
+    EXPECT_TRUE(tracker.track(GreyFrame(dim.picture(aruco_marker("DICT_5X5_50", 3)))).empty());
+}
+
 TEST(ArucoTracker, RejectsContradictoryThresholdWindows) {
     Tracker tracker("tracker_aruco", {{"threshold_window_min_px", "31"}, {"threshold_window_max_px", "23"}});
     EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
