@@ -251,7 +251,10 @@ class _Adapter:
                                                      pattern_ratio=ratio)
                                               for id, family, target, corners, file, ratio in markers],
                                      families=list(families)))
-            return STATUS_OK
+            size = int(self.plugin.state_size()) if hasattr(self.plugin, "state_size") else 0
+            if not 0 <= size <= MAX_STATE:
+                raise Failure(f"'state_size' returned {size}; it must be 0 to {MAX_STATE}", STATUS_ERROR_INTERNAL)
+            return STATUS_OK, size
 
         return self._guarded(start)
 
@@ -259,13 +262,16 @@ class _Adapter:
         return self._guarded(lambda: (STATUS_OK, (float(self.plugin.aspect(marker)),)
                                       if hasattr(self.plugin, "aspect") else (1.0,)))
 
-    def track(self, sequence, capture_ns, clock, planes, grey, search_everywhere, expected, observations):
+    def track(self, sequence, capture_ns, clock, planes, grey, search_everywhere, expected, state_before, state_after,
+              observations):
         def track():
             f = self.format
             frame = Fields(format=f, sequence=sequence, capture_ns=capture_ns, clock=clock, planes=_planes(f, planes),
                            grey=_pixels(grey, int(f.height), int(f.width), 1, int(f.grey_stride)),
                            search_everywhere=search_everywhere,
-                           expected=[Fields(marker) for marker in _elements(bytes(expected), EXPECTED_MARKER)])
+                           expected=[Fields(marker) for marker in _elements(bytes(expected), EXPECTED_MARKER)],
+                           state_before=state_before and np.frombuffer(state_before, np.uint8),
+                           state_after=state_after and np.frombuffer(state_after, np.uint8), candidate_count=-1)
             out, count = _elements(observations, OBSERVATION), 0
             result = self.plugin.track(frame)
             if not hasattr(result, "__iter__") and result is not None:
@@ -282,9 +288,9 @@ class _Adapter:
                 to["corner_sigma_px"] = seen.corner_sigma_px
                 to["false_positive_rate"] = seen.false_positive_rate
                 count += 1
-            return STATUS_OK, count
+            return STATUS_OK, (count, int(frame.candidate_count))
 
-        return self._with_memory([*planes, grey], track)
+        return self._with_memory([*planes, grey, *filter(None, (state_before, state_after))], track)
 
     # ---- ray tracers ----
 

@@ -295,9 +295,14 @@ public:
                                                     marker.file, marker.pattern_ratio)));
         for (std::uint32_t i = 0; i < setup.family_count; ++i)
             families.push_back(checked(PyUnicode_FromString(setup.families[i])));
-        call("start_tracker", "NNNNN", view_of(setup.format).release(), view_of(setup.intrinsics).release(),
-             tuple_of(std::move(targets)).release(), tuple_of(std::move(markers)).release(),
-             tuple_of(std::move(families)).release());
+        state_size_ = PyLong_AsUnsignedLongLong(
+            call("start_tracker", "NNNNN", view_of(setup.format).release(), view_of(setup.intrinsics).release(),
+                 tuple_of(std::move(targets)).release(), tuple_of(std::move(markers)).release(),
+                 tuple_of(std::move(families)).release())
+                .value.get());
+    }
+    std::uint64_t state_size() const {
+        return state_size_;
     }
     double aspect(std::uint32_t marker) {
         const GilLock lock;
@@ -309,14 +314,18 @@ public:
         const GilLock lock;
         const arhost_frame &frame = *request.frame;
         const arhost_frame_format &format = *frame.format;
-        const Answer answer = call("track", "KLiNNNNN", static_cast<unsigned long long>(frame.sequence),
+        const auto state = [&](const void *bytes, int flag) {
+            return bytes ? view(bytes, request.state_size, flag).release() : Py_NewRef(Py_None);
+        };
+        const Answer answer = call("track", "KLiNNNNNNN", static_cast<unsigned long long>(frame.sequence),
                                    static_cast<long long>(frame.capture_ns), frame.clock,
                                    views_of_planes(format, frame.plane, PyBUF_READ).release(),
                                    view(frame.grey, std::size_t(format.grey_stride) * format.height).release(),
                                    PyBool_FromLong(request.search_everywhere),
                                    view_of_elements(request.expected, request.expected_count).release(),
+                                   state(request.state_before, PyBUF_READ), state(request.state_after, PyBUF_WRITE),
                                    view_of_elements(result.observations, ARHOST_MAX_OBSERVATIONS).release());
-        result.observation_count = static_cast<std::uint32_t>(PyLong_AsUnsignedLong(answer.value.get()));
+        require(PyArg_ParseTuple(answer.value.get(), "Ii", &result.observation_count, &result.candidate_count));
     }
 
     // ray tracers
@@ -424,6 +433,7 @@ private:
 
     Host host_;
     std::string path_;
+    std::uint64_t state_size_ = 0; // of a tracker
     Object adapter_;
 #if defined(KIND_RAYTRACER)
     std::uint32_t capabilities_ = 0;

@@ -515,6 +515,9 @@ class Frame(Protocol):
     grey: np.ndarray
     search_everywhere: bool
     expected: list[ExpectedMarker]
+    state_before: Optional[np.ndarray]
+    state_after: Optional[np.ndarray]
+    candidate_count: int
 
 class RaytracerSetup(Protocol):
     width: int

@@ -156,6 +156,37 @@ class Tracker:
     EXPECT_EQ(counted(run).size(), 6u);
 }
 
+TEST_F(PythonAdapter, TheStateOfATrackerSurvivesItsProcess) {
+    ArhostRun run(tracker);
+    EXPECT_EQ(run_script(run, R"(
+import arhost, os
+class Tracker:
+    def __init__(self, host): self.first = None
+    def start(self, setup): pass
+    def state_size(self): return 8
+    def track(self, frame):
+        if self.first is None: self.first = frame.sequence
+        if self.first == 0 and frame.sequence == 3: os._exit(1)
+        count = 0 if frame.state_before is None else int(frame.state_before.view("u8")[0])
+        assert count == frame.sequence and (frame.state_before is None) == (frame.sequence == 0)
+        assert frame.state_before is None or not frame.state_before.flags.writeable
+        frame.state_after.view("u8")[0] = count + 1
+        frame.candidate_count = 4
+        return [arhost.Observation(3, [[20, 15], [40, 15], [40, 35], [20, 35]])]
+)"),
+              0)
+        << run.output();
+    EXPECT_EQ(run.stats()["frames"]["tracked"], 6);
+    EXPECT_EQ(run.stats()["search"]["candidates"], 24);
+    EXPECT_THAT(run.output(), HasSubstr("exited with status 1"));
+}
+
+TEST_F(PythonAdapter, AnInvalidSizeOfTheStateIsAnError) {
+    ArhostRun run(tracker);
+    EXPECT_NE(run_script(run, std::string(idle_tracker) + "    def state_size(self): return -1\n"), 0);
+    EXPECT_THAT(run.output(), HasSubstr("'state_size' returned -1; it must be 0 to 16777216"));
+}
+
 TEST_F(PythonAdapter, RayTracerReadsTheSceneAndWritesTheImage) {
     ArhostRun run(raytracer);
     EXPECT_EQ(run_script(run, R"(
