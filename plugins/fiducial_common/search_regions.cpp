@@ -87,41 +87,41 @@ Seen SearchRegions::search(const arhost_track_request &request, const RegionLimi
             if (const auto one = verify(expected, marker.id, marker.family))
                 verified.push_back(*one);
         }
-    // What the passes detect in the regions of each.
-    const auto detected = [&](Detect Pass::*detect, const auto &regions_of) {
-        Seen all;
-        for (const Pass &pass : passes) {
-            if (!(pass.*detect))
-                continue;
-            Seen seen;
-            for (const cv::Rect &region : regions_of(pass))
-                (pass.*detect)(region, seen);
-            all.add(seen);
-        }
-        return all;
+    const auto detected = [](const Detect &detect, const std::vector<cv::Rect> &regions) {
+        Seen seen;
+        for (const cv::Rect &region : regions)
+            detect(region, seen);
+        return seen;
     };
-    const auto expected_places = [&](const Pass &pass) { return of(request, limits, pass.family, verified); };
+    const auto add_closer_looks = [&](const Pass &pass, const std::vector<cv::Rect> &regions, Seen &seen) {
+        for (const Detect &look : pass.closer_looks)
+            seen.add(detected(look, regions));
+    };
     const cv::Rect whole = whole_of(request);
-    Seen seen = detected(&Pass::detect, expected_places);
+    Seen seen;
+    for (const Pass &pass : passes)
+        seen.add(detected(pass.detect, of(request, limits, pass.family, verified)));
     seen.candidates += verified.size();
     seen.markers.insert(seen.markers.end(), verified.begin(), verified.end());
     bool is_whole = request.search_everywhere != 0;
     if (miss_a_target(request, seen.markers)) {
-        const Seen closer = detected(&Pass::detect_closer, [&](const Pass &pass) {
+        Seen closer;
+        for (const Pass &pass : passes) {
             std::vector<cv::Rect> regions = of(request, limits, pass.family, seen.markers);
             std::erase_if(regions, [](const cv::Rect &one) { return one.area() > tile_width_px * tile_height_px; });
-            return regions;
-        });
+            add_closer_looks(pass, regions, closer);
+        }
         seen.add(closer);
         if (miss_a_target(request, seen.markers)) {
-            seen = detected(&Pass::detect, [&](const Pass &) { return std::vector{whole}; });
-            seen.add(closer);
+            seen = closer;
+            for (const Pass &pass : passes)
+                seen.add(detected(pass.detect, {whole}));
             is_whole = true;
         }
     }
     if (is_whole && !are_all_targets_in(seen.markers))
-        seen.add(detected(&Pass::detect_closer,
-                          [&](const Pass &) { return std::vector{tile_of(whole.size(), request.frame->sequence)}; }));
+        for (const Pass &pass : passes)
+            add_closer_looks(pass, {tile_of(whole.size(), request.frame->sequence)}, seen);
     seen.candidates = std::max(seen.candidates, seen.markers.size()); // one may be a marker of several families
     return seen;
 }

@@ -36,8 +36,7 @@ using Detect = std::function<void(const cv::Rect &region, Seen &seen)>;
 struct Pass {
     const Family *family;
     Detect detect;
-    Detect detect_closer = {}; // takes a closer look: slower, but finds more of the small and faint markers; may be
-                               // empty
+    std::vector<Detect> closer_looks = {}; // slower, but find more of the small and faint markers
 };
 
 // A closer look examines more squares with lower thresholds, so it reports only listed markers whose
@@ -56,8 +55,8 @@ public:
 
     // Returns the expected markers that `verify` confirms and what the passes detect where the others are expected,
     // or what they detect in the whole frame if a target is not there. Where a target is missed, the passes also
-    // detect closer: at the expected places, and after a search of the whole frame in tile_of(). A marker may be in
-    // the result twice.
+    // take their closer looks: at the expected places, and after a search of the whole frame in tile_of(). A marker
+    // may be in the result twice.
     Seen search(const arhost_track_request &request, const RegionLimits &limits, std::span<const Pass> passes,
                 const Verify &verify = {}) const;
 

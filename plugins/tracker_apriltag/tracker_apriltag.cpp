@@ -225,16 +225,16 @@ public:
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
-        const auto search = [&](const std::vector<Look> &looks) {
-            return [&, looks](const cv::Rect &region, arhost::fiducial::Seen &seen) {
-                for (const Look &look : looks)
-                    observe(*request.frame, region, look, seen);
-            };
+        const auto detection = [&](const Look &look) {
+            return [&, look](const cv::Rect &region, auto &seen) { observe(*request.frame, region, look, seen); };
         };
-        arhost::fiducial::Pass pass{nullptr, search({Look()}), {}};
+        arhost::fiducial::Pass pass{nullptr, detection({})};
         if (looks_closer_ &&
-            std::ranges::any_of(parts_, [](const auto &part) { return part->permits_closer_look(); }))
-            pass.detect_closer = min_margin_ > 0 ? search({enlarged}) : search({enlarged, sharpened});
+            std::ranges::any_of(parts_, [](const auto &part) { return part->permits_closer_look(); })) {
+            pass.closer_looks.emplace_back(detection(enlarged));
+            if (min_margin_ == 0)
+                pass.closer_looks.emplace_back(detection(sharpened));
+        }
         arhost::fiducial::Seen seen = regions_->search(request, {grid_px(), min_image_side()}, {&pass, 1});
         others_->frame(arhost::fiducial::grey_of(*request.frame), seen.markers);
         observations.set_candidate_count(seen.candidates);

@@ -201,6 +201,11 @@ Reading read(const cv::Mat &grey, const Corners &corners_px, const cv::aruco::Di
     return reading;
 }
 
+bool permits_closer_look(const cv::aruco::Dictionary &dictionary) {
+    return arhost::fiducial::false_positive_rate(dictionary.markerSize * dictionary.markerSize, 0) <=
+           arhost::fiducial::max_rate_of_closer_look;
+}
+
 struct Dictionary {
     cv::aruco::Dictionary table;
     bool rotated_180 = false; // relative to AprilTag's own library
@@ -311,17 +316,14 @@ public:
         const cv::Mat grey = arhost::fiducial::grey_of(*request.frame);
         std::vector<arhost::fiducial::Pass> passes;
         for (const Detectable &detectable : detectables_) {
-            const auto search = [&](const std::vector<Look> &looks) {
-                return [&, looks](const cv::Rect &region, arhost::fiducial::Seen &seen) {
-                    for (const Look &look : looks)
-                        observe(grey, request.frame->format->transfer, region, look, detectable, seen);
+            const auto detection = [&](const Look &look) {
+                return [&, look](const cv::Rect &region, auto &seen) {
+                    observe(grey, request.frame->format->transfer, region, look, detectable, seen);
                 };
             };
-            passes.push_back({&detectable.family, search({Look()}), {}});
-            const int side = detectable.dictionary.table.markerSize;
-            if (looks_closer_ &&
-                arhost::fiducial::false_positive_rate(side * side, 0) <= arhost::fiducial::max_rate_of_closer_look)
-                passes.back().detect_closer = search({smoothed, enlarged});
+            arhost::fiducial::Pass &pass = passes.emplace_back(&detectable.family, detection({}));
+            if (looks_closer_ && permits_closer_look(detectable.dictionary.table))
+                pass.closer_looks = {detection(smoothed), detection(enlarged)};
         }
         arhost::fiducial::Seen seen = regions_->search(
             request, {}, passes, [&](const arhost_expected_marker &expected, std::int32_t id, std::uint32_t family) {

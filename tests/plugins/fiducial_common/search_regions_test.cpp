@@ -204,12 +204,12 @@ TEST_F(Regions, AreExaminedCloserWhereATargetIsMissed) {
                                 all.markers.push_back(seen(0));
                             all.candidates += 2;
                         },
-                        [&](const cv::Rect &region, auto &all) {
+                        {[&](const cv::Rect &region, auto &all) {
                             searched.emplace_back("closer", region);
                             if (finds(region))
                                 all.markers.push_back(seen(3, 1));
                             all.candidates += 5;
-                        }};
+                        }}};
         return regions_->search(request_, {}, {&pass, 1});
     };
     const std::pair near_first("normal", cv::Rect(75, 125, 51, 51)),
@@ -237,7 +237,7 @@ TEST_F(Regions, AreNotExaminedCloserIfAllTargetsAreSeen) {
                     [&](const cv::Rect &, auto &all) {
                         all.markers = {seen(1), seen(2), seen(3, 1)};
                     },
-                    [&](const cv::Rect &, auto &) { ++looks; }};
+                    {[&](const cv::Rect &, auto &) { ++looks; }}};
     EXPECT_EQ(regions_->search(request_, {}, {&pass, 1}).markers.size(), 3u);
     EXPECT_EQ(looks, 0) << "one marker of the first target is enough";
 }
