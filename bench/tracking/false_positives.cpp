@@ -122,7 +122,7 @@ public:
     }
 
     void show(const cv::Mat &picture, const std::string &shown_family = "") {
-        tracker_.track(test::GreyFrame(picture, ARHOST_TRANSFER_SRGB), capture_ns_ += frame_ns);
+        tracker_.track(test::GreyFrame(picture, ARHOST_TRANSFER_SRGB, sequence_++), capture_ns_ += frame_ns);
         std::map<std::string, int> poses;
         for (std::size_t i = 0; i < setup_.listed.size(); ++i) {
             const arhost_target &target = tracker_.targets()[i];
@@ -151,6 +151,7 @@ private:
     CountsByFamily &counts_;
     std::vector<std::string> families_;
     std::int64_t capture_ns_ = 0;
+    std::uint64_t sequence_ = 0;
 };
 
 // Pictures that have nothing in common.

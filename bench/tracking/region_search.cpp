@@ -49,7 +49,7 @@ public:
             cv::GaussianBlur(picture, picture, {}, 0.6);
             random.fill(noise, cv::RNG::NORMAL, 0, 1.5);
             cv::add(picture, noise, picture, cv::noArray(), CV_8U);
-            frames_.emplace_back(picture);
+            frames_.emplace_back(picture, ARHOST_TRANSFER_LINEAR, static_cast<std::uint64_t>(i));
         }
     }
     const std::deque<GreyFrame> &frames() const { return frames_; }

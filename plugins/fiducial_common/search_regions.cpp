@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
 
 namespace arhost::fiducial {
 namespace {
@@ -67,15 +69,22 @@ void add(std::vector<cv::Rect> &regions, cv::Rect region) {
     regions.push_back(region);
 }
 
+Seen detected(const Detect &detect, const std::vector<cv::Rect> &regions) {
+    Seen seen;
+    for (const cv::Rect &region : regions)
+        detect(region, seen);
+    return seen;
+}
+
 } // namespace
 
 SearchRegions::SearchRegions(const arhost_tracker_setup &setup,
-                             const std::function<double(const std::string &)> &margin) {
-    std::vector<double> margins;
+                             const std::function<FamilyTraits(const std::string &)> &traits_of) {
+    std::vector<FamilyTraits> traits;
     for (std::uint32_t i = 0; i < setup.family_count; ++i)
-        margins.push_back(margin(april_tag_name(setup.families[i])));
+        traits.push_back(traits_of(april_tag_name(setup.families[i])));
     for (const arhost_marker_config &marker : elements(setup.markers, setup.marker_count))
-        markers_.push_back({marker.id, marker.family, marker.target, margins.at(marker.family)});
+        markers_.push_back({marker.id, marker.family, marker.target, traits.at(marker.family)});
 }
 
 Seen SearchRegions::search(const arhost_track_request &request, const RegionLimits &limits,
@@ -87,43 +96,69 @@ Seen SearchRegions::search(const arhost_track_request &request, const RegionLimi
             if (const auto one = verify(expected, marker.id, marker.family))
                 verified.push_back(*one);
         }
-    const auto detected = [](const Detect &detect, const std::vector<cv::Rect> &regions) {
-        Seen seen;
-        for (const cv::Rect &region : regions)
-            detect(region, seen);
-        return seen;
-    };
-    const auto add_closer_looks = [&](const Pass &pass, const std::vector<cv::Rect> &regions, Seen &seen) {
-        for (const Detect &look : pass.closer_looks)
-            seen.add(detected(look, regions));
-    };
     const cv::Rect whole = whole_of(request);
     Seen seen;
     for (const Pass &pass : passes)
         seen.add(detected(pass.detect, of(request, limits, pass.family, verified)));
     seen.candidates += verified.size();
     seen.markers.insert(seen.markers.end(), verified.begin(), verified.end());
-    bool is_whole = request.search_everywhere != 0;
+
+    const Seen closer =
+        look_closer(passes, missed_markers(seen.markers), [&](const CloserLook &look, const Indices &wanted) {
+            std::vector<cv::Rect> regions = around_expected(
+                request, limits, [&](const arhost_expected_marker &one) { return wanted.contains(one.marker); });
+            int area = 0;
+            if (look.is_slow)
+                std::erase_if(regions, [&](const cv::Rect &region) {
+                    return (area += region.area()) > tile_width_px * tile_height_px;
+                });
+            return regions;
+        });
+    seen.add(closer);
     if (miss_a_target(request, seen.markers)) {
-        Seen closer;
-        for (const Pass &pass : passes) {
-            std::vector<cv::Rect> regions = of(request, limits, pass.family, seen.markers);
-            std::erase_if(regions, [](const cv::Rect &one) { return one.area() > tile_width_px * tile_height_px; });
-            add_closer_looks(pass, regions, closer);
-        }
-        seen.add(closer);
-        if (miss_a_target(request, seen.markers)) {
-            seen = closer;
-            for (const Pass &pass : passes)
-                seen.add(detected(pass.detect, {whole}));
-            is_whole = true;
-        }
-    }
-    if (is_whole && !are_all_targets_in(seen.markers))
+        seen = closer;
         for (const Pass &pass : passes)
-            add_closer_looks(pass, {tile_of(whole.size(), request.frame->sequence)}, seen);
+            seen.add(detected(pass.detect, {whole}));
+    }
+    if (request.search_everywhere)
+        seen.add(look_closer(passes, missed_markers(seen.markers), [&](const CloserLook &look, const Indices &) {
+            return std::vector{look.is_slow ? tile_of(whole.size(), request.frame->sequence) : whole};
+        }));
     seen.candidates = std::max(seen.candidates, seen.markers.size()); // one may be a marker of several families
     return seen;
+}
+
+template <class RegionsOf>
+Seen SearchRegions::look_closer(std::span<const Pass> passes, const Indices &missed,
+                                const RegionsOf &regions_of) const {
+    Seen closer;
+    for (const Pass &pass : passes) {
+        Indices wanted;
+        std::ranges::copy_if(missed, std::inserter(wanted, wanted.end()), [&](std::uint32_t marker) {
+            return !pass.family || pass.family->lists(markers_[marker].id, markers_[marker].family);
+        });
+        if (!wanted.empty())
+            for (const CloserLook &look : pass.closer_looks)
+                closer.add(detected(look.detect, regions_of(look, wanted)));
+    }
+    std::erase_if(closer.markers, [&](const arhost_observation &one) {
+        return one.false_positive_rate > max_rate_of_closer_look ||
+               std::ranges::none_of(missed, [&](std::uint32_t marker) { return markers_[marker].is(one); });
+    });
+    return closer;
+}
+
+SearchRegions::Indices SearchRegions::missed_markers(std::span<const arhost_observation> seen) const {
+    std::set<std::uint32_t> seen_targets;
+    for (const Marker &marker : markers_)
+        if (marker.is_in(seen))
+            seen_targets.insert(marker.target);
+    Indices missed;
+    for (std::uint32_t i = 0; i < markers_.size(); ++i)
+        if (!seen_targets.contains(markers_[i].target) &&
+            false_positive_rate(markers_[i].traits.bits, 0) <= max_rate_of_closer_look)
+            missed.insert(missed.end(), i);
+    return missed;
 }
 
 cv::Rect SearchRegions::tile_of(cv::Size frame, std::uint64_t sequence) {
@@ -138,10 +173,11 @@ cv::Rect SearchRegions::tile_of(cv::Size frame, std::uint64_t sequence) {
         return tiles == 1 ? 0 : static_cast<int>(index * static_cast<unsigned>(length - tile_length) / (tiles - 1));
     };
     const unsigned columns = count(frame.width, tile.width), rows = count(frame.height, tile.height);
-    // Multiples of the golden ratio modulo 1 are evenly distributed, and so are those of every nth frame.
-    constexpr std::uint64_t golden_ratio = 0x9E3779B97F4A7C15; // · 2^64
-    const std::uint64_t fraction = (sequence * golden_ratio) >> 32;
-    const auto index = static_cast<unsigned>((fraction * columns * rows) >> 32);
+    // SplitMix64: a fixed order could miss tiles if only every nth frame is searched.
+    std::uint64_t hash = (sequence + 1) * 0x9E3779B97F4A7C15;
+    hash = (hash ^ (hash >> 30)) * 0xBF58476D1CE4E5B9;
+    hash = (hash ^ (hash >> 27)) * 0x94D049BB133111EB;
+    const auto index = static_cast<unsigned>((hash ^ (hash >> 31)) % (columns * rows));
     return {{begin(index % columns, columns, frame.width, tile.width),
              begin(index / columns, rows, frame.height, tile.height)},
             tile};
@@ -149,17 +185,25 @@ cv::Rect SearchRegions::tile_of(cv::Size frame, std::uint64_t sequence) {
 
 std::vector<cv::Rect> SearchRegions::of(const arhost_track_request &request, const RegionLimits &limits,
                                         const Family *family, std::span<const arhost_observation> seen) const {
-    const cv::Rect whole = whole_of(request);
     if (request.search_everywhere)
-        return {whole};
-    std::vector<cv::Rect> regions;
-    for (const arhost_expected_marker &expected : elements(request.expected, request.expected_count)) {
+        return {whole_of(request)};
+    return around_expected(request, limits, [&](const arhost_expected_marker &expected) {
         const Marker &marker = markers_.at(expected.marker);
-        if ((family && !family->lists(marker.id, marker.family)) || marker.is_in(seen))
-            continue;
-        if (const cv::Rect region = region_of(expected, marker.margin, whole.size(), limits); !region.empty())
-            add(regions, region);
-    }
+        return (!family || family->lists(marker.id, marker.family)) && !marker.is_in(seen);
+    });
+}
+
+std::vector<cv::Rect>
+SearchRegions::around_expected(const arhost_track_request &request, const RegionLimits &limits,
+                               const std::function<bool(const arhost_expected_marker &)> &accepts) const {
+    const cv::Rect whole = whole_of(request);
+    std::vector<cv::Rect> regions;
+    for (const arhost_expected_marker &expected : elements(request.expected, request.expected_count))
+        if (accepts(expected))
+            if (const cv::Rect region =
+                    region_of(expected, markers_.at(expected.marker).traits.margin, whole.size(), limits);
+                !region.empty())
+                add(regions, region);
     double area = 0;
     for (const cv::Rect &region : regions)
         area += region.area();
@@ -176,13 +220,6 @@ bool SearchRegions::miss_a_target(const arhost_track_request &request,
         is_seen[marker.target] |= marker.is_in(seen);
     }
     return std::ranges::any_of(is_seen, [](const auto &target) { return !target.second; });
-}
-
-bool SearchRegions::are_all_targets_in(std::span<const arhost_observation> seen) const {
-    std::map<std::uint32_t, bool> is_seen; // targets
-    for (const Marker &marker : markers_)
-        is_seen[marker.target] |= marker.is_in(seen);
-    return std::ranges::all_of(is_seen, [](const auto &target) { return target.second; });
 }
 
 } // namespace arhost::fiducial

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <functional>
 #include <optional>
+#include <set>
 #include <span>
 
 namespace arhost::fiducial {
@@ -22,7 +23,8 @@ struct Seen {
     std::vector<arhost_observation> markers;
     std::size_t candidates = 0; // quadrilaterals that were examined, those of markers and others
 
-    // Adds what another search of the same quadrilaterals has found.
+    // Adds what another search has found. Searches mostly examine the same quadrilaterals, so `candidates` is that of
+    // the search with most of them.
     void add(const Seen &other) {
         markers.insert(markers.end(), other.markers.begin(), other.markers.end());
         candidates = std::max(candidates, other.candidates);
@@ -32,16 +34,27 @@ struct Seen {
 // Detects markers in a region of the frame and adds them to `seen`.
 using Detect = std::function<void(const cv::Rect &region, Seen &seen)>;
 
+// A search with other thresholds or pixels, for targets that the normal one misses.
+struct CloserLook {
+    Detect detect;
+    bool is_slow; // it searches only a tile of the frame
+};
+
 // How to search for the markers of `family`, or for those of all families if it is null.
 struct Pass {
     const Family *family;
     Detect detect;
-    std::vector<Detect> closer_looks = {}; // slower, but find more of the small and faint markers
+    std::vector<CloserLook> closer_looks = {};
 };
 
-// A closer look examines more squares with lower thresholds, so it reports only listed markers whose
-// false_positive_rate is at most this. That leaves out families of up to 25 bits.
+// A closer look examines more squares with lower thresholds, so only markers whose false_positive_rate is at most
+// this count.
 constexpr double max_rate_of_closer_look = 1e-7;
+
+struct FamilyTraits {
+    double margin; // what must be visible around a square to detect it, relative to its side
+    int bits;      // of the code
+};
 
 // Returns an observation if the marker of this id and family is where it is expected. Takes less time than detection.
 using Verify = std::function<std::optional<arhost_observation>(const arhost_expected_marker &expected,
@@ -50,13 +63,13 @@ using Verify = std::function<std::optional<arhost_observation>(const arhost_expe
 // Derives rectangles from the markers that a request expects, and searches them.
 class SearchRegions {
 public:
-    // `margin`: what must be visible around a square of a family to detect it, relative to its side.
-    SearchRegions(const arhost_tracker_setup &setup, const std::function<double(const std::string &family)> &margin);
+    SearchRegions(const arhost_tracker_setup &setup,
+                  const std::function<FamilyTraits(const std::string &family)> &traits_of);
 
     // Returns the expected markers that `verify` confirms and what the passes detect where the others are expected,
-    // or what they detect in the whole frame if a target is not there. Where a target is missed, the passes also
-    // take their closer looks: at the expected places, and after a search of the whole frame in tile_of(). A marker
-    // may be in the result twice.
+    // or what they detect in the whole frame if a target is not there. For targets that are missed, the passes take
+    // their closer looks where these are expected, and, if everything is to be searched, in the whole frame, or in
+    // tile_of() if they are slow. A marker may be in the result twice.
     Seen search(const arhost_track_request &request, const RegionLimits &limits, std::span<const Pass> passes,
                 const Verify &verify = {}) const;
 
@@ -69,8 +82,8 @@ public:
     // must then search the whole frame.
     bool miss_a_target(const arhost_track_request &request, std::span<const arhost_observation> seen) const;
 
-    // Returns the part of a frame that is searched closer, at most tile_width_px × tile_height_px: the frames of a
-    // video take turns with the parts, in an order that reaches all of them even if only every nth frame is searched.
+    // Returns the part of a frame that slow closer looks search, at most tile_width_px × tile_height_px: depends on
+    // the number of the frame, in a pseudo-random order.
     static cv::Rect tile_of(cv::Size frame, std::uint64_t sequence);
     static constexpr int tile_width_px = 480, tile_height_px = 360;
 
@@ -78,14 +91,25 @@ private:
     struct Marker {
         std::int32_t id;
         std::uint32_t family, target; // indices in the setup
-        double margin;                // relative to its side
+        FamilyTraits traits;
 
+        bool is(const arhost_observation &seen) const { return seen.id == id && seen.family == family; }
         bool is_in(std::span<const arhost_observation> seen) const {
-            return std::ranges::any_of(
-                seen, [&](const arhost_observation &one) { return one.id == id && one.family == family; });
+            return std::ranges::any_of(seen, [&](const arhost_observation &one) { return is(one); });
         }
     };
-    bool are_all_targets_in(std::span<const arhost_observation> seen) const;
+    using Indices = std::set<std::uint32_t>; // in markers_
+
+    // Returns what the closer looks of all passes find of the missed markers. `regions_of` returns where a look has
+    // to search for those of its pass.
+    template <class RegionsOf>
+    Seen look_closer(std::span<const Pass> passes, const Indices &missed, const RegionsOf &regions_of) const;
+    // Returns the markers of the targets of which none has been seen, except those of families with so few bits that
+    // a closer look would often find one by chance.
+    Indices missed_markers(std::span<const arhost_observation> seen) const;
+    // As of(), for the expected markers that are accepted, also if everything is to be searched.
+    std::vector<cv::Rect> around_expected(const arhost_track_request &request, const RegionLimits &limits,
+                                          const std::function<bool(const arhost_expected_marker &)> &accepts) const;
 
     std::vector<Marker> markers_; // as in the setup
 };

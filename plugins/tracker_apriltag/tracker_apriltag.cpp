@@ -111,10 +111,6 @@ public:
     apriltag_family_t *tags() const { return tags_; }
     int id(int index) const { return ids_[index]; } // of the tag that the library numbers so
 
-    bool permits_closer_look() const {
-        return is_listed_ && arhost::fiducial::false_positive_rate(static_cast<int>(tags_->nbits), 0) <=
-                                 arhost::fiducial::max_rate_of_closer_look;
-    }
     // `configured`: −1 for the family's default.
     int max_hamming(int configured) const {
         return !is_listed_ ? 0 : configured < 0 ? type_.default_max_hamming : configured;
@@ -150,19 +146,19 @@ WholeFamily whole_family(const std::string &name) {
     return {type.create(), type.destroy};
 }
 
-// The bits outside the border, or the white margin, relative to the side of the square.
-double print_margin(const std::string &name) {
+arhost::fiducial::FamilyTraits traits_of(const std::string &name) {
     const WholeFamily family = whole_family(name);
-    return (family->total_width - family->width_at_border) / 2.0 / family->width_at_border;
+    // The margin has the bits outside of the border, or is white.
+    return {(family->total_width - family->width_at_border) / 2.0 / family->width_at_border,
+            static_cast<int>(family->nbits)};
 }
 
+// How to search a region: the normal look, or a closer one.
 struct Look {
     int scale = 1;
-    double sharpening = 1; // relative to decode_sharpening; the decision margin increases with it
-
-    bool is_closer() const { return scale > 1 || sharpening > 1; }
+    double min_sharpening = 0; // of the bits; the decision margin increases with it
 };
-constexpr Look enlarged{2, 1}, sharpened{1, 8};
+constexpr Look enlarged{2}, sharpened{1, 2};
 
 class AprilTagTracker {
 public:
@@ -206,7 +202,7 @@ public:
         lens_.emplace(*setup.intrinsics);
         families_ = arhost::fiducial::families_of(
             setup, [](const std::string &name) { return static_cast<int>(whole_family(name)->ncodes); });
-        regions_.emplace(setup, print_margin);
+        regions_.emplace(setup, traits_of);
         for (const Family &family : families_)
             for (const bool is_listed : {true, false}) {
                 auto part = std::make_unique<PartOfFamily>(family, family_type(family.name), is_listed);
@@ -229,12 +225,10 @@ public:
             return [&, look](const cv::Rect &region, auto &seen) { observe(*request.frame, region, look, seen); };
         };
         arhost::fiducial::Pass pass{nullptr, detection({})};
-        if (looks_closer_ &&
-            std::ranges::any_of(parts_, [](const auto &part) { return part->permits_closer_look(); })) {
-            pass.closer_looks.emplace_back(detection(enlarged));
-            if (min_margin_ == 0)
-                pass.closer_looks.emplace_back(detection(sharpened));
-        }
+        if (looks_closer_)
+            pass.closer_looks.push_back({detection(enlarged), true});
+        if (looks_closer_ && min_margin_ == 0 && sharpening_ < sharpened.min_sharpening)
+            pass.closer_looks.push_back({detection(sharpened), true});
         arhost::fiducial::Seen seen = regions_->search(request, {grid_px(), min_image_side()}, {&pass, 1});
         others_->frame(arhost::fiducial::grey_of(*request.frame), seen.markers);
         observations.set_candidate_count(seen.candidates);
@@ -264,14 +258,14 @@ private:
             apriltag_detector_add_family_bits(detector_.get(), part->tags(), part->max_hamming(max_hamming_));
     }
 
-    // Adds the tags of a region of the frame to `seen`, only the listed ones in a closer look.
+    // Adds the tags of a region of the frame to `seen`.
     void observe(const arhost_frame &frame, const cv::Rect &region, const Look &look, arhost::fiducial::Seen &seen) {
         const cv::Mat grey = arhost::fiducial::grey_of(frame);
-        cv::Mat pixels = grey(region);
+        cv::Mat enlarged;
         if (look.scale > 1)
-            cv::resize(grey(region), pixels, {}, look.scale, look.scale, cv::INTER_CUBIC);
-        detector_->decode_sharpening = look.sharpening * sharpening_;
-        const Detections tags = detect(*detector_, pixels);
+            cv::resize(grey(region), enlarged, {}, look.scale, look.scale, cv::INTER_CUBIC);
+        detector_->decode_sharpening = std::max(look.min_sharpening, sharpening_);
+        const Detections tags = detect(*detector_, look.scale > 1 ? enlarged : grey(region));
         if (tags)
             seen.candidates += detector_->nquads;
         for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
@@ -281,10 +275,6 @@ private:
                 continue;
             const PartOfFamily &part =
                 **std::ranges::find(parts_, tag->family, [](const auto &one) { return one->tags(); });
-            const double rate = arhost::fiducial::false_positive_rate(static_cast<int>(tag->family->nbits),
-                                                                      static_cast<std::uint32_t>(tag->hamming));
-            if (look.is_closer() && (!part.is_listed() || rate > arhost::fiducial::max_rate_of_closer_look))
-                continue;
             arhost::fiducial::MeasuredCorners corners;
             // AprilTag's corners begin at the bottom left and are counter-clockwise; pixel centres are at +0.5.
             for (int corner = 0; corner < 4; ++corner)
@@ -298,7 +288,8 @@ private:
             arhost_observation &one = seen.markers.emplace_back(part.family().observation(part.id(tag->id), corners));
             one.hamming = static_cast<std::uint32_t>(tag->hamming);
             one.decision_margin = tag->decision_margin;
-            one.false_positive_rate = rate;
+            one.false_positive_rate =
+                arhost::fiducial::false_positive_rate(static_cast<int>(tag->family->nbits), one.hamming);
         }
     }
 

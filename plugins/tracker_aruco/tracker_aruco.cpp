@@ -201,11 +201,6 @@ Reading read(const cv::Mat &grey, const Corners &corners_px, const cv::aruco::Di
     return reading;
 }
 
-bool permits_closer_look(const cv::aruco::Dictionary &dictionary) {
-    return arhost::fiducial::false_positive_rate(dictionary.markerSize * dictionary.markerSize, 0) <=
-           arhost::fiducial::max_rate_of_closer_look;
-}
-
 struct Dictionary {
     cv::aruco::Dictionary table;
     bool rotated_180 = false; // relative to AprilTag's own library
@@ -218,14 +213,14 @@ struct Detectable {
     cv::aruco::DetectorParameters parameters;
 };
 
-// How to prepare pixels for OpenCV's detector. Its thresholds of contrast suit bright pictures without noise; a
-// closer look has lower ones.
+// How to search a region: the normal look, or a closer one. OpenCV's thresholds of contrast suit bright pictures
+// without noise.
 struct Look {
     int scale = 1;
-    double sigma_px = 0;  // of a Gaussian blur
-    double threshold = 0; // the constant of the adaptive threshold in grey levels; 0: as configured
+    double sigma_px = 0;                      // of a Gaussian blur
+    std::optional<double> threshold = {};     // adaptiveThreshConstant, in grey levels
+    std::optional<double> min_deviation = {}; // minOtsuStdDev: standard deviation of the grey levels of a marker
 
-    bool is_closer() const { return threshold > 0; }
     cv::Mat prepared(const cv::Mat &grey) const {
         cv::Mat scaled = grey, blurred; // does not write to `grey`, which is read-only
         if (scale > 1)
@@ -236,7 +231,7 @@ struct Look {
         return blurred;
     }
 };
-constexpr Look smoothed{1, 1.0, 2}, enlarged{2, 0, 3};
+constexpr Look smoothed{1, 1, 2, 1}, enlarged{2, 0, 3, 1};
 
 class ArucoTracker {
 public:
@@ -308,7 +303,10 @@ public:
             detectables_.push_back({std::move(family), std::move(dictionary), {}});
         }
         make_parameters();
-        regions_.emplace(setup, [&](const std::string &name) { return 1.0 / cells_of(dictionary_of(name).table); });
+        regions_.emplace(setup, [&](const std::string &name) {
+            const cv::aruco::Dictionary table = dictionary_of(name).table;
+            return arhost::fiducial::FamilyTraits{1.0 / cells_of(table), table.markerSize * table.markerSize};
+        });
         others_.emplace(host_, setup, [&](const cv::Mat &grey) { return markers_of_other_dictionaries(grey); });
     }
 
@@ -322,8 +320,8 @@ public:
                 };
             };
             arhost::fiducial::Pass &pass = passes.emplace_back(&detectable.family, detection({}));
-            if (looks_closer_ && permits_closer_look(detectable.dictionary.table))
-                pass.closer_looks = {detection(smoothed), detection(enlarged)};
+            if (looks_closer_)
+                pass.closer_looks = {{detection(smoothed), false}, {detection(enlarged), true}};
         }
         arhost::fiducial::Seen seen = regions_->search(
             request, {}, passes, [&](const arhost_expected_marker &expected, std::int32_t id, std::uint32_t family) {
@@ -342,40 +340,37 @@ public:
     }
 
 private:
-    // Adds the markers of a dictionary in a region of the frame to `seen`, only the listed ones in a closer look.
+    // Adds the markers of a dictionary in a region of the frame to `seen`.
     void observe(const cv::Mat &grey, arhost_transfer transfer, const cv::Rect &region, const Look &look,
                  const Detectable &detectable, arhost::fiducial::Seen &seen) const {
         const cv::aruco::Dictionary &table = detectable.dictionary.table;
         cv::aruco::DetectorParameters parameters = detectable.parameters;
-        if (look.is_closer()) {
-            parameters.adaptiveThreshConstant = look.threshold;
-            parameters.minOtsuStdDev = 1;
-        }
+        parameters.adaptiveThreshConstant = look.threshold.value_or(parameters.adaptiveThreshConstant);
+        parameters.minOtsuStdDev = look.min_deviation.value_or(parameters.minOtsuStdDev);
         // OpenCV takes the perimeter relative to the longer side of the image that it gets.
         parameters.minMarkerPerimeterRate *=
             static_cast<double>(std::max(grey.cols, grey.rows)) / std::max(region.width, region.height);
-        const cv::Point2d shift(0.5 - centre_shift_px_, 0.5 - centre_shift_px_),
-            offset(region.x - 0.5, region.y - 0.5);
-        const arhost::aruco::DetectedMarkers found =
-            arhost::aruco::detect(look.prepared(grey(region)), table, parameters);
+        const cv::Mat pixels = look.prepared(grey(region));
+        const arhost::aruco::DetectedMarkers found = arhost::aruco::detect(pixels, table, parameters);
         seen.candidates += found.ids.size() + found.rejected.size();
+        const cv::Point2d half(0.5, 0.5), shift = half - cv::Point2d(centre_shift_px_, centre_shift_px_),
+                                          origin = cv::Point2d(region.tl()) - half;
         for (std::size_t i = 0; i < found.ids.size(); ++i) {
             const bool is_listed = detectable.family.lists(found.ids[i]);
             arhost::fiducial::MeasuredCorners corners;
             for (int corner = 0; corner < 4; ++corner) {
                 const cv::Point2d at =
                     found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner];
-                corners.corners_px[corner] = (at + shift) / look.scale + offset;
+                corners.corners_px[corner] = (at + shift) / look.scale + origin;
             }
             if (refine_edges_ && is_listed)
                 corners = refined(grey, transfer, detectable.dictionary, found.ids[i], corners.corners_px)
                               .value_or(corners);
-            const Reading reading =
-                read(grey, corners.corners_px, table, found.ids[i], parameters.markerBorderBits, false);
-            const double max_rate = look.is_closer() ? arhost::fiducial::max_rate_of_closer_look : 1;
-            if (is_listed ? reading.false_positive_rate <= max_rate
-                          : !look.is_closer() && reading.wrong_bits == 0 &&
-                                reading.false_positive_rate < 1) // else it may be anything
+            Corners in_pixels;
+            for (int corner = 0; corner < 4; ++corner)
+                in_pixels[corner] = (corners.corners_px[corner] - origin) * look.scale - half;
+            const Reading reading = read(pixels, in_pixels, table, found.ids[i], parameters.markerBorderBits, false);
+            if (is_listed || (reading.wrong_bits == 0 && reading.false_positive_rate < 1)) // else it may be anything
                 seen.markers.push_back(observation_of(detectable, found.ids[i], corners, reading));
         }
     }

@@ -78,7 +78,7 @@ public:
             }
         }
         lens_.emplace(*setup.intrinsics);
-        regions_.emplace(setup, [](const std::string &) { return 0.1; });
+        regions_.emplace(setup, [](const std::string &) { return arhost::fiducial::FamilyTraits{0.1, 0}; });
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) const {

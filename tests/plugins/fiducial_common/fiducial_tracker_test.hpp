@@ -87,7 +87,7 @@ struct Difficult {
     }
 };
 
-// Expects that a tracker finds the marker only in a closer look.
+// Expects that a tracker finds the marker only in a closer look, and in a large frame whenever it is expected.
 inline void expect_found_in_closer_look(const std::string &plugin, const Difficult &marker) {
     const GreyFrame frame(marker.picture(tag(3)));
     for (const auto &[closer_look, count] : {std::pair{"true", 1u}, {"false", 0u}}) {
@@ -95,6 +95,22 @@ inline void expect_found_in_closer_look(const std::string &plugin, const Difficu
         ASSERT_EQ(tracker.start(test_camera, {{3}}), ARHOST_STATUS_OK) << tracker.log();
         EXPECT_EQ(tracker.track(frame).size(), count) << closer_look;
     }
+    const cv::Mat picture = marker.picture(tag(3));
+    cv::Mat wide(720, 1280, CV_8U, cv::Scalar(picture.at<uint8_t>(0, 0)));
+    const cv::Rect place(430, 210, picture.cols, picture.rows);
+    picture.copyTo(wide(place));
+    auto corners = corners_of(marker.truth(), test_camera, 100);
+    for (cv::Point2d &corner : corners)
+        corner += cv::Point2d(place.tl());
+    Tracker tracker(plugin);
+    ASSERT_EQ(tracker.start(plain_camera(wide.size()), {{3}}), ARHOST_STATUS_OK) << tracker.log();
+    for (const bool everywhere : {false, true})
+        for (std::uint64_t sequence = 0; sequence < 8; ++sequence) {
+            const GreyFrame frame_of_video(wide, ARHOST_TRANSFER_LINEAR, sequence);
+            const auto seen = tracker.track(frame_of_video, {expected_at(0, corners)}, everywhere);
+            ASSERT_EQ(seen.size(), 1u) << "frame " << sequence;
+            EXPECT_LT(greatest_distance_px(seen[0], corners), 0.5);
+        }
 }
 
 // Expects that a tracker locates the corners of a print that is blurred by so many of its cells.
@@ -494,6 +510,38 @@ TEST_P(FiducialTracker, SearchesRegionsOfTinyFrames) {
         const auto expected = expected_at(0, {cv::Point2d(-3, -3), {9, -3}, {9, 9}, {-3, 9}});
         EXPECT_THAT(tracker_.track(GreyFrame(picture), {expected}, false), testing::IsEmpty());
     }
+}
+
+TEST_P(FiducialTracker, ReportsAMarkerInTheSameWayIfAnotherOneIsMissed) {
+    const GreyFrame frame(picture_of({{tag(3), 100, pose_of(20, 10, 400, 20, 10, 30)}}));
+    ASSERT_EQ(tracker_.start(test_camera, {{3}}), ARHOST_STATUS_OK);
+    const auto alone = tracker_.track(frame);
+    ASSERT_EQ(tracker_.start(test_camera, {{3}, {4}}), ARHOST_STATUS_OK); // takes a closer look for marker 4
+    const auto seen = tracker_.track(frame);
+    ASSERT_EQ(seen.size(), 1u);
+    EXPECT_EQ(std::memcmp(seen.data(), alone.data(), sizeof seen[0]), 0);
+}
+
+// The corners of the enlarged picture must not be shifted by a part of a pixel.
+TEST_P(FiducialTracker, FindsCornersOfSmallMarkersWithoutBias) {
+    Options options = GetParam().options;
+    options["corner_refinement"] = "none";
+    Tracker tracker(GetParam().plugin, options);
+    ASSERT_EQ(tracker.start(test_camera, {{3}}), ARHOST_STATUS_OK);
+    cv::Point2d bias;
+    int found = 0;
+    for (int i = 0; i < 40; ++i) {
+        const Mt truth = pose_of(10 + 0.37 * i, 5 - 0.29 * i, 450 * 100 / 14.0, 30, 0, 9 * i);
+        const auto seen = tracker.track(GreyFrame(picture_of({{tag(3), 100, truth}})));
+        if (seen.empty())
+            continue;
+        const auto corners = corners_of(truth, test_camera, 100);
+        for (int k = 0; k < 4; ++k)
+            bias += cv::Point2d(seen[0].corners_px[k][0], seen[0].corners_px[k][1]) - corners[k];
+        ++found;
+    }
+    EXPECT_GE(found, 20);
+    EXPECT_LT(cv::norm(bias) / (4.0 * found), 0.15);
 }
 
 TEST_P(FiducialTracker, DoesNotModifyTheFrame) {

@@ -12,6 +12,7 @@
 namespace {
 
 using arhost::fiducial::Family;
+using arhost::fiducial::FamilyTraits;
 using arhost::fiducial::Pass;
 using arhost::fiducial::RegionLimits;
 using arhost::fiducial::SearchRegions;
@@ -40,7 +41,9 @@ protected:
         format_.height = 300;
         frame_.format = &format_;
         request_.frame = &frame_;
-        regions_.emplace(setup_, [](const std::string &) { return 0.5; });
+        regions_.emplace(setup_, [](const std::string &family) {
+            return FamilyTraits{0.5, family == "tag36h11" ? 36 : 25};
+        });
     }
     // Expects a marker with sides of 20 px, centred here, to 5 px.
     void expect(std::uint32_t marker, double x, double y) {
@@ -189,55 +192,111 @@ TEST_F(Regions, AreSearchedByEachPassAndThenTheWholeFrameIfATargetIsMissed) {
     EXPECT_THAT(searched, ElementsAre(near_first, near_second, std::pair(1, whole_frame), std::pair(2, whole_frame)));
 }
 
-// A pass whose closer look alone finds marker 3, in the regions that `finds` accepts.
-TEST_F(Regions, AreExaminedCloserWhereATargetIsMissed) {
-    expect(0, 100, 150);
-    expect(3, 300, 150);
-    std::vector<std::pair<std::string, cv::Rect>> searched;
-    std::function<bool(const cv::Rect &)> finds = [](const cv::Rect &) { return true; };
-    const auto search = [&] {
-        searched.clear();
+// A pass that sees marker 0 and has a fast and a slow closer look.
+class CloserLooks : public Regions {
+protected:
+    arhost::fiducial::Seen search() {
+        searched_.clear();
+        const auto look = [&](const std::string &name) {
+            return [this, name](const cv::Rect &region, auto &all) {
+                searched_.emplace_back(name, region);
+                all.markers.insert(all.markers.end(), finds_.begin(), finds_.end());
+                all.candidates += 7;
+            };
+        };
         const Pass pass{nullptr,
                         [&](const cv::Rect &region, auto &all) {
-                            searched.emplace_back("normal", region);
+                            searched_.emplace_back("normal", region);
                             if (region.contains({100, 150}))
                                 all.markers.push_back(seen(0));
                             all.candidates += 2;
                         },
-                        {[&](const cv::Rect &region, auto &all) {
-                            searched.emplace_back("closer", region);
-                            if (finds(region))
-                                all.markers.push_back(seen(3, 1));
-                            all.candidates += 5;
-                        }}};
+                        {{look("fast"), false}, {look("slow"), true}}};
         return regions_->search(request_, {}, {&pass, 1});
-    };
-    const std::pair near_first("normal", cv::Rect(75, 125, 51, 51)),
-        near_second("normal", cv::Rect(275, 125, 51, 51)), closer("closer", cv::Rect(275, 125, 51, 51)),
-        everywhere("normal", whole_frame), closer_everywhere("closer", whole_frame);
-    auto found = search();
-    EXPECT_THAT(searched, ElementsAre(near_first, near_second, closer)) << "the marker that is missed, not the other";
-    EXPECT_EQ(found.markers.size(), 2u);
-    EXPECT_EQ(found.candidates, 5u);
+    }
+    using Search = std::pair<std::string, cv::Rect>;
 
-    finds = [](const cv::Rect &) { return false; };
-    EXPECT_EQ(search().markers.size(), 1u);
-    EXPECT_THAT(searched, ElementsAre(near_first, near_second, closer, everywhere, closer_everywhere));
+    std::vector<Search> searched_;
+    std::vector<arhost_observation> finds_; // the closer looks
+    const cv::Rect first_{75, 125, 51, 51}, third_{275, 125, 51, 51};
+};
 
-    request_.search_everywhere = 1;
-    finds = [](const cv::Rect &) { return true; };
-    EXPECT_EQ(search().markers.size(), 2u);
-    EXPECT_THAT(searched, ElementsAre(everywhere, closer_everywhere)) << "targets 1 and 2 are missed";
+TEST_F(CloserLooks, AreTakenWhereMarkersOfMissedTargetsAreExpected) {
+    expect(0, 100, 150);
+    expect(1, 200, 150); // belongs to the target of marker 0
+    expect(2, 300, 150);
+    finds_ = {seen(2), seen(0), seen(9)};
+    const auto found = search();
+    EXPECT_THAT(searched_, testing::IsSupersetOf({Search("fast", third_), Search("slow", third_)}));
+    EXPECT_THAT(searched_, testing::Not(testing::Contains(testing::Pair("fast", first_))));
+    EXPECT_EQ(found.candidates, 7u) << "the search with most of them";
+    std::vector<int> ids;
+    for (const arhost_observation &one : found.markers)
+        ids.push_back(one.id);
+    EXPECT_THAT(ids, UnorderedElementsAre(0, 2, 2)) << "by both looks, and no markers but those of missed targets";
 }
 
-TEST_F(Regions, AreNotExaminedCloserIfAllTargetsAreSeen) {
+TEST_F(CloserLooks, PrecedeASearchOfTheWholeFrame) {
+    expect(0, 100, 150);
+    expect(2, 300, 150);
+    EXPECT_EQ(search().markers.size(), 1u);
+    EXPECT_THAT(searched_, ElementsAre(Search("normal", first_), Search("normal", third_), Search("fast", third_),
+                                       Search("slow", third_), Search("normal", whole_frame)));
+}
+
+TEST_F(CloserLooks, AreTakenAtExpectedPlacesAlsoIfEverythingIsSearched) {
+    expect(2, 300, 150);
+    request_.search_everywhere = 1;
+    finds_ = {seen(2)};
+    search();
+    EXPECT_THAT(searched_,
+                ElementsAre(Search("normal", whole_frame), Search("fast", third_), Search("slow", third_)));
+}
+
+TEST_F(CloserLooks, SearchTheWholeFrameOrATileForTargetsThatAreNotExpected) {
+    request_.search_everywhere = 1;
+    format_.width = 1280;
+    format_.height = 720;
+    const cv::Rect everywhere(0, 0, 1280, 720);
+    for (frame_.sequence = 0; frame_.sequence < 3; ++frame_.sequence) {
+        search();
+        EXPECT_THAT(searched_, ElementsAre(Search("normal", everywhere), Search("fast", everywhere),
+                                           Search("slow", SearchRegions::tile_of({1280, 720}, frame_.sequence))));
+    }
+}
+
+TEST_F(CloserLooks, AreSlowInAtMostTheAreaOfATile) {
+    format_.width = 1280;
+    format_.height = 720;
+    expect(2, 700, 300);
+    expected_.back().margin_px = 210;
+    search();
+    EXPECT_THAT(searched_, ElementsAre(testing::Pair("normal", testing::_), testing::Pair("fast", testing::_),
+                                       testing::Pair("normal", cv::Rect(0, 0, 1280, 720))));
+}
+
+TEST_F(CloserLooks, AreNotTakenForMarkersOfSmallFamilies) {
+    expect(0, 100, 150);
+    expect(3, 300, 150);
+    search();
+    EXPECT_THAT(searched_, testing::Each(testing::Pair("normal", testing::_)));
+}
+
+TEST_F(CloserLooks, DoNotCountIfTheMarkerIsProbablyChance) {
+    expect(2, 300, 150);
+    finds_ = {seen(2)};
+    finds_[0].false_positive_rate = 1e-6;
+    EXPECT_THAT(search().markers, testing::SizeIs(1)) << "that of the whole frame";
+}
+
+TEST_F(CloserLooks, AreNotTakenIfAllTargetsAreSeen) {
     request_.search_everywhere = 1;
     int looks = 0;
     const Pass pass{nullptr,
                     [&](const cv::Rect &, auto &all) {
                         all.markers = {seen(1), seen(2), seen(3, 1)};
                     },
-                    {[&](const cv::Rect &, auto &) { ++looks; }}};
+                    {{[&](const cv::Rect &, auto &) { ++looks; }, false}}};
     EXPECT_EQ(regions_->search(request_, {}, {&pass, 1}).markers.size(), 3u);
     EXPECT_EQ(looks, 0) << "one marker of the first target is enough";
 }
@@ -248,11 +307,11 @@ TEST(Tiles, AreTheWholeOfASmallFrame) {
             EXPECT_EQ(SearchRegions::tile_of(size, sequence), cv::Rect({}, size));
 }
 
-TEST(Tiles, ContainEveryMarkerOf96PxWithinAMinuteHoweverOftenFramesAreSearched) {
-    for (const cv::Size size : {cv::Size(481, 361), cv::Size(640, 480), cv::Size(1280, 720), cv::Size(3840, 2160)})
-        for (const std::uint64_t every : {1, 2, 5, 6, 10, 30}) {
+TEST(Tiles, ContainEveryMarkerOf96PxSoonHoweverOftenFramesAreSearched) {
+    for (const cv::Size size : {cv::Size(481, 361), cv::Size(640, 480), cv::Size(1280, 720), cv::Size(1920, 1080)})
+        for (const std::uint64_t every : {1, 2, 5, 6, 10, 30, 34, 55, 89}) {
             std::set<std::pair<int, int>> begins;
-            for (std::uint64_t sequence = 0; sequence < 1800 * every; sequence += every) {
+            for (std::uint64_t sequence = 0; sequence < 300 * every; sequence += every) {
                 const cv::Rect tile = SearchRegions::tile_of(size, sequence);
                 ASSERT_EQ(tile & cv::Rect({}, size), tile);
                 ASSERT_EQ(tile.size(), cv::Size(480, 360));

@@ -53,8 +53,9 @@ inline cv::Mat read_grey(const std::filesystem::path &file) {
 // so by default the codes are linear light.
 class GreyFrame {
 public:
-    explicit GreyFrame(const cv::Mat &picture, arhost_transfer transfer = ARHOST_TRANSFER_LINEAR)
-        : format_(layout(picture.size())), slot_(format_.byte_size) {
+    explicit GreyFrame(const cv::Mat &picture, arhost_transfer transfer = ARHOST_TRANSFER_LINEAR,
+                       std::uint64_t sequence = 0)
+        : sequence_(sequence), format_(layout(picture.size())), slot_(format_.byte_size) {
         format_.transfer = transfer;
         for (int y = 0; y < picture.rows; ++y)
             std::memcpy(slot_.data() + std::size_t{format_.grey_stride} * y, picture.ptr(y), picture.cols);
@@ -64,6 +65,7 @@ public:
         arhost_frame frame{};
         frame.struct_size = sizeof frame;
         frame.clock = ARHOST_CLOCK_MEDIA;
+        frame.sequence = sequence_;
         frame.format = &format_;
         frame.plane[0] = frame.grey = slot_.data();
         return frame;
@@ -81,6 +83,7 @@ private:
             throw std::runtime_error("the frame size is invalid");
         return format;
     }
+    std::uint64_t sequence_;
     arhost_frame_format format_;
     GuardedBuffer slot_;
 };
