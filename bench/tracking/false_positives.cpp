@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// false-positives [--quick]: shows pictures without markers to the trackers, with all of their families, and counts
-// what they take for markers: sightings in a frame, and poses that the worker reports.
+// false-positives [--quick] [--only REGEX]: shows pictures without markers to the trackers, with all of their
+// families or those whose name matches, and counts what they take for markers: sightings in a frame, and poses that
+// the worker reports.
 #include "solving_tracker.hpp"
 
 #include <fiducial_common/aruco_dictionaries.hpp>
@@ -16,6 +17,7 @@
 #include <deque>
 #include <filesystem>
 #include <future>
+#include <regex>
 
 namespace {
 
@@ -52,7 +54,8 @@ struct Setup {
     std::vector<Listed> listed;
 };
 
-std::vector<Setup> setups() {
+// `only`: the names of families.
+std::vector<Setup> setups(const std::regex &only) {
     const auto of = [](const std::string &plugin, const std::vector<std::pair<std::string, int>> &families) {
         Setup setup{plugin, {}};
         for (const auto &[family, count] : families)
@@ -86,6 +89,9 @@ std::vector<Setup> setups() {
         all.push_back(of("tracker_aruco", {{family, 1000}}));
     for (const fiducial::MatrixFamily &family : fiducial::matrix_families())
         all.push_back(of("tracker_pattern", {{family.name, std::min(family.id_count, 1000)}}));
+    for (Setup &setup : all)
+        std::erase_if(setup.listed, [&](const Listed &one) { return !std::regex_search(one.family, only); });
+    std::erase_if(all, [](const Setup &setup) { return setup.listed.empty(); });
     return all;
 }
 
@@ -237,10 +243,16 @@ template <class Show> CountsByFamily in_parallel(int count, int unit, const Show
 } // namespace
 
 int main(int argc, char **argv) try {
-    const bool is_quick = argc > 1 && std::string(argv[1]) == "--quick";
+    bool is_quick = false;
+    std::string only = ".*";
+    for (int i = 1; i < argc; ++i)
+        if (std::string(argv[i]) == "--quick")
+            is_quick = true;
+        else if (std::string(argv[i]) == "--only" && i + 1 < argc)
+            only = argv[++i];
     const int pictures = is_quick ? 200 : 6000, video_frames = is_quick ? 400 : 4000;
     cv::setNumThreads(1);
-    const std::vector<Setup> all = setups();
+    const std::vector<Setup> all = setups(std::regex(only));
     const CountsByFamily in_pictures = in_parallel(
         pictures, 1, [&](int first, int last, CountsByFamily &counts) { show_pictures(all, first, last, counts); });
     print("independent pictures of generated clutter", in_pictures);

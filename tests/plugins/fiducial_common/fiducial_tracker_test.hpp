@@ -90,9 +90,10 @@ struct Difficult {
 // Expects that a tracker finds the marker only in a closer look, and in a large frame whenever it is expected.
 inline void expect_found_in_closer_look(const std::string &plugin, const Difficult &marker) {
     const GreyFrame frame(marker.picture(tag(3)));
-    for (const auto &[closer_look, count] : {std::pair{"true", 1u}, {"false", 0u}}) {
-        Tracker tracker(plugin, {{"closer_look", closer_look}});
-        ASSERT_EQ(tracker.start(test_camera, {{3}}), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker(plugin);
+    ASSERT_EQ(tracker.start(test_camera, {{3}}), ARHOST_STATUS_OK) << tracker.log();
+    for (const auto &[closer_look, count] : {std::pair{"true", 1u}, {"false", 0u}, {"true", 1u}}) {
+        EXPECT_EQ(tracker.set("closer_look", closer_look), ARHOST_STATUS_OK) << tracker.log();
         EXPECT_EQ(tracker.track(frame).size(), count) << closer_look;
     }
     const cv::Mat picture = marker.picture(tag(3));
@@ -102,7 +103,6 @@ inline void expect_found_in_closer_look(const std::string &plugin, const Difficu
     auto corners = corners_of(marker.truth(), test_camera, 100);
     for (cv::Point2d &corner : corners)
         corner += cv::Point2d(place.tl());
-    Tracker tracker(plugin);
     ASSERT_EQ(tracker.start(plain_camera(wide.size()), {{3}}), ARHOST_STATUS_OK) << tracker.log();
     for (const bool everywhere : {false, true})
         for (std::uint64_t sequence = 0; sequence < 8; ++sequence) {
