@@ -107,10 +107,12 @@ Seen SearchRegions::search(const arhost_track_request &request, const RegionLimi
         look_closer(passes, missed_markers(seen.markers), [&](const CloserLook &look, const Indices &wanted) {
             std::vector<cv::Rect> regions = around_expected(
                 request, limits, [&](const arhost_expected_marker &one) { return wanted.contains(one.marker); });
-            int area = 0;
+            int area = tile_width_px * tile_height_px; // that remains for a slow look
             if (look.is_slow)
                 std::erase_if(regions, [&](const cv::Rect &region) {
-                    return (area += region.area()) > tile_width_px * tile_height_px;
+                    const bool fits = region.area() <= area;
+                    area -= fits ? region.area() : 0;
+                    return !fits;
                 });
             return regions;
         });

@@ -58,10 +58,10 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_REAL, "min_decision_margin", "0",
                    "Minimum bit contrast of a tag, in grey levels from 0 to 255; tags of lower contrast are ignored.",
                    0, 255),
-    arhost::option(
-        ARHOST_OPTION_BOOL, "closer_look", "true",
-        "If a target is not found, searches a part of the frame again at twice the resolution, which finds "
-        "more of the strongly tilted tags."),
+    arhost::option(ARHOST_OPTION_BOOL, "closer_look", "true",
+                   "If a target is not found, searches a part of the frame again, at twice the resolution and with "
+                   "sharper bits: "
+                   "finds more of the strongly tilted, blurred and small tags of families with more than 25 bits."),
     arhost::option(ARHOST_OPTION_INTEGER, "threads", "1",
                    "Number of detector threads; it does not affect the result.", 1, 64),
 };
@@ -261,11 +261,11 @@ private:
     // Adds the tags of a region of the frame to `seen`.
     void observe(const arhost_frame &frame, const cv::Rect &region, const Look &look, arhost::fiducial::Seen &seen) {
         const cv::Mat grey = arhost::fiducial::grey_of(frame);
-        cv::Mat enlarged;
+        cv::Mat larger;
         if (look.scale > 1)
-            cv::resize(grey(region), enlarged, {}, look.scale, look.scale, cv::INTER_CUBIC);
+            cv::resize(grey(region), larger, {}, look.scale, look.scale, cv::INTER_CUBIC);
         detector_->decode_sharpening = std::max(look.min_sharpening, sharpening_);
-        const Detections tags = detect(*detector_, look.scale > 1 ? enlarged : grey(region));
+        const Detections tags = detect(*detector_, look.scale > 1 ? larger : grey(region));
         if (tags)
             seen.candidates += detector_->nquads;
         for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {

@@ -66,9 +66,10 @@ constexpr arhost_option_descriptor options[] = {
         "Maximum number of bit errors to correct, as a fraction of the number that the dictionary can correct. "
         "Negative: 0.6, but at most 0 errors in dictionaries of 4x4 bits, 1 of 5x5 and 3 of 6x6.",
         -1, 1),
-    arhost::option(ARHOST_OPTION_BOOL, "closer_look", "true",
-                   "If a target is not found, searches a part of the frame again, smoothed and at twice the "
-                   "resolution, which finds more of the noisy, dim and small markers."),
+    arhost::option(
+        ARHOST_OPTION_BOOL, "closer_look", "true",
+        "If a target is not found, searches the frame again, smoothed and in part at twice the resolution: "
+        "finds more of the noisy, dim and small markers of dictionaries with more than 25 bits."),
     arhost::option(ARHOST_OPTION_INTEGER, "border_bits", "1", "Width of the black border in cells.", 1, 8),
     arhost::option(ARHOST_OPTION_BOOL, "inverted", "false", "Also detects white-on-black markers."),
 };
