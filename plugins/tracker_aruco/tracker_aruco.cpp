@@ -12,6 +12,7 @@
 
 #include <arhost-cpp/plugin.hpp>
 
+#include <opencv2/core/utility.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
@@ -356,8 +357,10 @@ private:
         seen.candidates += found.ids.size() + found.rejected.size();
         const cv::Point2d half(0.5, 0.5), shift = half - cv::Point2d(centre_shift_px_, centre_shift_px_),
                                           origin = cv::Point2d(region.tl()) - half;
-        for (std::size_t i = 0; i < found.ids.size(); ++i) {
-            const bool is_listed = detectable.family.lists(found.ids[i]);
+        std::vector<std::optional<arhost_observation>> observations(found.ids.size());
+        const auto observe_one = [&](int i) {
+            const int id = found.ids[i];
+            const bool is_listed = detectable.family.lists(id);
             arhost::fiducial::MeasuredCorners corners;
             for (int corner = 0; corner < 4; ++corner) {
                 const cv::Point2d at =
@@ -365,15 +368,21 @@ private:
                 corners.corners_px[corner] = (at + shift) / look.scale + origin;
             }
             if (refine_edges_ && is_listed)
-                corners = refined(grey, transfer, detectable.dictionary, found.ids[i], corners.corners_px)
-                              .value_or(corners);
+                corners = refined(grey, transfer, detectable.dictionary, id, corners.corners_px).value_or(corners);
             Corners in_pixels;
             for (int corner = 0; corner < 4; ++corner)
                 in_pixels[corner] = (corners.corners_px[corner] - origin) * look.scale - half;
-            const Reading reading = read(pixels, in_pixels, table, found.ids[i], parameters.markerBorderBits, false);
+            const Reading reading = read(pixels, in_pixels, table, id, parameters.markerBorderBits, false);
             if (is_listed || (reading.wrong_bits == 0 && reading.false_positive_rate < 1)) // else it may be anything
-                seen.markers.push_back(observation_of(detectable, found.ids[i], corners, reading));
-        }
+                observations[i] = observation_of(detectable, id, corners, reading);
+        };
+        cv::parallel_for_({0, static_cast<int>(found.ids.size())}, [&](const cv::Range &range) {
+            for (int i = range.start; i < range.end; ++i)
+                observe_one(i);
+        });
+        for (const std::optional<arhost_observation> &one : observations)
+            if (one)
+                seen.markers.push_back(*one);
     }
 
     // Returns an expected marker if it can be read where it is expected, without detection.
