@@ -321,7 +321,8 @@ public:
                     observe(grey, request.frame->format->transfer, region, look, detectable, seen);
                 };
             };
-            arhost::fiducial::Pass &pass = passes.emplace_back(&detectable.family, detection({}));
+            arhost::fiducial::Pass &pass =
+                passes.emplace_back(arhost::fiducial::Pass{&detectable.family, detection({})});
             if (looks_closer_)
                 pass.closer_looks = {{detection(smoothed), false}, {detection(enlarged), true}};
         }
