@@ -103,24 +103,28 @@ Seen SearchRegions::search(const arhost_track_request &request, const RegionLimi
     seen.candidates += verified.size();
     seen.markers.insert(seen.markers.end(), verified.begin(), verified.end());
 
-    const Seen closer =
-        look_closer(passes, missed_markers(seen.markers), [&](const CloserLook &look, const Indices &wanted) {
-            std::vector<cv::Rect> regions = around_expected(
-                request, limits, [&](const arhost_expected_marker &one) { return wanted.contains(one.marker); });
-            int area = tile_width_px * tile_height_px; // that remains for a slow look
-            if (look.is_slow)
-                std::erase_if(regions, [&](const cv::Rect &region) {
-                    const bool fits = region.area() <= area;
-                    area -= fits ? region.area() : 0;
-                    return !fits;
-                });
-            return regions;
-        });
-    seen.add(closer);
+    seen.add(look_closer(passes, missed_markers(seen.markers), [&](const CloserLook &look, const Indices &wanted) {
+        std::vector<cv::Rect> regions = around_expected(
+            request, limits, [&](const arhost_expected_marker &one) { return wanted.contains(one.marker); });
+        int area = tile_width_px * tile_height_px; // that remains for a slow look
+        if (look.is_slow)
+            std::erase_if(regions, [&](const cv::Rect &region) {
+                const bool fits = region.area() <= area;
+                area -= fits ? region.area() : 0;
+                return !fits;
+            });
+        return regions;
+    }));
     if (miss_a_target(request, seen.markers)) {
-        seen = closer;
+        Seen everywhere;
         for (const Pass &pass : passes)
-            seen.add(detected(pass.detect, {whole}));
+            everywhere.add(detected(pass.detect, {whole}));
+        std::erase_if(everywhere.markers, [&](const arhost_observation &one) {
+            return std::ranges::any_of(seen.markers, [&](const arhost_observation &known) {
+                return known.id == one.id && known.family == one.family;
+            });
+        });
+        seen.add(everywhere);
     }
     if (request.search_everywhere)
         seen.add(look_closer(passes, missed_markers(seen.markers), [&](const CloserLook &look, const Indices &) {

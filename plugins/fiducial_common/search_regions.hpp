@@ -67,9 +67,9 @@ public:
                   const std::function<FamilyTraits(const std::string &family)> &traits_of);
 
     // Returns the expected markers that `verify` confirms and what the passes detect where the others are expected,
-    // or what they detect in the whole frame if a target is not there. For targets that are missed, the passes take
-    // their closer looks where these are expected, and, if everything is to be searched, in the whole frame, or in
-    // tile_of() if they are slow. A marker may be in the result twice.
+    // and, if a target is not there, the other markers that they detect in the whole frame. For targets that are
+    // missed, the passes take their closer looks where these are expected, and, if everything is to be searched, in
+    // the whole frame, or in tile_of() if they are slow. A marker may be in the result twice.
     Seen search(const arhost_track_request &request, const RegionLimits &limits, std::span<const Pass> passes,
                 const Verify &verify = {}) const;
 

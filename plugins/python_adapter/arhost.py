@@ -120,6 +120,12 @@ def _planes(format, memory):
     return [_pixels(plane, *shape, stride) for plane, shape, stride in zip(memory, shapes, s)]
 
 
+def _integer(what, value, least, most, status=STATUS_ERROR_INTERNAL):
+    if not hasattr(value, "__index__") or not least <= int(value) <= most:
+        raise Failure(f"{what} {value!r}; it must be an integer from {least} to {most}", status)
+    return int(value)
+
+
 class _Adapter:
     """One plugin instance. python_adapter.cpp calls its methods, which return (status, error message or value)."""
 
@@ -251,10 +257,8 @@ class _Adapter:
                                                      pattern_ratio=ratio)
                                               for id, family, target, corners, file, ratio in markers],
                                      families=list(families)))
-            size = int(self.plugin.state_size()) if hasattr(self.plugin, "state_size") else 0
-            if not 0 <= size <= MAX_STATE:
-                raise Failure(f"'state_size' returned {size}; it must be 0 to {MAX_STATE}", STATUS_ERROR_INTERNAL)
-            return STATUS_OK, size
+            size = self.plugin.state_size() if hasattr(self.plugin, "state_size") else 0
+            return STATUS_OK, _integer("'state_size' returned", size, 0, MAX_STATE, STATUS_ERROR_CONFIGURATION)
 
         return self._guarded(start)
 
@@ -270,8 +274,9 @@ class _Adapter:
                            grey=_pixels(grey, int(f.height), int(f.width), 1, int(f.grey_stride)),
                            search_everywhere=search_everywhere,
                            expected=[Fields(marker) for marker in _elements(bytes(expected), EXPECTED_MARKER)],
-                           state_before=state_before and np.frombuffer(state_before, np.uint8),
-                           state_after=state_after and np.frombuffer(state_after, np.uint8), candidate_count=-1)
+                           state_before=state_before and np.ndarray(len(state_before), np.uint8, state_before),
+                           state_after=state_after and np.ndarray(len(state_after), np.uint8, state_after),
+                           candidate_count=-1)
             out, count = _elements(observations, OBSERVATION), 0
             result = self.plugin.track(frame)
             if not hasattr(result, "__iter__") and result is not None:
@@ -288,7 +293,7 @@ class _Adapter:
                 to["corner_sigma_px"] = seen.corner_sigma_px
                 to["false_positive_rate"] = seen.false_positive_rate
                 count += 1
-            return STATUS_OK, (count, int(frame.candidate_count))
+            return STATUS_OK, (count, _integer("'frame.candidate_count' is", frame.candidate_count, -1, 2**31 - 1))
 
         return self._with_memory([*planes, grey, *filter(None, (state_before, state_after))], track)
 

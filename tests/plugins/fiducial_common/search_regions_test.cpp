@@ -244,6 +244,16 @@ TEST_F(CloserLooks, PrecedeASearchOfTheWholeFrame) {
                                        Search("slow", third_), Search("normal", whole_frame)));
 }
 
+TEST_F(CloserLooks, KeepWhatTheyAndTheRegionsHaveFoundIfAnotherTargetIsMissed) {
+    expect(2, 300, 150);
+    expect(3, 200, 150);
+    finds_ = {seen(2)};
+    finds_[0].decision_margin = 7;
+    const auto found = search();
+    ASSERT_THAT(searched_, testing::Contains(Search("normal", whole_frame)));
+    EXPECT_THAT(found.markers, testing::Contains(testing::Field(&arhost_observation::decision_margin, 7)));
+}
+
 TEST_F(CloserLooks, AreTakenAtExpectedPlacesAlsoIfEverythingIsSearched) {
     expect(2, 300, 150);
     request_.search_everywhere = 1;

@@ -181,10 +181,38 @@ class Tracker:
     EXPECT_THAT(run.output(), HasSubstr("exited with status 1"));
 }
 
-TEST_F(PythonAdapter, AnInvalidSizeOfTheStateIsAnError) {
-    ArhostRun run(tracker);
-    EXPECT_NE(run_script(run, std::string(idle_tracker) + "    def state_size(self): return -1\n"), 0);
-    EXPECT_THAT(run.output(), HasSubstr("'state_size' returned -1; it must be 0 to 16777216"));
+TEST_F(PythonAdapter, AnInvalidSizeOfTheStateIsAConfigurationError) {
+    for (const std::string size : {"-1", "8.5", "'8'", "16777217"}) {
+        ArhostRun run(tracker);
+        EXPECT_EQ(run_script(run, std::string(idle_tracker) + "    def state_size(self): return " + size + "\n"), 2);
+        EXPECT_THAT(run.output(),
+                    HasSubstr("'state_size' returned " + size + "; it must be an integer from 0 to 16777216"));
+    }
+}
+
+TEST_F(PythonAdapter, AnInvalidCountOfCandidatesIsAnError) {
+    for (const std::string count : {"-2", "'many'", "2147483648"}) {
+        ArhostRun run(tracker);
+        EXPECT_EQ(run_script(run, "class T:\n    def __init__(self, host): pass\n    def start(self, setup): pass\n"
+                                  "    def track(self, frame): frame.candidate_count = " +
+                                      count + "\n"),
+                  1);
+        EXPECT_THAT(run.output(),
+                    HasSubstr("'frame.candidate_count' is " + count + "; it must be an integer from -1"));
+    }
+}
+
+TEST_F(PythonAdapter, WarnsIfATrackerKeepsItsState) {
+    for (const std::string array : {"before", "after"}) {
+        ArhostRun run(tracker);
+        EXPECT_EQ(run_script(run, "class T:\n    kept = []\n    def __init__(self, host): pass\n"
+                                  "    def start(self, setup): pass\n    def state_size(self): return 8\n"
+                                  "    def track(self, frame):\n        frame.state_after[:] = 1\n"
+                                  "        self.kept.append(frame.state_" +
+                                      array + ")\n"),
+                  0);
+        EXPECT_THAT(run.output(), HasSubstr("'track' kept an array whose memory is no longer valid"));
+    }
 }
 
 TEST_F(PythonAdapter, RayTracerReadsTheSceneAndWritesTheImage) {
