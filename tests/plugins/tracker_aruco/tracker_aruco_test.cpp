@@ -335,6 +335,20 @@ TEST(ArucoTracker, FindsSmallMarkersInACloserLook) {
     expect_found_in_closer_look("tracker_aruco", {"small", 13});
 }
 
+TEST(ArucoTracker, LooksCloserAtTinyFramesWithEachRefinement) {
+    for (const std::string refinement : {"edges", "none", "subpix", "contour", "apriltag"}) {
+        Tracker tracker("tracker_aruco", {{"corner_refinement", refinement}});
+        for (const cv::Size size :
+             {cv::Size(1, 1), cv::Size(2, 3), cv::Size(7, 7), cv::Size(1, 200), cv::Size(33, 9)}) {
+            cv::Mat picture(size, CV_8U, cv::Scalar(128));
+            add_noise(picture, 60, 4);
+            ASSERT_EQ(tracker.start(plain_camera(size), {{3}}), ARHOST_STATUS_OK) << tracker.log();
+            const auto expected = expected_at(0, {cv::Point2d(-3, -3), {9, -3}, {9, 9}, {-3, 9}});
+            EXPECT_TRUE(tracker.track(GreyFrame(picture), {expected}, true).empty()) << refinement << ' ' << size;
+        }
+    }
+}
+
 // By chance, clutter looks like a marker of a small family more often the closer the tracker looks.
 TEST(ArucoTracker, TakesNoCloserLookForASmallFamily) {
     Tracker tracker("tracker_aruco");
