@@ -7,16 +7,19 @@
 #include "rendered_board.hpp"
 
 #include <calibrate/board.hpp>
-#include <fiducial_common/opencv_aruco.hpp>
 
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <tuple>
+#include <vector>
 
 namespace {
 
@@ -28,17 +31,12 @@ struct Result {
     std::size_t views = 0;
 };
 
-std::vector<View> views_in(const std::vector<cv::Mat> &images, const BoardOptions &options) {
+Result arhost_result(const std::vector<cv::Mat> &images, const BoardOptions &options, Model model) {
     const Board board(options);
     std::vector<View> views;
     for (const cv::Mat &image : images)
         if (const auto view = board.find(image))
             views.push_back(*view);
-    return views;
-}
-
-Result arhost_result(const std::vector<cv::Mat> &images, const BoardOptions &options, Model model) {
-    const std::vector<View> views = views_in(images, options);
     const Calibration calibration = calibrate(views, images[0].size(), model);
     return {calibration.lens.matrix, calibration.error_px, calibration.used.size()};
 }
