@@ -22,6 +22,8 @@ public:
     std::optional<std::vector<cv::Point2d>> undistort(const std::vector<cv::Point2d> &pixels) const;
     std::optional<std::vector<cv::Point2d>> distort(const std::vector<cv::Point2d> &undistorted_px) const;
 
+    cv::Vec2d focal_px() const { return {fx_, fy_}; }
+
 private:
     double fx_, fy_;
     shading::Lens lens_;

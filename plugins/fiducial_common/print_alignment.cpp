@@ -148,14 +148,21 @@ public:
         differentiate();
     }
 
-    Whiteness at(const cv::Vec2d &cell) const { // interpolates bilinearly
+    // Interpolates bilinearly. The slopes correct the value, so its error is of the third order instead of the
+    // second.
+    Whiteness at(const cv::Vec2d &cell) const {
         const double x = std::clamp(cell[0] * per_cell_ - 0.5, 0.0, values_.cols - 1.001);
         const double y = std::clamp(cell[1] * per_cell_ - 0.5, 0.0, values_.rows - 1.001);
         const int column = static_cast<int>(x), row = static_cast<int>(y);
         const auto a = static_cast<float>(x - column), b = static_cast<float>(y - row);
         const Sample *upper = &values_(row, column), *lower = upper + values_.cols;
-        const Sample w = (1 - b) * ((1 - a) * upper[0] + a * upper[1]) + b * ((1 - a) * lower[0] + a * lower[1]);
-        return {w[0], w[1], w[2], w[3], w[4], w[5]};
+        const Sample left = (1 - b) * upper[0] + b * lower[0], right = (1 - b) * upper[1] + b * lower[1];
+        const Sample w = (1 - a) * left + a * right;
+        const float top_v = (1 - a) * upper[0][2] + a * upper[1][2],
+                    bottom_v = (1 - a) * lower[0][2] + a * lower[1][2];
+        const float correction = (a * (1 - a) * (left[1] - right[1]) + b * (1 - b) * (top_v - bottom_v)) /
+                                 static_cast<float>(2 * per_cell_);
+        return {w[0] + correction, w[1], w[2], w[3], w[4], w[5]};
     }
 
 private:
@@ -223,15 +230,23 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
         }
         const cv::Vec2d cell(h[0] / h[2], h[1] / h[2]);
         Whiteness white = blurred.at(cell);
-        const cv::Matx22d cells_per_px_here = derivative(to_cells, h);
-        // A blur spreads as heat does: it changes the whiteness by half of the change of its covariance times the
-        // second derivatives. So the ellipse of the blur at this cell is corrected to the first order.
-        const auto spread = [&](const cv::Matx22d &covariance) {
-            return covariance(0, 0) * white.uu + 2 * covariance(0, 1) * white.uv + covariance(1, 1) * white.vv;
+        // A blur spreads as heat does: the whiteness changes with the variance of the blur by half of the Laplacian,
+        // in px. That of the homography differs in two ways from the one that the table was blurred with, which is
+        // constant: its second derivatives have the ellipse at this cell, and it has first derivatives, because the
+        // homography is not linear. Both are corrected to the first order of the perspective: by half of the change
+        // of the ellipse times the second derivatives, and by a shift of the whiteness and of its spread.
+        const double variance_px2 = model.blur_px * model.blur_px;
+        const cv::Matx22d cells_per_px_here = derivative(to_cells, h),
+                          ellipse_here = cells_per_px_here * cells_per_px_here.t();
+        const auto spread = [](const cv::Matx22d &covariance, const Whiteness &of) {
+            return covariance(0, 0) * of.uu + 2 * covariance(0, 1) * of.uv + covariance(1, 1) * of.vv;
         };
-        const cv::Matx22d ellipse_here = cells_per_px_here * cells_per_px_here.t();
-        const double by_blur = model.blur_px * spread(ellipse_here);
-        white.value += static_cast<float>(spread(ellipse_here - ellipse) * model.blur_px * model.blur_px / 2);
+        const double spread_here = spread(ellipse_here, white), by_blur = model.blur_px * spread_here;
+        const cv::Vec2d shift = cells_per_px_here * cv::Vec2d(to_cells(2, 0), to_cells(2, 1)) * (variance_px2 / h[2]);
+        const Whiteness shifted = blurred.at(cell - shift);
+        white.value =
+            shifted.value + static_cast<float>(variance_px2 * (spread(ellipse_here - ellipse, white) / 2 +
+                                                               spread(ellipse_here, shifted) - spread_here));
         const double u = cell[0] / print.cells.cols - 0.5, v = cell[1] / print.cells.rows - 0.5;
         const double illumination = 1 + model.slope[0] * u + model.slope[1] * v;
         const double light = model.black + model.contrast * white.value,
@@ -333,15 +348,42 @@ std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &ligh
     return result;
 }
 
-// Returns the variance of the independent noise of 8 coordinates whose 95 % ellipsoid contains noise with this
-// covariance as often (Satterthwaite's approximation: a sum of squares with unequal variances is a scaled chi-squared
-// with fewer degrees of freedom).
-double equivalent_variance(const cv::Matx<double, 8, 8> &covariance) {
-    const double sum = cv::trace(covariance), sum_of_squares = covariance.dot(covariance);
+using CornerMotions = cv::Matx<double, 8, 6>;
+
+// Returns how the corners of a square, in undistorted px, change with its pose: with shifts along three axes, and
+// with turns about its centre.
+CornerMotions corner_motions(const cv::Vec<double, 8> &corners_px, const cv::Vec2d &focal_px) {
+    const cv::Point2f square[] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+    cv::Point2f corners[4];
+    for (int i = 0; i < 4; ++i)
+        corners[i] = cv::Point2d(corners_px[2 * i] / focal_px[0], corners_px[2 * i + 1] / focal_px[1]);
+    const Homography camera_from_square = cv::getPerspectiveTransform(square, corners); // up to a scale
+    CornerMotions motions;
+    for (int i = 0; i < 4; ++i) {
+        const cv::Vec3d from_centre = camera_from_square * cv::Vec3d(square[i].x, square[i].y, 0),
+                        at = from_centre + camera_from_square * cv::Vec3d(0, 0, 1);
+        for (int degree = 0; degree < 6; ++degree) {
+            cv::Vec3d axis;
+            axis[degree % 3] = 1;
+            const cv::Vec3d motion = degree < 3 ? axis : axis.cross(from_centre);
+            for (int k = 0; k < 2; ++k)
+                motions(2 * i + k, degree) = focal_px[k] * (motion[k] - at[k] / at[2] * motion[2]) / at[2];
+        }
+    }
+    return motions;
+}
+
+// Returns the variance of independent noise of the coordinates for which the 95 % ellipsoid of the pose contains
+// noise with this covariance as often. Of the noise, only the part that `motions` span changes the pose: a sum of
+// squares with unequal variances, and so by Satterthwaite's approximation a scaled chi-squared with fewer degrees of
+// freedom.
+double equivalent_variance(const cv::Matx<double, 8, 8> &covariance, const CornerMotions &motions) {
+    const auto projected = (motions.t() * motions).inv() * (motions.t() * covariance * motions);
+    const double sum = cv::trace(projected), sum_of_squares = cv::trace(projected * projected);
     const double freedom = sum * sum / sum_of_squares;
     // 95 % quantile of the chi-squared distribution (Wilson–Hilferty)
     const auto quantile = [](double n) { return n * std::pow(1 - 2 / (9 * n) + 1.645 * std::sqrt(2 / (9 * n)), 3); };
-    return sum_of_squares / sum * quantile(freedom) / quantile(8);
+    return sum_of_squares / sum * quantile(freedom) / quantile(6);
 }
 
 // The fit of a print to pixels.
@@ -542,7 +584,9 @@ std::optional<AlignedPrint> aligned(const cv::Mat &grey, arhost_transfer transfe
         return std::nullopt;
     AlignedPrint result{{}, fit.white()};
     std::ranges::copy(*distorted, result.corners.corners_px.begin());
-    const double sigma_px = noise_scale(found, *distorted) * std::sqrt(equivalent_variance(fit.covariance_px2()));
+    const double variance_px2 =
+        equivalent_variance(fit.covariance_px2(), corner_motions(fit.corners_px(), lens.focal_px()));
+    const double sigma_px = noise_scale(found, *distorted) * std::sqrt(variance_px2);
     if (!(sigma_px > 0) || !std::isfinite(sigma_px))
         return std::nullopt;
     result.corners.sigma_px = sigma_px;

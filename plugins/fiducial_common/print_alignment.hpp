@@ -15,9 +15,9 @@ namespace arhost::fiducial {
 // illumination changes across it, by the method of least squares (Levenberg–Marquardt). All cells contribute, so this
 // is accurate where blur mixes an edge with the cells beside it. Pixels that do not fit, and those that blur mixes
 // with them, are left out: up to a quarter of all. `corners_px` are correct to about half a cell. The errors of the
-// coordinates depend on each other, so `sigma_px` is the standard deviation of independent noise of which as much
-// lies in its 95 % ellipsoid as of these errors; it follows from the residuals. Returns std::nullopt if the picture
-// does not resemble the frame.
+// coordinates depend on each other, so `sigma_px` is the standard deviation of the independent noise for which the
+// 95 % ellipsoid of the pose contains the errors of the pose as often; it follows from the residuals. Returns
+// std::nullopt if the picture does not resemble the frame.
 std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
                                            const Lens &lens, const Print &print);
 
