@@ -13,6 +13,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <optional>
 #include <random>
 
 namespace arhost::host {
@@ -32,6 +33,25 @@ std::string random_id() {
 
 std::shared_ptr<SlotPool> pool_of(const Component &component) {
     return component.output() ? std::make_shared<SlotPool>(component.output()) : nullptr;
+}
+
+// Returns the node of the target that a message of the tracker quotes: by its name, or by the family or the file of a
+// marker.
+std::optional<yaml::Node> quoted_target(const std::string &message, const run_config::TrackerConfiguration &tracker) {
+    const auto find = [&](const auto &is_meant) -> std::optional<yaml::Node> {
+        const auto found = std::ranges::find_if(tracker.targets, is_meant);
+        if (found == tracker.targets.end())
+            return std::nullopt;
+        return tracker.target_nodes[static_cast<std::size_t>(found - tracker.targets.begin())];
+    };
+    const auto quotes = [&](const std::string &text) { return message.find("'" + text + "'") != std::string::npos; };
+    if (const auto named = find([&](const Target &target) { return quotes(target.name); }))
+        return named;
+    return find([&](const Target &target) {
+        return std::ranges::any_of(target.markers, [&](const TargetMarker &marker) {
+            return quotes(marker.family) || (!marker.file.empty() && quotes(marker.file));
+        });
+    });
 }
 
 } // namespace
@@ -223,6 +243,8 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(TrackerPointer configuratio
     callbacks.disabled = [this, stage](const std::string &reason, bool is_configuration_error) {
         if (stage == next_tracker_.get())
             return abandon_swap(std::exchange(next_tracker_, nullptr), reason);
+        if (const auto target = quoted_target(reason, *stage->configuration))
+            return on_disabled(target->path(), *target, reason, is_configuration_error);
         on_disabled("tracker", stage->configuration->node, reason, is_configuration_error);
     };
     callbacks.result = [this](const Command &command, const Result &result) { on_tracked(command, result); };

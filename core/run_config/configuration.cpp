@@ -127,7 +127,7 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared,
     reject_markers(node);
     TrackerConfiguration tracker{parse_component(node, "tracker", shared), {}};
     reject_family_option(node);
-    tracker.targets = parse_targets(node.require("targets"), tracker.map_files, warnings);
+    tracker.targets = parse_targets(node.require("targets"), tracker.target_nodes, tracker.map_files, warnings);
     let_read_prints(tracker);
     const auto frames = [&](const char *path, std::int64_t minimum) {
         return static_cast<std::uint32_t>(integer_or_default(node, path, minimum, 1'000'000));

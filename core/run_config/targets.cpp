@@ -594,14 +594,15 @@ std::string family_of_all_markers(const yaml::Node &tracker) {
 
 } // namespace
 
-std::vector<Target> parse_targets(const yaml::Node &list, std::vector<fs::path> &files,
-                                  std::vector<std::string> &warnings) {
+std::vector<Target> parse_targets(const yaml::Node &list, std::vector<yaml::Node> &nodes,
+                                  std::vector<fs::path> &files, std::vector<std::string> &warnings) {
     std::vector<Target> targets;
     Owners owners;
     for (const yaml::Node &node : list.items())
         for (Target &target : parse_target(node, owners.marker_count(), files, warnings)) {
             owners.add(node, target);
             targets.push_back(std::move(target));
+            nodes.push_back(node);
             for (const auto &[count, limit, what] : {std::tuple{targets.size(), int{ARHOST_MAX_TARGETS}, "targets"},
                                                      {owners.marker_count(), ARHOST_MAX_MARKERS, "markers"},
                                                      {owners.family_count(), ARHOST_MAX_FAMILIES, "families"}})

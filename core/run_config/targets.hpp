@@ -15,10 +15,11 @@ namespace arhost::run_config {
 using ipc::Target; // declared in core/ipc, because workers receive them
 using ipc::TargetMarker;
 
-// Parses the key `targets` of a tracker. Appends the absolute paths of the maps that it reads to `map_files`. All
-// functions throw yaml::Error and append their warnings to `warnings`.
-std::vector<Target> parse_targets(const yaml::Node &targets, std::vector<std::filesystem::path> &map_files,
-                                  std::vector<std::string> &warnings);
+// Parses the key `targets` of a tracker. Appends the node of each target to `nodes` (`ids` are many targets in one
+// node), and the absolute paths of the maps that it reads to `map_files`. All functions throw yaml::Error and append
+// their warnings to `warnings`.
+std::vector<Target> parse_targets(const yaml::Node &targets, std::vector<yaml::Node> &nodes,
+                                  std::vector<std::filesystem::path> &map_files, std::vector<std::string> &warnings);
 
 // Reads a map of markers (docs/markers.md).
 std::vector<TargetMarker> read_map(const std::filesystem::path &file, std::vector<std::string> &warnings);
