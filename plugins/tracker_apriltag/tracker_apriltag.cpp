@@ -59,9 +59,9 @@ constexpr arhost_option_descriptor options[] = {
                    "Minimum bit contrast of a tag, in grey levels from 0 to 255; tags of lower contrast are ignored.",
                    0, 255),
     arhost::option(ARHOST_OPTION_BOOL, "closer_look", "true",
-                   "If a target is not found, searches a part of the frame again, at twice the resolution and with "
-                   "sharper bits: "
-                   "finds more of the strongly tilted, blurred and small tags of families with more than 25 bits."),
+                   "If a target is not found, searches a part of the frame again, at twice the resolution, and with "
+                   "sharper bits and more candidates for corners: finds more of the strongly tilted, blurred, small "
+                   "and partly hidden tags of families with more than 25 bits."),
     arhost::option(ARHOST_OPTION_INTEGER, "threads", "1",
                    "Number of detector threads; it does not affect the result.", 1, 64),
 };
@@ -157,8 +157,10 @@ arhost::fiducial::FamilyTraits traits_of(const std::string &name) {
 struct Look {
     int scale = 1;
     double min_sharpening = 0; // of the bits; the decision margin increases with it
+    int max_maxima = 10;       // qtp.max_nmaxima: of an outline, so many places are tried as corners of a square
 };
-constexpr Look enlarged{2}, sharpened{1, 2};
+// The ends of what hides a corner look like corners, too.
+constexpr Look enlarged{2}, sharpened{1, 2, 20};
 
 class AprilTagTracker {
 public:
@@ -265,6 +267,7 @@ private:
         if (look.scale > 1)
             cv::resize(grey(region), larger, {}, look.scale, look.scale, cv::INTER_CUBIC);
         detector_->decode_sharpening = std::max(look.min_sharpening, sharpening_);
+        detector_->qtp.max_nmaxima = look.max_maxima;
         const Detections tags = detect(*detector_, look.scale > 1 ? larger : grey(region));
         if (tags)
             seen.candidates += detector_->nquads;

@@ -146,6 +146,27 @@ TEST(AprilTagTracker, FindsABlurredTagInACloserLook) {
     expect_found_in_closer_look("tracker_apriltag", {"blurred", 60, 30, 4.2});
 }
 
+TEST(AprilTagTracker, FindsATagWithAHiddenCornerInACloserLook) {
+    const cv::Size size(480, 360);
+    const auto camera = intrinsics_of(size, 450, 450, 239.5, 179.5), fine = enlarged(camera, 4);
+    // One of few poses in which more than ten places of the outline look like corners.
+    const Mt truth = {0.541612,  -0.780395, -0.312473, 0, 0.822179, 0.41432, 0.390334, 0,
+                      -0.175151, -0.468319, 0.866025,  0, 44.9377,  16.3027, -750,     1};
+    cv::Mat picture = render(fine, {{april_tag("tag36h11", 0).with_margin(1), 100, truth}});
+    hide_corner(picture, fine, truth, 100, 0.3, 120);
+    cv::GaussianBlur(picture, picture, {}, 4 * 0.6);
+    cv::resize(picture, picture, size, 0, 0, cv::INTER_AREA);
+    add_noise(picture, 1.5, 252);
+    for (const auto &[closer_look, count] : {std::pair{"false", 0u}, {"true", 1u}}) {
+        Tracker tracker("tracker_apriltag", {{"closer_look", closer_look}});
+        ASSERT_EQ(tracker.start(camera, {{0}}), ARHOST_STATUS_OK) << tracker.log();
+        const auto seen = tracker.track(GreyFrame(picture));
+        ASSERT_EQ(seen.size(), count) << closer_look;
+        for (const arhost_observation &one : seen)
+            EXPECT_LT(greatest_distance_px(one, corners_of(truth, camera, 100)), 0.05);
+    }
+}
+
 TEST(AprilTagTracker, IgnoresTagsBelowTheDecisionMargin) {
     const GreyFrame frame(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}));
     for (const auto &[margin, count] : {std::pair{"20", 1u}, std::pair{"200", 0u}}) {
