@@ -45,7 +45,7 @@ std::optional<yaml::Node> quoted_target(const std::string &message, const run_co
         return tracker.target_nodes[static_cast<std::size_t>(found - tracker.targets.begin())];
     };
     const auto quotes = [&](const std::string &text) { return message.find("'" + text + "'") != std::string::npos; };
-    if (const auto named = find([&](const Target &target) { return quotes(target.name); }))
+    if (auto named = find([&](const Target &target) { return quotes(target.name); }))
         return named;
     return find([&](const Target &target) {
         return std::ranges::any_of(target.markers, [&](const TargetMarker &marker) {
