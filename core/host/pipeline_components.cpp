@@ -35,23 +35,25 @@ std::shared_ptr<SlotPool> pool_of(const Component &component) {
     return component.output() ? std::make_shared<SlotPool>(component.output()) : nullptr;
 }
 
-// Returns the node of the target that a message of the tracker quotes: by its name, or by the family or the file of a
-// marker.
+// Returns the node of the target that a message of the tracker quotes first: by its name, or by the family or the
+// file of a marker. Later quotes may be keys, such as 'image', that other targets have as their family.
 std::optional<yaml::Node> quoted_target(const std::string &message, const run_config::TrackerConfiguration &tracker) {
-    const auto find = [&](const auto &is_meant) -> std::optional<yaml::Node> {
-        const auto found = std::ranges::find_if(tracker.targets, is_meant);
-        if (found == tracker.targets.end())
-            return std::nullopt;
-        return tracker.target_nodes[static_cast<std::size_t>(found - tracker.targets.begin())];
-    };
-    const auto quotes = [&](const std::string &text) { return message.find("'" + text + "'") != std::string::npos; };
-    if (auto named = find([&](const Target &target) { return quotes(target.name); }))
-        return named;
-    return find([&](const Target &target) {
-        return std::ranges::any_of(target.markers, [&](const TargetMarker &marker) {
-            return quotes(marker.family) || (!marker.file.empty() && quotes(marker.file));
-        });
-    });
+    std::optional<yaml::Node> quoted;
+    std::size_t first = std::string::npos;
+    for (std::size_t i = 0; i < tracker.targets.size(); ++i) {
+        const auto look_for = [&](const std::string &text) {
+            if (const std::size_t at = message.find("'" + text + "'"); !text.empty() && at < first) {
+                first = at;
+                quoted = tracker.target_nodes[i];
+            }
+        };
+        look_for(tracker.targets[i].name);
+        for (const TargetMarker &marker : tracker.targets[i].markers) {
+            look_for(marker.family);
+            look_for(marker.file);
+        }
+    }
+    return quoted;
 }
 
 } // namespace
@@ -243,7 +245,8 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(TrackerPointer configuratio
     callbacks.disabled = [this, stage](const std::string &reason, bool is_configuration_error) {
         if (stage == next_tracker_.get())
             return abandon_swap(std::exchange(next_tracker_, nullptr), reason);
-        if (const auto target = quoted_target(reason, *stage->configuration))
+        // While the video runs, it continues without the whole tracker.
+        if (const auto target = quoted_target(reason, *stage->configuration); target && phase_ != Phase::running)
             return on_disabled(target->path(), *target, reason, is_configuration_error);
         on_disabled("tracker", stage->configuration->node, reason, is_configuration_error);
     };

@@ -76,6 +76,11 @@ const std::vector<Case> cases = {
      small_scene,
      {"run.yaml:4:", "tracker.targets[1]: target 'tag36h11-587': marker id 587 is not in tag36h11, whose ids are "
                      "0 to 586"}},
+    {"FamilyOfAnotherTracker", // the message also quotes 'image', the family of the first target
+     replaced(replaced(good, "tracker_counter", "tracker_image"), "[{marker: 3,",
+              "[{name: cover, image: f-0001.png, width_mm: 60}, {marker: 3,"),
+     small_scene,
+     {"run.yaml:4:", "tracker.targets[1]: unknown family 'tag36h11': tracker_image finds targets with an 'image'"}},
     {"MarkersInsteadOfTargets",
      replaced(good, "targets: [{marker: 3, family: tag36h11,", "markers: [{id: 3,"),
      small_scene,
