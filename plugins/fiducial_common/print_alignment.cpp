@@ -230,11 +230,11 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
         }
         const cv::Vec2d cell(h[0] / h[2], h[1] / h[2]);
         Whiteness white = blurred.at(cell);
-        // A blur spreads as heat does: the whiteness changes with the variance of the blur by half of the Laplacian,
-        // in px. That of the homography differs in two ways from the one that the table was blurred with, which is
-        // constant: its second derivatives have the ellipse at this cell, and it has first derivatives, because the
-        // homography is not linear. Both are corrected to the first order of the perspective: by half of the change
-        // of the ellipse times the second derivatives, and by a shift of the whiteness and of its spread.
+        // A blur spreads as heat does: the whiteness changes with the variance of the blur by half of its Laplacian
+        // with respect to px. The table has the Laplacian of a linear map with the ellipse of the centre. Corrected
+        // to the first order of the perspective: the ellipse at this cell is another one (half of the difference
+        // times the second derivatives), the map is not linear (a shift of the whiteness), and the ellipse changes
+        // within the blur (a shift of its spread).
         const double variance_px2 = model.blur_px * model.blur_px;
         const cv::Matx22d cells_per_px_here = derivative(to_cells, h),
                           ellipse_here = cells_per_px_here * cells_per_px_here.t();
@@ -351,7 +351,7 @@ std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &ligh
 using CornerMotions = cv::Matx<double, 8, 6>;
 
 // Returns how the corners of a square, in undistorted px, change with its pose: with shifts along three axes, and
-// with turns about its centre.
+// with turns about its centre. Takes the homography as the pose, although noise makes its axes slightly oblique.
 CornerMotions corner_motions(const cv::Vec<double, 8> &corners_px, const cv::Vec2d &focal_px) {
     const cv::Point2f square[] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
     cv::Point2f corners[4];
