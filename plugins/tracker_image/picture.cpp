@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace tracker_image {
@@ -19,7 +20,7 @@ constexpr int stored_side_px = 640; // of the longer side; larger pictures are r
 constexpr int max_features = 1500;
 constexpr std::size_t max_points = 200, min_points = 24;
 constexpr std::size_t min_inliers = 12;
-constexpr double min_inlier_share = 0.25; // of an aligned picture: three quarters may be covered
+constexpr double min_inlier_share = 0.25; // of the points of an aligned picture; covered ones are no inliers
 constexpr double match_ratio = 0.8;       // Lowe: distance of the best match to that of the second best
 constexpr double find_tolerance_px = 4, align_tolerance_px = 1.5;
 
@@ -66,6 +67,27 @@ cv::Mat normalized(const cv::Mat &grey) {
 }
 
 } // namespace
+
+Camera::Camera(const arhost_intrinsics &intrinsics)
+    : lens_(intrinsics), undistorted_(static_cast<int>(intrinsics.height), static_cast<int>(intrinsics.width)) {
+    constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+    for (int y = 0; y < undistorted_.rows; ++y)
+        for (int x = 0; x < undistorted_.cols; ++x) {
+            const auto point = undistort(cv::Point2d(x, y));
+            undistorted_(y, x) =
+                point ? cv::Vec2f(static_cast<float>(point->x), static_cast<float>(point->y)) : cv::Vec2f(nan, nan);
+        }
+}
+
+std::optional<cv::Point2d> Camera::undistort(cv::Point2d pixel) const {
+    const auto points = lens_.undistort({pixel});
+    return points ? std::optional(points->front()) : std::nullopt;
+}
+
+std::optional<cv::Point2d> Camera::distort(cv::Point2d undistorted_px) const {
+    const auto points = lens_.distort({undistorted_px});
+    return points ? std::optional(points->front()) : std::nullopt;
+}
 
 Features features_of(const cv::Mat &grey) {
     constexpr int min_side_px = 64; // ORB's pyramid and margins need as much
@@ -120,71 +142,87 @@ std::vector<cv::Point2f> Picture::own_corners() const {
     return {{-0.5F, -0.5F}, {right, -0.5F}, {right, bottom}, {-0.5F, bottom}};
 }
 
-std::vector<cv::Point2d> Picture::corners_px(const Place &place) const {
-    std::vector<cv::Point2d> corners;
-    for (const cv::Point2f &corner : own_corners())
-        corners.push_back(transformed(place.frame_from_picture, corner));
-    return corners;
-}
-
-std::optional<Picture::Place> Picture::find(const cv::Mat &frame, const Features &features) const {
+std::optional<Picture::Place> Picture::find(const cv::Mat &frame, const Camera &camera,
+                                            const Features &features) const {
     if (features.points.size() < 2)
         return std::nullopt;
     std::vector<std::vector<cv::DMatch>> matches;
     cv::BFMatcher(cv::NORM_HAMMING).knnMatch(features_.descriptors, features.descriptors, matches, 2);
     std::vector<cv::Point2f> from, to;
     for (const auto &match : matches)
-        if (match.size() == 2 && match[0].distance < match_ratio * match[1].distance) {
-            from.push_back(features_.points[static_cast<std::size_t>(match[0].queryIdx)].pt);
-            to.push_back(features.points[static_cast<std::size_t>(match[0].trainIdx)].pt);
-        }
+        if (match.size() == 2 && match[0].distance < match_ratio * match[1].distance)
+            if (const auto at = camera.undistort(features.points[static_cast<std::size_t>(match[0].trainIdx)].pt)) {
+                from.push_back(features_.points[static_cast<std::size_t>(match[0].queryIdx)].pt);
+                to.emplace_back(*at);
+            }
     if (from.size() < min_inliers)
         return std::nullopt;
     cv::Mat is_inlier;
     const cv::Mat homography = cv::findHomography(from, to, cv::RANSAC, find_tolerance_px, is_inlier);
     if (homography.empty() || static_cast<std::size_t>(cv::countNonZero(is_inlier)) < min_inliers)
         return std::nullopt;
-    return align(frame, cv::Matx33d(homography));
+    return align(frame, camera, cv::Matx33d(homography));
 }
 
-std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const std::vector<cv::Point2f> &corners_px) const {
-    return align(frame, cv::Matx33d(cv::getPerspectiveTransform(own_corners(), corners_px)));
+std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const Camera &camera,
+                                             const std::vector<cv::Point2d> &corners_px) const {
+    std::vector<cv::Point2f> corners;
+    for (const cv::Point2d &corner : corners_px)
+        if (const auto undistorted = camera.undistort(corner))
+            corners.emplace_back(*undistorted);
+    if (corners.size() != 4)
+        return std::nullopt;
+    return align(frame, camera, cv::Matx33d(cv::getPerspectiveTransform(own_corners(), corners)));
 }
 
 // Draws the picture as it should look in the frame, and measures with the method of Lucas and Kanade where its points
 // really are.
-std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const cv::Matx33d &frame_from_picture) const {
+std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const Camera &camera,
+                                             cv::Matx33d undistorted_from_picture) const {
     constexpr int repetitions = 2, window_px = 15, levels = 2, margin_px = 24;
-    Place place{frame_from_picture, 0, 0};
+    Place place{};
     const std::vector<cv::Point2f> corners = own_corners();
+    // Returns the pixels of the frame; empty if the lens does not show one of the points.
+    const auto in_frame = [&](const std::vector<cv::Point2f> &points) {
+        std::vector<cv::Point2d> pixels;
+        for (const cv::Point2f &point : points)
+            if (const auto pixel = camera.distort(transformed(undistorted_from_picture, point)))
+                pixels.push_back(*pixel);
+        return pixels.size() == points.size() ? pixels : std::vector<cv::Point2d>();
+    };
+    std::vector<cv::Point2f> outline; // with points between the corners, as a lens bends edges
+    for (std::size_t i = 0; i < 4; ++i)
+        for (const float along : {0.0F, 0.25F, 0.5F, 0.75F})
+            outline.push_back(corners[i] + along * (corners[(i + 1) % 4] - corners[i]));
     for (int repetition = 0; repetition < repetitions; ++repetition) {
-        if (!is_plausible(place.frame_from_picture, corners))
+        if (!is_plausible(undistorted_from_picture, corners))
             return std::nullopt;
-        std::vector<cv::Point2f> outline;
-        outline.reserve(corners.size());
-        for (const cv::Point2f &corner : corners)
-            outline.emplace_back(transformed(place.frame_from_picture, corner));
+        const std::vector<cv::Point2d> outline_px = in_frame(outline);
+        if (outline_px.empty())
+            return std::nullopt;
+        const std::vector<cv::Point2f> polygon(outline_px.begin(), outline_px.end());
         const cv::Rect whole({0, 0}, frame.size());
-        cv::Rect region = cv::boundingRect(outline);
+        cv::Rect region = cv::boundingRect(polygon);
         region = (region + cv::Point(-margin_px, -margin_px) + cv::Size(2 * margin_px, 2 * margin_px)) & whole;
         if (region.width < 2 * window_px || region.height < 2 * window_px)
             return std::nullopt;
-        const Level &level = level_for(cv::contourArea(outline));
+        const Level &level = level_for(cv::contourArea(polygon));
         const double x_scale = static_cast<double>(levels_[0].grey.cols) / level.grey.cols,
                      y_scale = static_cast<double>(levels_[0].grey.rows) / level.grey.rows;
-        const cv::Matx33d picture_from_level(x_scale, 0, (x_scale - 1) / 2, 0, y_scale, (y_scale - 1) / 2, 0, 0, 1),
-            region_from_level = cv::Matx33d(1, 0, -region.x, 0, 1, -region.y, 0, 0, 1) * place.frame_from_picture *
-                                picture_from_level;
-        cv::Mat drawn;
-        cv::warpPerspective(level.grey, drawn, region_from_level, region.size(), cv::INTER_LINEAR,
-                            cv::BORDER_REPLICATE);
+        const cv::Matx33d picture_from_level(x_scale, 0, (x_scale - 1) / 2, 0, y_scale, (y_scale - 1) / 2, 0, 0, 1);
+        cv::Mat in_level, drawn;
+        cv::perspectiveTransform(camera.undistorted(region), in_level,
+                                 (undistorted_from_picture * picture_from_level).inv());
+        cv::remap(level.grey, drawn, in_level, cv::noArray(), cv::INTER_LINEAR, cv::BORDER_REPLICATE);
         std::vector<cv::Point2f> on_picture, expected, actual;
-        for (const cv::Point2f &point : level.points)
-            if (const cv::Point2d at = transformed(region_from_level, point);
-                cv::Rect2d(0, 0, region.width, region.height).contains(at)) {
-                on_picture.emplace_back(transformed(picture_from_level, point));
-                expected.emplace_back(at);
+        for (const cv::Point2f &point : level.points) {
+            const cv::Point2d on_largest = transformed(picture_from_level, point);
+            const auto at = camera.distort(transformed(undistorted_from_picture, on_largest));
+            if (at && cv::Rect2d(region).contains(*at)) {
+                on_picture.emplace_back(on_largest);
+                expected.emplace_back(*at - cv::Point2d(region.tl()));
             }
+        }
         if (expected.size() < min_inliers)
             return std::nullopt;
         std::vector<std::uint8_t> is_found;
@@ -192,9 +230,10 @@ std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const cv::Mat
                                  cv::noArray(), {window_px, window_px}, levels);
         std::vector<cv::Point2f> from, to;
         for (std::size_t i = 0; i < is_found.size(); ++i)
-            if (is_found[i]) {
+            if (const auto at = is_found[i] ? camera.undistort(cv::Point2d(actual[i]) + cv::Point2d(region.tl()))
+                                            : std::nullopt) {
                 from.push_back(on_picture[i]);
-                to.push_back(actual[i] + cv::Point2f(region.tl()));
+                to.emplace_back(*at);
             }
         if (from.size() < min_inliers)
             return std::nullopt;
@@ -202,13 +241,16 @@ std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const cv::Mat
         const cv::Mat homography = cv::findHomography(from, to, cv::RANSAC, align_tolerance_px, is_inlier);
         if (homography.empty())
             return std::nullopt;
-        place.frame_from_picture = cv::Matx33d(homography);
+        undistorted_from_picture = cv::Matx33d(homography);
         place.inliers = static_cast<std::size_t>(cv::countNonZero(is_inlier));
         place.inlier_share = static_cast<double>(place.inliers) / static_cast<double>(expected.size());
         if (place.inliers < min_inliers || place.inlier_share < min_inlier_share)
             return std::nullopt;
     }
-    return is_plausible(place.frame_from_picture, corners) ? std::optional(place) : std::nullopt;
+    if (!is_plausible(undistorted_from_picture, corners))
+        return std::nullopt;
+    place.corners_px = in_frame(corners);
+    return place.corners_px.empty() ? std::nullopt : std::optional(place);
 }
 
 } // namespace tracker_image

@@ -4,6 +4,8 @@
 // frame in which its place is roughly known.
 #pragma once
 
+#include <fiducial_common/lens.hpp>
+
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
 
@@ -12,6 +14,23 @@
 #include <vector>
 
 namespace tracker_image {
+
+// The camera of the frames. In undistorted pixels (fiducial::Lens), a plane picture is related to a frame by a
+// homography.
+class Camera {
+public:
+    explicit Camera(const arhost_intrinsics &intrinsics);
+
+    // Both return std::nullopt where the distortion model is not one-to-one.
+    std::optional<cv::Point2d> undistort(cv::Point2d pixel) const;
+    std::optional<cv::Point2d> distort(cv::Point2d undistorted_px) const;
+    // For each pixel of a region of the frame, the undistorted pixel (CV_32FC2); NaN where there is none.
+    cv::Mat undistorted(const cv::Rect &region) const { return undistorted_(region); }
+
+private:
+    arhost::fiducial::Lens lens_;
+    cv::Mat_<cv::Vec2f> undistorted_;
+};
 
 // The features of a frame, which all pictures share.
 struct Features {
@@ -30,16 +49,15 @@ public:
 
     // Where the picture is in a frame, and how well it fits.
     struct Place {
-        cv::Matx33d frame_from_picture; // from pixels of the largest level
-        std::size_t inliers;            // points of the picture that were found there
-        double inlier_share;            // of the points that should be visible
+        std::vector<cv::Point2d> corners_px; // from the top left one clockwise
+        std::size_t inliers;                 // points of the picture that were found there
+        double inlier_share;                 // of the points that should be visible
     };
     // The features must be those of `frame`.
-    std::optional<Place> find(const cv::Mat &frame, const Features &features) const;
+    std::optional<Place> find(const cv::Mat &frame, const Camera &camera, const Features &features) const;
     // `corners_px`: where the corners are expected, from the top left one clockwise.
-    std::optional<Place> align(const cv::Mat &frame, const std::vector<cv::Point2f> &corners_px) const;
-
-    std::vector<cv::Point2d> corners_px(const Place &place) const;
+    std::optional<Place> align(const cv::Mat &frame, const Camera &camera,
+                               const std::vector<cv::Point2d> &corners_px) const;
 
 private:
     // The picture at one of several sizes, each 1/sqrt(2) of the one before.
@@ -48,7 +66,9 @@ private:
         std::vector<cv::Point2f> points; // with texture in both directions, for the alignment
     };
 
-    std::optional<Place> align(const cv::Mat &frame, const cv::Matx33d &frame_from_picture) const;
+    // `undistorted_from_picture`: to undistorted pixels from pixels of the largest level.
+    std::optional<Place> align(const cv::Mat &frame, const Camera &camera,
+                               cv::Matx33d undistorted_from_picture) const;
     std::vector<cv::Point2f> own_corners() const;
     const Level &level_for(double area_px) const;
 

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <optional>
 #include <vector>
 
 namespace tracker_image {
@@ -50,6 +51,7 @@ public:
                 throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "a marker of the family 'image' has no file");
             shown_.push_back({marker.id, marker.family, Picture(marker.file)});
         }
+        camera_.emplace(*setup.intrinsics);
     }
 
     double aspect(std::uint32_t marker) const { return shown_.at(marker).picture.aspect(); }
@@ -60,11 +62,11 @@ public:
         std::vector<bool> is_found(shown_.size()), is_missed(shown_.size());
         std::vector<arhost_observation> seen;
         for (const arhost_expected_marker &expected : arhost::elements(request.expected, request.expected_count)) {
-            std::vector<cv::Point2f> corners;
+            std::vector<cv::Point2d> corners;
             for (const auto &corner : expected.corners_px)
-                corners.emplace_back(static_cast<float>(corner[0]), static_cast<float>(corner[1]));
+                corners.emplace_back(corner[0], corner[1]);
             const Shown &shown = shown_.at(expected.marker);
-            const auto place = shown.picture.align(grey, corners);
+            const auto place = shown.picture.align(grey, *camera_, corners);
             is_found[expected.marker] = place.has_value();
             is_missed[expected.marker] = !place;
             if (place)
@@ -75,7 +77,7 @@ public:
             const Features features = features_of(grey);
             for (std::size_t i = 0; i < shown_.size(); ++i)
                 if (!is_found[i] && (searches_all || is_missed[i]))
-                    if (const auto place = shown_[i].picture.find(grey, features))
+                    if (const auto place = shown_[i].picture.find(grey, *camera_, features))
                         seen.push_back(observation_of(shown_[i], *place));
         }
         arhost::fiducial::report(std::move(seen), observations);
@@ -92,13 +94,14 @@ private:
     };
 
     static arhost_observation observation_of(const Shown &shown, const Picture::Place &place) {
-        const std::vector<cv::Point2d> corners = shown.picture.corners_px(place);
+        const std::vector<cv::Point2d> &corners = place.corners_px;
         arhost_observation one = arhost::fiducial::observation_of(shown.id, shown.family,
                                                                   {{corners[0], corners[1], corners[2], corners[3]}});
         one.decision_margin = 100 * place.inlier_share;
         return one;
     }
 
+    std::optional<Camera> camera_;
     std::vector<Shown> shown_; // as the markers of the setup
 };
 

@@ -2,6 +2,7 @@
 #include "poster_video.hpp"
 
 #include <gmock/gmock.h>
+#include <opencv2/calib3d.hpp>
 
 #include <fstream>
 
@@ -67,6 +68,58 @@ TEST_F(ImageTracker, FollowsAPictureThatIsHalfCovered) {
     }
     EXPECT_GE(found, 98 * frames / 100);
     EXPECT_LE(error_px / found, 1);
+}
+
+// The frame and the true corners come from OpenCV's lens models.
+TEST_F(ImageTracker, KnowsTheDistortionOfTheLens) {
+    const cv::Size size(640, 480);
+    const cv::Matx33d matrix(400, 0, 322, 0, 400, 236, 0, 0, 1);
+    const std::vector<double> brown{-0.28, 0.09, 1e-3, -5e-4}, fisheye{-0.02, 0.005, 0, 0};
+    for (const auto distortion : {ARHOST_DISTORTION_BROWN, ARHOST_DISTORTION_FISHEYE}) {
+        const bool is_fisheye = distortion == ARHOST_DISTORTION_FISHEYE;
+        const std::vector<double> &coefficients = is_fisheye ? fisheye : brown;
+        const auto lens =
+            intrinsics_of(size, matrix(0, 0), matrix(1, 1), matrix(0, 2), matrix(1, 2), distortion, coefficients);
+        std::vector<cv::Point2d> pixels, undistorted;
+        for (int y = 0; y < size.height; ++y)
+            for (int x = 0; x < size.width; ++x)
+                pixels.emplace_back(x, y);
+        const cv::Point2d scale(matrix(0, 0), matrix(1, 1)), origin(500, 400); // of a flat image of 1000 × 800
+        if (is_fisheye)
+            cv::fisheye::undistortPoints(pixels, undistorted, matrix, coefficients);
+        else
+            cv::undistortPoints(pixels, undistorted, matrix, coefficients);
+        cv::Mat map(size, CV_32FC2);
+        for (int y = 0; y < size.height; ++y)
+            for (int x = 0; x < size.width; ++x) {
+                const cv::Point2d at = undistorted[static_cast<std::size_t>(y * size.width + x)];
+                map.at<cv::Vec2f>(y, x) = cv::Vec2f(static_cast<float>(at.x * scale.x + origin.x),
+                                                    static_cast<float>(at.y * scale.y + origin.y));
+            }
+        ASSERT_EQ(tracker_.start(lens, {listed(0, poster(7))}), ARHOST_STATUS_OK) << tracker_.log();
+        for (const cv::Point2d place : {cv::Point2d(420, 300), {230, 190}, {600, 440}}) {
+            const Quad flat_corners = moved({cv::Point2d(0, 10), {150, 0}, {160, 210}, {5, 190}}, place.x, place.y);
+            cv::Mat flat(800, 1000, CV_8UC1, cv::Scalar(110)), frame;
+            draw(poster(7), flat_corners, flat);
+            cv::remap(flat, frame, map, cv::noArray(), cv::INTER_LINEAR);
+            add_sensor(frame, 1);
+            std::vector<cv::Point2d> projected;
+            std::vector<cv::Point3d> rays;
+            for (const cv::Point2d &corner : flat_corners)
+                rays.emplace_back((corner.x - origin.x) / scale.x, (corner.y - origin.y) / scale.y, 1);
+            if (is_fisheye)
+                cv::fisheye::projectPoints(rays, projected, cv::Vec3d(), cv::Vec3d(), matrix, coefficients);
+            else
+                cv::projectPoints(rays, cv::Vec3d(), cv::Vec3d(), matrix, coefficients, projected);
+            Quad truth;
+            std::ranges::copy(projected, truth.begin());
+            for (const bool everywhere : {true, false}) {
+                const auto seen = tracker_.track(GreyFrame(frame), {expected_at(0, moved(truth, 3, -2))}, everywhere);
+                ASSERT_EQ(seen.size(), 1u) << distortion << ' ' << place << ' ' << everywhere;
+                EXPECT_LT(mean_error_px(seen[0], truth), 0.3) << distortion << ' ' << place << ' ' << everywhere;
+            }
+        }
+    }
 }
 
 TEST_F(ImageTracker, FindsAPictureThatIsNotWhereItIsExpected) {
