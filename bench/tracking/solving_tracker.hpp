@@ -28,8 +28,9 @@ class SolvingTracker {
 public:
     SolvingTracker(const std::string &plugin, const arhost_intrinsics &camera,
                    const std::vector<test::Listed> &listed,
-                   const worker::TargetSolver::Settings &settings = {default_full_search_every})
-        : tracker_(plugin), solver_(camera, targets_of(listed), settings), targets_(listed.size()) {
+                   const worker::TargetSolver::Settings &settings = {default_full_search_every},
+                   const test::Options &options = {})
+        : tracker_(plugin, options), solver_(camera, targets_of(listed), settings), targets_(listed.size()) {
         if (tracker_.created() != ARHOST_STATUS_OK || tracker_.start(camera, listed) != ARHOST_STATUS_OK)
             throw std::runtime_error(tracker_.log());
     }

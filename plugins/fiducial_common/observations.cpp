@@ -32,13 +32,6 @@ bool contains(const arhost_observation &seen, cv::Point2d pixel) {
     return true;
 }
 
-bool are_of_one_print(const arhost_observation &a, const arhost_observation &b) {
-    const auto centre = [](const arhost_observation &seen) {
-        return (corner(seen, 0) + corner(seen, 1) + corner(seen, 2) + corner(seen, 3)) / 4;
-    };
-    return a.family == b.family && a.id == b.id && (contains(a, centre(b)) || contains(b, centre(a)));
-}
-
 std::array<double, 8> place(const arhost_observation &seen) {
     std::array<double, 8> numbers;
     std::copy_n(&seen.corners_px[0][0], numbers.size(), numbers.begin());
@@ -120,6 +113,13 @@ std::vector<Family> families_of(const arhost_tracker_setup &setup,
                    setup.families[twin->second] + "; both are names of the same family");
     }
     return families;
+}
+
+bool are_of_one_print(const arhost_observation &a, const arhost_observation &b) {
+    const auto centre = [](const arhost_observation &seen) {
+        return (corner(seen, 0) + corner(seen, 1) + corner(seen, 2) + corner(seen, 3)) / 4;
+    };
+    return a.family == b.family && a.id == b.id && (contains(a, centre(b)) || contains(b, centre(a)));
 }
 
 void report(std::vector<arhost_observation> seen, Observations &observations) {

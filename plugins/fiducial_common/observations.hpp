@@ -67,10 +67,13 @@ void reject_prints_without_ids(std::string_view family, std::string_view tracker
 std::vector<Family> families_of(const arhost_tracker_setup &setup,
                                 const std::function<int(const std::string &name)> &id_count);
 
+// Returns whether two observations are of the same marker and overlap.
+bool are_of_one_print(const arhost_observation &a, const arhost_observation &b);
+
 // Reports what was seen, by family, id and place, so the order does not depend on the detector's threads. Leaves out
-// corners that are not those of a convex quadrilateral seen from the front. Detections of the same marker that
-// overlap are of the same print: reports only the one with the fewest wrong bits, then one with refined corners (a
-// detector may also find the inside of the border), then the one with the highest decision margin.
+// corners that are not those of a convex quadrilateral seen from the front. Of detections that are of one print,
+// reports only the one with the fewest wrong bits, then one with refined corners (a detector may also find the inside
+// of the border), then the one with the highest decision margin.
 void report(std::vector<arhost_observation> seen, Observations &observations);
 
 } // namespace arhost::fiducial

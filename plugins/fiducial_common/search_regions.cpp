@@ -87,21 +87,35 @@ SearchRegions::SearchRegions(const arhost_tracker_setup &setup,
         markers_.push_back({marker.id, marker.family, marker.target, traits.at(marker.family)});
 }
 
-Seen SearchRegions::search(const arhost_track_request &request, const RegionLimits &limits,
-                           std::span<const Pass> passes, const Verify &verify) const {
-    std::vector<arhost_observation> verified;
-    if (verify && !request.search_everywhere)
+Verified SearchRegions::verified(const arhost_track_request &request, const Verify &verify) const {
+    const auto verify_all = [this, &request, &verify] {
+        std::vector<arhost_observation> verified;
         for (const arhost_expected_marker &expected : elements(request.expected, request.expected_count)) {
             const Marker &marker = markers_.at(expected.marker);
             if (const auto one = verify(expected, marker.id, marker.family))
                 verified.push_back(*one);
         }
+        return verified;
+    };
+    if (request.expected_count == 0)
+        return {};
+    // If no thread can be started, the caller of get() verifies them.
+    const std::launch by_any_thread = std::launch::async | std::launch::deferred;
+    return std::async(request.search_everywhere ? by_any_thread : std::launch::deferred, verify_all).share();
+}
+
+Seen SearchRegions::search(const arhost_track_request &request, const RegionLimits &limits,
+                           std::span<const Pass> passes, const Verified &verified) const {
     const cv::Rect whole = whole_of(request);
     Seen seen;
     for (const Pass &pass : passes)
-        seen.add(detected(pass.detect, of(request, limits, pass.family, verified)));
-    seen.candidates += verified.size();
-    seen.markers.insert(seen.markers.end(), verified.begin(), verified.end());
+        seen.add(detected(pass.detect, request.search_everywhere
+                                           ? std::vector{whole}
+                                           : of(request, limits, pass.family, markers_of(verified))));
+    const std::span<const arhost_observation> known = markers_of(verified);
+    if (!request.search_everywhere)
+        seen.candidates += known.size();
+    seen.markers.insert(seen.markers.end(), known.begin(), known.end());
 
     seen.add(look_closer(passes, missed_markers(seen.markers), [&](const CloserLook &look, const Indices &wanted) {
         std::vector<cv::Rect> regions = around_expected(

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <future>
 #include <optional>
 #include <set>
 #include <span>
@@ -60,18 +61,30 @@ struct FamilyTraits {
 using Verify = std::function<std::optional<arhost_observation>(const arhost_expected_marker &expected,
                                                                std::int32_t id, std::uint32_t family)>;
 
+// The expected markers that were verified. Not valid: there are none.
+using Verified = std::shared_future<std::vector<arhost_observation>>;
+
+// Returns the verified markers when they are ready.
+inline std::span<const arhost_observation> markers_of(const Verified &verified) {
+    return verified.valid() ? verified.get() : std::span<const arhost_observation>();
+}
+
 // Derives rectangles from the markers that a request expects, and searches them.
 class SearchRegions {
 public:
     SearchRegions(const arhost_tracker_setup &setup,
                   const std::function<FamilyTraits(const std::string &family)> &traits_of);
 
-    // Returns the expected markers that `verify` confirms and what the passes detect where the others are expected,
-    // and, if a target is not there, the other markers that they detect in the whole frame. For targets that are
-    // missed, the passes take their closer looks where these are expected, and, if everything is to be searched, in
-    // the whole frame, or in tile_of() if they are slow. A marker may be in the result twice.
+    // Verifies the expected markers. If everything is to be searched, another thread does so, because detection does
+    // not use all processors all the time. `request`, `verify` and what it uses must outlive the result.
+    Verified verified(const arhost_track_request &request, const Verify &verify) const;
+
+    // Returns the verified markers and what the passes detect where the others are expected, and, if a target is not
+    // there, the other markers that they detect in the whole frame. For targets that are missed, the passes take
+    // their closer looks where these are expected, and, if everything is to be searched, in the whole frame, or in
+    // tile_of() if they are slow. A marker may be in the result twice.
     Seen search(const arhost_track_request &request, const RegionLimits &limits, std::span<const Pass> passes,
-                const Verify &verify = {}) const;
+                const Verified &verified = {}) const;
 
     // Returns rectangles that do not overlap and contain all expected markers, or those of `family`, except those
     // that `seen` has. They are the whole frame if the request says so, or if they would cover most of it.

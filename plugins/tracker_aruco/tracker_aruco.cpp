@@ -21,6 +21,7 @@
 #include <fstream>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -314,11 +315,17 @@ public:
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
         const cv::Mat grey = arhost::fiducial::grey_of(*request.frame);
+        const arhost_transfer transfer = request.frame->format->transfer;
+        const arhost::fiducial::Verify verify = [&](const arhost_expected_marker &expected, std::int32_t id,
+                                                    std::uint32_t family) {
+            return verify_one(grey, transfer, expected, id, family);
+        };
+        const arhost::fiducial::Verified verified = regions_->verified(request, verify);
         std::vector<arhost::fiducial::Pass> passes;
         for (const Detectable &detectable : detectables_) {
             const auto detection = [&](const Look &look) {
                 return [&, look](const cv::Rect &region, auto &seen) {
-                    observe(grey, request.frame->format->transfer, region, look, detectable, seen);
+                    observe(grey, transfer, region, look, detectable, verified, seen);
                 };
             };
             arhost::fiducial::Pass &pass =
@@ -326,10 +333,7 @@ public:
             if (looks_closer_)
                 pass.closer_looks = {{detection(smoothed), false}, {detection(enlarged), true}};
         }
-        arhost::fiducial::Seen seen = regions_->search(
-            request, {}, passes, [&](const arhost_expected_marker &expected, std::int32_t id, std::uint32_t family) {
-                return verified(grey, request.frame->format->transfer, expected, id, family);
-            });
+        arhost::fiducial::Seen seen = regions_->search(request, {}, passes, verified);
         others_->frame(grey, seen.markers);
         observations.set_candidate_count(seen.candidates);
         arhost::fiducial::report(std::move(seen.markers), observations);
@@ -343,9 +347,10 @@ public:
     }
 
 private:
-    // Adds the markers of a dictionary in a region of the frame to `seen`.
+    // Adds the markers of a dictionary in a region of the frame to `seen`, except the verified ones.
     void observe(const cv::Mat &grey, arhost_transfer transfer, const cv::Rect &region, const Look &look,
-                 const Detectable &detectable, arhost::fiducial::Seen &seen) const {
+                 const Detectable &detectable, const arhost::fiducial::Verified &verified,
+                 arhost::fiducial::Seen &seen) const {
         const cv::aruco::Dictionary &table = detectable.dictionary.table;
         cv::aruco::DetectorParameters parameters = detectable.parameters;
         parameters.adaptiveThreshConstant = look.threshold.value_or(parameters.adaptiveThreshConstant);
@@ -356,6 +361,7 @@ private:
         const cv::Mat pixels = look.prepared(grey(region));
         const arhost::aruco::DetectedMarkers found = arhost::aruco::detect(pixels, table, parameters);
         seen.candidates += found.ids.size() + found.rejected.size();
+        const std::span<const arhost_observation> known = arhost::fiducial::markers_of(verified);
         const cv::Point2d half(0.5, 0.5), shift = half - cv::Point2d(centre_shift_px_, centre_shift_px_),
                                           origin = cv::Point2d(region.tl()) - half;
         std::vector<std::optional<arhost_observation>> observations(found.ids.size());
@@ -367,6 +373,13 @@ private:
                 const cv::Point2d at =
                     found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner];
                 corners.corners_px[corner] = (at + shift) / look.scale + origin;
+            }
+            if (is_listed) {
+                const arhost_observation rough = detectable.family.observation(id, corners);
+                if (std::ranges::any_of(known, [&](const arhost_observation &one) {
+                        return arhost::fiducial::are_of_one_print(one, rough);
+                    }))
+                    return;
             }
             if (refine_edges_ && is_listed)
                 corners = refined(grey, transfer, detectable.dictionary, id, corners.corners_px).value_or(corners);
@@ -387,9 +400,9 @@ private:
     }
 
     // Returns an expected marker if it can be read where it is expected, without detection.
-    std::optional<arhost_observation> verified(const cv::Mat &grey, arhost_transfer transfer,
-                                               const arhost_expected_marker &expected, std::int32_t id,
-                                               std::uint32_t family) const {
+    std::optional<arhost_observation> verify_one(const cv::Mat &grey, arhost_transfer transfer,
+                                                 const arhost_expected_marker &expected, std::int32_t id,
+                                                 std::uint32_t family) const {
         const auto found =
             std::ranges::find_if(detectables_, [&](const Detectable &one) { return one.family.lists(id, family); });
         if (!refine_edges_ || found == detectables_.end())
@@ -447,7 +460,7 @@ private:
             detectable.parameters.errorCorrectionRate = 0;
             arhost::fiducial::Seen seen;
             constexpr arhost_transfer any = ARHOST_TRANSFER_LINEAR; // only listed markers are refined, which need it
-            observe(grey, any, {0, 0, grey.cols, grey.rows}, {}, detectable, seen);
+            observe(grey, any, {0, 0, grey.cols, grey.rows}, {}, detectable, {}, seen);
             std::set<int> ids;
             for (const arhost_observation &one : seen.markers)
                 if (std::ranges::none_of(detectables_, [&](const Detectable &used) {

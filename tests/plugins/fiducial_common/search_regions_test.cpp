@@ -192,6 +192,34 @@ TEST_F(Regions, AreSearchedByEachPassAndThenTheWholeFrameIfATargetIsMissed) {
     EXPECT_THAT(searched, ElementsAre(near_first, near_second, std::pair(1, whole_frame), std::pair(2, whole_frame)));
 }
 
+TEST_F(Regions, OfVerifiedMarkersAreSearchedOnlyIfEverythingIs) {
+    expect(0, 100, 150);
+    expect(3, 300, 150);
+    const arhost::fiducial::Verify verify = [&](const arhost_expected_marker &expected, std::int32_t id,
+                                                std::uint32_t family) {
+        EXPECT_EQ(expected.marker, static_cast<std::uint32_t>(id));
+        return id == 3 ? std::optional(seen(id, family)) : std::nullopt;
+    };
+    for (const bool everywhere : {false, true}) {
+        request_.search_everywhere = everywhere;
+        const auto verified = regions_->verified(request_, verify);
+        std::vector<cv::Rect> searched;
+        const Pass pass{nullptr, [&](const cv::Rect &region, auto &all) {
+                            searched.push_back(region);
+                            all.candidates += 1;
+                            EXPECT_EQ(arhost::fiducial::markers_of(verified).size(), 1u);
+                            all.markers.push_back(seen(0));
+                        }};
+        const auto found = regions_->search(request_, {}, {&pass, 1}, verified);
+        EXPECT_THAT(searched, ElementsAre(everywhere ? whole_frame : cv::Rect(75, 125, 51, 51)));
+        std::vector<int> ids;
+        for (const arhost_observation &one : found.markers)
+            ids.push_back(one.id);
+        EXPECT_THAT(ids, UnorderedElementsAre(0, 3));
+        EXPECT_EQ(found.candidates, 2u);
+    }
+}
+
 // A pass that sees marker 0 and has a fast and a slow closer look.
 class CloserLooks : public Regions {
 protected:

@@ -105,14 +105,15 @@ TEST_P(ArucoDictionary, IsReportedInTheSameWayWhereverAndHoweverItIsExpected) {
     const cv::Point2d cell_px = (corners[1] - corners[0]) / print_of(dictionary, 21).corner_cells;
     for (const std::uint32_t marker : {0U, 1U}) // 1: where it is, marker 7 is expected
         for (const double cells : {0.0, 0.3, 0.6, 1.5})
-            for (const int turn : {0, 1, 2, 3}) {
+            for (const auto &[turn, everywhere] :
+                 {std::pair(0, false), {1, false}, {2, false}, {3, false}, {0, true}, {1, true}}) {
                 auto expected_corners = corners;
                 for (int i = 0; i < 4; ++i)
                     expected_corners[i] = corners[(i + turn) % 4] + cells * cell_px;
                 auto expected = expected_at(marker, expected_corners);
                 expected.margin_px = 2 * cv::norm(cell_px);
-                const auto seen = tracker.track(frame, {expected}, false);
-                ASSERT_EQ(seen.size(), 1u) << marker << ' ' << cells << ' ' << turn;
+                const auto seen = tracker.track(frame, {expected}, everywhere);
+                ASSERT_EQ(seen.size(), 1u) << marker << ' ' << cells << ' ' << turn << ' ' << everywhere;
                 EXPECT_EQ(seen[0].id, 21);
                 EXPECT_EQ(seen[0].hamming, 0u);
                 EXPECT_LT(greatest_distance_px(seen[0], corners), 0.1) << marker << ' ' << cells << ' ' << turn;
