@@ -17,10 +17,12 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
+#include <algorithm>
 #include <charconv>
 #include <csignal>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <unistd.h>
@@ -161,6 +163,7 @@ struct Observations {
     arhost_intrinsics camera;
     std::vector<Frame> frames;
     std::map<int, double> sides_mm; // of the markers that were seen
+    std::set<int> unseen;           // of the markers that --ids lists
 };
 
 Observations observe(const Arguments &arguments, const Family &family, const Sides &sides, Progress &progress) {
@@ -176,6 +179,8 @@ Observations observe(const Arguments &arguments, const Family &family, const Sid
                                 static_cast<std::uint32_t>(picture->grey.rows)};
         if (!detect) {
             result.camera = camera::read_calibration(arguments.camera, size);
+            if (const std::string doubt = camera::doubt_about_focal_length(result.camera); !doubt.empty())
+                warn(arguments.camera + ": " + doubt);
             detect = detector_of(family, ids, result.camera);
         } else if (size != camera::Size{result.camera.width, result.camera.height}) {
             throw std::runtime_error(fmt::format("{}: is {}×{} px, but the images before it are {}×{} px",
@@ -199,6 +204,8 @@ Observations observe(const Arguments &arguments, const Family &family, const Sid
     if (result.sides_mm.empty())
         throw std::runtime_error(
             fmt::format("none of the {} frames shows a marker of {}", result.frames.size(), family.name));
+    std::ranges::copy_if(ids, std::inserter(result.unseen, result.unseen.end()),
+                         [&](int id) { return !result.sides_mm.contains(id); });
     return result;
 }
 
@@ -257,6 +264,8 @@ void run(const Arguments &arguments, int signals) {
     std::string refused;
     for (const Refusal &refusal : map.refused)
         refused += fmt::format("{}marker {} {}", refused.empty() ? "" : "; ", refusal.id, refusal.reason);
+    for (const int id : seen.unseen)
+        refused += fmt::format("{}marker {} was not seen", refused.empty() ? "" : "; ", id);
     if (map.markers.size() < 2)
         throw std::runtime_error("a map needs at least two markers in the same frames" +
                                  (refused.empty() ? "" : ": " + refused));

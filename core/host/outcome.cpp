@@ -52,8 +52,18 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
                         configuration.raytracer ? ", so no frame has an overlay" : "", describe_targets(targets),
                         seen_instead(statistics, targets), how_to_compare(targets)),
             true};
-    if (configuration.mode != run_config::Mode::live || !configuration.raytracer || statistics.composited == 0 ||
-        statistics.augmented > 0)
+    if (!configuration.raytracer || statistics.composited == 0 || statistics.augmented > 0)
+        return std::nullopt;
+    if (poses_from_tracker && !targets.empty() && !statistics.targets.contains(targets.front().name)) {
+        const std::vector world{targets.front()};
+        return Problem{"tracker",
+                       fmt::format("no frame has an overlay, because the first target, the world of the scene, was "
+                                   "not seen in any of {} frames: {}{}{}",
+                                   statistics.tracker_results, describe_targets(world),
+                                   seen_instead(statistics, world), how_to_compare(world)),
+                       true};
+    }
+    if (configuration.mode != run_config::Mode::live)
         return std::nullopt;
     std::string why;
     for (const auto &[stage, frames] : statistics.skipped)
@@ -75,6 +85,22 @@ std::string unseen_targets(const run_config::Configuration &configuration, const
         return {};
     return fmt::format("never seen in {} frames: {}{}", statistics.tracker_results, describe_targets(unseen),
                        seen_instead(statistics, unseen));
+}
+
+std::string misfitting_maps(const Statistics &statistics, const std::vector<ipc::Target> &targets) {
+    constexpr double max_reprojection_px = 3; // imprecise calibrations and layouts stay below it
+    std::string text;
+    for (const ipc::Target &target : targets) {
+        const auto seen = statistics.targets.find(target.name);
+        if (target.markers.size() > 1 && seen != statistics.targets.end() &&
+            seen->second.mean_reprojection_px > max_reprojection_px)
+            text += fmt::format("{}'{}' (mean reprojection error {:.1f} px)", text.empty() ? "" : ", ", target.name,
+                                seen->second.mean_reprojection_px);
+    }
+    return text.empty() ? ""
+                        : "the map does not fit the prints: " + text +
+                              "; check its places and sides, and the calibration of the camera ('arhost map' learns "
+                              "a map)";
 }
 
 std::string marker_name(const ipc::TargetMarker &marker) {
@@ -120,7 +146,7 @@ std::string seen_instead(const Statistics &statistics, const std::vector<ipc::Ta
         text = search.candidates == 0
                    ? std::string("; it found no quadrilaterals: check the light, the focus and the size of the print "
                                  "in the image")
-                   : fmt::format("; of {:.1f} quadrilaterals per frame, none is a marker that it knows",
+                   : fmt::format("; of {:.1f} quadrilaterals per frame, none is a marker of their families",
                                  static_cast<double>(search.candidates) /
                                      static_cast<double>(search.frames_with_candidate_count));
     return text;

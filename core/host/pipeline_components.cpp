@@ -35,22 +35,26 @@ std::shared_ptr<SlotPool> pool_of(const Component &component) {
     return component.output() ? std::make_shared<SlotPool>(component.output()) : nullptr;
 }
 
-// Returns the node of the target that a message of the tracker quotes first: by its name, or by the family or the
-// file of a marker. Later quotes may be keys, such as 'image', that other targets have as their family.
+// Returns the key of the target that a message of the tracker quotes first: by its name, or by the family or the file
+// of a marker. Later quotes may be keys, such as 'image', that other targets have as their family.
 std::optional<yaml::Node> quoted_target(const std::string &message, const run_config::TrackerConfiguration &tracker) {
     std::optional<yaml::Node> quoted;
     std::size_t first = std::string::npos;
     for (std::size_t i = 0; i < tracker.targets.size(); ++i) {
-        const auto look_for = [&](const std::string &text) {
-            if (const std::size_t at = message.find("'" + text + "'"); !text.empty() && at < first) {
-                first = at;
-                quoted = tracker.target_nodes[i];
-            }
+        const auto look_for = [&](const std::string &text, const auto &...keys) {
+            const std::size_t at = message.find("'" + text + "'");
+            if (text.empty() || at >= first)
+                return;
+            first = at;
+            quoted = tracker.target_nodes[i];
+            for (const char *key : {keys...})
+                if (const auto value = tracker.target_nodes[i].find(key))
+                    quoted = value;
         };
-        look_for(tracker.targets[i].name);
+        look_for(tracker.targets[i].name, "marker", "ids", "map", "pattern", "image");
         for (const TargetMarker &marker : tracker.targets[i].markers) {
-            look_for(marker.family);
-            look_for(marker.file);
+            look_for(marker.family, "family", "dictionary", "map");
+            look_for(marker.file, "pattern", "image", "map");
         }
     }
     return quoted;

@@ -78,9 +78,14 @@ std::string parse_family(const yaml::Node &map) {
     return name;
 }
 
-// The name under which two names of a family are the same: AprilTag's families are also dictionaries of OpenCV.
+// The name under which two names of a family are the same: AprilTag's families are also dictionaries of OpenCV, and
+// DICT_6X6_50 has the first markers of DICT_6X6_250.
 std::string canonical(const std::string &family) {
-    constexpr std::string_view prefix = "DICT_APRILTAG_";
+    constexpr std::string_view prefix = "DICT_APRILTAG_",
+                               nested[] = {"DICT_4X4_", "DICT_5X5_", "DICT_6X6_", "DICT_7X7_"};
+    for (const std::string_view series : nested)
+        if (family.starts_with(series))
+            return std::string(series);
     return family.starts_with(prefix) ? "tag" + family.substr(prefix.size()) : family;
 }
 
@@ -147,7 +152,8 @@ std::vector<std::int32_t> parse_ids(const yaml::Node &node) {
             text = text.substr(0, text.find_last_not_of(' ') + 1);
             const auto range = parse_range(text);
             if (!range)
-                item.fail("must be ids of 0 to " + std::to_string(max_id) + " such as 0-35 or [0-3, 7], but is '" +
+                item.fail("must be ids of 0 to " + std::to_string(max_id) +
+                          " in ascending order, such as 0-35 or [0-3, 7], but is '" +
                           base::printable(item.text(), 200) + "'");
             if (const std::size_t count =
                     static_cast<std::size_t>(range->second) - static_cast<std::size_t>(range->first) + 1;
@@ -321,22 +327,30 @@ bool overlap(const Corners &a, const Corners &b) {
 class Owners {
 public:
     void add(const yaml::Node &node, const Target &target) {
-        if (const auto [other, is_new] = names_.try_emplace(target.name, node.where()); !is_new)
-            node.fail("the name '" + target.name + "' is also that of another target (" + other->second +
-                      "); give each its own name");
         for (const TargetMarker &marker : target.markers) {
             families_.insert(marker.family);
+            std::error_code ignored;
+            const std::string file = marker.file.empty() ? "" : fs::canonical(marker.file, ignored).string();
+            if (const auto [other, is_new] = prints_.try_emplace({file, marker.pattern_ratio}, target.name);
+                !file.empty() && !is_new)
+                node.fail("the print '" + base::printable(marker.file) + "' also belongs to the target '" +
+                          other->second + "'; remove one of them");
             if (const auto [other, is_new] = markers_.try_emplace({canonical(marker.family), marker.id}, target.name);
                 !is_new)
                 node.fail("the marker " + marker_name(marker.family, marker.id) + " also belongs to the target '" +
                           other->second + "'; remove one of them");
         }
+        if (const auto [other, is_new] = names_.try_emplace(target.name, node.where()); !is_new)
+            node.fail("the name '" + target.name + "' is also that of another target (" + other->second +
+                      "); give each its own name");
     }
     std::size_t marker_count() const { return markers_.size(); }
     std::size_t family_count() const { return families_.size(); }
 
 private:
     std::map<std::string, std::string> names_; // with the places of the targets
+    std::map<std::pair<std::string, double>, std::string>
+        prints_; // files and pattern ratios, with the names of targets
     std::map<std::pair<std::string, std::int32_t>, std::string> markers_;
     std::set<std::string> families_;
 };

@@ -69,18 +69,19 @@ const std::vector<Case> cases = {
     {"UnknownFamily",
      replaced(replaced(good, "tracker_counter", "tracker_aruco"), "family: tag36h11", "family: tag36h12"),
      small_scene,
-     {"run.yaml:4:", "tracker.targets[0]: unknown dictionary 'tag36h12': tracker_aruco has tag36h11, "}},
+     {"run.yaml:4:", "tracker.targets[0].family: unknown dictionary 'tag36h12': tracker_aruco has tag36h11, "}},
     {"IdBeyondItsFamily",
      replaced(replaced(good, "tracker_counter", "tracker_aruco"), "[{marker: 3,",
               "[{name: cup, marker: 3, family: tag36h11, side_mm: 60}, {ids: 580-590,"),
      small_scene,
-     {"run.yaml:4:", "tracker.targets[1]: target 'tag36h11-587': marker id 587 is not in tag36h11, whose ids are "
+     {"run.yaml:4:", "tracker.targets[1].ids: target 'tag36h11-587': marker id 587 is not in tag36h11, whose ids are "
                      "0 to 586"}},
     {"FamilyOfAnotherTracker", // the message also quotes 'image', the family of the first target
      replaced(replaced(good, "tracker_counter", "tracker_image"), "[{marker: 3,",
               "[{name: cover, image: f-0001.png, width_mm: 60}, {marker: 3,"),
      small_scene,
-     {"run.yaml:4:", "tracker.targets[1]: unknown family 'tag36h11': tracker_image finds targets with an 'image'"}},
+     {"run.yaml:4:",
+      "tracker.targets[1].family: unknown family 'tag36h11': tracker_image finds targets with an 'image'"}},
     {"MarkersInsteadOfTargets",
      replaced(good, "targets: [{marker: 3, family: tag36h11,", "markers: [{id: 3,"),
      small_scene,

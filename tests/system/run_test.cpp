@@ -646,7 +646,7 @@ TEST(Run, TellsWhetherTheTrackerHasFoundQuadrilaterals) {
         EXPECT_EQ(run.run(), 1);
         return run.output();
     };
-    const std::string known = " quadrilaterals per frame, none is a marker that it knows; compare",
+    const std::string known = " quadrilaterals per frame, none is a marker of their families; compare",
                       none = "it found no quadrilaterals: check the light";
     for (const std::string tracker : {"tracker_apriltag", "tracker_aruco"}) {
         const std::string target = "{marker: 7, family: tag25h9, side_mm: 80}";

@@ -64,12 +64,42 @@ TEST_F(Outcome, ReportsATrackerThatFailsInEveryFrame) {
     ASSERT_TRUE(problem());
     EXPECT_FALSE(problem()->is_missing_target);
     EXPECT_THAT(problem()->text, HasSubstr("failed in every frame"));
-    statistics.tracker_results = statistics.tracked = 1;
+    statistics.tracker_results = statistics.tracked = statistics.augmented = 1;
     EXPECT_FALSE(problem());
+}
+
+TEST_F(Outcome, ReportsThatTheFirstTargetWasNeverSeen) {
+    statistics.augmented = 0;
+    statistics.targets["cup"].frames = 20;
+    statistics.strangers = {{"D 24", 29}};
+    for (const auto mode : {run_config::Mode::lockstep, run_config::Mode::live}) {
+        configuration->mode = mode;
+        ASSERT_TRUE(problem());
+        EXPECT_TRUE(problem()->is_missing_target);
+        EXPECT_EQ(problem()->text,
+                  "no frame has an overlay, because the first target, the world of the scene, was "
+                  "not seen in any of 30 frames: 'desk' (D 23); it saw D 24 (29 frames); compare the "
+                  "numbers and the family with the print");
+    }
+    configuration->raytracer.reset();
+    EXPECT_FALSE(problem()) << "no overlay was requested";
+}
+
+TEST_F(Outcome, NamesMapsThatDoNotFit) {
+    std::vector<ipc::Target> targets{{"board", {{0, "D", {}}, {1, "D", {}}}, ""}, {"cup", {{7, "D", {}}}, ""}};
+    EXPECT_EQ(misfitting_maps(statistics, targets), "");
+    for (const char *name : {"board", "cup"})
+        statistics.targets[name].mean_reprojection_px = 47.14;
+    EXPECT_THAT(misfitting_maps(statistics, targets),
+                testing::StartsWith("the map does not fit the prints: 'board' (mean reprojection error 47.1 px); "
+                                    "check"));
+    statistics.targets["board"].mean_reprojection_px = 2.9;
+    EXPECT_EQ(misfitting_maps(statistics, targets), "");
 }
 
 TEST_F(Outcome, ReportsThatEveryOverlayWasLateInModeLive) {
     statistics.augmented = 0;
+    statistics.targets["desk"].frames = 20;
     statistics.skipped["latency"] = 27;
     EXPECT_FALSE(problem()) << "mode lockstep waits";
     configuration->mode = run_config::Mode::live;
@@ -115,7 +145,8 @@ TEST_F(Outcome, TellsWhetherThereWereQuadrilateralsIfNothingWasSeen) {
     statistics.search.frames_with_candidate_count = 30;
     EXPECT_THAT(seen_instead(statistics, targets), testing::StartsWith("; it found no quadrilaterals"));
     statistics.search.candidates = 75;
-    EXPECT_EQ(seen_instead(statistics, targets), "; of 2.5 quadrilaterals per frame, none is a marker that it knows");
+    EXPECT_EQ(seen_instead(statistics, targets),
+              "; of 2.5 quadrilaterals per frame, none is a marker of their families");
     statistics.strangers = {{"D 8", 30}};
     EXPECT_EQ(seen_instead(statistics, targets), "; it saw D 8 (30 frames)");
 }

@@ -131,9 +131,10 @@ TEST_F(TargetsTest, AMultiMarkerFileIsAMap) {
         return error_in("[{name: board, map: marker.dat" + more + "}]");
     };
     write("hiro.patt", "");
+    write("one.patt", "");
     write("marker.dat", "2\nhiro.patt\n" + upright + "07\n" + lying);
     const auto tracker =
-        parse("[{name: one, pattern: hiro.patt, side_mm: 9}, {name: board, map: marker.dat, family: artoolkit-3x3}]");
+        parse("[{name: one, pattern: one.patt, side_mm: 9}, {name: board, map: marker.dat, family: artoolkit-3x3}]");
     const auto &markers = tracker.targets.at(1).markers;
     ASSERT_EQ(markers.size(), 2u);
     EXPECT_EQ(markers[0].family, "pattern");
@@ -363,10 +364,10 @@ TEST_F(TargetsTest, RejectsInvalidIds) {
         EXPECT_THAT(error_in(std::string("[{family: f, side_mm: 80, ids: ") + ids + "}]"),
                     HasSubstr("tracker.targets[0].ids"))
             << ids;
-    EXPECT_EQ(
-        error_in("[{family: f, side_mm: 80, ids: 3-1}]"),
-        "lab.yaml:4:70: tracker.targets[0].ids: must be ids of 0 to 2147483647 such as 0-35 or [0-3, 7], but is "
-        "'3-1'");
+    EXPECT_EQ(error_in("[{family: f, side_mm: 80, ids: 3-1}]"),
+              "lab.yaml:4:70: tracker.targets[0].ids: must be ids of 0 to 2147483647 in ascending order, such as "
+              "0-35 or [0-3, 7], but is "
+              "'3-1'");
     EXPECT_THAT(error_in("[{family: f, side_mm: 80, ids: []}]"), HasSubstr("ids: must not be empty"));
     EXPECT_THAT(error_in("[{family: f, side_mm: 80, ids: 0-2147483647}]"),
                 HasSubstr("tracker.targets[0].ids: there can be at most 1024 targets"));
@@ -403,13 +404,26 @@ TEST_F(TargetsTest, RejectsATargetOrMarkerThatIsThereTwice) {
                  "80}]"),
         "lab.yaml:4:88: tracker.targets[1]: the name 'cup' is also that of another target (lab.yaml:4:40); give "
         "each its own name");
-    EXPECT_THAT(error_in("[{ids: '3,3', family: f, side_mm: 80}]"), HasSubstr("the name 'f-3' is also that of"));
+    EXPECT_THAT(error_in("[{ids: '3,3', family: f, side_mm: 80}]"),
+                HasSubstr("the marker f-3 also belongs to the target 'f-3'"));
     EXPECT_THAT(error_in("[{ids: 0-3, family: f, side_mm: 80}, {name: cup, marker: 2, family: f, side_mm: 80}]"),
                 EndsWith("tracker.targets[1]: the marker f-2 also belongs to the target 'f-2'; remove one of them"));
     EXPECT_THAT(error_in("[{marker: 2, family: tag36h11, side_mm: 80}, {marker: 2, dictionary: DICT_APRILTAG_36h11, "
                          "side_mm: 80}]"),
                 HasSubstr("also belongs to the target 'tag36h11-2'"))
         << "two names of the same family";
+    EXPECT_THAT(error_in("[{ids: 0-9, dictionary: DICT_6X6_250, side_mm: 80}, {name: cup, marker: 9, dictionary: "
+                         "DICT_6X6_50, side_mm: 40}]"),
+                EndsWith("the marker DICT_6X6_50-9 also belongs to the target 'DICT_6X6_250-9'; remove one of them"))
+        << "the smaller dictionary has the first markers of the larger one";
+    EXPECT_EQ(error_in("[{marker: 9, dictionary: DICT_6X6_250, side_mm: 80}, {marker: 9, dictionary: DICT_5X5_250, "
+                       "side_mm: 40}]"),
+              "no error");
+    write("poster.png", "");
+    EXPECT_THAT(error_in("[{name: a, image: poster.png, width_mm: 60}, {name: b, image: ./poster.png, width_mm: "
+                         "90}]"),
+                testing::AllOf(HasSubstr("tracker.targets[1]: the print '"),
+                               HasSubstr("poster.png' also belongs to the target 'a'; remove one of them")));
     write("board.map.yaml", "version: 1\nfamily: f\nmarkers: [{id: 4, side_mm: 8, position_mm: [0, 0, 0]}]\n");
     EXPECT_THAT(
         error_in("[{name: board, map: board.map.yaml}, {ids: 3-4, family: f, side_mm: 80}]"),

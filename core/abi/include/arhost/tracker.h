@@ -92,8 +92,8 @@ typedef struct arhost_observation {
 typedef int32_t arhost_target_state;
 enum {
     ARHOST_TARGET_DETECTED = 1,  /* seen in this frame */
-    ARHOST_TARGET_PREDICTED = 2, /* the pose comes from a motion model: smoothed if the target was seen in this frame
-                                    (age_frames 0), extrapolated otherwise */
+    ARHOST_TARGET_PREDICTED = 2, /* the pose comes from the motion model of a tracker that reports poses: smoothed if
+                                    the target was seen in this frame (age_frames 0), extrapolated otherwise */
     ARHOST_TARGET_LOST = 3       /* not seen, pose unknown; `mt` is the last known pose */
 };
 
