@@ -288,10 +288,13 @@ Views views_of_camera(const CameraOptions &camera, const Board &board, Model mod
             last_line = line;
         }
         is_stopped = (with_window && show(frame, view, *collector, line)) || collector->is_full();
-        // The calibration may leave out views, after which more are needed.
+        // The calibration may leave out views, or fail, after which more are needed.
         if (verdict == Collector::Verdict::taken && collector->is_complete()) {
-            const Calibration calibration = calibrate(collector->views(), frames.size(), model);
-            is_stopped = is_stopped || Coverage(calibration).missing().empty();
+            try {
+                const Calibration calibration = calibrate(collector->views(), frames.size(), model);
+                is_stopped = is_stopped || Coverage(calibration).missing().empty();
+            } catch (const std::runtime_error &) { // the last calibration reports it
+            }
         }
     }
     if (with_window)

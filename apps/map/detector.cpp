@@ -71,7 +71,7 @@ public:
         const std::unique_ptr<zarray_t, decltype(&apriltag_detections_destroy)> tags(
             apriltag_detector_detect(detector_.get(), &image), apriltag_detections_destroy);
         std::vector<Candidate> candidates;
-        for (int i = 0; i < zarray_size(tags.get()); ++i) {
+        for (int i = 0; tags && i < zarray_size(tags.get()); ++i) { // null if no thread could be started
             apriltag_detection_t *tag = nullptr;
             zarray_get(tags.get(), i, &tag);
             Candidate candidate{

@@ -666,6 +666,10 @@ private:
                     origin = found;
                     wanted = given.map_from_marker;
                 }
+            if (!settings_.layout.empty() && origin == group_.end())
+                throw std::runtime_error("none of the layout's markers is in the map, so it cannot have the layout's "
+                                         "frame; add images that show them together with the others, or choose a "
+                                         "frame with --origin");
         }
         fixed_ = origin == group_.end() ? *group_.begin() : *origin;
         move_map(wanted * markers_[fixed_].map_from_marker->inverse());

@@ -36,7 +36,7 @@ struct Settings {
     std::map<int, double> sides_mm; // of all markers that may be detected; others are ignored
     std::optional<int> origin;      // the map's frame is that of this marker; default: the smallest id
     std::vector<Marker> layout;     // a first guess; the map's frame is that of the layout, unless `origin` is given
-    bool is_plane = false;          // turn the map's frame so that z = 0 is the plane that fits the centres best
+    bool is_plane = false;          // turn the map's frame so that z = 0 is the plane that fits the corners best
     // Called between steps, with a text that says what is done; may throw to stop.
     std::function<void(const std::string &)> progress = [](const std::string &) {};
 };
@@ -64,7 +64,7 @@ struct Map {
     double rms_px = 0;                  // over the corners of all views that fit
 };
 
-// Throws std::runtime_error if the marker `origin` cannot be in the map.
+// Throws std::runtime_error if the marker `origin`, or none of the layout's markers, can be in the map.
 Map learn(const std::vector<Frame> &frames, const arhost_intrinsics &camera, const Settings &settings);
 
 inline constexpr std::size_t min_views = 3; // of a marker in the map, together with others

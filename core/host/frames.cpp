@@ -36,9 +36,10 @@ const char *problem_with(const arhost_observation &observation, std::size_t fami
         for (int i = 0; i < 4; ++i)
             if (!all_finite(corners[i]))
                 return "a coordinate of an observation's corner is not finite";
-    if (!std::isfinite(observation.decision_margin) || !std::isfinite(observation.corner_sigma_px) ||
-        !std::isfinite(observation.false_positive_rate))
-        return "an observation's decision margin, corner noise or false positive rate is not finite";
+    if (!(observation.decision_margin >= 0 && std::isfinite(observation.decision_margin)) ||
+        !(observation.corner_sigma_px >= 0 && std::isfinite(observation.corner_sigma_px)) ||
+        !(observation.false_positive_rate >= 0 && observation.false_positive_rate <= 1))
+        return "an observation's decision margin, corner noise or false positive rate is out of range";
     return nullptr;
 }
 

@@ -23,8 +23,10 @@ constexpr double jump = 5;
 bool continues(const Smoothing &memory, std::int64_t capture_ns) {
     const double seconds = 1e-9 * (static_cast<double>(capture_ns) - static_cast<double>(memory.capture_ns));
     const Eigen::Map<const Eigen::Matrix3d> rotation(memory.rotation);
-    return seconds >= 0 && seconds <= max_gap_s && (rotation * rotation.transpose()).isIdentity(1e-6) &&
-           rotation.determinant() > 0;
+    const bool has_innovations = Eigen::Map<const Vector6d>(memory.innovations).allFinite() && memory.squares >= 0 &&
+                                 std::isfinite(memory.squares) && memory.weights >= 0 && memory.weights <= 1;
+    return has_innovations && seconds >= 0 && seconds <= max_gap_s &&
+           (rotation * rotation.transpose()).isIdentity(1e-6) && rotation.determinant() > 0;
 }
 
 // The weight of the newest pose, by how much the innovations agree.

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "matrix_codes.hpp"
 
+#include "observations.hpp"
+
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 
 namespace arhost::fiducial {
 namespace {
@@ -45,6 +48,7 @@ constexpr std::array families{
 };
 
 enum class Cell { black, white, bit };
+constexpr int fixed_cells = 3; // in the corners
 
 Cell cell_at(int row, int column, int side) {
     if (column == 0 && (row == 0 || row == side - 1))
@@ -65,7 +69,7 @@ const MatrixFamily *find_matrix_family(std::string_view name) {
 
 std::vector<bool> matrix_cells(const MatrixFamily &family, int id) {
     const std::uint32_t word = family.word(static_cast<std::uint32_t>(id));
-    int bits = family.side * family.side - 3;
+    int bits = family.side * family.side - fixed_cells;
     std::vector<bool> black;
     for (int row = 0; row < family.side; ++row)
         for (int column = 0; column < family.side; ++column) {
@@ -73,6 +77,10 @@ std::vector<bool> matrix_cells(const MatrixFamily &family, int id) {
             black.push_back(cell == Cell::bit ? (word >> --bits & 1) != 0 : cell == Cell::black);
         }
     return black;
+}
+
+double matrix_false_positive_rate(int side, std::uint32_t wrong_cells) {
+    return std::ldexp(false_positive_rate(side * side - fixed_cells, wrong_cells), -fixed_cells);
 }
 
 std::optional<std::uint32_t> matrix_word(const std::vector<bool> &cells, int side) {

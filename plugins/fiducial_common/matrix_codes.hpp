@@ -29,6 +29,10 @@ const MatrixFamily *find_matrix_family(std::string_view name); // nullptr if the
 // first.
 std::vector<bool> matrix_cells(const MatrixFamily &family, int id);
 
+// The probability that random cells read as one of the codes, as arhost_observation.false_positive_rate has it. Only
+// cells of the word may be wrong.
+double matrix_false_positive_rate(int side, std::uint32_t wrong_cells);
+
 // Returns the word in the cells of a print; nullopt if it is not upright.
 std::optional<std::uint32_t> matrix_word(const std::vector<bool> &cells, int side);
 

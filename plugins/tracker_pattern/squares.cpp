@@ -35,10 +35,11 @@ std::vector<Corners> find_squares(const cv::Mat &grey, double min_side_px) {
                               threshold_levels);
         cv::findContours(dark, contours, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
         for (const std::vector<cv::Point> &contour : contours) {
-            if (static_cast<double>(contour.size()) < 4 * min_side_px)
+            const double perimeter_px = cv::arcLength(contour, true); // through the centres of the outermost pixels
+            if (perimeter_px < 4 * (min_side_px - 1))
                 continue;
-            cv::approxPolyDP(contour, polygon, max_deviation * static_cast<double>(contour.size()), true);
-            if (polygon.size() != 4 || !cv::isContourConvex(polygon) || shortest_side(polygon) < min_side_px)
+            cv::approxPolyDP(contour, polygon, max_deviation * perimeter_px, true);
+            if (polygon.size() != 4 || !cv::isContourConvex(polygon) || shortest_side(polygon) < min_side_px - 1)
                 continue;
             // The outer contour of a dark region runs counter-clockwise in the image, that of a hole clockwise.
             if (cv::contourArea(polygon, true) >= 0)

@@ -149,7 +149,7 @@ private:
         for (const MatrixReader &reader : matrix_readers_)
             if (const auto match = reader.match(interior(grey, corners_px, reader.ratio(), reader.side())))
                 consider(*match, *match, arhost::fiducial::matrix_ratio, match->wrong_cells,
-                         arhost::fiducial::false_positive_rate(reader.cells() * reader.cells(), match->wrong_cells));
+                         arhost::fiducial::matrix_false_positive_rate(reader.cells(), match->wrong_cells));
         return best;
     }
 

@@ -258,6 +258,8 @@ TEST_F(MapProgram, RejectsInvalidArgumentsWithoutWritingAFile) {
     write("text.png", "text");
     write("text.avi", "text");
     write("bad.map.yaml", "version: 1\nfamily: tag36h11\nmarkers: [{id: 1}]\n");
+    write("other.map.yaml", "version: 1\nfamily: tag36h11\nmarkers: [{id: 90, side_mm: 40, position_mm: [0, 0, 0]}, "
+                            "{id: 91, side_mm: 40, position_mm: [60, 0, 0]}]\n");
     const std::string camera = " --camera camera.yaml --family tag36h11 ", side = "--side 40 ",
                       out = "-o desk.map.yaml";
     const std::string photos = "--images photo-00.png photo-01.png photo-02.png";
@@ -287,6 +289,7 @@ TEST_F(MapProgram, RejectsInvalidArgumentsWithoutWritingAFile) {
         {photos + camera + "--side 3=-40 " + out, "--side 3=-40: write a length"},
         {photos + camera + side + "--layout bad.map.yaml " + out, "bad.map.yaml:3:11: markers[0]"},
         {photos + camera + side + "--layout missing.yaml " + out, "missing.yaml"},
+        {photos + camera + side + "--layout other.map.yaml " + out, "none of the layout's markers is in the map"},
         {photos + camera + side + "--layout board.map.yaml --plane " + out,
          "--plane and --layout exclude each other"},
         {photos + camera + side + "-o ./camera.yaml", "./camera.yaml: --output would overwrite an input"},

@@ -142,10 +142,13 @@ TEST(TrackerResult, IsRejectedIfItsNumbersAreInvalid) {
     for (const auto alter : {+[](TrackerResult &r) { r.observation(1).corners_px[3][1] = nan; },
                              +[](TrackerResult &r) { r.observation(0).projected_px[0][0] = nan; }})
         expect(alter, "a coordinate of an observation's corner is not finite");
-    for (const auto alter : {+[](TrackerResult &r) { r.observation(0).decision_margin = nan; },
+    for (const auto alter : {+[](TrackerResult &r) { r.observation(0).decision_margin = -1; },
+                             +[](TrackerResult &r) { r.observation(0).corner_sigma_px = -0.1; },
+                             +[](TrackerResult &r) { r.observation(0).false_positive_rate = 1.1; },
+                             +[](TrackerResult &r) { r.observation(0).decision_margin = nan; },
                              +[](TrackerResult &r) { r.observation(1).corner_sigma_px = nan; },
                              +[](TrackerResult &r) { r.observation(1).false_positive_rate = nan; }})
-        expect(alter, "an observation's decision margin, corner noise or false positive rate is not finite");
+        expect(alter, "an observation's decision margin, corner noise or false positive rate is out of range");
 }
 
 TEST(DeviceTime, IsIgnoredIfLongerThanTheRenderCall) {

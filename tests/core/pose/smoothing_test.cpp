@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <limits>
 
 namespace arhost::pose {
 namespace {
@@ -104,6 +105,16 @@ TEST(Smoothing, IgnoresAMemoryOfOtherBytes) {
     memory.capture_ns = 0;
     const Estimate measured = measure(camera, resting);
     EXPECT_EQ(smoothed(memory, measured, 1).translation_mm, measured.camera_from_target.translation_mm);
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    for (const auto spoil : {+[](Smoothing &m, double value) { m.innovations[3] = value; },
+                             +[](Smoothing &m, double value) { m.squares = value; },
+                             +[](Smoothing &m, double value) { m.weights = value; },
+                             +[](Smoothing &m, double value) { m.translation_mm[0] = value; }}) {
+        memory = {};
+        smoothed(memory, measured, 0);
+        spoil(memory, nan);
+        EXPECT_EQ(smoothed(memory, measured, 1).translation_mm, measured.camera_from_target.translation_mm);
+    }
 }
 
 TEST(Smoothing, DependsOnlyOnMemoryAndPose) {

@@ -60,4 +60,10 @@ TEST(MatrixCodes, CanBeReadAndCorrected) {
     }
 }
 
+TEST(MatrixCodes, AreReadInRandomCellsByChance) {
+    EXPECT_DOUBLE_EQ(matrix_false_positive_rate(3, 0), 4.0 / 512);
+    EXPECT_DOUBLE_EQ(matrix_false_positive_rate(3, 1), 4 * (1 + 6) / 512.0) << "three corners are never wrong";
+    EXPECT_DOUBLE_EQ(matrix_false_positive_rate(5, 3), 4 * (1 + 22 + 231 + 1540) / 33554432.0);
+}
+
 } // namespace

@@ -131,7 +131,7 @@ typedef struct arhost_target {
     uint32_t reserved;          /* 0 */
     /* Target-to-camera matrix, column-major, OpenGL eye space: x right, y up, looking along −z; millimetres. The
      * rotation is orthonormal to 1e-9, the last row is 0 0 0 1. */
-    double mt[16];
+    double mt[16]; /* with tracker.filter, it and projected_px are filtered; the fields below are not */
     /* The second solution of the planar pose problem; all 0 if there is none. `mt` is the one that continues the
      * motion of the earlier frames, or the one with the smaller error in the first frame. */
     double mt_alternative[16];

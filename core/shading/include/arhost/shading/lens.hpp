@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // arhost/shading/lens.hpp: converts rays to pixels and pixels to rays for the lens models of arhost/camera.h, in
-// double precision. Intended for precomputing ray tables; too slow for every frame.
+// double precision. For tables, and for some points of each frame; ray() iterates, so it is too slow for each pixel.
 //
 // Axes: x right, y down, z forward (OpenCV). The image plane is z = 1.
 #pragma once
