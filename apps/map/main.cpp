@@ -209,6 +209,21 @@ Observations observe(const Arguments &arguments, const Family &family, const Sid
     return result;
 }
 
+// Returns a list such as "0-3, 7".
+std::string ranges_of(const std::set<int> &ids) {
+    std::string text;
+    for (auto first = ids.begin(); first != ids.end();) {
+        auto last = first, next = std::next(first);
+        for (; next != ids.end() && *next == *last + 1; ++next)
+            last = next;
+        text += fmt::format("{}{}", text.empty() ? "" : ", ", *first);
+        if (last != first)
+            text += fmt::format("-{}", *last);
+        first = next;
+    }
+    return text;
+}
+
 std::string table_of(const Map &map) {
     std::string text = fmt::format("{:>6} {:>8} {:>7} {:>8} {:>8} {:>9}\n", "id", "side mm", "frames", "RMS px",
                                    "± mm", "± degrees");
@@ -264,8 +279,8 @@ void run(const Arguments &arguments, int signals) {
     std::string refused;
     for (const Refusal &refusal : map.refused)
         refused += fmt::format("{}marker {} {}", refused.empty() ? "" : "; ", refusal.id, refusal.reason);
-    for (const int id : seen.unseen)
-        refused += fmt::format("{}marker {} was not seen", refused.empty() ? "" : "; ", id);
+    if (!seen.unseen.empty())
+        refused += fmt::format("{}not seen: {}", refused.empty() ? "" : "; ", ranges_of(seen.unseen));
     if (map.markers.size() < 2)
         throw std::runtime_error("a map needs at least two markers in the same frames" +
                                  (refused.empty() ? "" : ": " + refused));
@@ -316,7 +331,8 @@ int main(int argc, char **argv) {
                "Side of the markers, as trackers measure it; also IDS=MM for some of them (repeatable)")
         .type_name("MM")
         .one_value_each();
-    app.option("--ids", arguments.ids, "The markers of the map, such as 0-19,25 (default: all that are seen)")
+    app.option("--ids", arguments.ids,
+               "The markers of the map, all of which must be seen, such as 0-19,25 (default: all that are seen)")
         .type_name("IDS");
     app.option("--origin", arguments.origin, "The map's frame is that of this marker (default: the smallest id)")
         .type_name("ID")
@@ -325,7 +341,7 @@ int main(int argc, char **argv) {
     app.option("--layout", arguments.layout, "Begin with the places in this map, and keep its frame and its sides")
         .type_name("FILE");
     app.flag("--skip-unconnected", arguments.skip_unconnected,
-             "Leave out markers that were seen too rarely or not together with the others");
+             "Leave out markers that were not seen, too rarely, or not together with the others");
     app.option("-o,--output", arguments.output, "The map to write, such as desk.map.yaml")
         .type_name("FILE")
         .required();

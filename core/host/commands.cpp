@@ -516,7 +516,7 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
                     problem->component,
                     problem->text + (problem->is_missing_target ? " (--allow-no-target accepts this)" : ""));
     if (const std::string unseen = unseen_targets(configuration, statistics, pipeline.targets());
-        completed && !unseen.empty())
+        completed && !unseen.empty() && !(problem && problem->is_missing_target))
         console.log(ARHOST_SEVERITY_WARNING, "tracker", unseen);
     if (const std::string misfits = misfitting_maps(statistics, pipeline.targets()); !misfits.empty())
         console.log(ARHOST_SEVERITY_WARNING, "tracker", misfits);

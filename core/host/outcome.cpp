@@ -54,13 +54,13 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
             true};
     if (!configuration.raytracer || statistics.composited == 0 || statistics.augmented > 0)
         return std::nullopt;
-    if (poses_from_tracker && !targets.empty() && !statistics.targets.contains(targets.front().name)) {
-        const std::vector world{targets.front()};
+    if (poses_from_tracker && statistics.tracker_results > 0 && !targets.empty() &&
+        !statistics.targets.contains(targets.front().name)) {
         return Problem{"tracker",
-                       fmt::format("no frame has an overlay, because the first target, the world of the scene, was "
-                                   "not seen in any of {} frames: {}{}{}",
-                                   statistics.tracker_results, describe_targets(world),
-                                   seen_instead(statistics, world), how_to_compare(world)),
+                       fmt::format("no frame has an overlay, because '{}', the first target, is the world of the "
+                                   "scene; {}{}",
+                                   targets.front().name, unseen_targets(configuration, statistics, targets),
+                                   how_to_compare({targets.front()})),
                        true};
     }
     if (configuration.mode != run_config::Mode::live)
@@ -88,7 +88,7 @@ std::string unseen_targets(const run_config::Configuration &configuration, const
 }
 
 std::string misfitting_maps(const Statistics &statistics, const std::vector<ipc::Target> &targets) {
-    constexpr double max_reprojection_px = 3; // imprecise calibrations and layouts stay below it
+    constexpr double max_reprojection_px = 3; // errors of a usable calibration or layout are smaller
     std::string text;
     for (const ipc::Target &target : targets) {
         const auto seen = statistics.targets.find(target.name);

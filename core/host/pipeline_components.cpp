@@ -48,8 +48,10 @@ std::optional<yaml::Node> quoted_target(const std::string &message, const run_co
             first = at;
             quoted = tracker.target_nodes[i];
             for (const char *key : {keys...})
-                if (const auto value = tracker.target_nodes[i].find(key))
+                if (const auto value = tracker.target_nodes[i].find(key)) {
                     quoted = value;
+                    break;
+                }
         };
         look_for(tracker.targets[i].name, "marker", "ids", "map", "pattern", "image");
         for (const TargetMarker &marker : tracker.targets[i].markers) {

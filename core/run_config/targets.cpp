@@ -81,12 +81,14 @@ std::string parse_family(const yaml::Node &map) {
 // The name under which two names of a family are the same: AprilTag's families are also dictionaries of OpenCV, and
 // DICT_6X6_50 has the first markers of DICT_6X6_250.
 std::string canonical(const std::string &family) {
-    constexpr std::string_view prefix = "DICT_APRILTAG_",
-                               nested[] = {"DICT_4X4_", "DICT_5X5_", "DICT_6X6_", "DICT_7X7_"};
-    for (const std::string_view series : nested)
-        if (family.starts_with(series))
-            return std::string(series);
-    return family.starts_with(prefix) ? "tag" + family.substr(prefix.size()) : family;
+    constexpr std::string_view april_tag = "DICT_APRILTAG_";
+    if (family.starts_with(april_tag))
+        return "tag" + family.substr(april_tag.size());
+    for (const std::string series : {"DICT_4X4", "DICT_5X5", "DICT_6X6", "DICT_7X7"})
+        for (const char *count : {"_50", "_100", "_250", "_1000"})
+            if (family == series + count)
+                return series;
+    return family;
 }
 
 std::string marker_name(const std::string &family, std::int64_t id) {
@@ -330,11 +332,13 @@ public:
         for (const TargetMarker &marker : target.markers) {
             families_.insert(marker.family);
             std::error_code ignored;
-            const std::string file = marker.file.empty() ? "" : fs::canonical(marker.file, ignored).string();
-            if (const auto [other, is_new] = prints_.try_emplace({file, marker.pattern_ratio}, target.name);
-                !file.empty() && !is_new)
-                node.fail("the print '" + base::printable(marker.file) + "' also belongs to the target '" +
-                          other->second + "'; remove one of them");
+            const fs::path file = marker.file.empty() ? "" : fs::canonical(marker.file, ignored);
+            if (!file.empty()) {
+                const auto [other, is_new] = prints_.try_emplace({file, marker.pattern_ratio}, target.name);
+                if (!is_new)
+                    node.fail("the print '" + base::printable(marker.file) + "' also belongs to the target '" +
+                              other->second + "'; remove one of them");
+            }
             if (const auto [other, is_new] = markers_.try_emplace({canonical(marker.family), marker.id}, target.name);
                 !is_new)
                 node.fail("the marker " + marker_name(marker.family, marker.id) + " also belongs to the target '" +

@@ -29,7 +29,7 @@ const MatrixFamily *find_matrix_family(std::string_view name); // nullptr if the
 // first.
 std::vector<bool> matrix_cells(const MatrixFamily &family, int id);
 
-// The probability that random cells read as one of the codes, as arhost_observation.false_positive_rate has it. Only
+// The probability that random cells read as a certain code, as arhost_observation.false_positive_rate has it. Only
 // cells of the word may be wrong.
 double matrix_false_positive_rate(int side, std::uint32_t wrong_cells);
 

@@ -320,7 +320,7 @@ public:
                                                     std::uint32_t family) {
             return verify_one(grey, transfer, expected, id, family);
         };
-        const arhost::fiducial::Verified verified = regions_->verified(request, verify);
+        const auto verified = refine_edges_ ? regions_->verified(request, verify) : arhost::fiducial::Verified();
         std::vector<arhost::fiducial::Pass> passes;
         for (const Detectable &detectable : detectables_) {
             const auto detection = [&](const Look &look) {
@@ -405,7 +405,7 @@ private:
                                                  std::uint32_t family) const {
         const auto found =
             std::ranges::find_if(detectables_, [&](const Detectable &one) { return one.family.lists(id, family); });
-        if (!refine_edges_ || found == detectables_.end())
+        if (found == detectables_.end())
             return std::nullopt;
         Corners corners;
         for (int i = 0; i < 4; ++i)

@@ -66,17 +66,60 @@ cv::Mat normalized(const cv::Mat &grey) {
     return result;
 }
 
+// Root mean square distance from the mean.
+double spread(const std::vector<cv::Point2f> &points) {
+    cv::Scalar mean, deviation;
+    cv::meanStdDev(points, mean, deviation);
+    return std::hypot(deviation[0], deviation[1]);
+}
+
+struct Fit {
+    cv::Matx33d undistorted_from_picture;
+    std::size_t inliers;
+};
+
+// Fits a homography to undistorted pixels. `tolerance_px`: of inliers, in pixels of the frame.
+std::optional<Fit> fit(const Camera &camera, const std::vector<cv::Point2f> &on_picture,
+                       const std::vector<cv::Point2f> &in_frame, double tolerance_px) {
+    std::vector<cv::Point2f> from, pixels, to;
+    for (std::size_t i = 0; i < in_frame.size(); ++i)
+        if (const auto undistorted = camera.undistort(in_frame[i])) {
+            from.push_back(on_picture[i]);
+            pixels.push_back(in_frame[i]);
+            to.emplace_back(*undistorted);
+        }
+    if (from.size() < min_inliers)
+        return std::nullopt;
+    cv::Mat is_inlier;
+    const double scale = spread(to) / std::max(spread(pixels), 1.0); // large at the rim of a wide lens
+    const cv::Mat homography = cv::findHomography(from, to, cv::RANSAC, scale * tolerance_px, is_inlier);
+    if (homography.empty())
+        return std::nullopt;
+    const Fit fitted{cv::Matx33d(homography), static_cast<std::size_t>(cv::countNonZero(is_inlier))};
+    return fitted.inliers < min_inliers ? std::nullopt : std::optional(fitted);
+}
+
 } // namespace
 
 Camera::Camera(const arhost_intrinsics &intrinsics)
-    : lens_(intrinsics), undistorted_(static_cast<int>(intrinsics.height), static_cast<int>(intrinsics.width)) {
+    : lens_(intrinsics), grid_(static_cast<int>(intrinsics.height - 1) / step_px + 2,
+                               static_cast<int>(intrinsics.width - 1) / step_px + 2) {
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-    for (int y = 0; y < undistorted_.rows; ++y)
-        for (int x = 0; x < undistorted_.cols; ++x) {
-            const auto point = undistort(cv::Point2d(x, y));
-            undistorted_(y, x) =
+    for (int row = 0; row < grid_.rows; ++row)
+        for (int column = 0; column < grid_.cols; ++column) {
+            const auto point = undistort(cv::Point2d(column * step_px, row * step_px));
+            grid_(row, column) =
                 point ? cv::Vec2f(static_cast<float>(point->x), static_cast<float>(point->y)) : cv::Vec2f(nan, nan);
         }
+}
+
+cv::Mat Camera::undistorted(const cv::Rect &region) const {
+    constexpr double scale = 1.0 / step_px;
+    const cv::Matx23d grid_from_region(scale, 0, scale * region.x, 0, scale, scale * region.y);
+    cv::Mat pixels;
+    cv::warpAffine(grid_, pixels, grid_from_region, region.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
+                   cv::BORDER_REPLICATE);
+    return pixels;
 }
 
 std::optional<cv::Point2d> Camera::undistort(cv::Point2d pixel) const {
@@ -148,20 +191,14 @@ std::optional<Picture::Place> Picture::find(const cv::Mat &frame, const Camera &
         return std::nullopt;
     std::vector<std::vector<cv::DMatch>> matches;
     cv::BFMatcher(cv::NORM_HAMMING).knnMatch(features_.descriptors, features.descriptors, matches, 2);
-    std::vector<cv::Point2f> from, to;
+    std::vector<cv::Point2f> on_picture, in_frame;
     for (const auto &match : matches)
-        if (match.size() == 2 && match[0].distance < match_ratio * match[1].distance)
-            if (const auto at = camera.undistort(features.points[static_cast<std::size_t>(match[0].trainIdx)].pt)) {
-                from.push_back(features_.points[static_cast<std::size_t>(match[0].queryIdx)].pt);
-                to.emplace_back(*at);
-            }
-    if (from.size() < min_inliers)
-        return std::nullopt;
-    cv::Mat is_inlier;
-    const cv::Mat homography = cv::findHomography(from, to, cv::RANSAC, find_tolerance_px, is_inlier);
-    if (homography.empty() || static_cast<std::size_t>(cv::countNonZero(is_inlier)) < min_inliers)
-        return std::nullopt;
-    return align(frame, camera, cv::Matx33d(homography));
+        if (match.size() == 2 && match[0].distance < match_ratio * match[1].distance) {
+            on_picture.push_back(features_.points[static_cast<std::size_t>(match[0].queryIdx)].pt);
+            in_frame.push_back(features.points[static_cast<std::size_t>(match[0].trainIdx)].pt);
+        }
+    const auto found = fit(camera, on_picture, in_frame, find_tolerance_px);
+    return found ? align(frame, camera, found->undistorted_from_picture) : std::nullopt;
 }
 
 std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const Camera &camera,
@@ -182,13 +219,13 @@ std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const Camera 
     constexpr int repetitions = 2, window_px = 15, levels = 2, margin_px = 24;
     Place place{};
     const std::vector<cv::Point2f> corners = own_corners();
-    // Returns the pixels of the frame; empty if the lens does not show one of the points.
-    const auto in_frame = [&](const std::vector<cv::Point2f> &points) {
+    // Returns where the lens shows points of the picture. Leaves out those that it does not show.
+    const auto shown = [&](const std::vector<cv::Point2f> &points) {
         std::vector<cv::Point2d> pixels;
         for (const cv::Point2f &point : points)
             if (const auto pixel = camera.distort(transformed(undistorted_from_picture, point)))
                 pixels.push_back(*pixel);
-        return pixels.size() == points.size() ? pixels : std::vector<cv::Point2d>();
+        return pixels;
     };
     std::vector<cv::Point2f> outline; // with points between the corners, as a lens bends edges
     for (std::size_t i = 0; i < 4; ++i)
@@ -197,10 +234,10 @@ std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const Camera 
     for (int repetition = 0; repetition < repetitions; ++repetition) {
         if (!is_plausible(undistorted_from_picture, corners))
             return std::nullopt;
-        const std::vector<cv::Point2d> outline_px = in_frame(outline);
-        if (outline_px.empty())
-            return std::nullopt;
+        const std::vector<cv::Point2d> outline_px = shown(outline);
         const std::vector<cv::Point2f> polygon(outline_px.begin(), outline_px.end());
+        if (polygon.size() < 3)
+            return std::nullopt;
         const cv::Rect whole({0, 0}, frame.size());
         cv::Rect region = cv::boundingRect(polygon);
         region = (region + cv::Point(-margin_px, -margin_px) + cv::Size(2 * margin_px, 2 * margin_px)) & whole;
@@ -228,29 +265,25 @@ std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const Camera 
         std::vector<std::uint8_t> is_found;
         cv::calcOpticalFlowPyrLK(normalized(drawn), normalized(frame(region)), expected, actual, is_found,
                                  cv::noArray(), {window_px, window_px}, levels);
-        std::vector<cv::Point2f> from, to;
+        std::vector<cv::Point2f> found_on_picture, found_in_frame;
         for (std::size_t i = 0; i < is_found.size(); ++i)
-            if (const auto at = is_found[i] ? camera.undistort(cv::Point2d(actual[i]) + cv::Point2d(region.tl()))
-                                            : std::nullopt) {
-                from.push_back(on_picture[i]);
-                to.emplace_back(*at);
+            if (is_found[i]) {
+                found_on_picture.push_back(on_picture[i]);
+                found_in_frame.push_back(actual[i] + cv::Point2f(region.tl()));
             }
-        if (from.size() < min_inliers)
+        const auto fitted = fit(camera, found_on_picture, found_in_frame, align_tolerance_px);
+        if (!fitted)
             return std::nullopt;
-        cv::Mat is_inlier;
-        const cv::Mat homography = cv::findHomography(from, to, cv::RANSAC, align_tolerance_px, is_inlier);
-        if (homography.empty())
-            return std::nullopt;
-        undistorted_from_picture = cv::Matx33d(homography);
-        place.inliers = static_cast<std::size_t>(cv::countNonZero(is_inlier));
+        undistorted_from_picture = fitted->undistorted_from_picture;
+        place.inliers = fitted->inliers;
         place.inlier_share = static_cast<double>(place.inliers) / static_cast<double>(expected.size());
-        if (place.inliers < min_inliers || place.inlier_share < min_inlier_share)
+        if (place.inlier_share < min_inlier_share)
             return std::nullopt;
     }
     if (!is_plausible(undistorted_from_picture, corners))
         return std::nullopt;
-    place.corners_px = in_frame(corners);
-    return place.corners_px.empty() ? std::nullopt : std::optional(place);
+    place.corners_px = shown(corners);
+    return place.corners_px.size() == corners.size() ? std::optional(place) : std::nullopt;
 }
 
 } // namespace tracker_image

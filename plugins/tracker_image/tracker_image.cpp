@@ -83,7 +83,10 @@ public:
         arhost::fiducial::report(std::move(seen), observations);
     }
 
-    void stop() { shown_.clear(); }
+    void stop() {
+        shown_.clear();
+        camera_.reset();
+    }
 
 private:
     // A picture that a target has.

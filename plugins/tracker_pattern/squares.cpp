@@ -4,6 +4,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
+#include <numbers>
 
 namespace tracker_pattern {
 namespace {
@@ -35,8 +36,12 @@ std::vector<Corners> find_squares(const cv::Mat &grey, double min_side_px) {
                               threshold_levels);
         cv::findContours(dark, contours, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
         for (const std::vector<cv::Point> &contour : contours) {
-            const double perimeter_px = cv::arcLength(contour, true); // through the centres of the outermost pixels
-            if (perimeter_px < 4 * (min_side_px - 1))
+            // The contour goes through the centres of the outermost pixels, in steps of at most √2 px.
+            const double min_perimeter_px = 4 * (min_side_px - 1);
+            if (static_cast<double>(contour.size()) * std::numbers::sqrt2 < min_perimeter_px)
+                continue;
+            const double perimeter_px = cv::arcLength(contour, true);
+            if (perimeter_px < min_perimeter_px)
                 continue;
             cv::approxPolyDP(contour, polygon, max_deviation * perimeter_px, true);
             if (polygon.size() != 4 || !cv::isContourConvex(polygon) || shortest_side(polygon) < min_side_px - 1)

@@ -76,6 +76,11 @@ const std::vector<Case> cases = {
      small_scene,
      {"run.yaml:4:", "tracker.targets[1].ids: target 'tag36h11-587': marker id 587 is not in tag36h11, whose ids are "
                      "0 to 586"}},
+    {"FamilyOfAMultiMarkerFile",
+     replaced(replaced(good, "tracker_counter", "tracker_aruco"), "marker: 3, family: tag36h11, side_mm: 80",
+              "name: board, map: marker.dat, family: tag36h12"),
+     small_scene,
+     {"run.yaml:4:", "tracker.targets[0].family: unknown dictionary 'tag36h12': tracker_aruco has tag36h11, "}},
     {"FamilyOfAnotherTracker", // the message also quotes 'image', the family of the first target
      replaced(replaced(good, "tracker_counter", "tracker_image"), "[{marker: 3,",
               "[{name: cover, image: f-0001.png, width_mm: 60}, {marker: 3,"),
@@ -320,6 +325,7 @@ TEST_P(BadInput, IsReportedWithPositionAndFix) {
     run.write("text.so", "This is no shared object, whatever its name says, and it is longer than an ELF header.\n");
     run.write("cut.so", "\177ELF");
     run.write("f-0001.png", "x");
+    run.write("marker.dat", "1\n0\n40\n1 0 0 0\n0 1 0 0\n0 0 1 0\n");
     run.write("mesh.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
     std::filesystem::create_symlink("scene.yaml", run.path("linked.yaml"));
     std::filesystem::create_hard_link(run.path("scene.yaml"), run.path("hard.yaml"));

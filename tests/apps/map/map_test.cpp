@@ -282,7 +282,7 @@ TEST_F(MapProgram, RejectsInvalidArgumentsWithoutWritingAFile) {
         {photos + camera + side + "--ids 3-1 " + out, "the range 3-1 ends before it begins"},
         {photos + camera + side + "--ids 100-120 " + out, "none of the 3 frames shows a marker of tag36h11"},
         {photos + camera + side + "--ids 1 " + out, "a map needs at least two markers in the same frames"},
-        {photos + camera + side + "--ids 0-5,50 " + out, "marker 50 was not seen (--skip-unconnected leaves"},
+        {photos + camera + side + "--ids 0-5,50-53,60 " + out, "not seen: 50-53, 60 (--skip-unconnected leaves"},
         {photos + camera + side + "--origin 77 " + out, "marker 77 cannot be the origin"},
         {photos + camera + side + "--origin -1 " + out, "--origin: "},
         {photos + camera + "--side nan " + out, "--side nan: write a length"},

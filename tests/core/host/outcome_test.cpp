@@ -77,9 +77,9 @@ TEST_F(Outcome, ReportsThatTheFirstTargetWasNeverSeen) {
         ASSERT_TRUE(problem());
         EXPECT_TRUE(problem()->is_missing_target);
         EXPECT_EQ(problem()->text,
-                  "no frame has an overlay, because the first target, the world of the scene, was "
-                  "not seen in any of 30 frames: 'desk' (D 23); it saw D 24 (29 frames); compare the "
-                  "numbers and the family with the print");
+                  "no frame has an overlay, because 'desk', the first target, is the world of the scene; never seen "
+                  "in 30 frames: 'desk' (D 23); it saw D 24 (29 frames); compare the numbers and the family with the "
+                  "print");
     }
     configuration->raytracer.reset();
     EXPECT_FALSE(problem()) << "no overlay was requested";

@@ -416,9 +416,10 @@ TEST_F(TargetsTest, RejectsATargetOrMarkerThatIsThereTwice) {
                          "DICT_6X6_50, side_mm: 40}]"),
                 EndsWith("the marker DICT_6X6_50-9 also belongs to the target 'DICT_6X6_250-9'; remove one of them"))
         << "the smaller dictionary has the first markers of the larger one";
-    EXPECT_EQ(error_in("[{marker: 9, dictionary: DICT_6X6_250, side_mm: 80}, {marker: 9, dictionary: DICT_5X5_250, "
-                       "side_mm: 40}]"),
-              "no error");
+    for (const std::string other : {"DICT_5X5_250", "DICT_6X6_lab"})
+        EXPECT_EQ(error_in("[{marker: 9, dictionary: DICT_6X6_250, side_mm: 80}, {marker: 9, dictionary: " + other +
+                           ", side_mm: 40}]"),
+                  "no error");
     write("poster.png", "");
     EXPECT_THAT(error_in("[{name: a, image: poster.png, width_mm: 60}, {name: b, image: ./poster.png, width_mm: "
                          "90}]"),

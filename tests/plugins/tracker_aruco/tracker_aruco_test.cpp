@@ -120,6 +120,21 @@ TEST_P(ArucoDictionary, IsReportedInTheSameWayWhereverAndHoweverItIsExpected) {
             }
 }
 
+TEST(TrackerAruco, AnExpectedMarkerIsReadAlsoIfItIsNotDetected) {
+    const Mt truth = pose_of(10, 5, 400);
+    Tracker tracker("tracker_aruco", {{"closer_look", "false"}});
+    ASSERT_EQ(tracker.start(test_camera, {{5}}), ARHOST_STATUS_OK) << tracker.log();
+    cv::Mat dim;
+    picture_of({{tag(5), 80, truth}}).convertTo(dim, -1, 0.04, 100); // below OpenCV's threshold of contrast
+    const GreyFrame frame(dim);
+    EXPECT_TRUE(tracker.track(frame).empty());
+    for (const bool everywhere : {false, true}) {
+        const auto seen = tracker.track(frame, {expected_at(0, corners_of(truth, test_camera, 80))}, everywhere);
+        ASSERT_EQ(seen.size(), 1u) << everywhere;
+        EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 80)), 0.2);
+    }
+}
+
 TEST(TrackerAruco, AnExpectedMarkerWithAWrongCellIsNotReadButDetected) {
     const Mt truth = pose_of(10, 5, 400);
     Tracker tracker("tracker_aruco");
