@@ -84,9 +84,9 @@ std::string canonical(const std::string &family) {
     constexpr std::string_view april_tag = "DICT_APRILTAG_";
     if (family.starts_with(april_tag))
         return "tag" + family.substr(april_tag.size());
-    for (const std::string series : {"DICT_4X4", "DICT_5X5", "DICT_6X6", "DICT_7X7"})
+    for (const char *series : {"DICT_4X4", "DICT_5X5", "DICT_6X6", "DICT_7X7"})
         for (const char *count : {"_50", "_100", "_250", "_1000"})
-            if (family == series + count)
+            if (family == std::string(series) + count)
                 return series;
     return family;
 }
