@@ -101,25 +101,22 @@ std::optional<Fit> fit(const Camera &camera, const std::vector<cv::Point2f> &on_
 
 } // namespace
 
-Camera::Camera(const arhost_intrinsics &intrinsics)
-    : lens_(intrinsics), grid_(static_cast<int>(intrinsics.height - 1) / step_px + 2,
-                               static_cast<int>(intrinsics.width - 1) / step_px + 2) {
+Camera::Camera(const arhost_intrinsics &intrinsics) : lens_(intrinsics) {
+    // Computes every eighth pixel and interpolates the others: the distortion is smooth. A power of 2 gives exact
+    // weights in OpenCV.
+    constexpr int step_px = 8;
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-    for (int row = 0; row < grid_.rows; ++row)
-        for (int column = 0; column < grid_.cols; ++column) {
+    const cv::Size size(static_cast<int>(intrinsics.width), static_cast<int>(intrinsics.height));
+    cv::Mat_<cv::Vec2f> grid((size.height - 1) / step_px + 2, (size.width - 1) / step_px + 2);
+    for (int row = 0; row < grid.rows; ++row)
+        for (int column = 0; column < grid.cols; ++column) {
             const auto point = undistort(cv::Point2d(column * step_px, row * step_px));
-            grid_(row, column) =
+            grid(row, column) =
                 point ? cv::Vec2f(static_cast<float>(point->x), static_cast<float>(point->y)) : cv::Vec2f(nan, nan);
         }
-}
-
-cv::Mat Camera::undistorted(const cv::Rect &region) const {
-    constexpr double scale = 1.0 / step_px;
-    const cv::Matx23d grid_from_region(scale, 0, scale * region.x, 0, scale, scale * region.y);
-    cv::Mat pixels;
-    cv::warpAffine(grid_, pixels, grid_from_region, region.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
+    const cv::Matx23d grid_from_frame(1.0 / step_px, 0, 0, 0, 1.0 / step_px, 0);
+    cv::warpAffine(grid, undistorted_, grid_from_frame, size, cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
                    cv::BORDER_REPLICATE);
-    return pixels;
 }
 
 std::optional<cv::Point2d> Camera::undistort(cv::Point2d pixel) const {

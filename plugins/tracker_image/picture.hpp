@@ -24,15 +24,12 @@ public:
     // Both return std::nullopt where the distortion model is not one-to-one.
     std::optional<cv::Point2d> undistort(cv::Point2d pixel) const;
     std::optional<cv::Point2d> distort(cv::Point2d undistorted_px) const;
-    // For each pixel of a region of the frame, the undistorted pixel (CV_32FC2), interpolated; NaN where there is
-    // none.
-    cv::Mat undistorted(const cv::Rect &region) const;
+    // For each pixel of a region of the frame, the undistorted pixel (CV_32FC2); NaN where there is none.
+    cv::Mat undistorted(const cv::Rect &region) const { return undistorted_(region); }
 
 private:
-    static constexpr int step_px = 8; // a power of 2, so that OpenCV's interpolation has exact weights
-
     arhost::fiducial::Lens lens_;
-    cv::Mat_<cv::Vec2f> grid_; // undistorted pixels of every eighth pixel
+    cv::Mat undistorted_; // of all pixels of a frame
 };
 
 // The features of a frame, which all pictures share.
