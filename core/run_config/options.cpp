@@ -9,6 +9,14 @@
 
 namespace arhost::run_config {
 
+namespace {
+
+std::vector<std::string_view> choices_of(const ipc::OptionDeclaration &declared) {
+    return {declared.choices.begin(), declared.choices.end()};
+}
+
+} // namespace
+
 ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::Node &node) {
     ipc::OptionValue value{declared.key, declared.type, 0, 0.0, ""};
     const bool bounded = declared.minimum != 0 || declared.maximum != 0;
@@ -40,8 +48,7 @@ ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::No
         if (declared.choices.empty()) {
             value.text = node.text();
         } else {
-            const std::vector<std::string_view> choices(declared.choices.begin(), declared.choices.end());
-            value.text = node.choice(choices);
+            value.text = node.choice(choices_of(declared));
         }
     }
     return value;
@@ -67,7 +74,8 @@ std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plug
     std::vector<std::string_view> keys;
     for (const ipc::OptionDeclaration &declared : plugin.options)
         keys.push_back(declared.key);
-    if (options && (plugin.kind == ARHOST_KIND_TRACKER || plugin.kind == ARHOST_KIND_RAYTRACER)) {
+    const bool sets_aside = plugin.kind == ARHOST_KIND_TRACKER || plugin.kind == ARHOST_KIND_RAYTRACER;
+    if (options && sets_aside) {
         for (const yaml::Node &unknown : options->set_aside_keys(keys))
             notes.push_back(unknown.where() + ": " + unknown.path() + ": set aside, because " + plugin.id +
                             " has no such option");
@@ -84,6 +92,11 @@ std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plug
             if (value)
                 value->fail("the path is also given by the key 'path' next to 'plugin'; remove one of them");
             value = path;
+        }
+        if (value && sets_aside && !declared.choices.empty() && !value->known_choice(choices_of(declared))) {
+            notes.push_back(value->where() + ": " + value->path() + ": '" + value->text() +
+                            "' is set aside, because " + plugin.id + " has no such choice");
+            value.reset();
         }
         if (value && declared.type == ARHOST_OPTION_OUTPUT_PATH && is_standard_output(*value) &&
             !(plugin.capabilities & ARHOST_CAPABILITY_STANDARD_OUTPUT && declared.key == "path"))

@@ -17,8 +17,9 @@ ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::No
 // Returns a value for every option that the plugin declares, in the order of the descriptor. `options` is the YAML
 // map of the configured options, if any. `path` is the component's key `path:`, which sets the option of the same
 // name. Throws yaml::Error for unknown keys, wrong types, values out of range, and missing required options. The
-// position of the last of these errors is that of `owner`. Unknown options of a tracker or ray tracer may be those of
-// another plugin that was named there before, so they only add a note, unless they resemble a known one.
+// position of the last of these errors is that of `owner`. Unknown options of a tracker or ray tracer, and
+// unknown choices, may be those of another plugin that was named there before, so they only add a note, unless they
+// resemble a known one.
 std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plugin,
                                               const std::optional<yaml::Node> &options,
                                               const std::optional<yaml::Node> &path, const yaml::Node &owner,

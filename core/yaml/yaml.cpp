@@ -490,6 +490,12 @@ std::string Node::choice(std::span<const std::string_view> choices) const {
     return value;
 }
 
+std::optional<std::string> Node::known_choice(std::span<const std::string_view> choices) const {
+    const bool is_known = std::ranges::find(choices, text()) != choices.end();
+    return is_known || is_overridden() || !nearest(text(), choices).empty() ? std::optional(choice(choices))
+                                                                            : std::nullopt;
+}
+
 std::vector<double> Node::reals() const {
     std::vector<double> values;
     for (const Node &item : items())

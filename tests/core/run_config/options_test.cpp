@@ -69,3 +69,12 @@ TEST(Options, OfAnotherTrackerAreSetAsideWithANote) {
                                             "has no such option"));
     EXPECT_THROW(resolve("{path: x, options: {quad_decimate: 2}}", &notes, ARHOST_KIND_SINK), yaml::Error);
 }
+
+TEST(Options, AChoiceOfAnotherTrackerIsSetAsideWithANote) {
+    std::vector<std::string> notes;
+    const auto values = resolve("{path: x, options: {family: DICT_4X4_50}}", &notes);
+    EXPECT_EQ(values[3].text, "tag36h11") << "the default";
+    EXPECT_THAT(notes, testing::ElementsAre("/lab/a.yaml:1:29: options.family: 'DICT_4X4_50' is set aside, because "
+                                            "tracker_x has no such choice"));
+    EXPECT_THROW(resolve("{path: x, options: {family: DICT_4X4_50}}", &notes, ARHOST_KIND_SINK), yaml::Error);
+}
