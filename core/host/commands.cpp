@@ -518,7 +518,7 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     if (const std::string unseen = unseen_targets(configuration, statistics, pipeline.targets());
         completed && !unseen.empty() && !(problem && problem->is_missing_target))
         console.log(ARHOST_SEVERITY_WARNING, "tracker", unseen);
-    if (const std::string misfits = misfitting_maps(statistics, pipeline.targets()); !misfits.empty())
+    if (const std::string misfits = misfitting_targets(statistics, pipeline.targets()); !misfits.empty())
         console.log(ARHOST_SEVERITY_WARNING, "tracker", misfits);
     if (configuration.mode == run_config::Mode::live && statistics.composited > 0)
         console.log(ARHOST_SEVERITY_INFO, "arhost",
@@ -690,7 +690,7 @@ int check_by_opening(run_config::Configuration configuration, const Arguments &a
     const auto problem = problem_with_run(configuration, pipeline.statistics(), pipeline.targets());
     if (problem)
         context.log(ARHOST_SEVERITY_ERROR, problem->component, problem->text);
-    if (const std::string misfits = misfitting_maps(pipeline.statistics(), pipeline.targets()); !misfits.empty())
+    if (const std::string misfits = misfitting_targets(pipeline.statistics(), pipeline.targets()); !misfits.empty())
         context.log(ARHOST_SEVERITY_WARNING, "tracker", misfits);
     return problem ? run_failed : success;
 }

@@ -87,20 +87,22 @@ std::string unseen_targets(const run_config::Configuration &configuration, const
                        seen_instead(statistics, unseen));
 }
 
-std::string misfitting_maps(const Statistics &statistics, const std::vector<ipc::Target> &targets) {
+std::string misfitting_targets(const Statistics &statistics, const std::vector<ipc::Target> &targets) {
     constexpr double max_reprojection_px = 3; // errors of a usable calibration or layout are smaller
     std::string text;
+    bool has_map = false;
     for (const ipc::Target &target : targets) {
         const auto seen = statistics.targets.find(target.name);
-        if (target.markers.size() > 1 && seen != statistics.targets.end() &&
-            seen->second.mean_reprojection_px > max_reprojection_px)
-            text += fmt::format("{}'{}' (mean reprojection error {:.1f} px)", text.empty() ? "" : ", ", target.name,
-                                seen->second.mean_reprojection_px);
+        if (seen == statistics.targets.end() || seen->second.mean_reprojection_px <= max_reprojection_px)
+            continue;
+        text += fmt::format("{}'{}' (mean reprojection error {:.1f} px)", text.empty() ? "" : ", ", target.name,
+                            seen->second.mean_reprojection_px);
+        has_map = has_map || target.markers.size() > 1;
     }
     return text.empty() ? ""
-                        : "the map does not fit the prints: " + text +
-                              "; check its places and sides, and the calibration of the camera ('arhost map' learns "
-                              "a map)";
+                        : "the corners of the prints do not fit the poses: " + text +
+                              "; check the calibration of the camera and the proportions of the prints" +
+                              (has_map ? ", and the places and sides in the map ('arhost map' learns a map)" : "");
 }
 
 std::string marker_name(const ipc::TargetMarker &marker) {
@@ -128,25 +130,32 @@ std::string describe_targets(const std::vector<ipc::Target> &targets) {
 }
 
 std::string seen_instead(const Statistics &statistics, const std::vector<ipc::Target> &unseen) {
-    std::map<std::string, std::uint64_t> unconfirmed;
+    std::map<std::string, std::uint64_t> unconfirmed_ids, unconfirmed_files;
     for (const ipc::Target &target : unseen)
         for (const ipc::TargetMarker &marker : target.markers)
             if (const auto found = statistics.unconfirmed.find(marker_name(marker));
                 found != statistics.unconfirmed.end())
-                unconfirmed.insert(*found);
+                (marker.file.empty() ? unconfirmed_ids : unconfirmed_files).insert(*found);
     std::string text;
     if (const std::string strangers = strangers_text(statistics); !strangers.empty())
         text += "; it saw " + strangers;
-    if (!unconfirmed.empty())
-        text += "; it saw " + frames_text(unconfirmed) +
-                " but got no pose: corners were hidden, or a small family was not seen in successive frames (see "
+    for (const std::string &hint : statistics.hints)
+        text += "; " + hint;
+    if (!unconfirmed_ids.empty())
+        text += "; it saw " + frames_text(unconfirmed_ids) +
+                " but got no pose: either the corners fit none (check the calibration of the camera, and whether "
+                "something hides a corner), or a small family was not seen in successive frames (see "
                 "'tracker.confirm' in docs/config.md)";
+    if (!unconfirmed_files.empty())
+        text += "; it saw " + frames_text(unconfirmed_files) +
+                " but got no pose, because the corners fit none: check the calibration of the camera, the "
+                "proportions of the print, and whether something hides a corner";
     if (const SearchStatistics &search = statistics.search;
         text.empty() && statistics.targets.empty() && search.frames_with_candidate_count > 0)
         text = search.candidates == 0
                    ? std::string("; it found no quadrilaterals: check the light, the focus and the size of the print "
                                  "in the image")
-                   : fmt::format("; of {:.1f} quadrilaterals per frame, none is a marker of their families",
+                   : fmt::format("; of {:.1f} quadrilaterals per frame, none reads as one of their markers",
                                  static_cast<double>(search.candidates) /
                                      static_cast<double>(search.frames_with_candidate_count));
     return text;

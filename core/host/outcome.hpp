@@ -25,8 +25,8 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
 std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics,
                            const std::vector<ipc::Target> &targets);
 
-// Names the maps whose markers are not where the poses project them; "" if there are none.
-std::string misfitting_maps(const Statistics &statistics, const std::vector<ipc::Target> &targets);
+// Names the targets whose corners are not where the poses project them; "" if there are none.
+std::string misfitting_targets(const Statistics &statistics, const std::vector<ipc::Target> &targets);
 
 // Names a marker by its family and its id or, if it has one, its file: "tag36h11 23", "pattern hiro.patt".
 std::string marker_name(const ipc::TargetMarker &marker);

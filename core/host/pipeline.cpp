@@ -18,6 +18,13 @@ Pipeline::Pipeline(const run_config::Configuration &configuration, supervise::Co
                    std::function<void(const Progress &)> on_progress)
     : configuration_(configuration), latest_(std::shared_ptr<void>(), &configuration), context_(std::move(context)),
       on_progress_(std::move(on_progress)), live_(configuration.mode == run_config::Mode::live) {
+    context_.log = [this, log = context_.log](arhost_severity severity, const std::string &component,
+                                              const std::string &text) {
+        if (severity == ARHOST_SEVERITY_HINT && component == "tracker")
+            take_hint(text);
+        else
+            log(severity, component, text);
+    };
     statistics_.contract_checks = ContractChecks([this](const std::string &name, const std::string &violation) {
         context_.log(ARHOST_SEVERITY_WARNING, name.substr(0, name.find('.')),
                      "violates the contract: " + name + ": " + violation);

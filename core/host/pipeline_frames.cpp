@@ -317,6 +317,16 @@ void Pipeline::count_strangers(Frame &frame) {
     }
 }
 
+// Keeps what the tracker sees instead of the targets for the warning that they were not seen.
+void Pipeline::take_hint(const std::string &text) {
+    std::vector<std::string> &hints = statistics_.hints;
+    if (hints.size() == Statistics::max_hints || std::ranges::find(hints, text) != hints.end())
+        return;
+    hints.push_back(text);
+    if (reported_missing_targets_ && statistics_.targets.empty())
+        context_.log(ARHOST_SEVERITY_INFO, "tracker", "has seen no target yet; " + text);
+}
+
 void Pipeline::set_camera_from_targets(Frame &frame) {
     if (configuration_.trajectory)
         return;

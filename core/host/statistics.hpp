@@ -94,7 +94,7 @@ struct SearchStatistics {
 };
 
 struct Statistics {
-    static constexpr std::size_t max_strangers = 64;
+    static constexpr std::size_t max_strangers = 64, max_hints = 4;
     std::uint64_t frames_in = 0;                     // frames received from the source
     std::uint64_t tracker_results = 0;               // frames for which the tracker delivered a result in time
     std::uint64_t tracked = 0;                       // frames with at least one detected target
@@ -104,6 +104,7 @@ struct Statistics {
     SearchStatistics search;
     std::map<std::string, std::uint64_t> strangers;   // frames with a marker that no target lists, by name
     std::map<std::string, std::uint64_t> unconfirmed; // frames with a listed marker whose target got no pose
+    std::vector<std::string> hints;                   // of the tracker: what it sees instead of the targets
     std::map<std::string, std::uint64_t> dropped;     // number of dropped frames by stage
     std::map<std::string, std::uint64_t> skipped;     // number of unaugmented frames by the failed stage
     StageTimings stages;

@@ -58,6 +58,17 @@ Cell cell_at(int row, int column, int side) {
 
 } // namespace
 
+std::optional<std::int32_t> matrix_id(const MatrixFamily &family, std::uint32_t word) {
+    const auto is_of = [&](std::uint32_t id) { return family.word(id) == word; };
+    const auto count = static_cast<std::uint32_t>(family.id_count);
+    if (word < count && is_of(word)) // all words of a family without check bits, which may have millions
+        return static_cast<std::int32_t>(word);
+    for (std::uint32_t id = 0; id < count; ++id)
+        if (is_of(id))
+            return static_cast<std::int32_t>(id);
+    return std::nullopt;
+}
+
 std::span<const MatrixFamily> matrix_families() {
     return families;
 }

@@ -21,6 +21,9 @@ struct MatrixFamily {
     std::uint32_t (*word)(std::uint32_t id);
 };
 
+// Returns the id of a word; nullopt if it is none of the family's.
+std::optional<std::int32_t> matrix_id(const MatrixFamily &family, std::uint32_t word);
+
 std::span<const MatrixFamily> matrix_families();
 const MatrixFamily *find_matrix_family(std::string_view name); // nullptr if there is none
 

@@ -33,6 +33,10 @@ class Host:
     def info(self, text):
         self.log(SEVERITY_INFO, str(text))
 
+    def hint(self, text):
+        """Tells what a frame shows instead of the targets; for trackers (SEVERITY_HINT)."""
+        self.log(SEVERITY_HINT, str(text))
+
     def warn(self, text):
         self.log(SEVERITY_WARNING, str(text))
 

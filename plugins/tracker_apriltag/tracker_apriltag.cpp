@@ -3,9 +3,10 @@
 // tracker_apriltag: detects AprilTags with the AprilTag library, version 3.
 #include <fiducial_common/apriltag_families.hpp>
 #include <fiducial_common/edge_refinement.hpp>
+#include <fiducial_common/family_search.hpp>
 #include <fiducial_common/lens.hpp>
 #include <fiducial_common/observations.hpp>
-#include <fiducial_common/other_families.hpp>
+#include <fiducial_common/other_markers.hpp>
 #include <fiducial_common/print_alignment.hpp>
 #include <fiducial_common/search_regions.hpp>
 
@@ -211,7 +212,9 @@ public:
                 if (part->tags()->ncodes > 0) // the library divides by the number of tags
                     parts_.push_back(std::move(part));
             }
-        others_.emplace(host_, setup, [&](const cv::Mat &grey) { return tags_of_other_families(grey); });
+        others_.emplace(host_, setup, [&](const cv::Mat &grey) {
+            return arhost::fiducial::markers_of_other_families(grey, families_);
+        });
         detector_.reset(apriltag_detector_create());
         detector_->nthreads = threads_;
         configure_detector();
@@ -296,27 +299,6 @@ private:
         }
     }
 
-    arhost::fiducial::OtherFamilies::Markers tags_of_other_families(const cv::Mat &grey) const {
-        std::vector<std::pair<const char *, WholeFamily>> others;
-        for (const FamilyType &type : family_types)
-            if (std::ranges::none_of(families_, [&](const Family &used) { return used.name == type.name; }))
-                others.emplace_back(type.name, whole_family(type.name));
-        const Detector detector(apriltag_detector_create(),
-                                apriltag_detector_destroy); // destroyed before the families
-        configure(*detector);
-        for (const auto &[name, family] : others)
-            apriltag_detector_add_family_bits(detector.get(), family.get(), 0);
-        arhost::fiducial::OtherFamilies::Markers markers;
-        const Detections tags = detect(*detector, grey);
-        for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
-            apriltag_detection_t *tag = nullptr;
-            zarray_get(tags.get(), i, &tag);
-            if (tag->decision_margin >= min_margin_)
-                markers[tag->family->name].insert(tag->id);
-        }
-        return markers;
-    }
-
     // The library's threshold is that of 4×4 px tiles of the decimated image. Regions on this grid have the tiles of
     // the whole frame.
     int grid_px() const { return decimate_ == 1.5 ? 6 : 4 * static_cast<int>(decimate_); }
@@ -346,7 +328,7 @@ private:
 
     std::optional<arhost::fiducial::Lens> lens_;
     std::optional<arhost::fiducial::SearchRegions> regions_;
-    std::optional<arhost::fiducial::OtherFamilies> others_;
+    std::optional<arhost::fiducial::OtherMarkers> others_;
     std::vector<Family> families_;
     std::vector<std::unique_ptr<PartOfFamily>> parts_;
     Detector detector_{

@@ -3,10 +3,11 @@
 // tracker_aruco: detects ArUco markers and AprilTags with OpenCV.
 #include <fiducial_common/aruco_dictionaries.hpp>
 #include <fiducial_common/edge_refinement.hpp>
+#include <fiducial_common/family_search.hpp>
 #include <fiducial_common/lens.hpp>
 #include <fiducial_common/observations.hpp>
 #include <fiducial_common/opencv_aruco.hpp>
-#include <fiducial_common/other_families.hpp>
+#include <fiducial_common/other_markers.hpp>
 #include <fiducial_common/print_alignment.hpp>
 #include <fiducial_common/search_regions.hpp>
 
@@ -310,7 +311,9 @@ public:
             const cv::aruco::Dictionary table = dictionary_of(name).table;
             return arhost::fiducial::FamilyTraits{1.0 / cells_of(table), table.markerSize * table.markerSize};
         });
-        others_.emplace(host_, setup, [&](const cv::Mat &grey) { return markers_of_other_dictionaries(grey); });
+        others_.emplace(host_, setup, [families = predefined_families()](const cv::Mat &grey) {
+            return arhost::fiducial::markers_of_other_families(grey, families);
+        });
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
@@ -449,35 +452,6 @@ private:
                                                 [&] { return print_of(dictionary, id); });
     }
 
-    // Each dictionary of "DICT_4X4_50", "DICT_4X4_100" and so on begins with the markers of the smaller ones: detects
-    // those of the largest, and names the smallest that has all that were found.
-    arhost::fiducial::OtherFamilies::Markers markers_of_other_dictionaries(const cv::Mat &grey) const {
-        arhost::fiducial::OtherFamilies::Markers markers;
-        for (auto largest = dictionary_types.begin(); largest != dictionary_types.end(); ++largest) {
-            if (const auto next = largest + 1; next != dictionary_types.end() && next->is_of_series(largest->family))
-                continue;
-            Detectable detectable{{largest->family, 0, 0, {}}, predefined(*largest), parameters_};
-            detectable.parameters.errorCorrectionRate = 0;
-            arhost::fiducial::Seen seen;
-            constexpr arhost_transfer any = ARHOST_TRANSFER_LINEAR; // only listed markers are refined, which need it
-            observe(grey, any, {0, 0, grey.cols, grey.rows}, {}, detectable, {}, seen);
-            std::set<int> ids;
-            for (const arhost_observation &one : seen.markers)
-                if (std::ranges::none_of(detectables_, [&](const Detectable &used) {
-                        return used.family.name != file_name_ && largest->is_of_series(used.family.name) &&
-                               one.id < used.family.id_count;
-                    }))
-                    ids.insert(one.id);
-            if (ids.empty())
-                continue;
-            const auto smallest = std::ranges::find_if(dictionary_types, [&](const DictionaryType &type) {
-                return largest->is_of_series(type.family) && *ids.rbegin() < predefined(type).table.bytesList.rows;
-            });
-            markers[smallest->family] = std::move(ids);
-        }
-        return markers;
-    }
-
     arhost::fiducial::Print print_of(const Dictionary &dictionary, int id) const {
         arhost::fiducial::Print print = arhost::aruco::print_of(dictionary.table, id, parameters_.markerBorderBits);
         if (dictionary.rotated_180)
@@ -515,6 +489,14 @@ private:
                                : "; 'dictionary_file' loads others, also those of newer versions of OpenCV"));
     }
 
+    std::vector<Family> predefined_families() const {
+        std::vector<Family> families;
+        for (const Detectable &detectable : detectables_)
+            if (detectable.family.name != file_name_)
+                families.push_back(detectable.family);
+        return families;
+    }
+
     void make_parameters() {
         for (Detectable &detectable : detectables_) {
             detectable.parameters = parameters_;
@@ -533,7 +515,7 @@ private:
 
     std::optional<arhost::fiducial::Lens> lens_;
     std::optional<arhost::fiducial::SearchRegions> regions_;
-    std::optional<arhost::fiducial::OtherFamilies> others_;
+    std::optional<arhost::fiducial::OtherMarkers> others_;
     std::vector<Detectable> detectables_;
 };
 

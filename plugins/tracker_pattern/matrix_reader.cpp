@@ -13,6 +13,12 @@ namespace tracker_pattern {
 
 using arhost::fiducial::MatrixFamily;
 
+namespace {
+
+constexpr double min_correlation = 0.8; // of the samples with the code's picture
+
+} // namespace
+
 void MatrixReader::add(const MatrixFamily &type, std::int32_t id, std::uint32_t family) {
     Code code{&type, id, family, type.word(static_cast<std::uint32_t>(id)), {}};
     if (const auto twin = std::ranges::find(codes_, code.word, &Code::word); twin != codes_.end())
@@ -20,14 +26,19 @@ void MatrixReader::add(const MatrixFamily &type, std::int32_t id, std::uint32_t 
                                                                      "-" + std::to_string(twin->id) + " and " +
                                                                      type.name + "-" + std::to_string(id) +
                                                                      " look the same; use the markers of one family");
+    code.picture = picture_of(type, id);
+    codes_.push_back(code);
+}
+
+// Returns the samples of an ideal print.
+Samples MatrixReader::picture_of(const MatrixFamily &type, std::int32_t id) const {
     Samples cells(cells_ + 2, cells_ + 2, 0.0F);
     const std::vector<bool> black = arhost::fiducial::matrix_cells(type, id);
     for (int i = 0; i < cells_ * cells_; ++i)
         cells(1 + i / cells_, 1 + i % cells_) = black[static_cast<std::size_t>(i)] ? 0 : 255;
     Samples picture;
     cv::resize(cells, picture, {side(), side()}, 0, 0, cv::INTER_NEAREST);
-    code.picture = normalized(picture);
-    codes_.push_back(code);
+    return normalized(picture);
 }
 
 // Returns nullopt if the cells are not clearly black or white, or if the border is not black.
@@ -59,29 +70,39 @@ std::optional<std::vector<bool>> MatrixReader::black_cells(const Samples &sample
     return black;
 }
 
-std::optional<MatrixReader::Match> MatrixReader::match(const Samples &samples) const {
-    constexpr double min_correlation = 0.8;
-    std::optional<Match> best;
+std::optional<MatrixReader::Reading> MatrixReader::read(const Samples &samples) const {
     Samples upright = samples;
     for (int turns = 0; turns < 4; ++turns) {
         const auto black = black_cells(upright);
         if (!black)
             return std::nullopt;
-        if (const auto word = arhost::fiducial::matrix_word(*black, cells_)) {
+        if (const auto word = arhost::fiducial::matrix_word(*black, cells_)) { // no other side can be up
             const Samples picture = normalized(upright);
-            if (picture.empty())
-                return std::nullopt;
-            for (const Code &code : codes_)
-                if (const int wrong = std::popcount(code.word ^ *word);
-                    wrong <= code.type->corrects && (!best || wrong < best->wrong_cells))
-                    best = {code.id, code.family, wrong, picture.dot(code.picture), turns};
-            break; // no other side of a print can be up
+            return picture.empty() ? std::nullopt : std::optional(Reading{*word, turns, picture});
         }
         Samples turned;
         cv::rotate(upright, turned, cv::ROTATE_90_COUNTERCLOCKWISE);
         upright = turned;
     }
+    return std::nullopt;
+}
+
+std::optional<MatrixReader::Match> MatrixReader::match(const Samples &samples) const {
+    const auto reading = read(samples);
+    if (!reading)
+        return std::nullopt;
+    std::optional<Match> best;
+    for (const Code &code : codes_)
+        if (const int wrong = std::popcount(code.word ^ reading->word);
+            wrong <= code.type->corrects && (!best || wrong < best->wrong_cells))
+            best = {code.id, code.family, wrong, reading->upright.dot(code.picture), reading->quarter_turns};
     return best && best->correlation >= min_correlation ? best : std::nullopt;
+}
+
+std::optional<std::int32_t> MatrixReader::id_of(const MatrixFamily &type, const Samples &samples) const {
+    const auto reading = read(samples);
+    const auto id = reading ? arhost::fiducial::matrix_id(type, reading->word) : std::nullopt;
+    return id && reading->upright.dot(picture_of(type, *id)) >= min_correlation ? id : std::nullopt;
 }
 
 } // namespace tracker_pattern

@@ -37,6 +37,9 @@ public:
     };
     std::optional<Match> match(const Samples &samples) const;
 
+    // Returns the id of the family's code that the samples show, listed or not, if no cell is wrong.
+    std::optional<std::int32_t> id_of(const arhost::fiducial::MatrixFamily &type, const Samples &samples) const;
+
 private:
     static constexpr int samples_per_cell = 3; // odd, so one is at the centre
 
@@ -46,7 +49,14 @@ private:
         std::uint32_t family, word;
         Samples picture; // upright; normalized
     };
+    struct Reading {
+        std::uint32_t word;
+        int quarter_turns;
+        Samples upright; // normalized
+    };
+    std::optional<Reading> read(const Samples &samples) const;
     std::optional<std::vector<bool>> black_cells(const Samples &samples) const;
+    Samples picture_of(const arhost::fiducial::MatrixFamily &type, std::int32_t id) const;
 
     int cells_;
     std::vector<Code> codes_;

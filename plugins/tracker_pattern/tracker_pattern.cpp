@@ -6,6 +6,7 @@
 #include "squares.hpp"
 
 #include <fiducial_common/edge_refinement.hpp>
+#include <fiducial_common/family_search.hpp>
 #include <fiducial_common/lens.hpp>
 #include <fiducial_common/search_regions.hpp>
 
@@ -50,7 +51,7 @@ constexpr arhost_descriptor descriptor = {
 
 class PatternTracker {
 public:
-    PatternTracker(const arhost::Host &, const arhost::Options &options) { set(options); }
+    PatternTracker(const arhost::Host &host, const arhost::Options &options) : host_(host) { set(options); }
 
     static constexpr const char *changeable[] = {"min_correlation", "min_side_px", nullptr};
     void set(const arhost::Options &changed) {
@@ -70,6 +71,7 @@ public:
                 if (reader == matrix_readers_.end())
                     reader = matrix_readers_.insert(reader, MatrixReader(type->side));
                 reader->add(*type, marker.id, marker.family);
+                listed_codes_[type->name].insert(marker.id);
             } else if (marker.file) {
                 const Pattern pattern(marker.file);
                 patterns_[{marker.pattern_ratio, pattern.side()}].push_back({marker.id, marker.family, pattern});
@@ -79,19 +81,25 @@ public:
         }
         lens_.emplace(*setup.intrinsics);
         regions_.emplace(setup, [](const std::string &) { return arhost::fiducial::FamilyTraits{0.1, 0}; });
+        others_.emplace(host_, setup, [this](const cv::Mat &grey) { return other_markers(grey); });
     }
 
-    void track(const arhost_track_request &request, arhost::Observations &observations) const {
+    void track(const arhost_track_request &request, arhost::Observations &observations) {
         const arhost::fiducial::Pass pass{
             nullptr, [&](const cv::Rect &region, auto &seen) { observe(*request.frame, region, seen); }};
         arhost::fiducial::Seen seen = regions_->search(request, {}, {&pass, 1});
+        others_->frame(arhost::fiducial::grey_of(*request.frame), seen.markers);
         observations.set_candidate_count(seen.candidates);
         arhost::fiducial::report(std::move(seen.markers), observations);
     }
 
     void stop() {
+        if (others_)
+            others_->finish();
+        others_.reset();
         patterns_.clear();
         matrix_readers_.clear();
+        listed_codes_.clear();
     }
 
 private:
@@ -178,6 +186,23 @@ private:
         }
     }
 
+    arhost::fiducial::OtherMarkers::Markers other_markers(const cv::Mat &grey) const {
+        auto markers = arhost::fiducial::markers_of_other_families(grey, {});
+        if (!markers.empty()) // they may also read as matrix codes, which have few check bits or none
+            return markers;
+        const std::vector<Corners> squares = find_squares(grey, min_side_px_);
+        for (const auto &type : arhost::fiducial::matrix_families()) {
+            const MatrixReader reader(type.side);
+            const auto listed = listed_codes_.find(type.name);
+            for (const Corners &corners_px : squares) {
+                const auto id = reader.id_of(type, interior(grey, corners_px, reader.ratio(), reader.side()));
+                if (id && (listed == listed_codes_.end() || !listed->second.contains(*id)))
+                    markers[type.name].insert(*id);
+            }
+        }
+        return markers;
+    }
+
     // The mean grey levels of the picture within a square.
     static Samples interior(const cv::Mat &grey, const Corners &corners_px, double ratio, int side) {
         constexpr int oversampling = 4;
@@ -195,11 +220,14 @@ private:
         return samples;
     }
 
+    arhost::Host host_;
     double min_correlation_ = 0.6, min_side_px_ = 12;
     std::optional<arhost::fiducial::Lens> lens_;
     std::optional<arhost::fiducial::SearchRegions> regions_;
     std::map<Sampling, std::vector<Marked>> patterns_;
     std::vector<MatrixReader> matrix_readers_;
+    arhost::fiducial::OtherMarkers::Markers listed_codes_;
+    std::optional<arhost::fiducial::OtherMarkers> others_;
 };
 
 } // namespace

@@ -639,19 +639,29 @@ TEST(Run, ReportsAMarkerOfASmallFamilyWhenItIsSeenAgain) {
 }
 
 TEST(Run, TellsWhetherTheTrackerHasFoundQuadrilaterals) {
-    const auto output_of = [](const std::string &tracker, const std::string &target, const std::string &source) {
-        ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 3, side_mm: 80" + source +
-                      "}}\ntracker: {plugin: " + tracker + ", targets: [" + target + "]}\n" +
-                      "outputs: [{plugin: sink_null}]\n");
+    // Pictures of a dark square, and without one.
+    const auto output_of = [](const std::string &tracker, const std::string &family, int square_px) {
+        ArhostRun run("version: 1\nsource: {plugin: source_file, path: picture.pgm}\n"
+                      "camera: {width: 320, height: 240, fx: 300, fy: 300, cx: 159.5, cy: 119.5}\n"
+                      "tracker: {plugin: " +
+                      tracker + ", targets: [{marker: 7, family: " + family +
+                      ", side_mm: 80}]}\noutputs: [{plugin: sink_null}]\n");
+        std::string picture = "P5 320 240 255\n";
+        for (int y = 0; y < 240; ++y)
+            for (int x = 0; x < 320; ++x)
+                picture += std::max(std::abs(x - 160), std::abs(y - 120)) < square_px / 2 ? '\x20' : '\x7f';
+        run.write("picture.pgm", picture);
         EXPECT_EQ(run.run(), 1);
         return run.output();
     };
-    const std::string known = " quadrilaterals per frame, none is a marker of their families; compare",
-                      none = "it found no quadrilaterals: check the light";
-    for (const std::string tracker : {"tracker_apriltag", "tracker_aruco"}) {
-        const std::string target = "{marker: 7, family: tag25h9, side_mm: 80}";
-        EXPECT_THAT(output_of(tracker, target, ", id: 4"), HasSubstr(known)) << tracker;
-        EXPECT_THAT(output_of(tracker, target, ", id: 4, width: 16, height: 8"), HasSubstr(none)) << tracker;
+    for (const auto &[tracker, family] : {std::pair{"tracker_apriltag", "tag25h9"},
+                                          {"tracker_aruco", "tag25h9"},
+                                          {"tracker_pattern", "artoolkit-4x4"}}) {
+        EXPECT_THAT(output_of(tracker, family, 80),
+                    HasSubstr(" quadrilaterals per frame, none reads as one of their markers; compare"))
+            << tracker;
+        EXPECT_THAT(output_of(tracker, family, 0), HasSubstr("it found no quadrilaterals: check the light"))
+            << tracker;
     }
 }
 
@@ -664,6 +674,19 @@ TEST(Run, InModeLiveWarnsAfterFiveSecondsWithoutTargets) {
     const std::string warning = "has seen no target yet; it looks for 'tag36h11-7' (tag36h11 7); it saw tag36h11 4 (";
     ASSERT_THAT(run.output(), HasSubstr(warning));
     EXPECT_THAT(run.output().substr(run.output().find(warning) + 1), testing::Not(HasSubstr(warning)));
+}
+
+TEST(Run, InModeLiveNamesOtherMarkersThatAreFoundAfterTheWarning) {
+    ArhostRun run("version: 1\nmode: live\n"
+                  "source: {plugin: source_synthetic, fps: 5, options: {frames: 35, family: DICT_5X5_50, id: 4}}\n"
+                  "tracker: {plugin: tracker_aruco, targets: [{marker: 7, family: tag36h11, side_mm: 80}]}\n"
+                  "outputs: [{plugin: sink_null}]\n");
+    EXPECT_EQ(run.run(), 1) << run.output();
+    const std::string hint = "frame 30 has other markers: DICT_5X5_50 4";
+    EXPECT_THAT(run.output(), testing::ContainsRegex("warning: tracker: has seen no target yet;.*\n(.*\n)*.*"
+                                                     "info: tracker: has seen no target yet; " +
+                                                     hint + "\n"));
+    EXPECT_THAT(run.output(), HasSubstr("it looked for 'tag36h11-7' (tag36h11 7); " + hint));
 }
 
 TEST(Run, InModeLiveWarnsAfterFiveSecondsOfTargetsThatWereNotSeen) {

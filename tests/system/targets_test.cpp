@@ -112,12 +112,15 @@ TEST(Targets, ATrackerIsSwappedInOneLine) {
             "tracker:\n  plugin: " +
             tracker +
             "\n  targets: [{marker: 4, family: tag36h11, side_mm: 80}]\n"
-            "  options: {quad_decimate: 1, min_perimeter_rate: 0.02}\n"
+            "  options: {quad_decimate: 1, min_perimeter_rate: 0.02, corner_refinement: subpix}\n"
             "outputs: [{plugin: sink_null}]\n");
         EXPECT_EQ(run.run(), 0) << run.output();
         EXPECT_THAT(run.output(), HasSubstr(tracker == "tracker_aruco"
                                                 ? "options.quad_decimate: set aside, because tracker_aruco has no"
                                                 : "options.min_perimeter_rate: set aside, because tracker_apriltag"));
+        EXPECT_EQ(run.output().find("options.corner_refinement: 'subpix' is set aside, because tracker_apriltag has "
+                                    "no such choice") != std::string::npos,
+                  tracker == "tracker_apriltag");
     }
 }
 
@@ -138,6 +141,7 @@ TEST(Targets, MarkersOfOtherDictionariesAreNamedIfTargetsAreMissing) {
         "tracker: {plugin: tracker_aruco, targets: [{marker: 5, family: tag36h11, side_mm: 80}]}\n"
         "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run(), 1);
-    EXPECT_THAT(run.output(), HasSubstr("info: tracker: no listed marker was seen so far, but frame 3 has markers of "
-                                        "other families: DICT_5X5_250 104\n"));
+    EXPECT_THAT(run.output(), HasSubstr("it looked for 'tag36h11-5' (tag36h11 5); frame 3 has other markers: "
+                                        "DICT_5X5_250 104; compare the numbers and the family with the print"));
+    EXPECT_THAT(run.output(), Not(HasSubstr("info: tracker: frame"))) << "told twice";
 }

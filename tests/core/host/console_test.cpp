@@ -56,10 +56,13 @@ TEST(Console, PrintsEachMessageOnOneLine) {
         Console console(false);
         console.log(ARHOST_SEVERITY_WARNING, "tracker", "two\nlines\033[2J");
         console.log(ARHOST_SEVERITY_DEBUG, "tracker", "not shown");
+        console.log(ARHOST_SEVERITY_HINT, "source", "a hint");
         console.log(ARHOST_SEVERITY_PLUGIN_MISBEHAVING, "source", "no frame");
     }
     stream.restore();
-    EXPECT_EQ(stream.read_all(), "warning: tracker: two lines [2J\nerror: source: the plugin misbehaves: no frame\n");
+    EXPECT_EQ(
+        stream.read_all(),
+        "warning: tracker: two lines [2J\ninfo: source: a hint\nerror: source: the plugin misbehaves: no frame\n");
 }
 
 TEST(Console, DropsLinesInsteadOfBlockingAndReportsTheirNumber) {

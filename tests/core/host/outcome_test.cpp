@@ -85,16 +85,20 @@ TEST_F(Outcome, ReportsThatTheFirstTargetWasNeverSeen) {
     EXPECT_FALSE(problem()) << "no overlay was requested";
 }
 
-TEST_F(Outcome, NamesMapsThatDoNotFit) {
+TEST_F(Outcome, NamesTargetsThatDoNotFit) {
     std::vector<ipc::Target> targets{{"board", {{0, "D", {}}, {1, "D", {}}}, ""}, {"cup", {{7, "D", {}}}, ""}};
-    EXPECT_EQ(misfitting_maps(statistics, targets), "");
-    for (const char *name : {"board", "cup"})
-        statistics.targets[name].mean_reprojection_px = 47.14;
-    EXPECT_THAT(misfitting_maps(statistics, targets),
-                testing::StartsWith("the map does not fit the prints: 'board' (mean reprojection error 47.1 px); "
-                                    "check"));
-    statistics.targets["board"].mean_reprojection_px = 2.9;
-    EXPECT_EQ(misfitting_maps(statistics, targets), "");
+    EXPECT_EQ(misfitting_targets(statistics, targets), "");
+    statistics.targets["cup"].mean_reprojection_px = 18.9;
+    EXPECT_EQ(misfitting_targets(statistics, targets),
+              "the corners of the prints do not fit the poses: 'cup' (mean reprojection error 18.9 px); check the "
+              "calibration of the camera and the proportions of the prints");
+    statistics.targets["board"].mean_reprojection_px = 47.14;
+    EXPECT_THAT(misfitting_targets(statistics, targets),
+                testing::AllOf(HasSubstr("'board' (mean reprojection error 47.1 px), 'cup' ("),
+                               testing::EndsWith("prints, and the places and sides in the map ('arhost map' learns a "
+                                                 "map)")));
+    statistics.targets["board"].mean_reprojection_px = statistics.targets["cup"].mean_reprojection_px = 2.9;
+    EXPECT_EQ(misfitting_targets(statistics, targets), "");
 }
 
 TEST_F(Outcome, ReportsThatEveryOverlayWasLateInModeLive) {
@@ -128,10 +132,11 @@ TEST_F(Outcome, NamesTargetsThatWereNeverSeenAlthoughOthersWere) {
     EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets),
               "never seen in 30 frames: 'cup' (D 7); it saw D 8 (30 frames)");
     statistics.unconfirmed = {{"D 7", 2}};
-    EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets),
-              "never seen in 30 frames: 'cup' (D 7); it saw D 8 (30 frames); it saw D 7 (2 frames) but got "
-              "no pose: corners were hidden, or a small family was not seen in successive frames (see "
-              "'tracker.confirm' in docs/config.md)");
+    EXPECT_EQ(
+        unseen_targets(*configuration, statistics, configuration->tracker->targets),
+        "never seen in 30 frames: 'cup' (D 7); it saw D 8 (30 frames); it saw D 7 (2 frames) but got no pose: "
+        "either the corners fit none (check the calibration of the camera, and whether something hides a "
+        "corner), or a small family was not seen in successive frames (see 'tracker.confirm' in docs/config.md)");
     statistics.unconfirmed = {{"D 23", 2}};
     EXPECT_THAT(unseen_targets(*configuration, statistics, configuration->tracker->targets), Not(HasSubstr("D 23")))
         << "its target was seen";
@@ -146,7 +151,11 @@ TEST_F(Outcome, TellsWhetherThereWereQuadrilateralsIfNothingWasSeen) {
     EXPECT_THAT(seen_instead(statistics, targets), testing::StartsWith("; it found no quadrilaterals"));
     statistics.search.candidates = 75;
     EXPECT_EQ(seen_instead(statistics, targets),
-              "; of 2.5 quadrilaterals per frame, none is a marker of their families");
+              "; of 2.5 quadrilaterals per frame, none reads as one of their markers");
+    statistics.hints = {"frame 30 has other markers: D 9", "frame 60 has other markers: E 1"};
+    EXPECT_EQ(seen_instead(statistics, targets),
+              "; frame 30 has other markers: D 9; frame 60 has other markers: E 1");
+    statistics.hints.clear();
     statistics.strangers = {{"D 8", 30}};
     EXPECT_EQ(seen_instead(statistics, targets), "; it saw D 8 (30 frames)");
 }
@@ -164,7 +173,8 @@ TEST_F(Outcome, NamesAPatternByItsFile) {
     ipc::TargetMarker marker{3, "pattern", {}, "/lab/hiro.patt"};
     statistics.unconfirmed = {{"pattern hiro.patt", 2}};
     EXPECT_THAT(seen_instead(statistics, {{"card", {marker}, ""}}),
-                testing::StartsWith("; it saw pattern hiro.patt (2 frames) but got no pose"));
+                testing::StartsWith("; it saw pattern hiro.patt (2 frames) but got no pose, because the corners fit "
+                                    "none: check the calibration of the camera, the proportions of the print"));
 }
 
 TEST(Targets, AreDescribedByTheirMarkers) {

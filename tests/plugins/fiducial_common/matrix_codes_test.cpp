@@ -34,6 +34,7 @@ TEST(MatrixCodes, AreThoseOfArToolKit) {
     EXPECT_EQ(matrix_cells(*find_matrix_family("artoolkit-3x3"), 37),
               (std::vector<bool>{true, true, false, false, true, false, true, true, false}));
     EXPECT_EQ(find_matrix_family("artoolkit-6x6"), nullptr);
+    EXPECT_EQ(matrix_id(*find_matrix_family("artoolkit-3x3-parity65"), 32), std::nullopt);
 }
 
 TEST(MatrixCodes, CanBeReadAndCorrected) {
@@ -45,6 +46,7 @@ TEST(MatrixCodes, CanBeReadAndCorrected) {
         for (int id = 0; id < family.id_count; ++id) {
             const std::uint32_t word = family.word(static_cast<std::uint32_t>(id));
             ASSERT_LT(word, 1U << bits) << id;
+            ASSERT_EQ(matrix_id(family, word), id);
             if (id > 0)
                 distance = std::min(distance, std::popcount(word));
             if (id % std::max(1, family.id_count / 500) != 0)

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <tracker_pattern/printed_patterns.hpp>
 
+#include <fiducial_common/matrix_codes.hpp>
+#include <fiducial_common/prints.hpp>
+
 #include <gmock/gmock.h>
 
 #include <random>
@@ -57,6 +60,34 @@ TEST(PatternTracker, FindsNothingElse) {
         ASSERT_EQ(tracker.start(other, {{0, 80, "pattern", file_of("hiro"), 0.5}}), ARHOST_STATUS_OK);
         EXPECT_THAT(tracker.track(GreyFrame(cv::Mat(size, CV_8UC1, cv::Scalar(128)))), IsEmpty());
     }
+}
+
+// The print of a matrix code.
+Print code(const char *family, int id) {
+    const auto &type = *arhost::fiducial::find_matrix_family(family);
+    const int side = 2 * type.side; // cells of half the size
+    Print print{cv::Mat_<std::uint8_t>(2 * side, 2 * side, std::uint8_t{0}), 2 * side};
+    const auto black = arhost::fiducial::matrix_cells(type, id);
+    for (int y = 0; y < side; ++y)
+        for (int x = 0; x < side; ++x)
+            print.cells(side / 2 + y, side / 2 + x) =
+                black[static_cast<std::size_t>(y / 2 * type.side + x / 2)] ? 0 : 255;
+    return print.with_margin(4);
+}
+
+TEST(PatternTracker, NamesOtherCodesAndMarkersIfNoListedOneAppears) {
+    const auto log_after = [](const Listed &listed, const Print &print) {
+        Tracker tracker("tracker_pattern");
+        EXPECT_EQ(tracker.start(camera, {listed}), ARHOST_STATUS_OK) << tracker.log();
+        tracker.track(GreyFrame(picture_of({{print, 80, pose_of(0, 0, 400, 20, 10, 30)}})));
+        tracker.stop();
+        return tracker.log();
+    };
+    const Listed listed{5, 80, "artoolkit-4x4-bch-13-9-3"};
+    EXPECT_THAT(log_after(listed, code("artoolkit-4x4-bch-13-9-3", 7)),
+                HasSubstr("has other markers: artoolkit-4x4 121; artoolkit-4x4-bch-13-9-3 7\n"));
+    EXPECT_THAT(log_after(listed, code("artoolkit-5x5", 2222222)), HasSubstr(": artoolkit-5x5 2222222\n"));
+    EXPECT_THAT(log_after(listed, aruco_marker("DICT_5X5_100", 77)), HasSubstr(": DICT_5X5_100 77\n"));
 }
 
 TEST(PatternTracker, RejectsFamiliesOfMarkersAndBadFiles) {

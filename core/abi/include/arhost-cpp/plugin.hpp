@@ -54,6 +54,7 @@ public:
     explicit Host(const arhost_host *host) : host_(host) {}
     void log(arhost_severity severity, const std::string &text) const { host_->log(host_, severity, text.c_str()); }
     void info(const std::string &text) const { log(ARHOST_SEVERITY_INFO, text); }
+    void hint(const std::string &text) const { log(ARHOST_SEVERITY_HINT, text); }
     void warn(const std::string &text) const { log(ARHOST_SEVERITY_WARNING, text); }
     void error(const std::string &text) const { log(ARHOST_SEVERITY_ERROR, text); }
     void progress(double fraction, const char *what) const { host_->progress(host_, fraction, what); }

@@ -35,6 +35,7 @@ pub const ARHOST_SEVERITY_WARNING: arhost_severity = 3;
 pub const ARHOST_SEVERITY_ERROR: arhost_severity = 4;
 pub const ARHOST_SEVERITY_HOST_MISBEHAVING: arhost_severity = 5;
 pub const ARHOST_SEVERITY_PLUGIN_MISBEHAVING: arhost_severity = 6;
+pub const ARHOST_SEVERITY_HINT: arhost_severity = 7;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_host {

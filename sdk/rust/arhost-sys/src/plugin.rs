@@ -43,6 +43,10 @@ impl Host {
     pub fn info(&self, text: &str) {
         self.log(ARHOST_SEVERITY_INFO, text);
     }
+    /// Tells what a frame shows instead of the targets; for trackers (`ARHOST_SEVERITY_HINT`).
+    pub fn hint(&self, text: &str) {
+        self.log(ARHOST_SEVERITY_HINT, text);
+    }
     pub fn warn(&self, text: &str) {
         self.log(ARHOST_SEVERITY_WARNING, text);
     }

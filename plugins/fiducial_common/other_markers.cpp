@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "other_families.hpp"
+#include "other_markers.hpp"
 
 #include <algorithm>
 #include <exception>
@@ -7,7 +7,7 @@
 namespace arhost::fiducial {
 namespace {
 
-OtherFamilies::Markers in_both(OtherFamilies::Markers first, const OtherFamilies::Markers &second) {
+OtherMarkers::Markers in_both(OtherMarkers::Markers first, const OtherMarkers::Markers &second) {
     for (auto &[family, ids] : first) {
         const auto found = second.find(family);
         std::erase_if(ids, [&](int id) { return found == second.end() || !found->second.contains(id); });
@@ -29,14 +29,14 @@ std::string text_of(const std::set<int> &ids) {
 
 } // namespace
 
-OtherFamilies::OtherFamilies(const Host &host, const arhost_tracker_setup &setup,
-                             std::function<Markers(const cv::Mat &grey)> find)
+OtherMarkers::OtherMarkers(const Host &host, const arhost_tracker_setup &setup,
+                           std::function<Markers(const cv::Mat &grey)> find)
     : host_(host), find_(std::move(find)) {
     for (const arhost_marker_config &marker : elements(setup.markers, setup.marker_count))
         listed_.emplace(marker.family, marker.id);
 }
 
-void OtherFamilies::frame(const cv::Mat &grey, std::span<const arhost_observation> seen) {
+void OtherMarkers::frame(const cv::Mat &grey, std::span<const arhost_observation> seen) {
     if (is_done_)
         return;
     ++frames_;
@@ -54,13 +54,13 @@ void OtherFamilies::frame(const cv::Mat &grey, std::span<const arhost_observatio
     }
 }
 
-void OtherFamilies::finish() {
+void OtherMarkers::finish() {
     if (!is_done_ && !last_.empty())
         search();
     is_done_ = true;
 }
 
-bool OtherFamilies::shows_listed(std::span<const arhost_observation> seen) {
+bool OtherMarkers::shows_listed(std::span<const arhost_observation> seen) {
     constexpr double max_chance = 1e-7;
     std::map<Id, double> chances;
     for (const arhost_observation &one : seen) {
@@ -77,14 +77,14 @@ bool OtherFamilies::shows_listed(std::span<const arhost_observation> seen) {
     return false;
 }
 
-void OtherFamilies::search() {
+void OtherMarkers::search() {
     Markers markers;
     try {
         markers = find_(last_);
         if (!markers.empty() && !previous_.empty())
             markers = in_both(std::move(markers), find_(previous_));
     } catch (const std::exception &error) {
-        host_.warn(std::string("the search for markers of other families failed: ") + error.what());
+        host_.warn(std::string("the search for other markers failed: ") + error.what());
         is_done_ = true;
     }
     last_.release(); // it need not be searched again
@@ -93,8 +93,7 @@ void OtherFamilies::search() {
         if (!ids.empty() && named_.insert(family).second)
             text += (text.empty() ? "" : "; ") + family + " " + text_of(ids);
     if (!text.empty())
-        host_.info("no listed marker was seen so far, but frame " + std::to_string(frames_) +
-                   " has markers of other families: " + text);
+        host_.hint("frame " + std::to_string(frames_) + " has other markers: " + text);
 }
 
 } // namespace arhost::fiducial

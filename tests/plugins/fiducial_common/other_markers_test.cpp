@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/other_families.hpp>
+#include <fiducial_common/other_markers.hpp>
 
 #include <gmock/gmock.h>
 
@@ -9,18 +9,18 @@
 
 namespace {
 
-using arhost::fiducial::OtherFamilies;
+using arhost::fiducial::OtherMarkers;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
 // Looks for the markers 3 and 5 of the first family, in pictures of one pixel whose code is the number of the frame.
-class OtherFamiliesTest : public testing::Test {
+class OtherMarkersTest : public testing::Test {
 protected:
-    OtherFamiliesTest() {
+    OtherMarkersTest() {
         host_.struct_size = sizeof host_;
         host_.context = this;
         host_.log = [](const arhost_host *host, arhost_severity, const char *text) {
-            static_cast<OtherFamiliesTest *>(host->context)->log_.emplace_back(text);
+            static_cast<OtherMarkersTest *>(host->context)->log_.emplace_back(text);
         };
     }
     void run(int frames, const std::vector<arhost_observation> &seen = {}) {
@@ -36,7 +36,7 @@ protected:
 
     std::vector<std::string> log_;
     std::vector<int> searched_; // frames
-    std::function<OtherFamilies::Markers(int frame)> markers_ = [](int) { return OtherFamilies::Markers{}; };
+    std::function<OtherMarkers::Markers(int frame)> markers_ = [](int) { return OtherMarkers::Markers{}; };
 
 private:
     arhost_tracker_setup setup() {
@@ -54,13 +54,13 @@ private:
     int frame_ = 0;
 
 protected:
-    OtherFamilies others_{arhost::Host(&host_), setup(), [this](const cv::Mat &grey) {
-                              searched_.push_back(grey.at<std::uint8_t>(0, 0));
-                              return markers_(searched_.back());
-                          }};
+    OtherMarkers others_{arhost::Host(&host_), setup(), [this](const cv::Mat &grey) {
+                             searched_.push_back(grey.at<std::uint8_t>(0, 0));
+                             return markers_(searched_.back());
+                         }};
 };
 
-TEST_F(OtherFamiliesTest, SearchesEverRarerAndAtTheEnd) {
+TEST_F(OtherMarkersTest, SearchesEverRarerAndAtTheEnd) {
     run(100);
     EXPECT_THAT(searched_, ElementsAre(30, 60));
     others_.finish();
@@ -69,49 +69,47 @@ TEST_F(OtherFamiliesTest, SearchesEverRarerAndAtTheEnd) {
     EXPECT_THAT(log_, IsEmpty());
 }
 
-TEST_F(OtherFamiliesTest, DoesNotSearchAFrameTwiceAtTheEnd) {
+TEST_F(OtherMarkersTest, DoesNotSearchAFrameTwiceAtTheEnd) {
     run(30);
     others_.finish();
     EXPECT_THAT(searched_, ElementsAre(30));
 }
 
-TEST_F(OtherFamiliesTest, NamesMarkersThatAreInTwoSuccessiveFrames) {
+TEST_F(OtherMarkersTest, NamesMarkersThatAreInTwoSuccessiveFrames) {
     markers_ = [](int frame) {
-        return frame == 29 ? OtherFamilies::Markers{{"a", {1, 2}}, {"b", {7}}}
-                           : OtherFamilies::Markers{{"a", {2, 4}}, {"b", {7}}, {"c", {9}}};
+        return frame == 29 ? OtherMarkers::Markers{{"a", {1, 2}}, {"b", {7}}}
+                           : OtherMarkers::Markers{{"a", {2, 4}}, {"b", {7}}, {"c", {9}}};
     };
     run(30);
     EXPECT_THAT(searched_, ElementsAre(30, 29));
-    EXPECT_THAT(log_, ElementsAre("no listed marker was seen so far, but frame 30 has markers of other families: "
-                                  "a 2; b 7"));
+    EXPECT_THAT(log_, ElementsAre("frame 30 has other markers: a 2; b 7"));
 }
 
-TEST_F(OtherFamiliesTest, NamesEachFamilyOnceAndFiveOfItsMarkers) {
+TEST_F(OtherMarkersTest, NamesEachFamilyOnceAndFiveOfItsMarkers) {
     markers_ = [](int frame) {
-        return frame <= 30 ? OtherFamilies::Markers{{"a", {1, 2, 3, 4, 5, 6, 7}}}
-                           : OtherFamilies::Markers{{"a", {1}}, {"b", {1}}};
+        return frame <= 30 ? OtherMarkers::Markers{{"a", {1, 2, 3, 4, 5, 6, 7}}}
+                           : OtherMarkers::Markers{{"a", {1}}, {"b", {1}}};
     };
     run(60);
-    EXPECT_THAT(log_, ElementsAre(testing::EndsWith("frame 30 has markers of other families: a 1, 2, 3, 4, 5 and 2 "
-                                                    "more"),
-                                  testing::EndsWith("frame 60 has markers of other families: b 1")));
+    EXPECT_THAT(log_, ElementsAre(testing::EndsWith("frame 30 has other markers: a 1, 2, 3, 4, 5 and 2 more"),
+                                  testing::EndsWith("frame 60 has other markers: b 1")));
 }
 
-TEST_F(OtherFamiliesTest, ASingleFrameSufficesIfThereIsNoOther) {
-    markers_ = [](int) { return OtherFamilies::Markers{{"a", {1}}}; };
+TEST_F(OtherMarkersTest, ASingleFrameSufficesIfThereIsNoOther) {
+    markers_ = [](int) { return OtherMarkers::Markers{{"a", {1}}}; };
     run(1);
     others_.finish();
-    EXPECT_THAT(log_, ElementsAre(testing::EndsWith("frame 1 has markers of other families: a 1")));
+    EXPECT_THAT(log_, ElementsAre(testing::EndsWith("frame 1 has other markers: a 1")));
 }
 
-TEST_F(OtherFamiliesTest, StopsWhenAListedMarkerIsSeen) {
+TEST_F(OtherMarkersTest, StopsWhenAListedMarkerIsSeen) {
     run(1, {sighting(5, 1e-9)});
     run(60);
     others_.finish();
     EXPECT_THAT(searched_, IsEmpty());
 }
 
-TEST_F(OtherFamiliesTest, StopsWhenAListedMarkerOfASmallFamilyIsSeenInSuccessiveFrames) {
+TEST_F(OtherMarkersTest, StopsWhenAListedMarkerOfASmallFamilyIsSeenInSuccessiveFrames) {
     run(1, {sighting(5, 1e-4)});
     run(28, {sighting(3, 1)});
     run(1, {sighting(5, 1e-4)});
@@ -121,19 +119,19 @@ TEST_F(OtherFamiliesTest, StopsWhenAListedMarkerOfASmallFamilyIsSeenInSuccessive
     EXPECT_THAT(searched_, ElementsAre(30));
 }
 
-TEST_F(OtherFamiliesTest, IgnoresMarkersThatAreNotListed) {
+TEST_F(OtherMarkersTest, IgnoresMarkersThatAreNotListed) {
     run(30, {sighting(4, 0)});
     EXPECT_THAT(searched_, ElementsAre(30));
 }
 
-TEST_F(OtherFamiliesTest, ReportsASearchThatFails) {
-    markers_ = [](int) -> OtherFamilies::Markers { throw std::runtime_error("no memory"); };
+TEST_F(OtherMarkersTest, ReportsASearchThatFails) {
+    markers_ = [](int) -> OtherMarkers::Markers { throw std::runtime_error("no memory"); };
     run(100);
     others_.finish();
-    EXPECT_THAT(log_, ElementsAre("the search for markers of other families failed: no memory"));
+    EXPECT_THAT(log_, ElementsAre("the search for other markers failed: no memory"));
 }
 
-TEST_F(OtherFamiliesTest, DoesNothingWithoutAFrame) {
+TEST_F(OtherMarkersTest, DoesNothingWithoutAFrame) {
     others_.finish();
     EXPECT_THAT(searched_, IsEmpty());
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tells the user which markers of other families there are if no listed marker appears: then the configuration
-// probably has the wrong family or dictionary.
+// Tells the user which other markers there are if no listed marker appears: then the configuration probably has the
+// wrong family, dictionary or id.
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
@@ -18,17 +18,17 @@
 
 namespace arhost::fiducial {
 
-class OtherFamilies {
+class OtherMarkers {
 public:
     using Markers = std::map<std::string, std::set<int>>; // ids by family
 
-    // `find` returns the markers in a picture that belong to families without listed markers. It may take a second.
-    OtherFamilies(const Host &host, const arhost_tracker_setup &setup,
-                  std::function<Markers(const cv::Mat &grey)> find);
+    // `find` returns the markers in a picture that the tracker does not report. It may take a second.
+    OtherMarkers(const Host &host, const arhost_tracker_setup &setup,
+                 std::function<Markers(const cv::Mat &grey)> find);
 
     // To be called with each frame and what the tracker has seen in it. Until a listed marker appears that is no
-    // chance, searches frames 30, 60, 120 and so on, and logs each family once of which it finds markers in this
-    // frame and in the one before.
+    // chance, searches frames 30, 60, 120 and so on, and logs a hint with each family once of which it finds markers
+    // in this frame and in the one before.
     void frame(const cv::Mat &grey, std::span<const arhost_observation> seen);
     // To be called at the end. Searches the last frame if no listed marker has appeared.
     void finish();
