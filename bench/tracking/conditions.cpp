@@ -7,6 +7,8 @@
 #include "bare_detectors.hpp"
 #include "cramer_rao.hpp"
 
+#include "base/command_line.hpp"
+
 #include <fiducial_common/prints.hpp>
 #include <fiducial_common/rendered_marker.hpp>
 
@@ -286,15 +288,16 @@ std::vector<std::string> missed_targets(const Result &tracker, const std::array<
 
 int main(int argc, char **argv) try {
     bool is_quick = false;
-    std::string only; // the name of a dimension; empty: all
+    std::string only, csv_file;
+    arhost::base::CommandLine line("Measures the errors of poses in synthetic pictures.");
+    line.flag("--quick", is_quick, "Measure with fewer frames; the figures are less precise");
+    line.option("--only", only, "Name of a dimension (default: all)");
+    line.option("CSV", csv_file, "File to write");
+    if (const auto status = line.parse(argc, argv))
+        return *status;
     std::ofstream csv;
-    for (int i = 1; i < argc; ++i)
-        if (std::string(argv[i]) == "--quick")
-            is_quick = true;
-        else if (std::string(argv[i]) == "--only" && i + 1 < argc)
-            only = argv[++i];
-        else
-            csv.open(argv[i]);
+    if (!csv_file.empty())
+        csv.open(csv_file);
     constexpr double fractions[] = {0.5, 0.95, 0.99};
     csv << "dimension,unit,value,detector,found,corner_px";
     for (const char *error :

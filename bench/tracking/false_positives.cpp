@@ -5,6 +5,8 @@
 // the worker reports.
 #include "solving_tracker.hpp"
 
+#include "base/command_line.hpp"
+
 #include <fiducial_common/aruco_dictionaries.hpp>
 #include <fiducial_common/clutter.hpp>
 #include <fiducial_common/matrix_codes.hpp>
@@ -245,11 +247,11 @@ template <class Show> CountsByFamily in_parallel(int count, int unit, const Show
 int main(int argc, char **argv) try {
     bool is_quick = false;
     std::string only = ".*";
-    for (int i = 1; i < argc; ++i)
-        if (std::string(argv[i]) == "--quick")
-            is_quick = true;
-        else if (std::string(argv[i]) == "--only" && i + 1 < argc)
-            only = argv[++i];
+    arhost::base::CommandLine line("Counts sightings and poses in pictures without markers; takes over an hour.");
+    line.flag("--quick", is_quick, "Measure with fewer frames; the figures are less precise");
+    line.option("--only", only, "Regular expression for the names of families (default: all)");
+    if (const auto status = line.parse(argc, argv))
+        return *status;
     const int pictures = is_quick ? 200 : 6000, video_frames = is_quick ? 400 : 4000;
     cv::setNumThreads(1);
     const std::vector<Setup> all = setups(std::regex(only));

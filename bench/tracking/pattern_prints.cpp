@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Which patterns tracker_pattern reports for rendered prints of hiro and kanji, and the errors of their corners.
+#include "base/command_line.hpp"
+
 #include <tracker_pattern/printed_patterns.hpp>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstring>
 #include <exception>
 #include <filesystem>
 #include <random>
@@ -15,7 +16,12 @@
 
 int main(int argc, char **argv) try {
     using namespace arhost::test;
-    const int views = argc > 1 && std::strcmp(argv[1], "--quick") == 0 ? 20 : 200;
+    bool is_quick = false;
+    arhost::base::CommandLine line("Counts confusions of patterns.");
+    line.flag("--quick", is_quick, "Measure with fewer frames; the figures are less precise");
+    if (const auto status = line.parse(argc, argv))
+        return *status;
+    const int views = is_quick ? 20 : 200;
     if (!std::filesystem::exists(shared_data("markers/artoolkit"))) {
         std::printf("pattern-prints is skipped: the patterns are missing (%s)\n",
                     shared_data("markers/artoolkit").string().c_str());

@@ -2,6 +2,8 @@
 //
 // Speed and accuracy of tracker_image on generated video of 640×480, in which half of the picture is covered, next to
 // OpenCV's features (ORB, ratio test, findHomography with RANSAC) in every frame.
+#include "base/command_line.hpp"
+
 #include <tracker_image/poster_video.hpp>
 
 #include <opencv2/calib3d.hpp>
@@ -11,7 +13,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
-#include <cstring>
 #include <exception>
 #include <numeric>
 #include <optional>
@@ -99,7 +100,12 @@ std::optional<Quad> quad_of(const std::vector<arhost_observation> &seen) {
 } // namespace
 
 int main(int argc, char **argv) try {
-    const int frames = argc > 1 && std::strcmp(argv[1], "--quick") == 0 ? 200 : 2000;
+    bool is_quick = false;
+    arhost::base::CommandLine line("Measures the speed of tracker_image.");
+    line.flag("--quick", is_quick, "Measure with fewer frames; the figures are less precise");
+    if (const auto status = line.parse(argc, argv))
+        return *status;
+    const int frames = is_quick ? 200 : 2000;
     constexpr int full_search_every = 10; // the default of tracker.full_search_every
     const ScratchFolder folder;
     const cv::Mat picture = poster(3);

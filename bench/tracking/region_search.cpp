@@ -5,6 +5,8 @@
 #include "bare_detectors.hpp"
 #include "solving_tracker.hpp"
 
+#include "base/command_line.hpp"
+
 #include <fiducial_common/clutter.hpp>
 #include <fiducial_common/prints.hpp>
 #include <fiducial_common/rendered_marker.hpp>
@@ -158,7 +160,11 @@ Detector plugin(const std::string &name, std::uint32_t full_search_every, int li
 } // namespace
 
 int main(int argc, char **argv) try {
-    const bool is_quick = argc > 1 && std::string(argv[1]) == "--quick";
+    bool is_quick = false;
+    arhost::base::CommandLine line("Measures the speed of the search for markers in video.");
+    line.flag("--quick", is_quick, "Measure with fewer frames; the figures are less precise");
+    if (const auto status = line.parse(argc, argv))
+        return *status;
     const int frame_count = is_quick ? 30 : 300;
     bool met = true;
     std::printf("search for markers in video of 1280x720, 4 markers, %d frames; speed relative to the bare library\n"

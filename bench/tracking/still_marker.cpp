@@ -5,6 +5,8 @@
 #include "bare_detectors.hpp"
 #include "solving_tracker.hpp"
 
+#include "base/command_line.hpp"
+
 #include <fiducial_common/prints.hpp>
 #include <fiducial_common/rendered_marker.hpp>
 
@@ -72,7 +74,12 @@ double with_plugin(const std::deque<GreyFrame> &frames, const std::string &plugi
 } // namespace
 
 int main(int argc, char **argv) try {
-    const int count = argc > 1 && std::string(argv[1]) == "--quick" ? 60 : 600;
+    bool is_quick = false;
+    arhost::base::CommandLine line("Measures the jitter of a resting marker.");
+    line.flag("--quick", is_quick, "Measure with fewer frames; the figures are less precise");
+    if (const auto status = line.parse(argc, argv))
+        return *status;
+    const int count = is_quick ? 60 : 600;
     std::printf(
         "jitter of a corner of a resting marker, RMS in px, %d frames with noise of 2 grey levels: detected by "
         "the bare library (OpenCV: subpix), and projected with the pose of the tracker\n"

@@ -243,9 +243,11 @@ arhost_intrinsics read_calibration(const std::filesystem::path &file, std::optio
         return intrinsics;
     }
     const Node root = Node::parse(content, file.string());
+    if (root.is_null())
+        root.fail("is empty");
     if (!root.is_map())
-        root.fail("is not a calibration in YAML format; for YAML, give OpenCV's FileStorage a file name that ends in "
-                  ".yaml");
+        root.fail("is not a calibration: expected YAML of OpenCV, ROS or Kalibr, or ARToolKit's camera parameters; "
+                  "OpenCV's FileStorage writes YAML if the file name ends in .yaml");
     if (is_kalibr(root))
         return read_kalibr(root, expected, name.value_or("cam0"));
     expect_no_name();

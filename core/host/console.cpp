@@ -49,10 +49,9 @@ void Console::clear_line() {
 }
 
 void Console::log(arhost_severity severity, const std::string &component, const std::string &text) {
-    const auto level = severity == ARHOST_SEVERITY_HINT      ? spdlog::level::info
-                       : severity >= ARHOST_SEVERITY_ERROR   ? spdlog::level::err
+    const auto level = severity >= ARHOST_SEVERITY_ERROR     ? spdlog::level::err
                        : severity == ARHOST_SEVERITY_WARNING ? spdlog::level::warn
-                       : severity == ARHOST_SEVERITY_INFO    ? spdlog::level::info
+                       : severity >= ARHOST_SEVERITY_INFO    ? spdlog::level::info
                                                              : spdlog::level::debug;
     if (!log_->should_log(level))
         return;

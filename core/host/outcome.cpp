@@ -88,19 +88,22 @@ std::string unseen_targets(const run_config::Configuration &configuration, const
 }
 
 std::string misfitting_targets(const Statistics &statistics, const std::vector<ipc::Target> &targets) {
-    constexpr double max_reprojection_px = 3; // errors of a usable calibration or layout are smaller
+    // Errors of a usable calibration or layout are smaller.
+    const auto fits = [](const TargetStatistics &seen) {
+        return seen.mean_reprojection_px <= std::max(3.0, 0.01 * seen.largest_px);
+    };
     std::string text;
     bool has_map = false;
     for (const ipc::Target &target : targets) {
         const auto seen = statistics.targets.find(target.name);
-        if (seen == statistics.targets.end() || seen->second.mean_reprojection_px <= max_reprojection_px)
+        if (seen == statistics.targets.end() || fits(seen->second))
             continue;
         text += fmt::format("{}'{}' (mean reprojection error {:.1f} px)", text.empty() ? "" : ", ", target.name,
                             seen->second.mean_reprojection_px);
         has_map = has_map || target.markers.size() > 1;
     }
     return text.empty() ? ""
-                        : "the corners of the prints do not fit the poses: " + text +
+                        : "the corners and the computed poses disagree: " + text +
                               "; check the calibration of the camera and the proportions of the prints" +
                               (has_map ? ", and the places and sides in the map ('arhost map' learns a map)" : "");
 }
@@ -152,12 +155,13 @@ std::string seen_instead(const Statistics &statistics, const std::vector<ipc::Ta
                 "proportions of the print, and whether something hides a corner";
     if (const SearchStatistics &search = statistics.search;
         text.empty() && statistics.targets.empty() && search.frames_with_candidate_count > 0)
-        text = search.candidates == 0
-                   ? std::string("; it found no quadrilaterals: check the light, the focus and the size of the print "
-                                 "in the image")
-                   : fmt::format("; of {:.1f} quadrilaterals per frame, none reads as one of their markers",
-                                 static_cast<double>(search.candidates) /
-                                     static_cast<double>(search.frames_with_candidate_count));
+        text =
+            search.candidates == 0
+                ? std::string("; it found no quadrilaterals: check the light, the focus and the size of the print "
+                              "in the image")
+                : fmt::format("; of {:.1f} quadrilaterals per frame, none could be read as a marker of these targets",
+                              static_cast<double>(search.candidates) /
+                                  static_cast<double>(search.frames_with_candidate_count));
     return text;
 }
 

@@ -176,7 +176,7 @@ private:
     void set_recorded_camera(Frame &frame) const;
     void count_targets(const Frame &frame);
     void count_strangers(Frame &frame);
-    void take_hint(const std::string &text);
+    void take_hint(std::string text);
     void set_camera_from_targets(Frame &frame);
     void set_camera_from_trajectory(Frame &frame) const;
     void on_camera_known(Frame &frame);

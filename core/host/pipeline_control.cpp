@@ -143,6 +143,8 @@ bool Pipeline::finish_swaps() {
         next_tracker_ && next_tracker_->configuration->targets != tracker_->configuration->targets;
     const bool tracker = finish(tracker_, next_tracker_);
     anchors_unchecked_ |= tracker && targets_change;
+    if (tracker)
+        statistics_.hints.clear();
     const std::shared_ptr<LoadedScene> scene = raytracer_ ? raytracer_->scene : nullptr;
     const bool raytracer = finish(raytracer_, next_raytracer_);
     if (raytracer && raytracer_->scene != scene) {

@@ -318,13 +318,15 @@ void Pipeline::count_strangers(Frame &frame) {
 }
 
 // Keeps what the tracker sees instead of the targets for the warning that they were not seen.
-void Pipeline::take_hint(const std::string &text) {
+void Pipeline::take_hint(std::string text) {
+    constexpr std::size_t max_bytes = 500;
     std::vector<std::string> &hints = statistics_.hints;
-    if (hints.size() == Statistics::max_hints || std::ranges::find(hints, text) != hints.end())
-        return;
+    text.resize(std::min(text.size(), max_bytes));
+    if (!retired_.empty() || hints.size() == Statistics::max_hints || std::ranges::find(hints, text) != hints.end())
+        return; // it may be of a tracker that was replaced, or is known
     hints.push_back(text);
-    if (reported_missing_targets_ && statistics_.targets.empty())
-        context_.log(ARHOST_SEVERITY_INFO, "tracker", "has seen no target yet; " + text);
+    const bool is_late = reported_missing_targets_ && statistics_.targets.empty();
+    context_.log(is_late ? ARHOST_SEVERITY_INFO : ARHOST_SEVERITY_DEBUG, "tracker", text);
 }
 
 void Pipeline::set_camera_from_targets(Frame &frame) {

@@ -93,7 +93,7 @@ std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plug
                 value->fail("the path is also given by the key 'path' next to 'plugin'; remove one of them");
             value = path;
         }
-        if (value && sets_aside && !declared.choices.empty() && !value->known_choice(choices_of(declared))) {
+        if (value && sets_aside && !declared.choices.empty() && value->is_unlike(choices_of(declared))) {
             notes.push_back(value->where() + ": " + value->path() + ": '" + value->text() +
                             "' is set aside, because " + plugin.id + " has no such choice");
             value.reset();

@@ -105,7 +105,7 @@ std::string doubt_of_side(double side_mm) {
         return "";
     char text[32];
     char *const end = std::to_chars(text, std::end(text), side_mm, std::chars_format::general, 6).ptr;
-    return "a marker with a side of " + std::string(text, end) + " mm is implausible; check the unit, which is mm";
+    return "a print of " + std::string(text, end) + " mm is implausible; check the unit, which is mm";
 }
 
 // Returns whether it warns.

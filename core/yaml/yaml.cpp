@@ -31,6 +31,11 @@ std::string child_path(const std::string &parent, std::string_view key) {
     return parent.empty() ? std::string(key) : parent + "." + std::string(key);
 }
 
+char lower(char c) {
+    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+}
+
+// Ignores the case of letters.
 std::size_t edit_distance(std::string_view a, std::string_view b) {
     std::vector<std::size_t> row(b.size() + 1);
     for (std::size_t j = 0; j <= b.size(); ++j)
@@ -38,7 +43,7 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
     for (std::size_t i = 1; i <= a.size(); ++i) {
         std::size_t diagonal = row[0]++;
         for (std::size_t j = 1; j <= b.size(); ++j) {
-            const std::size_t substituted = diagonal + (a[i - 1] != b[j - 1]);
+            const std::size_t substituted = diagonal + (lower(a[i - 1]) != lower(b[j - 1]));
             diagonal = row[j];
             row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
         }
@@ -490,10 +495,8 @@ std::string Node::choice(std::span<const std::string_view> choices) const {
     return value;
 }
 
-std::optional<std::string> Node::known_choice(std::span<const std::string_view> choices) const {
-    const bool is_known = std::ranges::find(choices, text()) != choices.end();
-    return is_known || is_overridden() || !nearest(text(), choices).empty() ? std::optional(choice(choices))
-                                                                            : std::nullopt;
+bool Node::is_unlike(std::span<const std::string_view> choices) const {
+    return !is_overridden() && nearest(text(), choices).empty();
 }
 
 std::vector<double> Node::reals() const {

@@ -115,9 +115,8 @@ public:
     std::string choice(std::initializer_list<std::string_view> choices) const {
         return choice(std::span(choices.begin(), choices.size()));
     }
-    // Like `choice`, but returns nullopt for a value that resembles none of the choices, unless it was set by an
-    // option of the command line.
-    std::optional<std::string> known_choice(std::span<const std::string_view> choices) const;
+    // Returns whether the value resembles none of the choices, and was not set by an option of the command line.
+    bool is_unlike(std::span<const std::string_view> choices) const;
     std::vector<double> reals() const;                  // a sequence of finite numbers
     std::vector<double> reals(std::size_t count) const; // exactly `count` numbers
 

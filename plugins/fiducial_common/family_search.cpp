@@ -3,6 +3,7 @@
 
 #include "apriltag_families.hpp"
 #include "aruco_dictionaries.hpp"
+#include "aruco_reading.hpp"
 
 #include <opencv2/imgproc.hpp>
 
@@ -19,7 +20,8 @@ using aruco::dictionary_types;
 using aruco::DictionaryType;
 
 void add_april_tags(const cv::Mat &grey, std::span<const Family> used, OtherMarkers::Markers &markers) {
-    constexpr int min_side = 8; // the library reads out of bounds in smaller images
+    constexpr int min_side = 8;        // the library reads out of bounds in smaller images
+    constexpr float min_contrast = 20; // grey levels; clutter of less contrast may read as a tag of a small family
     if (std::min(grey.cols, grey.rows) < min_side)
         return;
     using TagFamily = std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t *)>;
@@ -38,7 +40,8 @@ void add_april_tags(const cv::Mat &grey, std::span<const Family> used, OtherMark
     for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
         apriltag_detection_t *tag = nullptr;
         zarray_get(tags.get(), i, &tag);
-        markers[tag->family->name].insert(tag->id);
+        if (tag->decision_margin >= min_contrast)
+            markers[tag->family->name].insert(tag->id);
     }
 }
 
@@ -51,12 +54,22 @@ void add_aruco_markers(const cv::Mat &grey, std::span<const Family> used, OtherM
         const auto next = largest + 1;
         if (largest->is_april_tag() || (next != dictionary_types.end() && next->is_of_series(largest->family)))
             continue;
+        const auto is_used = [&](int id) {
+            return std::ranges::any_of(used, [&](const Family &family) {
+                return largest->is_of_series(family.name) && id < family.id_count;
+            });
+        };
+        const cv::aruco::Dictionary dictionary = aruco::predefined(largest->name);
+        const aruco::DetectedMarkers found = aruco::detect(grey, dictionary, parameters);
         std::set<int> ids;
-        for (const int id : aruco::detect(grey, aruco::predefined(largest->name), parameters).ids)
-            if (std::ranges::none_of(used, [&](const Family &family) {
-                    return largest->is_of_series(family.name) && id < family.id_count;
-                }))
-                ids.insert(id);
+        for (std::size_t i = 0; i < found.ids.size(); ++i) {
+            Corners corners_px;
+            std::ranges::copy(found.corners[i], corners_px.begin());
+            const aruco::Reading reading =
+                aruco::read(grey, corners_px, dictionary, found.ids[i], parameters.markerBorderBits, true);
+            if (reading.has_whole_border && reading.false_positive_rate < 1 && !is_used(found.ids[i]))
+                ids.insert(found.ids[i]);
+        }
         if (ids.empty())
             continue;
         const auto smallest = std::ranges::find_if(dictionary_types, [&](const DictionaryType &type) {
@@ -69,7 +82,7 @@ void add_aruco_markers(const cv::Mat &grey, std::span<const Family> used, OtherM
 } // namespace
 
 OtherMarkers::Markers markers_of_other_families(const cv::Mat &grey, std::span<const Family> used) {
-    constexpr int max_side_px = 1920; // so that it takes less than a second
+    constexpr int max_side_px = 1280; // so that it takes less than a second
     cv::Mat reduced = grey;
     if (const double scale = static_cast<double>(max_side_px) / std::max(grey.cols, grey.rows); scale < 1)
         cv::resize(grey, reduced, {std::max(1, cvRound(scale * grey.cols)), std::max(1, cvRound(scale * grey.rows))},

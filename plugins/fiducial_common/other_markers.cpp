@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <exception>
+#include <utility>
 
 namespace arhost::fiducial {
 namespace {
@@ -48,15 +49,21 @@ void OtherMarkers::frame(const cv::Mat &grey, std::span<const arhost_observation
     }
     std::swap(previous_, last_);
     grey.copyTo(last_);
-    if (frames_ == next_search_) {
+    if (!candidates_.empty()) {
+        tell(in_both(std::exchange(candidates_, {}), search(grey)));
+    } else if (frames_ == next_search_) {
         next_search_ *= 2;
-        search();
+        candidates_ = search(grey);
     }
 }
 
 void OtherMarkers::finish() {
-    if (!is_done_ && !last_.empty())
-        search();
+    if (!is_done_ && !last_.empty()) {
+        Markers markers = search(last_);
+        if (!markers.empty() && !previous_.empty())
+            markers = in_both(std::move(markers), search(previous_));
+        tell(markers);
+    }
     is_done_ = true;
 }
 
@@ -77,23 +84,23 @@ bool OtherMarkers::shows_listed(std::span<const arhost_observation> seen) {
     return false;
 }
 
-void OtherMarkers::search() {
-    Markers markers;
+OtherMarkers::Markers OtherMarkers::search(const cv::Mat &grey) {
     try {
-        markers = find_(last_);
-        if (!markers.empty() && !previous_.empty())
-            markers = in_both(std::move(markers), find_(previous_));
+        return is_done_ ? Markers() : find_(grey);
     } catch (const std::exception &error) {
         host_.warn(std::string("the search for other markers failed: ") + error.what());
         is_done_ = true;
+        return {};
     }
-    last_.release(); // it need not be searched again
+}
+
+void OtherMarkers::tell(const Markers &markers) {
     std::string text;
     for (const auto &[family, ids] : markers)
         if (!ids.empty() && named_.insert(family).second)
             text += (text.empty() ? "" : "; ") + family + " " + text_of(ids);
     if (!text.empty())
-        host_.hint("frame " + std::to_string(frames_) + " has other markers: " + text);
+        host_.hint("other markers were in view: " + text);
 }
 
 } // namespace arhost::fiducial

@@ -27,17 +27,18 @@ public:
                  std::function<Markers(const cv::Mat &grey)> find);
 
     // To be called with each frame and what the tracker has seen in it. Until a listed marker appears that is no
-    // chance, searches frames 30, 60, 120 and so on, and logs a hint with each family once of which it finds markers
-    // in this frame and in the one before.
+    // chance, searches frames 30, 60, 120 and so on, and if there are markers, also the next frame. Logs a hint with
+    // each family once of which both frames have a marker.
     void frame(const cv::Mat &grey, std::span<const arhost_observation> seen);
-    // To be called at the end. Searches the last frame if no listed marker has appeared.
+    // To be called at the end. If no listed marker has appeared, searches the last two frames.
     void finish();
 
 private:
     using Id = std::pair<std::uint32_t, std::int32_t>; // family and id
 
     bool shows_listed(std::span<const arhost_observation> seen);
-    void search();
+    Markers search(const cv::Mat &grey);
+    void tell(const Markers &markers);
 
     Host host_;
     std::set<Id> listed_;
@@ -45,6 +46,7 @@ private:
     std::map<Id, double> chances_; // that all sightings of a marker in successive frames are chance
     std::set<std::string> named_;  // families
     std::uint64_t frames_ = 0, next_search_ = 30;
+    Markers candidates_; // found in the previous frame
     bool is_done_ = false;
     cv::Mat previous_, last_; // frames
 };

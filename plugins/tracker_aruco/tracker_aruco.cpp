@@ -2,6 +2,7 @@
 //
 // tracker_aruco: detects ArUco markers and AprilTags with OpenCV.
 #include <fiducial_common/aruco_dictionaries.hpp>
+#include <fiducial_common/aruco_reading.hpp>
 #include <fiducial_common/edge_refinement.hpp>
 #include <fiducial_common/family_search.hpp>
 #include <fiducial_common/lens.hpp>
@@ -32,6 +33,7 @@ namespace {
 using arhost::Failure;
 using arhost::aruco::dictionary_types;
 using arhost::aruco::DictionaryType;
+using arhost::aruco::Reading;
 using arhost::fiducial::Corners;
 using arhost::fiducial::Family;
 
@@ -142,67 +144,6 @@ cv::aruco::Dictionary read_dictionary(const std::string &file) {
     throw invalid("is not a dictionary: it needs the keys nmarkers, markersize, and marker_0, marker_1, …; each "
                   "marker must be a "
                   "string of markersize² digits 0 or 1");
-}
-
-// Samples the square of a marker at the centres of `count`² equal parts.
-cv::Mat_<std::uint8_t> unwarped(const cv::Mat &grey, const Corners &corners_px, int count) {
-    const float first = -0.5F, last = static_cast<float>(count) - 0.5F;
-    const cv::Point2f square[] = {{first, first}, {last, first}, {last, last}, {first, last}};
-    cv::Point2f corners[4];
-    std::ranges::copy(corners_px, corners);
-    cv::Mat_<std::uint8_t> samples;
-    cv::warpPerspective(grey, samples, cv::getPerspectiveTransform(corners, square), {count, count}, cv::INTER_LINEAR,
-                        cv::BORDER_REPLICATE);
-    return samples;
-}
-
-// Whether the cells of a marker are uniform around their centres: on the side of the threshold that `white` tells.
-bool is_uniform(const cv::Mat &grey, const Corners &corners_px, const cv::Mat_<std::uint8_t> &white,
-                double threshold) {
-    const cv::Mat_<std::uint8_t> samples = unwarped(grey, corners_px, 4 * white.rows);
-    for (int row = 0; row < white.rows; ++row)
-        for (int column = 0; column < white.cols; ++column)
-            for (const int y : {4 * row + 1, 4 * row + 2})
-                for (const int x : {4 * column + 1, 4 * column + 2})
-                    if ((samples(y, x) > threshold) != (white(row, column) != 0))
-                        return false;
-    return true;
-}
-
-struct Reading {
-    std::uint32_t wrong_bits;
-    bool has_whole_border;      // each of its cells is black, or white if the marker is inverted
-    double contrast;            // half of the difference between the mean grey levels of white and of black cells
-    double false_positive_rate; // as arhost_observation has it
-};
-
-// Reads the bits of a detected marker once more, because OpenCV does not tell how many of them it has corrected.
-// `is_oriented`: the corners begin at the top left of the drawn marker; otherwise at any of its corners.
-Reading read(const cv::Mat &grey, const Corners &corners_px, const cv::aruco::Dictionary &dictionary, int id,
-             int border_bits, bool is_oriented) {
-    const int cells = dictionary.markerSize + 2 * border_bits, bits = dictionary.markerSize * dictionary.markerSize;
-    const cv::Mat_<std::uint8_t> levels = unwarped(grey, corners_px, cells);
-    cv::Mat_<std::uint8_t> white;
-    cv::threshold(levels, white, 0, 1, cv::THRESH_BINARY | cv::THRESH_OTSU);
-    const cv::Mat black = 1 - white;
-    const double white_level = cv::mean(levels, white)[0], black_level = cv::mean(levels, black)[0];
-    const cv::Rect code(border_bits, border_bits, dictionary.markerSize, dictionary.markerSize);
-    const int wrong_bits = dictionary.getDistanceToId(white(code), id, !is_oriented),
-              wrong_bits_inverted = dictionary.getDistanceToId(black(code), id, !is_oriented);
-    const bool is_inverted = wrong_bits_inverted < wrong_bits;
-    const cv::Mat unlike_border = is_inverted ? black : white;
-    Reading reading{static_cast<std::uint32_t>(std::min(wrong_bits, wrong_bits_inverted)),
-                    cv::countNonZero(unlike_border) == cv::countNonZero(unlike_border(code)),
-                    (white_level - black_level) / 2, 0};
-    reading.false_positive_rate = arhost::fiducial::false_positive_rate(bits, reading.wrong_bits);
-    // Squares in clutter often read as a code of 4×4 bits, but most of their cells are not uniform.
-    if (bits <= 16) {
-        cv::Mat_<std::uint8_t> expected(cells, cells, is_inverted ? 1 : 0); // the border
-        white(code).copyTo(expected(code));
-        if (!is_uniform(grey, corners_px, expected, (white_level + black_level) / 2))
-            reading.false_positive_rate = 1;
-    }
-    return reading;
 }
 
 struct Dictionary {
@@ -389,7 +330,8 @@ private:
             Corners in_pixels;
             for (int corner = 0; corner < 4; ++corner)
                 in_pixels[corner] = (corners.corners_px[corner] - origin) * look.scale - half;
-            const Reading reading = read(pixels, in_pixels, table, id, parameters.markerBorderBits, false);
+            const Reading reading =
+                arhost::aruco::read(pixels, in_pixels, table, id, parameters.markerBorderBits, false);
             if (is_listed || (reading.wrong_bits == 0 && reading.false_positive_rate < 1)) // else it may be anything
                 observations[i] = observation_of(detectable, id, corners, reading);
         };
@@ -432,7 +374,7 @@ private:
     Reading read_upright(const cv::Mat &grey, Corners corners_px, const Dictionary &dictionary, int id) const {
         if (dictionary.rotated_180)
             std::rotate(corners_px.begin(), corners_px.begin() + 2, corners_px.end());
-        return read(grey, corners_px, dictionary.table, id, parameters_.markerBorderBits, true);
+        return arhost::aruco::read(grey, corners_px, dictionary.table, id, parameters_.markerBorderBits, true);
     }
 
     static arhost_observation observation_of(const Detectable &detectable, int id,

@@ -99,10 +99,18 @@ std::optional<MatrixReader::Match> MatrixReader::match(const Samples &samples) c
     return best && best->correlation >= min_correlation ? best : std::nullopt;
 }
 
-std::optional<std::int32_t> MatrixReader::id_of(const MatrixFamily &type, const Samples &samples) const {
+std::vector<MatrixReader::AnyCode> MatrixReader::codes(const Samples &samples) const {
+    std::vector<AnyCode> codes;
     const auto reading = read(samples);
-    const auto id = reading ? arhost::fiducial::matrix_id(type, reading->word) : std::nullopt;
-    return id && reading->upright.dot(picture_of(type, *id)) >= min_correlation ? id : std::nullopt;
+    if (!reading)
+        return codes;
+    for (const MatrixFamily &type : arhost::fiducial::matrix_families()) {
+        const auto id = type.side == cells_ ? arhost::fiducial::matrix_id(type, reading->word) : std::nullopt;
+        const double correlation = id ? reading->upright.dot(picture_of(type, *id)) : 0;
+        if (correlation >= min_correlation)
+            codes.push_back({&type, *id, correlation});
+    }
+    return codes;
 }
 
 } // namespace tracker_pattern

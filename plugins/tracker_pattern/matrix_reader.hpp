@@ -37,8 +37,13 @@ public:
     };
     std::optional<Match> match(const Samples &samples) const;
 
-    // Returns the id of the family's code that the samples show, listed or not, if no cell is wrong.
-    std::optional<std::int32_t> id_of(const arhost::fiducial::MatrixFamily &type, const Samples &samples) const;
+    // Returns the codes that the samples show without a wrong cell, one of each family that has it, listed or not.
+    struct AnyCode {
+        const arhost::fiducial::MatrixFamily *type;
+        std::int32_t id;
+        double correlation;
+    };
+    std::vector<AnyCode> codes(const Samples &samples) const;
 
 private:
     static constexpr int samples_per_cell = 3; // odd, so one is at the centre

@@ -19,6 +19,8 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <set>
+#include <string>
 #include <tuple>
 
 namespace tracker_pattern {
@@ -71,7 +73,7 @@ public:
                 if (reader == matrix_readers_.end())
                     reader = matrix_readers_.insert(reader, MatrixReader(type->side));
                 reader->add(*type, marker.id, marker.family);
-                listed_codes_[type->name].insert(marker.id);
+                listed_families_.insert(type->name);
             } else if (marker.file) {
                 const Pattern pattern(marker.file);
                 patterns_[{marker.pattern_ratio, pattern.side()}].push_back({marker.id, marker.family, pattern});
@@ -99,7 +101,7 @@ public:
         others_.reset();
         patterns_.clear();
         matrix_readers_.clear();
-        listed_codes_.clear();
+        listed_families_.clear();
     }
 
 private:
@@ -186,21 +188,32 @@ private:
         }
     }
 
+    // Squares of other markers may also read as matrix codes, which have few check bits or none.
     arhost::fiducial::OtherMarkers::Markers other_markers(const cv::Mat &grey) const {
         auto markers = arhost::fiducial::markers_of_other_families(grey, {});
-        if (!markers.empty()) // they may also read as matrix codes, which have few check bits or none
+        if (!markers.empty() || matrix_readers_.empty())
             return markers;
-        const std::vector<Corners> squares = find_squares(grey, min_side_px_);
-        for (const auto &type : arhost::fiducial::matrix_families()) {
-            const MatrixReader reader(type.side);
-            const auto listed = listed_codes_.find(type.name);
-            for (const Corners &corners_px : squares) {
-                const auto id = reader.id_of(type, interior(grey, corners_px, reader.ratio(), reader.side()));
-                if (id && (listed == listed_codes_.end() || !listed->second.contains(*id)))
-                    markers[type.name].insert(*id);
-            }
-        }
+        for (const Corners &corners_px : find_squares(grey, min_side_px_))
+            if (recognised(grey, corners_px).correlation <= 0)
+                if (const auto code = any_code(grey, corners_px))
+                    markers[code->type->name].insert(code->id);
         return markers;
+    }
+
+    // The code that a square resembles most, of any family. If families share it: of a listed one, otherwise of the
+    // one with the fewest codes.
+    std::optional<MatrixReader::AnyCode> any_code(const cv::Mat &grey, const Corners &corners_px) const {
+        const auto rank = [&](const MatrixReader::AnyCode &code) {
+            return std::tuple(code.correlation, listed_families_.contains(code.type->name), -code.type->id_count);
+        };
+        std::optional<MatrixReader::AnyCode> best;
+        for (const int cells : {3, 4, 5}) {
+            const MatrixReader reader(cells);
+            for (const auto &code : reader.codes(interior(grey, corners_px, reader.ratio(), reader.side())))
+                if (!best || rank(code) > rank(*best))
+                    best = code;
+        }
+        return best;
     }
 
     // The mean grey levels of the picture within a square.
@@ -226,7 +239,7 @@ private:
     std::optional<arhost::fiducial::SearchRegions> regions_;
     std::map<Sampling, std::vector<Marked>> patterns_;
     std::vector<MatrixReader> matrix_readers_;
-    arhost::fiducial::OtherMarkers::Markers listed_codes_;
+    std::set<std::string> listed_families_; // of matrix codes
     std::optional<arhost::fiducial::OtherMarkers> others_;
 };
 

@@ -301,9 +301,11 @@ TEST_F(Calibration, ErrorsNameLineKeyAndFix) {
     EXPECT_EQ(error_in("image_width: 640\n"), "camera.yaml:1:1: the key 'image_height' is missing; give the size of "
                                               "the calibration's images in px, here or as width and height next to "
                                               "'file' in the configuration");
-    EXPECT_EQ(error_in("<?xml version=\"1.0\"?>\n"), "camera.yaml:1:1: is not a calibration in YAML format; for "
-                                                     "YAML, give OpenCV's FileStorage a file name that ends in "
+    EXPECT_EQ(error_in("<?xml version=\"1.0\"?>\n"), "camera.yaml:1:1: is not a calibration: expected YAML of "
+                                                     "OpenCV, ROS or Kalibr, or ARToolKit's camera parameters; "
+                                                     "OpenCV's FileStorage writes YAML if the file name ends in "
                                                      ".yaml");
+    EXPECT_EQ(error_in(""), "camera.yaml: is empty");
 }
 
 TEST_F(Calibration, RejectsInvalidCameraMatrices) {

@@ -90,14 +90,15 @@ TEST_F(Outcome, NamesTargetsThatDoNotFit) {
     EXPECT_EQ(misfitting_targets(statistics, targets), "");
     statistics.targets["cup"].mean_reprojection_px = 18.9;
     EXPECT_EQ(misfitting_targets(statistics, targets),
-              "the corners of the prints do not fit the poses: 'cup' (mean reprojection error 18.9 px); check the "
+              "the corners and the computed poses disagree: 'cup' (mean reprojection error 18.9 px); check the "
               "calibration of the camera and the proportions of the prints");
     statistics.targets["board"].mean_reprojection_px = 47.14;
     EXPECT_THAT(misfitting_targets(statistics, targets),
                 testing::AllOf(HasSubstr("'board' (mean reprojection error 47.1 px), 'cup' ("),
                                testing::EndsWith("prints, and the places and sides in the map ('arhost map' learns a "
                                                  "map)")));
-    statistics.targets["board"].mean_reprojection_px = statistics.targets["cup"].mean_reprojection_px = 2.9;
+    statistics.targets["board"].mean_reprojection_px = 2.9;
+    statistics.targets["cup"].largest_px = 1900;
     EXPECT_EQ(misfitting_targets(statistics, targets), "");
 }
 
@@ -151,7 +152,7 @@ TEST_F(Outcome, TellsWhetherThereWereQuadrilateralsIfNothingWasSeen) {
     EXPECT_THAT(seen_instead(statistics, targets), testing::StartsWith("; it found no quadrilaterals"));
     statistics.search.candidates = 75;
     EXPECT_EQ(seen_instead(statistics, targets),
-              "; of 2.5 quadrilaterals per frame, none reads as one of their markers");
+              "; of 2.5 quadrilaterals per frame, none could be read as a marker of these targets");
     statistics.hints = {"frame 30 has other markers: D 9", "frame 60 has other markers: E 1"};
     EXPECT_EQ(seen_instead(statistics, targets),
               "; frame 30 has other markers: D 9; frame 60 has other markers: E 1");

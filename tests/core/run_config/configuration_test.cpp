@@ -55,10 +55,8 @@ TEST_F(Warnings, AreForImplausibleFocalLengths) {
 TEST_F(Warnings, AreForImplausibleSidesOfMarkers) {
     EXPECT_THAT(of(camera, "1"), IsEmpty());
     EXPECT_THAT(of(camera, "5000"), IsEmpty());
-    EXPECT_THAT(of(camera, "0.08"),
-                ElementsAre("lab.yaml:4:72: tracker.targets[0].side_mm: a marker with a side of 0.08 mm is "
-                            "implausible; check the unit, which is mm"));
-    EXPECT_THAT(of(camera, "5001"),
-                ElementsAre("lab.yaml:4:72: tracker.targets[0].side_mm: a marker with a side of 5001 mm is "
-                            "implausible; check the unit, which is mm"));
+    EXPECT_THAT(of(camera, "0.08"), ElementsAre("lab.yaml:4:72: tracker.targets[0].side_mm: a print of 0.08 mm is "
+                                                "implausible; check the unit, which is mm"));
+    EXPECT_THAT(of(camera, "5001"), ElementsAre("lab.yaml:4:72: tracker.targets[0].side_mm: a print of 5001 mm is "
+                                                "implausible; check the unit, which is mm"));
 }

@@ -54,6 +54,7 @@ TEST(Options, ReportErrorsWithTheirPosition) {
     EXPECT_EQ(error_of("{path: x, options: {threads: 9}}"),
               "/lab/a.yaml:1:30: options.threads: must be 1 to 8, but is 9");
     EXPECT_THAT(error_of("{path: x, options: {family: tag36h12}}"), HasSubstr("did you mean 'tag36h11'?"));
+    EXPECT_THAT(error_of("{path: x, options: {family: TAG36H11}}"), HasSubstr("did you mean 'tag36h11'?"));
     EXPECT_THAT(error_of("{path: x, options: {refine: 1}}"), HasSubstr("options.refine: must be true or false"));
     EXPECT_THAT(error_of("{path: x, options: {tread: 1}}"),
                 HasSubstr("options.tread: unknown key; did you mean 'threads'?"));

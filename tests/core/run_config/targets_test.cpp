@@ -643,6 +643,6 @@ TEST_F(TargetsTest, AMapHasOneWarningAboutItsUnit) {
     const auto warnings =
         parse_tracker("{plugin: tracker_x, targets: [{name: board, map: board.map.yaml}]}").warnings;
     ASSERT_EQ(warnings.size(), 1u);
-    EXPECT_EQ(without_folder(warnings[0]), "board.map.yaml:4:3: markers[0]: a marker with a side of 0.08 mm is "
-                                           "implausible; check the unit, which is mm");
+    EXPECT_EQ(without_folder(warnings[0]),
+              "board.map.yaml:4:3: markers[0]: a print of 0.08 mm is implausible; check the unit, which is mm");
 }

@@ -315,7 +315,7 @@ class Tracker:
     def __init__(self, host):
         self.done = threading.Event()
         self.host = host
-    def start(self, setup): threading.Thread(target=lambda: (self.host.info("from a thread"), self.done.set())).start()
+    def start(self, setup): threading.Thread(target=lambda: (self.host.hint("from a thread"), self.done.set())).start()
     def track(self, frame): assert self.done.wait(20)
 )"),
               0)

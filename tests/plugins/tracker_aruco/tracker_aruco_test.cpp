@@ -83,19 +83,20 @@ TEST_P(ArucoDictionary, IsNamedIfMarkersOfAnotherOneAreListed) {
     const std::string named = !family.empty() ? family
                               : is_of_series  ? dictionary.substr(0, dictionary.size() - count.size()) + "50"
                                               : dictionary;
-    EXPECT_THAT(log_after("tracker_aruco", listed, print), EndsWith("other markers: " + named + " 21\n"));
+    EXPECT_THAT(log_after("tracker_aruco", listed, print),
+                EndsWith("other markers were in view: " + named + " 21\n"));
 }
 
 TEST(TrackerAruco, NamesTheSmallestDictionaryWithAllMarkersOfASeries) {
     EXPECT_THAT(log_after("tracker_aruco", "DICT_6X6_50", aruco_marker("DICT_6X6_1000", 249)),
-                EndsWith("other markers: DICT_6X6_250 249\n"));
+                EndsWith("other markers were in view: DICT_6X6_250 249\n"));
     EXPECT_EQ(log_after("tracker_aruco", "DICT_6X6_50", aruco_marker("DICT_6X6_1000", 49)), "")
         << "it is a marker of the listed dictionary";
 }
 
 TEST(TrackerAruco, NamesTagsThatOpenCvDoesNotKnow) {
     EXPECT_THAT(log_after("tracker_aruco", "DICT_6X6_50", april_tag("tagStandard41h12", 20).with_margin(1)),
-                EndsWith("other markers: tagStandard41h12 20\n"));
+                EndsWith("other markers were in view: tagStandard41h12 20\n"));
 }
 
 // Expected markers are read at their places before they are searched for.

@@ -11,6 +11,7 @@
 namespace {
 
 using namespace arhost::test;
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
@@ -75,19 +76,33 @@ Print code(const char *family, int id) {
     return print.with_margin(4);
 }
 
+std::string log_after(const Listed &listed, const Print &print) {
+    Tracker tracker("tracker_pattern");
+    EXPECT_EQ(tracker.start(camera, {listed}), ARHOST_STATUS_OK) << tracker.log();
+    tracker.track(GreyFrame(picture_of({{print, 80, pose_of(0, 0, 400, 20, 10, 30)}})));
+    tracker.stop();
+    return tracker.log();
+}
+
 TEST(PatternTracker, NamesOtherCodesAndMarkersIfNoListedOneAppears) {
-    const auto log_after = [](const Listed &listed, const Print &print) {
-        Tracker tracker("tracker_pattern");
-        EXPECT_EQ(tracker.start(camera, {listed}), ARHOST_STATUS_OK) << tracker.log();
-        tracker.track(GreyFrame(picture_of({{print, 80, pose_of(0, 0, 400, 20, 10, 30)}})));
-        tracker.stop();
-        return tracker.log();
-    };
     const Listed listed{5, 80, "artoolkit-4x4-bch-13-9-3"};
-    EXPECT_THAT(log_after(listed, code("artoolkit-4x4-bch-13-9-3", 7)),
-                HasSubstr("has other markers: artoolkit-4x4 121; artoolkit-4x4-bch-13-9-3 7\n"));
-    EXPECT_THAT(log_after(listed, code("artoolkit-5x5", 2222222)), HasSubstr(": artoolkit-5x5 2222222\n"));
-    EXPECT_THAT(log_after(listed, aruco_marker("DICT_5X5_100", 77)), HasSubstr(": DICT_5X5_100 77\n"));
+    EXPECT_EQ(log_after(listed, code("artoolkit-4x4-bch-13-9-3", 5)), "");
+    for (const auto &[family, id] : {std::pair{"artoolkit-4x4-bch-13-9-3", 7},
+                                     {"artoolkit-5x5", 2222222},
+                                     {"artoolkit-5x5-bch-22-7-7", 42},
+                                     {"artoolkit-3x3", 37},
+                                     {"artoolkit-3x3-hamming63", 6}})
+        EXPECT_THAT(log_after(listed, code(family, id)),
+                    EndsWith("other markers were in view: " + std::string(family) + " " + std::to_string(id) + "\n"));
+    for (int id = 0; id < 64; ++id)
+        EXPECT_EQ(log_after({id, 80, "artoolkit-3x3"}, code("artoolkit-3x3", id)), "");
+    EXPECT_THAT(log_after(listed, aruco_marker("DICT_5X5_100", 77)), EndsWith(": DICT_5X5_100 77\n"));
+}
+
+TEST(PatternTracker, DoesNotNameCodesIfOnlyPatternsAreListed) {
+    ARHOST_REQUIRE_SHARED_DATA("markers/artoolkit");
+    EXPECT_EQ(log_after(both()[0], print_of("kanji")), "");
+    EXPECT_EQ(log_after(both()[0], code("artoolkit-4x4", 4896)), "");
 }
 
 TEST(PatternTracker, RejectsFamiliesOfMarkersAndBadFiles) {

@@ -84,13 +84,13 @@ typedef int32_t arhost_severity;
 enum {
     ARHOST_SEVERITY_DEBUG = 1,
     ARHOST_SEVERITY_INFO = 2,
-    ARHOST_SEVERITY_WARNING = 3,
-    ARHOST_SEVERITY_ERROR = 4,
-    ARHOST_SEVERITY_HOST_MISBEHAVING = 5,   /* logged by a plugin: contract violation by the host */
-    ARHOST_SEVERITY_PLUGIN_MISBEHAVING = 6, /* logged by the worker: contract violation by the plugin */
-    /* logged by a tracker: what a frame shows instead of the targets, such as "frame 30 has other markers: tag25h9
-     * 7". It is part of the warning that targets were never seen. From other plugins, as ARHOST_SEVERITY_INFO */
-    ARHOST_SEVERITY_HINT = 7
+    /* logged by a tracker: what it sees instead of the targets, such as "other markers were in view: tag25h9 7". The
+     * host adds it to its warning that targets were never seen. From other plugins, as ARHOST_SEVERITY_INFO */
+    ARHOST_SEVERITY_HINT = 3,
+    ARHOST_SEVERITY_WARNING = 4,
+    ARHOST_SEVERITY_ERROR = 5,
+    ARHOST_SEVERITY_HOST_MISBEHAVING = 6,  /* logged by a plugin: contract violation by the host */
+    ARHOST_SEVERITY_PLUGIN_MISBEHAVING = 7 /* logged by the worker: contract violation by the plugin */
 };
 
 /* The host's callbacks. Valid until the process ends; no function is NULL. */

@@ -31,11 +31,11 @@ pub const ARHOST_KIND_SINK: arhost_kind = 4;
 pub type arhost_severity = i32;
 pub const ARHOST_SEVERITY_DEBUG: arhost_severity = 1;
 pub const ARHOST_SEVERITY_INFO: arhost_severity = 2;
-pub const ARHOST_SEVERITY_WARNING: arhost_severity = 3;
-pub const ARHOST_SEVERITY_ERROR: arhost_severity = 4;
-pub const ARHOST_SEVERITY_HOST_MISBEHAVING: arhost_severity = 5;
-pub const ARHOST_SEVERITY_PLUGIN_MISBEHAVING: arhost_severity = 6;
-pub const ARHOST_SEVERITY_HINT: arhost_severity = 7;
+pub const ARHOST_SEVERITY_HINT: arhost_severity = 3;
+pub const ARHOST_SEVERITY_WARNING: arhost_severity = 4;
+pub const ARHOST_SEVERITY_ERROR: arhost_severity = 5;
+pub const ARHOST_SEVERITY_HOST_MISBEHAVING: arhost_severity = 6;
+pub const ARHOST_SEVERITY_PLUGIN_MISBEHAVING: arhost_severity = 7;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_host {
