@@ -243,6 +243,23 @@ TEST(Watch, AnEditedPatternRestartsTheTracker) {
     run.interrupt();
 }
 
+TEST(Watch, AnEditedTrackerDoesNotRepeatTheHintsOfThePreviousOne) {
+    const auto tracker_of = [](const std::string &markers) {
+        return WatchedRun::configuration("tracker: {plugin: tracker_aruco, targets: [{" + markers +
+                                         ", side_mm: 80}]}\n");
+    };
+    const std::string hint = "other markers were in view: tag36h11 0";
+    WatchedRun run;
+    run.write("run.yaml", tracker_of("marker: 3, family: tag25h9"));
+    run.start({"run.yaml", "--watch", "-v"});
+    run.wait_for(hint);
+    run.replace("run.yaml", tracker_of("ids: 0-1, family: tag36h11"));
+    run.wait_for("tracker is now tracker_aruco");
+    run.interrupt();
+    EXPECT_THAT(run.output(), testing::ContainsRegex("never seen in [0-9]+ frames: 'tag36h11-1' .tag36h11 1.\n"));
+    EXPECT_EQ(run.output().rfind(hint), run.output().find(hint)) << run.output();
+}
+
 TEST(Watch, AnEditedPictureOfATargetRestartsTheTracker) {
     const std::filesystem::path pictures = source_directory() + "/docs/images";
     WatchedRun run;
