@@ -149,7 +149,7 @@ TEST_F(TargetsTest, AMultiMarkerFileIsAMap) {
     EXPECT_THAT(tracker.map_files, testing::Contains(folder / "marker.dat"));
     write("small.dat", "2\n7\n" + upright + "8\n0.5\n1 0 0 90\n0 1 0 0\n0 0 1 0\n");
     EXPECT_THAT(parse_tracker("{plugin: tracker_x, targets: [{name: b, map: small.dat, family: t}]}").warnings,
-                ElementsAre(HasSubstr("a side of 0.5 mm")));
+                ElementsAre(HasSubstr("a print of 0.5 mm")));
     EXPECT_THAT(tracker.policy.readable, testing::Contains(folder / "hiro.patt"));
 
     EXPECT_THAT(error_with("1\n7\n" + upright), HasSubstr("the key 'family' or 'dictionary' is missing"));

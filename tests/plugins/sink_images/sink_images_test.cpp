@@ -265,7 +265,7 @@ TEST_F(SinkImages, AnImageOfAnEarlierRunIsDeletedAtTheFirstFrame) {
         }
         EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
         EXPECT_THAT(names(), IsEmpty());
-        EXPECT_THAT(s.log(), HasSubstr("3 '" + path("demo.png").string() + "' was not written"));
+        EXPECT_THAT(s.log(), HasSubstr("4 '" + path("demo.png").string() + "' was not written"));
     }
 }
 

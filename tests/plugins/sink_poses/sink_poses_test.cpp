@@ -368,7 +368,7 @@ TEST_F(SinkPoses, SurvivesAKillAtAnyMoment) {
 TEST_F(SinkPoses, ARestartWithoutTheOldLogGivesAWarning) {
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(8, 8, 5), ARHOST_STATUS_OK);
-    EXPECT_THAT(s.log(), HasSubstr("3 '" + log().string() + "' has no frame before 5"));
+    EXPECT_THAT(s.log(), HasSubstr("4 '" + log().string() + "' has no frame before 5"));
 }
 
 TEST_F(SinkPoses, CreatesMissingFolders) {
@@ -390,7 +390,7 @@ TEST_F(SinkPoses, AFullDiskLeavesWholeLinesAndAMessage) {
         EXPECT_EQ(s.write(Picture(8, 8, 0), full_record(2)), ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_EQ(read_text(log()), before);
-    EXPECT_THAT(s.log(), HasSubstr("4 cannot write '" + log().string() + "': File too large"));
+    EXPECT_THAT(s.log(), HasSubstr("5 cannot write '" + log().string() + "': File too large"));
     write(s, 2, 4); // continues when the disk has free space again
     EXPECT_EQ(read_text(log()), uninterrupted(4));
 }

@@ -362,7 +362,7 @@ TEST_F(SinkVideo, AnEmptySegmentHasNoFrames) {
     ASSERT_EQ(s.start(width, height, 4), ARHOST_STATUS_OK);
     ASSERT_EQ(s.write(4, 6), ARHOST_STATUS_OK);
     ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
-    EXPECT_THAT(s.log(), HasSubstr("3 cannot read a frame from '" + path(".demo.mp4.from3.mkv").string()));
+    EXPECT_THAT(s.log(), HasSubstr("4 cannot read a frame from '" + path(".demo.mp4.from3.mkv").string()));
     EXPECT_THAT(read_video(path()).numbers(), ElementsAre(0, 1, 2, 4, 5));
 }
 
@@ -420,7 +420,7 @@ TEST_F(SinkVideo, AnOlderVideoStaysUntilTheNewOneIsComplete) {
 TEST_F(SinkVideo, ARestartWithoutItsFirstSegmentWarnsAndKeepsTheRest) {
     SinkUnderTest s = sink();
     ASSERT_EQ(s.start(width, height, 5), ARHOST_STATUS_OK);
-    EXPECT_THAT(s.log(), HasSubstr("3 the part of the video before frame 5 is lost"));
+    EXPECT_THAT(s.log(), HasSubstr("4 the part of the video before frame 5 is lost"));
     ASSERT_EQ(s.write(5, 8), ARHOST_STATUS_OK);
     ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_EQ(read_video(path()).numbers(), numbers(5, 8));
@@ -441,7 +441,7 @@ TEST_F(SinkVideo, NoFramesGiveAWarningAndNoVideo) {
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK);
     EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
     EXPECT_THAT(names(), IsEmpty());
-    EXPECT_THAT(s.log(), HasSubstr("3 '" + path().string() + "' was not written, because there were no frames"));
+    EXPECT_THAT(s.log(), HasSubstr("4 '" + path().string() + "' was not written, because there were no frames"));
 }
 
 // ---- Errors ----------------------------------------------------------------------------------------

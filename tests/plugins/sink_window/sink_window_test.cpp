@@ -472,7 +472,7 @@ TEST(SinkWindowWithoutScreen, NamesWhatIsMissingAndWhatToTry) {
         setenv("DISPLAY", display, 1);
         SinkUnderTest sink("sink_window", {});
         EXPECT_EQ(sink.start(160, 120), ARHOST_STATUS_ERROR_CONFIGURATION);
-        EXPECT_THAT(sink.log(), AllOf(HasSubstr("4 cannot open a window: X11:"), HasSubstr("DISPLAY"),
+        EXPECT_THAT(sink.log(), AllOf(HasSubstr("5 cannot open a window: X11:"), HasSubstr("DISPLAY"),
                                       HasSubstr("xvfb-run -a"), HasSubstr("sink_video")));
     }
 }
