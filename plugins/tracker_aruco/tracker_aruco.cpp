@@ -22,7 +22,6 @@
 #include <filesystem>
 #include <fstream>
 #include <optional>
-#include <set>
 #include <span>
 #include <string>
 #include <utility>
