@@ -2,11 +2,11 @@
 //
 // The options of a source that set the controls of its camera, at the start and while it runs. `Controls` below is
 // the plugin's class for the controls of its API. It has these functions; those that fail throw Failure:
+//   all()                         the controls; each has a `name`
 //   find(handle)                  the control with this handle or with this name, or nullptr
 //   values_of(control)            the ControlValues that it accepts
 //   set(control, text, key)       sets it; returns a warning if the camera sets another value, else ""
 //   fail(key, what)               throws "KEY: the camera … WHAT"
-//   fail_missing(name, key)       throws that the camera has no such control
 #pragma once
 
 #include "camera_common/control_values.hpp"
@@ -44,6 +44,15 @@ inline constexpr arhost_option_descriptor controls_option =
     option(ARHOST_OPTION_TEXT, "controls", "",
            "Further controls by the names that arhost devices lists: 'sharpness=3, backlight_compensation=1'.");
 
+// Throws Failure: the camera has no control `name`. `key`: the option that names it.
+template <class Controls>
+[[noreturn]] void fail_missing(const Controls &controls, std::string_view name, const std::string &key) {
+    std::string names;
+    for (const auto &control : controls.all())
+        names += (names.empty() ? "" : ", ") + std::string(control.name);
+    controls.fail(key, "has no control '" + std::string(name) + "'" + (names.empty() ? "" : "; it has: " + names));
+}
+
 // Returns the value that `text` represents. Throws Failure if the control does not accept it.
 template <class Controls, class Control>
 std::int64_t accepted_value(const Controls &controls, const Control &control, std::string_view text,
@@ -70,7 +79,7 @@ std::vector<std::string> set_automatic_control(const Controls &controls, const A
     const auto *const found = controls.find(control.value);
     if (!is_automatic) {
         if (!found)
-            controls.fail_missing(key, key);
+            fail_missing(controls, key, key);
         accepted_value(controls, *found, text, key);
     }
     std::vector<std::string> warnings;
@@ -86,7 +95,7 @@ std::vector<std::string> set_automatic_control(const Controls &controls, const A
         });
         warnings.push_back(controls.set(*mode, std::to_string(*value), key));
     } else if (is_automatic) {
-        controls.fail_missing("auto " + key, key);
+        fail_missing(controls, "auto " + key, key);
     }
     if (!is_automatic)
         warnings.push_back(controls.set(*found, text, key));
@@ -104,7 +113,7 @@ std::vector<std::string> set_listed_controls(const Controls &controls, std::stri
             controls.fail(key, "cannot be set up: '" + setting.text + "' is not of the form NAME=VALUE");
         const auto *control = controls.find(std::string_view(setting.name));
         if (!control)
-            controls.fail_missing(setting.name, key);
+            fail_missing(controls, setting.name, key);
         accepted_value(controls, *control, *setting.value, key);
     }
     std::vector<std::string> warnings;
@@ -134,7 +143,7 @@ void set_option_controls(const Host &host, const Controls &controls,
             return set_listed_controls(controls, text, key);
         const auto *control = controls.find(lamps);
         if (!control)
-            controls.fail_missing(key, key);
+            fail_missing(controls, key, key);
         return {controls.set(*control, text, key)};
     };
     for (const auto &[key, text] : values)

@@ -41,15 +41,15 @@ std::vector<DeviceFormat> formats_of(const VideoFunction &function) {
 std::vector<DeviceControl> controls_of(const UsbDevice &device, const VideoFunction &function) {
     std::vector<DeviceControl> listed;
     const Controls controls(device, function);
-    for (const ControlDefinition *control : controls.all()) {
-        const ControlValues values = controls.values_of(*control);
-        const arhost_device_control_type type = control->kind == ControlKind::boolean ? ARHOST_DEVICE_CONTROL_BOOLEAN
-                                                : control->kind == ControlKind::menu  ? ARHOST_DEVICE_CONTROL_MENU
-                                                                                      : ARHOST_DEVICE_CONTROL_INTEGER;
+    for (const ControlDefinition &control : controls.all()) {
+        const ControlValues values = controls.values_of(control);
+        const arhost_device_control_type type = control.kind == ControlKind::boolean ? ARHOST_DEVICE_CONTROL_BOOLEAN
+                                                : control.kind == ControlKind::menu  ? ARHOST_DEVICE_CONTROL_MENU
+                                                                                     : ARHOST_DEVICE_CONTROL_INTEGER;
         if (values.minimum <= values.maximum) // some cameras report nonsense
-            listed.push_back({std::string(control->name), type, values.minimum, values.maximum,
+            listed.push_back({std::string(control.name), type, values.minimum, values.maximum,
                               static_cast<std::int64_t>(values.step), values.default_value,
-                              controls.value_of(*control)});
+                              controls.value_of(control)});
     }
     return listed;
 }

@@ -7,6 +7,7 @@
 #include <array>
 #include <charconv>
 #include <cstdio>
+#include <iterator>
 
 namespace arhost::uvc {
 namespace {
@@ -104,10 +105,6 @@ std::vector<std::uint8_t> parse_hex(std::string_view text) {
 
 } // namespace
 
-std::span<const ControlDefinition> control_definitions() {
-    return definitions;
-}
-
 Controls::Controls(const UsbDevice &device, const VideoFunction &function) : device_(device), function_(function) {}
 
 std::uint16_t Controls::entity_of(const Unit &unit) const {
@@ -126,20 +123,11 @@ const ControlDefinition *Controls::find(std::string_view name) const {
     return found != definitions.end() && unit_of(*found) ? &*found : nullptr;
 }
 
-std::vector<const ControlDefinition *> Controls::all() const {
-    std::vector<const ControlDefinition *> found;
-    for (const ControlDefinition &control : definitions)
-        if (unit_of(control))
-            found.push_back(&control);
+std::vector<ControlDefinition> Controls::all() const {
+    std::vector<ControlDefinition> found;
+    std::ranges::copy_if(definitions, std::back_inserter(found),
+                         [&](const auto &control) { return unit_of(control); });
     return found;
-}
-
-void Controls::fail_missing(std::string_view name, const std::string &key) const {
-    std::string names;
-    for (const ControlDefinition *control : all())
-        names += (names.empty() ? "" : ", ") + std::string(control->name);
-    device_.fail_configuration(key, "has no control '" + std::string(name) + "'" +
-                                        (names.empty() ? "" : "; it has: " + names));
 }
 
 std::vector<std::uint8_t> Controls::read(std::uint8_t request, const ControlDefinition &control) const {

@@ -23,15 +23,13 @@ struct ControlDefinition {
     ControlKind kind;
 };
 
-std::span<const ControlDefinition> control_definitions();
-
 class Controls {
 public:
     Controls(const UsbDevice &device, const VideoFunction &function);
 
     // The control of this name, if the camera has it.
     const ControlDefinition *find(std::string_view name) const;
-    std::vector<const ControlDefinition *> all() const;
+    std::vector<ControlDefinition> all() const;
     ControlValues values_of(const ControlDefinition &control) const;
     // Returns the current value, or std::nullopt if it cannot be read.
     std::optional<std::int64_t> value_of(const ControlDefinition &control) const;
@@ -47,8 +45,6 @@ public:
     [[noreturn]] void fail(const std::string &key, const std::string &what) const {
         device_.fail_configuration(key, what);
     }
-    // The camera has no such control.
-    [[noreturn]] void fail_missing(std::string_view name, const std::string &key) const;
 
 private:
     std::uint16_t entity_of(const Unit &unit) const;

@@ -7,15 +7,10 @@
 #include "stream.hpp"
 #include "usb.hpp"
 
-#include "camera_common/control_options.hpp"
+#include "camera_common/camera_source.hpp"
 #include "camera_common/copy_rows.hpp"
-#include "camera_common/frame_size.hpp"
-#include "camera_common/jpeg.hpp"
-#include "camera_common/silence.hpp"
-#include "camera_common/start_camera.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <iterator>
 
@@ -24,8 +19,6 @@ namespace {
 namespace uvc = arhost::uvc;
 using arhost::Failure;
 using Size = arhost::FrameSize;
-
-constexpr auto poll_slice = std::chrono::milliseconds(100); // the ABI permits no longer wait
 
 constexpr arhost::AutomaticControl<std::string_view> automatic_controls[] = {
     {"exposure", "exposure_time_absolute", "auto_exposure"},
@@ -48,22 +41,18 @@ std::string rate_text(double fps) {
     return text;
 }
 
-class UvcSource {
+// The option `extension` is not changeable: an output that may change options could otherwise replace the firmware of
+// some cameras.
+class UvcSource : arhost::CameraSource {
 public:
-    // Not `extension`: an output that may change options could otherwise replace the firmware of some cameras.
-    static constexpr const char *changeable[] = {"exposure", "gain", "focus", "white_balance", "power_line_frequency",
-                                                 "controls", nullptr};
+    using CameraSource::changeable;
 
     static std::vector<arhost::Device> devices() { return uvc::list_cameras(); }
 
     UvcSource(const arhost::Host &host, const arhost::Options &options)
-        : host_(host), configured_size_{static_cast<std::uint32_t>(options.integer("width")),
-                                        static_cast<std::uint32_t>(options.integer("height"))},
-          camera_(static_cast<std::size_t>(options.integer("camera"))), format_option_(options.text("format")),
-          control_values_(arhost::given_options(options, changeable)), extension_option_(options.text("extension")),
+        : CameraSource(host, options), camera_(static_cast<std::size_t>(options.integer("camera"))),
+          extension_option_(options.text("extension")),
           buffer_count_(static_cast<std::size_t>(options.integer("buffers"))) {
-        if ((configured_size_.width == 0) != (configured_size_.height == 0))
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: set both or neither");
         if (const std::string usb = options.text("usb"); !usb.empty()) {
             identity_ = uvc::parse_identity(usb);
             if (!identity_)
@@ -74,7 +63,7 @@ public:
     ~UvcSource() { stop(); }
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
-        arhost::start_camera(setup, [&] { open(setup, properties); });
+        start_camera(setup, [&] { open(setup, properties); });
     }
 
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
@@ -153,13 +142,16 @@ private:
         format.yuv_matrix = mode.format->matrix == bt709 ? ARHOST_YUV_MATRIX_BT709 : ARHOST_YUV_MATRIX_BT601;
         format.yuv_range = ARHOST_YUV_RANGE_LIMITED;
         encoding_ = mode.format->encoding;
-        if (encoding_ == uvc::Encoding::mjpeg) {
-            describe_first_picture(format);
-            if (Size{format.width, format.height} != mode.size())
-                throw Failure(ARHOST_STATUS_ERROR_IO, device_->name() + " was set to " + what +
-                                                          ", but sends pictures of " +
-                                                          Size{format.width, format.height}.text());
-        }
+        if (encoding_ == uvc::Encoding::mjpeg)
+            describe_first_picture(format, mode.size(), device_->name(), what,
+                                   [&](arhost::Silence &silence, const auto &use) {
+                                       auto frame = next(silence);
+                                       if (frame) {
+                                           use(frame->bytes);
+                                           stream_->recycle(std::move(*frame));
+                                       }
+                                       return frame.has_value();
+                                   });
         format.fps = fps;
         if (!arhost_frame_layout(&format))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
@@ -205,22 +197,19 @@ private:
         for (const auto &[encoding, name] : uvc::encodings)
             for (const uvc::StreamingInterface &stream : function.streams)
                 for (const uvc::Format &format : stream.formats)
-                    if (format.encoding == encoding && (format_option_ == "auto" || format_option_ == name))
+                    if (format.encoding == encoding && permits(name))
                         for (const uvc::FrameSize &frame : format.frames)
                             if (frame.width <= ARHOST_MAX_IMAGE_SIDE && frame.height <= ARHOST_MAX_IMAGE_SIDE)
                                 modes.push_back({&stream, &format, &frame});
         return modes;
     }
 
-    // Chooses the first permitted format in which the camera reaches the configured rate, else the fastest.
     Mode choose_mode(const uvc::VideoFunction &function, const arhost_source_setup &setup) const {
         const arhost::DemandedSize wanted = arhost::demanded_size(configured_size_, setup.intrinsics);
         Size size = wanted.size;
         std::vector<Mode> modes = permitted_modes(function);
         if (modes.empty())
-            device_->fail_configuration(
-                "format", "offers no " + (format_option_ == "auto" ? "supported format" : format_option_) +
-                              ", only " + describe(function));
+            device_->fail_configuration("format", "offers no " + permitted_text() + ", only " + describe(function));
         if (size == Size{}) {
             const auto standard = std::ranges::find_if(
                 modes, [](const Mode &mode) { return mode.frame->index == mode.format->default_frame; });
@@ -230,14 +219,7 @@ private:
         if (modes.empty())
             device_->fail_configuration("width, height", "has no size " + size.text() + "; it offers " +
                                                              describe(function) + "; " + wanted.advice);
-        const double wanted_fps = 0.95 * (setup.fps > 0 ? setup.fps : 25);
-        const auto fast = std::ranges::find_if(modes, [&](const Mode &mode) {
-            const double fps = mode.frame->max_fps();
-            return fps <= 0 || fps >= wanted_fps;
-        });
-        return fast != modes.end()
-                   ? *fast
-                   : *std::ranges::max_element(modes, {}, [](const Mode &mode) { return mode.frame->max_fps(); });
+        return choose_by_rate(modes, setup.fps, [](const Mode &mode) { return mode.frame->max_fps(); });
     }
 
     void set_controls(const uvc::VideoFunction &function,
@@ -291,27 +273,9 @@ private:
         stream_.emplace(*device_, setup);
     }
 
-    // Waits for a picture and describes its format. The chroma subsampling is known only from a picture.
-    void describe_first_picture(arhost_frame_format &format) {
-        for (arhost::Silence silence;;) {
-            host_.progress(-1, "waiting for the camera's first picture");
-            auto frame = next(silence);
-            if (!frame)
-                throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "starting " + device_->name() + " was cancelled");
-            const bool is_good = jpeg_.describe(frame->bytes, format);
-            stream_->recycle(std::move(*frame));
-            if (is_good)
-                return;
-            fault_ = "it is not a JPEG picture";
-        }
-    }
-
-    // Returns a frame: in live mode the newest one, otherwise the oldest one. Waits until `silence` exceeds its
-    // limit, then throws Failure. Returns std::nullopt if cancelled.
+    // Waits for a frame and returns it: in live mode the newest one, otherwise the oldest one.
     std::optional<uvc::CapturedFrame> next(arhost::Silence &silence) {
-        for (;;) {
-            if (host_.cancelled())
-                return std::nullopt;
+        return wait_for_frame(silence, device_->name(), [&] {
             auto found = stream_->next(poll_slice);
             while (found && newest_only_ && stream_->has_more()) {
                 lost_ += found->lost_before + 1;
@@ -319,15 +283,8 @@ private:
                 stream_->recycle(std::move(*found));
                 found = stream_->next(poll_slice);
             }
-            if (found)
-                return found;
-            host_.progress(-1, "waiting for a picture"); // the plugin reports a silent camera itself
-            if (silence.exceeds_limit())
-                throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST,
-                              device_->name() + " has delivered no intact picture for " +
-                                  std::to_string(arhost::Silence::limit.count()) + " s" +
-                                  (fault_.empty() ? "" : "; the last picture was rejected: " + fault_));
-        }
+            return found;
+        });
     }
 
     bool copy(const std::vector<std::uint8_t> &bytes, const arhost_frame_buffer &buffer) {
@@ -348,11 +305,7 @@ private:
         return true;
     }
 
-    arhost::Host host_;
-    Size configured_size_; // 0×0: use the size of the calibration or the camera's default
     std::size_t camera_;
-    std::string format_option_;
-    std::vector<std::pair<std::string, std::string>> control_values_; // of the options that set controls
     std::string extension_option_;
     std::size_t buffer_count_;
     std::optional<uvc::UsbIdentity> identity_;
@@ -361,11 +314,9 @@ private:
     std::vector<std::uint8_t> claimed_; // interfaces
     std::optional<uvc::FrameStream> stream_;
     uvc::Encoding encoding_ = uvc::Encoding::yuy2;
-    arhost::JpegDecoder jpeg_;
-    bool newest_only_ = false, has_delivered_ = false;
+    bool has_delivered_ = false;
     std::uint32_t lost_ = 0; // since the last delivered frame
     std::uint64_t undecodable_ = 0, superseded_ = 0;
-    std::string fault_; // what was wrong with the last damaged picture
 };
 
 using arhost::option;

@@ -95,13 +95,6 @@ void Controls::fail(const std::string &key, const std::string &what) const {
                   key + ": the camera '" + device_.path() + "' (" + device_.card() + ") " + what);
 }
 
-void Controls::fail_missing(std::string_view name, const std::string &key) const {
-    std::string names;
-    for (const Control &control : controls_)
-        names += (names.empty() ? "" : ", ") + control.name;
-    fail(key, "has no control '" + std::string(name) + "'" + (names.empty() ? "" : "; it has: " + names));
-}
-
 std::optional<std::int64_t> Controls::value_of(const Control &control) const {
     if (control.type == V4L2_CTRL_TYPE_BUTTON || (control.flags & V4L2_CTRL_FLAG_WRITE_ONLY))
         return std::nullopt;

@@ -38,8 +38,6 @@ public:
     std::string set(const Control &control, std::string_view text, const std::string &key) const;
 
     [[noreturn]] void fail(const std::string &key, const std::string &what) const;
-    // The camera has no such control.
-    [[noreturn]] void fail_missing(std::string_view name, const std::string &key) const;
 
 private:
     const CaptureDevice &device_;

@@ -8,12 +8,8 @@
 #include "device.hpp"
 #include "pixels.hpp"
 
-#include "camera_common/control_options.hpp"
+#include "camera_common/camera_source.hpp"
 #include "camera_common/fourcc.hpp"
-#include "camera_common/frame_size.hpp"
-#include "camera_common/jpeg.hpp"
-#include "camera_common/silence.hpp"
-#include "camera_common/start_camera.hpp"
 
 #include <algorithm>
 #include <array>
@@ -33,8 +29,6 @@ using arhost::CaptureStream;
 using arhost::Failure;
 using Size = arhost::FrameSize;
 using arhost::PictureFormat;
-
-constexpr int poll_slice_ms = 100;
 
 bool offers(const CaptureFormat &format, const Size &size) {
     if (format.any_size)
@@ -62,26 +56,19 @@ struct Losses {
     std::uint64_t depth = 0;      // delivered, but without depth
 };
 
-class V4l2Source {
+class V4l2Source : arhost::CameraSource {
 public:
-    static constexpr const char *changeable[] = {"exposure", "gain", "focus", "white_balance", "power_line_frequency",
-                                                 "controls", nullptr};
+    using CameraSource::changeable;
 
     static std::vector<arhost::Device> devices() { return arhost::list_cameras(); }
 
     V4l2Source(const arhost::Host &host, const arhost::Options &options)
-        : host_(host),
-          path_(options.text("device")), configured_size_{static_cast<std::uint32_t>(options.integer("width")),
-                                                          static_cast<std::uint32_t>(options.integer("height"))},
-          format_option_(options.text("format")), control_values_(arhost::given_options(options, changeable)),
+        : CameraSource(host, options), path_(options.text("device")),
           buffer_count_(static_cast<std::uint32_t>(options.integer("buffers"))),
-          depth_path_(options.text("depth_device")), depth_unit_mm_(options.real("depth_unit_mm")), clock_(host) {
-        if ((configured_size_.width == 0) != (configured_size_.height == 0))
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: set both or neither");
-    }
+          depth_path_(options.text("depth_device")), depth_unit_mm_(options.real("depth_unit_mm")), clock_(host) {}
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
-        arhost::start_camera(setup, [&] { open(setup, properties); });
+        start_camera(setup, [&] { open(setup, properties); });
     }
 
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
@@ -145,11 +132,15 @@ private:
                 host_.warn(
                     "the camera's Y'CbCr matrix is neither that of BT.601 nor of BT.709, so colours are inexact");
         } else {
-            describe_first_picture(format);
-            if (Size{format.width, format.height} != size)
-                throw Failure(ARHOST_STATUS_ERROR_IO, "the camera '" + path_ + "' was set to " + mode +
-                                                          ", but sends pictures of " +
-                                                          Size{format.width, format.height}.text());
+            describe_first_picture(format, size, "the camera '" + path_ + "'", mode,
+                                   [&](arhost::Silence &silence, const auto &use) {
+                                       const auto captured = next(silence);
+                                       if (captured) {
+                                           use(captured->planes.front());
+                                           stream_->queue(captured->index);
+                                       }
+                                       return captured.has_value();
+                                   });
         }
         format.fps = fps > 0 ? fps : setup.fps;
         frame_ns_ = fps > 0 ? static_cast<std::int64_t>(1e9 / fps) : 0;
@@ -173,7 +164,7 @@ private:
         }
         const CaptureFormat &chosen = choose_format(size, setup.fps);
         PictureFormat set = device_->set_format(chosen.fourcc, size.width, size.height);
-        const std::string camera = "the camera '" + path_ + "' (" + device_->card() + ")";
+        const std::string camera = name();
         if (set.fourcc != chosen.fourcc)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           camera + " rejects " + arhost::fourcc_text(chosen.fourcc) + " at " + size.text() +
@@ -200,7 +191,7 @@ private:
         std::vector<const CaptureFormat *> permitted;
         const auto add = [&](std::uint32_t fourcc, std::string_view name) {
             const CaptureFormat *format = device_->find(fourcc);
-            if (format && (format_option_ == "auto" || format_option_ == name))
+            if (format && permits(name))
                 permitted.push_back(format);
         };
         const auto add_raw = [&](bool is_grey) {
@@ -215,68 +206,30 @@ private:
         return permitted;
     }
 
-    // Chooses the first permitted format in which the camera reaches the configured rate, else the fastest.
+    // Returns the first of the permitted formats if none has this size.
     const CaptureFormat &choose_format(const Size &size, double fps) const {
-        const std::vector<const CaptureFormat *> known = permitted_formats();
-        if (known.empty())
-            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          "format: the camera '" + path_ + "' (" + device_->card() + ") offers no " +
-                              (format_option_ == "auto" ? "supported format" : format_option_) + ", only " +
-                              device_->describe_formats());
-        const double wanted_fps = 0.95 * (fps > 0 ? fps : 25);
-        const CaptureFormat *best = known.front();
-        double best_fps = -1;
-        for (const CaptureFormat *format : known) {
-            if (!offers(*format, size))
-                continue;
-            const double offered = device_->max_fps(format->fourcc, size.width, size.height);
-            if (offered <= 0 || offered >= wanted_fps)
-                return *format;
-            if (offered > best_fps) {
-                best = format;
-                best_fps = offered;
-            }
-        }
-        return *best;
+        std::vector<const CaptureFormat *> formats = permitted_formats();
+        if (formats.empty())
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "format: " + name() + " offers no " + permitted_text() +
+                                                                 ", only " + device_->describe_formats());
+        const CaptureFormat &first = *formats.front();
+        std::erase_if(formats, [&](const CaptureFormat *format) { return !offers(*format, size); });
+        if (formats.empty())
+            return first;
+        return *choose_by_rate(formats, fps, [&](const CaptureFormat *format) {
+            return device_->max_fps(format->fourcc, size.width, size.height);
+        });
     }
 
-    // Waits for a picture and describes its format. The chroma subsampling is known only from a picture.
-    void describe_first_picture(arhost_frame_format &format) {
-        for (arhost::Silence silence;;) {
-            host_.progress(-1, "waiting for the camera's first picture");
-            const auto captured = next(silence);
-            if (!captured)
-                throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "starting the camera '" + path_ + "' was cancelled");
-            const bool good = jpeg_.describe(captured->planes.front(), format);
-            stream_->queue(captured->index);
-            if (good)
-                return;
-            fault_ = "it is not a JPEG picture";
-        }
+    std::string name() const { return "the camera '" + path_ + "' (" + device_->card() + ")"; }
+
+    std::optional<Capture> next(arhost::Silence &silence) {
+        return wait_for_frame(silence, name(),
+                              [&] { return stream_->wait(poll_slice.count()) ? dequeue_intact() : std::nullopt; });
     }
 
     // Returns a frame from the driver's queue that the driver does not mark as damaged: in live mode the newest one,
-    // otherwise the oldest one. Waits until `silence` exceeds its limit, then throws Failure. Returns std::nullopt if
-    // cancelled.
-    std::optional<Capture> next(arhost::Silence &silence) {
-        for (;;) {
-            if (host_.cancelled())
-                return std::nullopt;
-            std::optional<Capture> found;
-            if (stream_->wait(poll_slice_ms))
-                found = dequeue_intact();
-            if (found)
-                return found;
-            host_.progress(-1, "waiting for a picture"); // the plugin reports a silent camera itself
-            if (silence.exceeds_limit())
-                throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST,
-                              "the camera '" + path_ + "' (" + device_->card() +
-                                  ") has delivered no intact picture for " +
-                                  std::to_string(arhost::Silence::limit.count()) + " s" +
-                                  (fault_.empty() ? "" : "; the last picture was rejected: " + fault_));
-        }
-    }
-
+    // otherwise the oldest one.
     std::optional<Capture> dequeue_intact() {
         std::optional<Capture> found;
         while (auto captured = stream_->dequeue()) {
@@ -328,11 +281,7 @@ private:
         return skipped;
     }
 
-    arhost::Host host_;
     std::string path_;
-    Size configured_size_; // 0×0: use the size of the calibration or the driver
-    std::string format_option_;
-    std::vector<std::pair<std::string, std::string>> control_values_; // of the options that set controls
     std::uint32_t buffer_count_;
     std::string depth_path_; // empty: no depth
     double depth_unit_mm_;
@@ -342,14 +291,11 @@ private:
     std::optional<arhost::DepthCamera> depth_;
     arhost::CaptureClock clock_;
     std::int64_t frame_ns_ = 0; // time from frame to frame; 0: unknown
-    arhost::JpegDecoder jpeg_;
-    bool newest_only_ = false;
     PictureFormat camera_;
     std::optional<std::uint32_t> last_sequence_;
     std::uint32_t dropped_ = 0; // frames dropped since the last delivered frame
     Losses losses_;
     std::int64_t last_ns_ = 0;
-    std::string fault_; // what was wrong with the last damaged picture
 };
 
 using arhost::option;
