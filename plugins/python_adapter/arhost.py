@@ -130,35 +130,38 @@ def _integer(what, value, least, most, status=STATUS_ERROR_INTERNAL):
     return int(value)
 
 
+def _reporting(status=STATUS_ERROR_INTERNAL):
+    """Decorates a method of _Adapter: it then returns what _run() returns."""
+    return lambda method: lambda self, *arguments: self._run(lambda: method(self, *arguments), status)
+
+
 class _Adapter:
-    """One plugin instance. python_adapter.cpp calls its methods, which return (status, error message or value)."""
+    """One plugin instance. python_adapter.cpp calls its methods, which return (status, error message or value).
+    `method`: the per-frame method of this kind of plugin."""
 
-    def __init__(self, method, log, progress, cancelled):
-        self.method = method  # the per-frame method of this kind
+    def __init__(self, log, progress, cancelled):
         self.host = Host(log, progress, cancelled)
-        self.warned = self.overflowed = False
+        self.warned = False
 
+    # Report a configuration error: if the script fails to load now, it would also fail on every retry.
+    @_reporting(STATUS_ERROR_CONFIGURATION)
     def load(self, script, class_name, arguments):
-        def load():
-            try:
-                keywords = json.loads(arguments)
-            except ValueError as error:
-                raise Failure(f"the option 'arguments' is not valid JSON: {error}")
-            if not isinstance(keywords, dict):
-                raise Failure("the option 'arguments' must be a JSON object, as in '{\"size\": 3}'")
-            if not os.path.isfile(script):
-                raise Failure(f"the option 'script' names a file that does not exist: {script}")
-            sys.path.insert(0, os.path.dirname(script))
-            name = os.path.splitext(os.path.basename(script))[0]
-            specification = importlib.util.spec_from_file_location(name, script)
-            module = importlib.util.module_from_spec(specification)
-            sys.modules[name] = module
-            specification.loader.exec_module(module)
-            self.plugin = self._class_in(module, script, class_name)(self.host, **keywords)
-            return STATUS_OK, callable(getattr(self.plugin, "devices", None))
-
-        # Report a configuration error: if the script fails to load now, it would also fail on every retry.
-        return self._guarded(load, STATUS_ERROR_CONFIGURATION)
+        try:
+            keywords = json.loads(arguments)
+        except ValueError as error:
+            raise Failure(f"the option 'arguments' is not valid JSON: {error}")
+        if not isinstance(keywords, dict):
+            raise Failure("the option 'arguments' must be a JSON object, as in '{\"size\": 3}'")
+        if not os.path.isfile(script):
+            raise Failure(f"the option 'script' names a file that does not exist: {script}")
+        sys.path.insert(0, os.path.dirname(script))
+        name = os.path.splitext(os.path.basename(script))[0]
+        specification = importlib.util.spec_from_file_location(name, script)
+        module = importlib.util.module_from_spec(specification)
+        sys.modules[name] = module
+        specification.loader.exec_module(module)
+        self.plugin = self._class_in(module, script, class_name)(self.host, **keywords)
+        return STATUS_OK, callable(getattr(self.plugin, "devices", None))
 
     def _class_in(self, module, script, wanted):
         classes = [value for value in vars(module).values()
@@ -172,7 +175,7 @@ class _Adapter:
             raise Failure(f"{script} has {len(classes) or 'no'} classes{named} with a method '{self.method}'{hint}")
         return classes[0]
 
-    def _guarded(self, call, status=STATUS_ERROR_INTERNAL):
+    def _run(self, call, status=STATUS_ERROR_INTERNAL):
         try:
             result = call()
             return result if isinstance(result, tuple) else (result, None)
@@ -197,48 +200,44 @@ class _Adapter:
     def _with_memory(self, memory, call):
         """Runs `call`. Warns once if the script keeps arrays that refer to `memory`, which is invalid after the call."""
         references = [sys.getrefcount(view) for view in memory]
-        result = self._guarded(call)
+        result = self._run(call)
         if result[0] > 0 and not self.warned and references != [sys.getrefcount(view) for view in memory]:
             self.host.warn(f"'{self.method}' kept an array whose memory is no longer valid; "
                            "keep a copy (array.copy())")
             self.warned = True
         return result
 
+    @_reporting()
     def devices(self):
-        def devices():
-            return STATUS_OK, [
-                (index, int(device.get("kind", DEVICE_OTHER)), bool(device.get("is_default", False)), str(device["name"]),
-                 str(device.get("serial", "")), str(device.get("abilities", "")))
-                for index, device in enumerate(self.plugin.devices())]
+        return STATUS_OK, [
+            (index, int(device.get("kind", DEVICE_OTHER)), bool(device.get("is_default", False)), str(device["name"]),
+             str(device.get("serial", "")), str(device.get("abilities", "")))
+            for index, device in enumerate(self.plugin.devices())]
 
-        return self._guarded(devices)
-
+    @_reporting()
     def stop(self):
-        def stop():
-            if hasattr(self.plugin, "stop"):
-                self.plugin.stop()
-            return STATUS_OK
+        if hasattr(self.plugin, "stop"):
+            self.plugin.stop()
+        return STATUS_OK
 
-        return self._guarded(stop)
 
-    # ---- sources ----
+class _SourceAdapter(_Adapter):
+    method = "read"
 
-    def start_source(self, first_sequence, fps, paced, intrinsics):
-        def start():
-            setup = Fields(first_sequence=first_sequence, fps=fps, paced=paced,
-                           intrinsics=intrinsics and Fields(_record(intrinsics, INTRINSICS)))
-            result = dict(self.plugin.start(setup))
-            self.clock = int(result.pop("clock", CLOCK_MEDIA))
-            format = [int(result.pop("pixel_format", PIXEL_FORMAT_RGB8)), int(result.pop("width")),
-                      int(result.pop("height")), float(result.pop("fps", fps) or 0),
-                      int(result.pop("yuv_matrix", YUV_MATRIX_BT601)),
-                      int(result.pop("yuv_range", YUV_RANGE_LIMITED)),
-                      int(result.pop("transfer", TRANSFER_SRGB)), int(result.pop("frame_count", 0))]
-            if result:
-                raise Failure(f"start returned the unknown key '{next(iter(result))}'", STATUS_ERROR_INTERNAL)
-            return STATUS_OK, tuple(format)
-
-        return self._guarded(start)
+    @_reporting()
+    def start(self, first_sequence, fps, paced, intrinsics):
+        setup = Fields(first_sequence=first_sequence, fps=fps, paced=paced,
+                       intrinsics=intrinsics and Fields(_record(intrinsics, INTRINSICS)))
+        result = dict(self.plugin.start(setup))
+        self.clock = int(result.pop("clock", CLOCK_MEDIA))
+        format = [int(result.pop("pixel_format", PIXEL_FORMAT_RGB8)), int(result.pop("width")),
+                  int(result.pop("height")), float(result.pop("fps", fps) or 0),
+                  int(result.pop("yuv_matrix", YUV_MATRIX_BT601)),
+                  int(result.pop("yuv_range", YUV_RANGE_LIMITED)),
+                  int(result.pop("transfer", TRANSFER_SRGB)), int(result.pop("frame_count", 0))]
+        if result:
+            raise Failure(f"start returned the unknown key '{next(iter(result))}'", STATUS_ERROR_INTERNAL)
+        return STATUS_OK, tuple(format)
 
     def read(self, format, sequence, planes):
         def read():
@@ -249,26 +248,27 @@ class _Adapter:
 
         return self._with_memory(planes, read)
 
-    # ---- trackers ----
 
-    def start_tracker(self, format, intrinsics, targets, markers, families):
-        def start():
-            self.format = Fields(_record(format, FRAME_FORMAT))
-            self.plugin.start(Fields(format=self.format, intrinsics=Fields(_record(intrinsics, INTRINSICS)),
-                                     targets=[Fields(name=name, body=body) for name, body in targets],
-                                     markers=[Fields(id=id, family=family, target=target, file=file,
-                                                     corners_mm=np.frombuffer(bytes(corners)).reshape(4, 3),
-                                                     pattern_ratio=ratio)
-                                              for id, family, target, corners, file, ratio in markers],
-                                     families=list(families)))
-            size = self.plugin.state_size() if hasattr(self.plugin, "state_size") else 0
-            return STATUS_OK, _integer("'state_size' returned", size, 0, MAX_STATE, STATUS_ERROR_CONFIGURATION)
+class _TrackerAdapter(_Adapter):
+    method = "track"
+    overflowed = False
 
-        return self._guarded(start)
+    @_reporting()
+    def start(self, format, intrinsics, targets, markers, families):
+        self.format = Fields(_record(format, FRAME_FORMAT))
+        self.plugin.start(Fields(format=self.format, intrinsics=Fields(_record(intrinsics, INTRINSICS)),
+                                 targets=[Fields(name=name, body=body) for name, body in targets],
+                                 markers=[Fields(id=id, family=family, target=target, file=file,
+                                                 corners_mm=np.frombuffer(bytes(corners)).reshape(4, 3),
+                                                 pattern_ratio=ratio)
+                                          for id, family, target, corners, file, ratio in markers],
+                                 families=list(families)))
+        size = self.plugin.state_size() if hasattr(self.plugin, "state_size") else 0
+        return STATUS_OK, _integer("'state_size' returned", size, 0, MAX_STATE, STATUS_ERROR_CONFIGURATION)
 
+    @_reporting()
     def aspect(self, marker):
-        return self._guarded(lambda: (STATUS_OK, (float(self.plugin.aspect(marker)),)
-                                      if hasattr(self.plugin, "aspect") else (1.0,)))
+        return STATUS_OK, (float(self.plugin.aspect(marker)) if hasattr(self.plugin, "aspect") else 1.0,)
 
     def track(self, sequence, capture_ns, clock, planes, grey, search_everywhere, expected, state_before, state_after,
               observations):
@@ -301,20 +301,19 @@ class _Adapter:
 
         return self._with_memory([*planes, grey, *filter(None, (state_before, state_after))], track)
 
-    # ---- ray tracers ----
 
+class _RaytracerAdapter(_Adapter):
+    method = "render"
+
+    @_reporting(STATUS_ERROR_CONFIGURATION)
     def capabilities(self):
-        return self._guarded(
-            lambda: (STATUS_OK, int(getattr(self.plugin, "capabilities", CAPABILITY_EVERY_SCENE))),
-            STATUS_ERROR_CONFIGURATION)
+        return STATUS_OK, int(getattr(self.plugin, "capabilities", CAPABILITY_EVERY_SCENE))
 
-    def start_raytracer(self, width, height, scene, intrinsics):
-        def start():
-            self.plugin.start(Fields(width=width, height=height, scene=Scene(scene),
-                                     intrinsics=Fields(_record(intrinsics, INTRINSICS))))
-            return STATUS_OK
-
-        return self._guarded(start)
+    @_reporting()
+    def start(self, width, height, scene, intrinsics):
+        self.plugin.start(Fields(width=width, height=height, scene=Scene(scene),
+                                 intrinsics=Fields(_record(intrinsics, INTRINSICS))))
+        return STATUS_OK
 
     def render(self, sequence, time_s, camera, moved, deformed, pixels, height, width, stride):
         def render():
@@ -330,15 +329,15 @@ class _Adapter:
         memory = [pixels, moved] + [view for _, _, p, n in deformed for view in (p, n) if view]
         return self._with_memory(memory, render)
 
-    # ---- sinks ----
 
-    def start_sink(self, width, height, fps, first_sequence, path, intrinsics):
-        def start():
-            self.plugin.start(Fields(width=width, height=height, fps=fps, first_sequence=first_sequence, path=path,
-                                     intrinsics=intrinsics and Fields(_record(intrinsics, INTRINSICS))))
-            return STATUS_OK
+class _SinkAdapter(_Adapter):
+    method = "write"
 
-        return self._guarded(start)
+    @_reporting()
+    def start(self, width, height, fps, first_sequence, path, intrinsics):
+        self.plugin.start(Fields(width=width, height=height, fps=fps, first_sequence=first_sequence, path=path,
+                                 intrinsics=intrinsics and Fields(_record(intrinsics, INTRINSICS))))
+        return STATUS_OK
 
     def write(self, bgr, height, width, stride, record, targets, observations, expected):
         def write():

@@ -16,19 +16,24 @@
 #include <utility>
 #include <vector>
 
+// METHOD: the method of the script's class for each frame. ADAPTER: the class of arhost.py that calls it.
 #if defined(KIND_SOURCE)
 #define KIND ARHOST_KIND_SOURCE
 #define METHOD "read"
+#define ADAPTER "_SourceAdapter"
 #elif defined(KIND_TRACKER)
 #define KIND ARHOST_KIND_TRACKER
 #define METHOD "track"
+#define ADAPTER "_TrackerAdapter"
 #elif defined(KIND_RAYTRACER)
 #define KIND ARHOST_KIND_RAYTRACER
 #define METHOD "render"
+#define ADAPTER "_RaytracerAdapter"
 #define CAPABILITIES ARHOST_CAPABILITY_EVERY_SCENE // a script may implement less: the attribute `capabilities`
 #else
 #define KIND ARHOST_KIND_SINK
 #define METHOD "write"
+#define ADAPTER "_SinkAdapter"
 #endif
 #ifndef CAPABILITIES
 #define CAPABILITIES 0
@@ -221,8 +226,8 @@ public:
         Object functions[3];
         for (int i = 0; i < 3; ++i)
             functions[i] = checked(PyCFunction_New(&callbacks[i], capsule.get()));
-        adapter_ = checked(PyObject_CallMethod(module.get(), "_Adapter", "sOOO", METHOD, functions[0].get(),
-                                               functions[1].get(), functions[2].get()));
+        adapter_ = checked(PyObject_CallMethod(module.get(), ADAPTER, "OOO", functions[0].get(), functions[1].get(),
+                                               functions[2].get()));
         try {
             if (call("load", "sss", options.text("script").c_str(), options.text("class").c_str(),
                      options.text("arguments").c_str())
@@ -260,8 +265,8 @@ public:
     // sources
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
         const GilLock lock;
-        const Answer answer = call("start_source", "KdNN", static_cast<unsigned long long>(setup.first_sequence),
-                                   setup.fps, PyBool_FromLong(setup.paced), view_of(setup.intrinsics).release());
+        const Answer answer = call("start", "KdNN", static_cast<unsigned long long>(setup.first_sequence), setup.fps,
+                                   PyBool_FromLong(setup.paced), view_of(setup.intrinsics).release());
         arhost_frame_format &format = properties.format;
         unsigned long long frames = 0;
         require(PyArg_ParseTuple(answer.value.get(), "iIIdiiiK", &format.pixel_format, &format.width, &format.height,
@@ -296,7 +301,7 @@ public:
         for (std::uint32_t i = 0; i < setup.family_count; ++i)
             families.push_back(checked(PyUnicode_FromString(setup.families[i])));
         state_size_ = PyLong_AsUnsignedLongLong(
-            call("start_tracker", "NNNNN", view_of(setup.format).release(), view_of(setup.intrinsics).release(),
+            call("start", "NNNNN", view_of(setup.format).release(), view_of(setup.intrinsics).release(),
                  tuple_of(std::move(targets)).release(), tuple_of(std::move(markers)).release(),
                  tuple_of(std::move(families)).release())
                 .value.get());
@@ -336,8 +341,8 @@ public:
 #endif
     void start(const arhost_raytracer_setup &setup) {
         const GilLock lock;
-        call("start_raytracer", "IINN", setup.width, setup.height,
-             view(setup.scene, setup.scene->byte_size).release(), view_of(setup.intrinsics).release());
+        call("start", "IINN", setup.width, setup.height, view(setup.scene, setup.scene->byte_size).release(),
+             view_of(setup.intrinsics).release());
     }
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
         const GilLock lock;
@@ -370,7 +375,7 @@ public:
     // sinks
     void start(const arhost_sink_setup &setup) {
         const GilLock lock;
-        call("start_sink", "IIdKsN", setup.width, setup.height, setup.fps,
+        call("start", "IIdKsN", setup.width, setup.height, setup.fps,
              static_cast<unsigned long long>(setup.first_sequence), path_.c_str(),
              view_of(setup.intrinsics).release());
     }
@@ -411,7 +416,7 @@ private:
         });
     }
 
-    // Calls a method of _Adapter; throws if it reports an error.
+    // Calls a method of the adapter; throws if it reports an error.
     template <class... Arguments> Answer call(const char *method, const char *format, Arguments... arguments) {
         const Object pair = checked(PyObject_CallMethod(adapter_.get(), method, format, arguments...));
         Answer answer{ARHOST_STATUS_ERROR_INTERNAL, {}};
