@@ -56,8 +56,8 @@ bool is_rejection(arhost_status status) {
 
 // Starts at `fps`, or at the source's default rate if it rejects that.
 void start_at(SourceRun &run, double fps, bool paced, std::uint64_t first = 0) {
-    const arhost_status status = run.try_start({first, fps, paced, nullptr});
-    run.accept(is_rejection(status) ? run.try_start({first, 0, paced, nullptr}) : status);
+    const arhost_status status = run.try_start({first, fps, paced});
+    run.accept(is_rejection(status) ? run.try_start({first, 0, paced}) : status);
 }
 
 // ---- From start to stop ----------------------------------------------------------------------------
@@ -225,7 +225,7 @@ void rate(Context &context) {
     std::string rejected, reason;
     bool accepted = false;
     for (const double fps : {10.0, 48.0}) {
-        const arhost_status status = run.try_start({0, fps, false, nullptr});
+        const arhost_status status = run.try_start({0, fps});
         if (is_rejection(status)) {
             rejected += fmt::format("{}{}", rejected.empty() ? "" : " and ", fps);
             reason = call_result("start", status, run.instance().host());
@@ -294,7 +294,7 @@ void end(Context &context) {
         throw Skip(run.is_live() ? live_skip
                    : count == 0  ? "it does not report a frame count"
                                  : "it has too many frames to read them all and cannot seek");
-    run.start({first, 0, false, nullptr});
+    run.start({first});
     for (std::uint64_t i = first; i < count; ++i)
         if (!run.read())
             throw Failure(fmt::format("start reports {} frames, but it ends before frame {}", count, i));
@@ -349,7 +349,7 @@ void seek(Context &context) {
     for (const std::size_t first : {std::size_t{1}, std::size_t{5}}) {
         if (first >= frames.size())
             continue;
-        run.start({first, 0, false, nullptr});
+        run.start({first});
         for (std::size_t i = first; i < std::min(first + 3, frames.size()); ++i) {
             const std::optional<Frame> frame = run.read();
             if (!frame)

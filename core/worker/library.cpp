@@ -102,7 +102,7 @@ const arhost_entry_point &open_library(const std::filesystem::path &file) {
 
 const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_entry_point &entry) {
     const arhost_offer offer{sizeof offer, ARHOST_ABI_VERSION, ARHOST_ABI_VERSION};
-    arhost_answer answer{sizeof answer, 0xffffffffu, nullptr};
+    arhost_answer answer{.struct_size = sizeof answer, .abi_version = 0xffffffffu, .plugin = nullptr};
     const arhost_status status = entry.negotiate(&offer, &answer);
     const std::string versions = "this arhost supports only ABI version " + std::to_string(ARHOST_ABI_VERSION);
     if (status != ARHOST_STATUS_OK)

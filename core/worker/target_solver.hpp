@@ -28,10 +28,10 @@ public:
     TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<ipc::Target> &targets,
                  const Settings &settings);
 
-    // Bytes of `before` and `after`.
+    // Size of `before` and `after`, in bytes.
     std::uint64_t state_size() const;
 
-    // Returns what arhost_track_request says about a frame.
+    // The fields of the same names of arhost_track_request, which tell a tracker where to search in the next frame.
     struct Expectation {
         std::vector<arhost_expected_marker> markers;
         bool search_everywhere;

@@ -458,18 +458,18 @@ constexpr arhost_option_descriptor options[] = {
 };
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    KIND,
-    ID,
-    "Python",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Runs a class of a Python script.",
-    CAPABILITIES,
-    std::size(options),
-    options,
-    nullptr,
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = KIND,
+    .id = ID,
+    .name = "Python",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Runs a class of a Python script.",
+    .capabilities = CAPABILITIES,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr,
 };
 
 } // namespace

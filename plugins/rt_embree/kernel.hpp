@@ -60,9 +60,10 @@ enum SumRow : int {
     light_row,        // three rows: linear radiance of the virtual objects
     coverage_row = 3, // number of samples that hit a virtual object; the remaining rows are unused without catchers
     caught_row,       // number of samples that hit a catcher
-    irradiance_row,   // on the catcher, without shadows
-    hidden_row, // three rows: the parts of it that opaque and that translucent objects hide, and 0; for coloured
-                // shadows, the part hidden in each channel
+    irradiance_row,   // irradiance of the catcher without shadows
+    // Three rows: the parts of that irradiance that virtual objects hide. With coloured shadows, one part for each
+    // colour channel; otherwise, the part that opaque objects hide, the part that translucent objects hide, and 0.
+    hidden_row,
     sum_rows = hidden_row + 3
 };
 

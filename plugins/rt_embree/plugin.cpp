@@ -80,19 +80,21 @@ constexpr arhost_option_descriptor options[] = {
                    "Vector instructions used for shading; 'auto': the widest that the processor supports.", 0, 0,
                    instruction_sets)};
 
-constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
-                                          ARHOST_KIND_RAYTRACER,
-                                          "rt_embree",
-                                          "Embree ray tracer",
-                                          "0.1.0",
-                                          "arhost",
-                                          "Apache-2.0",
-                                          "CPU ray tracer that traces packets of 16 rays with Intel Embree.",
-                                          ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE |
-                                              ARHOST_CAPABILITY_SCALED_IMAGES,
-                                          std::size(options),
-                                          options,
-                                          nullptr};
+constexpr arhost_descriptor descriptor = {
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_RAYTRACER,
+    .id = "rt_embree",
+    .name = "Embree ray tracer",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "CPU ray tracer that traces packets of 16 rays with Intel Embree.",
+    .capabilities =
+        ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE | ARHOST_CAPABILITY_SCALED_IMAGES,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr,
+};
 
 } // namespace
 } // namespace rt_embree

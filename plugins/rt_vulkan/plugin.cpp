@@ -173,18 +173,20 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_BOOL, "validate", "false",
                    "Enable Vulkan's validation layers and log their messages; slow.")};
 
-constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
-                                          ARHOST_KIND_RAYTRACER,
-                                          "rt_vulkan",
-                                          "Vulkan ray tracer",
-                                          "0.1.0",
-                                          "arhost",
-                                          "Apache-2.0",
-                                          "Ray tracer for any Vulkan 1.1 GPU; renders the same images as rt_embree.",
-                                          ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE,
-                                          std::size(options),
-                                          options,
-                                          needs};
+constexpr arhost_descriptor descriptor = {
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_RAYTRACER,
+    .id = "rt_vulkan",
+    .name = "Vulkan ray tracer",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Ray tracer for any Vulkan 1.1 GPU; renders the same images as rt_embree.",
+    .capabilities = ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = needs,
+};
 
 } // namespace
 } // namespace rt_vulkan

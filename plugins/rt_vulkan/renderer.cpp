@@ -206,7 +206,11 @@ void Renderer::make_descriptor_set(const Shaders &shaders) {
     const std::uint32_t count = descriptor_count();
     std::array<VkDescriptorSetLayoutBinding, binding_count + 1> bindings{};
     for (std::uint32_t i = 0; i < count; ++i)
-        bindings[i] = {i, descriptor_type(i), 1, shaders.stage_flags(), nullptr};
+        bindings[i] = {.binding = i,
+                       .descriptorType = descriptor_type(i),
+                       .descriptorCount = 1,
+                       .stageFlags = shaders.stage_flags(),
+                       .pImmutableSamplers = nullptr};
     const VkDescriptorSetLayoutCreateInfo set_info{.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
                                                    .bindingCount = count,
                                                    .pBindings = bindings.data()};

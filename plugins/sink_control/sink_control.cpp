@@ -132,18 +132,18 @@ constexpr arhost_option_descriptor options[] = {
 constexpr const char *needs[] = {"listen", nullptr};
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_SINK,
-    "sink_control",
-    "Control socket",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Passes commands from `arhost ctl` to the host.",
-    ARHOST_CAPABILITY_REALTIME_SINK,
-    std::size(options),
-    options,
-    needs,
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SINK,
+    .id = "sink_control",
+    .name = "Control socket",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Passes commands from `arhost ctl` to the host.",
+    .capabilities = ARHOST_CAPABILITY_REALTIME_SINK,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = needs,
 };
 
 } // namespace

@@ -198,18 +198,19 @@ constexpr arhost_option_descriptor options[] = {
 };
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_SINK,
-    "sink_images",
-    "Image files",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Writes frames as numbered PNG or JPEG files, or one frame as a single file.",
-    ARHOST_CAPABILITY_NUMBERED_FILES | ARHOST_CAPABILITY_VIDEO_INPUT | ARHOST_CAPABILITY_OVERLAY_INPUT,
-    std::size(options),
-    options,
-    nullptr,
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SINK,
+    .id = "sink_images",
+    .name = "Image files",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Writes frames as numbered PNG or JPEG files, or one frame as a single file.",
+    .capabilities =
+        ARHOST_CAPABILITY_NUMBERED_FILES | ARHOST_CAPABILITY_VIDEO_INPUT | ARHOST_CAPABILITY_OVERLAY_INPUT,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr,
 };
 
 } // namespace

@@ -39,18 +39,18 @@ constexpr arhost_option_descriptor options[] = {
 };
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_SINK,
-    "sink_null",
-    "Nothing",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Discards frames, immediately or after a delay.",
-    0,
-    std::size(options),
-    options,
-    nullptr,
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SINK,
+    .id = "sink_null",
+    .name = "Nothing",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Discards frames, immediately or after a delay.",
+    .capabilities = 0,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr,
 };
 
 } // namespace

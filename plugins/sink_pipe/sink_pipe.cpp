@@ -177,18 +177,18 @@ constexpr arhost_option_descriptor options[] = {
 };
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_SINK,
-    "sink_pipe",
-    "Pipe",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Writes uncompressed video (Y4M or pixels) to a FIFO or standard output, for other programs.",
-    ARHOST_CAPABILITY_STANDARD_OUTPUT | ARHOST_CAPABILITY_OVERLAY_INPUT,
-    std::size(options),
-    options,
-    nullptr,
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SINK,
+    .id = "sink_pipe",
+    .name = "Pipe",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Writes uncompressed video (Y4M or pixels) to a FIFO or standard output, for other programs.",
+    .capabilities = ARHOST_CAPABILITY_STANDARD_OUTPUT | ARHOST_CAPABILITY_OVERLAY_INPUT,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr,
 };
 
 } // namespace

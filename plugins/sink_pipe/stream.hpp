@@ -24,7 +24,8 @@ public:
     bool is_standard_output() const { return path_ == "-"; }
     std::string name() const { return is_standard_output() ? "standard output" : "'" + path_ + "'"; }
 
-    // Throws Failure if the path is not a FIFO or cannot be written. Does not open it, which its reader would notice.
+    // Throws Failure if the path is not a FIFO or cannot be written. Does not open the FIFO, because closing it again
+    // would end the stream of a waiting reader.
     void check() const;
 
     bool is_open() const { return fd_ >= 0; }

@@ -189,18 +189,18 @@ constexpr arhost_option_descriptor options[] = {
 };
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_SINK,
-    "sink_session",
-    "Session",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Records the raw video, poses and configuration of a run, for arhost replay.",
-    ARHOST_CAPABILITY_VIDEO_INPUT | ARHOST_CAPABILITY_RUN_DESCRIPTION,
-    std::size(options),
-    options,
-    nullptr,
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SINK,
+    .id = "sink_session",
+    .name = "Session",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Records the raw video, poses and configuration of a run, for arhost replay.",
+    .capabilities = ARHOST_CAPABILITY_VIDEO_INPUT | ARHOST_CAPABILITY_RUN_DESCRIPTION,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr,
 };
 
 } // namespace

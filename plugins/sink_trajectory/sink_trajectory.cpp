@@ -73,18 +73,18 @@ constexpr arhost_option_descriptor options[] = {
 };
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_SINK,
-    "sink_trajectory",
-    "Trajectory",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Records the camera of each frame for 'arhost replay'.",
-    0,
-    std::size(options),
-    options,
-    nullptr,
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SINK,
+    .id = "sink_trajectory",
+    .name = "Trajectory",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Records the camera of each frame for 'arhost replay'.",
+    .capabilities = 0,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr,
 };
 
 } // namespace

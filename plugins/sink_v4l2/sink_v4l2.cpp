@@ -178,18 +178,19 @@ constexpr arhost_option_descriptor options[] = {
 constexpr const char *needs[] = {"video", nullptr};
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_SINK,
-    "sink_v4l2",
-    "V4L2 output",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Writes frames to a Video4Linux output device, such as the virtual camera of v4l2loopback.",
-    0,
-    std::size(options),
-    options,
-    needs};
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SINK,
+    .id = "sink_v4l2",
+    .name = "V4L2 output",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Writes frames to a Video4Linux output device, such as the virtual camera of v4l2loopback.",
+    .capabilities = 0,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = needs,
+};
 
 } // namespace
 

@@ -81,18 +81,19 @@ constexpr arhost_option_descriptor options[] = {
 constexpr const char *needs[] = {"listen", nullptr};
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_SINK,
-    "sink_web",
-    "Web page",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Shows the live picture and the state of the run in a browser, and passes its commands to the host.",
-    ARHOST_CAPABILITY_REALTIME_SINK,
-    std::size(options),
-    options,
-    needs,
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SINK,
+    .id = "sink_web",
+    .name = "Web page",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description =
+        "Shows the live picture and the state of the run in a browser, and passes its commands to the host.",
+    .capabilities = ARHOST_CAPABILITY_REALTIME_SINK,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = needs,
 };
 
 } // namespace

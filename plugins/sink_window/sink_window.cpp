@@ -258,18 +258,18 @@ constexpr arhost_option_descriptor options[] = {
 constexpr const char *needs[] = {"display", nullptr};
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_SINK,
-    "sink_window",
-    "Window",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Shows frames in a window.",
-    ARHOST_CAPABILITY_REALTIME_SINK | ARHOST_CAPABILITY_OVERLAY_INPUT,
-    std::size(options),
-    options,
-    needs,
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SINK,
+    .id = "sink_window",
+    .name = "Window",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Shows frames in a window.",
+    .capabilities = ARHOST_CAPABILITY_REALTIME_SINK | ARHOST_CAPABILITY_OVERLAY_INPUT,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = needs,
 };
 
 } // namespace

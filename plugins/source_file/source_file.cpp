@@ -171,18 +171,20 @@ constexpr arhost_option_descriptor options[] = {
            "Number of frames to deliver; 0: all (1 for a single image, which is repeated).", 0, 2'147'483'647),
 };
 
-constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
-                                          ARHOST_KIND_SOURCE,
-                                          "source_file",
-                                          "Video and image files",
-                                          "0.1.0",
-                                          "arhost",
-                                          "Apache-2.0",
-                                          "Reads frames from a video file, numbered images or one image.",
-                                          ARHOST_CAPABILITY_SEEK,
-                                          std::size(options),
-                                          options,
-                                          nullptr};
+constexpr arhost_descriptor descriptor = {
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SOURCE,
+    .id = "source_file",
+    .name = "Video and image files",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Reads frames from a video file, numbered images or one image.",
+    .capabilities = ARHOST_CAPABILITY_SEEK,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr,
+};
 
 } // namespace
 

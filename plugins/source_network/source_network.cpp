@@ -126,18 +126,20 @@ constexpr arhost_option_descriptor options[] = {
 };
 constexpr const char *needs[] = {"network", nullptr};
 
-constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
-                                          ARHOST_KIND_SOURCE,
-                                          "source_network",
-                                          "Network camera",
-                                          "0.1.0",
-                                          "arhost",
-                                          "Apache-2.0",
-                                          "Plays network cameras: RTSP, Motion-JPEG over HTTP, HLS.",
-                                          ARHOST_CAPABILITY_LIVE,
-                                          std::size(options),
-                                          options,
-                                          needs};
+constexpr arhost_descriptor descriptor = {
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SOURCE,
+    .id = "source_network",
+    .name = "Network camera",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Plays network cameras: RTSP, Motion-JPEG over HTTP, HLS.",
+    .capabilities = ARHOST_CAPABILITY_LIVE,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = needs,
+};
 
 } // namespace
 

@@ -61,10 +61,10 @@ private:
 
 struct U16x8 {
     std::uint16_t lane[8];
-    template <class Of> static U16x8 each(Of of) {
+    template <class Value> static U16x8 each(Value value) {
         U16x8 r;
         for (int i = 0; i < 8; ++i)
-            r.lane[i] = static_cast<std::uint16_t>(of(i));
+            r.lane[i] = static_cast<std::uint16_t>(value(i));
         return r;
     }
     static U16x8 load(const void *p) {

@@ -247,18 +247,19 @@ const arhost_option_descriptor options[] = {
 };
 
 const arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_SOURCE,
-    "source_synthetic",
-    "Synthetic marker scene",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "A printed marker on a desk, filmed by a moving camera whose poses are known exactly.",
-    ARHOST_CAPABILITY_SEEK,
-    std::size(options),
-    options,
-    nullptr};
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SOURCE,
+    .id = "source_synthetic",
+    .name = "Synthetic marker scene",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "A printed marker on a desk, filmed by a moving camera whose poses are known exactly.",
+    .capabilities = ARHOST_CAPABILITY_SEEK,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr,
+};
 
 } // namespace
 

@@ -347,18 +347,19 @@ constexpr arhost_option_descriptor options[] = {
 constexpr const char *needs[] = {"usb", nullptr};
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_SOURCE,
-    "source_uvc",
-    "USB camera",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Captures frames from a USB camera through libusb, uncompressed or as Motion-JPEG.",
-    ARHOST_CAPABILITY_LIVE,
-    std::size(options),
-    options,
-    needs};
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SOURCE,
+    .id = "source_uvc",
+    .name = "USB camera",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Captures frames from a USB camera through libusb, uncompressed or as Motion-JPEG.",
+    .capabilities = ARHOST_CAPABILITY_LIVE,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = needs,
+};
 
 } // namespace
 

@@ -197,7 +197,7 @@ typedef struct hit {
     double distance;
     const object *object;    /* NULL: no hit */
     vec face_normal, normal; /* geometric and shading normal, unit length */
-    vec lift;                /* to the origin of shadow rays */
+    vec lift;                /* from the hit to the origin of shadow rays */
 } hit;
 
 /* Distances at which the ray's line enters and leaves a sphere; returns 0 if it misses. */

@@ -112,7 +112,7 @@ static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_OUTPUT_PATH, "path", NULL, 0, 0, NULL,
      "Prefix of the file names; a number and .ppm are appended."},
 };
-static const arhost_sink functions = {sizeof functions, start, write_frame, NULL, stop, NULL};
+static const arhost_sink functions = {.struct_size = sizeof functions, .start = start, .write = write_frame, .stop = stop};
 static const arhost_descriptor descriptor = {
     .struct_size = sizeof descriptor,
     .kind = ARHOST_KIND_SINK,

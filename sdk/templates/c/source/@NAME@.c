@@ -104,7 +104,7 @@ static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "frames", "60", 0, 1e9, NULL,
      "Number of frames; 0: endless."},
 };
-static const arhost_source functions = {sizeof functions, start, read, stop};
+static const arhost_source functions = {.struct_size = sizeof functions, .start = start, .read = read, .stop = stop};
 static const arhost_descriptor descriptor = {
     .struct_size = sizeof descriptor,
     .kind = ARHOST_KIND_SOURCE,

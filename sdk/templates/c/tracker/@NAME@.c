@@ -86,7 +86,7 @@ static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "threshold", "200", 1, 255, NULL,
      "Minimum grey level of a bright pixel."},
 };
-static const arhost_tracker functions = {sizeof functions, start, track, stop, NULL};
+static const arhost_tracker functions = {.struct_size = sizeof functions, .start = start, .track = track, .stop = stop};
 static const arhost_descriptor descriptor = {
     .struct_size = sizeof descriptor,
     .kind = ARHOST_KIND_TRACKER,

@@ -100,20 +100,20 @@ constexpr arhost_option_descriptor options[] = {
 };
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_RAYTRACER,
-    "@NAME@", // must equal the file name without ".so"
-    "@NAME@",
-    "0.1.0",
-    "unknown", // FILL IN: your name
-    "NONE",    // FILL IN: SPDX identifier, e.g. "Apache-2.0"
-    "Brute-force ray tracer.",
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_RAYTRACER,
+    .id = "@NAME@", // must equal the file name without ".so"
+    .name = "@NAME@",
+    .version = "0.1.0",
+    .vendor = "unknown", // FILL IN: your name
+    .licence = "NONE",   // FILL IN: SPDX identifier, e.g. "Apache-2.0"
+    .description = "Brute-force ray tracer.",
     // FILL IN: what you implement, such as ARHOST_CAPABILITY_TEXTURES or ARHOST_CAPABILITY_LENS_DISTORTION. arhost warns if
     // a scene needs more.
-    ARHOST_CAPABILITY_REFLECTION | ARHOST_CAPABILITY_MOTION,
-    std::size(options),
-    options,
-    nullptr, // permissions from the sandbox: arhost/plugin.h
+    .capabilities = ARHOST_CAPABILITY_REFLECTION | ARHOST_CAPABILITY_MOTION,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr, // permissions from the sandbox: arhost/plugin.h
 };
 
 } // namespace

@@ -88,7 +88,7 @@ private:
         double distance = infinity;
         const Object *object = nullptr; // null: no hit
         Vec face_normal, normal;        // geometric and shading normal, unit length
-        Vec lift;                       // to the origin of shadow rays
+        Vec lift;                       // from the hit to the origin of shadow rays
     };
     struct Surface;
     struct IncidentLight;

@@ -67,18 +67,18 @@ constexpr arhost_option_descriptor options[] = {
 };
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_SOURCE,
-    "@NAME@", // must equal the file name without ".so"
-    "@NAME@",
-    "0.1.0",
-    "unknown", // FILL IN: your name
-    "NONE",    // FILL IN: SPDX identifier, e.g. "Apache-2.0"
-    "Moving gradient.",
-    ARHOST_CAPABILITY_SEEK, // frame n is the same wherever reading starts
-    std::size(options),
-    options,
-    nullptr, // permissions from the sandbox: arhost/plugin.h
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_SOURCE,
+    .id = "@NAME@", // must equal the file name without ".so"
+    .name = "@NAME@",
+    .version = "0.1.0",
+    .vendor = "unknown", // FILL IN: your name
+    .licence = "NONE",   // FILL IN: SPDX identifier, e.g. "Apache-2.0"
+    .description = "Moving gradient.",
+    .capabilities = ARHOST_CAPABILITY_SEEK, // frame n is the same wherever reading starts
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr, // permissions from the sandbox: arhost/plugin.h
 };
 
 } // namespace

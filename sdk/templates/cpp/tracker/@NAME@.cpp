@@ -52,18 +52,18 @@ constexpr arhost_option_descriptor options[] = {
 };
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_TRACKER,
-    "@NAME@", // must equal the file name without ".so"
-    "@NAME@",
-    "0.1.0",
-    "unknown", // FILL IN: your name
-    "NONE",    // FILL IN: SPDX identifier, e.g. "Apache-2.0"
-    "Detects a bright patch as the marker.",
-    0,
-    std::size(options),
-    options,
-    nullptr, // permissions from the sandbox: arhost/plugin.h
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_TRACKER,
+    .id = "@NAME@", // must equal the file name without ".so"
+    .name = "@NAME@",
+    .version = "0.1.0",
+    .vendor = "unknown", // FILL IN: your name
+    .licence = "NONE",   // FILL IN: SPDX identifier, e.g. "Apache-2.0"
+    .description = "Detects a bright patch as the marker.",
+    .capabilities = 0,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr, // permissions from the sandbox: arhost/plugin.h
 };
 
 } // namespace

@@ -89,7 +89,7 @@ class Hits:
         self.object = np.full(count, -1)  # index; -1: no hit
         self.face_normal = np.zeros((count, 3))  # geometric normal, unit length
         self.normal = np.zeros((count, 3))  # shading normal, unit length
-        self.lift = np.zeros((count, 3))  # to the origin of shadow rays
+        self.lift = np.zeros((count, 3))  # from the hit to the origin of shadow rays
 
     def take(self, rays, number, distance, face_normal, normal, lift):
         nearer = (distance > 0) & (distance < self.distance[rays])  # false for NaN

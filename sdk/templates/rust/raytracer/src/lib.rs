@@ -34,7 +34,7 @@ struct ShadowAlpha {
 impl ShadowAlpha {
     /// Alpha of a shadow. The host composites in sRGB, but a shadow hides a share of the linear light: alpha is exact for
     /// mid-grey video, the sRGB value 0.5. `opaque`, `translucent`: the shares of the light that such objects hide.
-    fn of(&self, opaque: f64, translucent: f64) -> f64 {
+    fn alpha(&self, opaque: f64, translucent: f64) -> f64 {
         let hidden = |alpha: f64| linear_light(0.5) - linear_light(0.5 * (1.0 - alpha));
         let light = linear_light(0.5) - opaque * hidden(self.opaque) - translucent * hidden(self.translucent);
         1.0 - 2.0 * srgb(light)
@@ -93,7 +93,7 @@ fn pixel(tracer: &Tracer, shadow: &ShadowAlpha, view: &View, side: u32, column: 
         }
     }
     let (coverage, others) = (hits / count, (count - hits).max(1.0));
-    let alpha = coverage + (1.0 - coverage) * shadow.of(opaque / others, translucent / others);
+    let alpha = coverage + (1.0 - coverage) * shadow.alpha(opaque / others, translucent / others);
     let share = if alpha > 0.0 { coverage / alpha } else { 0.0 }; // shadows are black
     let code = |sum: f64| to_byte(share * srgb(sum / hits.max(1.0)));
     [code(colour[0]), code(colour[1]), code(colour[2]), to_byte(alpha)]

@@ -189,7 +189,7 @@ struct Hit<'a> {
     object: Option<&'a Object>, // None: no hit
     face_normal: Vec3,          // geometric normal, unit length
     normal: Vec3,               // shading normal, unit length
-    lift: Vec3,                 // to the origin of shadow rays
+    lift: Vec3,                 // from the hit to the origin of shadow rays
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -207,7 +207,7 @@ fn sphere_interval(sphere: &Sphere, ray: &Ray) -> Option<(f64, f64)> {
     (squared > 0.0).then(|| (middle - squared.sqrt(), middle + squared.sqrt()))
 }
 
-/// Distance, geometric and shading normal, lift.
+/// Distance along the ray, geometric normal, shading normal, and vector from the hit to the origin of shadow rays (`lift`).
 type Intersection = (f64, Vec3, Vec3, Vec3);
 
 fn intersect_sphere(sphere: &Sphere, ray: &Ray, faces: Faces) -> Option<Intersection> {
@@ -217,7 +217,7 @@ fn intersect_sphere(sphere: &Sphere, ray: &Ray, faces: Faces) -> Option<Intersec
     Some((distance, normal, normal, Vec3([0.0; 3])))
 }
 
-/// From a point of a triangle to the curved surface that its normals describe. Shadow rays start there, so that the
+/// The vector from a point of a triangle to the curved surface that its normals describe. Shadow rays start there, so that the
 /// facets of a smooth mesh do not shadow themselves (J. Hanika, Hacking the Shadow Terminator, Ray Tracing Gems II, 2021).
 fn lift(t: &Triangle, u: f64, v: f64) -> Vec3 {
     let from_corner = u * t.edge_1 + v * t.edge_2;
