@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What source_uvc and source_v4l2 share: options, the choice of a format, and waiting for pictures.
+// The common part of source_uvc and source_v4l2: options, the choice of a format, and waiting for pictures.
 #pragma once
 
 #include "camera_common/control_options.hpp"

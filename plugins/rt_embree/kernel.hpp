@@ -33,7 +33,7 @@ struct Object {
     // 3×3 matrices from object to world space, column-major. `transform` is for directions; `normal_transform`, its
     // inverse transpose, is for normals.
     float transform[9], normal_transform[9];
-    float extent[3];        // result of object_extent() (raytracer_common/arena.hpp)
+    float extent[3];        // result of object_extent() (raytracer_common/scene_geometry.hpp)
     const int *indices;     // three vertex indices per triangle
     const float *positions; // vertex positions
     const float *normals;   // NULL if flat-shaded or a sphere

@@ -6,10 +6,10 @@
 
 #include "acceleration_structures.hpp"
 #include "bands.hpp"
-#include "pipeline.hpp"
+#include "camera_data.hpp"
+#include "image_pipeline.hpp"
 #include "raytracer_common/samples.hpp"
 #include "scene_data.hpp"
-#include "view.hpp"
 
 #include <optional>
 #include <vector>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene_data.hpp"
 
-#include "raytracer_common/arena.hpp"
+#include "raytracer_common/scene_geometry.hpp"
 
 #include <arhost/shading/srgb8.hpp>
 

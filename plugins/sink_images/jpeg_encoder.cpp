@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "encoder.hpp"
+#include "image_encoder.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "encoder.hpp"
+#include "image_encoder.hpp"
 #include "sink_common/files.hpp"
 
 #include <array>

@@ -2,7 +2,7 @@
 //
 // Encodes images as PNG (ISO/IEC 15948). With libdeflate and a single filter, this takes a third of the time that
 // libpng and zlib take at their fastest setting.
-#include "encoder.hpp"
+#include "image_encoder.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 

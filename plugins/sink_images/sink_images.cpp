@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // sink_images: writes frames as numbered image files, or one frame as a single image file.
-#include "encoder.hpp"
+#include "image_encoder.hpp"
 #include "last_frame.hpp"
 #include "sink_common/debug_view.hpp"
 #include "sink_common/files.hpp"

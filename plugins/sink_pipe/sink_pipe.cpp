@@ -2,7 +2,7 @@
 //
 // sink_pipe: writes uncompressed video to a FIFO or to standard output, for other programs.
 #include "libav_common/bgr_converter.hpp"
-#include "stream.hpp"
+#include "pipe_stream.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -19,7 +19,7 @@ namespace {
 
 using namespace arhost;
 using namespace arhost::libav;
-using arhost::pipe::Stream;
+using arhost::pipe::PipeStream;
 
 struct Format {
     std::string_view name; // value of the option `format`
@@ -149,7 +149,7 @@ private:
     }
 
     Host host_;
-    Stream stream_;
+    PipeStream stream_;
     const Format &format_;
     std::string matrix_;
     bool writes_overlay_, reopen_;

@@ -2,10 +2,10 @@
 //
 // sink_video: writes a video. Encodes each frame immediately and writes it to a segment file. Each restart begins a
 // new segment. At the end, joins all segments without re-encoding and atomically replaces the video.
-#include "encoder.hpp"
 #include "segments.hpp"
 #include "sink_common/debug_view.hpp"
 #include "sink_common/files.hpp"
+#include "video_encoder.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 

@@ -2,7 +2,7 @@
 #include "server.hpp"
 
 #include "checks.hpp"
-#include "files.hpp"
+#include "embedded_files.hpp"
 #include "metrics.hpp"
 
 #include <fcntl.h>
@@ -135,8 +135,8 @@ struct Server::Callbacks {
     }
 };
 
-Server::Server(Settings settings, Frames &frames, HostControl &control)
-    : settings_(std::move(settings)), frames_(frames), control_(control) {
+Server::Server(Settings settings, NewestFrame &frame, HostControl &control)
+    : settings_(std::move(settings)), frame_(frame), control_(control) {
     daemon_ = MHD_start_daemon(MHD_USE_EPOLL_INTERNAL_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, nullptr, nullptr,
                                Callbacks::handle, this, MHD_OPTION_LISTEN_SOCKET, settings_.socket,
                                MHD_OPTION_CONNECTION_LIMIT, max_connections, MHD_OPTION_PER_IP_CONNECTION_LIMIT,
@@ -170,7 +170,7 @@ void Server::tick() {
     const std::lock_guard lock(mutex_);
     const auto now = Clock::now();
     for (Viewer *viewer : viewers_)
-        if (viewer->is_waiting && (viewer->number != frames_.number() || now - viewer->sent_at >= repeat_time)) {
+        if (viewer->is_waiting && (viewer->number != frame_.number() || now - viewer->sent_at >= repeat_time)) {
             viewer->is_waiting = false;
             MHD_resume_connection(viewer->connection);
         }
@@ -302,7 +302,7 @@ bool Server::respond_with_answer(const Request &request) {
     if (request.path == "/")
         return respond_with_page(request);
     if (request.path == "/metrics") {
-        OwnCounts own{frames_.number(), frames_.encoded(), 0, 0};
+        OwnCounts own{frame_.number(), frame_.encoded(), 0, 0};
         {
             const std::lock_guard lock(mutex_);
             own.viewers = viewers_.size();
@@ -341,7 +341,7 @@ bool Server::respond_with_page(const Request &request) {
 }
 
 bool Server::respond_with_snapshot(const Request &request) {
-    const std::shared_ptr<const Jpeg> jpeg = frames_.newest();
+    const std::shared_ptr<const Jpeg> jpeg = frame_.newest();
     if (!jpeg)
         return refuse(request, MHD_HTTP_SERVICE_UNAVAILABLE, "there is no picture yet");
     return respond(request, MHD_HTTP_OK, "image/jpeg",
@@ -385,7 +385,7 @@ std::ptrdiff_t Server::read_stream(Viewer &viewer, std::span<char> to) {
             const std::lock_guard lock(mutex_);
             if (is_stopping_)
                 return MHD_CONTENT_READER_END_OF_STREAM;
-            const std::uint64_t number = frames_.number();
+            const std::uint64_t number = frame_.number();
             const auto now = Clock::now();
             auto &deadline = connections_.at(viewer.connection).deadline;
             if (number == 0 || (number == viewer.number && now - viewer.sent_at < repeat_time)) {
@@ -397,7 +397,7 @@ std::ptrdiff_t Server::read_stream(Viewer &viewer, std::span<char> to) {
             deadline = now + frame_time;
             viewer.sent_at = now;
         }
-        std::shared_ptr<const Jpeg> jpeg = frames_.newest();
+        std::shared_ptr<const Jpeg> jpeg = frame_.newest();
         if (!jpeg) // the encoder has failed
             return MHD_CONTENT_READER_END_WITH_ERROR;
         viewer.jpeg = std::move(jpeg);

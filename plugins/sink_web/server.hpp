@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "frames.hpp"
+#include "newest_frame.hpp"
 
 #include <condition_variable>
 #include <map>
@@ -25,7 +25,7 @@ struct Settings {
 class Server {
 public:
     // `control` may be without functions; there are then no status and no commands.
-    Server(Settings settings, Frames &frames, HostControl &control);
+    Server(Settings settings, NewestFrame &frame, HostControl &control);
     ~Server();
     Server(const Server &) = delete;
     Server &operator=(const Server &) = delete;
@@ -66,7 +66,7 @@ private:
     std::ptrdiff_t read_stream(Viewer &viewer, std::span<char> to);
 
     Settings settings_;
-    Frames &frames_;
+    NewestFrame &frame_;
     HostControl &control_;
     MHD_Daemon *daemon_ = nullptr;
     std::mutex mutex_; // guards the following members

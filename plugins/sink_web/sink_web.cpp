@@ -14,8 +14,10 @@ public:
     static constexpr const char *changeable[] = {"quality", arhost::drawing::DebugView::key, nullptr};
 
     WebSink(const arhost::Host &host, const arhost::Options &options)
-        : host_(host), control_(host), debug_view_(options), frames_(static_cast<int>(options.integer("quality"))),
-          settings_{static_cast<int>(options.integer("listen")), options.text("token"), options.text("hosts"), 0, 0},
+        : host_(host), control_(host), debug_view_(options),
+          frame_(static_cast<int>(options.integer("quality"))), settings_{static_cast<int>(options.integer("listen")),
+                                                                          options.text("token"),
+                                                                          options.text("hosts"), 0, 0},
           address_(options.text("listen")) {
         if (settings_.socket < 0)
             fail("the option 'listen' must not be empty");
@@ -30,12 +32,12 @@ public:
         settings_.width = setup.width;
         settings_.height = setup.height;
         debug_view_.start(setup);
-        server_ = std::make_unique<arhost::web::Server>(settings_, frames_, control_);
+        server_ = std::make_unique<arhost::web::Server>(settings_, frame_, control_);
         host_.info(address_.starts_with('/') ? "listens at " + address_ : "open http://" + address_ + "/");
     }
 
     arhost_status write(const arhost_output &output) {
-        frames_.put(debug_view_.applied_to(output));
+        frame_.put(debug_view_.applied_to(output));
         return idle();
     }
 
@@ -46,7 +48,7 @@ public:
 
     void set(const arhost::Options &changed) {
         if (changed.contains("quality"))
-            frames_.set_quality(static_cast<int>(changed.integer("quality")));
+            frame_.set_quality(static_cast<int>(changed.integer("quality")));
         else
             debug_view_.is_on = changed.boolean(arhost::drawing::DebugView::key);
     }
@@ -61,7 +63,7 @@ private:
     arhost::Host host_;
     arhost::HostControl control_;
     arhost::drawing::DebugView debug_view_;
-    arhost::web::Frames frames_;
+    arhost::web::NewestFrame frame_;
     arhost::web::Settings settings_;
     std::string address_;
     std::unique_ptr<arhost::web::Server> server_;

@@ -3,7 +3,7 @@
 // Draws text and lines over the picture in the window, with OpenGL.
 #pragma once
 
-#include "picture.hpp"
+#include "frame_texture.hpp"
 #include "sink_common/canvas.hpp"
 
 namespace sink_window {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // sink_window: shows frames in a window, and sends commands to the host when the user presses keys.
-#include "controls.hpp"
+#include "frame_texture.hpp"
+#include "host_commands.hpp"
 #include "overlay.hpp"
-#include "picture.hpp"
 #include "sink_common/debug_view.hpp"
 #include "window.hpp"
 
@@ -54,7 +54,7 @@ public:
         : title_(options.text("title")), scale_(options.real("scale")), vsync_(options.boolean("vsync")),
           status_line_(options.boolean("status_line")), shows_overlay_(options.text("content") == "overlay"),
           debug_view_(options),
-          controls_(host, [this](const std::string &text, bool is_error) { show(text, is_error); }) {}
+          commands_(host, [this](const std::string &text, bool is_error) { show(text, is_error); }) {}
 
     std::uint32_t capabilities() const {
         return ARHOST_CAPABILITY_REALTIME_SINK |
@@ -85,7 +85,7 @@ public:
 
     arhost_status idle() {
         const arhost_status status = poll();
-        if (window_->stale() || stale_ || controls_.take_changed() || (message_ && Clock::now() > message_->end))
+        if (window_->stale() || stale_ || commands_.take_changed() || (message_ && Clock::now() > message_->end))
             draw();
         return status;
     }
@@ -131,11 +131,11 @@ private:
             help_ = !help_;
             break;
         case 's':
-            return controls_.snapshot();
+            return commands_.snapshot();
         case ' ':
-            return controls_.freeze();
+            return commands_.freeze();
         case 'r':
-            return controls_.record();
+            return commands_.record();
         case 'd':
             debug_view_.is_on = !debug_view_.is_on;
             break;
@@ -148,14 +148,14 @@ private:
             return window_->close();
         default:
             if (key >= '1' && key <= '9')
-                controls_.load_scene(static_cast<std::size_t>(key - '1'));
+                commands_.load_scene(static_cast<std::size_t>(key - '1'));
         }
     }
 
     arhost_status poll() {
         window_->process_events();
         if (record_) // before the first frame, the host accepts no commands
-            controls_.poll(Clock::now());
+            commands_.poll(Clock::now());
         return window_->closed() ? ARHOST_STATUS_END : ARHOST_STATUS_OK;
     }
 
@@ -174,11 +174,11 @@ private:
     void draw_overlay(const Overlay &overlay) {
         double top = 0;
         if (debug_view_.is_on && record_)
-            top = debug_view_.draw(overlay, *record_, controls_.numbers() ? controls_.numbers()->timings : Timings());
+            top = debug_view_.draw(overlay, *record_, commands_.numbers() ? commands_.numbers()->timings : Timings());
         std::vector<Row> states;
-        if (controls_.recording())
+        if (commands_.recording())
             states.push_back({"", "REC", red});
-        if (controls_.frozen())
+        if (commands_.frozen())
             states.push_back({"", "FROZEN", blue});
         if (!states.empty())
             overlay.box(states, 1, 0, top);
@@ -192,7 +192,7 @@ private:
     }
 
     std::string status() const {
-        const auto &numbers = controls_.numbers();
+        const auto &numbers = commands_.numbers();
         std::string text = fmt::format("{:.1f} fps", numbers ? numbers->fps : rate_.per_second());
         if (numbers && !numbers->latency.empty())
             text += "   " + numbers->latency;
@@ -211,17 +211,17 @@ private:
     std::vector<Row> help() const {
         std::vector<Row> rows = {{"h", "close this help"},
                                  {"s", "snapshot"},
-                                 {"space", controls_.frozen() ? "continue" : "freeze"},
-                                 {"r", controls_.recording() ? "end the recording" : "record"},
+                                 {"space", commands_.frozen() ? "continue" : "freeze"},
+                                 {"r", commands_.recording() ? "end the recording" : "record"},
                                  {"d", "debug view"},
                                  {"f", "full screen"},
                                  {"m", "mirror"}};
-        const std::vector<std::string> &scenes = controls_.scenes();
+        const std::vector<std::string> &scenes = commands_.scenes();
         if (scenes.empty())
             rows.push_back({"1-9", "scenes"});
         for (std::size_t i = 0; i < std::min<std::size_t>(scenes.size(), 9); ++i)
             rows.push_back(
-                {std::to_string(i + 1), "scene " + scenes[i], scenes[i] == controls_.scene() ? green : white});
+                {std::to_string(i + 1), "scene " + scenes[i], scenes[i] == commands_.scene() ? green : white});
         rows.push_back({"q", "quit"});
         return rows;
     }
@@ -231,9 +231,9 @@ private:
     bool vsync_, status_line_, shows_overlay_;
     int width_ = 0, height_ = 0; // frame size in px
     DebugView debug_view_;
-    Controls controls_;
+    HostCommands commands_;
     std::optional<Window> window_;
-    std::optional<Picture> picture_;
+    std::optional<FrameTexture> picture_;
     std::optional<arhost_record> record_; // of the frame in the window
     std::vector<arhost_target> targets_;  // of the record
     std::vector<arhost_observation> observations_;

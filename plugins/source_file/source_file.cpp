@@ -3,7 +3,7 @@
 // source_file: reads frames from videos, numbered images and single images.
 #include "folder.hpp"
 #include "image_sequence.hpp"
-#include "video.hpp"
+#include "video_decoder.hpp"
 
 #include <algorithm>
 #include <chrono>

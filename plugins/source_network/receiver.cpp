@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "receiver.hpp"
 
-#include "url.hpp"
+#include "stream_url.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -71,7 +71,7 @@ void Receiver::run(const std::stop_token &stop) {
 
 // Receives one connection until the end of a recording. Throws Failure if it is lost.
 void Receiver::receive(const std::stop_token &stop) {
-    Stream stream(settings_.stream, log_, stop);
+    NetworkStream stream(settings_.stream, log_, stop);
     const Clock::time_point begin = Clock::now();
     clock_.restart();
     epoch_ns_.reset();
@@ -93,7 +93,7 @@ bool Receiver::wait(const std::stop_token &stop, Clock::time_point until) {
     return !stop.stop_requested();
 }
 
-bool Receiver::wait_until_due(const Stream &stream, const std::stop_token &stop) {
+bool Receiver::wait_until_due(const NetworkStream &stream, const std::stop_token &stop) {
     constexpr std::int64_t latest_ns = 500'000'000, earliest_ns = 10'000'000'000;
     const auto sender_ns = stream.sender_ns();
     if (!sender_ns)
@@ -106,7 +106,7 @@ bool Receiver::wait_until_due(const Stream &stream, const std::stop_token &stop)
     return wait(stop, Clock::time_point(std::chrono::nanoseconds(*epoch_ns_ + *sender_ns)));
 }
 
-std::int64_t Receiver::capture_ns(const Stream &stream) {
+std::int64_t Receiver::capture_ns(const NetworkStream &stream) {
     // The arrival of pictures that wait until they are due says nothing about their capture.
     const std::int64_t now_ns = monotonic_ns(), arrival_ns = stream.is_ahead_of_time() ? now_ns : stream.arrival_ns();
     const auto utc_ns = stream.sender_utc_ns();
@@ -126,7 +126,7 @@ std::int64_t Receiver::capture_ns(const Stream &stream) {
     return clock_.capture_ns(stream.sender_ns(), arrival_ns);
 }
 
-void Receiver::publish(const Stream &stream) {
+void Receiver::publish(const NetworkStream &stream) {
     Received received{libav::allocated<libav::FramePointer>(av_frame_clone(&stream.picture())), capture_ns(stream),
                       0};
     const std::lock_guard lock(mutex_);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "capture_clock.hpp"
-#include "stream.hpp"
+#include "network_stream.hpp"
+#include "sender_clock.hpp"
 
 #include <condition_variable>
 #include <deque>
@@ -49,9 +49,9 @@ private:
     void run(const std::stop_token &stop);
     void receive(const std::stop_token &stop);
     bool wait(const std::stop_token &stop, std::chrono::steady_clock::time_point until); // false: stop was requested
-    bool wait_until_due(const Stream &stream, const std::stop_token &stop);
-    std::int64_t capture_ns(const Stream &stream);
-    void publish(const Stream &stream);
+    bool wait_until_due(const NetworkStream &stream, const std::stop_token &stop);
+    std::int64_t capture_ns(const NetworkStream &stream);
+    void publish(const NetworkStream &stream);
     void finish(std::exception_ptr error);
 
     static constexpr std::chrono::milliseconds first_delay{250}, longest_delay{5000}; // between attempts to connect
@@ -60,7 +60,7 @@ private:
     ReceiverSettings settings_;
     LibavLog log_;
     // Used only by the thread:
-    CaptureClock clock_;
+    SenderClock clock_;
     bool has_received_ = false, is_lost_ = false, clock_reported_ = false;
     std::chrono::milliseconds delay_ = first_delay; // before the next attempt
     std::optional<std::int64_t> epoch_ns_; // CLOCK_MONOTONIC at time stamp 0, for streams that are ahead of time

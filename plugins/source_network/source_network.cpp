@@ -2,9 +2,9 @@
 //
 // source_network: plays network cameras (RTSP, Motion-JPEG over HTTP) and HLS.
 #include "receiver.hpp"
-#include "url.hpp"
+#include "stream_url.hpp"
 
-#include "libav_common/picture.hpp"
+#include "libav_common/picture_converter.hpp"
 
 #include <iterator>
 #include <optional>

@@ -3,8 +3,8 @@
 // source_uvc: captures frames from USB cameras (UVC 1.0 to 1.5) through libusb, without the kernel's camera driver.
 #include "cameras.hpp"
 #include "controls.hpp"
+#include "frame_stream.hpp"
 #include "negotiation.hpp"
-#include "stream.hpp"
 #include "usb.hpp"
 
 #include "camera_common/camera_source.hpp"

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cameras.hpp"
 
+#include "capture_device.hpp"
 #include "controls.hpp"
-#include "device.hpp"
 #include "pixels.hpp"
 
 #include <algorithm>

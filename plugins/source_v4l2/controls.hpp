@@ -4,7 +4,7 @@
 // user.
 #pragma once
 
-#include "device.hpp"
+#include "capture_device.hpp"
 
 #include "camera_common/control_values.hpp"
 

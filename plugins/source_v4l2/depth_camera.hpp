@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "capture_clock.hpp"
-#include "device.hpp"
+#include "capture_device.hpp"
+#include "driver_clock.hpp"
 
 #include "camera_common/frame_size.hpp"
 #include "camera_common/silence.hpp"
@@ -39,7 +39,7 @@ private:
 
     Host host_;
     CaptureDevice device_;
-    CaptureClock clock_;
+    DriverClock clock_;
     double unit_mm_;
     std::uint32_t stride_ = 0;     // bytes per row of the camera
     std::int64_t interval_ns_ = 0; // from frame to frame

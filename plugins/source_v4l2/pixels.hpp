@@ -4,7 +4,7 @@
 // kernel's documentation, "Image Formats" of the V4L2 API.
 #pragma once
 
-#include "device.hpp"
+#include "capture_device.hpp"
 
 #include <arhost/frame.h>
 

@@ -2,10 +2,10 @@
 //
 // source_v4l2: captures frames from Video4Linux devices (USB and built-in cameras, capture cards).
 #include "cameras.hpp"
-#include "capture_clock.hpp"
+#include "capture_device.hpp"
 #include "controls.hpp"
 #include "depth_camera.hpp"
-#include "device.hpp"
+#include "driver_clock.hpp"
 #include "pixels.hpp"
 
 #include "camera_common/camera_source.hpp"
@@ -253,7 +253,7 @@ private:
 
     // Whether the camera cannot have captured another picture since this one.
     bool is_fresh(const Capture &captured) const {
-        const auto age_ns = arhost::CaptureClock::age_ns(captured);
+        const auto age_ns = arhost::DriverClock::age_ns(captured);
         return age_ns && *age_ns < frame_ns_ / 2;
     }
 
@@ -289,7 +289,7 @@ private:
     std::optional<CaptureDevice> device_;
     std::optional<CaptureStream> stream_; // declared after device_, because it must be destroyed first
     std::optional<arhost::DepthCamera> depth_;
-    arhost::CaptureClock clock_;
+    arhost::DriverClock clock_;
     std::int64_t frame_ns_ = 0; // time from frame to frame; 0: unknown
     PictureFormat camera_;
     std::optional<std::uint32_t> last_sequence_;

@@ -33,7 +33,7 @@ struct Object {
     uint material, role, mask, flags;
     uint root; // the root node of its mesh's BVH; without software BVHs, the mesh's first primitive
     uint first_index, first_normal, first_texcoord; // NONE if absent
-    vec3 extent;                                    // result of object_extent() (raytracer_common/arena.hpp)
+    vec3 extent;                                    // result of object_extent() (raytracer_common/scene_geometry.hpp)
 };
 
 struct Material {

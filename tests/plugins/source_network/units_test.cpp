@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "capture_clock.hpp"
-#include "url.hpp"
+#include "sender_clock.hpp"
+#include "stream_url.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -10,8 +10,8 @@
 
 namespace {
 
-using arhost::CaptureClock;
 using arhost::check_url;
+using arhost::SenderClock;
 using arhost::without_credentials;
 
 constexpr std::int64_t ms = 1'000'000, second = 1000 * ms, frame = 40 * ms;
@@ -28,8 +28,8 @@ std::string rejection_of(const std::string &url) {
 
 } // namespace
 
-TEST(CaptureClock, RemovesTheJitterOfTheNetwork) {
-    CaptureClock clock;
+TEST(SenderClock, RemovesTheJitterOfTheNetwork) {
+    SenderClock clock;
     std::mt19937 random(1);
     std::int64_t worst_ns = 0;
     for (std::int64_t n = 0; n < 500; ++n) {
@@ -41,9 +41,9 @@ TEST(CaptureClock, RemovesTheJitterOfTheNetwork) {
     EXPECT_LT(worst_ns, 2 * ms) << "the delays vary by 20 ms";
 }
 
-TEST(CaptureClock, FollowsClocksThatAreFastOrSlow) {
+TEST(SenderClock, FollowsClocksThatAreFastOrSlow) {
     for (const double drift : {-200e-6, 200e-6}) {
-        CaptureClock clock;
+        SenderClock clock;
         for (std::int64_t n = 0; n < 25 * 3600; ++n) {
             const std::int64_t arrival_ns = n * frame + 10 * ms;
             const auto stamp_ns = static_cast<std::int64_t>(static_cast<double>(n * frame) * (1 + drift));
@@ -53,8 +53,8 @@ TEST(CaptureClock, FollowsClocksThatAreFastOrSlow) {
     }
 }
 
-TEST(CaptureClock, NeverDecreasesNorIsInTheFutureWhateverTheSenderSends) {
-    CaptureClock clock;
+TEST(SenderClock, NeverDecreasesNorIsInTheFutureWhateverTheSenderSends) {
+    SenderClock clock;
     std::mt19937_64 random(2);
     std::int64_t last_ns = 0, arrival_ns = second;
     for (int n = 0; n < 10'000; ++n) {
@@ -71,15 +71,15 @@ TEST(CaptureClock, NeverDecreasesNorIsInTheFutureWhateverTheSenderSends) {
     }
 }
 
-TEST(CaptureClock, RecoversFromTimeStampsThatJumpBack) {
-    CaptureClock clock;
+TEST(SenderClock, RecoversFromTimeStampsThatJumpBack) {
+    SenderClock clock;
     clock.capture_ns(100 * second, second);
     EXPECT_EQ(clock.capture_ns(0, second + frame), second + frame);
     EXPECT_EQ(clock.capture_ns(frame, second + 2 * frame + 5 * ms), second + 2 * frame + frame / 2000 + 2500);
 }
 
-TEST(CaptureClock, UsesTheArrivalIfThereAreNoTimeStamps) {
-    CaptureClock clock;
+TEST(SenderClock, UsesTheArrivalIfThereAreNoTimeStamps) {
+    SenderClock clock;
     EXPECT_EQ(clock.capture_ns(std::nullopt, 5), 5);
     EXPECT_EQ(clock.capture_ns(std::nullopt, 9), 9);
 }

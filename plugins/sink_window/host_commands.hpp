@@ -16,7 +16,7 @@
 
 namespace sink_window {
 
-class Controls {
+class HostCommands {
 public:
     using Clock = std::chrono::steady_clock;
     // Receives a message to the user.
@@ -32,7 +32,7 @@ public:
         int targets = 0, restarts = 0;
     };
 
-    Controls(const arhost::Host &host, Show show) : control_(host), show_(std::move(show)) {}
+    HostCommands(const arhost::Host &host, Show show) : control_(host), show_(std::move(show)) {}
 
     void freeze();
     void snapshot();

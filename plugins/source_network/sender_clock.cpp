@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "capture_clock.hpp"
+#include "sender_clock.hpp"
 
 #include <algorithm>
 
 namespace arhost {
 
-std::int64_t CaptureClock::capture_ns(std::optional<std::int64_t> sender_ns, std::int64_t arrival_ns) {
+std::int64_t SenderClock::capture_ns(std::optional<std::int64_t> sender_ns, std::int64_t arrival_ns) {
     std::int64_t capture_ns = arrival_ns;
     if (sender_ns) {
         const std::int64_t candidate_ns = arrival_ns - *sender_ns;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "stream.hpp"
+#include "frame_stream.hpp"
 
 #include <algorithm>
 #include <ctime>

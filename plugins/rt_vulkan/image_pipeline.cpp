@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pipeline.hpp"
+#include "image_pipeline.hpp"
 
 #include "pipeline_cache.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "view.hpp"
+#include "camera_data.hpp"
 
 #include "raytracer_common/view.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "libav_common/picture.hpp"
+#include "libav_common/picture_converter.hpp"
 
 #include <algorithm>
 #include <array>

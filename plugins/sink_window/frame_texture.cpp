@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "picture.hpp"
+#include "frame_texture.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -9,7 +9,7 @@
 
 namespace sink_window {
 
-Picture::Picture(int width, int height, bool shows_overlay)
+FrameTexture::FrameTexture(int width, int height, bool shows_overlay)
     : width_(width), height_(height), shows_overlay_(shows_overlay) {
     GLint largest = 0;
     glGetIntegerv(GL_MAX_TEXTURE_SIZE, &largest);
@@ -32,7 +32,7 @@ Picture::Picture(int width, int height, bool shows_overlay)
     glDisable(GL_DITHER);
 }
 
-void Picture::upload(const arhost_output &output) {
+void FrameTexture::upload(const arhost_output &output) {
     if (shows_overlay_) {
         glPixelStorei(GL_UNPACK_ROW_LENGTH, static_cast<GLint>(output.overlay_stride / 4));
         glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_RGBA, GL_UNSIGNED_BYTE, output.overlay_rgba);
@@ -49,7 +49,7 @@ void Picture::upload(const arhost_output &output) {
     glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, width_, height_, GL_BGR, GL_UNSIGNED_BYTE, pixels);
 }
 
-void Picture::draw(const View &view, const Rectangle &window) const {
+void FrameTexture::draw(const View &view, const Rectangle &window) const {
     const Rectangle &r = view.area;
     glViewport(r.x, window.height - r.y - r.height, r.width, r.height); // OpenGL has its origin at the bottom
     glEnable(GL_TEXTURE_2D);

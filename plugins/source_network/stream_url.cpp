@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "url.hpp"
+#include "stream_url.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 #include <arhost-cpp/url.hpp>

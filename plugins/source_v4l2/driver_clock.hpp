@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "device.hpp"
+#include "capture_device.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -11,9 +11,9 @@
 namespace arhost {
 
 // Converts a driver's time stamps to CLOCK_MONOTONIC.
-class CaptureClock {
+class DriverClock {
 public:
-    explicit CaptureClock(const Host &host) : host_(host) {}
+    explicit DriverClock(const Host &host) : host_(host) {}
 
     // Returns the capture time in ns of CLOCK_MONOTONIC, at most the current time. Reports once if the driver uses
     // another clock.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "stream.hpp"
+#include "network_stream.hpp"
 
-#include "url.hpp"
+#include "stream_url.hpp"
 
 #include <algorithm>
 #include <string_view>
@@ -50,7 +50,7 @@ std::int64_t monotonic_ns() {
     return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch()).count();
 }
 
-Stream::Stream(const StreamSettings &settings, LibavLog &log, std::stop_token stop)
+NetworkStream::NetworkStream(const StreamSettings &settings, LibavLog &log, std::stop_token stop)
     : name_("the stream '" + without_credentials(settings.url) + "'"), timeout_(settings.timeout),
       verifies_tls_(settings.verifies_tls), log_(log), stop_(std::move(stop)), deadline_(Clock::now() + timeout_),
       packet_(libav::allocated<libav::PacketPointer>(av_packet_alloc())),
@@ -60,12 +60,12 @@ Stream::Stream(const StreamSettings &settings, LibavLog &log, std::stop_token st
     open_decoder();
 }
 
-void Stream::open(const StreamSettings &settings) {
+void NetworkStream::open(const StreamSettings &settings) {
     AVFormatContext *context = avformat_alloc_context();
     if (!context)
         throw std::bad_alloc();
     context->interrupt_callback = {[](void *opaque) -> int {
-                                       const auto &self = *static_cast<Stream *>(opaque);
+                                       const auto &self = *static_cast<NetworkStream *>(opaque);
                                        return self.stop_.stop_requested() || Clock::now() > self.deadline_;
                                    },
                                    this};
@@ -74,7 +74,7 @@ void Stream::open(const StreamSettings &settings) {
     open_io_ = context->io_open;
     context->io_open = [](AVFormatContext *opener, AVIOContext **io, const char *url, int flags,
                           AVDictionary **options) {
-        const auto &self = *static_cast<Stream *>(opener->opaque);
+        const auto &self = *static_cast<NetworkStream *>(opener->opaque);
         av_dict_set(options, "tls_verify", self.verifies_tls_ ? "1" : "0", 0);
         return self.open_io_(opener, io, url, flags, options);
     };
@@ -118,7 +118,7 @@ void Stream::open(const StreamSettings &settings) {
     ends_ = is_hls ? context->duration > 0 : is_file;
 }
 
-void Stream::open_decoder() {
+void NetworkStream::open_decoder() {
     const AVCodec *decoder = avcodec_find_decoder(track_->codecpar->codec_id);
     if (!decoder)
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
@@ -137,7 +137,7 @@ void Stream::open_decoder() {
         throw failure(ready);
 }
 
-bool Stream::next() {
+bool NetworkStream::next() {
     deadline_ = Clock::now() + timeout_;
     damaged_ = 0;
     for (;;) {
@@ -158,7 +158,7 @@ bool Stream::next() {
     }
 }
 
-bool Stream::feed() {
+bool NetworkStream::feed() {
     if (stop_.stop_requested() || Clock::now() > deadline_)
         throw failure(AVERROR_EXIT);
     av_packet_unref(packet_.get());
@@ -181,18 +181,18 @@ bool Stream::feed() {
     return true;
 }
 
-std::optional<std::int64_t> Stream::sender_ns() const {
+std::optional<std::int64_t> NetworkStream::sender_ns() const {
     if (!timed_ || picture_->best_effort_timestamp == AV_NOPTS_VALUE)
         return std::nullopt;
     return av_rescale_q(picture_->best_effort_timestamp, track_->time_base, nanoseconds);
 }
 
-std::optional<std::int64_t> Stream::sender_utc_ns() const {
+std::optional<std::int64_t> NetworkStream::sender_utc_ns() const {
     const auto time_ns = sender_ns();
     return time_ns && utc_offset_ns_ ? std::optional(*time_ns + *utc_offset_ns_) : std::nullopt;
 }
 
-double Stream::fps() const {
+double NetworkStream::fps() const {
     const AVRational rate = av_guess_frame_rate(input_.get(), track_, nullptr);
     if (rate.num > 0 && rate.den > 0)
         return av_q2d(rate);
@@ -200,7 +200,7 @@ double Stream::fps() const {
 }
 
 // Describes why the connection ended.
-Failure Stream::failure(int code) {
+Failure NetworkStream::failure(int code) {
     if (stop_.stop_requested())
         return {ARHOST_STATUS_ERROR_CANCELLED, "receiving " + name_ + " was cancelled"};
     const std::string limit = std::to_string(timeout_.count()) + " ms (timeout_ms)", reason = log_.take_reason();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "raytracer_common/arena.hpp"
+#include "raytracer_common/scene_geometry.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,20 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "frames.hpp"
+#include "newest_frame.hpp"
 
 #include <turbojpeg.h>
 
 namespace arhost::web {
 
-void Frames::Free::operator()(void *compressor) const {
+void NewestFrame::Free::operator()(void *compressor) const {
     tjDestroy(compressor);
 }
 
-Frames::Frames(int quality) : quality_(quality), compressor_(tjInitCompress()) {
+NewestFrame::NewestFrame(int quality) : quality_(quality), compressor_(tjInitCompress()) {
     if (!compressor_)
         throw std::bad_alloc();
 }
 
-void Frames::put(const arhost_output &output) {
+void NewestFrame::put(const arhost_output &output) {
     const std::size_t row = std::size_t{3} * output.width;
     written_.number = number_.load() + 1;
     written_.received = std::chrono::steady_clock::now().time_since_epoch();
@@ -28,7 +28,7 @@ void Frames::put(const arhost_output &output) {
     number_ = newest_.number;
 }
 
-std::shared_ptr<const Jpeg> Frames::newest() {
+std::shared_ptr<const Jpeg> NewestFrame::newest() {
     {
         const std::lock_guard lock(mutex_);
         if (newest_.number <= encoding_.number)

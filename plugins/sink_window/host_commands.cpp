@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "controls.hpp"
+#include "host_commands.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -17,7 +17,7 @@ std::string percentiles_of(const Json &timing) {
 
 } // namespace
 
-void Controls::send(const Json &command, Take take) {
+void HostCommands::send(const Json &command, Take take) {
     if (!control_)
         return show_("this version of arhost takes no commands from outputs", true);
     const arhost_status status =
@@ -37,23 +37,23 @@ void Controls::send(const Json &command, Take take) {
         show_("arhost has not answered the previous commands yet; retry later", true);
 }
 
-void Controls::freeze() {
+void HostCommands::freeze() {
     send({{"command", "freeze"}}, [this](const Json &answer) { frozen_ = answer.at("frozen").get<bool>(); });
 }
 
-void Controls::snapshot() {
+void HostCommands::snapshot() {
     send({{"command", "snapshot"}},
          [this](const Json &answer) { show_("snapshot: " + answer.value("file", "written"), false); });
 }
 
-void Controls::record() {
+void HostCommands::record() {
     send({{"command", "record"}, {"on", !recording_}}, [this, on = !recording_](const Json &answer) {
         recording_ = on;
         show_((on ? "recording: " : "recorded: ") + answer.value("file", ""), false);
     });
 }
 
-void Controls::load_scene(std::size_t index) {
+void HostCommands::load_scene(std::size_t index) {
     if (scenes_.empty())
         return show_("the names of the scenes are not known: add status to the output's key 'control'", true);
     if (index >= scenes_.size())
@@ -65,7 +65,7 @@ void Controls::load_scene(std::size_t index) {
     });
 }
 
-void Controls::poll(Clock::time_point now) {
+void HostCommands::poll(Clock::time_point now) {
     if (!control_ || !status_granted_ || status_pending_ || now < next_poll_)
         return;
     next_poll_ = now + std::chrono::milliseconds(500);
@@ -83,7 +83,7 @@ void Controls::poll(Clock::time_point now) {
     }) == ARHOST_STATUS_OK;
 }
 
-void Controls::take_status(const Json &status) {
+void HostCommands::take_status(const Json &status) {
     frozen_ = status.at("frozen").get<bool>();
     recording_ = !status.at("recording").is_null();
     scenes_ = status.at("scenes").get<std::vector<std::string>>();

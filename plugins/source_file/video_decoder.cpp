@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "video.hpp"
+#include "video_decoder.hpp"
 
 #include "folder.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "capture_clock.hpp"
+#include "driver_clock.hpp"
 
 #include <algorithm>
 #include <cstdlib>
@@ -25,14 +25,14 @@ std::int64_t stamp_ns_of(const Capture &captured) {
 
 } // namespace
 
-std::optional<std::int64_t> CaptureClock::age_ns(const Capture &captured) {
+std::optional<std::int64_t> DriverClock::age_ns(const Capture &captured) {
     const std::int64_t age_ns = clock_ns(CLOCK_MONOTONIC) - stamp_ns_of(captured);
     if ((captured.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC || !is_recent(age_ns))
         return {};
     return std::max<std::int64_t>(age_ns, 0);
 }
 
-std::int64_t CaptureClock::monotonic_ns(const Capture &captured) {
+std::int64_t DriverClock::monotonic_ns(const Capture &captured) {
     const std::int64_t now_ns = clock_ns(CLOCK_MONOTONIC);
     if (const auto age = age_ns(captured))
         return now_ns - *age;

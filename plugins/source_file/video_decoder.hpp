@@ -2,7 +2,7 @@
 #pragma once
 
 #include "libav_common/log.hpp"
-#include "libav_common/picture.hpp"
+#include "libav_common/picture_converter.hpp"
 #include "reader.hpp"
 
 #include <filesystem>

@@ -15,9 +15,9 @@ struct Jpeg {
 };
 
 // The newest frame. It is encoded only if somebody asks for it, and only once.
-class Frames {
+class NewestFrame {
 public:
-    explicit Frames(int quality);
+    explicit NewestFrame(int quality);
 
     // Called by the plugin's thread, which never waits for the encoder.
     void put(const arhost_output &output);

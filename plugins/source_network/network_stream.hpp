@@ -24,12 +24,12 @@ struct StreamSettings {
 std::int64_t monotonic_ns();
 
 // One connection to a network camera. Decodes the first video track.
-class Stream {
+class NetworkStream {
 public:
     // Connects. Throws Failure, as next does, also if `stop` is requested.
-    Stream(const StreamSettings &settings, LibavLog &log, std::stop_token stop);
-    Stream(const Stream &) = delete; // libav stores its address
-    Stream &operator=(const Stream &) = delete;
+    NetworkStream(const StreamSettings &settings, LibavLog &log, std::stop_token stop);
+    NetworkStream(const NetworkStream &) = delete; // libav stores its address
+    NetworkStream &operator=(const NetworkStream &) = delete;
 
     // Decodes the next intact picture. Returns false at the end of a recording; throws Failure if the connection is
     // lost or no intact picture arrives within the timeout.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "device.hpp"
+#include "capture_device.hpp"
 
 #include "camera_common/fourcc.hpp"
 

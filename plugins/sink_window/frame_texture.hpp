@@ -26,11 +26,11 @@ struct View {
     }
 };
 
-class Picture {
+class FrameTexture {
 public:
     // Creates a black picture in the current OpenGL context, with which the texture is deleted. `shows_overlay`: the
     // overlay alone, over black, instead of the frame. Throws arhost::Failure if OpenGL does not support the size.
-    Picture(int width, int height, bool shows_overlay);
+    FrameTexture(int width, int height, bool shows_overlay);
 
     void upload(const arhost_output &output);
     void draw(const View &view, const Rectangle &window) const;

@@ -13,13 +13,13 @@
 
 namespace arhost::pipe {
 
-class Stream {
+class PipeStream {
 public:
     // `path`: of an existing FIFO, or "-" for standard output.
-    Stream(const Host &host, std::string path) : host_(host), path_(std::move(path)) {}
-    ~Stream() { close(); }
-    Stream(const Stream &) = delete;
-    Stream &operator=(const Stream &) = delete;
+    PipeStream(const Host &host, std::string path) : host_(host), path_(std::move(path)) {}
+    ~PipeStream() { close(); }
+    PipeStream(const PipeStream &) = delete;
+    PipeStream &operator=(const PipeStream &) = delete;
 
     bool is_standard_output() const { return path_ == "-"; }
     std::string name() const { return is_standard_output() ? "standard output" : "'" + path_ + "'"; }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "stream.hpp"
+#include "pipe_stream.hpp"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -24,7 +24,7 @@ Failure io_failure(const std::string &what) {
 
 } // namespace
 
-void Stream::check() const {
+void PipeStream::check() const {
     if (is_standard_output())
         return;
     const std::string start = "path: '" + path_ + "' ";
@@ -41,7 +41,7 @@ void Stream::check() const {
                       start + "cannot be written: " + std::strerror(errno) + "; change its permissions");
 }
 
-void Stream::open(bool after_another) {
+void PipeStream::open(bool after_another) {
     if (is_standard_output())
         return open_standard_output();
     if (after_another)
@@ -63,7 +63,7 @@ void Stream::open(bool after_another) {
     }
 }
 
-void Stream::open_standard_output() {
+void PipeStream::open_standard_output() {
     if (::isatty(STDOUT_FILENO))
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "path: standard output is a terminal; connect it to a program, as in 'arhost … | ffplay -'");
@@ -71,7 +71,7 @@ void Stream::open_standard_output() {
 }
 
 // The reader sees the end of a stream when it reads while the FIFO is empty and no program has it open for writing.
-void Stream::wait_for_end_of_earlier_stream() {
+void PipeStream::wait_for_end_of_earlier_stream() {
     constexpr auto time_to_read = std::chrono::seconds(1);
     const int fd = ::open(path_.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC); // for reading, so it delays no end
     if (fd < 0)
@@ -87,7 +87,7 @@ void Stream::wait_for_end_of_earlier_stream() {
             empty_since = now();
 }
 
-bool Stream::write(std::span<const std::uint8_t> bytes) {
+bool PipeStream::write(std::span<const std::uint8_t> bytes) {
     // Standard output may be shared with other programs, so it must not become non-blocking. If poll(2) reports room
     // in a pipe, then a write of PIPE_BUF bytes does not block.
     const std::size_t most = is_standard_output() ? PIPE_BUF : SIZE_MAX;
@@ -118,13 +118,13 @@ bool Stream::write(std::span<const std::uint8_t> bytes) {
     return true;
 }
 
-void Stream::close() {
+void PipeStream::close() {
     if (is_open() && !is_standard_output())
         ::close(fd_);
     fd_ = -1;
 }
 
-void Stream::wait(const char *what) const {
+void PipeStream::wait(const char *what) const {
     host_.progress(-1, what);
     if (!host_.wait_until(std::chrono::steady_clock::now() + poll_interval))
         throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "stopped waiting for the reader of " + name());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "encoder.hpp"
+#include "video_encoder.hpp"
 
 #include <algorithm>
 #include <cmath>

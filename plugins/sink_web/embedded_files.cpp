@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "files.hpp"
+#include "embedded_files.hpp"
 
 asm(".section .rodata\n"
     "web_page: .incbin \"" PAGE_HTML "\"\n"

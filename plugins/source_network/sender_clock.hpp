@@ -12,7 +12,7 @@ namespace arhost {
 // apart, so the offset is the minimum of arrival − time stamp. It may rise by 500 ppm, more than the drift of quartz
 // clocks, so that it also follows a sender whose clock is slow. The shortest delay itself is unknown, and remains in
 // the result: the capture time of the fastest picture is its arrival.
-class CaptureClock {
+class SenderClock {
 public:
     // `sender_ns`: the time stamp on any clock; nullopt: the sender has none, so the result is the arrival.
     std::int64_t capture_ns(std::optional<std::int64_t> sender_ns, std::int64_t arrival_ns);
