@@ -40,7 +40,7 @@ sandbox::Level enter_sandbox(const Test &test, const Subject &subject) {
     return sandbox::enter_for(subject.plugin, policy);
 }
 
-// Discards what a sink with the option `path: "-"` writes, which would hide other output.
+// Discards what a sink with the option `path: "-"` writes to standard output, where it would mix with the report.
 void discard_standard_output(const Settings &settings) {
     const auto path = settings.find("path");
     if (path == settings.end() || path->second != standard_output)

@@ -213,7 +213,8 @@ std::string family_of(std::span<const Test> tests, RunSettings settings,
     return plugin.capabilities & ARHOST_CAPABILITY_REPORTS_POSES ? "" : drawn_families.front(); // tests report why
 }
 
-// Returns the addresses of the options of type ARHOST_OPTION_LISTEN, as set or by default. Tests report invalid ones.
+// Returns the values of the options of type ARHOST_OPTION_LISTEN: as set, else their defaults. Skips invalid
+// addresses, which tests report.
 Settings addresses_of(const arhost::ipc::PluginDescription &plugin, const Settings &settings) {
     Settings addresses;
     for (const arhost::ipc::OptionDeclaration &option : plugin.options) {
@@ -311,7 +312,7 @@ Report run(RunSettings settings, const std::vector<std::string> &patterns, bool 
     return report;
 }
 
-// Too few descriptors would fail tests of correct plugins.
+// With too few file descriptors, correct plugins would fail tests.
 void expect_descriptors(unsigned jobs) {
     rlimit limit{};
     ::getrlimit(RLIMIT_NOFILE, &limit);

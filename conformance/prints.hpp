@@ -37,8 +37,8 @@ using PrintFiles = std::map<int, std::filesystem::path>; // by id
 // The families whose markers the suite can draw.
 inline constexpr std::array drawn_families = {"tag36h11", "DICT_6X6_250", "tag25h9"};
 
-// Four markers of one of these families, or the user's PNG files. At least one; ids are not in ascending order, and
-// each two of these families have some in common.
+// Returns four markers of one of these families, or the prints in the user's PNG files. Never empty. The ids are not
+// in ascending order, and some ids occur in several families.
 std::vector<Print> prints_of(const PrintFiles &files, std::string_view family = drawn_families.front());
 
 // A greyscale camera image.
@@ -66,8 +66,8 @@ using Pose = glm::dmat4;
 // Returns the pose of a marker that faces the camera upright, rotated by degrees about the camera's axes x, then y,
 // then z.
 Pose pose(const glm::dvec3 &centre, double about_x = 0, double about_y = 0, double about_z = 0);
-// Returns the pose of a marker whose edge in the image direction `towards` (degrees from the camera's x axis) is
-// tilted away by `tilt` degrees.
+// Returns the pose of a marker that is tilted by `tilt` degrees: the edge that lies in the image direction `towards`
+// (degrees from the camera's x axis) is farther from the camera.
 Pose tilted(const glm::dvec3 &centre, double tilt, double towards, double about_z = 0);
 
 struct Placed {

@@ -12,7 +12,7 @@
 
 namespace arhost::conformance {
 
-// The rows of a plane; those of the depth plane if `plane` is format.plane_count (none without depth).
+// The rows of a plane. The depth plane has the index format.plane_count; without depth, it has no rows.
 struct PlaneShape {
     std::uint32_t row_bytes, rows;
 };

@@ -61,7 +61,7 @@ struct ReportImage {
     unsigned width = 0, height = 0;
 };
 
-// Set by abi.load.
+// Facts about the plugin, which the test abi.load sets.
 struct Facts {
     ipc::PluginDescription descriptor;
     std::string sandbox; // active and missing layers, from sandbox::to_text

@@ -810,7 +810,7 @@ private:
 
     // Applies skins and morph targets that are not animated to the vertices, in the rest pose.
     void bake_static_deformations() {
-        ArenaBuilder at_rest; // a temporary scene, evaluated like an animation
+        ArenaBuilder at_rest; // temporary scene: the code that evaluates animations computes the rest pose
         at_rest.settings.duration_s = 1;
         for (const SceneNode &node : nodes_) {
             MotionNode world_node;

@@ -114,7 +114,7 @@ public:
         for_each(Table::objects, objects_.size(), [&](std::size_t i) { check_in_bounds(i, boxes); });
     }
 
-    // The element that was being checked.
+    // The element that was being checked when the exception was thrown.
     Table table() const { return table_; }
     std::size_t index() const { return index_; }
 

@@ -90,7 +90,8 @@ bool ControlGroup::exceeded_memory() const {
     std::string name;
     for (int count = 0; file >> name >> count;)
         events[name] = count;
-    // Kills by the machine's OOM killer count as oom_kill, too, but only the group's own limit counts as oom.
+    // The counter oom_kill includes kills because the machine ran out of memory. The counter oom does not: it counts
+    // how often the group reached its own limit.
     return events["oom"] > 0 && events["oom_kill"] > 0;
 }
 

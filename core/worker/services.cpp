@@ -263,7 +263,7 @@ private:
             }
     }
 
-    struct alignas(64) Block { // the stride and the alignment of planes are multiples of it
+    struct alignas(64) Block { // strides and alignments of planes are multiples of its size
         std::uint8_t bytes[64];
     };
 

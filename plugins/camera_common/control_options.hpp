@@ -150,7 +150,8 @@ void set_option_controls(const Host &host, const Controls &controls,
         show_warnings(host, set(key, text));
 }
 
-// Returns the keys and values of those of the options `keys` that `options` contains and that are not "".
+// Returns the key and the value of each option that `options` contains with a value other than "". `keys`: the
+// options to look for; ends with nullptr.
 inline std::vector<std::pair<std::string, std::string>> given_options(const Options &options,
                                                                       const char *const *keys) {
     std::vector<std::pair<std::string, std::string>> given;

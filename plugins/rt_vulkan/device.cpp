@@ -25,7 +25,8 @@ Memory allocated(const Device &device, VkDeviceSize size, std::span<const std::u
     return {device, memory};
 }
 
-// The first function that `path` needs and the driver lacks though it announces the extension, or nullptr.
+// Returns a function that `path` needs and the driver lacks, although the driver announces its extension; nullptr:
+// none.
 const char *missing_function(const VolkDeviceTable &functions, Path path, bool imports_host_memory) {
     const struct {
         const char *name;

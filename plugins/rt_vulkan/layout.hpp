@@ -107,7 +107,7 @@ static_assert(sizeof(Object) == 208 && sizeof(Material) == 176 && sizeof(Light) 
               sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Sums) == 48 &&
               sizeof(Frame) == 208 + 16 * max_samples);
 
-// The bindings of the descriptor set, in order: 0 is the frame.
+// The bindings of the descriptor set, from 0.
 enum Binding : std::uint32_t {
     frame_binding,
     objects_binding,

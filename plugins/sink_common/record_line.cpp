@@ -51,7 +51,7 @@ const char *name_of_overlay(arhost_overlay overlay) {
     }
 }
 
-// Appends an array that is all 0 if it is unknown.
+// Appends an array unless all its elements are 0, which means that it is unknown.
 void append_if_known(std::string &text, const char *key, std::span<const double> numbers) {
     if (std::ranges::all_of(numbers, [](double x) { return x == 0; }))
         return;

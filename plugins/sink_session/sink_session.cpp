@@ -61,7 +61,7 @@ public:
     }
 
     arhost_status write(const arhost_output &output) {
-        is_complete_ = false; // if this frame cannot be written
+        is_complete_ = false; // stays false if this frame cannot be written
         const arhost_record &record = *output.record;
         if (!video_->is_open())
             begin();
@@ -161,7 +161,7 @@ private:
                 return false;
             }
         });
-        if (last_ms_ >= 0) // otherwise the first frame begins the session
+        if (last_ms_ >= 0) // otherwise no frame was written, and write() creates the video
             video_->resume(end);
     }
 

@@ -103,7 +103,7 @@ private:
             if (std::ranges::count(offered, candidate.fourcc) == 0 ||
                 (format_option_ != "auto" && format_option_ != candidate.name))
                 continue;
-            // The matrix that programs assume if the device does not pass on the colour space.
+            // Programs that read the device may not see the colour space, and then assume this one from the height.
             constexpr std::uint32_t standard_definition = 576;
             const std::uint32_t colour_space = !candidate.is_yuv                ? V4L2_COLORSPACE_SRGB
                                                : height_ <= standard_definition ? V4L2_COLORSPACE_SMPTE170M

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Sends the commands of keys to the host, and keeps what the host answers (docs/control.md).
+// Sends to the host the commands that the user gives with keys, and stores the host's answers (docs/control.md).
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>

@@ -107,7 +107,7 @@ bool Receiver::wait_until_due(const NetworkStream &stream, const std::stop_token
 }
 
 std::int64_t Receiver::capture_ns(const NetworkStream &stream) {
-    // The arrival of pictures that wait until they are due says nothing about their capture.
+    // A picture that arrives ahead of time waits until it is due; then that time counts as its arrival.
     const std::int64_t now_ns = monotonic_ns(), arrival_ns = stream.is_ahead_of_time() ? now_ns : stream.arrival_ns();
     const auto utc_ns = stream.sender_utc_ns();
     if (!settings_.uses_sender_clock || !utc_ns)

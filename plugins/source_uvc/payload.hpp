@@ -21,7 +21,7 @@ struct PayloadHeader {
     std::optional<std::uint32_t>
         presentation_ticks; // PTS: when the frame was captured, in ticks of the camera's clock
     std::optional<std::uint32_t>
-        clock_ticks; // SCR: when the payload was sent. Its frame number of the bus is not used
+        clock_ticks; // SCR: when the payload was sent. The other half of the SCR, the bus frame number, is not used
 };
 
 // Returns std::nullopt if the payload has no valid header.

@@ -206,7 +206,7 @@ private:
         return permitted;
     }
 
-    // Returns the first of the permitted formats if none has this size.
+    // Chooses a permitted format; only formats with this size if there are any.
     const CaptureFormat &choose_format(const Size &size, double fps) const {
         std::vector<const CaptureFormat *> formats = permitted_formats();
         if (formats.empty())

@@ -164,7 +164,7 @@ float environment_density(float row_step, float column_step, float v) {
 // Returns the light that arrives along a secondary ray that hits no surface, from the environment or the background.
 // `inverse_density`: see Path.
 vec3 arriving_from_environment(vec3 direction, float inverse_density) {
-    inverse_density = max(inverse_density, 0.0); // samples of the environment do not follow mirrors
+    inverse_density = max(inverse_density, 0.0); // negative after a mirror, which shadow rays do not follow
     vec3 light = frame.background;
     float density = hemisphere_density();
     if (frame.environment_texture != NONE) {

@@ -160,9 +160,10 @@ layout(std430, set = 0, binding = 11) readonly buffer Rays {
 struct Sums {
     vec3 light;       // linear radiance of the virtual objects
     float coverage;   // number of samples that hit a virtual object
-    vec3 hidden;      // the parts of `irradiance` that opaque and that translucent objects hide, and 0; for coloured
-                      // shadows, the part hidden in each channel
-    float irradiance; // on the catcher, without shadows
+    // The parts of `irradiance` that virtual objects hide. With coloured shadows, one part for each colour channel;
+    // otherwise, the part that opaque objects hide, the part that translucent objects hide, and 0.
+    vec3 hidden;
+    float irradiance; // of the catcher, without shadows
     float caught;     // number of samples that hit a catcher
     float unused, unused_2, unused_3;
 };
