@@ -365,7 +365,7 @@ void check_report_files(const std::vector<std::string> &reports, const Subject &
     }
 }
 
-// Prints the last line. Blocks while nobody reads standard error; another signal ends the program.
+// Prints the last line. If this blocks because nobody reads standard error, a further signal ends the program.
 void print_last_line(const std::string &line, int signals) noexcept {
     try {
         base::write_all(STDERR_FILENO, line + "\n", signals);
@@ -461,7 +461,7 @@ int main(int argc, char **argv) {
         expect_utf8(option_texts);
         expect_descriptors(settings.jobs);
         check_report_files({json, junit, html}, settings.subject);
-        signals = base::watch_signals(); // not in a test's process: signals terminate it
+        signals = base::watch_signals(); // not in the process of a test, which signals shall terminate
         settings.signals = signals.get();
         if (is_script)
             settings.subject.plugin = adapter_of(settings);

@@ -159,7 +159,7 @@ private:
     arhost_instance *instance_ = nullptr;
 };
 
-// "OK", "INVALID_ARGUMENT", …; "0, which is not a valid status".
+// Returns the name of a status, such as "INVALID_ARGUMENT", or for example "0, which is not a valid status".
 std::string status_name(arhost_status status);
 
 // For example "read returned IO: the camera was unplugged".

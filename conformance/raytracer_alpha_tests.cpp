@@ -49,8 +49,8 @@ void inside_sphere(Context &context) {
 }
 
 void near_the_eye(Context &context) {
-    // Distance to the sphere's centre; its surface is at 0.75 × mm, at least 1.6e-4 × scene extent: beyond the near
-    // clip.
+    // `mm`: distance from the eye to the centre of the near sphere. Its surface is 0.75 × mm away, which is at least
+    // 1.6e-4 × scene extent, so the near clip must not remove it.
     for (const double mm : {1.0, 0.05}) {
         scene::ArenaBuilder builder = one_sphere({0, 0, 0, 30}, glowing(glm::vec3(0.1f)));
         builder.add_object("near", builder.add_spheres({{0, 0, 200 - mm, mm / 4}}),

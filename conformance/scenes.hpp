@@ -18,7 +18,8 @@ arhost_camera camera(const glm::dvec3 &eye, const glm::dvec3 &look_at, const glm
                      const arhost_intrinsics &intrinsics = pinhole());
 arhost_camera from_front(const arhost_intrinsics &intrinsics = pinhole());
 
-// Ambient only: has this colour (linear light) regardless of lamps, in a scene with ambient light 1.
+// A material that reflects only ambient light. In a scene with ambient light 1, it has this colour (linear light),
+// whatever the lamps.
 arhost_material glowing(const glm::vec3 &colour);
 arhost_material diffuse(const glm::vec3 &colour); // also as ambient colour
 arhost_material mirror(float reflectivity);

@@ -30,7 +30,7 @@ public:
         Size size{};
         std::uint32_t padding = 0;   // bytes per row in addition to the host's stride
         std::uint8_t in_padding = 0; // value of the bytes after a row's pixels
-        bool other = false;          // a different frame with the same number
+        bool other = false;          // a frame with other pixels than the usual one with this number
     };
     explicit SealedOutput(const Content &content);
 

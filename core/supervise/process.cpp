@@ -39,7 +39,7 @@ Process::Process(Context &context, WorkerBudget &budget, Callbacks callbacks, co
     host_memory_.seal_future_writes(); // the worker can map this page only read-only
     Reactor &reactor = context_.reactor;
     channel_watch_ = reactor.watch(spawned_.channel.fd(), [this] {
-        WorkerBudget &of_component = budget_; // outlives this process, which a message may end
+        WorkerBudget &of_component = budget_; // stays valid if a message destroys this object
         const auto begin = WorkerBudget::Clock::now();
         receive_messages(16);
         of_component.exclude(WorkerBudget::Clock::now() - begin);

@@ -56,7 +56,7 @@ private:
     LineCount other_lines_, warnings_, deaths_;
     std::map<std::pair<arhost_severity, std::string>, Clock::time_point>
         recent_lines_;                  // with the time when they were printed
-    std::uint64_t repetitions_[2] = {}; // [1]: of warnings and errors
+    std::uint64_t repetitions_[2] = {}; // repeated lines that were not printed; [1]: warnings and errors
     double left_ = max_cost;
 };
 

@@ -118,7 +118,7 @@ TargetSolver::Memory TargetSolver::memory_of(const void *state, std::size_t targ
                     sizeof memory);
     const bool has_pose = !memory.was_reported || is_rotation(pose::rigid_of(memory.mt));
     if (!has_pose || !(memory.log_chance >= certain_log_chance && memory.log_chance <= max_log_chance))
-        memory = {}; // this class has not written these bytes
+        memory = {}; // the state is not one that this class has written
     return memory;
 }
 

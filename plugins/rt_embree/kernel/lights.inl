@@ -287,7 +287,7 @@ ARHOST_INLINE void for_each_light(const Frame &frame, const Surface &s, const Ra
 
 // Returns the share of the light of a sample that a rough surface reflects to the eye, without the Fresnel term. A
 // ray that is reflected at random can also arrive at the light source; balance_weight() divides the light between
-// them. Such rays bring all light of the environment that glass lets through.
+// them. Light of the environment that passes through glass counts only for such rays, not for samples.
 ARHOST_INLINE Float rough_lobe(const Surface &s, Vec3 to_eye, Vec3 half_vector, const LightSample &sample,
                                const Visibility &visibility, bool rays_follow) {
     const Float cosine_eye = dot(s.normal, to_eye), cosine_half = dot(s.normal, half_vector);

@@ -230,8 +230,8 @@ void add_shadow(inout DirectLight sum, LightSample arriving, Visibility visible,
 }
 
 // Returns the share of the arriving light that a rough surface reflects to the eye, without the Fresnel term. A ray that
-// is reflected at random can also arrive at the light source; balance_weight() divides the light between them. Such rays
-// bring all light of the environment that glass lets through.
+// is reflected at random can also arrive at the light source; balance_weight() divides the light between them. Light of
+// the environment that passes through glass counts only for such rays, not for samples.
 float rough_lobe(Surface s, vec3 to_eye, vec3 half_vector, LightSample arriving, Visibility visible, bool rays_follow) {
     float cosine_eye = dot(s.normal, to_eye), cosine_half = dot(s.normal, half_vector);
     float lobe = ggx_lobe(arriving.cosine, cosine_eye, cosine_half, s.alpha);
