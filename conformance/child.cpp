@@ -82,7 +82,15 @@ void run_in_sandbox(const Test &test, Context &context) {
     }
 }
 
-Result run(const Test &test, const Subject &subject, Context &context) {
+} // namespace
+
+Result run_here(const Test &test, const Subject &subject, const CallPage &calls) {
+    PluginLibrary library(subject.plugin, subject.settings, calls, subject.scratch, subject.sockets);
+    Context context{library, subject.reference, std::mt19937_64(subject.seed)};
+    context.prints = subject.prints;
+    context.family = subject.family;
+    context.body = subject.body;
+    context.timeout_factor = subject.timeout_factor;
     Result result;
     result.test = test.name;
     try {
@@ -112,10 +120,9 @@ Result run(const Test &test, const Subject &subject, Context &context) {
         result.message =
             out_of_descriptors ? "it leaks descriptors until the limit of open files is reached" : error.what();
     }
+    result.facts = context.facts;
     return result;
 }
-
-} // namespace
 
 std::filesystem::path default_reference() {
     const std::filesystem::path folder = std::filesystem::read_symlink("/proc/self/exe").parent_path();
@@ -171,16 +178,9 @@ int run_child(const std::string &name, const Subject &subject) {
     for (const Test &test : tests) {
         if (name != test.name)
             continue;
-        PluginLibrary library(subject.plugin, subject.settings, calls, subject.scratch, subject.sockets);
         discard_standard_output(subject.settings);
-        Context context{library, subject.reference, std::mt19937_64(subject.seed)};
-        context.prints = subject.prints;
-        context.family = subject.family;
-        context.body = subject.body;
-        context.timeout_factor = subject.timeout_factor;
-        Result result = run(test, subject, context);
-        result.facts = context.facts;
-        const std::string line = to_json(result).dump(-1, ' ', false, ipc::Json::error_handler_t::replace) + "\n";
+        const std::string line =
+            to_json(run_here(test, subject, calls)).dump(-1, ' ', false, ipc::Json::error_handler_t::replace) + "\n";
         std::FILE *pipe = ::fdopen(result_fd, "w");
         std::fwrite(line.data(), 1, line.size(), pipe);
         std::fclose(pipe);

@@ -4,8 +4,7 @@
 
 #include "base/unique_fd.hpp"
 #include "conformance/plugin_library.hpp"
-#include "conformance/prints.hpp"
-#include "conformance/verdict.hpp"
+#include "conformance/test.hpp"
 #include "sandbox/sandbox.hpp"
 
 #include <cstdint>
@@ -53,6 +52,9 @@ struct Pipe {
 // Executes this program in a child process, with `descriptors` as 0, 1, 2, … The kernel kills the child when this
 // process ends. `new_group`: the child leads a new process group.
 pid_t start_process(std::vector<std::string> arguments, const std::vector<int> &descriptors, bool new_group = false);
+
+// Runs a test in this process, which permanently enters the sandbox of subject.policy.
+Result run_here(const Test &test, const Subject &subject, const CallPage &calls);
 
 // Runs one test and writes its result to `result_fd` as a line of JSON. Returns the exit status.
 int run_child(const std::string &test, const Subject &subject);

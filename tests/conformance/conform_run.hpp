@@ -6,7 +6,6 @@
 #include "arhost_run.hpp"
 
 #include <directories.hpp>
-#include <set>
 
 namespace arhost::test {
 
@@ -32,25 +31,16 @@ public:
     nlohmann::json json(const std::string &name) const { return nlohmann::json::parse(read(name)); }
     std::filesystem::path path(const std::string &name) const { return run_.path(name); }
 
-    // Creates a link to the wrong plugin; the link's name selects the defect.
+    // The plugin whose file name selects a defect.
+    static std::filesystem::path wrong_library(const std::string &defect, const std::string &kind) {
+        return wrong_plugin_directory() + (defect == "exports_more" ? "/wrong_exports_more.so"
+                                           : kind == "rt"           ? "/wrong.so"
+                                                                    : "/wrong_" + kind + ".so");
+    }
     std::filesystem::path link_wrong(const std::string &defect, const std::string &kind = "rt") const {
         const std::filesystem::path link = path(kind + "_" + defect + ".so");
-        std::filesystem::create_symlink(arhost::test::wrong_plugin_directory() + "/" +
-                                            (defect == "exports_more" ? "wrong_exports_more.so"
-                                             : kind == "rt"           ? "wrong.so"
-                                                                      : "wrong_" + kind + ".so"),
-                                        link);
+        std::filesystem::create_symlink(wrong_library(defect, kind), link);
         return link;
-    }
-
-    static std::set<std::string> test_names() {
-        ConformRun run;
-        run.run({"--list"});
-        std::istringstream lines(run.output());
-        std::set<std::string> names;
-        for (std::string name, requirement; lines >> name && std::getline(lines, requirement);)
-            names.insert(name);
-        return names;
     }
 
 private:

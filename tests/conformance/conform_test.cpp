@@ -22,92 +22,146 @@ using testing::Not;
 
 const std::string rt_embree = arhost::test::plugin_directory() + "/rt_embree.so";
 
-TEST(Conform, ListsTheTestsThatAPatternMatches) {
-    ConformRun run;
-    EXPECT_EQ(run.run({"--list", "--only", "raytracer.*-alpha"}), 0);
-    EXPECT_THAT(run.output(), HasSubstr("raytracer.miss-alpha "));
-    EXPECT_THAT(run.output(), Not(HasSubstr("abi.")));
-}
+// ---- Text and exit status of one run ---------------------------------------------------------------
 
-TEST(Conform, ReportsTheFailureAndTheCommandToRepeatIt) {
-    ConformRun run;
-    const std::string plugin = run.link_wrong("miss_alpha_1").string();
-    EXPECT_EQ(run.run({plugin, "--only", "raytracer.miss-alpha", "--seed", "7", "--set", "samples=2"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("pixel (0, 0): no ray hit, alpha is 1; expected 0"));
-    EXPECT_THAT(run.output(),
-                HasSubstr("arhost conform " + plugin + " --only raytracer.miss-alpha --seed 7 --set samples=2"));
-}
+struct Case {
+    Case(std::string b, std::string a, int s, std::vector<std::string> t)
+        : behaviour(std::move(b)), arguments(std::move(a)), status(s), texts(std::move(t)) {}
+    std::string behaviour;
+    std::string arguments; // "./rt_bgra.so" is a wrong plugin, and "@" the folder of the shipped plugins
+    int status;
+    std::vector<std::string> texts; // in the output, or not if they begin with '!'
+};
+class ConformCase : public testing::TestWithParam<Case> {};
 
-TEST(Conform, ReportsTheSignalAndTheCallOfACrash) {
-    ConformRun run;
-    EXPECT_EQ(run.run({run.link_wrong("crash_in_render").string(), "--only", "raytracer.render"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("crashed  raytracer.render\n         SIGSEGV in render"));
-}
-
-TEST(Conform, SkipsTestsWhoseNeededTestHasNotPassed) {
-    ConformRun run;
-    EXPECT_EQ(run.run({run.link_wrong("crash_in_create").string()}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("raytracer.start\n         needs abi.create, which has not passed"));
-}
-
-TEST(Conform, RunsNeededTestsWithoutReportingThem) {
-    ConformRun run;
-    EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.miss-alpha"}), 0) << run.output();
-    EXPECT_THAT(run.output(), Not(HasSubstr("abi.")));
-    EXPECT_EQ(run.run({run.link_wrong("crash_in_create").string(), "--only", "abi.longer-options"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("crashed  abi.create\n"));
-    EXPECT_THAT(run.output(), HasSubstr("skip     abi.longer-options\n         needs abi.create, which has not "));
-}
-
-TEST(Conform, ReportsALoadFailureOnce) {
+TEST_P(ConformCase, HasTextAndStatus) {
     ConformRun run;
     run.write("text.so", "no library");
-    EXPECT_EQ(run.run({"text.so", "--only", "abi.longer-options"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("fail     abi.load\n"));
-    EXPECT_THAT(run.output(), HasSubstr("skip     abi.longer-options\n"));
-}
-
-TEST(Conform, FailsIfNoTestRan) {
-    ConformRun run;
-    EXPECT_EQ(run.run({rt_embree, "--only", "tracker.*"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("no test"));
-}
-
-TEST(Conform, FailsIfTheReferenceIsMissing) {
-    ConformRun run;
-    EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.reference", "--reference", "none.so"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("none.so' does not exist; give --reference FILE"));
-}
-
-// An invalid reference is not the plugin's fault.
-TEST(Conform, FailsIfTheReferenceCannotBeUsed) {
-    ConformRun run;
-    run.write("text.so", "no library");
-    const std::string crashing = run.link_wrong("crash_in_render").string();
-    for (const auto &[reference, why] :
-         {std::pair<std::string, std::string>{arhost::test::plugin_directory() + "/tracker_aruco.so",
-                                              "tracker_aruco.so' is a tracker but must be a ray tracer"},
-          {"text.so", "text.so' cannot be used: abi.load failed: "},
-          {crashing, "cannot be used: raytracer.render failed: SIGSEGV in render"}}) {
-        EXPECT_EQ(run.run({rt_embree, "--only", "raytracer.reference", "--reference", reference, "--reads",
-                           arhost::test::plugin_directory()}),
-                  2);
-        EXPECT_THAT(run.output(), HasSubstr("error    raytracer.reference\n"));
-        EXPECT_THAT(run.output(), HasSubstr(why));
+    const auto with_folder = [](std::string text) {
+        if (const std::size_t at = text.find('@'); at != std::string::npos)
+            text.replace(at, 1, plugin_directory());
+        return text;
+    };
+    std::vector<std::string> arguments;
+    std::istringstream words(with_folder(GetParam().arguments));
+    for (std::string word; words >> word;) {
+        if (word.starts_with("./")) {
+            const std::string name = std::filesystem::path(word).stem();
+            const std::size_t kind = name.find('_');
+            run.link_wrong(name.substr(kind + 1), name.substr(0, kind));
+        }
+        arguments.push_back(word);
     }
+    EXPECT_EQ(run.run(arguments), GetParam().status) << run.output();
+    for (const std::string &text : GetParam().texts)
+        if (text.starts_with('!'))
+            EXPECT_THAT(run.output(), Not(HasSubstr(text.substr(1))));
+        else
+            EXPECT_THAT(run.output(), HasSubstr(with_folder(text)));
 }
 
-TEST(Conform, PrintsTheCommandWithAllOptions) {
-    ConformRun run;
-    const std::string plugin = run.link_wrong("no_licence").string(), reference = run.link_wrong("none").string();
-    EXPECT_EQ(run.run({plugin, "--only", "abi.descriptor", "--reads", arhost::test::plugin_directory(), "--reference",
-                       reference, "--timeout-factor", "2.5"}),
-              1);
-    EXPECT_THAT(run.output(),
-                HasSubstr("to repeat: arhost conform " + plugin + " --only abi.descriptor --seed 1 --reads " +
-                          arhost::test::plugin_directory() + " --reference " + reference +
-                          " --timeout-factor 2.5\n"));
-}
+const std::string not_allowed = "it needs 'video', which the sandbox does not allow: give --allow video";
+const Case cases[] = {
+    Case("ListsTheTestsThatAPatternMatches", "--list --only raytracer.*-alpha", 0,
+         {"raytracer.miss-alpha ", "!abi."}),
+    Case("ReportsTheFailureAndTheCommandToRepeatIt",
+         "./rt_miss_alpha_1.so --only raytracer.miss-alpha --seed 7 --set samples=2", 1,
+         {"pixel (0, 0): no ray hit, alpha is 1; expected 0",
+          "/rt_miss_alpha_1.so --only raytracer.miss-alpha --seed 7 --set samples=2"}),
+    Case("PrintsTheCommandWithAllOptions",
+         "./rt_no_licence.so --only abi.descriptor --reads @ --reference ./rt_none.so --timeout-factor 2.5", 1,
+         {"to repeat: arhost conform /", "/rt_no_licence.so --only abi.descriptor --seed 1 --reads @ --reference /",
+          "rt_none.so --timeout-factor 2.5\n"}),
+    Case("ReportsTheSignalAndTheCallOfACrash", "./rt_crash_in_render.so --only raytracer.render", 1,
+         {"crashed  raytracer.render\n         SIGSEGV in render"}),
+    Case("SkipsTestsWhoseNeededTestHasNotPassed", "./rt_crash_in_create.so", 1,
+         {"raytracer.start\n         needs abi.create, which has not passed"}),
+    Case("RunsNeededTestsWithoutReportingThem", "rt_embree --only raytracer.miss-alpha", 0, {"!abi."}),
+    Case("ReportsNeededTestsThatFail", "./rt_crash_in_create.so --only abi.longer-options", 1,
+         {"crashed  abi.create\n", "skip     abi.longer-options\n         needs abi.create, which has not "}),
+    Case("ReportsALoadFailureOnce", "text.so --only abi.longer-options", 1,
+         {"fail     abi.load\n", "cannot be loaded", "skip     abi.longer-options\n"}),
+    Case("FailsIfNoTestRan", "rt_embree --only tracker.*", 2, {"no test"}),
+    Case("FailsIfThePluginDoesNotExist", "nothing.so", 2, {"there is no plugin 'nothing.so'"}),
+    Case("FailsOnAnUnknownOption", "rt_embree --only abi.create --set sampels=2", 2, {"sampels"}),
+    // An invalid reference is not the plugin's fault.
+    Case("FailsIfTheReferenceIsMissing", "rt_embree --only raytracer.reference --reference none.so", 2,
+         {"none.so' does not exist; give --reference FILE"}),
+    Case("FailsIfTheReferenceIsATracker", "rt_embree --only raytracer.reference --reference @/tracker_aruco.so", 2,
+         {"error    raytracer.reference\n", "tracker_aruco.so' is a tracker but must be a ray tracer"}),
+    Case("FailsIfTheReferenceIsNoLibrary", "rt_embree --only raytracer.reference --reference text.so", 2,
+         {"error    raytracer.reference\n", "text.so' cannot be used: abi.load failed: "}),
+    Case("FailsIfTheReferenceCrashes",
+         "rt_embree --only raytracer.reference --reads @ --reference ./rt_crash_in_render.so", 2,
+         {"error    raytracer.reference\n", "cannot be used: raytracer.render failed: SIGSEGV in render"}),
+    Case("FailsAPluginThatFloodsTheSuitesDescriptor", "./rt_floods_descriptor_3.so --only abi.create", 1,
+         {"more than 32 MiB were written to the suite's result pipe, descriptor 3"}),
+    Case("FailsAPluginThatWritesToTheSuitesDescriptor", "./rt_writes_to_descriptor_3.so --only abi.create", 1,
+         {"descriptor 3, has an invalid result: '{} {"}),
+    Case("FailsALongName", "./rt_long_name.so --only abi.*", 1,
+         {"fail     abi.load", "the descriptor's 'name' has 5000000 bytes; the maximum is 4096"}),
+    Case("FailsManyOptions", "./rt_many_options.so --only abi.*", 1,
+         {"fail     abi.load", "bytes as JSON; the limit is 130048: declare fewer options"}),
+    Case("FailsAnOptionWithoutAKey", "./rt_option_without_key.so --only abi.*", 1,
+         {"fail     abi.load", "its option 1 has no key"}),
+    Case("FailsADescriptionThatIsNotUtf8", "./rt_description_not_utf8.so --only abi.*", 1,
+         {"fail     abi.descriptor", "the descriptor's description is not UTF-8: \"Bas\ufffd"}),
+    Case(
+        "ReportsAnUnknownNeed", "./rt_unknown_need.so --only abi.load", 1,
+        {"it needs 'bluetooth', which this arhost cannot allow; a plugin may need video, usb, gpu, display, network, "
+         "listen, processes"}),
+    Case("ReportsAMissingRender", "./rt_no_render.so", 1,
+         {"its function 'render' is NULL, but a ray tracer must have it"}),
+    Case("ReportsAMissingTrack", "./tracker_no_track.so", 1,
+         {"its function 'track' is NULL, but a tracker must have it"}),
+    Case("ReportsAMissingRead", "./source_no_read.so", 1, {"its function 'read' is NULL, but a source must have it"}),
+    Case("ReportsAMissingWrite", "./sink_no_write.so", 1, {"its function 'write' is NULL, but a sink must have it"}),
+    Case("SkipsTestsOfCapabilitiesThatTheRayTracerLacks",
+         "./rt_lambert_only.so --only raytracer.translucent-shadow,raytracer.moving-object,raytracer.reference", 0,
+         {"skip     raytracer.translucent-shadow\n         ARHOST_CAPABILITY_GLASS is not declared",
+          "skip     raytracer.moving-object\n         ARHOST_CAPABILITY_MOTION is not declared",
+          "pass     raytracer.reference"}),
+    Case("DrawsTag36h11", "tracker_aruco --family tag36h11 --only tracker.start,tracker.corners", 0,
+         {"with a marker of tag36h11"}),
+    Case("DrawsDict6x6", "tracker_aruco --family DICT_6X6_250 --only tracker.start,tracker.corners", 0,
+         {"with a marker of DICT_6X6_250"}),
+    Case("DrawsTheFamilyThatTheTrackerKnows", "tracker_apriltag --only tracker.start", 0,
+         {"with a marker of tag36h11"}),
+    Case("FailsIfTheTrackerDoesNotKnowTheFamily", "tracker_apriltag --family DICT_6X6_250 --only tracker.start", 1,
+         {" --seed 1 --family DICT_6X6_250"}),
+    Case("FailsIfTheSuiteDoesNotDrawTheFamily", "tracker_apriltag --family tag16h5 --only tracker.start", 2,
+         {"--family tag16h5: the suite draws only tag36h11, DICT_6X6_250, tag25h9; give pictures of the markers: "
+          "--print ID=FILE"}),
+    Case("FailsIfAPrintHasNoId", "tracker_apriltag --print one=tag.png", 2, {"--print one=tag.png: must be ID=FILE"}),
+    Case("FailsIfAPrintCannotBeRead", "tracker_apriltag --print 1=none.png --only tracker.track", 2, {"none.png"}),
+    Case(
+        "ReportsTheOrderOfCorners", "./tracker_corners_from_bottom_left.so --only tracker.*corner*", 1,
+        {"the corners begin at the bottom left corner of the upright print and run clockwise; expected top left, top "
+         "right, bottom right, bottom left"}),
+    Case("TestsATrackerOfBodies", "tracker_body --body head --only tracker.*", 0,
+         {"pass     tracker.body-pose", "skip     tracker.start"}),
+    Case("FailsIfTheTrackerDoesNotKnowTheBody", "tracker_body --body foot --only tracker.*", 1,
+         {"there is no body 'foot'; known: head hand"}),
+    Case("FailsIfNoBodyIsNamed", "tracker_body --only tracker.*", 1,
+         {"it starts with no marker, and no body is named: give --family NAME or --body NAME"}),
+    Case("SkipsTestsThatNeedAMissingDevice", "source_v4l2 --allow video --set device=/dev/arhost-none", 0,
+         {"skip     source.start\n         it needs 'video', and start returned ",
+          "source.read\n         needs source.start, which has not passed"}),
+    Case("SkipsTestsWithInstancesIfANeedIsNotAllowed", "source_v4l2", 0,
+         {"pass     abi.descriptor", "skip     abi.create\n         " + not_allowed,
+          "skip     source.seek\n         " + not_allowed}),
+    Case("AllowsEveryNeedWithoutASandbox", "source_v4l2 --only abi.create --sandbox none", 0,
+         {"pass     abi.create"}),
+    Case("RejectsAnUnknownNeed", "source_v4l2 --allow vidoe", 2, {"vidoe"}),
+    Case("RunsThePluginInTheSandbox", "./source_opens_a_socket.so --only source.start --reads /srv", 1,
+         {"no socket: Operation not permitted", "--only source.start --seed 1 --reads /srv\n"}),
+    Case("AllowsTheNetwork", "./source_opens_a_socket.so --only source.start --allow network", 0, {}),
+    Case("RunsThePluginWithoutASandbox", "./source_opens_a_socket.so --only source.start --sandbox none", 0, {}),
+};
+INSTANTIATE_TEST_SUITE_P(, ConformCase, testing::ValuesIn(cases),
+                         [](const auto &info) { return info.param.behaviour; });
+
+// ---- Options and reports ---------------------------------------------------------------------------
 
 TEST(Conform, RejectsInvalidOptions) {
     const std::array<std::array<std::string, 3>, 15> cases = {
@@ -342,28 +396,6 @@ TEST(Conform, LeavesNothingBehindIfInterrupted) {
     }
 }
 
-TEST(Conform, FailsAPluginThatWritesToTheSuitesDescriptor) {
-    ConformRun run;
-    EXPECT_EQ(run.run({run.link_wrong("floods_descriptor_3").string(), "--only", "abi.create"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("more than 32 MiB were written to the suite's result pipe, descriptor 3"));
-    EXPECT_EQ(run.run({run.link_wrong("writes_to_descriptor_3").string(), "--only", "abi.create"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("descriptor 3, has an invalid result: '{} {"));
-}
-
-TEST(Conform, FailsInvalidDescriptors) {
-    const std::array<std::array<std::string, 3>, 4> cases = {
-        {{"long_name", "abi.load", "the descriptor's 'name' has 5000000 bytes; the maximum is 4096"},
-         {"many_options", "abi.load", "bytes as JSON; the limit is 130048: declare fewer options"},
-         {"option_without_key", "abi.load", "its option 1 has no key"},
-         {"description_not_utf8", "abi.descriptor", "the descriptor's description is not UTF-8: \"Bas\ufffd"}}};
-    for (const auto &[defect, test, why] : cases) {
-        ConformRun run;
-        EXPECT_EQ(run.run({run.link_wrong(defect).string(), "--only", "abi.*"}), 1);
-        EXPECT_THAT(run.output(), HasSubstr("fail     " + test));
-        EXPECT_THAT(run.output(), HasSubstr(why));
-    }
-}
-
 TEST(Conform, RemovesControlCharactersFromAPluginsMessages) {
     ConformRun run;
     EXPECT_EQ(run.run({run.link_wrong("create_fails").string(), "--only", "abi.create", "--junit", "junit.xml",
@@ -384,12 +416,6 @@ TEST(Conform, RemovesControlCharactersFromPaths) {
         EXPECT_THAT(shown, Not(HasSubstr("\x1b")));
         EXPECT_THAT(shown, Not(HasSubstr("\xff")));
     }
-}
-
-TEST(Conform, FailsIfThePluginDoesNotExist) {
-    ConformRun run;
-    EXPECT_EQ(run.run({"nothing.so"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("there is no plugin 'nothing.so'"));
 }
 
 TEST(Conform, FindsPluginsByName) {
@@ -449,38 +475,12 @@ TEST_F(ConformPython, RejectsAScriptWithoutOrWithSeveralPlugins) {
     EXPECT_EQ(run.run({"sink_python", "--set", "script=my.py", "--only", "abi.create"}), 0) << run.output();
 }
 
-TEST(Conform, SkipsTestsOfCapabilitiesThatTheRayTracerLacks) {
-    ConformRun run;
-    EXPECT_EQ(run.run({run.link_wrong("lambert_only").string(), "--only",
-                       "raytracer.translucent-shadow,raytracer.moving-object,raytracer.reference"}),
-              0)
-        << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("skip     raytracer.translucent-shadow\n"
-                                        "         ARHOST_CAPABILITY_GLASS is not declared"));
-    EXPECT_THAT(run.output(), HasSubstr("skip     raytracer.moving-object\n"
-                                        "         ARHOST_CAPABILITY_MOTION is not declared"));
-    EXPECT_THAT(run.output(), HasSubstr("pass     raytracer.reference"));
-}
-
-TEST(Conform, FailsOnAnUnknownOption) {
-    ConformRun run;
-    EXPECT_EQ(run.run({rt_embree, "--only", "abi.create", "--set", "sampels=2"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("sampels"));
-}
-
 TEST(Conform, FailsOnAnInvalidAddressOfASocket) {
     ConformRun run;
     EXPECT_EQ(run.run({arhost::test::plugin_directory() + "/sink_web.so", "--allow", "listen", "--only", "abi.create",
                        "--set", "listen=local host"}),
               2);
     EXPECT_THAT(run.output(), HasSubstr("option 'listen': 'local host' must be a name"));
-}
-
-TEST(Conform, FailsAFileThatIsNotAPlugin) {
-    ConformRun run;
-    std::ofstream(run.path("text.so")) << "no library";
-    EXPECT_EQ(run.run({"text.so"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("cannot be loaded"));
 }
 
 TEST(Conform, PassesTheTrackers) {
@@ -492,19 +492,6 @@ TEST(Conform, PassesTheTrackers) {
             << run.output();
         const nlohmann::json report = run.json("results.json");
         EXPECT_THAT(report.at("results"), testing::SizeIs(testing::Gt(40)));
-    }
-}
-
-TEST(Conform, ReportsAMissingFunction) {
-    const std::array<std::array<std::string, 3>, 4> cases = {{{"rt", "render", "a ray tracer"},
-                                                              {"tracker", "track", "a tracker"},
-                                                              {"source", "read", "a source"},
-                                                              {"sink", "write", "a sink"}}};
-    for (const auto &[kind, function, owner] : cases) {
-        ConformRun run;
-        EXPECT_EQ(run.run({run.link_wrong("no_" + function, kind).string()}), 1);
-        EXPECT_THAT(run.output(),
-                    HasSubstr("its function '" + function + "' is NULL, but " + owner + " must have it"));
     }
 }
 
@@ -559,92 +546,11 @@ TEST(Conform, DrawsTheUsersMarkers) {
                 HasSubstr("to repeat: arhost conform " + tracker + " --only tracker.track --seed 1 --print 5="));
 }
 
-TEST(Conform, DrawsMarkersOfTheFamilyThatTheTrackerKnows) {
+TEST(Conform, ReportsTheOffsetOfCorners) {
     ConformRun run;
-    const std::string aruco = arhost::test::plugin_directory() + "/tracker_aruco.so",
-                      apriltag = arhost::test::plugin_directory() + "/tracker_apriltag.so";
-    for (const char *family : {"tag36h11", "DICT_6X6_250"}) {
-        EXPECT_EQ(run.run({aruco, "--family", family, "--only", "tracker.start,tracker.corners"}), 0) << run.output();
-        EXPECT_THAT(run.output(), HasSubstr(std::string("with a marker of ") + family));
-    }
-    EXPECT_EQ(run.run({apriltag, "--only", "tracker.start"}), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("with a marker of tag36h11"));
-    EXPECT_EQ(run.run({apriltag, "--family", "DICT_6X6_250", "--only", "tracker.start"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr(" --seed 1 --family DICT_6X6_250"));
-    EXPECT_EQ(run.run({apriltag, "--family", "tag16h5", "--only", "tracker.start"}), 2);
-    EXPECT_THAT(run.output(),
-                HasSubstr("--family tag16h5: the suite draws only tag36h11, DICT_6X6_250, tag25h9; give "
-                          "pictures of the markers: --print ID=FILE"));
-}
-
-TEST(Conform, TestsATrackerOfBodies) {
-    ConformRun run;
-    const std::string tracker = arhost::test::test_plugin_directory() + "/tracker_body.so";
-    EXPECT_EQ(run.run({tracker, "--body", "head", "--only", "tracker.*"}), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("pass     tracker.body-pose"));
-    EXPECT_THAT(run.output(), HasSubstr("skip     tracker.start"));
-    EXPECT_EQ(run.run({tracker, "--body", "foot", "--only", "tracker.*"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("there is no body 'foot'; known: head hand"));
-    EXPECT_EQ(run.run({tracker, "--only", "tracker.*"}), 1);
-    EXPECT_THAT(run.output(),
-                HasSubstr("it starts with no marker, and no body is named: give --family NAME or --body "
-                          "NAME"));
-}
-
-TEST(Conform, ReportsTheOrderOfCornersAndTheirOffset) {
-    ConformRun run;
-    EXPECT_EQ(run.run({run.link_wrong("corners_from_bottom_left", "tracker").string(), "--only", "tracker.*corner*"}),
-              1);
-    EXPECT_THAT(run.output(), HasSubstr("the corners begin at the bottom left corner of the upright print and run "
-                                        "clockwise; expected top left, top right, bottom right, bottom left"));
     EXPECT_EQ(run.run({run.link_wrong("corners_at_half", "tracker").string(), "--only", "tracker.corners"}), 1);
     EXPECT_THAT(run.output(), testing::ContainsRegex("mean error of the four corners is .0\\.[45]., 0\\.[45].*: "
                                                      "pixel centres are at integers"));
-}
-
-TEST(Conform, FailsIfAMarkersPictureCannotBeRead) {
-    ConformRun run;
-    const std::string tracker = arhost::test::plugin_directory() + "/tracker_apriltag.so";
-    EXPECT_EQ(run.run({tracker, "--print", "one=tag.png"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("--print one=tag.png: must be ID=FILE"));
-    EXPECT_EQ(run.run({tracker, "--print", "1=none.png", "--only", "tracker.track"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("none.png"));
-}
-
-TEST(Conform, SkipsTestsThatNeedAMissingDevice) {
-    ConformRun run;
-    EXPECT_EQ(run.run({arhost::test::plugin_directory() + "/source_v4l2.so", "--allow", "video", "--set",
-                       "device=/dev/arhost-none"}),
-              0);
-    EXPECT_THAT(run.output(), HasSubstr("skip     source.start\n         it needs 'video', and start returned "));
-    EXPECT_THAT(run.output(), HasSubstr("source.read\n         needs source.start, which has not passed"));
-}
-
-TEST(Conform, SkipsTestsWithInstancesIfANeedIsNotAllowed) {
-    ConformRun run;
-    const std::string camera = arhost::test::plugin_directory() + "/source_v4l2.so";
-    EXPECT_EQ(run.run({camera}), 0);
-    const std::string why = "it needs 'video', which the sandbox does not allow: give --allow video";
-    EXPECT_THAT(run.output(), HasSubstr("pass     abi.descriptor"));
-    EXPECT_THAT(run.output(), HasSubstr("skip     abi.create\n         " + why));
-    EXPECT_THAT(run.output(), HasSubstr("skip     source.seek\n         " + why));
-    EXPECT_EQ(run.run({camera, "--only", "abi.create", "--sandbox", "none"}), 0);
-    EXPECT_THAT(run.output(), HasSubstr("pass     abi.create"));
-    EXPECT_EQ(run.run({camera, "--allow", "vidoe"}), 2);
-}
-
-TEST(Conform, RunsThePluginInTheSandbox) {
-    ConformRun run;
-    const std::string plugin = run.link_wrong("opens_a_socket", "source").string();
-    EXPECT_EQ(run.run({plugin, "--only", "source.start", "--reads", "/srv"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("no socket: Operation not permitted"));
-    EXPECT_THAT(run.output(), HasSubstr("--only source.start --seed 1 --reads /srv\n"));
-    for (const std::vector<std::string> &options :
-         {std::vector<std::string>{"--allow", "network"}, {"--sandbox", "none"}}) {
-        std::vector<std::string> arguments = {plugin, "--only", "source.start"};
-        arguments.insert(arguments.end(), options.begin(), options.end());
-        EXPECT_EQ(run.run(arguments), 0) << run.output();
-    }
 }
 
 TEST(Conform, LetsAPluginWriteOnlyToTheTestsFolder) {
@@ -656,13 +562,6 @@ TEST(Conform, LetsAPluginWriteOnlyToTheTestsFolder) {
     EXPECT_FALSE(std::filesystem::exists(cache));
     EXPECT_EQ(run.run({plugin, "--only", "sink.start", "--sandbox", "none"}), 0);
     EXPECT_TRUE(std::filesystem::exists(cache));
-}
-
-TEST(Conform, ReportsAnUnknownNeed) {
-    ConformRun run;
-    EXPECT_EQ(run.run({run.link_wrong("unknown_need").string(), "--only", "abi.load"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("it needs 'bluetooth', which this arhost cannot allow; a plugin may need "
-                                        "video, usb, gpu, display, network, listen, processes"));
 }
 
 TEST(Conform, RemovesASinksFiles) {
