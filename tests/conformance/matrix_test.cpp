@@ -152,10 +152,11 @@ bool needs_process(const WrongPlugin &wrong) {
 
 class Matrix : public testing::TestWithParam<Kind> {};
 
-// Each plugin runs the tests that must find its defect; a correct one runs all tests.
+// Each plugin runs the tests that must find its defect; an unusual but correct one runs all tests, as the usual one
+// does in MatrixWhole.
 TEST_P(Matrix, FindsDefectsInOneProcess) {
     for (const WrongPlugin &wrong : wrong_plugins(GetParam())) {
-        if (needs_process(wrong))
+        if (needs_process(wrong) || wrong.defect == "none")
             continue;
         SCOPED_TRACE(wrong.defect);
         SuiteHere here(wrong);

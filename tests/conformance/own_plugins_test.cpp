@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Shipped sources and sinks pass the suite. matrix_test.cpp covers rt_embree (defect "none"), and
-// Conform.PassesTheTrackers the trackers.
+// Shipped plugins pass the suite. The defect "none" in matrix_test.cpp covers rt_embree and tracker_apriltag.
 #include "conform_run.hpp"
 
 #include <directories.hpp>
@@ -55,6 +54,7 @@ const auto name_of = [](const auto &info) { return info.param.name; };
 INSTANTIATE_TEST_SUITE_P(
     All, OwnPlugins,
     testing::Values(
+        OwnPlugin{"ArUco", "tracker_aruco", {}},
         OwnPlugin{"Synthetic", "source_synthetic", {"width=160", "height=120", "frames=60"}},
         OwnPlugin{"FilePictures", "source_file", {"path=in/%02d.png"}},
         OwnPlugin{"FileVideo", "source_file", {"path=in/a.mp4"}}, OwnPlugin{"Camera", "source_v4l2", {}, "video"},
@@ -68,7 +68,8 @@ INSTANTIATE_TEST_SUITE_P(
     name_of);
 INSTANTIATE_TEST_SUITE_P(
     Exhaustive, OwnPlugins,
-    testing::Values(OwnPlugin{"FilePicture", "source_file", {"path=in/00.png"}},
+    testing::Values(OwnPlugin{"AprilTag", "tracker_apriltag", {}},
+                    OwnPlugin{"FilePicture", "source_file", {"path=in/00.png"}},
                     OwnPlugin{"FileLoop", "source_file", {"path=in/a.mp4", "loop=true", "frames=30"}},
                     OwnPlugin{"LastImage", "sink_images", {"path=last.jpg"}},
                     OwnPlugin{"Mpeg4", "sink_video", {"path=video.mkv", "codec=mpeg4"}},
