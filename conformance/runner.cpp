@@ -3,6 +3,7 @@
 
 #include "base/listening_socket.hpp"
 #include "base/orphans.hpp"
+#include "base/temporary_folder.hpp"
 #include "base/text.hpp"
 #include "ipc/memory.hpp"
 #include "ipc/protocol.hpp"
@@ -36,31 +37,6 @@ std::string call_text(Call call, const Test &test) {
     constexpr const char *per_frame[] = {"its per-frame call", "read", "track", "render", "write"};
     return " " + ipc::to_text(call, per_frame[test.kind]);
 }
-
-// A temporary folder for one test.
-class ScratchFolder {
-public:
-    ScratchFolder() {
-        std::error_code error;
-        std::string pattern = std::filesystem::temp_directory_path(error) / "arhost-conform-XXXXXX";
-        if (error)
-            throw std::runtime_error(
-                "the folder for temporary files does not exist; set TMPDIR to an existing folder");
-        if (!::mkdtemp(pattern.data()))
-            base::throw_errno("mkdtemp " + pattern);
-        path_ = pattern;
-    }
-    ~ScratchFolder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    ScratchFolder(const ScratchFolder &) = delete;
-    ScratchFolder &operator=(const ScratchFolder &) = delete;
-    const std::filesystem::path &path() const { return path_; }
-
-private:
-    std::filesystem::path path_;
-};
 
 // Returns a socket of the same kind that neither other tests nor other programs use: at a free port, or in `folder`.
 base::ListeningSocket listen_like(const std::string &address, const std::string &key,
@@ -242,7 +218,7 @@ private:
     const Test &test_;
     std::set<pid_t> &alive_;
     Clock::time_point begin_, deadline_;
-    ScratchFolder scratch_; // removed after the process has ended
+    base::TemporaryFolder scratch_{"arhost-conform"}; // removed after the process has ended
     std::list<base::ListeningSocket> listening_;
     ipc::SharedMemory memory_;
     CallPage calls_;

@@ -3,6 +3,7 @@
 
 #include "base/atomic_file.hpp"
 #include "base/file_identity.hpp"
+#include "base/temporary_folder.hpp"
 #include "base/text.hpp"
 #include "camera/coordinates.hpp"
 #include "host/console.hpp"
@@ -617,31 +618,12 @@ void check_scene(const run_config::Configuration &configuration, supervise::Cont
             context.log(ARHOST_SEVERITY_WARNING, "raytracer", text);
 }
 
-class TemporaryFolder {
-public:
-    TemporaryFolder() : path_((fs::temp_directory_path() / "arhost-check-XXXXXX").string()) {
-        if (!::mkdtemp(path_.data()))
-            throw std::runtime_error("cannot create a folder in " + fs::temp_directory_path().string() + ": " +
-                                     std::strerror(errno));
-    }
-    ~TemporaryFolder() {
-        std::error_code ignored;
-        fs::remove_all(path_, ignored);
-    }
-    TemporaryFolder(const TemporaryFolder &) = delete;
-    TemporaryFolder &operator=(const TemporaryFolder &) = delete;
-    fs::path path() const { return path_; }
-
-private:
-    std::string path_;
-};
-
 // Starts all components once, without restarts, and prints what they report. The outputs may write only to a
 // temporary folder; messages name their own folder instead.
 // Returns the exit status.
 int check_by_opening(run_config::Configuration configuration, const Arguments &arguments,
                      supervise::Context context) {
-    const TemporaryFolder scratch;
+    const base::TemporaryFolder scratch("arhost-check");
     std::vector<std::pair<std::string, std::string>> folders; // temporary folder, the output's own folder
     const auto restart_never = [](run_config::ComponentConfiguration &component) {
         component.limits.restart.quarantine_after = 1;

@@ -4,6 +4,7 @@
 // but without child processes and shared memory. The tests in tests/system test the entire pipeline.
 #pragma once
 
+#include "base/temporary_folder.hpp"
 #include "directories.hpp"
 #include <arhost/arhost.h>
 
@@ -35,25 +36,8 @@ inline std::filesystem::path shared_data(const std::string &relative) {
     if (!std::filesystem::exists(::arhost::test::shared_data(relative)))                                             \
     GTEST_SKIP() << "needs " << ::arhost::test::shared_data(relative) << ", which is missing"
 
-// A temporary folder, which is deleted by the destructor.
-class ScratchFolder {
-public:
-    ScratchFolder() {
-        std::string pattern = (std::filesystem::temp_directory_path() / "arhost-test-XXXXXX").string();
-        if (!mkdtemp(pattern.data()))
-            throw std::runtime_error("mkdtemp " + pattern);
-        path_ = pattern;
-    }
-    ~ScratchFolder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    ScratchFolder(const ScratchFolder &) = delete;
-    ScratchFolder &operator=(const ScratchFolder &) = delete;
-    const std::filesystem::path &path() const { return path_; }
-
-private:
-    std::filesystem::path path_;
+struct ScratchFolder : base::TemporaryFolder {
+    ScratchFolder() : TemporaryFolder("arhost-test") {}
 };
 
 // A frame or image buffer, 64-byte aligned, followed by guard bytes that detect overruns.

@@ -37,6 +37,13 @@ inline void hang() {
     for (;;)
         ::pause();
 }
+// The defects "crash_in_…" and "hang_in_…". Call at the beginning of each function of the plugin.
+inline void misbehave_in(const std::string &function) {
+    if (has("crash_in_" + function))
+        crash();
+    if (has("hang_in_" + function))
+        hang();
+}
 inline void leak_memory(std::size_t bytes) {
     static std::vector<std::vector<char>> kept;
     kept.emplace_back(bytes, 'x');

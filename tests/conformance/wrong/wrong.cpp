@@ -202,10 +202,7 @@ void start_a_process() {
 
 arhost_status create(const arhost_host *host, const arhost_option *options, std::uint32_t count,
                      arhost_instance **instance) {
-    if (has("crash_in_create"))
-        crash();
-    if (has("hang_in_create"))
-        hang();
+    misbehave_in("create");
     if (has("hangs_with_child_process")) {
         start_a_process();
         hang();
@@ -280,8 +277,7 @@ arhost_status create(const arhost_host *host, const arhost_option *options, std:
 }
 
 void destroy(arhost_instance *instance) {
-    if (has("crash_in_destroy"))
-        crash();
+    misbehave_in("destroy");
     Wrong &self = wrong(instance);
     if (--self.users > 0)
         return;
@@ -430,10 +426,7 @@ void combine(std::uint8_t *pixel, const Pixels &other, std::uint32_t x, std::uin
 }
 
 arhost_status start(arhost_instance *instance, const arhost_raytracer_setup *setup) {
-    if (has("crash_in_start"))
-        crash();
-    if (has("hang_in_start"))
-        hang();
+    misbehave_in("start");
     if (has("writes_into_scene"))
         const_cast<arhost_scene *>(setup->scene)->max_depth = 1;
     if (has("crash_on_degenerate") && has_degenerate_triangle(*setup->scene))
@@ -458,10 +451,7 @@ arhost_status start(arhost_instance *instance, const arhost_raytracer_setup *set
 arhost_status render(arhost_instance *instance, const arhost_render_request *request, const arhost_image *image,
                      arhost_render_info *info) {
     Wrong &self = wrong(instance);
-    if (has("crash_in_render"))
-        crash();
-    if (has("hang_in_render"))
-        hang();
+    misbehave_in("render");
     if (has("exits_in_render"))
         std::exit(0);
     if (has("crash_on_nan") && std::isnan(request->camera.eye[0]))
@@ -569,8 +559,7 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
 }
 
 void stop(arhost_instance *instance) {
-    if (has("crash_in_stop"))
-        crash();
+    misbehave_in("stop");
     embree_functions().stop(wrong(instance).real);
     if (wrong(instance).other)
         embree_functions().stop(wrong(instance).other);
@@ -679,8 +668,7 @@ const arhost_plugin &wrong_plugin() {
 }
 
 arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
-    if (has("crash_in_negotiate"))
-        crash();
+    misbehave_in("negotiate");
     if ((offer->struct_size < sizeof *offer && !has("reads_past_short_offer")) ||
         (answer->struct_size < sizeof *answer && !has("writes_past_short_answer")))
         return ARHOST_STATUS_ERROR_INVALID_ARGUMENT;

@@ -74,10 +74,7 @@ public:
     Files &operator=(const Files &) = delete;
 
     void start(const arhost_sink_setup &setup) {
-        if (has("crash_in_start"))
-            crash();
-        if (has("hang_in_start"))
-            hang();
+        misbehave_in("start");
         is_starting_ = true;
         if (has("cannot_restart") && std::exchange(is_in_use, true))
             throw Failure(ARHOST_STATUS_ERROR_IO, "the file is busy");
@@ -108,10 +105,7 @@ public:
 
     arhost_status write(const arhost_output &output) {
         const arhost_record &record = *output.record;
-        if (has("crash_in_write"))
-            crash();
-        if (has("hang_in_write"))
-            hang();
+        misbehave_in("write");
         if (has("status_0"))
             return 0;
         if (has("writes_into_the_frame"))
@@ -163,14 +157,12 @@ public:
     }
 
     arhost_status idle() {
-        if (has("crash_in_idle"))
-            crash();
+        misbehave_in("idle");
         return has("idle_fails") ? ARHOST_STATUS_ERROR_UNSUPPORTED : ARHOST_STATUS_OK;
     }
 
     void stop() {
-        if (has("crash_in_stop"))
-            crash();
+        misbehave_in("stop");
         if (has("stop_fails"))
             throw Failure(ARHOST_STATUS_ERROR_IO, "the files are incomplete");
         write_waiting();

@@ -32,10 +32,7 @@ public:
     Pattern &operator=(const Pattern &) = delete;
 
     void start(const arhost_source_setup &setup, arhost_source_properties &properties) {
-        if (has("crash_in_start"))
-            crash();
-        if (has("hang_in_start"))
-            hang();
+        misbehave_in("start");
         if (has("cannot_restart") && std::exchange(is_in_use, true))
             throw Failure(ARHOST_STATUS_ERROR_IO, "the device is busy");
         if (has("start_cancelled_is_internal") && host_.cancelled())
@@ -87,10 +84,7 @@ public:
     }
 
     arhost_status read(const arhost_frame_buffer &buffer, arhost_frame_info &info) {
-        if (has("crash_in_read"))
-            crash();
-        if (has("hang_in_read"))
-            hang();
+        misbehave_in("read");
         if (has("exits_in_read"))
             std::exit(0);
         if (has("status_0"))
@@ -140,10 +134,7 @@ public:
         return ARHOST_STATUS_OK;
     }
 
-    void stop() {
-        if (has("crash_in_stop"))
-            crash();
-    }
+    void stop() { misbehave_in("stop"); }
 
 private:
     std::chrono::nanoseconds time_of(std::uint64_t n) const {

@@ -347,8 +347,7 @@ void destroy(arhost_instance *instance) {
 
 arhost_status start(arhost_instance *instance, const arhost_tracker_setup *setup) {
     Wrong &self = wrong(instance);
-    if (has("crash_in_start"))
-        crash();
+    misbehave_in("start");
     if (has("leaves_a_thread"))
         std::thread(hang).detach();
     if (has("cannot_restart") && was_started)
@@ -450,11 +449,9 @@ arhost_status track(arhost_instance *instance, const arhost_track_request *input
     request.frame = &frame;
     request.state_before = request.state_after = nullptr; // the real tracker has no state
     request.state_size = 0;
-    if (has("crash_in_track") ||
-        (has("crash_on_small_frames") && std::min(frame.format->width, frame.format->height) < 8))
+    misbehave_in("track");
+    if (has("crash_on_small_frames") && std::min(frame.format->width, frame.format->height) < 8)
         crash();
-    if (has("hang_in_track"))
-        hang();
     if (has("crash_on_dropped_frames") && self.tracks > 0 && frame.sequence > self.last_sequence + 1)
         crash();
     if (has("writes_the_frame"))
@@ -544,8 +541,7 @@ arhost_status track(arhost_instance *instance, const arhost_track_request *input
 }
 
 void stop(arhost_instance *instance) {
-    if (has("crash_in_stop"))
-        crash();
+    misbehave_in("stop");
     real_functions().stop(wrong(instance).real);
 }
 
