@@ -23,6 +23,9 @@ struct Kind {
     std::string heading; // in docs/conformance.md
     std::string suite;   // the value of --only for all tests. Only ray tracers run those of abi.*
 };
+std::ostream &operator<<(std::ostream &stream, const Kind &kind) {
+    return stream << kind.prefix;
+}
 const std::vector<Kind> kinds = {{"rt", "### Ray tracers", "abi.*,raytracer.*"},
                                  {"tracker", "### Trackers", "tracker.*"},
                                  {"body", "### Trackers of bodies", "tracker.*"},
