@@ -67,7 +67,7 @@ std::runtime_error no_space(const std::filesystem::path &folder, int error) {
 }
 
 void run_in_sandbox(const Test &test, Context &context) {
-    if (test.kind != ARHOST_KIND_SINK)
+    if (test.kind() != ARHOST_KIND_SINK)
         return test.run(context);
     const std::filesystem::path &folder = context.library.scratch();
     if (const int error = check_space(folder); error != 0)

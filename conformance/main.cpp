@@ -288,13 +288,13 @@ Report run(RunSettings settings, const std::vector<std::string> &patterns, bool 
     std::vector<Test> selected;
     std::set<std::string_view> needed;
     std::for_each(report.tests.rbegin(), report.tests.rend(), [&](const Test &test) {
-        if ((is_selected(test.name) && (test.kind == 0 || test.kind == kind)) || needed.contains(test.name)) {
+        if ((is_selected(test.name) && (test.kind() == 0 || test.kind() == kind)) || needed.contains(test.name)) {
             selected.insert(selected.begin(), test);
             needed.insert(test.needs);
         }
     });
     const std::string missing = missing_need(report.results.front(), settings.subject.policy);
-    const auto is_of_tracker = [](const Test &test) { return test.kind == ARHOST_KIND_TRACKER; };
+    const auto is_of_tracker = [](const Test &test) { return test.kind() == ARHOST_KIND_TRACKER; };
     if (settings.subject.family.empty() && missing.empty() && std::ranges::any_of(selected, is_of_tracker))
         settings.subject.family = family_of(report.tests, settings, report.plugin->descriptor);
     for (const Test &test : selected)

@@ -211,22 +211,19 @@ void moving_object(Context &context) {
 }
 
 constexpr const char *gate = "raytracer.render";
-constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
-    {"raytracer.pixel-centres", "Rays pass through pixel centres, at integer coordinates, accurate to 0.02 px.", kind,
-     gate, 30s, pixel_centres},
-    {"raytracer.focal-length", "fx and fy of the intrinsics are used.", kind, gate, 20s, focal_length},
-    {"raytracer.orientation", "The image is not mirrored; its first row is at the top.", kind, gate, 20s,
-     orientation},
-    {"raytracer.principal-point", "The optical axis projects to the principal point.", kind, gate, 20s,
-     principal_point},
-    {"raytracer.eye-look-at-up", "For any eye, look-at and up, a sphere is at its analytic projection.", kind, gate,
-     30s, eye_look_at_up},
-    {"raytracer.lens", "If LENS_DISTORTION is declared, rays are distorted by Brown's model.", kind, gate, 20s, lens},
-    {"raytracer.crop", "A camera with the intrinsics of a crop renders that crop.", kind, gate, 20s, crop},
-    {"raytracer.moved-with-camera", "A scene moved together with its camera looks the same.", kind, gate, 20s,
+    {"raytracer.pixel-centres", "Rays pass through pixel centres, at integer coordinates, accurate to 0.02 px.", gate,
+     30s, pixel_centres},
+    {"raytracer.focal-length", "fx and fy of the intrinsics are used.", gate, 20s, focal_length},
+    {"raytracer.orientation", "The image is not mirrored; its first row is at the top.", gate, 20s, orientation},
+    {"raytracer.principal-point", "The optical axis projects to the principal point.", gate, 20s, principal_point},
+    {"raytracer.eye-look-at-up", "For any eye, look-at and up, a sphere is at its analytic projection.", gate, 30s,
+     eye_look_at_up},
+    {"raytracer.lens", "If LENS_DISTORTION is declared, rays are distorted by Brown's model.", gate, 20s, lens},
+    {"raytracer.crop", "A camera with the intrinsics of a crop renders that crop.", gate, 20s, crop},
+    {"raytracer.moved-with-camera", "A scene moved together with its camera looks the same.", gate, 20s,
      moved_with_camera},
-    {"raytracer.moving-object", "Objects move, and are hidden, as the request's motion specifies.", kind, gate, 20s,
+    {"raytracer.moving-object", "Objects move, and are hidden, as the request's motion specifies.", gate, 20s,
      moving_object},
 };
 

@@ -179,23 +179,20 @@ void reference(Context &context) {
 }
 
 constexpr const char *gate = "raytracer.render";
-constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
-    {"raytracer.writes-every-pixel", "Every pixel is written.", kind, gate, 20s, writes_every_pixel},
-    {"raytracer.writes-nothing-else", "No byte outside the pixels is written.", kind, gate, 20s, writes_nothing_else},
-    {"raytracer.sizes", "Images of one pixel, one row, one column and odd sizes are correct.", kind, gate, 20s,
-     sizes},
-    {"raytracer.region", "Alpha is 0 outside the reported region.", kind, gate, 20s, region},
-    {"raytracer.device-time", "The reported device time is at most the duration of render.", kind, gate, 20s,
-     device_time},
-    {"raytracer.deterministic", "The same request gives the same bytes, repeatedly and in another instance.", kind,
-     gate, 20s, deterministic},
-    {"raytracer.frames-before", "An image does not depend on previous frames.", kind, gate, 20s, frames_before},
-    {"raytracer.threads", "The image does not depend on the number of threads.", kind, gate, 20s, threads},
+    {"raytracer.writes-every-pixel", "Every pixel is written.", gate, 20s, writes_every_pixel},
+    {"raytracer.writes-nothing-else", "No byte outside the pixels is written.", gate, 20s, writes_nothing_else},
+    {"raytracer.sizes", "Images of one pixel, one row, one column and odd sizes are correct.", gate, 20s, sizes},
+    {"raytracer.region", "Alpha is 0 outside the reported region.", gate, 20s, region},
+    {"raytracer.device-time", "The reported device time is at most the duration of render.", gate, 20s, device_time},
+    {"raytracer.deterministic", "The same request gives the same bytes, repeatedly and in another instance.", gate,
+     20s, deterministic},
+    {"raytracer.frames-before", "An image does not depend on previous frames.", gate, 20s, frames_before},
+    {"raytracer.threads", "The image does not depend on the number of threads.", gate, 20s, threads},
     {"raytracer.reference",
      "The image matches that of the reference ray tracer: a PSNR of 40 dB inside objects, equal alpha except at "
      "edges.",
-     kind, gate, 30s, reference},
+     gate, 30s, reference},
 };
 
 } // namespace

@@ -262,23 +262,22 @@ void linear_samples(Context &context) {
 }
 
 constexpr const char *gate = "raytracer.render";
-constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
-    {"raytracer.colour-order", "The bytes of a pixel are red, green, blue, alpha.", kind, gate, 20s, colour_order},
-    {"raytracer.srgb", "Colours are sRGB-encoded, within one code.", kind, gate, 20s, srgb},
-    {"raytracer.lambert", "A plane under a lamp follows Lambert's law, within one code.", kind, gate, 20s, lambert},
-    {"raytracer.inverse-square", "A light with inverse-square falloff follows the inverse-square law.", kind, gate,
-     20s, inverse_square},
-    {"raytracer.directional-light", "A directional light comes from its direction.", kind, gate, 20s, directional},
-    {"raytracer.shadow-on-object", "Objects cast shadows on other objects.", kind, gate, 20s, shadow_on_object},
-    {"raytracer.shadow-terminator", "A smooth mesh is lit up to the terminator of its normals, without facets.", kind,
-     gate, 20s, shadow_terminator},
-    {"raytracer.glass-shadow", "Glass tints the light that it lets through to objects by shadow_attenuation.", kind,
-     gate, 20s, glass_shadow},
-    {"raytracer.visible-lamps", "Area lights are visible in mirrors and through glass, with their radiance.", kind,
-     gate, 20s, visible_lamps},
+    {"raytracer.colour-order", "The bytes of a pixel are red, green, blue, alpha.", gate, 20s, colour_order},
+    {"raytracer.srgb", "Colours are sRGB-encoded, within one code.", gate, 20s, srgb},
+    {"raytracer.lambert", "A plane under a lamp follows Lambert's law, within one code.", gate, 20s, lambert},
+    {"raytracer.inverse-square", "A light with inverse-square falloff follows the inverse-square law.", gate, 20s,
+     inverse_square},
+    {"raytracer.directional-light", "A directional light comes from its direction.", gate, 20s, directional},
+    {"raytracer.shadow-on-object", "Objects cast shadows on other objects.", gate, 20s, shadow_on_object},
+    {"raytracer.shadow-terminator", "A smooth mesh is lit up to the terminator of its normals, without facets.", gate,
+     20s, shadow_terminator},
+    {"raytracer.glass-shadow", "Glass tints the light that it lets through to objects by shadow_attenuation.", gate,
+     20s, glass_shadow},
+    {"raytracer.visible-lamps", "Area lights are visible in mirrors and through glass, with their radiance.", gate,
+     20s, visible_lamps},
     {"raytracer.linear-samples",
-     "Samples are averaged in linear light, in which samples brighter than white count in full.", kind, gate, 20s,
+     "Samples are averaged in linear light, in which samples brighter than white count in full.", gate, 20s,
      linear_samples},
 };
 

@@ -151,16 +151,14 @@ void many_objects(Context &context) {
 }
 
 constexpr const char *gate = "raytracer.render";
-constexpr arhost_kind kind = ARHOST_KIND_RAYTRACER;
 constexpr Test tests[] = {
-    {"raytracer.object-order", "The order of objects does not matter.", kind, gate, 20s, object_order},
-    {"raytracer.split-mesh", "A mesh split into several objects looks the same.", kind, gate, 20s, split_mesh},
-    {"raytracer.object-transform", "world_from_object applies to positions and smooth normals.", kind, gate, 20s,
+    {"raytracer.object-order", "The order of objects does not matter.", gate, 20s, object_order},
+    {"raytracer.split-mesh", "A mesh split into several objects looks the same.", gate, 20s, split_mesh},
+    {"raytracer.object-transform", "world_from_object applies to positions and smooth normals.", gate, 20s,
      object_transform},
-    {"raytracer.size", "Scaling scene and camera by 1e-3 or 1e6 does not change the image.", kind, gate, 20s, size},
-    {"raytracer.many-triangles", "A mesh of 100,000 triangles is rendered completely.", kind, gate, 60s,
-     many_triangles},
-    {"raytracer.many-objects", "All of 1,000 objects are rendered.", kind, gate, 60s, many_objects},
+    {"raytracer.size", "Scaling scene and camera by 1e-3 or 1e6 does not change the image.", gate, 20s, size},
+    {"raytracer.many-triangles", "A mesh of 100,000 triangles is rendered completely.", gate, 60s, many_triangles},
+    {"raytracer.many-objects", "All of 1,000 objects are rendered.", gate, 60s, many_objects},
 };
 
 } // namespace

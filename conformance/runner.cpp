@@ -35,7 +35,7 @@ using ipc::Call;
 
 std::string call_text(Call call, const Test &test) {
     constexpr const char *per_frame[] = {"its per-frame call", "read", "track", "render", "write"};
-    return " " + ipc::to_text(call, per_frame[test.kind]);
+    return " " + ipc::to_text(call, per_frame[test.kind()]);
 }
 
 // Returns a socket of the same kind that neither other tests nor other programs use: at a free port, or in `folder`.

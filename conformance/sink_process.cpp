@@ -38,7 +38,7 @@ void work(Context &context) {
     }
 }
 
-constexpr Test helpers[] = {{helper, "It writes frames until it is killed.", ARHOST_KIND_SINK, "", 60s, work}};
+constexpr Test helpers[] = {{helper, "It writes frames until it is killed.", "", 60s, work}};
 
 } // namespace
 

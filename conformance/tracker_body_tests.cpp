@@ -122,19 +122,17 @@ void pose(Context &context) {
     });
 }
 
-constexpr arhost_kind kind = ARHOST_KIND_TRACKER;
 constexpr const char *gate = "tracker.body-track";
 constexpr Test tests[] = {
-    {"tracker.body-start", "If REPORTS_POSES is declared, it starts with a body that it knows, and stops.", kind,
+    {"tracker.body-start", "If REPORTS_POSES is declared, it starts with a body that it knows, and stops.",
      "abi.create", 30s, start},
-    {"tracker.body-track", "It reports a pose of the body within 60 frames.", kind, "tracker.body-start", 30s, track},
+    {"tracker.body-track", "It reports a pose of the body within 60 frames.", "tracker.body-start", 30s, track},
     {"tracker.body-pose",
      "A body has at most one pose per frame: finite, orthonormal to 1e-9, with a valid state and age, and a "
      "covariance "
      "that is 0 or symmetric and positive semidefinite.",
-     kind, gate, 20s, pose},
-    {"tracker.unknown-body", "A body that it does not know is rejected with CONFIGURATION.", kind, gate, 20s,
-     unknown_body},
+     gate, 20s, pose},
+    {"tracker.unknown-body", "A body that it does not know is rejected with CONFIGURATION.", gate, 20s, unknown_body},
 };
 
 } // namespace

@@ -220,37 +220,36 @@ void map(Context &context) {
                 image);
 }
 
-constexpr arhost_kind kind = ARHOST_KIND_TRACKER;
 // If a prerequisite fails, the other tests of corners and poses fail for the same reason.
 constexpr const char *gate = "tracker.track", *order_gate = "tracker.corner-order", *corner_gate = "tracker.corners";
 constexpr Test tests[] = {
     {"tracker.corner-order",
-     "Corners are top left, top right, bottom right, bottom left on the upright print, for any rotation of it.", kind,
-     gate, 20s, corner_order},
+     "Corners are top left, top right, bottom right, bottom left on the upright print, for any rotation of it.", gate,
+     20s, corner_order},
     {"tracker.corners",
-     "Corners are accurate to 0.3 px each and 0.06 px on average, where pixel centres are at integers.", kind,
-     order_gate, 20s, corners},
+     "Corners are accurate to 0.3 px each and 0.06 px on average, where pixel centres are at integers.", order_gate,
+     20s, corners},
     {"tracker.tilt-and-distance",
      "Corners of markers 30 to 130 px wide, tilted by 20° to 60°, give poses accurate to 1.5° and 1 % of the "
      "distance.",
-     kind, corner_gate, 30s, tilt_and_distance},
+     corner_gate, 30s, tilt_and_distance},
     {"tracker.near-frontal",
-     "Corners of a nearly frontal marker give a pose accurate to 4°, not tilted to the wrong side.", kind,
-     corner_gate, 20s, near_frontal},
-    {"tracker.intrinsics", "Corners are accurate with any focal lengths and principal point, also in a crop.", kind,
+     "Corners of a nearly frontal marker give a pose accurate to 4°, not tilted to the wrong side.", corner_gate, 20s,
+     near_frontal},
+    {"tracker.intrinsics", "Corners are accurate with any focal lengths and principal point, also in a crop.",
      corner_gate, 20s, intrinsics},
     {"tracker.lens",
      "With Brown's lens model, corners are in the distorted frame: they give poses accurate to 1.5° and 1 % of the "
      "distance.",
-     kind, corner_gate, 20s, lens},
+     corner_gate, 20s, lens},
     {"tracker.fisheye",
      "A fisheye lens is rejected, or corners are in the distorted frame: they give poses accurate to 1.5° and 1 % of "
      "the distance.",
-     kind, corner_gate, 20s, fisheye},
+     corner_gate, 20s, fisheye},
     {"tracker.map",
      "The markers of a map are observed, each once; together, their corners give a pose accurate to 0.5° and 0.3 % "
      "of the distance.",
-     kind, corner_gate, 20s, map},
+     corner_gate, 20s, map},
 };
 
 } // namespace
