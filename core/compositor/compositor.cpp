@@ -19,10 +19,6 @@ Region clipped(const Region &region, const ImageView &overlay, const arhost_fram
             std::min(region.height, format.height - region.y)};
 }
 
-bool contains(const Region &region, std::size_t x, std::size_t y) {
-    return x >= region.x && x - region.x < region.width && y >= region.y && y - region.y < region.height;
-}
-
 void convert_row(const arhost_frame_format &format, const YuvMatrix &matrix, const std::uint8_t *const planes[],
                  std::size_t y, std::uint8_t *bgr) {
     const auto row = [&](std::size_t plane, std::size_t at) { return planes[plane] + at * format.stride[plane]; };
@@ -37,26 +33,6 @@ void convert_row(const arhost_frame_format &format, const YuvMatrix &matrix, con
         return rows::bgr_from_nv12(row(0, y), row(1, y / 2), matrix, bgr, format.width);
     case ARHOST_PIXEL_FORMAT_I420:
         return rows::bgr_from_i420(row(0, y), row(1, y / 2), row(2, y / 2), matrix, bgr, format.width);
-    }
-}
-
-Bgr pixel(const arhost_frame_format &format, const std::uint8_t *const planes[], std::size_t x, std::size_t y) {
-    const auto row = [&](std::size_t plane, std::size_t at) { return planes[plane] + at * format.stride[plane]; };
-    const std::uint8_t *first = row(0, y);
-    const YuvMatrix matrix = yuv_matrix(format);
-    switch (format.pixel_format) {
-    case ARHOST_PIXEL_FORMAT_GREY8:
-        return {first[x], first[x], first[x]};
-    case ARHOST_PIXEL_FORMAT_RGB8:
-        return {first[3 * x + 2], first[3 * x + 1], first[3 * x]};
-    case ARHOST_PIXEL_FORMAT_YUYV:
-        return bgr_from_yuv(matrix, first[2 * x], first[x / 2 * 4 + 1], first[x / 2 * 4 + 3]);
-    case ARHOST_PIXEL_FORMAT_NV12:
-        return bgr_from_yuv(matrix, first[x], row(1, y / 2)[x / 2 * 2], row(1, y / 2)[x / 2 * 2 + 1]);
-    case ARHOST_PIXEL_FORMAT_I420:
-        return bgr_from_yuv(matrix, first[x], row(1, y / 2)[x / 2], row(2, y / 2)[x / 2]);
-    default:
-        return {first[3 * x], first[3 * x + 1], first[3 * x + 2]};
     }
 }
 
@@ -134,7 +110,7 @@ void composite(const arhost_frame_format &format, const std::uint8_t *const plan
     for (std::size_t y = 0; y < format.height; ++y) {
         std::uint8_t *to = out.bgr + y * out.stride;
         const std::uint8_t *from = to; // a row that was converted to BGR is blended in place
-        const bool blending = contains(inside, inside.x, y);
+        const bool blending = inside.width > 0 && y >= inside.y && y - inside.y < inside.height;
         if (format.pixel_format != ARHOST_PIXEL_FORMAT_BGR8) {
             convert_row(format, matrix, planes, y, to);
         } else {
@@ -150,20 +126,6 @@ void composite(const arhost_frame_format &format, const std::uint8_t *const plan
             rows::blend(from + begin, overlay.rgba + y * overlay.stride + 4 * std::size_t(inside.x), to + begin,
                         inside.width);
     }
-}
-
-void composite_reference(const arhost_frame_format &format, const std::uint8_t *const planes[ARHOST_MAX_PLANES],
-                         const ImageView &overlay, const Region &region, const OutputView &out) {
-    const Region inside = clipped(region, overlay, format);
-    for (std::size_t y = 0; y < format.height; ++y)
-        for (std::size_t x = 0; x < format.width; ++x) {
-            Bgr c = pixel(format, planes, x, y);
-            if (contains(inside, x, y)) {
-                const std::uint8_t *rgba = overlay.rgba + y * overlay.stride + 4 * x;
-                c = {blended(c.b, rgba[2], rgba[3]), blended(c.g, rgba[1], rgba[3]), blended(c.r, rgba[0], rgba[3])};
-            }
-            std::memcpy(out.bgr + y * out.stride + 3 * x, &c, 3);
-        }
 }
 
 } // namespace arhost

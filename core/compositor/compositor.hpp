@@ -59,8 +59,4 @@ Region enlarge(const ImageView &image, std::uint32_t from_width, std::uint32_t f
 void composite(const arhost_frame_format &format, const std::uint8_t *const planes[ARHOST_MAX_PLANES],
                const ImageView &overlay, const Region &region, const OutputView &out);
 
-// Reference implementation for tests: writes the same bytes as composite(), but processes one pixel at a time.
-void composite_reference(const arhost_frame_format &format, const std::uint8_t *const planes[ARHOST_MAX_PLANES],
-                         const ImageView &overlay, const Region &region, const OutputView &out);
-
 } // namespace arhost

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "compositor/compositor.hpp"
+#include "pixels/formulas.hpp"
 
 #include "../pixels/instruction_sets.hpp"
 
@@ -83,6 +84,44 @@ struct Scene {
     const std::uint8_t *planes[ARHOST_MAX_PLANES] = {};
     std::size_t overlay_stride = 0, out_stride = 0, out_shift = 0;
 };
+
+bool contains(const Region &region, std::size_t x, std::size_t y) {
+    return x >= region.x && x - region.x < region.width && y >= region.y && y - region.y < region.height;
+}
+
+Bgr pixel(const arhost_frame_format &format, const std::uint8_t *const planes[], std::size_t x, std::size_t y) {
+    const auto row = [&](std::size_t plane, std::size_t at) { return planes[plane] + at * format.stride[plane]; };
+    const std::uint8_t *first = row(0, y);
+    const YuvMatrix matrix = yuv_matrix(format);
+    switch (format.pixel_format) {
+    case ARHOST_PIXEL_FORMAT_GREY8:
+        return {first[x], first[x], first[x]};
+    case ARHOST_PIXEL_FORMAT_RGB8:
+        return {first[3 * x + 2], first[3 * x + 1], first[3 * x]};
+    case ARHOST_PIXEL_FORMAT_YUYV:
+        return bgr_from_yuv(matrix, first[2 * x], first[x / 2 * 4 + 1], first[x / 2 * 4 + 3]);
+    case ARHOST_PIXEL_FORMAT_NV12:
+        return bgr_from_yuv(matrix, first[x], row(1, y / 2)[x / 2 * 2], row(1, y / 2)[x / 2 * 2 + 1]);
+    case ARHOST_PIXEL_FORMAT_I420:
+        return bgr_from_yuv(matrix, first[x], row(1, y / 2)[x / 2], row(2, y / 2)[x / 2]);
+    default:
+        return {first[3 * x], first[3 * x + 1], first[3 * x + 2]};
+    }
+}
+
+// Writes the same bytes as composite(), but processes one pixel at a time.
+void composite_reference(const arhost_frame_format &format, const std::uint8_t *const planes[ARHOST_MAX_PLANES],
+                         const ImageView &overlay, const Region &region, const OutputView &out) {
+    for (std::size_t y = 0; y < format.height; ++y)
+        for (std::size_t x = 0; x < format.width; ++x) {
+            Bgr c = pixel(format, planes, x, y);
+            if (contains(region, x, y)) {
+                const std::uint8_t *rgba = overlay.rgba + y * overlay.stride + 4 * x;
+                c = {blended(c.b, rgba[2], rgba[3]), blended(c.g, rgba[1], rgba[3]), blended(c.r, rgba[0], rgba[3])};
+            }
+            std::memcpy(out.bgr + y * out.stride + 3 * x, &c, 3);
+        }
+}
 
 } // namespace
 
