@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/text.hpp"
 
-#include <nlohmann/json.hpp>
+#include <iterator>
+#include <utf8.h>
 
 namespace arhost::base {
 namespace {
@@ -16,12 +17,13 @@ bool is_unsafe(std::string_view c) {
 } // namespace
 
 bool is_utf8(std::string_view text) {
-    return valid_utf8(text) == text;
+    return utf8::is_valid(text.begin(), text.end());
 }
 
 std::string valid_utf8(std::string_view text) {
-    using Json = nlohmann::json;
-    return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
+    std::string valid;
+    utf8::replace_invalid(text.begin(), text.end(), std::back_inserter(valid));
+    return valid;
 }
 
 std::string printable(std::string_view text, std::size_t max_size) {
