@@ -4,7 +4,7 @@ find_program(GZIP gzip REQUIRED)
 set(pages_directory ${CMAKE_BINARY_DIR}/pages)
 file(MAKE_DIRECTORY ${pages_directory})
 set(pages)
-foreach(program arhost arhost-calibrate arhost-conform arhost-inprocess arhost-map arhost-marker render-scene)
+foreach(program arhost arhost-inprocess ${ARHOST_COMMANDS} render-scene)
   set(page ${pages_directory}/${program}.1.gz)
   add_custom_command(OUTPUT ${page} DEPENDS ${program} VERBATIM
                      COMMAND ${program} --generate man > ${program}.1
@@ -21,16 +21,17 @@ install(FILES ${pages} DESTINATION share/man/man1)
 
 # zsh autoloads the file as a function, so its last line calls the function.
 foreach(shell bash zsh fish)
+  set(commands)
+  foreach(command ${ARHOST_COMMANDS})
+    list(APPEND commands COMMAND ${command} --generate ${shell} >> arhost.${shell})
+  endforeach()
   set(last_line)
   if(shell STREQUAL zsh)
     set(last_line COMMAND ${CMAKE_COMMAND} -E echo "_arhost \"$@\"" >> arhost.zsh)
   endif()
-  add_custom_command(OUTPUT ${pages_directory}/arhost.${shell} DEPENDS arhost arhost-calibrate arhost-conform arhost-map arhost-marker VERBATIM
+  add_custom_command(OUTPUT ${pages_directory}/arhost.${shell} DEPENDS arhost ${ARHOST_COMMANDS} VERBATIM
                      COMMAND arhost --generate ${shell} > arhost.${shell}
-                     COMMAND arhost-conform --generate ${shell} >> arhost.${shell}
-                     COMMAND arhost-map --generate ${shell} >> arhost.${shell}
-                     COMMAND arhost-marker --generate ${shell} >> arhost.${shell}
-                     COMMAND arhost-calibrate --generate ${shell} >> arhost.${shell}
+                     ${commands}
                      ${last_line}
                      WORKING_DIRECTORY ${pages_directory})
   list(APPEND pages ${pages_directory}/arhost.${shell})

@@ -322,7 +322,7 @@ void devices(Context &context) {
         throw Skip("it does not have the extension " ARHOST_DEVICES_EXTENSION);
     const Host host;
     const auto list = [&] {
-        std::optional<ipc::DeviceList> listed;
+        std::optional<devices::DeviceList> listed;
         arhost_status status;
         try {
             status = in_call(context.library.calls(), Call::devices,
@@ -332,18 +332,18 @@ void devices(Context &context) {
         }
         if (status != ARHOST_STATUS_OK)
             throw Failure(call_result("list", status, host));
-        return listed ? listed->devices : std::vector<ipc::DeviceDescription>();
+        return listed ? listed->devices : std::vector<devices::DeviceDescription>();
     };
     // A camera may change the value of a control at any time, for example if it sets its gain automatically.
-    const auto without_values = [](std::vector<ipc::DeviceDescription> listed) {
-        for (ipc::DeviceDescription &device : listed)
-            for (ipc::DeviceControl &control : device.controls)
+    const auto without_values = [](std::vector<devices::DeviceDescription> listed) {
+        for (devices::DeviceDescription &device : listed)
+            for (devices::DeviceControl &control : device.controls)
                 control.value.reset();
         return listed;
     };
-    const std::vector<ipc::DeviceDescription> first = list();
+    const std::vector<devices::DeviceDescription> first = list();
     const ProcessUsage before = ProcessUsage::now();
-    const std::vector<ipc::DeviceDescription> again = list();
+    const std::vector<devices::DeviceDescription> again = list();
     constexpr long allowed_kib = 4096;
     if (const std::string grown = growth(before, ProcessUsage::now(), allowed_kib); !grown.empty())
         throw Failure("listing the devices again, the process grew " + grown);

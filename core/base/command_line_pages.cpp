@@ -54,6 +54,11 @@ std::string program_name(const PageCommand &program) {
     return replaced(program.name, " ", "-");
 }
 
+// The shell function that completes a command: "arhost new-plugin" → "_arhost_new_plugin"
+std::string function_name(const std::string &command) {
+    return "_" + replaced(replaced(command, " ", "_"), "-", "_");
+}
+
 // ---- Man pages ---------------------------------------------------------------------------------------------------
 
 std::string roff(const std::string &text) {
@@ -141,14 +146,14 @@ std::string bash_command(const PageCommand &command, const std::vector<PageComma
 }
 
 std::string bash_completion(const PageCommand &program, const std::vector<PageCommand> &commands) {
-    const std::string function = "_" + replaced(program_name(program), "-", "_");
+    const std::string function = function_name(program.name);
     std::string names, cases;
     for (const PageCommand &command : commands) {
         names += (names.empty() ? "" : " | ") + command.name;
-        cases +=
-            "    " + command.name + ")\n" +
-            (command.is_program ? "        " + function + "_" + command.name + "\n" : bash_command(command, {})) +
-            "        ;;\n";
+        cases += "    " + command.name + ")\n" +
+                 (command.is_program ? "        " + function_name(program.name + " " + command.name) + "\n"
+                                     : bash_command(command, {})) +
+                 "        ;;\n";
     }
     return "# bash completion of " + program.name + ", generated from the definitions of its command line.\n" +
            "_arhost_words() {\n    local word\n    while read -r word; do COMPREPLY+=(\"$word\"); done < <(compgen "
@@ -200,7 +205,7 @@ std::string zsh_specs(const PageCommand &command, bool with_positionals) {
 }
 
 std::string zsh_completion(const PageCommand &program, const std::vector<PageCommand> &commands) {
-    const std::string function = "_" + replaced(program_name(program), "-", "_");
+    const std::string function = function_name(program.name);
     std::string text = commands.empty() ? "" : "#compdef " + program_name(program) + "\n";
     text += function + "() {\n";
     if (commands.empty())
@@ -209,7 +214,7 @@ std::string zsh_completion(const PageCommand &program, const std::vector<PageCom
     for (const PageCommand &command : commands) {
         names += " \\\n            '" + command.name + ":" + zsh_text(command.description) + "'";
         cases += "        " + command.name + ")\n    " +
-                 (command.is_program ? function + "_" + command.name + "\n"
+                 (command.is_program ? function_name(program.name + " " + command.name) + "\n"
                                      : "_arguments -S -s" + zsh_specs(command, true)) +
                  "        ;;\n";
     }

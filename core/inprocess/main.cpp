@@ -2,7 +2,8 @@
 //
 // arhost-inprocess: runs a configuration like `arhost --config FILE`, but in one process and without deadlines and
 // sandbox, for debuggers, valgrind and sanitizers. If a plugin crashes, the whole program crashes.
-#include "host/program.hpp"
+#include "base/program.hpp"
+#include "host/run_options.hpp"
 #include "inprocess/thread_starter.hpp"
 #include "worker/session.hpp"
 
@@ -19,9 +20,9 @@ int main(int argc, char **argv) {
     host::Arguments arguments;
     arguments.in_process = true;
     add_run_options(app, arguments).required();
-    if (const auto status = app.parse(argc, argv))
-        return *status;
-    return host::exit_status_of([&] {
+    return base::exit_status_of([&] {
+        if (const auto status = app.parse(argc, argv))
+            return *status;
         inprocess::ThreadStarter starter;
         return host::run(arguments, starter);
     });

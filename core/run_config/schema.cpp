@@ -2,7 +2,6 @@
 #include "run_config/schema.hpp"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 namespace arhost::run_config {
@@ -233,92 +232,6 @@ std::pair<std::string_view, std::string_view> split(std::string_view path) {
     return {path.substr(0, dot), path.substr(dot + 1)};
 }
 
-const char *type_name(Type type) {
-    switch (type) {
-    case map:
-        return "map";
-    case list:
-        return "list";
-    case text:
-        return "text";
-    case input_path:
-        return "path (input)";
-    case output_path:
-        return "path (output)";
-    case integer:
-        return "whole number";
-    case real:
-        return "number";
-    case boolean:
-        return "true or false";
-    case reals:
-        return "list of numbers";
-    case free_map:
-        return "map of options";
-    }
-    return "";
-}
-
-using Json = nlohmann::ordered_json;
-
-Json json_schema_of_map(std::string_view path);
-
-Json json_schema_of(const Key &key) {
-    Json json;
-    switch (key.type) {
-    case map:
-        json = json_schema_of_map(key.path);
-        break;
-    case free_map:
-        json["type"] = "object";
-        break;
-    case list: {
-        json["type"] = "array";
-        const std::string element = key.path + "[]";
-        json["items"] = keys_of(element).empty() ? Json{{"type", "string"}} : json_schema_of_map(element);
-        break;
-    }
-    case reals:
-        json = {{"type", "array"}, {"items", {{"type", "number"}}}};
-        break;
-    case integer:
-        json["type"] = "integer";
-        break;
-    case real:
-        json["type"] = "number";
-        break;
-    case boolean:
-        json["type"] = "boolean";
-        break;
-    default:
-        json["type"] = "string";
-    }
-    if (!key.choices.empty())
-        json["enum"] = key.choices;
-    if (key.path == "version")
-        json["const"] = 1;
-    if (key.path == "tracker.targets[].ids")
-        json["type"] = {"string", "integer", "array"};
-    json["description"] = key.meaning;
-    return json;
-}
-
-Json json_schema_of_map(std::string_view path) {
-    Json json = {{"type", "object"}, {"additionalProperties", false}};
-    Json required = Json::array();
-    for (const Key &key : table()) {
-        const auto [parent, name] = split(key.path);
-        if (parent != path)
-            continue;
-        json["properties"][std::string(name)] = json_schema_of(key);
-        if (key.required)
-            required.push_back(name);
-    }
-    if (!required.empty())
-        json["required"] = required;
-    return json;
-}
-
 } // namespace
 
 std::span<const Key> schema() {
@@ -338,23 +251,6 @@ const Key &key_at(std::string_view path) {
     if (found == table().end())
         throw std::logic_error("no key " + std::string(path));
     return *found;
-}
-
-std::string schema_as_markdown() {
-    std::string text = "| key | type | default | meaning |\n| --- | --- | --- | --- |\n";
-    for (const Key &key : table()) {
-        const std::string standard = key.required                ? "**required**"
-                                     : key.default_value.empty() ? "—"
-                                                                 : std::string(key.default_value);
-        text += "| `" + key.path + "` | " + type_name(key.type) + " | " + standard + " | " + key.meaning + " |\n";
-    }
-    return text;
-}
-
-std::string schema_as_json_schema() {
-    Json json = {{"$schema", "https://json-schema.org/draft/2020-12/schema"}, {"title", "arhost configuration"}};
-    json.update(json_schema_of_map(""));
-    return json.dump(2) + "\n";
 }
 
 } // namespace arhost::run_config

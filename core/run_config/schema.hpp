@@ -28,7 +28,4 @@ std::span<const Key> schema();
 std::vector<std::string_view> keys_of(std::string_view path);
 const Key &key_at(std::string_view path);
 
-std::string schema_as_markdown();    // the table in docs/config.md
-std::string schema_as_json_schema(); // the contents of docs/arhost.schema.json
-
 } // namespace arhost::run_config

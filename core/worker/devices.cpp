@@ -9,7 +9,7 @@ namespace arhost::worker {
 namespace {
 
 struct Listing {
-    ipc::DeviceList list;
+    devices::DeviceList list;
     std::exception_ptr fault; // contract violation
 };
 
@@ -19,7 +19,7 @@ void add_device(void *context, const arhost_device *device) noexcept {
         return;
     try {
         if (listing.list.devices.size() < ARHOST_MAX_DEVICES)
-            listing.list.devices.push_back(ipc::describe(device));
+            listing.list.devices.push_back(devices::describe(device));
         else
             ++listing.list.left_out;
     } catch (...) { // no exception may propagate into the plugin
@@ -30,7 +30,7 @@ void add_device(void *context, const arhost_device *device) noexcept {
 } // namespace
 
 arhost_status list_devices(const arhost_plugin &plugin, const arhost_host &host,
-                           std::optional<ipc::DeviceList> &list) {
+                           std::optional<devices::DeviceList> &list) {
     const auto *extension = static_cast<const arhost_devices *>(plugin.get_extension(ARHOST_DEVICES_EXTENSION));
     if (!extension)
         return ARHOST_STATUS_OK;

@@ -3,7 +3,7 @@
 // Lists a plugin's devices through the extension of arhost/devices.h.
 #pragma once
 
-#include "ipc/device_list.hpp"
+#include "devices/device_list.hpp"
 
 #include <arhost/arhost.h>
 
@@ -13,6 +13,6 @@ namespace arhost::worker {
 // plugin's `list` function, or ARHOST_STATUS_OK without the extension. Throws std::runtime_error with a message for
 // the user if the plugin violates the extension's contract.
 arhost_status list_devices(const arhost_plugin &plugin, const arhost_host &host,
-                           std::optional<ipc::DeviceList> &list);
+                           std::optional<devices::DeviceList> &list);
 
 } // namespace arhost::worker

@@ -257,7 +257,7 @@ sandbox::Level log_level(const Link &link, sandbox::Level level) {
 }
 
 void send_devices(const Link &link, const PluginHost &host, const arhost_plugin &plugin) {
-    std::optional<DeviceList> list;
+    std::optional<devices::DeviceList> list;
     arhost_status status;
     {
         const Link::InCall call(link, Call::devices);
@@ -267,7 +267,7 @@ void send_devices(const Link &link, const PluginHost &host, const arhost_plugin 
         link.send(host.failed(status));
         return;
     }
-    const std::string text = to_text(list);
+    const std::string text = devices::to_text(list);
     for (std::size_t at = 0; at < text.size(); at += messages::Devices::max_part)
         link.send(messages::Devices{text.substr(at, messages::Devices::max_part),
                                     at + messages::Devices::max_part >= text.size()});

@@ -4,6 +4,8 @@
 // fix the error. Used for configurations, scenes and calibrations.
 #pragma once
 
+#include "base/program.hpp"
+
 #include <yaml-cpp/yaml.h>
 
 #include <cstdint>
@@ -23,9 +25,9 @@
 namespace arhost::yaml {
 
 // what() is one line for the user: "lab.yaml:12:5: tracker.targets[0].side_mm: must be …".
-class Error : public std::runtime_error {
+class Error : public base::InvalidInput {
 public:
-    using std::runtime_error::runtime_error;
+    using InvalidInput::InvalidInput;
 };
 
 // Larger files are rejected, because reading them would take seconds.

@@ -551,13 +551,16 @@ TEST(CommandLine, CompletesInZsh) {
 
 TEST(CommandLine, HasAManPageForEachProgram) {
     const std::filesystem::path pages = arhost::test::build_directory() + "/pages";
-    for (const char *program : {"arhost", "arhost-calibrate", "arhost-conform", "arhost-inprocess", "arhost-launcher",
-                                "arhost-map", "arhost-marker", "arhost-worker", "render-scene"})
+    for (const char *program :
+         {"arhost", "arhost-calibrate", "arhost-conform", "arhost-ctl", "arhost-devices", "arhost-inprocess",
+          "arhost-launcher", "arhost-map", "arhost-marker", "arhost-new-plugin", "arhost-plugins", "arhost-schema",
+          "arhost-worker", "render-scene"})
         EXPECT_TRUE(std::filesystem::is_regular_file(pages / (std::string(program) + ".1.gz"))) << program;
     ArhostRun run;
     EXPECT_EQ(run.run({"--generate", "man"}), 0);
-    for (const char *part : {"\n.SH SYNOPSIS\n\\fBarhost\\fR [\\fIOPTIONS\\fR] [\\fIFILE\\fR]\n",
-                             "\n.SS arhost check\n", "\\fB\\-\\-no\\-open\\fR\n", "one of: c, cpp, rust, python"})
+    for (const char *part :
+         {"\n.SH SYNOPSIS\n\\fBarhost\\fR [\\fIOPTIONS\\fR] [\\fIFILE\\fR]\n", "\n.SS arhost check\n",
+          "\\fB\\-\\-no\\-open\\fR\n", "one of: replay, latency, check", "See arhost\\-new\\-plugin(1)."})
         EXPECT_THAT(run.output(), HasSubstr(part));
 }
 

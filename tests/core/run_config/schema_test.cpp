@@ -1,35 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_config/schema.hpp"
 
-#include <directories.hpp>
 #include <gmock/gmock.h>
 
-#include <fstream>
 #include <set>
-#include <sstream>
 
 using namespace arhost::run_config;
-
-namespace {
-
-std::string document(const std::string &name) {
-    std::ifstream stream(arhost::test::source_directory() + "/docs/" + name);
-    std::ostringstream text;
-    text << stream.rdbuf();
-    return text.str();
-}
-
-} // namespace
-
-TEST(Schema, MatchesTheDocumentation) {
-    EXPECT_THAT(document("config.md"), testing::HasSubstr(schema_as_markdown()))
-        << "docs/config.md is out of date: replace its table with the output of 'arhost schema --markdown'";
-}
-
-TEST(Schema, MatchesTheJsonSchemaFile) {
-    EXPECT_EQ(document("arhost.schema.json"), schema_as_json_schema())
-        << "docs/arhost.schema.json is out of date: replace it with the output of 'arhost schema'";
-}
 
 TEST(Schema, ListsEachKeyOnceUnderAListedParent) {
     std::set<std::string> seen;

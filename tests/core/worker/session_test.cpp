@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Tests a worker process with a plugin; the test takes the role of the host.
-#include "ipc/device_list.hpp"
+#include "devices/device_list.hpp"
 #include "supervise/process.hpp"
 
 #include "plugin_under_test.hpp"
@@ -64,7 +64,7 @@ TEST(Worker, ListsDevicesRepeatedlyBeforeCreate) {
         worker.process.send(messages::ListDevices{});
         const auto answer = worker.next<messages::Devices>().value();
         EXPECT_TRUE(answer.is_last);
-        EXPECT_EQ(devices_from_text(answer.part).value().devices.size(), 2u);
+        EXPECT_EQ(devices::devices_from_text(answer.part).value().devices.size(), 2u);
     }
     worker.process.send(messages::Create{default_options(*hello), messages::SourceSetup{}});
     EXPECT_TRUE(worker.next<messages::Ready>().value().format);

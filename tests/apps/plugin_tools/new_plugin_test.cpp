@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Tests what `arhost new-plugin` writes and rejects. tests/sdk builds and tests the skeletons.
-#include "host/new_plugin.hpp"
+#include "plugin_tools/new_plugin.hpp"
 
 #include "plugin_under_test.hpp"
 
@@ -12,7 +12,7 @@
 #include <regex>
 #include <sstream>
 
-using namespace arhost::host;
+using namespace arhost::plugin_tools;
 using testing::HasSubstr;
 namespace fs = std::filesystem;
 

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Tests that query real plugins in real workers.
-#include "host/probe.hpp"
+#include "plugin_tools/device_listing.hpp"
+
 #include "plugin_under_test.hpp"
+#include "supervise/probe.hpp"
 
 #include <directories.hpp>
 #include <gmock/gmock.h>
 
 using namespace arhost;
-using namespace arhost::ipc;
+using namespace arhost::devices;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -18,12 +20,12 @@ struct Probe : testing::Test {
     // Sets the folder in which GPU drivers keep their shader caches.
     void SetUp() override { ::setenv("XDG_CACHE_HOME", scratch.path().c_str(), 1); }
 
-    host::DevicesResult devices(const std::string &plugin, const std::vector<std::string> &needs = {},
-                                std::chrono::seconds timeout = std::chrono::seconds(60)) {
-        return host::list_devices(context(), file(plugin), {}, needs, timeout);
+    plugin_tools::DevicesResult devices(const std::string &plugin, const std::vector<std::string> &needs = {},
+                                        std::chrono::seconds timeout = std::chrono::seconds(60)) {
+        return plugin_tools::list_devices(context(), file(plugin), {}, needs, timeout);
     }
     DeviceList list(const std::string &plugin, const std::vector<std::string> &needs = {}) {
-        const host::DevicesResult result = devices(plugin, needs);
+        const plugin_tools::DevicesResult result = devices(plugin, needs);
         if (const auto *reason = std::get_if<std::string>(&result))
             throw std::runtime_error(*reason);
         return std::get<std::optional<DeviceList>>(result).value();
@@ -46,7 +48,7 @@ struct Probe : testing::Test {
     test::ScratchFolder scratch;
 
 private:
-    Reactor reactor_;
+    ipc::Reactor reactor_;
     std::optional<supervise::Launcher>
         launcher_; // created in SetUp, because it inherits the environment that is set there
     std::optional<supervise::Context> context_;
@@ -56,12 +58,12 @@ private:
 
 TEST_F(Probe, DescribesAPluginOrWhyItIsUnusable) {
     std::string level;
-    const host::ProbeResult good = host::probe(context(), file("source_counter"), {}, &level);
-    EXPECT_EQ(std::get<PluginDescription>(good).id, "source_counter");
+    const supervise::ProbeResult good = supervise::probe(context(), file("source_counter"), {}, &level);
+    EXPECT_EQ(std::get<ipc::PluginDescription>(good).id, "source_counter");
     EXPECT_NE(level, "");
-    EXPECT_THAT(std::get<std::string>(host::probe(context(), file("no_plugin"), {})),
+    EXPECT_THAT(std::get<std::string>(supervise::probe(context(), file("no_plugin"), {})),
                 HasSubstr("is not an arhost plugin"));
-    EXPECT_THAT(std::get<std::string>(host::probe(context(), file("broken_constructor"), {})),
+    EXPECT_THAT(std::get<std::string>(supervise::probe(context(), file("broken_constructor"), {})),
                 HasSubstr("while its library was loaded"));
 }
 
@@ -119,7 +121,7 @@ TEST_F(Probe, ReportsWhyDevicesCantBeListed) {
 
 TEST_F(Probe, GrantsDevicesButNoNetwork) {
     std::string level;
-    host::probe(context(), file("lister_gpu"), {}, &level);
+    supervise::probe(context(), file("lister_gpu"), {}, &level);
     if (level.substr(0, level.find("MISSING")).find("seccomp") == std::string::npos)
         GTEST_SKIP() << "this machine's sandbox is: " << level;
     const DeviceList with = list("lister_gpu", {"gpu", "network"}), without = list("lister_gpu");

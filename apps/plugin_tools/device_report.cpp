@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/device_report.hpp"
+#include "plugin_tools/device_report.hpp"
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
 #include <fstream>
@@ -12,14 +12,14 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-namespace arhost::host {
+namespace arhost::plugin_tools {
 namespace {
 
 namespace fs = std::filesystem;
-using ipc::DeviceControl;
-using ipc::DeviceDescription;
-using ipc::DeviceFormat;
-using ipc::DeviceSize;
+using devices::DeviceControl;
+using devices::DeviceDescription;
+using devices::DeviceFormat;
+using devices::DeviceSize;
 using Json = nlohmann::ordered_json;
 
 enum class Section { cameras, gpus, displays };
@@ -99,7 +99,7 @@ Json json_of(const DeviceFormat &format) {
 
 Json json_of(const DeviceControl &c) {
     return {{"name", c.name},
-            {"type", ipc::control_type_text(c.type)},
+            {"type", devices::control_type_text(c.type)},
             {"minimum", c.minimum},
             {"maximum", c.maximum},
             {"step", c.step},
@@ -127,7 +127,7 @@ Json json_of(const DeviceDescription &d, const std::string &plugin) {
     case Section::gpus:
         json.update({{"index", d.index},
                      {"name", d.name},
-                     {"kind", ipc::device_kind_text(d.kind)},
+                     {"kind", devices::device_kind_text(d.kind)},
                      {"uuid", text_or_null(d.serial)},
                      {"abilities", text_or_null(d.abilities)},
                      {"is_default", d.is_default}});
@@ -164,7 +164,7 @@ std::string text_of(const DeviceFormat &format) {
 }
 
 std::string text_of(const DeviceControl &control) {
-    std::string text = fmt::format("    {:<31} {}", control.name, ipc::control_type_text(control.type));
+    std::string text = fmt::format("    {:<31} {}", control.name, devices::control_type_text(control.type));
     if (control.type == ARHOST_DEVICE_CONTROL_BUTTON)
         return text;
     text += fmt::format(" {} to {}", control.minimum, control.maximum);
@@ -189,7 +189,7 @@ std::string headline(const DeviceDescription &d, const std::string &plugin) {
         return text + " [" + plugin + "]";
     }
     default:
-        return fmt::format("GPU {}: {} ({}{}{}){} [{}]", d.index, d.name, ipc::device_kind_text(d.kind),
+        return fmt::format("GPU {}: {} ({}{}{}){} [{}]", d.index, d.name, devices::device_kind_text(d.kind),
                            d.serial.empty() ? "" : ", ", d.serial, d.is_default ? ", the default" : "", plugin);
     }
 }
@@ -295,4 +295,4 @@ std::vector<std::string> devices_as_text(const std::vector<PluginDevices> &plugi
     return lines;
 }
 
-} // namespace arhost::host
+} // namespace arhost::plugin_tools

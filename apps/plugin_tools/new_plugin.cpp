@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/new_plugin.hpp"
+#include "plugin_tools/new_plugin.hpp"
 
+#include "base/program.hpp"
 #include "base/text.hpp"
-#include "host/commands.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -15,7 +15,7 @@
 #include <sstream>
 #include <stdexcept>
 
-namespace arhost::host {
+namespace arhost::plugin_tools {
 namespace {
 
 namespace fs = std::filesystem;
@@ -164,7 +164,7 @@ int new_plugin(const NewPlugin &plugin, const fs::path &prefix) {
     }
     std::printf("%s: a working %s in %s. Its README.md explains how to build, run and extend it.\n",
                 base::printable(folder.string()).c_str(), plugin.kind.c_str(), plugin.language.c_str());
-    return success;
+    return base::success;
 }
 
-} // namespace arhost::host
+} // namespace arhost::plugin_tools

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ipc/device_list.hpp"
+#include "devices/device_list.hpp"
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
 #include <limits>
 
-using namespace arhost::ipc;
+using namespace arhost::devices;
+using Json = nlohmann::json;
 using testing::HasSubstr;
 
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace arhost::host {
+namespace arhost::plugin_tools {
 
 inline const std::vector<std::string> plugin_kinds = {"raytracer", "tracker", "source", "sink"};
 inline const std::vector<std::string> plugin_languages = {"c", "cpp", "rust", "python"};
@@ -21,4 +21,4 @@ struct NewPlugin {
 // status; throws std::runtime_error.
 int new_plugin(const NewPlugin &plugin, const std::filesystem::path &prefix);
 
-} // namespace arhost::host
+} // namespace arhost::plugin_tools

@@ -3,20 +3,20 @@
 // The output of `arhost devices`, as text and as JSON (docs/devices.schema.json).
 #pragma once
 
-#include "ipc/device_list.hpp"
+#include "devices/device_list.hpp"
 
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
-namespace arhost::host {
+namespace arhost::plugin_tools {
 
 // The answer of one plugin to `arhost devices`.
 struct PluginDevices {
     std::string plugin;
     arhost_kind kind = 0;
-    ipc::DeviceList list;
+    devices::DeviceList list;
     std::string problem; // why the plugin cannot list its devices; "" if it can
 };
 
@@ -25,10 +25,10 @@ std::vector<std::string> holders_of(const std::filesystem::path &node);
 
 // Returns why the device cannot be opened and what to do; "" if it can. A worker cannot see other processes, so the
 // host looks for the processes that use a busy device, and for the group that may open a forbidden one.
-std::string problem_with(const ipc::DeviceDescription &device);
+std::string problem_with(const devices::DeviceDescription &device);
 
 nlohmann::ordered_json devices_as_json(const std::vector<PluginDevices> &plugins);
 // One line per element. Texts of plugins are printable, but those of `problem` may not be.
 std::vector<std::string> devices_as_text(const std::vector<PluginDevices> &plugins);
 
-} // namespace arhost::host
+} // namespace arhost::plugin_tools

@@ -1,25 +1,33 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/ctl.hpp"
-
+//
+// arhost-ctl sends a command to a running arhost whose configuration has the output sink_control. `arhost ctl` runs
+// it.
+#include "base/command_line.hpp"
 #include "base/listening_socket.hpp"
+#include "base/program.hpp"
 #include "base/text.hpp"
 #include "base/write_all.hpp"
-#include "host/commands.hpp"
-#include "host/program.hpp"
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <cstdio>
-#include <map>
 #include <unistd.h>
 
-namespace arhost::host {
 namespace {
 
 using Json = nlohmann::ordered_json;
+namespace base = arhost::base;
+
+struct Arguments {
+    std::string name = "arhost"; // of the run: its socket is $XDG_RUNTIME_DIR/arhost/NAME.sock
+    std::string command;
+    std::vector<std::string> values; // of the command's members
+    bool json = false;               // print the answer as it is
+};
 
 // The members of each command, in the order of the values on the command line.
-const std::map<std::string, std::vector<std::string>, std::less<>> members_of = {
+const std::vector<std::pair<std::string, std::vector<std::string>>> commands = {
     {"quit", {}},
     {"freeze", {"on"}},
     {"snapshot", {}},
@@ -30,9 +38,10 @@ const std::map<std::string, std::vector<std::string>, std::less<>> members_of = 
     {"status", {}},
 };
 
-Json command_of(const CtlArguments &arguments) {
+Json command_of(const Arguments &arguments) {
     Json command = {{"command", arguments.command}};
-    const std::vector<std::string> &members = members_of.at(arguments.command); // the command line was checked
+    const std::vector<std::string> &members = // the command line was checked
+        std::ranges::find(commands, arguments.command, &decltype(commands)::value_type::first)->second;
     if (arguments.values.size() > members.size())
         throw std::runtime_error("'" + arguments.command + "' takes at most " + std::to_string(members.size()) +
                                  " values");
@@ -71,20 +80,19 @@ void print_members(const Json &answer) {
                         base::printable(value.is_string() ? value.get<std::string>() : value.dump()).c_str());
 }
 
-} // namespace
-
-int ctl(const CtlArguments &arguments) {
+// Returns the exit status. Prints the answer, or an error.
+int send(const Arguments &arguments) {
     const std::string command = command_of(arguments).dump() + "\n";
     const auto path = base::named_socket(arguments.name);
     base::UniqueFd socket;
     try {
         socket = base::connect_to(path);
     } catch (const std::system_error &error) {
-        return print_error("no run with the name '" + arguments.name + "' can be reached (" + error.code().message() +
-                               ": " + path.string() +
-                               "); its configuration needs the output sink_control "
-                               "(docs/control.md)",
-                           run_failed);
+        return base::print_error("no run with the name '" + arguments.name + "' can be reached (" +
+                                     error.code().message() + ": " + path.string() +
+                                     "); its configuration needs the output sink_control "
+                                     "(docs/control.md)",
+                                 base::failed);
     }
     base::write_all(socket.get(), command);
     const std::string line = receive_line(socket.get());
@@ -94,8 +102,28 @@ int ctl(const CtlArguments &arguments) {
     else if (answer.value("ok", false))
         print_members(answer);
     if (!answer.value("ok", false))
-        return arguments.json ? run_failed : print_error(answer.value("error", "unknown error"), run_failed);
-    return success;
+        return arguments.json ? base::failed
+                              : base::print_error(answer.value("error", "unknown error"), base::failed);
+    return base::success;
 }
 
-} // namespace arhost::host
+} // namespace
+
+int main(int argc, char **argv) {
+    base::prepare_process();
+    base::CommandLine app("Send a command to a running arhost (docs/control.md)", "arhost ctl");
+    Arguments arguments;
+    std::vector<std::string> names(commands.size());
+    std::ranges::transform(commands, names.begin(), [](const auto &command) { return command.first; });
+    app.option("COMMAND", arguments.command, "The command").required().one_of(names);
+    app.option("VALUE", arguments.values,
+               "freeze and record: on|off; load_scene: SCENE; swap: COMPONENT PLUGIN; set: COMPONENT OPTION VALUE");
+    app.option("--name", arguments.name, "Name of the run, the option 'listen' of its sink_control")
+        .type_name("NAME")
+        .show_default();
+    app.flag("--json", arguments.json, "Print the answer as JSON");
+    return base::exit_status_of([&] {
+        const auto status = app.parse(argc, argv);
+        return status ? *status : send(arguments);
+    });
+}

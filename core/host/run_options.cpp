@@ -1,11 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/program.hpp"
-
-#include "base/text.hpp"
-#include "yaml/yaml.hpp"
-
-#include <cstdio>
-#include <filesystem>
+#include "host/run_options.hpp"
 
 namespace arhost::host {
 
@@ -29,24 +23,6 @@ base::Option add_run_options(base::CommandLine &command, Arguments &arguments) {
     command.flag("--watch", arguments.watch,
                  "Apply edits of the configuration and of the scene while the video runs (docs/control.md)");
     return config;
-}
-
-int print_error(const std::string &why, int exit_status) {
-    std::fprintf(stderr, "error: %s\n", base::printable(why).c_str());
-    return exit_status;
-}
-
-int exit_status_of(const std::function<int()> &command) {
-    try {
-        return command();
-    } catch (const yaml::Error &error) {
-        return print_error(error.what(), bad_configuration);
-    } catch (const std::filesystem::filesystem_error
-                 &error) { // for example: a file name is too long, or a folder is unreadable
-        return print_error(error.path1().string() + ": " + error.code().message(), bad_configuration);
-    } catch (const std::exception &error) {
-        return print_error(error.what(), run_failed);
-    }
 }
 
 } // namespace arhost::host

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ipc/device_list.hpp"
+#include "devices/device_list.hpp"
 
 #include "base/text.hpp"
 
@@ -12,7 +12,29 @@
 #include <functional>
 #include <stdexcept>
 
-namespace arhost::ipc {
+template <> struct nlohmann::adl_serializer<std::optional<std::int64_t>> {
+    static void to_json(json &json, const std::optional<std::int64_t> &value) {
+        json = nullptr;
+        if (value)
+            json = *value;
+    }
+    static void from_json(const json &json, std::optional<std::int64_t> &value) {
+        value.reset();
+        if (!json.is_null())
+            value = json.get<std::int64_t>();
+    }
+};
+
+namespace arhost::devices {
+
+using Json = nlohmann::json;
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(DeviceSize, width, height, is_rate_range, rates)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(DeviceFormat, pixel_format, is_size_range, sizes)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(DeviceControl, name, type, minimum, maximum, step, default_value, value)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(DeviceDescription, index, kind, state, is_default, name, path, serial, abilities,
+                                   problem, formats, controls, width, height, rate)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(DeviceList, devices, left_out)
+
 namespace {
 
 constexpr std::size_t longest_text = max_device_text_size + std::string_view("…").size();
@@ -80,7 +102,13 @@ DeviceControl describe(const arhost_device_control &control) {
     return copy;
 }
 
+void expect_at_most(std::size_t limit, std::size_t size, const char *what) {
+    if (size > limit)
+        reject("more than " + std::to_string(limit) + " " + what);
+}
+
 void check(const DeviceSize &size) {
+    expect_at_most(ARHOST_MAX_DEVICE_RATES, size.rates.size(), "rates");
     if (size.width < 1 || size.height < 1)
         reject("a size of " + std::to_string(size.width) + "×" + std::to_string(size.height) + " px");
     if (!std::ranges::all_of(size.rates, [](double rate) { return std::isfinite(rate) && rate > 0; }))
@@ -92,6 +120,8 @@ void check(const DeviceSize &size) {
 }
 
 void check(const DeviceFormat &format) {
+    expect_at_most(longest_text, format.pixel_format.size(), "bytes in the name of a pixel format");
+    expect_at_most(ARHOST_MAX_DEVICE_SIZES, format.sizes.size(), "sizes");
     if (format.pixel_format.empty())
         reject("a pixel format without a name");
     std::ranges::for_each(format.sizes, [](const DeviceSize &size) { check(size); });
@@ -101,6 +131,7 @@ void check(const DeviceFormat &format) {
 }
 
 void check(const DeviceControl &control) {
+    expect_at_most(longest_text, control.name.size(), "bytes in the name of a control");
     if (control.name.empty())
         reject("a control without a name");
     if (control.type < ARHOST_DEVICE_CONTROL_INTEGER || control.type > ARHOST_DEVICE_CONTROL_BUTTON)
@@ -111,6 +142,10 @@ void check(const DeviceControl &control) {
 
 // Throws if the device violates the contract.
 void check(const DeviceDescription &device) {
+    for (const std::string *text : {&device.name, &device.path, &device.serial, &device.abilities, &device.problem})
+        expect_at_most(longest_text, text->size(), "bytes in a text");
+    expect_at_most(ARHOST_MAX_DEVICE_FORMATS, device.formats.size(), "formats");
+    expect_at_most(ARHOST_MAX_DEVICE_CONTROLS, device.controls.size(), "controls");
     if (device.name.empty())
         reject("a device without a name");
     const std::string which = "the device '" + device.name + "' ";
@@ -129,109 +164,9 @@ void check(const DeviceDescription &device) {
     std::ranges::for_each(device.controls, [](const DeviceControl &control) { check(control); });
 }
 
-// ---- JSON ----
-
-Json to_json(const DeviceFormat &format) {
-    Json sizes = Json::array();
-    for (const DeviceSize &s : format.sizes)
-        sizes.push_back(
-            {{"width", s.width}, {"height", s.height}, {"is_rate_range", s.is_rate_range}, {"rates", s.rates}});
-    return {
-        {"pixel_format", format.pixel_format}, {"is_size_range", format.is_size_range}, {"sizes", std::move(sizes)}};
-}
-
-Json to_json(const DeviceControl &c) {
-    Json json = {{"name", c.name},       {"type", c.type}, {"minimum", c.minimum},
-                 {"maximum", c.maximum}, {"step", c.step}, {"default", c.default_value},
-                 {"value", nullptr}};
-    if (c.value)
-        json["value"] = *c.value;
-    return json;
-}
-
-Json to_json(const DeviceDescription &d) {
-    Json formats = Json::array(), controls = Json::array();
-    for (const DeviceFormat &format : d.formats)
-        formats.push_back(to_json(format));
-    for (const DeviceControl &control : d.controls)
-        controls.push_back(to_json(control));
-    return {{"index", d.index},
-            {"kind", d.kind},
-            {"state", d.state},
-            {"is_default", d.is_default},
-            {"name", d.name},
-            {"path", d.path},
-            {"serial", d.serial},
-            {"abilities", d.abilities},
-            {"problem", d.problem},
-            {"formats", std::move(formats)},
-            {"controls", std::move(controls)},
-            {"width", d.width},
-            {"height", d.height},
-            {"rate", d.rate}};
-}
-
-std::string text_from(const Json &json, const char *key) {
-    std::string text = json.at(key).get<std::string>();
-    if (text.size() > longest_text)
-        reject(std::string("a '") + key + "' that is too long");
-    return text;
-}
-
-const Json &array_from(const Json &json, const char *key, std::size_t limit) {
-    const Json &array = json.at(key);
-    if (!array.is_array() || array.size() > limit)
-        reject(std::string("more than ") + std::to_string(limit) + " '" + key + "'");
-    return array;
-}
-
-DeviceFormat format_from(const Json &json) {
-    DeviceFormat format{text_from(json, "pixel_format"), json.at("is_size_range").get<bool>(), {}};
-    for (const Json &size : array_from(json, "sizes", ARHOST_MAX_DEVICE_SIZES))
-        format.sizes.push_back({size.at("width").get<std::uint32_t>(), size.at("height").get<std::uint32_t>(),
-                                size.at("is_rate_range").get<bool>(),
-                                array_from(size, "rates", ARHOST_MAX_DEVICE_RATES).get<std::vector<double>>()});
-    return format;
-}
-
-DeviceControl control_from(const Json &json) {
-    DeviceControl control{text_from(json, "name"),
-                          json.at("type").get<arhost_device_control_type>(),
-                          json.at("minimum").get<std::int64_t>(),
-                          json.at("maximum").get<std::int64_t>(),
-                          json.at("step").get<std::int64_t>(),
-                          json.at("default").get<std::int64_t>(),
-                          {}};
-    if (!json.at("value").is_null())
-        control.value = json.at("value").get<std::int64_t>();
-    return control;
-}
-
 void check_size(std::string_view text) {
     if (text.size() > max_device_list_size)
         reject("a list of devices that is longer than " + std::to_string(max_device_list_size) + " bytes");
-}
-
-DeviceDescription device_from(const Json &json) {
-    DeviceDescription device;
-    device.index = json.at("index").get<std::uint32_t>();
-    device.kind = json.at("kind").get<arhost_device_kind>();
-    device.state = json.at("state").get<arhost_device_state>();
-    device.is_default = json.at("is_default").get<bool>();
-    device.name = text_from(json, "name");
-    device.path = text_from(json, "path");
-    device.serial = text_from(json, "serial");
-    device.abilities = text_from(json, "abilities");
-    device.problem = text_from(json, "problem");
-    for (const Json &format : array_from(json, "formats", ARHOST_MAX_DEVICE_FORMATS))
-        device.formats.push_back(format_from(format));
-    for (const Json &control : array_from(json, "controls", ARHOST_MAX_DEVICE_CONTROLS))
-        device.controls.push_back(control_from(control));
-    device.width = json.at("width").get<std::uint32_t>();
-    device.height = json.at("height").get<std::uint32_t>();
-    device.rate = json.at("rate").get<double>();
-    check(device);
-    return device;
 }
 
 } // namespace
@@ -266,14 +201,7 @@ DeviceDescription describe(const arhost_device *device) {
 }
 
 std::string to_text(const std::optional<DeviceList> &list) {
-    Json json; // null
-    if (list) {
-        Json devices = Json::array();
-        for (const DeviceDescription &device : list->devices)
-            devices.push_back(to_json(device));
-        json = {{"devices", std::move(devices)}, {"left_out", list->left_out}};
-    }
-    std::string text = json.dump(-1, ' ', true);
+    std::string text = (list ? Json(*list) : Json()).dump(-1, ' ', true);
     check_size(text);
     return text;
 }
@@ -283,10 +211,9 @@ std::optional<DeviceList> devices_from_text(std::string_view text) {
     const Json json = Json::parse(text);
     if (json.is_null())
         return std::nullopt;
-    DeviceList list;
-    for (const Json &device : array_from(json, "devices", ARHOST_MAX_DEVICES))
-        list.devices.push_back(device_from(device));
-    list.left_out = json.at("left_out").get<std::uint64_t>();
+    DeviceList list = json.get<DeviceList>();
+    expect_at_most(ARHOST_MAX_DEVICES, list.devices.size(), "devices");
+    std::ranges::for_each(list.devices, [](const DeviceDescription &device) { check(device); });
     return list;
 }
 
@@ -324,4 +251,4 @@ const char *control_type_text(arhost_device_control_type type) {
     }
 }
 
-} // namespace arhost::ipc
+} // namespace arhost::devices

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The devices that a plugin lists through the extension of arhost/devices.h: copies of the ABI's structs that own
-// their data, and their conversion to and from the JSON of control messages.
+// their data, and their conversion to and from the JSON in which a worker sends them.
 #pragma once
-
-#include "ipc/channel.hpp"
 
 #include <arhost/arhost.h>
 
@@ -14,7 +12,7 @@
 #include <string_view>
 #include <vector>
 
-namespace arhost::ipc {
+namespace arhost::devices {
 
 // The fields have the meanings of those in arhost/devices.h. The texts are printable.
 struct DeviceSize {
@@ -69,4 +67,4 @@ std::optional<DeviceList> devices_from_text(std::string_view text);
 const char *device_kind_text(arhost_device_kind kind);
 const char *control_type_text(arhost_device_control_type type);
 
-} // namespace arhost::ipc
+} // namespace arhost::devices

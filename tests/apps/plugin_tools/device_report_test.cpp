@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/device_report.hpp"
+#include "plugin_tools/device_report.hpp"
 
 #include "plugin_under_test.hpp"
 
@@ -13,16 +13,16 @@
 #include <unistd.h>
 
 using namespace arhost;
-using host::holders_of;
-using host::problem_with;
+using plugin_tools::holders_of;
+using plugin_tools::problem_with;
 using testing::Contains;
 using testing::HasSubstr;
 using testing::Not;
 
 namespace {
 
-ipc::DeviceDescription device_in(arhost_device_state state, const std::string &path) {
-    ipc::DeviceDescription device;
+devices::DeviceDescription device_in(arhost_device_state state, const std::string &path) {
+    devices::DeviceDescription device;
     device.kind = ARHOST_DEVICE_CAMERA;
     device.state = state;
     device.name = "Eye";
@@ -73,7 +73,7 @@ TEST(DeviceReport, DoesNotLookAtPathsOutsideOfDev) {
 }
 
 TEST(DeviceReport, PassesOnTheProblemOfThePlugin) {
-    ipc::DeviceDescription device = device_in(ARHOST_DEVICE_STATE_UNUSABLE, "");
+    devices::DeviceDescription device = device_in(ARHOST_DEVICE_STATE_UNUSABLE, "");
     device.problem = "no lens";
     EXPECT_EQ(problem_with(device), "no lens");
     EXPECT_EQ(problem_with(device_in(ARHOST_DEVICE_STATE_USABLE, "/dev/full")), "");

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The plugins that a command asks, each in a worker of its own.
+#pragma once
+
+#include "base/command_line.hpp"
+#include "ipc/reactor.hpp"
+#include "sandbox/sandbox.hpp"
+#include "supervise/launcher.hpp"
+#include "supervise/process.hpp"
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace arhost::plugin_tools {
+
+std::filesystem::path built_in_plugins(); // folder
+
+class Selection {
+public:
+    void add_names(base::CommandLine &app, const std::string &help); // PLUGIN
+    void add_reads(base::CommandLine &app);                          // --reads
+
+    // Returns the files of the plugins; of all plugins if none is named. Throws base::InvalidInput.
+    std::vector<std::filesystem::path> files() const;
+    sandbox::Policy policy() const; // permits to read the folders of --reads
+
+private:
+    std::vector<std::string> names_;
+    std::vector<std::filesystem::path> reads_;
+};
+
+// Starts workers and prints what they log to stderr.
+class Workers {
+public:
+    Workers();
+    supervise::Context &context() { return context_; }
+
+private:
+    supervise::Launcher launcher_;
+    ipc::Reactor reactor_;
+    supervise::Context context_;
+};
+
+} // namespace arhost::plugin_tools
