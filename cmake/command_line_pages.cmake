@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-# Man pages and shell completions. The programs print them from the definitions of their options (--generate).
+# Man pages and shell completions, generated from the definitions of options that the programs print (--describe).
 find_program(GZIP gzip REQUIRED)
 set(pages_directory ${CMAKE_BINARY_DIR}/pages)
 file(MAKE_DIRECTORY ${pages_directory})
 set(pages)
 foreach(program arhost arhost-inprocess ${ARHOST_COMMANDS} render-scene)
   set(page ${pages_directory}/${program}.1.gz)
-  add_custom_command(OUTPUT ${page} DEPENDS ${program} VERBATIM
-                     COMMAND ${program} --generate man > ${program}.1
+  add_custom_command(OUTPUT ${page} DEPENDS ${program} command-line-pages VERBATIM
+                     COMMAND ${program} --describe | $<TARGET_FILE:command-line-pages> man > ${program}.1
                      COMMAND ${GZIP} -9nf ${program}.1
                      WORKING_DIRECTORY ${pages_directory})
   list(APPEND pages ${page})
@@ -23,14 +23,14 @@ install(FILES ${pages} DESTINATION share/man/man1)
 foreach(shell bash zsh fish)
   set(commands)
   foreach(command ${ARHOST_COMMANDS})
-    list(APPEND commands COMMAND ${command} --generate ${shell} >> arhost.${shell})
+    list(APPEND commands COMMAND ${command} --describe | $<TARGET_FILE:command-line-pages> ${shell} >> arhost.${shell})
   endforeach()
   set(last_line)
   if(shell STREQUAL zsh)
     set(last_line COMMAND ${CMAKE_COMMAND} -E echo "_arhost \"$@\"" >> arhost.zsh)
   endif()
-  add_custom_command(OUTPUT ${pages_directory}/arhost.${shell} DEPENDS arhost ${ARHOST_COMMANDS} VERBATIM
-                     COMMAND arhost --generate ${shell} > arhost.${shell}
+  add_custom_command(OUTPUT ${pages_directory}/arhost.${shell} DEPENDS arhost ${ARHOST_COMMANDS} command-line-pages VERBATIM
+                     COMMAND arhost --describe | $<TARGET_FILE:command-line-pages> ${shell} > arhost.${shell}
                      ${commands}
                      ${last_line}
                      WORKING_DIRECTORY ${pages_directory})

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/command_line.hpp"
 
-#include "base/command_line_pages.hpp"
+#include "base/command_line_description.hpp"
 #include "base/text.hpp"
 
 #include <CLI/CLI.hpp>
@@ -23,34 +23,34 @@ std::vector<std::string> choices_of(const CLI::Option &option) {
     return CLI::detail::split(type.substr(begin + 1, end - begin - 1), ',');
 }
 
-PageOption page_option(const CLI::Option &option) {
-    PageOption page;
+OptionDescription describe(const CLI::Option &option) {
+    OptionDescription described;
     for (const std::string &name : option.get_snames())
-        page.names.push_back("-" + name);
+        described.names.push_back("-" + name);
     for (const std::string &name : option.get_lnames())
-        page.names.push_back("--" + name);
-    page.positional = option.get_positional() ? option.get_name(true) : "";
-    page.help = option.get_description();
-    page.choices = choices_of(option);
+        described.names.push_back("--" + name);
+    described.positional = option.get_positional() ? option.get_name(true) : "";
+    described.help = option.get_description();
+    described.choices = choices_of(option);
     const bool is_flag = option.get_items_expected_max() == 0;
     if (!is_flag)
-        page.value = page.choices.empty() ? CLI::detail::split(option.get_type_name(), ':').front() : "";
-    if (!is_flag && page.value.empty())
-        page.value = page.positional.empty() ? "VALUE" : page.positional;
-    page.is_required = option.get_required();
-    page.is_repeatable = option.get_expected_max() > 1;
-    return page;
+        described.value = described.choices.empty() ? CLI::detail::split(option.get_type_name(), ':').front() : "";
+    if (!is_flag && described.value.empty())
+        described.value = described.positional.empty() ? "VALUE" : described.positional;
+    described.is_required = option.get_required();
+    described.is_repeatable = option.get_expected_max() > 1;
+    return described;
 }
 
-void add_options(PageCommand &command, const CLI::App &app) {
+void add_options(CommandDescription &command, const CLI::App &app) {
     const bool is_group = app.get_name().empty() && app.get_parent(); // repeats its parent's --help
     for (const CLI::Option *option : app.get_options())
         if (!option->get_group().empty() && !(is_group && option == app.get_help_ptr())) // hidden: no group
-            command.options.push_back(page_option(*option));
+            command.options.push_back(describe(*option));
 }
 
-PageCommand page_command(const CLI::App &app) {
-    PageCommand command{app.get_name(), app.get_description(), app.get_prefix_command(), {}};
+CommandDescription describe(const CLI::App &app) {
+    CommandDescription command{app.get_name(), app.get_description(), app.get_prefix_command(), {}, {}};
     add_options(command, app);
     for (const CLI::App *group : app.get_subcommands([](const CLI::App *sub) { return sub->get_name().empty(); }))
         add_options(command, *group);
@@ -61,8 +61,9 @@ PageCommand page_command(const CLI::App &app) {
 struct Formatter : CLI::Formatter {
     std::string make_option_name(const CLI::Option *option, bool is_positional) const override {
         const std::string name = CLI::Formatter::make_option_name(option, is_positional);
-        const PageOption page = page_option(*option);
-        return is_positional || page.value.empty() || !page.choices.empty() ? name : name + " " + page.value;
+        const OptionDescription described = describe(*option);
+        return is_positional || described.value.empty() || !described.choices.empty() ? name
+                                                                                      : name + " " + described.value;
     }
     std::string make_option_opts(const CLI::Option *option) const override {
         const std::string choices = CLI::detail::join(choices_of(*option), "|"), value = option->get_default_str();
@@ -176,17 +177,14 @@ Option CommandLine::flag(const std::string &names, bool &value, const std::strin
 }
 
 std::optional<int> CommandLine::parse(int argc, char **argv) {
-    if (argc == 3 && std::string_view(argv[1]) == "--generate") {
+    if (argc == 2 && std::string_view(argv[1]) == "--describe") {
         if (app_->get_name().empty())
             app_->name(std::filesystem::path(argv[0]).filename().string());
-        std::vector<PageCommand> commands;
+        CommandDescription program = describe(*app_);
         for (const CLI::App *sub : named_subcommands(*app_))
-            commands.push_back(page_command(*sub));
-        const std::string page = generate_page(argv[2], page_command(*app_), commands);
-        if (page.empty())
-            std::fprintf(stderr, "--generate: '%s' is not one of man, bash, zsh, fish\n", printable(argv[2]).c_str());
-        std::fputs(page.c_str(), stdout);
-        return page.empty() ? 2 : 0;
+            program.commands.push_back(describe(*sub));
+        std::printf("%s\n", nlohmann::json(program).dump().c_str());
+        return 0;
     }
     try {
         app_->parse(argc, argv);

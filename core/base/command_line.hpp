@@ -38,8 +38,8 @@ private:
     CLI::Option *option_;
 };
 
-// Also writes the program's man page and shell completions: if the only arguments are `--generate man`, or bash, zsh
-// or fish, parse() prints that text, from the definitions of options and commands. The build uses this.
+// If the only argument is `--describe`, parse() prints the definitions of options and commands as JSON, from which
+// the build generates man pages and shell completions.
 class CommandLine {
 public:
     // `name`: the name in --help and in the man page, such as "arhost conform" for arhost-conform.

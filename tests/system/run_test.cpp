@@ -557,17 +557,11 @@ TEST(CommandLine, HasAManPageForEachProgram) {
           "arhost-worker", "render-scene"})
         EXPECT_TRUE(std::filesystem::is_regular_file(pages / (std::string(program) + ".1.gz"))) << program;
     ArhostRun run;
-    EXPECT_EQ(run.run({"--generate", "man"}), 0);
+    EXPECT_EQ(run_shell(run, "zcat '" + (pages / "arhost.1.gz").string() + "'"), 0);
     for (const char *part :
          {"\n.SH SYNOPSIS\n\\fBarhost\\fR [\\fIOPTIONS\\fR] [\\fIFILE\\fR]\n", "\n.SS arhost check\n",
           "\\fB\\-\\-no\\-open\\fR\n", "one of: replay, latency, check", "See arhost\\-new\\-plugin(1)."})
-        EXPECT_THAT(run.output(), HasSubstr(part));
-}
-
-TEST(CommandLine, RejectsAnUnknownKindOfPage) {
-    ArhostRun run;
-    EXPECT_EQ(run.run({"--generate", "nonsense"}), 2);
-    EXPECT_EQ(run.output(), "--generate: 'nonsense' is not one of man, bash, zsh, fish\n");
+        EXPECT_THAT(run.read("output.txt"), HasSubstr(part));
 }
 
 TEST(CommandLine, ChecksAConfigurationWithoutRunningIt) {

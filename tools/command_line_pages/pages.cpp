@@ -1,10 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/command_line_pages.hpp"
+//
+// command-line-pages man|bash|zsh|fish < DESCRIPTION
+//
+// Generates a program's man page or shell completion from the definitions of its command line, which the program
+// prints with `--describe`. Placeholders determine which values are completed: FILE and PLUGIN as files, FOLDER and
+// DIR as folders, choices as they are.
+#include "base/command_line_description.hpp"
 
 #include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <string_view>
 
-namespace arhost::base {
 namespace {
+
+using arhost::base::CommandDescription;
+using arhost::base::OptionDescription;
 
 std::string joined(const std::vector<std::string> &words, std::string_view separator) {
     std::string text;
@@ -23,19 +34,19 @@ std::string first_line(const std::string &text) {
     return text.substr(0, text.find('\n'));
 }
 
-bool takes_file(const PageOption &option) {
+bool takes_file(const OptionDescription &option) {
     return option.value.starts_with("FILE") || option.value == "PLUGIN" ||
            option.value.find("PATH") != std::string::npos || option.positional == "FILE" ||
            option.positional == "PLUGIN" || option.positional == "scene";
 }
 
-bool takes_folder(const PageOption &option) {
+bool takes_folder(const OptionDescription &option) {
     return option.value == "FOLDER" || option.value == "DIR";
 }
 
-std::vector<std::string> option_names(const PageCommand &command) {
+std::vector<std::string> option_names(const CommandDescription &command) {
     std::vector<std::string> names;
-    for (const PageOption &option : command.options)
+    for (const OptionDescription &option : command.options)
         names.insert(names.end(), option.names.begin(), option.names.end());
     return names;
 }
@@ -44,13 +55,13 @@ std::string first_sentence(const std::string &text) {
     return text.substr(0, std::min(text.find('.'), text.find('\n')));
 }
 
-const PageOption *first_positional(const PageCommand &command) {
+const OptionDescription *first_positional(const CommandDescription &command) {
     const auto found = std::ranges::find_if(command.options, [](const auto &o) { return !o.positional.empty(); });
     return found == command.options.end() ? nullptr : &*found;
 }
 
 // "arhost conform" → "arhost-conform"
-std::string program_name(const PageCommand &program) {
+std::string program_name(const CommandDescription &program) {
     return replaced(program.name, " ", "-");
 }
 
@@ -68,7 +79,7 @@ std::string roff(const std::string &text) {
     return escaped.starts_with('.') || escaped.starts_with('\'') ? "\\&" + escaped : escaped;
 }
 
-std::string man_option(const PageOption &option) {
+std::string man_option(const OptionDescription &option) {
     std::string text = ".TP\n";
     const std::string value = option.value.empty() ? "" : " \\fI" + roff(option.value) + "\\fR";
     std::vector<std::string> forms;
@@ -82,16 +93,16 @@ std::string man_option(const PageOption &option) {
     return text + ".\n";
 }
 
-std::string synopsis(const std::string &name, const PageCommand &command) {
+std::string synopsis(const std::string &name, const CommandDescription &command) {
     std::string text = "\\fB" + roff(name) + "\\fR [\\fIOPTIONS\\fR]";
-    for (const PageOption &option : command.options)
+    for (const OptionDescription &option : command.options)
         if (!option.positional.empty())
             text += std::string(option.is_required ? " " : " [") + "\\fI" + roff(option.positional) + "\\fR" +
                     (option.is_required ? "" : "]");
     return text + "\n";
 }
 
-std::string man_page(const PageCommand &program, const std::vector<PageCommand> &commands) {
+std::string man_page(const CommandDescription &program) {
     const std::string name = program_name(program);
     std::string summary = first_sentence(program.description);
     if (summary.starts_with(name + " ")) // "arhost overlays …"
@@ -101,18 +112,18 @@ std::string man_page(const PageCommand &program, const std::vector<PageCommand> 
                            [](char c) { return c >= 'a' && c <= 'z' ? char(c - 'a' + 'A') : c; });
     std::string text = ".TH " + roff(upper) + " 1 \"\" arhost \"arhost manual\"\n.SH NAME\n" + roff(name) + " \\- " +
                        roff(summary) + "\n.SH SYNOPSIS\n" + synopsis(program.name, program);
-    for (const PageCommand &command : commands)
+    for (const CommandDescription &command : program.commands)
         text += ".br\n" + synopsis(program.name + " " + command.name, command);
     text += ".SH DESCRIPTION\n" + roff(program.description) + "\n.SH OPTIONS\n";
-    for (const PageOption &option : program.options)
+    for (const OptionDescription &option : program.options)
         text += man_option(option);
-    if (!commands.empty())
+    if (!program.commands.empty())
         text += ".SH COMMANDS\n";
-    for (const PageCommand &command : commands) {
+    for (const CommandDescription &command : program.commands) {
         text += ".SS " + roff(program.name + " " + command.name) + "\n" + roff(command.description) + ".\n";
         if (command.is_program)
             text += "See " + roff(name + "-" + command.name) + "(1).\n";
-        for (const PageOption &option : command.options)
+        for (const OptionDescription &option : command.options)
             text += man_option(option);
     }
     return text;
@@ -120,19 +131,19 @@ std::string man_page(const PageCommand &program, const std::vector<PageCommand> 
 
 // ---- bash --------------------------------------------------------------------------------------------------------
 
-std::string bash_values(const PageOption &option) {
+std::string bash_values(const OptionDescription &option) {
     if (!option.choices.empty())
         return "_arhost_words '" + joined(option.choices, " ") + "'";
     return takes_file(option) ? "_arhost_paths -f" : takes_folder(option) ? "_arhost_paths -d" : ":";
 }
 
-std::string bash_command(const PageCommand &command, const std::vector<PageCommand> &commands) {
+std::string bash_command(const CommandDescription &command) {
     std::string text;
-    for (const PageOption &option : command.options)
+    for (const OptionDescription &option : command.options)
         if (!option.value.empty() && !option.names.empty())
             text += "        " + joined(option.names, " | ") + ") " + bash_values(option) + "; return ;;\n";
     std::string subcommands;
-    for (const PageCommand &sub : commands)
+    for (const CommandDescription &sub : command.commands)
         subcommands += (subcommands.empty() ? "" : " ") + sub.name;
     text = "        case $prev in\n" + text +
            "        esac\n        if [[ $cur == -* ]]; then\n            _arhost_words '" +
@@ -140,19 +151,19 @@ std::string bash_command(const PageCommand &command, const std::vector<PageComma
     // A folder may have the same name as a command.
     if (!subcommands.empty())
         text += "        _arhost_words '" + subcommands + "'\n        [[ $cur && ${COMPREPLY[*]} ]] && return\n";
-    if (const PageOption *positional = first_positional(command))
+    if (const OptionDescription *positional = first_positional(command))
         text += "        " + bash_values(*positional) + "\n";
     return text;
 }
 
-std::string bash_completion(const PageCommand &program, const std::vector<PageCommand> &commands) {
+std::string bash_completion(const CommandDescription &program) {
     const std::string function = function_name(program.name);
     std::string names, cases;
-    for (const PageCommand &command : commands) {
+    for (const CommandDescription &command : program.commands) {
         names += (names.empty() ? "" : " | ") + command.name;
         cases += "    " + command.name + ")\n" +
                  (command.is_program ? "        " + function_name(program.name + " " + command.name) + "\n"
-                                     : bash_command(command, {})) +
+                                     : bash_command(command)) +
                  "        ;;\n";
     }
     return "# bash completion of " + program.name + ", generated from the definitions of its command line.\n" +
@@ -168,7 +179,7 @@ std::string bash_completion(const PageCommand &program, const std::vector<PageCo
                 ? ""
                 : "    for word in \"${COMP_WORDS[@]:1:COMP_CWORD-1}\"; do\n        case $word in\n        " + names +
                       ") command=$word; break ;;\n        esac\n    done\n") +
-           "    case $command in\n" + cases + "    *)\n" + bash_command(program, commands) +
+           "    case $command in\n" + cases + "    *)\n" + bash_command(program) +
            "        ;;\n    esac\n}\ncomplete -F " + function + " " + program_name(program) + "\n";
 }
 
@@ -181,7 +192,7 @@ std::string zsh_text(const std::string &text) {
     return escaped;
 }
 
-std::string zsh_values(const PageOption &option) {
+std::string zsh_values(const OptionDescription &option) {
     const std::string label = ":" + zsh_text(option.value.empty() ? option.positional : option.value) + ":";
     if (!option.choices.empty())
         return label + "(" + joined(option.choices, " ") + ")";
@@ -189,10 +200,10 @@ std::string zsh_values(const PageOption &option) {
 }
 
 // Returns the arguments of _arguments.
-std::string zsh_specs(const PageCommand &command, bool with_positionals) {
+std::string zsh_specs(const CommandDescription &command, bool with_positionals) {
     std::string text;
     int position = 0;
-    for (const PageOption &option : command.options) {
+    for (const OptionDescription &option : command.options) {
         const std::string exclusive = option.is_repeatable ? "*" : "(" + joined(option.names, " ") + ")";
         for (const std::string &name : option.names)
             text += " \\\n        '" + exclusive + name + "[" + zsh_text(option.help) + "]" +
@@ -204,14 +215,14 @@ std::string zsh_specs(const PageCommand &command, bool with_positionals) {
     return text + "\n";
 }
 
-std::string zsh_completion(const PageCommand &program, const std::vector<PageCommand> &commands) {
+std::string zsh_completion(const CommandDescription &program) {
     const std::string function = function_name(program.name);
-    std::string text = commands.empty() ? "" : "#compdef " + program_name(program) + "\n";
+    std::string text = program.commands.empty() ? "" : "#compdef " + program_name(program) + "\n";
     text += function + "() {\n";
-    if (commands.empty())
+    if (program.commands.empty())
         return text + "    _arguments -S -s" + zsh_specs(program, true) + "}\n";
     std::string names, cases;
-    for (const PageCommand &command : commands) {
+    for (const CommandDescription &command : program.commands) {
         names += " \\\n            '" + command.name + ":" + zsh_text(command.description) + "'";
         cases += "        " + command.name + ")\n    " +
                  (command.is_program ? function_name(program.name + " " + command.name) + "\n"
@@ -236,9 +247,9 @@ std::string fish_text(const std::string &text) {
     return "'" + replaced(replaced(first_line(text), "\\", "\\\\"), "'", "\\'") + "'";
 }
 
-std::string fish_options(const std::string &complete, const PageCommand &command) {
+std::string fish_options(const std::string &complete, const CommandDescription &command) {
     std::string text;
-    for (const PageOption &option : command.options) {
+    for (const OptionDescription &option : command.options) {
         if (option.names.empty()) {
             if (!option.choices.empty())
                 text += complete + " -f -a '" + joined(option.choices, " ") + "'\n";
@@ -256,7 +267,7 @@ std::string fish_options(const std::string &complete, const PageCommand &command
     return text;
 }
 
-std::string fish_completion(const PageCommand &program, const std::vector<PageCommand> &commands) {
+std::string fish_completion(const CommandDescription &program) {
     const std::size_t space = program.name.find(' '); // "arhost conform" is completed as a command of arhost
     const std::string complete = "complete -c " + program.name.substr(0, space) + " -n ";
     const auto within = [&](const std::string &command) {
@@ -264,9 +275,9 @@ std::string fish_completion(const PageCommand &program, const std::vector<PageCo
     };
     if (space != std::string::npos)
         return fish_options(within(program.name.substr(space + 1)), program);
-    std::string text = commands.empty() ? fish_options("complete -c " + program.name, program)
-                                        : fish_options(complete + "__fish_use_subcommand", program);
-    for (const PageCommand &command : commands) {
+    std::string text = program.commands.empty() ? fish_options("complete -c " + program.name, program)
+                                                : fish_options(complete + "__fish_use_subcommand", program);
+    for (const CommandDescription &command : program.commands) {
         text +=
             complete + "__fish_use_subcommand -a " + command.name + " -d " + fish_text(command.description) + "\n";
         text += fish_options(within(command.name), command);
@@ -276,13 +287,13 @@ std::string fish_completion(const PageCommand &program, const std::vector<PageCo
 
 } // namespace
 
-std::string generate_page(std::string_view kind, const PageCommand &program,
-                          const std::vector<PageCommand> &commands) {
-    return kind == "man"    ? man_page(program, commands)
-           : kind == "bash" ? bash_completion(program, commands)
-           : kind == "zsh"  ? zsh_completion(program, commands)
-           : kind == "fish" ? fish_completion(program, commands)
-                            : "";
+int main(int argc, char **argv) {
+    const std::string_view kind = argc > 1 ? argv[1] : "";
+    const auto program = nlohmann::json::parse(std::cin).get<CommandDescription>();
+    const std::string page = kind == "man"    ? man_page(program)
+                             : kind == "bash" ? bash_completion(program)
+                             : kind == "zsh"  ? zsh_completion(program)
+                                              : fish_completion(program);
+    std::fputs(page.c_str(), stdout);
+    return 0;
 }
-
-} // namespace arhost::base

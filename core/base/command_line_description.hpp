@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Man pages and shell completions, generated from the definitions of a command line.
+// The definitions of a command line as JSON, from which the build generates man pages and shell completions
+// (tools/command_line_pages).
 #pragma once
 
+#include <nlohmann/json.hpp>
+
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace arhost::base {
 
-struct PageOption {
+struct OptionDescription {
     std::vector<std::string> names; // "-v", "--verbose"; empty if the option is only positional
     std::string positional;         // "FILE"; "" if the option is not positional
     std::string value;              // placeholder of the value; "" for a flag
@@ -17,17 +19,16 @@ struct PageOption {
     std::vector<std::string> choices; // the valid values; empty if there are others
     bool is_required = false, is_repeatable = false;
 };
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(OptionDescription, names, positional, value, help, choices, is_required,
+                                   is_repeatable)
 
-struct PageCommand {
+struct CommandDescription {
     std::string name; // "check"; for a program its full name, such as "arhost conform"
     std::string description;
-    bool is_program; // the program of this name ("arhost-conform" for "conform") defines its options
-    std::vector<PageOption> options;
+    bool is_program = false; // the program of this name ("arhost-conform" for "conform") defines its options
+    std::vector<OptionDescription> options;
+    std::vector<CommandDescription> commands;
 };
-
-// Returns the text for `kind`, which is man, bash, zsh or fish; "" for other kinds. Placeholders determine which
-// values are completed: FILE and PLUGIN as files, FOLDER and DIR as folders, choices as they are.
-std::string generate_page(std::string_view kind, const PageCommand &program,
-                          const std::vector<PageCommand> &commands);
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CommandDescription, name, description, is_program, options, commands)
 
 } // namespace arhost::base
