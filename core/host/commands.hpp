@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The subcommands of `arhost` that run plugins. Each returns the exit status (docs/config.md).
+// The commands of `arhost` that run a configuration. Each returns the exit status (docs/config.md).
 #pragma once
 
+#include "base/command_line.hpp"
 #include "supervise/launcher.hpp"
 
 #include <cstdint>
@@ -33,6 +34,10 @@ struct ReplayArguments {
     std::optional<std::uint32_t> width, height;                                          // px
     bool with_pipeline = false;
 };
+
+void add_configuration_options(base::CommandLine &command, Arguments &arguments); // --set, --verbose
+// Adds all options of a run and returns the option --config.
+base::Option add_run_options(base::CommandLine &command, Arguments &arguments);
 
 int run(const Arguments &arguments, supervise::Starter &launcher);
 // Measures the time from the camera's lens to the display of the configuration's outputs.

@@ -2,7 +2,7 @@
 //
 // Command line of arhost.
 #include "base/program.hpp"
-#include "host/run_options.hpp"
+#include "host/commands.hpp"
 
 #include <cerrno>
 #include <cstdio>

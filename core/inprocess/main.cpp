@@ -3,7 +3,7 @@
 // arhost-inprocess: runs a configuration like `arhost --config FILE`, but in one process and without deadlines and
 // sandbox, for debuggers, valgrind and sanitizers. If a plugin crashes, the whole program crashes.
 #include "base/program.hpp"
-#include "host/run_options.hpp"
+#include "host/commands.hpp"
 #include "inprocess/thread_starter.hpp"
 #include "worker/session.hpp"
 

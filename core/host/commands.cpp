@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/run_options.hpp"
+#include "host/commands.hpp"
 
 namespace arhost::host {
 
