@@ -2,7 +2,7 @@
 // Requirements on plugins of every kind.
 #include "conformance/process_usage.hpp"
 #include "conformance/test.hpp"
-#include "ipc/json_abi.hpp"
+#include "ipc/messages.hpp"
 #include "worker/devices.hpp"
 
 #include <fmt/format.h>
@@ -23,9 +23,10 @@ using ipc::Call;
 
 void load(Context &context) {
     try {
-        const ipc::Json described = ipc::to_json(context.library.descriptor());
-        ipc::PluginDescription description = ipc::description_from_json(described);
-        const std::size_t size = described.dump(-1, ' ', false, ipc::Json::error_handler_t::replace).size();
+        model::PluginDescription description = model::describe(context.library.descriptor());
+        check(description);
+        const std::size_t size =
+            ipc::Json(description).dump(-1, ' ', false, ipc::Json::error_handler_t::replace).size();
         if (size > ipc::max_descriptor_size)
             throw std::runtime_error(fmt::format(
                 "its descriptor takes {} bytes as JSON; the limit is {}: declare fewer options, or shorten texts",
@@ -165,7 +166,7 @@ void descriptor(Context &context) {
             ARHOST_CAPABILITY_VIDEO_INPUT | ARHOST_CAPABILITY_OVERLAY_INPUT | ARHOST_CAPABILITY_RUN_DESCRIPTION};
     if (const std::uint32_t invalid = d.capabilities & ~capabilities_of_kind[d.kind])
         throw Failure(fmt::format("the capability bits {:#x} are not defined for this kind of plugin", invalid));
-    const ipc::Json described = ipc::to_json(d);
+    const ipc::Json described = model::describe(d);
     for (const auto &[field, value] : described.items()) {
         const std::string text = value.dump(-1, ' ', false, ipc::Json::error_handler_t::replace);
         try {
@@ -198,14 +199,14 @@ void descriptor(Context &context) {
 // that it has read.
 void same_answer(Context &context) {
     const arhost_plugin &plugin = context.library.plugin();
-    const ipc::Json descriptor = ipc::to_json(*plugin.descriptor);
+    const ipc::Json descriptor = model::describe(*plugin.descriptor);
     const auto expect_same = [&](const char *when) {
         constexpr auto size = static_cast<std::uint32_t>(sizeof(arhost_answer));
         const Exchange again(context, {sizeof(arhost_offer), ARHOST_ABI_VERSION, ARHOST_ABI_VERSION}, size);
         if (again.status != ARHOST_STATUS_OK || again.answer().plugin != &plugin)
             throw Failure(
                 fmt::format("{}, negotiate returned {} or a different plugin", when, status_name(again.status)));
-        const ipc::Json now = ipc::to_json(*plugin.descriptor);
+        const ipc::Json now = model::describe(*plugin.descriptor);
         for (const auto &[key, value] : descriptor.items())
             if (now[key] != value)
                 throw Failure(fmt::format("{}, the descriptor's {} is {}; it was {}", when, key, now[key].dump(),
@@ -300,7 +301,7 @@ void set_option(Context &context) {
         throw Skip("it does not have the extension " ARHOST_SET_OPTION_EXTENSION);
     if (extension->struct_size < sizeof *extension || !extension->set || !extension->keys)
         throw Failure("the extension " ARHOST_SET_OPTION_EXTENSION " is too short, or a member is NULL");
-    const std::vector<const arhost_option_descriptor *> options = ipc::options_of(*plugin.descriptor);
+    const std::vector<const arhost_option_descriptor *> options = model::options_of(*plugin.descriptor);
     for (const char *const *key = extension->keys; *key; ++key) {
         const auto declared =
             std::find_if(options.begin(), options.end(),

@@ -192,7 +192,7 @@ int run_child(const std::string &name, const Subject &subject) {
 ipc::Json to_json(const std::optional<Facts> &facts) {
     if (!facts)
         return ipc::Json::object();
-    ipc::Json json = ipc::to_json(facts->descriptor);
+    ipc::Json json = facts->descriptor;
     json["sandbox"] = facts->sandbox;
     return json;
 }
@@ -219,7 +219,7 @@ Result result_from_json(const ipc::Json &json) {
     result.verdict = static_cast<Verdict>(verdict - verdict_texts.begin());
     result.message = json.at("message").get<std::string>();
     if (const ipc::Json &facts = json.at("facts"); facts != ipc::Json::object())
-        result.facts = {ipc::description_from_json(facts), facts.at("sandbox").get<std::string>()};
+        result.facts = {facts.get<model::PluginDescription>(), facts.at("sandbox").get<std::string>()};
     for (const ipc::Json &image : json.at("images"))
         result.images.push_back({image.at("label").get<std::string>(), image.at("png").get<std::string>(),
                                  image.at("width").get<unsigned>(), image.at("height").get<unsigned>()});

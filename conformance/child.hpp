@@ -5,6 +5,7 @@
 #include "base/unique_fd.hpp"
 #include "conformance/plugin_library.hpp"
 #include "conformance/test.hpp"
+#include "ipc/messages.hpp"
 #include "sandbox/sandbox.hpp"
 
 #include <cstdint>

@@ -195,7 +195,7 @@ std::string reference_problem(std::span<const Test> tests, const RunSettings &se
             if (const arhost_kind kind = result.facts ? result.facts->descriptor.kind : ARHOST_KIND_RAYTRACER;
                 kind != ARHOST_KIND_RAYTRACER)
                 return fmt::format("the reference '{}' is a {} but must be a ray tracer; give --reference FILE",
-                                   file.string(), arhost::ipc::to_text(kind));
+                                   file.string(), arhost::model::to_text(kind));
         }
     return {};
 }
@@ -203,7 +203,7 @@ std::string reference_problem(std::span<const Test> tests, const RunSettings &se
 // Returns the family of the markers to test a tracker with: the first one that it knows. Empty if it only reports the
 // poses of bodies.
 std::string family_of(std::span<const Test> tests, RunSettings settings,
-                      const arhost::ipc::PluginDescription &plugin) {
+                      const arhost::model::PluginDescription &plugin) {
     const auto start = std::ranges::find(tests, std::string_view("tracker.start"), &Test::name);
     for (const char *family : drawn_families) {
         settings.subject.family = family;
@@ -215,9 +215,9 @@ std::string family_of(std::span<const Test> tests, RunSettings settings,
 
 // Returns the values of the options of type ARHOST_OPTION_LISTEN: as set, else their defaults. Skips invalid
 // addresses, which tests report.
-Settings addresses_of(const arhost::ipc::PluginDescription &plugin, const Settings &settings) {
+Settings addresses_of(const arhost::model::PluginDescription &plugin, const Settings &settings) {
     Settings addresses;
-    for (const arhost::ipc::OptionDeclaration &option : plugin.options) {
+    for (const arhost::model::OptionDeclaration &option : plugin.options) {
         const auto set = settings.find(option.key);
         const std::string address = set != settings.end() ? set->second : option.default_value.value_or("");
         if (option.type == ARHOST_OPTION_LISTEN && base::problem_with_address(address).empty())

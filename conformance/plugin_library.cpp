@@ -3,6 +3,7 @@
 
 #include "base/listening_socket.hpp"
 #include "conformance/verdict.hpp"
+#include "ipc/channel.hpp"
 #include "worker/library.hpp"
 
 #include <fmt/format.h>

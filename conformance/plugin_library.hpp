@@ -2,9 +2,9 @@
 // The plugin in a test's process, opened as arhost-worker opens it, with its instances and their host.
 #pragma once
 
-#include "ipc/json_abi.hpp"
 #include "ipc/memory.hpp"
 #include "ipc/protocol.hpp"
+#include "model/plugin_description.hpp"
 
 #include <arhost/arhost.h>
 #include <arhost/control.h>
@@ -84,7 +84,7 @@ private:
     const arhost_plugin *plugin_ = nullptr;
 };
 
-using ipc::options_of;
+using model::options_of;
 
 // Parses an option's value. Throws std::runtime_error if it is invalid.
 arhost_option parse_option(const arhost_option_descriptor &option, const std::string &text);

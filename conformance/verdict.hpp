@@ -3,7 +3,7 @@
 #pragma once
 
 #include "conformance/picture.hpp"
-#include "ipc/json_abi.hpp"
+#include "model/plugin_description.hpp"
 
 #include <array>
 #include <cstddef>
@@ -63,7 +63,7 @@ struct ReportImage {
 
 // Facts about the plugin, which the test abi.load sets.
 struct Facts {
-    ipc::PluginDescription descriptor;
+    model::PluginDescription descriptor;
     std::string sandbox; // active and missing layers, from sandbox::to_text
 };
 

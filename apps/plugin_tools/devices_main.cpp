@@ -27,7 +27,7 @@ std::optional<plugin_tools::PluginDevices> devices_of(supervise::Context &contex
         found.problem = "cannot be used: " + *reason;
         return found;
     }
-    const auto &plugin = std::get<ipc::PluginDescription>(probed);
+    const auto &plugin = std::get<model::PluginDescription>(probed);
     found.kind = plugin.kind;
     const plugin_tools::DevicesResult listed = plugin_tools::list_devices(context, file, policy, plugin.needs);
     if (const auto *reason = std::get_if<std::string>(&listed)) {

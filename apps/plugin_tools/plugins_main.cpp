@@ -18,14 +18,14 @@ void print(const std::string &line) {
     std::printf("%s\n", base::printable(line).c_str());
 }
 
-void print(const ipc::PluginDescription &plugin, const std::string &file, bool with_options) {
-    print(fmt::format("{:<18} {:<10} {:<8} {}", plugin.id, ipc::to_text(plugin.kind), plugin.version, file));
+void print(const model::PluginDescription &plugin, const std::string &file, bool with_options) {
+    print(fmt::format("{:<18} {:<10} {:<8} {}", plugin.id, model::to_text(plugin.kind), plugin.version, file));
     print(fmt::format("{:<18} {}", "", plugin.description));
     for (const std::string &need : plugin.needs)
         print(fmt::format("{:<18} needs 'allow: [{}]'", "", need));
     if (!with_options)
         return;
-    for (const ipc::OptionDeclaration &option : plugin.options) {
+    for (const model::OptionDeclaration &option : plugin.options) {
         const std::string standard = option.default_value ? "default '" + *option.default_value + "'" : "required";
         print(fmt::format("    {:<20} {} ({})", option.key, option.help, standard));
         if (!option.choices.empty())
@@ -44,7 +44,7 @@ int list_plugins(const plugin_tools::Selection &selection, bool with_options) {
             print(fmt::format("{:<18} cannot be used: {}", file.stem().string(), *reason));
             status = base::failed;
         } else {
-            print(std::get<ipc::PluginDescription>(result), file.string(), with_options);
+            print(std::get<model::PluginDescription>(result), file.string(), with_options);
         }
     }
     if (!level.empty())

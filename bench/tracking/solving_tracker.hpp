@@ -55,8 +55,8 @@ public:
     std::span<const arhost_target> targets() const { return targets_; }
 
 private:
-    static std::vector<ipc::Target> targets_of(const std::vector<test::Listed> &listed) {
-        std::vector<ipc::Target> targets;
+    static std::vector<model::Target> targets_of(const std::vector<test::Listed> &listed) {
+        std::vector<model::Target> targets;
         for (const test::Listed &one : listed) {
             const double h = one.side_mm / 2;
             targets.push_back({one.family + " " + std::to_string(one.id),

@@ -14,6 +14,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <sys/stat.h>
 
 namespace arhost::host {
 namespace {
@@ -22,15 +23,15 @@ namespace fs = std::filesystem;
 
 // Checks the plugins, fallbacks included, and their options. Returns the ray tracers.
 // `logs_notes`: warns of options that are set aside, which otherwise the pipeline does.
-std::vector<ipc::PluginDescription> check_plugins(const run_config::Configuration &configuration,
-                                                  supervise::Context &context, bool logs_notes) {
+std::vector<model::PluginDescription> check_plugins(const run_config::Configuration &configuration,
+                                                    supervise::Context &context, bool logs_notes) {
     const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
-        std::vector<ipc::PluginDescription> plugins;
+        std::vector<model::PluginDescription> plugins;
         for (std::size_t i = 0; i < component.plugins.size(); ++i) {
             const supervise::ProbeResult result = probe(context, component.plugins[i], component.policy);
             if (const auto *reason = std::get_if<std::string>(&result))
                 component.node.require(i == 0 ? "plugin" : "fallback").fail(*reason);
-            plugins.push_back(std::get<ipc::PluginDescription>(result));
+            plugins.push_back(std::get<model::PluginDescription>(result));
             std::vector<std::string> notes;
             run_config::options_for(plugins.back(), kind, component, i, notes);
             for (const std::string &note : notes)
@@ -43,7 +44,7 @@ std::vector<ipc::PluginDescription> check_plugins(const run_config::Configuratio
         check_component(*configuration.source, ARHOST_KIND_SOURCE);
     for (const run_config::TrackerConfiguration &tracker : configuration.trackers)
         check_component(tracker, ARHOST_KIND_TRACKER);
-    std::vector<ipc::PluginDescription> raytracers;
+    std::vector<model::PluginDescription> raytracers;
     for (const run_config::RaytracerConfiguration &raytracer : configuration.raytracers)
         std::ranges::move(check_component(raytracer, ARHOST_KIND_RAYTRACER), std::back_inserter(raytracers));
     for (const auto *output : {&configuration.snapshot, &configuration.record})
@@ -51,7 +52,7 @@ std::vector<ipc::PluginDescription> check_plugins(const run_config::Configuratio
             check_component(**output, ARHOST_KIND_SINK);
     std::vector<run_config::OutputFile> files = configuration.report_files();
     for (const run_config::ComponentConfiguration &output : configuration.outputs) {
-        const ipc::PluginDescription plugin = check_component(output, ARHOST_KIND_SINK).back();
+        const model::PluginDescription plugin = check_component(output, ARHOST_KIND_SINK).back();
         if (const auto path = run_config::path_of(output.node))
             files.push_back({*path, (plugin.capabilities & ARHOST_CAPABILITY_NUMBERED_FILES) != 0});
     }
@@ -61,7 +62,7 @@ std::vector<ipc::PluginDescription> check_plugins(const run_config::Configuratio
 
 // Loads the scene. Warns of parts that one of the ray tracers lacks, according to its descriptor.
 void check_scene(const run_config::Configuration &configuration, supervise::Context &context,
-                 const std::vector<ipc::PluginDescription> &raytracers) {
+                 const std::vector<model::PluginDescription> &raytracers) {
     std::optional<std::string> outcome;
     std::uint32_t needed = 0;
     const SceneLoading loading(
@@ -76,7 +77,7 @@ void check_scene(const run_config::Configuration &configuration, supervise::Cont
         context.reactor.run_once();
     if (!outcome->empty())
         throw yaml::Error(*outcome);
-    for (const ipc::PluginDescription &plugin : raytracers)
+    for (const model::PluginDescription &plugin : raytracers)
         if (const std::string text = scene::missing_capabilities_text(plugin.id, needed & ~plugin.capabilities);
             !text.empty())
             context.log(ARHOST_SEVERITY_WARNING, "raytracer", text);
@@ -153,7 +154,7 @@ int check(const Arguments &arguments, bool open, supervise::Starter &launcher) {
     show_warnings(configuration, console);
     ipc::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
-    const std::vector<ipc::PluginDescription> raytracers = check_plugins(configuration, context, !open);
+    const std::vector<model::PluginDescription> raytracers = check_plugins(configuration, context, !open);
     if (open) {
         if (const int status = check_by_opening(configuration, arguments, context); status != base::success)
             return status;

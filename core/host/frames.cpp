@@ -62,7 +62,7 @@ template <class T> void copy_array(std::span<const std::byte> slot, std::uint64_
 
 } // namespace
 
-const char *accept_tracker_result(std::span<const std::byte> slot, const std::vector<ipc::Target> &configured,
+const char *accept_tracker_result(std::span<const std::byte> slot, const std::vector<model::Target> &configured,
                                   std::size_t family_count, Frame &frame) {
     const ipc::TrackerSlot layout(configured.size());
     std::vector<ipc::TrackerSlot::Header> header(1);
@@ -84,7 +84,7 @@ const char *accept_tracker_result(std::span<const std::byte> slot, const std::ve
             return problem;
     }
     std::size_t marker_count = 0;
-    for (const ipc::Target &target : configured)
+    for (const model::Target &target : configured)
         marker_count += target.markers.size();
     std::vector<arhost_expected_marker> expected(expected_count);
     copy_array(slot, layout.expected_offset, expected);

@@ -7,7 +7,7 @@
 #include "host/quality.hpp"
 #include "host/slots.hpp"
 #include "host/statistics.hpp"
-#include "ipc/targets.hpp"
+#include "model/target.hpp"
 #include "run_config/session.hpp"
 
 #include <arhost/sink.h>
@@ -79,7 +79,7 @@ using OutputFramePointer = std::shared_ptr<const OutputFrame>;
 // Copies a tracker's result into the frame and validates the copy. Returns nullptr if the copy is valid (finite
 // numbers, valid poses, indices in range), otherwise a description of the contract violation. Does not set
 // `search.unlisted_count`.
-const char *accept_tracker_result(std::span<const std::byte> slot, const std::vector<ipc::Target> &configured,
+const char *accept_tracker_result(std::span<const std::byte> slot, const std::vector<model::Target> &configured,
                                   std::size_t family_count, Frame &frame);
 
 // Copies and validates a source's frame info, which the host received at `now_ns` of CLOCK_MONOTONIC. Returns nullptr

@@ -33,7 +33,7 @@ std::uint64_t count(const std::map<std::string, std::uint64_t> &counts, const ch
 } // namespace
 
 std::optional<Problem> problem_with_run(const run_config::Configuration &configuration, const Statistics &statistics,
-                                        const std::vector<ipc::Target> &targets) {
+                                        const std::vector<model::Target> &targets) {
     if (statistics.frames_in == 0)
         return std::nullopt;
     if (configuration.time_codes)
@@ -75,26 +75,26 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
 }
 
 std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics,
-                           const std::vector<ipc::Target> &targets) {
+                           const std::vector<model::Target> &targets) {
     if (!configuration.tracker || configuration.trajectory || configuration.time_codes || statistics.targets.empty())
         return {};
-    std::vector<ipc::Target> unseen;
+    std::vector<model::Target> unseen;
     std::ranges::copy_if(targets, std::back_inserter(unseen),
-                         [&](const ipc::Target &target) { return !statistics.targets.contains(target.name); });
+                         [&](const model::Target &target) { return !statistics.targets.contains(target.name); });
     if (unseen.empty())
         return {};
     return fmt::format("never seen in {} frames: {}{}", statistics.tracker_results, describe_targets(unseen),
                        seen_instead(statistics, unseen));
 }
 
-std::string misfitting_targets(const Statistics &statistics, const std::vector<ipc::Target> &targets) {
+std::string misfitting_targets(const Statistics &statistics, const std::vector<model::Target> &targets) {
     // Errors of a usable calibration or layout are smaller.
     const auto fits = [](const TargetStatistics &seen) {
         return seen.mean_reprojection_px <= std::max(3.0, 0.01 * seen.largest_px);
     };
     std::string text;
     bool has_map = false;
-    for (const ipc::Target &target : targets) {
+    for (const model::Target &target : targets) {
         const auto seen = statistics.targets.find(target.name);
         if (seen == statistics.targets.end() || fits(seen->second))
             continue;
@@ -108,16 +108,16 @@ std::string misfitting_targets(const Statistics &statistics, const std::vector<i
                               (has_map ? ", and the places and sides in the map ('arhost map' learns a map)" : "");
 }
 
-std::string marker_name(const ipc::TargetMarker &marker) {
+std::string marker_name(const model::TargetMarker &marker) {
     return marker.family + " " +
            (marker.file.empty() ? std::to_string(marker.id) : std::filesystem::path(marker.file).filename().string());
 }
 
-std::string describe_targets(const std::vector<ipc::Target> &targets) {
+std::string describe_targets(const std::vector<model::Target> &targets) {
     constexpr std::size_t max_named = 8;
     std::string text;
     for (std::size_t i = 0; i < std::min(targets.size(), max_named); ++i) {
-        const ipc::Target &target = targets[i];
+        const model::Target &target = targets[i];
         text += i == 0 ? "'" : ", '";
         text += target.name + "' ";
         if (!target.body.empty())
@@ -132,10 +132,10 @@ std::string describe_targets(const std::vector<ipc::Target> &targets) {
     return text;
 }
 
-std::string seen_instead(const Statistics &statistics, const std::vector<ipc::Target> &unseen) {
+std::string seen_instead(const Statistics &statistics, const std::vector<model::Target> &unseen) {
     std::map<std::string, std::uint64_t> unconfirmed_ids, unconfirmed_files;
-    for (const ipc::Target &target : unseen)
-        for (const ipc::TargetMarker &marker : target.markers)
+    for (const model::Target &target : unseen)
+        for (const model::TargetMarker &marker : target.markers)
             if (const auto found = statistics.unconfirmed.find(marker_name(marker));
                 found != statistics.unconfirmed.end())
                 (marker.file.empty() ? unconfirmed_ids : unconfirmed_files).insert(*found);
@@ -165,10 +165,10 @@ std::string seen_instead(const Statistics &statistics, const std::vector<ipc::Ta
     return text;
 }
 
-std::string how_to_compare(const std::vector<ipc::Target> &unseen) {
+std::string how_to_compare(const std::vector<model::Target> &unseen) {
     bool has_ids = false, has_files = false;
-    for (const ipc::Target &target : unseen)
-        for (const ipc::TargetMarker &marker : target.markers)
+    for (const model::Target &target : unseen)
+        for (const model::TargetMarker &marker : target.markers)
             (marker.file.empty() ? has_ids : has_files) = true;
     return std::string(has_ids ? "; compare the numbers and the family with the print" : "") +
            (has_files ? "; compare the files with the prints" : "");

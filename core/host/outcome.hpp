@@ -19,27 +19,27 @@ struct Problem {
 
 // `targets`: those of the tracker at the end of the run.
 std::optional<Problem> problem_with_run(const run_config::Configuration &configuration, const Statistics &statistics,
-                                        const std::vector<ipc::Target> &targets);
+                                        const std::vector<model::Target> &targets);
 
 // Names the targets that were never seen although others were; "" if there are none.
 std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics,
-                           const std::vector<ipc::Target> &targets);
+                           const std::vector<model::Target> &targets);
 
 // Names the targets whose corners are not where the poses project them; "" if there are none.
-std::string misfitting_targets(const Statistics &statistics, const std::vector<ipc::Target> &targets);
+std::string misfitting_targets(const Statistics &statistics, const std::vector<model::Target> &targets);
 
 // Names a marker by its family and its id or, if it has one, its file: "tag36h11 23", "pattern hiro.patt".
-std::string marker_name(const ipc::TargetMarker &marker);
+std::string marker_name(const model::TargetMarker &marker);
 
 // Describes what a tracker looks for, such as "desk (tag36h11 23), board (map of 12 markers)".
-std::string describe_targets(const std::vector<ipc::Target> &targets);
+std::string describe_targets(const std::vector<model::Target> &targets);
 
 // Tells what the tracker saw instead of the unseen targets, as "; it saw tag36h11 5 (30 frames)"; "" if nothing.
-std::string seen_instead(const Statistics &statistics, const std::vector<ipc::Target> &unseen);
+std::string seen_instead(const Statistics &statistics, const std::vector<model::Target> &unseen);
 
 // Tells how to find out why targets are not seen, as "; compare the numbers and the family with the print"; "" for
 // bodies.
-std::string how_to_compare(const std::vector<ipc::Target> &unseen);
+std::string how_to_compare(const std::vector<model::Target> &unseen);
 
 // Names the most frequent markers that belong to no target, as "tag36h11 5 (30 frames)"; "" if there are none.
 std::string strangers_text(const Statistics &statistics);

@@ -12,6 +12,7 @@
 namespace arhost::host {
 
 using namespace ipc;
+using namespace model;
 using supervise::Component;
 
 Pipeline::Pipeline(const run_config::Configuration &configuration, supervise::Context context,
@@ -90,7 +91,7 @@ std::vector<std::string> Pipeline::findings() const {
     lines.push_back(fmt::format("{} frames: {} with a target, {} with an overlay", statistics_.composited,
                                 statistics_.tracked, statistics_.augmented));
     if (tracker_)
-        for (const ipc::Target &target : tracker_->configuration->targets) {
+        for (const model::Target &target : tracker_->configuration->targets) {
             const auto seen = statistics_.targets.find(target.name);
             lines.push_back(
                 seen == statistics_.targets.end()

@@ -59,8 +59,8 @@ public:
     const std::string &failure() const { return failure_; }
     bool failure_was_logged() const { return failure_was_logged_; }
     // The targets that the tracker looks for now.
-    std::vector<ipc::Target> targets() const {
-        return tracker_ ? tracker_->configuration->targets : std::vector<ipc::Target>();
+    std::vector<model::Target> targets() const {
+        return tracker_ ? tracker_->configuration->targets : std::vector<model::Target>();
     }
     bool failed_by_configuration() const { return failed_by_configuration_; }
 
@@ -89,9 +89,9 @@ private:
     SinkQueue &make_sink(const run_config::ComponentConfiguration &output, const std::string &name,
                          const std::string &path = "");
     std::vector<int> open_sockets(const run_config::ComponentConfiguration &output,
-                                  std::vector<ipc::OptionValue> &options);
+                                  std::vector<model::OptionValue> &options);
     void expect_distinct_files(const run_config::ComponentConfiguration &output,
-                               const ipc::PluginDescription &plugin);
+                               const model::PluginDescription &plugin);
     void load_scene();
     const run_config::TrackerConfiguration *tracker_of_anchors() const;
     void write_anchors(const Frame &frame, std::span<std::byte> slot) const;
@@ -130,9 +130,9 @@ private:
     SinkQueue &start_output(const run_config::ComponentConfiguration &output, const std::string &name,
                             const control::Done &done);
     std::filesystem::path free_path(const std::filesystem::path &pattern) const;
-    std::vector<ipc::OptionValue> options_for(const supervise::Component &component, arhost_kind kind,
-                                              const run_config::ComponentConfiguration &configuration,
-                                              std::size_t candidate);
+    std::vector<model::OptionValue> options_for(const supervise::Component &component, arhost_kind kind,
+                                                const run_config::ComponentConfiguration &configuration,
+                                                std::size_t candidate);
     std::string run_description(const std::string &id) const;
     nlohmann::ordered_json status() const;
     nlohmann::ordered_json status_of(const supervise::Component &component) const;
@@ -256,7 +256,7 @@ private:
     OutputFramePointer last_output_;     // for the command `snapshot`
     struct OptionsInUse {
         std::string path; // of the component in the configuration
-        std::vector<ipc::OptionValue> values;
+        std::vector<model::OptionValue> values;
         std::set<std::string> changed; // the keys that the command `set` has changed
     };
     std::map<const supervise::Component *, OptionsInUse> options_;

@@ -19,6 +19,7 @@
 namespace arhost::host {
 
 using namespace ipc;
+using namespace model;
 using supervise::Component;
 
 namespace {
@@ -218,8 +219,8 @@ std::unique_ptr<TrackerStage> Pipeline::make_tracker(TrackerPointer configuratio
     TrackerStage *stage = tracker.get();
     stage->families = families_of(configuration->targets);
     stage->targets = to_memory(configuration->targets);
-    for (const ipc::Target &target : configuration->targets)
-        for (const ipc::TargetMarker &marker : target.markers)
+    for (const model::Target &target : configuration->targets)
+        for (const model::TargetMarker &marker : target.markers)
             stage->listed.try_emplace({marker.family, marker.id}, marker_name(marker));
     Component::Callbacks callbacks = common_callbacks("tracker", configuration->node);
     callbacks.hello = [this, stage](const PluginDescription &plugin, std::size_t candidate) {

@@ -15,6 +15,7 @@
 namespace arhost::host {
 
 using namespace ipc;
+using namespace model;
 using supervise::Component;
 
 namespace {

@@ -59,8 +59,8 @@ FileWatch::Files configuration_files(const run_config::Configuration &configurat
 
 // Whether the file of a pattern or picture was edited. The targets contain only its path.
 bool has_edited_print(const run_config::TrackerConfiguration &tracker, const FileWatch::Files &edited) {
-    for (const ipc::Target &target : tracker.targets)
-        for (const ipc::TargetMarker &marker : target.markers)
+    for (const model::Target &target : tracker.targets)
+        for (const model::TargetMarker &marker : target.markers)
             if (!marker.file.empty() &&
                 std::ranges::any_of(paths_to(marker.file), [&](const auto &path) { return edited.contains(path); }))
                 return true;

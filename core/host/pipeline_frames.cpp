@@ -19,6 +19,7 @@
 namespace arhost::host {
 
 using namespace ipc;
+using namespace model;
 using supervise::Component;
 using Clock = std::chrono::steady_clock;
 
@@ -307,7 +308,7 @@ void Pipeline::count_strangers(Frame &frame) {
     if (live_ && !reported_missing_targets_ && !configuration_.time_codes &&
         Clock::now() - statistics_.first_frame > max_time_without_target) {
         reported_missing_targets_ = true;
-        const std::vector<ipc::Target> &targets = tracker_->configuration->targets;
+        const std::vector<model::Target> &targets = tracker_->configuration->targets;
         if (statistics_.targets.empty())
             context_.log(ARHOST_SEVERITY_WARNING, "tracker",
                          "has seen no target yet; it looks for " + describe_targets(targets) +

@@ -8,6 +8,7 @@
 namespace arhost::host {
 
 using namespace ipc;
+using namespace model;
 using supervise::Component;
 using Json = nlohmann::ordered_json;
 

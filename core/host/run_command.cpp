@@ -156,8 +156,8 @@ void log_latencies(const run_config::Configuration &configuration, const Statist
 // Logs what is wrong with the results of a run that `completed`, or was `stopped` by a signal. Returns false if the
 // run must not count as a success.
 bool log_problems(const run_config::Configuration &configuration, const Arguments &arguments,
-                  const Statistics &statistics, const std::vector<ipc::Target> &targets, bool completed, bool stopped,
-                  Console &console) {
+                  const Statistics &statistics, const std::vector<model::Target> &targets, bool completed,
+                  bool stopped, Console &console) {
     const auto problem = completed ? problem_with_run(configuration, statistics, targets) : std::nullopt;
     const bool lacks_target = problem && problem->is_missing_target;
     const bool is_accepted = lacks_target && arguments.allow_no_target;

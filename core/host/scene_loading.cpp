@@ -37,7 +37,7 @@ std::string problem_with(const std::vector<Anchor> &anchors, const run_config::T
         if (!tracker)
             return anchor.where + ": no tracker runs that could find the target '" + base::printable(anchor.target) +
                    "'; remove this key, or run a tracker with this target";
-        if (std::ranges::find(tracker->targets, anchor.target, &ipc::Target::name) == tracker->targets.end())
+        if (std::ranges::find(tracker->targets, anchor.target, &model::Target::name) == tracker->targets.end())
             return anchor.where + ": there is no target '" + base::printable(anchor.target) +
                    "'; the tracker looks for " + describe_targets(tracker->targets) +
                    "; correct the name, or add the target";
@@ -54,7 +54,7 @@ SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::p
     process_callbacks.result = [](const Result &) {};
     process_callbacks.died = [this](const supervise::Death &death) { on_died(death); };
     process_ = std::make_unique<supervise::Process>(context, budget_, std::move(process_callbacks),
-                                                    messages::Load{scene_, policy_of(sandbox)});
+                                                    messages::Load{scene_}, policy_of(sandbox));
     restart_deadline();
     total_deadline_ = context_.reactor.at(Reactor::Clock::now() + limits.start_total, [this, limits] {
         process_->end("took longer than " + std::to_string(limits.start_total.count()) +

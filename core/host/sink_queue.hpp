@@ -3,9 +3,9 @@
 // One output: its sink, the frames waiting for it, and the frames that it has not confirmed.
 #pragma once
 
-#include "host/control.hpp"
 #include "host/frames.hpp"
 #include "host/statistics.hpp"
+#include "model/control.hpp"
 #include "run_config/configuration.hpp"
 
 #include <deque>

@@ -6,10 +6,10 @@
 
 #include "camera/coordinates.hpp"
 #include "host/contract_checks.hpp"
-#include "host/control.hpp"
 #include "host/quality.hpp"
 #include "host/scene_loading.hpp"
 #include "host/slots.hpp"
+#include "model/control.hpp"
 #include "run_config/configuration.hpp"
 
 #include <chrono>

@@ -69,10 +69,10 @@ struct EndedComponents {
         std::string component;
         supervise::Crash crash;
     };
-    std::map<std::string, double> cpu_seconds;     // by the component's name
-    std::map<std::string, std::uint32_t> restarts; // by the component's name
-    std::map<std::string, ipc::Counters> counters; // by the component's name
-    std::deque<Crash> crashes;                     // the last supervise::Crash::max_kept of each component
+    std::map<std::string, double> cpu_seconds;       // by the component's name
+    std::map<std::string, std::uint32_t> restarts;   // by the component's name
+    std::map<std::string, model::Counters> counters; // by the component's name
+    std::deque<Crash> crashes;                       // the last supervise::Crash::max_kept of each component
     void add(const supervise::Component &component);
     EndedComponents and_running(const std::vector<supervise::Component *> &components) const;
 };

@@ -7,24 +7,35 @@
 // defines the order of messages relative to frames.
 #pragma once
 
-#include "ipc/json_abi.hpp"
+#include "ipc/channel.hpp"
+#include "ipc/memory.hpp"
 #include "ipc/message.hpp"
-#include "sandbox/sandbox.hpp"
+#include "model/plugin_description.hpp"
+#include "model/target.hpp"
 
-#include <map>
+#include <optional>
 #include <stdexcept>
+#include <string>
 #include <variant>
+#include <vector>
+
+namespace arhost::model {
+
+// from_json throws nlohmann::json::exception, or std::runtime_error if check() fails.
+void to_json(nlohmann::json &json, const PluginDescription &description);
+void from_json(const nlohmann::json &json, PluginDescription &description);
+
+} // namespace arhost::model
 
 namespace arhost::ipc {
+
+// Maximum size in bytes of a plugin's description as JSON, which must fit into a Hello message.
+constexpr std::size_t max_descriptor_size = Channel::max_message_size - 1024;
 
 // Thrown if the peer sent a message in which a field is missing or has the wrong type.
 class ProtocolViolation : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
-
-// The events that a plugin has counted, by name (arhost/counters.h).
-using Counters = std::map<std::string, std::uint64_t>;
-bool are_valid(const Counters &counters); // number and names
 
 namespace messages {
 
@@ -38,14 +49,14 @@ constexpr std::size_t max_text = 4000;
 struct Open {
     static constexpr const char *type = "open";
     std::string plugin; // path of the shared object
-    sandbox::Policy sandbox;
+    Json sandbox{};     // sandbox::Policy
 };
 
 // The first message to a worker that loads a scene.
 struct Load {
     static constexpr const char *type = "load";
     std::string scene; // path of the scene file
-    sandbox::Policy sandbox;
+    Json sandbox{};    // sandbox::Policy
 };
 
 // May be sent after Hello and before Create, any number of times. The worker answers with Devices, in
@@ -87,11 +98,11 @@ constexpr std::size_t max_run_description = Channel::max_message_size - 32 * 102
 using Setup = std::variant<SourceSetup, TrackerSetup, RaytracerSetup, SinkSetup>;
 
 // Requests the worker to create and start the plugin's instance. The descriptor of the scene's arena accompanies it
-// for a ray tracer, that of the targets (targets.hpp) for a tracker. The sockets of options of type LISTEN follow;
+// for a ray tracer, that of the targets (to_memory) for a tracker. The sockets of options of type LISTEN follow;
 // the option's `integer` is its position among the descriptors.
 struct Create {
     static constexpr const char *type = "create";
-    std::vector<OptionValue> options;
+    std::vector<model::OptionValue> options;
     Setup setup;
 };
 
@@ -113,7 +124,7 @@ struct Detach {
 // Requests the worker to change an option of the running plugin. The worker answers with OptionSet.
 struct SetOption {
     static constexpr const char *type = "set-option";
-    OptionValue option;
+    model::OptionValue option;
 };
 
 // Answers the Request with this id.
@@ -132,7 +143,7 @@ struct Stop {
 // The worker has loaded the plugin and negotiated the ABI version.
 struct Hello {
     static constexpr const char *type = "hello";
-    PluginDescription descriptor;
+    model::PluginDescription descriptor;
     std::string sandbox; // active and missing layers, from sandbox::to_text
 };
 
@@ -209,7 +220,7 @@ struct OptionSet {
 // Sent when the plugin's counters have changed.
 struct CountersChanged {
     static constexpr const char *type = "counters";
-    Counters counters; // all of them
+    model::Counters counters; // all of them
 };
 
 // A sink requests the end of the run, because the user closed its window.
@@ -246,5 +257,9 @@ template <class T> Json encode(const T &message);
 // Requires is<T>(message). Throws ProtocolViolation if a field is missing or has the wrong type, and
 // std::runtime_error if a value is out of range.
 template <class T> T parse(const Message &message);
+
+// Too many targets for a message are passed in shared memory, which accompanies the message.
+SharedMemory to_memory(const std::vector<model::Target> &targets);
+std::vector<model::Target> targets_from(const Mapping &memory); // throws ProtocolViolation
 
 } // namespace arhost::ipc

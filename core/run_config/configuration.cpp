@@ -3,6 +3,7 @@
 
 #include "camera/calibration.hpp"
 #include "camera/lens.hpp"
+#include "model/control.hpp"
 #include "run_config/access.hpp"
 #include "run_config/options.hpp"
 #include "run_config/schema.hpp"
@@ -51,11 +52,11 @@ base::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
     return limits;
 }
 
-// Returns the commands that `control` grants. Commands that choose from a list of the configuration need this list.
-std::set<std::string, std::less<>> parse_control(const yaml::Node &control, const yaml::Node &root) {
+// Returns the commands that `list` grants. Commands that choose from a list of the configuration need this list.
+std::set<std::string, std::less<>> parse_control(const yaml::Node &list, const yaml::Node &root) {
     std::set<std::string, std::less<>> granted;
-    for (const yaml::Node &command : control.items()) {
-        const std::string name = command.choice(control_commands);
+    for (const yaml::Node &command : list.items()) {
+        const std::string name = command.choice(control::names);
         for (const auto &[needing, key] : {std::pair{"load_scene", "scenes"},
                                            {"swap", "alternatives"},
                                            {"snapshot", "snapshot"},
@@ -244,11 +245,11 @@ void parse_choices(Configuration &configuration, const Shared &shared,
 
 } // namespace
 
-ipc::OptionValue option_value(const ipc::OptionDeclaration &declared, const std::string &text) {
+model::OptionValue option_value(const model::OptionDeclaration &declared, const std::string &text) {
     return value_of(declared, yaml::Node::scalar(text, declared.key));
 }
 
-std::string yaml_text(const ipc::OptionValue &value) {
+std::string yaml_text(const model::OptionValue &value) {
     switch (value.type) {
     case ARHOST_OPTION_BOOL:
         return value.integer ? "true" : "false";
@@ -261,13 +262,13 @@ std::string yaml_text(const ipc::OptionValue &value) {
     }
 }
 
-std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
-                                          const ComponentConfiguration &component, std::size_t candidate,
-                                          std::vector<std::string> &notes) {
+std::vector<model::OptionValue> options_for(const model::PluginDescription &plugin, arhost_kind kind,
+                                            const ComponentConfiguration &component, std::size_t candidate,
+                                            std::vector<std::string> &notes) {
     const bool configured = candidate == 0;
     if (plugin.kind != kind)
         component.node.require(configured ? "plugin" : "fallback")
-            .fail("'" + plugin.id + "' is a " + ipc::to_text(plugin.kind) + ", not a " + ipc::to_text(kind));
+            .fail("'" + plugin.id + "' is a " + model::to_text(plugin.kind) + ", not a " + model::to_text(kind));
     for (const std::string &need : plugin.needs)
         if (component.policy.mode != sandbox::Mode::none && !component.policy.meets(need))
             component.node.require(configured ? "plugin" : "fallback")
@@ -275,17 +276,17 @@ std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, 
                       "]'" + (need == "usb" ? ", or better 'usb: {vendor: …, product: …}'," : "") + " to " +
                       component.node.path() + " (docs/security.md)");
     const std::optional<yaml::Node> options = configured ? component.options : std::nullopt;
-    std::vector<ipc::OptionValue> values = resolve_options(plugin, options, component.path, component.node, notes);
-    if (const auto usb = std::ranges::find(values, "usb", &ipc::OptionValue::key);
+    std::vector<model::OptionValue> values = resolve_options(plugin, options, component.path, component.node, notes);
+    if (const auto usb = std::ranges::find(values, "usb", &model::OptionValue::key);
         usb != values.end() && !component.policy.usb_device.empty()) {
         if (const auto option = options ? options->find("usb") : std::nullopt)
             option->fail("the device is also given by the key 'usb' next to 'plugin'; remove one of them");
         usb->text = component.policy.usb_device;
     }
-    if (const auto debug_view = std::ranges::find(values, "debug_view", &ipc::OptionValue::key);
+    if (const auto debug_view = std::ranges::find(values, "debug_view", &model::OptionValue::key);
         component.debug_view && debug_view != values.end() && debug_view->type == ARHOST_OPTION_BOOL)
         debug_view->integer = 1;
-    for (const ipc::OptionDeclaration &declared : plugin.options) {
+    for (const model::OptionDeclaration &declared : plugin.options) {
         const auto option = options ? options->find(declared.key) : std::nullopt;
         const auto node = declared.key == "path" && component.path ? component.path : option;
         if (node && declared.type == ARHOST_OPTION_INPUT_PATH && is_url(node->text()))

@@ -6,7 +6,7 @@
 #include "base/limits.hpp"
 #include "camera/coordinates.hpp"
 #include "camera/trajectory.hpp"
-#include "ipc/json_abi.hpp"
+#include "model/plugin_description.hpp"
 #include "run_config/files_in_use.hpp"
 #include "run_config/plugin_path.hpp"
 #include "run_config/session.hpp"
@@ -16,21 +16,15 @@
 
 #include <arhost/camera.h>
 
-#include <array>
 #include <filesystem>
 #include <optional>
 #include <set>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace arhost::run_config {
 
 enum class Mode { lockstep, live };
-
-// The commands that the key `control` can grant to an output (docs/control.md).
-constexpr std::array<std::string_view, 8> control_commands = {"quit",       "freeze", "snapshot", "record",
-                                                              "load_scene", "swap",   "set",      "status"};
 
 // Settings that all kinds of components have in common.
 struct ComponentConfiguration {
@@ -108,15 +102,15 @@ struct Configuration {
 // the plugin has the wrong kind, needs a permission that is not allowed, or does not accept the options, or if an
 // input file cannot be read or an output file cannot be written.
 // Adds to `notes` the options that are set aside (resolve_options).
-std::vector<ipc::OptionValue> options_for(const ipc::PluginDescription &plugin, arhost_kind kind,
-                                          const ComponentConfiguration &component, std::size_t candidate,
-                                          std::vector<std::string> &notes);
+std::vector<model::OptionValue> options_for(const model::PluginDescription &plugin, arhost_kind kind,
+                                            const ComponentConfiguration &component, std::size_t candidate,
+                                            std::vector<std::string> &notes);
 
 // Returns the value of the declared option that `text`, in YAML syntax, represents. Throws yaml::Error.
-ipc::OptionValue option_value(const ipc::OptionDeclaration &declared, const std::string &text);
+model::OptionValue option_value(const model::OptionDeclaration &declared, const std::string &text);
 
 // Returns the value in YAML syntax; the inverse of option_value.
-std::string yaml_text(const ipc::OptionValue &value);
+std::string yaml_text(const model::OptionValue &value);
 
 // Parses and checks a configuration. Throws yaml::Error at the first error. `built_in_plugins` is the folder of the
 // built-in plugins.

@@ -11,14 +11,14 @@ namespace arhost::run_config {
 
 namespace {
 
-std::vector<std::string_view> choices_of(const ipc::OptionDeclaration &declared) {
+std::vector<std::string_view> choices_of(const model::OptionDeclaration &declared) {
     return {declared.choices.begin(), declared.choices.end()};
 }
 
 } // namespace
 
-ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::Node &node) {
-    ipc::OptionValue value{declared.key, declared.type, 0, 0.0, ""};
+model::OptionValue value_of(const model::OptionDeclaration &declared, const yaml::Node &node) {
+    model::OptionValue value{declared.key, declared.type, 0, 0.0, ""};
     const bool bounded = declared.minimum != 0 || declared.maximum != 0;
     const auto as_integer = [](double bound) { return static_cast<std::int64_t>(std::clamp(bound, -9e18, 9e18)); };
     switch (declared.type) {
@@ -57,7 +57,7 @@ ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::No
 namespace {
 
 // Parses a default value. The message about an invalid default names the plugin, not the configuration.
-ipc::OptionValue default_of(const ipc::OptionDeclaration &declared, const std::string &plugin) {
+model::OptionValue default_of(const model::OptionDeclaration &declared, const std::string &plugin) {
     if (declared.default_value->empty())
         return {declared.key, declared.type, declared.type == ARHOST_OPTION_LISTEN ? -1 : 0, 0.0, ""};
     const yaml::Node node =
@@ -67,12 +67,12 @@ ipc::OptionValue default_of(const ipc::OptionDeclaration &declared, const std::s
 
 } // namespace
 
-std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plugin,
-                                              const std::optional<yaml::Node> &options,
-                                              const std::optional<yaml::Node> &path, const yaml::Node &owner,
-                                              std::vector<std::string> &notes) {
+std::vector<model::OptionValue> resolve_options(const model::PluginDescription &plugin,
+                                                const std::optional<yaml::Node> &options,
+                                                const std::optional<yaml::Node> &path, const yaml::Node &owner,
+                                                std::vector<std::string> &notes) {
     std::vector<std::string_view> keys;
-    for (const ipc::OptionDeclaration &declared : plugin.options)
+    for (const model::OptionDeclaration &declared : plugin.options)
         keys.push_back(declared.key);
     const bool sets_aside = plugin.kind == ARHOST_KIND_TRACKER || plugin.kind == ARHOST_KIND_RAYTRACER;
     if (options && sets_aside) {
@@ -85,8 +85,8 @@ std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plug
     if (path && std::find(keys.begin(), keys.end(), "path") == keys.end())
         path->fail(plugin.id + " has no option 'path'; remove this key");
 
-    std::vector<ipc::OptionValue> values;
-    for (const ipc::OptionDeclaration &declared : plugin.options) {
+    std::vector<model::OptionValue> values;
+    for (const model::OptionDeclaration &declared : plugin.options) {
         std::optional<yaml::Node> value = options ? options->find(declared.key) : std::nullopt;
         if (declared.key == "path" && path) {
             if (value)

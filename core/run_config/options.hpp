@@ -3,7 +3,7 @@
 // Checks configured options against the options that a plugin declares.
 #pragma once
 
-#include "ipc/json_abi.hpp"
+#include "model/plugin_description.hpp"
 #include "yaml/yaml.hpp"
 
 #include <optional>
@@ -12,7 +12,7 @@
 namespace arhost::run_config {
 
 // Returns the value of `node` as a value of the declared option. Throws yaml::Error.
-ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::Node &node);
+model::OptionValue value_of(const model::OptionDeclaration &declared, const yaml::Node &node);
 
 // Returns a value for every option that the plugin declares, in the order of the descriptor. `options` is the YAML
 // map of the configured options, if any. `path` is the component's key `path:`, which sets the option of the same
@@ -20,9 +20,9 @@ ipc::OptionValue value_of(const ipc::OptionDeclaration &declared, const yaml::No
 // position of the last of these errors is that of `owner`. Unknown options of a tracker or ray tracer, and
 // unknown choices, may be those of another plugin that was named there before, so they only add a note, unless they
 // resemble a known one.
-std::vector<ipc::OptionValue> resolve_options(const ipc::PluginDescription &plugin,
-                                              const std::optional<yaml::Node> &options,
-                                              const std::optional<yaml::Node> &path, const yaml::Node &owner,
-                                              std::vector<std::string> &notes);
+std::vector<model::OptionValue> resolve_options(const model::PluginDescription &plugin,
+                                                const std::optional<yaml::Node> &options,
+                                                const std::optional<yaml::Node> &path, const yaml::Node &owner,
+                                                std::vector<std::string> &notes);
 
 } // namespace arhost::run_config

@@ -3,7 +3,7 @@
 // Parses the targets of a tracker: single markers, maps of markers, bodies.
 #pragma once
 
-#include "ipc/targets.hpp"
+#include "model/target.hpp"
 #include "yaml/yaml.hpp"
 
 #include <filesystem>
@@ -12,8 +12,8 @@
 
 namespace arhost::run_config {
 
-using ipc::Target; // declared in core/ipc, because workers receive them
-using ipc::TargetMarker;
+using model::Target;
+using model::TargetMarker;
 
 // Parses the key `targets` of a tracker. Appends the node of each target to `nodes` (`ids` are many targets in one
 // node), and the absolute paths of the maps that it reads to `map_files`. All functions throw yaml::Error and append

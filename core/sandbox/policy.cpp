@@ -15,40 +15,16 @@ namespace fs = std::filesystem;
 using PathList = std::initializer_list<const char *>;
 
 // Paths that libraries commonly need. Does not include /home, /tmp, /run and the /proc folders of other processes.
-constexpr PathList system_readable = {"/usr",
-                                      "/lib",
-                                      "/lib32",
-                                      "/lib64",
-                                      "/libx32",
-                                      "/bin",
-                                      "/sbin",
-                                      "/opt",
-                                      "/nix/store",
-                                      "/gnu/store",
-                                      "/etc/ld.so.cache",
-                                      "/etc/ld.so.conf",
-                                      "/etc/ld.so.conf.d",
-                                      "/etc/localtime",
-                                      "/etc/alternatives",
-                                      "/etc/fonts",
-                                      "/etc/OpenCL",
-                                      "/etc/vulkan",
-                                      "/etc/glvnd",
-                                      "/etc/drirc",
-                                      "/etc/python3",
-                                      "/etc/mime.types",
-                                      "/proc/self",
-                                      "/proc/cpuinfo",
-                                      "/proc/meminfo",
-                                      "/proc/stat",
-                                      "/proc/version",
-                                      "/proc/filesystems",
-                                      "/proc/sys/vm/overcommit_memory",
-                                      "/proc/sys/vm/max_map_count",
-                                      "/proc/sys/kernel/osrelease",
-                                      "/sys/devices/system",
-                                      "/sys/fs/cgroup",
-                                      "/sys/kernel/mm/transparent_hugepage"};
+constexpr PathList system_readable = {
+    // programs and libraries
+    "/usr", "/lib", "/lib32", "/lib64", "/libx32", "/bin", "/sbin", "/opt", "/nix/store", "/gnu/store",
+    // their settings
+    "/etc/ld.so.cache", "/etc/ld.so.conf", "/etc/ld.so.conf.d", "/etc/localtime", "/etc/alternatives", "/etc/fonts",
+    "/etc/OpenCL", "/etc/vulkan", "/etc/glvnd", "/etc/drirc", "/etc/python3", "/etc/mime.types",
+    // the process and the machine
+    "/proc/self", "/proc/cpuinfo", "/proc/meminfo", "/proc/stat", "/proc/version", "/proc/filesystems",
+    "/proc/sys/vm/overcommit_memory", "/proc/sys/vm/max_map_count", "/proc/sys/kernel/osrelease",
+    "/sys/devices/system", "/sys/fs/cgroup", "/sys/kernel/mm/transparent_hugepage"};
 constexpr PathList system_devices = {"/dev/null", "/dev/full", "/dev/random", "/dev/urandom"};
 
 constexpr PathList gpu_readable = {"/sys/dev",    "/sys/bus/pci", "/sys/class/drm", "/sys/devices",
@@ -170,39 +146,19 @@ void allow_read_files(Policy &policy, const fs::path &file_or_pattern) {
         allow_read(policy, file_or_pattern.parent_path());
 }
 
-Mode mode_of(std::string_view text) {
-    return static_cast<Mode>(std::ranges::find(modes, text) - modes.begin() + 1);
-}
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(Policy, mode, allow, readable, writable, usb_device, environment, memory_bytes,
+                                   makes_shared_memory, standard_output)
 
 nlohmann::json to_json(const Policy &policy) {
-    const auto texts = [](const std::vector<fs::path> &paths) {
-        return std::vector<std::string>(paths.begin(), paths.end());
-    };
-    return {{"mode", static_cast<int>(policy.mode)},    {"allow", policy.allow},
-            {"readable", texts(policy.readable)},       {"writable", texts(policy.writable)},
-            {"usb_device", policy.usb_device},          {"environment", policy.environment},
-            {"memory_bytes", policy.memory_bytes},      {"makes_shared_memory", policy.makes_shared_memory},
-            {"standard_output", policy.standard_output}};
+    return policy;
 }
 
 Policy policy_from_json(const nlohmann::json &json) {
-    const auto paths = [&](const char *key) {
-        const auto texts = json.at(key).get<std::vector<std::string>>();
-        return std::vector<fs::path>(texts.begin(), texts.end());
-    };
-    Policy policy;
-    policy.mode = static_cast<Mode>(json.at("mode").get<int>());
-    for (const auto &what : json.at("allow"))
-        policy.allow.insert(what.get<std::string>());
-    for (const auto &variable : json.at("environment"))
-        policy.environment.insert(variable.get<std::string>());
-    policy.readable = paths("readable");
-    policy.writable = paths("writable");
-    policy.usb_device = json.at("usb_device").get<std::string>();
-    policy.memory_bytes = json.at("memory_bytes").get<std::uint64_t>();
-    policy.makes_shared_memory = json.at("makes_shared_memory").get<bool>();
-    policy.standard_output = json.at("standard_output").get<bool>();
-    return policy;
+    return json.get<Policy>();
+}
+
+Mode mode_of(std::string_view text) {
+    return static_cast<Mode>(std::ranges::find(modes, text) - modes.begin() + 1);
 }
 
 } // namespace arhost::sandbox

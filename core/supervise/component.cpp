@@ -7,6 +7,7 @@
 namespace arhost::supervise {
 
 using namespace ipc;
+using namespace model;
 
 namespace {
 
@@ -63,7 +64,7 @@ void Component::spawn() {
     callbacks.died = [this](const Death &death) { on_died(death); };
     try {
         process_ = std::make_unique<Process>(context_, budget_, std::move(callbacks),
-                                             messages::Open{plugin().string(), sandbox_});
+                                             messages::Open{plugin().string()}, sandbox_);
     } catch (const std::exception &error) { // handled like the death of a process
         state_ = State::waiting;
         return restart(error.what());

@@ -48,7 +48,7 @@ public:
     struct Callbacks {
         // Called when the plugin has been opened. Returns the parameters of its instance; throws std::runtime_error
         // if the configuration does not match the plugin. `candidate`: index in the list of plugins.
-        std::function<Create(const ipc::PluginDescription &, std::size_t candidate)> hello;
+        std::function<Create(const model::PluginDescription &, std::size_t candidate)> hello;
         // Called when the plugin has started. Returns the layout of its output slots (count 0: no slots); throws if
         // the values in `ready` are unsuitable.
         std::function<ipc::SlotLayout(const ipc::messages::Ready &ready)> ready;
@@ -92,7 +92,7 @@ public:
     const std::string &name() const { return name_; }
     const std::filesystem::path &plugin() const { return plugins_[candidate_]; }
     std::size_t candidate() const { return candidate_; } // index of plugin() in the list of plugins
-    const ipc::PluginDescription &description() const { return description_; }
+    const model::PluginDescription &description() const { return description_; }
     pid_t pid() const { return process_ ? process_->pid() : 0; }
 
     // The output slots of the current process; null until the state is `running`.
@@ -108,14 +108,14 @@ public:
     void answer(const ipc::messages::Answer &answer, std::uint32_t restarts);
     // Changes an option of the running plugin. Calls `done` with "" or with the reason why the option is unchanged.
     // The caller has to pass the new value when a restarted worker creates the plugin.
-    void set_option(const ipc::OptionValue &option, std::function<void(const std::string &error)> done);
+    void set_option(const model::OptionValue &option, std::function<void(const std::string &error)> done);
 
     std::uint32_t restarts() const { return restarts_; }
     const std::string &sandbox_level() const { return sandbox_level_; } // as in messages::Hello
     // Logs a line for which the worker is responsible (WorkerBudget::log).
     void log(arhost_severity severity, const std::string &text) { budget_.log(severity, text); }
     // The events that the plugin has counted, in all processes.
-    ipc::Counters counters() const;
+    model::Counters counters() const;
     double cpu_seconds() const { return cpu_seconds_of_dead_ + (process_ ? process_->cpu_seconds() : 0); }
     const std::deque<Crash> &crashes() const { return crashes_; } // the last Crash::max_kept
 
@@ -162,7 +162,7 @@ private:
     std::string missing_device_;
     std::optional<ipc::messages::Stopped> stop_response_;
     std::string configuration_error_, failure_; // text of Failed, or of an exception of `hello` or `ready`
-    ipc::PluginDescription description_;
+    model::PluginDescription description_;
     std::unique_ptr<Process> process_;
     std::shared_ptr<Region> pending_output_;
     RegionPointer output_;
@@ -178,7 +178,7 @@ private:
     std::uint64_t next_ticket_ = 1;
     std::uint32_t restarts_ = 0;
     double cpu_seconds_of_dead_ = 0;
-    ipc::Counters counters_, counters_of_dead_; // of the current process, and of those before it
+    model::Counters counters_, counters_of_dead_; // of the current process, and of those before it
     std::deque<Crash> crashes_;
     std::uint32_t deaths_in_stop_ = 0;
     ipc::Reactor::Registration deadline_, total_deadline_, restart_timer_;

@@ -20,7 +20,7 @@ std::string query(Context &context, const std::filesystem::path &plugin, sandbox
                   const std::function<bool(Process &, const ipc::Message &)> &on_message);
 
 // The plugin's description, or the reason why the plugin cannot be used.
-using ProbeResult = std::variant<ipc::PluginDescription, std::string>;
+using ProbeResult = std::variant<model::PluginDescription, std::string>;
 
 // Opens the plugin in a worker and returns its description. On success, the sandbox level that the worker reached is
 // stored in `level`.

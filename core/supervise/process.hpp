@@ -7,6 +7,7 @@
 #include "ipc/messages.hpp"
 #include "ipc/protocol.hpp"
 #include "ipc/reactor.hpp"
+#include "sandbox/sandbox.hpp"
 #include "supervise/launcher.hpp"
 #include "supervise/worker_budget.hpp"
 
@@ -47,11 +48,11 @@ public:
         std::function<void(const Death &)> died;
     };
 
-    // Starts a worker and sends it the pages with `first`, a messages::Open or messages::Load. `budget` must outlive
-    // the Process.
+    // Starts a worker with `policy` and sends it the pages with `first`, a messages::Open or messages::Load, whose
+    // policy it sets. `budget` must outlive the Process.
     template <class T>
-    Process(Context &context, WorkerBudget &budget, Callbacks callbacks, const T &first)
-        : Process(context, budget, std::move(callbacks), ipc::encode(first), isolation_of(first.sandbox)) {}
+    Process(Context &context, WorkerBudget &budget, Callbacks callbacks, T first, const sandbox::Policy &policy)
+        : Process(context, budget, std::move(callbacks), with_policy(first, policy), isolation_of(policy)) {}
     ~Process(); // kills the process if it is still running
     Process(const Process &) = delete;
     Process &operator=(const Process &) = delete;
@@ -76,6 +77,10 @@ public:
     double cpu_seconds() const; // used so far
 
 private:
+    template <class T> static ipc::Json with_policy(T &first, const sandbox::Policy &policy) {
+        first.sandbox = sandbox::to_json(policy);
+        return ipc::encode(first);
+    }
     Process(Context &context, WorkerBudget &budget, Callbacks callbacks, const ipc::Json &first, Isolation isolation);
     void send_json(const ipc::Json &body, const std::vector<int> &fds);
     void send_json_ordered(const ipc::Json &body, const std::vector<int> &fds);

@@ -7,7 +7,7 @@ namespace arhost::worker {
 namespace {
 
 struct CounterListing {
-    ipc::Counters counters;
+    model::Counters counters;
     bool is_invalid = false;
 };
 
@@ -23,7 +23,7 @@ void add_counter(void *context, const char *name, std::uint64_t value) noexcept 
 
 } // namespace
 
-ipc::Counters list_counters(const arhost_plugin &plugin, arhost_instance *instance) {
+model::Counters list_counters(const arhost_plugin &plugin, arhost_instance *instance) {
     const auto *extension = static_cast<const arhost_counters *>(plugin.get_extension(ARHOST_COUNTERS_EXTENSION));
     if (!extension)
         return {};
@@ -31,7 +31,7 @@ ipc::Counters list_counters(const arhost_plugin &plugin, arhost_instance *instan
         throw std::runtime_error("the extension " ARHOST_COUNTERS_EXTENSION " is too short, or its 'list' is NULL");
     CounterListing listing;
     extension->list(instance, add_counter, &listing);
-    if (listing.is_invalid || !ipc::are_valid(listing.counters))
+    if (listing.is_invalid || !model::are_valid(listing.counters))
         throw std::runtime_error("contract violation: the counters of its extension " ARHOST_COUNTERS_EXTENSION
                                  " are repeated, too many, or have invalid names");
     return std::move(listing.counters);

@@ -3,12 +3,12 @@
 // Reads the counters of a plugin (arhost/counters.h).
 #pragma once
 
-#include "ipc/messages.hpp"
+#include "model/plugin_description.hpp"
 
 namespace arhost::worker {
 
 // Returns nothing if the plugin does not have the extension. Throws std::runtime_error if the plugin violates its
 // contract.
-ipc::Counters list_counters(const arhost_plugin &plugin, arhost_instance *instance);
+model::Counters list_counters(const arhost_plugin &plugin, arhost_instance *instance);
 
 } // namespace arhost::worker

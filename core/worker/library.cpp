@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/library.hpp"
 
-#include "ipc/json_abi.hpp"
+#include "model/plugin_description.hpp"
 #include "sandbox/sandbox.hpp"
 
 #include <algorithm>
@@ -140,7 +140,7 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
         (plugin->descriptor->options->struct_size < option_size ||
          plugin->descriptor->options->struct_size % alignof(arhost_option_descriptor) != 0))
         reject(file, "the struct_size of its options does not match arhost_option_descriptor");
-    const auto options = ipc::options_of(*plugin->descriptor);
+    const auto options = model::options_of(*plugin->descriptor);
     if (const auto found = std::ranges::find(options, nullptr, &arhost_option_descriptor::key);
         found != options.end())
         reject(file, "its option " + std::to_string(found - options.begin()) + " has no key");

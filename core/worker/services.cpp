@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/services.hpp"
 
-#include "ipc/targets.hpp"
 #include "pixels/grey.hpp"
 #include "scene/capabilities.hpp"
 #include "scene/motion.hpp"
@@ -18,6 +17,7 @@ namespace arhost::worker {
 namespace {
 
 using namespace ipc;
+using namespace model;
 
 std::uint8_t *as_pixels(std::span<std::byte> bytes) {
     return reinterpret_cast<std::uint8_t *>(bytes.data());

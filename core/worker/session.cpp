@@ -18,6 +18,7 @@ namespace arhost::worker {
 namespace {
 
 using namespace ipc;
+using namespace model;
 
 // The arhost_host that is passed to the plugin. Stores the last error that the plugin logged, which the messages
 // Failed and Stopped report.
@@ -275,7 +276,8 @@ void send_devices(const Link &link, const PluginHost &host, const arhost_plugin 
 
 int serve_plugin(Link &link, const messages::Open &open) {
     // Enters the sandbox before the library is loaded, because loading runs the constructors of the library.
-    const sandbox::Level level = log_level(link, sandbox::enter_for(open.plugin, open.sandbox));
+    const sandbox::Level level =
+        log_level(link, sandbox::enter_for(open.plugin, sandbox::policy_from_json(open.sandbox)));
     const arhost_entry_point *entry = nullptr;
     {
         Link::InCall call(link, Call::load);
@@ -301,7 +303,7 @@ int serve(Link &link) {
     Message first = link.receive();
     if (is<messages::Load>(first)) {
         const auto load = parse<messages::Load>(first);
-        log_level(link, sandbox::enter(load.sandbox));
+        log_level(link, sandbox::enter(sandbox::policy_from_json(load.sandbox)));
         return load_scene(link, load);
     }
     if (!is<messages::Open>(first))

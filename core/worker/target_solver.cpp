@@ -75,14 +75,14 @@ Eigen::Vector2d centre_px(const arhost_observation &observation) {
 
 } // namespace
 
-TargetSolver::TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<ipc::Target> &targets,
+TargetSolver::TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<model::Target> &targets,
                            const Settings &settings)
     : projection_(intrinsics), settings_(settings) {
     std::uint32_t next_index = 0;
     const std::vector<std::string> families = families_of(targets);
     marker_counts_.resize(families.size());
-    for (const ipc::Target &target : targets) {
-        for (const ipc::TargetMarker &marker : target.markers) {
+    for (const model::Target &target : targets) {
+        for (const model::TargetMarker &marker : target.markers) {
             const auto family =
                 static_cast<std::uint32_t>(std::ranges::find(families, marker.family) - families.begin());
             Marker &added = markers_[{family, marker.id}];

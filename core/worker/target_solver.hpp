@@ -3,7 +3,7 @@
 // Computes the poses of targets from what a tracker reports.
 #pragma once
 
-#include "ipc/targets.hpp"
+#include "model/target.hpp"
 #include "pose/motion_filter.hpp"
 
 #include <arhost/tracker.h>
@@ -25,7 +25,7 @@ public:
         bool confirm = true;   // whether a target is reported only when its sightings in successive frames are too
                                // unlikely to be chance (arhost_observation.false_positive_rate; ADR 29)
     };
-    TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<ipc::Target> &targets,
+    TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<model::Target> &targets,
                  const Settings &settings);
 
     // Size of `before` and `after`, in bytes.

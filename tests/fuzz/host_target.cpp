@@ -178,7 +178,7 @@ private:
                                               0,
                                               nullptr,
                                               nullptr};
-        send(messages::Hello{describe(descriptor), ""}, {}, input);
+        send(messages::Hello{model::describe(descriptor), ""}, {}, input);
     }
 
     void map_pages(Message &open) {

@@ -26,7 +26,7 @@ void require(bool condition, const char *message) {
 }
 
 void take_result(Input &input) {
-    const std::vector<ipc::Target> configured(2, {"target", {{7, "D", {}}}, ""});
+    const std::vector<model::Target> configured(2, {"target", {{7, "D", {}}}, ""});
     const ipc::TrackerSlot layout(configured.size());
     std::vector<std::byte> slot(layout.byte_size(0));
     *reinterpret_cast<ipc::TrackerSlot::Header *>(slot.data()) = {2, 2, 1, 0, 9};

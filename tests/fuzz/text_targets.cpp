@@ -22,8 +22,8 @@ Bytes bytes_of(std::string_view text) {
 }
 
 // One option of every type.
-ipc::PluginDescription plugin_of(arhost_kind kind) {
-    ipc::PluginDescription plugin;
+model::PluginDescription plugin_of(arhost_kind kind) {
+    model::PluginDescription plugin;
     plugin.kind = kind;
     plugin.id = "plugin";
     plugin.options = {{"on", ARHOST_OPTION_BOOL, "false", 0, 0, {}, ""},

@@ -2,7 +2,6 @@
 #include "ray_tracer.hpp"
 
 #include "base/text.hpp"
-#include "ipc/json_abi.hpp"
 #include "ipc/protocol.hpp"
 #include "run_config/options.hpp"
 #include "run_config/plugin_path.hpp"
@@ -44,8 +43,8 @@ constexpr arhost_host host = {sizeof(arhost_host),
 
 // Sets the option `samples` to 16 if it is not set and the plugin supports this value. Plugins default to 1, but here
 // quality matters more than speed.
-void prefer_samples(yaml::Node &options, const ipc::PluginDescription &plugin) {
-    for (const ipc::OptionDeclaration &o : plugin.options)
+void prefer_samples(yaml::Node &options, const model::PluginDescription &plugin) {
+    for (const model::OptionDeclaration &o : plugin.options)
         if (o.key == "samples" && o.type == ARHOST_OPTION_INTEGER && !options.find("samples") &&
             ((o.minimum == 0 && o.maximum == 0) || (o.minimum <= 16 && o.maximum >= 16)))
             options.override_value("samples", "16");
@@ -76,18 +75,19 @@ RayTracer::RayTracer(const std::string &name, yaml::Node options) {
     const yaml::Node requested = yaml::Node::scalar(name, "--raytracer");
     const std::filesystem::path file = run_config::PluginPath({}, built_in_plugins()).resolve(requested);
     plugin_ = &worker::negotiate(file, worker::open_library(file));
-    const ipc::PluginDescription plugin = ipc::description_from_json(ipc::to_json(*plugin_->descriptor));
+    const model::PluginDescription plugin = model::describe(*plugin_->descriptor);
+    model::check(plugin);
     if (plugin.kind != ARHOST_KIND_RAYTRACER)
-        requested.fail("'" + plugin.id + "' is a " + ipc::to_text(plugin.kind) + ", not a ray tracer");
+        requested.fail("'" + plugin.id + "' is a " + model::to_text(plugin.kind) + ", not a ray tracer");
     prefer_samples(options, plugin);
     std::vector<std::string> notes;
-    const std::vector<ipc::OptionValue> values =
+    const std::vector<model::OptionValue> values =
         run_config::resolve_options(plugin, options, std::nullopt, requested, notes);
     for (const std::string &note : notes)
         std::fprintf(stderr, "render-scene: %s\n", note.c_str());
     std::vector<arhost_option> passed;
     passed.reserve(values.size());
-    for (const ipc::OptionValue &v : values)
+    for (const model::OptionValue &v : values)
         passed.push_back({sizeof(arhost_option), v.type, v.key.c_str(), v.integer, v.real, v.text.c_str()});
     expect_ok("create", plugin_->create(&host, passed.data(), static_cast<std::uint32_t>(passed.size()), &instance_));
     if (!instance_)
@@ -97,7 +97,7 @@ RayTracer::RayTracer(const std::string &name, yaml::Node options) {
 void RayTracer::expect_ok(const char *call, arhost_status status) const {
     if (status != ARHOST_STATUS_OK) // the plugin has logged the reason
         throw std::runtime_error(std::string(plugin_->descriptor->id) + ": " + call + ": " +
-                                 ipc::status_text(status));
+                                 model::status_text(status));
 }
 
 cv::Mat RayTracer::render(const arhost_scene &scene, const arhost_camera &camera, double time_s) const {

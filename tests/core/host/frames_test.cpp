@@ -28,7 +28,7 @@ const char *problem_with(arhost_clock clock, std::int64_t capture_ns, std::int64
     return problem;
 }
 
-const std::vector<ipc::Target> targets = {
+const std::vector<model::Target> targets = {
     {"desk", {{23, "D", {}}}, ""}, {"cup", {{7, "D", {}}}, ""}, {"head", {}, "skull"}};
 
 // The result of a tracker: "desk" was never seen, "cup" is detected, "head" is lost.

@@ -86,7 +86,7 @@ TEST_F(Outcome, ReportsThatTheFirstTargetWasNeverSeen) {
 }
 
 TEST_F(Outcome, NamesTargetsThatDoNotFit) {
-    std::vector<ipc::Target> targets{{"board", {{0, "D", {}}, {1, "D", {}}}, ""}, {"cup", {{7, "D", {}}}, ""}};
+    std::vector<model::Target> targets{{"board", {{0, "D", {}}, {1, "D", {}}}, ""}, {"cup", {{7, "D", {}}}, ""}};
     EXPECT_EQ(misfitting_targets(statistics, targets), "");
     statistics.targets["cup"].mean_reprojection_px = 18.9;
     EXPECT_EQ(misfitting_targets(statistics, targets),
@@ -146,7 +146,7 @@ TEST_F(Outcome, NamesTargetsThatWereNeverSeenAlthoughOthersWere) {
 }
 
 TEST_F(Outcome, TellsWhetherThereWereQuadrilateralsIfNothingWasSeen) {
-    const std::vector<ipc::Target> &targets = configuration->tracker->targets;
+    const std::vector<model::Target> &targets = configuration->tracker->targets;
     EXPECT_EQ(seen_instead(statistics, targets), "") << "the tracker does not count them";
     statistics.search.frames_with_candidate_count = 30;
     EXPECT_THAT(seen_instead(statistics, targets), testing::StartsWith("; it found no quadrilaterals"));
@@ -162,8 +162,8 @@ TEST_F(Outcome, TellsWhetherThereWereQuadrilateralsIfNothingWasSeen) {
 }
 
 TEST_F(Outcome, TellsWhatToCompare) {
-    const ipc::Target marker{"cup", {{7, "D", {}}}, ""}, pattern{"card", {{3, "pattern", {}, "/lab/hiro.patt"}}, ""},
-        body{"head", {}, "skull"};
+    const model::Target marker{"cup", {{7, "D", {}}}, ""},
+        pattern{"card", {{3, "pattern", {}, "/lab/hiro.patt"}}, ""}, body{"head", {}, "skull"};
     EXPECT_EQ(how_to_compare({marker, pattern, body}),
               "; compare the numbers and the family with the print; compare the files with the prints");
     EXPECT_EQ(how_to_compare({pattern}), "; compare the files with the prints");
@@ -171,7 +171,7 @@ TEST_F(Outcome, TellsWhatToCompare) {
 }
 
 TEST_F(Outcome, NamesAPatternByItsFile) {
-    ipc::TargetMarker marker{3, "pattern", {}, "/lab/hiro.patt"};
+    model::TargetMarker marker{3, "pattern", {}, "/lab/hiro.patt"};
     statistics.unconfirmed = {{"pattern hiro.patt", 2}};
     EXPECT_THAT(seen_instead(statistics, {{"card", {marker}, ""}}),
                 testing::StartsWith("; it saw pattern hiro.patt (2 frames) but got no pose, because the corners fit "
@@ -179,13 +179,13 @@ TEST_F(Outcome, NamesAPatternByItsFile) {
 }
 
 TEST(Targets, AreDescribedByTheirMarkers) {
-    const ipc::Target cup{"cup", {{7, "D", {}}}, ""}, head{"head", {}, "skull"};
-    ipc::Target board{"board", {}, ""};
+    const model::Target cup{"cup", {{7, "D", {}}}, ""}, head{"head", {}, "skull"};
+    model::Target board{"board", {}, ""};
     for (int id = 0; id < 12; ++id)
         board.markers.push_back({id, "tag36h11", {}});
     EXPECT_EQ(describe_targets({cup, board, head}),
               "'cup' (D 7), 'board' (map of 12 markers of tag36h11), 'head' (body 'skull')");
     EXPECT_EQ(describe_targets({{"hiro", {{0, "pattern", {}, "/prints/hiro.patt", 0.5}}, ""}}),
               "'hiro' (pattern hiro.patt)");
-    EXPECT_EQ(describe_targets(std::vector<ipc::Target>(10, head)).substr(8 * 23 - 2), " and 2 more");
+    EXPECT_EQ(describe_targets(std::vector<model::Target>(10, head)).substr(8 * 23 - 2), " and 2 more");
 }

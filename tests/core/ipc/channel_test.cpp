@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ipc/channel.hpp"
-#include "ipc/json_abi.hpp"
 #include "ipc/message.hpp"
 
 #include <gtest/gtest.h>
@@ -74,50 +73,4 @@ TEST(Channel, ReportsAClosedPeer) {
     Message message;
     EXPECT_EQ(host.receive(message, 1000), ReceiveState::closed);
     EXPECT_FALSE(host.send({{"type", "stop"}}));
-}
-
-TEST(JsonAbi, PreservesIntrinsicsExactly) {
-    arhost_intrinsics lens{};
-    lens.struct_size = sizeof lens;
-    lens.width = 641;
-    lens.height = 479;
-    lens.fx = 607.178466796875;
-    lens.fy = 1.0 / 3.0;
-    lens.cx = -0.1;
-    lens.cy = 1e300;
-    lens.distortion = ARHOST_DISTORTION_BROWN;
-    lens.coefficient_count = 5;
-    for (int i = 0; i < 5; ++i)
-        lens.coefficients[i] = 0.1 * i - 0.2;
-    const arhost_intrinsics back = intrinsics_from_json(Json::parse(to_json(lens).dump()));
-    EXPECT_EQ(std::memcmp(&lens, &back, sizeof lens), 0);
-}
-
-TEST(JsonAbi, RejectsInvalidFormatsAndIntrinsics) {
-    Json format = {{"pixel_format", ARHOST_PIXEL_FORMAT_YUYV},
-                   {"width", 640},
-                   {"height", 480},
-                   {"yuv_matrix", ARHOST_YUV_MATRIX_BT601},
-                   {"yuv_range", ARHOST_YUV_RANGE_LIMITED},
-                   {"fps", 30.0},
-                   {"has_depth", true},
-                   {"transfer", ARHOST_TRANSFER_LINEAR}};
-    const arhost_frame_format parsed = format_from_json(format);
-    EXPECT_EQ(parsed.stride[0], 1280u);
-    EXPECT_EQ(parsed.depth_stride, 1280u);
-    EXPECT_EQ(parsed.transfer, ARHOST_TRANSFER_LINEAR);
-    EXPECT_EQ(parsed.byte_size, parsed.depth_offset + 1280u * 480);
-    for (const auto &[key, value] : std::map<std::string, Json>{{"pixel_format", 99},
-                                                                {"width", 641},
-                                                                {"height", 0},
-                                                                {"width", 1 << 20},
-                                                                {"yuv_matrix", 0},
-                                                                {"transfer", 2},
-                                                                {"fps", -1}}) {
-        Json wrong = format;
-        wrong[key] = value;
-        EXPECT_THROW(format_from_json(wrong), std::exception) << key;
-    }
-    EXPECT_THROW(format_from_json(Json::object()), std::exception);
-    EXPECT_THROW(intrinsics_from_json({{"width", "x"}}), std::exception);
 }

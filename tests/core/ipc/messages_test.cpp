@@ -3,8 +3,12 @@
 
 #include <gmock/gmock.h>
 
+#include <cstring>
+#include <tuple>
+
 using namespace arhost;
 using namespace arhost::ipc;
+using namespace arhost::model;
 using testing::HasSubstr;
 
 namespace {
@@ -81,15 +85,10 @@ TEST(Messages, NameTheKindOfSetup) {
 }
 
 TEST(Messages, PreserveThePolicyAndTheSlotLayout) {
-    sandbox::Policy policy;
-    policy.mode = sandbox::Mode::strict;
-    policy.allow = {"gpu"};
-    policy.memory_bytes = 1 << 20;
+    const Json policy = {{"allow", {"gpu"}}, {"memory_bytes", 1 << 20}};
     const auto open = sent(messages::Open{"plugin.so", policy});
     EXPECT_EQ(open.plugin, "plugin.so");
-    EXPECT_EQ(open.sandbox.mode, sandbox::Mode::strict);
-    EXPECT_TRUE(open.sandbox.allows("gpu"));
-    EXPECT_EQ(open.sandbox.memory_bytes, 1u << 20);
+    EXPECT_EQ(open.sandbox, policy);
     const auto attach = sent(messages::Attach{true, 5, {1000, 4}});
     EXPECT_TRUE(attach.is_output);
     EXPECT_EQ(attach.generation, 5u);
@@ -123,18 +122,6 @@ TEST(Messages, PreserveWhatAWorkerReports) {
     EXPECT_EQ(sent(messages::CountersChanged{counters}).counters, counters);
 }
 
-TEST(Messages, CountersHaveShortPlainNamesAndALimitedNumber) {
-    EXPECT_TRUE(are_valid({}));
-    EXPECT_TRUE(are_valid({{"lost_by_driver", 1}, {std::string(ARHOST_MAX_COUNTER_NAME, 'x'), 2}}));
-    for (const char *name : {"", "Lost", "lost frames", "lost\n", "\xc3\xa9"})
-        EXPECT_FALSE(are_valid({{name, 1}})) << name;
-    EXPECT_FALSE(are_valid({{std::string(ARHOST_MAX_COUNTER_NAME + 1, 'x'), 1}}));
-    Counters many;
-    for (int i = 0; i <= ARHOST_MAX_COUNTERS; ++i)
-        many["c" + std::to_string(i)] = 0;
-    EXPECT_FALSE(are_valid(many));
-}
-
 TEST(Messages, CutLongTexts) {
     const messages::Failed failed{ARHOST_STATUS_ERROR_IO, std::string(1 << 20, 'x')};
     EXPECT_LT(encode(failed).dump().size(), Channel::max_message_size);
@@ -155,4 +142,47 @@ TEST(Messages, MissingOrMistypedFieldsViolateTheProtocol) {
     Json create = encode(messages::Create{{}, messages::SinkSetup{}});
     create["kind"] = "camera";
     EXPECT_EQ(violation<messages::Create>(create), "unknown kind of setup 'camera'");
+}
+
+TEST(Messages, PreserveIntrinsicsExactly) {
+    arhost_intrinsics lens{};
+    lens.struct_size = sizeof lens;
+    lens.width = 641;
+    lens.height = 479;
+    lens.fx = 607.178466796875;
+    lens.fy = 1.0 / 3.0;
+    lens.cx = -0.1;
+    lens.cy = 1e300;
+    lens.distortion = ARHOST_DISTORTION_BROWN;
+    lens.coefficient_count = 5;
+    for (int i = 0; i < 5; ++i)
+        lens.coefficients[i] = 0.1 * i - 0.2;
+    const arhost_intrinsics back = sent(messages::Ready{{}, 0, lens}).intrinsics.value();
+    EXPECT_EQ(std::memcmp(&lens, &back, sizeof lens), 0);
+}
+
+TEST(Messages, RejectInvalidFormatsAndIntrinsics) {
+    arhost_frame_format yuyv = format();
+    yuyv.pixel_format = ARHOST_PIXEL_FORMAT_YUYV;
+    yuyv.yuv_matrix = ARHOST_YUV_MATRIX_BT601;
+    yuyv.yuv_range = ARHOST_YUV_RANGE_LIMITED;
+    yuyv.fps = 30;
+    yuyv.has_depth = 1;
+    yuyv.transfer = ARHOST_TRANSFER_LINEAR;
+    const Json ready = encode(messages::Ready{yuyv, 0, lens()});
+    const arhost_frame_format parsed = parse<messages::Ready>(Message{ready, {}}).format.value();
+    EXPECT_EQ(parsed.stride[0], 128u);
+    EXPECT_EQ(parsed.depth_stride, 128u);
+    EXPECT_EQ(parsed.transfer, ARHOST_TRANSFER_LINEAR);
+    EXPECT_EQ(parsed.byte_size, parsed.depth_offset + 128u * 48);
+    const std::tuple<const char *, const char *, Json> cases[] = {
+        {"format", "pixel_format", 99}, {"format", "width", 641},       {"format", "height", 0},
+        {"format", "width", 1 << 20},   {"format", "yuv_matrix", 0},    {"format", "transfer", 2},
+        {"format", "fps", -1},          {"format", "width", nullptr},   {"intrinsics", "width", "x"},
+        {"intrinsics", "fx", 0},        {"intrinsics", "distortion", 9}};
+    for (const auto &[member, key, value] : cases) {
+        Json wrong = ready;
+        wrong[member][key] = value;
+        EXPECT_THROW(parse<messages::Ready>(Message{wrong, {}}), std::exception) << key;
+    }
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ipc/messages.hpp"
-#include "ipc/targets.hpp"
 
 #include <arhost/tracker.h>
 
@@ -9,6 +8,9 @@
 #include <cstring>
 
 namespace arhost::ipc {
+
+using namespace model;
+
 namespace {
 
 TEST(Targets, ArePassedInSharedMemoryInAnyNumber) {
@@ -44,14 +46,6 @@ TEST(Targets, MalformedOnesAreAViolationOfTheProtocol) {
         std::memcpy(memory.map(Access::read_write).bytes().data(), text, std::strlen(text));
         EXPECT_THROW(targets_from(memory.map(Access::read_only)), ProtocolViolation) << text;
     }
-}
-
-TEST(Targets, NameEachFamilyOnce) {
-    const std::vector<Target> targets = {{"a", {{1, "DICT_4X4_50", {}}, {2, "tag36h11", {}}}, ""},
-                                         {"b", {}, "body"},
-                                         {"c", {{1, "tag36h11", {}}, {3, "DICT_5X5_50", {}}}, ""}};
-    EXPECT_EQ(families_of(targets), (std::vector<std::string>{"DICT_4X4_50", "tag36h11", "DICT_5X5_50"}));
-    EXPECT_TRUE(families_of({}).empty());
 }
 
 } // namespace

@@ -8,8 +8,8 @@ using testing::HasSubstr;
 
 namespace {
 
-ipc::PluginDescription plugin() {
-    ipc::PluginDescription description;
+model::PluginDescription plugin() {
+    model::PluginDescription description;
     description.id = "tracker_x";
     description.options = {{"threads", ARHOST_OPTION_INTEGER, "2", 1, 8, {}, "Threads."},
                            {"sigma", ARHOST_OPTION_REAL, "0.5", 0, 0, {}, "Blur in px."},
@@ -19,10 +19,10 @@ ipc::PluginDescription plugin() {
     return description;
 }
 
-std::vector<ipc::OptionValue> resolve(const std::string &yaml, std::vector<std::string> *notes = nullptr,
-                                      arhost_kind kind = ARHOST_KIND_TRACKER) {
+std::vector<model::OptionValue> resolve(const std::string &yaml, std::vector<std::string> *notes = nullptr,
+                                        arhost_kind kind = ARHOST_KIND_TRACKER) {
     const yaml::Node owner = yaml::Node::parse(yaml, "/lab/a.yaml");
-    ipc::PluginDescription description = plugin();
+    model::PluginDescription description = plugin();
     description.kind = kind;
     std::vector<std::string> ignored;
     return run_config::resolve_options(description, owner.find("options"), owner.find("path"), owner,

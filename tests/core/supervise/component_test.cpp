@@ -10,6 +10,7 @@
 
 using namespace arhost::supervise;
 using namespace arhost::ipc;
+using namespace arhost::model;
 using namespace std::chrono_literals;
 
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "ipc/targets.hpp"
+#include "ipc/messages.hpp"
 #include "worker/services.hpp"
 
 #include "pixels/formulas.hpp"
@@ -67,7 +67,7 @@ void track(arhost_pixel_format pixel_format, arhost_yuv_range range) {
     plugin.functions = &tracker_functions;
     const auto service = make_service(link, host, plugin, nullptr);
     ipc::messages::Ready ready;
-    const std::vector<ipc::Target> targets = {{"cup", {{7, "tag36h11", {}}}, ""}};
+    const std::vector<model::Target> targets = {{"cup", {{7, "tag36h11", {}}}, ""}};
     const ipc::SharedMemory targets_memory = ipc::to_memory(targets);
     std::vector<base::UniqueFd> fds;
     fds.emplace_back(::dup(targets_memory.fd()));

@@ -12,6 +12,7 @@
 
 using namespace arhost;
 using namespace arhost::ipc;
+using namespace arhost::model;
 
 namespace {
 
@@ -30,7 +31,7 @@ struct Conversation {
           process(context, budget,
                   {[this](Message &message) { received.push_back(message.body); }, [](const Result &) {},
                    [this](const supervise::Death &how) { death = how.how; }},
-                  messages::Open{arhost::test::test_plugin_directory() + "/" + plugin + ".so", sandbox::Policy{}}) {}
+                  messages::Open{arhost::test::test_plugin_directory() + "/" + plugin + ".so"}, sandbox::Policy{}) {}
 
     // Returns the next message of the worker, which must be a T, or nullopt if the worker has died.
     template <class T> std::optional<T> next() {

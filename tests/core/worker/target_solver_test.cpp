@@ -22,8 +22,8 @@ const arhost_intrinsics pinhole = intrinsics_of(ARHOST_DISTORTION_NONE, {});
 
 using Corners = std::array<Eigen::Vector3d, 4>;
 
-ipc::TargetMarker configured(std::int32_t id, const Corners &corners, const char *family = "tag36h11") {
-    ipc::TargetMarker marker{id, family, {}};
+model::TargetMarker configured(std::int32_t id, const Corners &corners, const char *family = "tag36h11") {
+    model::TargetMarker marker{id, family, {}};
     for (std::size_t i = 0; i < 4; ++i)
         marker.corners_mm[i] = {corners[i].x(), corners[i].y(), corners[i].z()};
     return marker;
@@ -36,7 +36,7 @@ Corners on_board(std::int32_t id) {
 }
 
 const Corners single = square_corners_mm(side_mm);
-const std::vector<ipc::Target> targets = {
+const std::vector<model::Target> targets = {
     {"cup", {configured(5, single)}, ""},
     {"board",
      {configured(10, on_board(10)), configured(11, on_board(11)), configured(12, on_board(12)),

@@ -1,19 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Converts ABI structs to and from the JSON of control messages. Workers are not trusted, so the functions that read
-// JSON validate it: they throw nlohmann::json::exception or std::runtime_error on malformed input.
+// A plugin's description of itself and of its options: copies of the ABI's structs that own their data.
 #pragma once
-
-#include "ipc/channel.hpp"
-#include "ipc/memory.hpp"
 
 #include <arhost/arhost.h>
 
+#include <cstddef>
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
-namespace arhost::ipc {
+namespace arhost::model {
 
 // Copies of arhost_option_descriptor, arhost_descriptor and arhost_option that own their strings.
 struct OptionDeclaration {
@@ -46,25 +45,15 @@ std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor
 
 PluginDescription describe(const arhost_descriptor &descriptor);
 
-// Maximum size in bytes of each text of a descriptor, and of the whole descriptor as JSON, which must fit into a
-// Hello message.
-constexpr std::size_t max_text_size = 4096, max_descriptor_size = Channel::max_message_size - 1024;
+// Throws std::runtime_error if a value is out of range, or a text too long.
+void check(const PluginDescription &description);
+constexpr std::size_t max_text_size = 4096; // bytes, of each text of a descriptor
 
-Json to_json(const PluginDescription &description);
-Json to_json(const arhost_descriptor &descriptor);
-PluginDescription description_from_json(const Json &json);
-
-Json to_json(const arhost_intrinsics &intrinsics);
-arhost_intrinsics intrinsics_from_json(const Json &json);
-
-// The JSON contains only the fields that a source sets; format_from_json recomputes the layout.
-Json to_json(const arhost_frame_format &format);
-arhost_frame_format format_from_json(const Json &json);
-
-Json to_json(const SlotLayout &layout);
-SlotLayout layout_from_json(const Json &json);
+// The events that a plugin has counted, by name (arhost/counters.h).
+using Counters = std::map<std::string, std::uint64_t>;
+bool are_valid(const Counters &counters); // number and names
 
 const char *to_text(arhost_kind kind);
 const char *status_text(arhost_status status);
 
-} // namespace arhost::ipc
+} // namespace arhost::model

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The targets of a tracker, as the host passes them to its worker.
+// The targets of a tracker.
 #pragma once
-
-#include "ipc/memory.hpp"
 
 #include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
 
-namespace arhost::ipc {
+namespace arhost::model {
 
 struct TargetMarker {
     std::int32_t id = 0;
@@ -32,8 +30,4 @@ struct Target {
 // arhost_observation.family are indices in it.
 std::vector<std::string> families_of(const std::vector<Target> &targets);
 
-// Too many targets for a message are passed in shared memory, which accompanies the message.
-SharedMemory to_memory(const std::vector<Target> &targets);
-std::vector<Target> targets_from(const Mapping &memory); // throws ProtocolViolation
-
-} // namespace arhost::ipc
+} // namespace arhost::model

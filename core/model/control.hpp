@@ -6,14 +6,16 @@
 
 #include <nlohmann/json_fwd.hpp>
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <variant>
 
-namespace arhost::host::control {
+namespace arhost::control {
 
 struct Quit {};
 struct Freeze {
@@ -39,6 +41,10 @@ struct Status {
 };
 using Command = std::variant<Quit, Freeze, Snapshot, Record, LoadScene, Swap, Set, Status>;
 
+// The names of the commands, which the key `control` can grant to an output.
+constexpr std::array<std::string_view, 8> names = {"quit",       "freeze", "snapshot", "record",
+                                                   "load_scene", "swap",   "set",      "status"};
+
 // Why a command was not executed, as a message for the user.
 class Error : public std::runtime_error {
     using std::runtime_error::runtime_error;
@@ -53,4 +59,4 @@ using Done = std::function<void(const std::string &error, const nlohmann::ordere
 
 std::string answer_text(const std::string &error, const nlohmann::ordered_json &members);
 
-} // namespace arhost::host::control
+} // namespace arhost::control

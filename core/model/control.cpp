@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/control.hpp"
+#include "model/control.hpp"
 
 #include "base/text.hpp"
-#include "run_config/configuration.hpp"
 
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 
-namespace arhost::host::control {
+namespace arhost::control {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -100,7 +99,7 @@ Command parse(const std::string &text, const std::set<std::string, std::less<>> 
         throw Error("a command must be a JSON object, as in {\"command\": \"status\"}");
     Members members(json);
     const std::string name = members.text("command");
-    if (std::ranges::find(run_config::control_commands, name) == run_config::control_commands.end())
+    if (std::ranges::find(names, name) == names.end())
         throw Error("unknown command '" + base::printable(name, 100) + "'");
     if (!granted.contains(name))
         throw Error("the configuration does not grant '" + name + "' to this output: add it to its key 'control'");
@@ -118,4 +117,4 @@ std::string answer_text(const std::string &error, const Json &members) {
     return answer.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-} // namespace arhost::host::control
+} // namespace arhost::control

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "model/plugin_description.hpp"
+
+#include <gtest/gtest.h>
+
+using namespace arhost::model;
+
+TEST(Counters, HaveShortPlainNamesAndALimitedNumber) {
+    EXPECT_TRUE(are_valid({}));
+    EXPECT_TRUE(are_valid({{"lost_by_driver", 1}, {std::string(ARHOST_MAX_COUNTER_NAME, 'x'), 2}}));
+    for (const char *name : {"", "Lost", "lost frames", "lost\n", "\xc3\xa9"})
+        EXPECT_FALSE(are_valid({{name, 1}})) << name;
+    EXPECT_FALSE(are_valid({{std::string(ARHOST_MAX_COUNTER_NAME + 1, 'x'), 1}}));
+    Counters many;
+    for (int i = 0; i <= ARHOST_MAX_COUNTERS; ++i)
+        many["c" + std::to_string(i)] = 0;
+    EXPECT_FALSE(are_valid(many));
+}
