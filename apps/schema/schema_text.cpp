@@ -11,30 +11,23 @@ namespace {
 using namespace run_config;
 using enum Type;
 
-const char *type_name(Type type) {
-    switch (type) {
-    case map:
-        return "map";
-    case list:
-        return "list";
-    case text:
-        return "text";
-    case input_path:
-        return "path (input)";
-    case output_path:
-        return "path (output)";
-    case integer:
-        return "whole number";
-    case real:
-        return "number";
-    case boolean:
-        return "true or false";
-    case reals:
-        return "list of numbers";
-    case free_map:
-        return "map of options";
-    }
-    return "";
+// Of each Type: its name in the documentation and in JSON Schema.
+struct TypeName {
+    const char *documented, *json;
+};
+constexpr TypeName type_names[] = {{"map", "object"},
+                                   {"list", "array"},
+                                   {"text", "string"},
+                                   {"path (input)", "string"},
+                                   {"path (output)", "string"},
+                                   {"whole number", "integer"},
+                                   {"number", "number"},
+                                   {"true or false", "boolean"},
+                                   {"list of numbers", "array"},
+                                   {"map of options", "object"}};
+
+const TypeName &name_of(Type type) {
+    return type_names[static_cast<std::size_t>(type)];
 }
 
 using Json = nlohmann::ordered_json;
@@ -42,37 +35,15 @@ using Json = nlohmann::ordered_json;
 Json json_schema_of_map(std::string_view path);
 
 Json json_schema_of(const Key &key) {
-    Json json;
-    switch (key.type) {
-    case map:
-        json = json_schema_of_map(key.path);
-        break;
-    case free_map:
-        json["type"] = "object";
-        break;
-    case list: {
-        json["type"] = "array";
+    Json json = key.type == map ? json_schema_of_map(key.path) : Json{{"type", name_of(key.type).json}};
+    if (key.type == list) {
         const std::string element = key.path + "[]";
         json["items"] = keys_of(element).empty() ? Json{{"type", "string"}} : json_schema_of_map(element);
-        break;
     }
-    case reals:
-        json = {{"type", "array"}, {"items", {{"type", "number"}}}};
-        break;
-    case integer:
-        json["type"] = "integer";
-        break;
-    case real:
-        json["type"] = "number";
-        break;
-    case boolean:
-        json["type"] = "boolean";
-        break;
-    default:
-        json["type"] = "string";
-    }
+    if (key.type == reals)
+        json["items"] = {{"type", "number"}};
     if (!key.choices.empty())
-        json["enum"] = key.choices;
+        json["enum"] = std::vector<std::string_view>(key.choices.begin(), key.choices.end());
     if (key.path == "version")
         json["const"] = 1;
     if (key.path == "tracker.targets[].ids")
@@ -87,7 +58,7 @@ Json json_schema_of_map(std::string_view path) {
     for (const std::string_view name : keys_of(path)) {
         const Key &key = key_at(path.empty() ? std::string(name) : std::string(path) + "." + std::string(name));
         json["properties"][std::string(name)] = json_schema_of(key);
-        if (key.required)
+        if (key.is_required())
             required.push_back(name);
     }
     if (!required.empty())
@@ -100,10 +71,11 @@ Json json_schema_of_map(std::string_view path) {
 std::string as_markdown() {
     std::string text = "| key | type | default | meaning |\n| --- | --- | --- | --- |\n";
     for (const Key &key : run_config::schema()) {
-        const std::string standard = key.required                ? "**required**"
+        const std::string standard = key.is_required()           ? "**required**"
                                      : key.default_value.empty() ? "—"
                                                                  : std::string(key.default_value);
-        text += "| `" + key.path + "` | " + type_name(key.type) + " | " + standard + " | " + key.meaning + " |\n";
+        text += "| `" + key.path + "` | " + name_of(key.type).documented + " | " + standard + " | " + key.meaning +
+                " |\n";
     }
     return text;
 }

@@ -28,27 +28,31 @@ std::int64_t default_of(std::string_view path) {
     return value;
 }
 
+// Returns the value of the integer key at `path`, whose parent is `map`.
 std::int64_t integer_or_default(const yaml::Node &map, std::string_view path, std::int64_t minimum,
                                 std::int64_t maximum) {
-    const std::string_view name = path.substr(path.rfind('.') == std::string_view::npos ? 0 : path.rfind('.') + 1);
-    const auto found = map.find(name);
+    const auto found = map.find(path.substr(path.rfind('.') + 1)); // npos + 1 is 0
     return found ? found->integer(minimum, maximum) : default_of(path);
 }
 
-constexpr std::int64_t max_ms = 3'600'000;
+std::uint32_t count_or_default(const yaml::Node &map, std::string_view path, std::int64_t minimum,
+                               std::int64_t maximum = 1'000'000) {
+    return static_cast<std::uint32_t>(integer_or_default(map, path, minimum, maximum));
+}
+
+std::chrono::milliseconds ms_or_default(const yaml::Node &map, std::string_view path, std::int64_t minimum) {
+    return std::chrono::milliseconds(integer_or_default(map, path, minimum, 3'600'000));
+}
 
 base::RestartLimits parse_restart(const std::optional<yaml::Node> &node) {
     base::RestartLimits limits;
     if (!node)
         return limits;
     node->allow_keys(keys_of("restart"));
-    limits.proven_after_frames =
-        static_cast<std::uint32_t>(integer_or_default(*node, "restart.proven_after_frames", 1, 1'000'000));
-    limits.quarantine_after =
-        static_cast<std::uint32_t>(integer_or_default(*node, "restart.quarantine_after", 1, 1'000'000));
-    limits.first_delay = std::chrono::milliseconds(integer_or_default(*node, "restart.first_delay_ms", 0, max_ms));
-    limits.longest_delay =
-        std::chrono::milliseconds(integer_or_default(*node, "restart.longest_delay_ms", 0, max_ms));
+    limits.proven_after_frames = count_or_default(*node, "restart.proven_after_frames", 1);
+    limits.quarantine_after = count_or_default(*node, "restart.quarantine_after", 1);
+    limits.first_delay = ms_or_default(*node, "restart.first_delay_ms", 0);
+    limits.longest_delay = ms_or_default(*node, "restart.longest_delay_ms", 0);
     return limits;
 }
 
@@ -91,12 +95,9 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
     // "options:" without a value is an empty map.
     if (component.options && component.options->is_null())
         component.options.reset();
-    component.limits.frame =
-        std::chrono::milliseconds(integer_or_default(node, schema_path + ".deadline_ms", 1, max_ms));
-    component.limits.start =
-        std::chrono::milliseconds(integer_or_default(node, schema_path + ".start_deadline_ms", 1, max_ms));
-    component.limits.stop =
-        std::chrono::milliseconds(integer_or_default(node, schema_path + ".stop_deadline_ms", 1, max_ms));
+    component.limits.frame = ms_or_default(node, schema_path + ".deadline_ms", 1);
+    component.limits.start = ms_or_default(node, schema_path + ".start_deadline_ms", 1);
+    component.limits.stop = ms_or_default(node, schema_path + ".stop_deadline_ms", 1);
     component.limits.start_total = base::Limits::total_factor * component.limits.start;
     component.limits.stop_total = base::Limits::total_factor * component.limits.stop;
     component.limits.restart = shared.restart;
@@ -130,17 +131,25 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared,
     reject_family_option(node);
     tracker.targets = parse_targets(node.require("targets"), tracker.target_nodes, tracker.map_files, warnings);
     let_read_prints(tracker);
-    const auto frames = [&](const char *path, std::int64_t minimum) {
-        return static_cast<std::uint32_t>(integer_or_default(node, path, minimum, 1'000'000));
-    };
-    tracker.hold_frames = frames("tracker.hold_frames", 0);
-    tracker.world_grace_frames = frames("tracker.world_grace_frames", 0);
-    tracker.full_search_every = frames("tracker.full_search_every", 1);
+    tracker.hold_frames = count_or_default(node, "tracker.hold_frames", 0);
+    tracker.world_grace_frames = count_or_default(node, "tracker.world_grace_frames", 0);
+    tracker.full_search_every = count_or_default(node, "tracker.full_search_every", 1);
     if (const auto filter = node.find("filter"))
         tracker.smooth = filter->choice(key_at("tracker.filter").choices) == "adaptive";
     if (const auto confirm = node.find("confirm"))
         tracker.confirm = confirm->boolean();
     return tracker;
+}
+
+// The outputs, and those that the commands `snapshot` and `record` start.
+std::vector<const ComponentConfiguration *> outputs_of(const Configuration &configuration) {
+    std::vector<const ComponentConfiguration *> all;
+    for (const ComponentConfiguration &output : configuration.outputs)
+        all.push_back(&output);
+    for (const auto *output : {&configuration.snapshot, &configuration.record})
+        if (*output)
+            all.push_back(&**output);
+    return all;
 }
 
 FilesInUse files_read_by(const Configuration &configuration) {
@@ -153,23 +162,21 @@ FilesInUse files_read_by(const Configuration &configuration) {
             files.read(node->input_path());
     const auto read_all_of = [&](const ComponentConfiguration &component) {
         for (const auto *paths : {&component.plugins, &component.policy.readable})
-            std::for_each(paths->begin(), paths->end(), [&](const auto &path) { files.read(path); });
+            std::ranges::for_each(*paths, [&](const auto &path) { files.read(path); });
     };
     if (configuration.source) {
         read_all_of(*configuration.source);
         if (const auto path = path_of(configuration.source->node))
             files.read_numbered(path->input_path()); // for a numbered file name, also registers the matching files
     }
-    std::for_each(configuration.trackers.begin(), configuration.trackers.end(), read_all_of);
+    std::ranges::for_each(configuration.trackers, read_all_of);
     if (configuration.tracker)
         std::ranges::for_each(configuration.tracker->map_files, [&](const auto &file) { files.read(file); });
-    std::for_each(configuration.raytracers.begin(), configuration.raytracers.end(), read_all_of);
+    std::ranges::for_each(configuration.raytracers, read_all_of);
     for (const Scene &scene : configuration.scenes)
         files.read(scene.file);
-    std::for_each(configuration.outputs.begin(), configuration.outputs.end(), read_all_of);
-    for (const auto *output : {&configuration.snapshot, &configuration.record})
-        if (*output)
-            read_all_of(**output);
+    for (const ComponentConfiguration *output : outputs_of(configuration))
+        read_all_of(*output);
     return files;
 }
 
@@ -193,6 +200,72 @@ std::filesystem::path find_scene(const yaml::Node &scene, const std::filesystem:
             return own;
     }
     scene.fail("there is no scene file '" + file.string() + "'" + hint_at_similar_name(file));
+}
+
+// The source or the trajectory, and how the run proceeds through the frames.
+void parse_run(Configuration &configuration, const Shared &shared) {
+    const yaml::Node &root = shared.root;
+    const auto trajectory = root.find("trajectory");
+    if (trajectory)
+        configuration.trajectory = camera::read_trajectory(trajectory->input_path());
+    if (const auto node = trajectory ? root.find("source") : root.require("source")) {
+        configuration.source = SourceConfiguration{parse_component(*node, "source", shared)};
+        if (const auto fps = node->find("fps")) {
+            configuration.source->fps = fps->real(0, 10'000);
+            if (configuration.source->fps > 0 &&
+                configuration.source->fps < 1e-6) // the duration of a frame in ns must fit in 64 bits
+                fps->fail("must be 0 (the source's own rate) or 1e-06 to 10000, but is " + fps->text());
+        }
+    }
+    if (const auto mode = root.find("mode"))
+        configuration.mode = mode->choice(key_at("mode").choices) == "live" ? Mode::live : Mode::lockstep;
+    if (configuration.mode == Mode::live && !configuration.source)
+        root.require("mode").fail(
+            "mode live needs a 'source', which sets the frame rate; without a source, a trajectory "
+            "can only be rendered in mode lockstep");
+    if (const auto node = root.find("paced"))
+        configuration.paced = node->boolean();
+    configuration.frames =
+        static_cast<std::uint64_t>(integer_or_default(root, "frames", 0, std::numeric_limits<std::int64_t>::max()));
+}
+
+void parse_camera(Configuration &configuration) {
+    const yaml::Node &root = configuration.node;
+    if (const auto node = root.find("camera")) {
+        node->allow_keys(keys_of("camera"));
+        configuration.camera = camera::parse_camera(*node);
+        configuration.camera_node = node;
+    }
+    if (const auto &trajectory = configuration.trajectory) {
+        const std::uint64_t end = trajectory->end();
+        configuration.frames = configuration.frames ? std::min(configuration.frames, end) : end;
+        if (!configuration.camera) {
+            configuration.camera = trajectory->intrinsics.value_or(camera::dissertation_camera({800, 600}));
+            configuration.camera_node = root.find("trajectory");
+        }
+    }
+    if (!configuration.camera)
+        return;
+    if (const std::string problem = camera::problem_with_lens(*configuration.camera); !problem.empty())
+        configuration.camera_node->fail(problem);
+    if (const std::string doubt = camera::doubt_about_focal_length(*configuration.camera); !doubt.empty())
+        configuration.warnings.push_back(warning_at(*configuration.camera_node, doubt));
+}
+
+// The tracker and the ray tracer.
+void parse_stages(Configuration &configuration, const Shared &shared, const std::filesystem::path &built_in_plugins) {
+    if (const auto node = shared.root.find("tracker")) {
+        configuration.tracker = parse_tracker(*node, shared, configuration.warnings);
+        if (!configuration.source)
+            node->fail("a tracker needs a 'source' that delivers frames");
+    }
+    if (const auto node = shared.root.find("raytracer")) {
+        const yaml::Node scene = node->require("scene");
+        configuration.raytracer = RaytracerConfiguration{parse_component(*node, "raytracer", shared), {}, scene};
+        if (!configuration.tracker && !configuration.trajectory)
+            node->fail("a ray tracer needs camera poses from a 'tracker' or a 'trajectory'");
+        configuration.raytracer->scene = find_scene(scene, built_in_plugins);
+    }
 }
 
 // Parses the lists from which the commands `swap` and `load_scene` choose.
@@ -241,6 +314,56 @@ void parse_choices(Configuration &configuration, const Shared &shared,
             expect_new_name(node, file.stem().string(), configuration.scenes);
             configuration.scenes.push_back({file.stem().string(), file});
         }
+}
+
+// Registers the files of the outputs, and warns of an output that may write to many files.
+void register_outputs(Configuration &configuration, const std::filesystem::path &built_in_plugins) {
+    for (const ComponentConfiguration *output : outputs_of(configuration)) {
+        const auto path = path_of(output->node);
+        if (!path)
+            continue;
+        configuration.files.write(*path);
+        const std::filesystem::path &plugin = output->plugins.front();
+        if (configuration.sandbox == sandbox::Mode::none || plugin.parent_path() == built_in_plugins)
+            continue; // no warning for built-in plugins, which are trusted
+        if (const std::string warning = warning_of_output(*path, plugin.stem()); !warning.empty())
+            configuration.warnings.push_back(warning);
+    }
+}
+
+void parse_live(Configuration &configuration, const yaml::Node &live) {
+    live.allow_keys(keys_of("live"));
+    configuration.max_latency = ms_or_default(live, "live.max_latency_ms", 1);
+    if (const auto target = live.find("target_fps"))
+        configuration.target_fps = target->real(0, 10'000);
+    for (const char *key : {"min_scale", "min_samples"})
+        if (const auto limit = live.find(key); limit && configuration.target_fps == 0)
+            limit->fail("this limit needs 'target_fps', the frame rate for which the quality is reduced");
+    if (const auto scale = live.find("min_scale"))
+        configuration.min_scale = scale->real(0.1, 1);
+    configuration.min_samples = count_or_default(live, "live.min_samples", 1, 65536);
+}
+
+// The files that the host writes.
+void parse_reports(Configuration &configuration) {
+    for (const auto &[key, file] :
+         {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}}) {
+        const auto node = configuration.node.find(key);
+        if (!node)
+            continue;
+        *file = base::real_path(node->text()); // if it is a symbolic link, the link's target is replaced
+        std::error_code error;
+        const auto type = std::filesystem::status(**file, error).type();
+        using enum std::filesystem::file_type;
+        if (type != regular && type != not_found && type != character)
+            node->fail("'" + node->text() +
+                       (error ? "' cannot be accessed: " + error.message() : "' is not a regular file") +
+                       "; choose another path");
+        if (type != character) { // character devices such as /dev/null may be used several times
+            configuration.files.write(*node);
+            expect_writable(*node);
+        }
+    }
 }
 
 } // namespace
@@ -326,59 +449,9 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     const Shared shared{root, PluginPath(folders, built_in_plugins), parse_restart(root.find("restart")),
                         configuration.sandbox};
 
-    const auto trajectory_node = root.find("trajectory");
-    if (trajectory_node)
-        configuration.trajectory = camera::read_trajectory(trajectory_node->input_path());
-    if (const auto node = trajectory_node ? root.find("source") : root.require("source")) {
-        configuration.source = SourceConfiguration{parse_component(*node, "source", shared)};
-        if (const auto fps = node->find("fps")) {
-            configuration.source->fps = fps->real(0, 10'000);
-            if (configuration.source->fps > 0 &&
-                configuration.source->fps < 1e-6) // the duration of a frame in ns must fit in 64 bits
-                fps->fail("must be 0 (the source's own rate) or 1e-06 to 10000, but is " + fps->text());
-        }
-    }
-    if (const auto mode = root.find("mode"))
-        configuration.mode = mode->choice(key_at("mode").choices) == "live" ? Mode::live : Mode::lockstep;
-    if (configuration.mode == Mode::live && !configuration.source)
-        root.require("mode").fail(
-            "mode live needs a 'source', which sets the frame rate; without a source, a trajectory "
-            "can only be rendered in mode lockstep");
-    if (const auto node = root.find("paced"))
-        configuration.paced = node->boolean();
-    configuration.frames =
-        static_cast<std::uint64_t>(integer_or_default(root, "frames", 0, std::numeric_limits<std::int64_t>::max()));
-    if (const auto node = root.find("camera")) {
-        node->allow_keys(keys_of("camera"));
-        configuration.camera = camera::parse_camera(*node);
-        configuration.camera_node = node;
-    }
-    if (const auto &trajectory = configuration.trajectory) {
-        const std::uint64_t end = trajectory->end();
-        configuration.frames = configuration.frames ? std::min(configuration.frames, end) : end;
-        if (!configuration.camera) {
-            configuration.camera = trajectory->intrinsics.value_or(camera::dissertation_camera({800, 600}));
-            configuration.camera_node = trajectory_node;
-        }
-    }
-    if (configuration.camera) {
-        if (const std::string problem = camera::problem_with_lens(*configuration.camera); !problem.empty())
-            configuration.camera_node->fail(problem);
-        if (const std::string doubt = camera::doubt_about_focal_length(*configuration.camera); !doubt.empty())
-            configuration.warnings.push_back(warning_at(*configuration.camera_node, doubt));
-    }
-    if (const auto node = root.find("tracker")) {
-        configuration.tracker = parse_tracker(*node, shared, configuration.warnings);
-        if (!configuration.source)
-            node->fail("a tracker needs a 'source' that delivers frames");
-    }
-    if (const auto node = root.find("raytracer")) {
-        const yaml::Node scene = node->require("scene");
-        configuration.raytracer = RaytracerConfiguration{parse_component(*node, "raytracer", shared), {}, scene};
-        if (!configuration.tracker && !configuration.trajectory)
-            node->fail("a ray tracer needs camera poses from a 'tracker' or a 'trajectory'");
-        configuration.raytracer->scene = find_scene(scene, built_in_plugins);
-    }
+    parse_run(configuration, shared);
+    parse_camera(configuration);
+    parse_stages(configuration, shared, built_in_plugins);
     parse_choices(configuration, shared, built_in_plugins);
     if (const auto node = root.find("coordinates")) {
         node->allow_keys(keys_of("coordinates"));
@@ -387,58 +460,18 @@ Configuration parse(const yaml::Node &root, const std::filesystem::path &built_i
     if (const auto node = root.find("outputs"))
         for (const yaml::Node &output : node->items())
             configuration.outputs.push_back(parse_component(output, "outputs[]", shared));
-    if (const auto node = root.find("snapshot"))
-        configuration.snapshot = parse_component(*node, "snapshot", shared);
-    if (const auto node = root.find("record"))
-        configuration.record = parse_component(*node, "record", shared);
+    for (const auto &[key, output] :
+         {std::pair{"snapshot", &configuration.snapshot}, {"record", &configuration.record}})
+        if (const auto node = root.find(key))
+            *output = parse_component(*node, key, shared);
     configuration.files = files_read_by(configuration);
-    const auto register_file = [&](const ComponentConfiguration &output) {
-        const auto path = path_of(output.node);
-        if (!path)
-            return;
-        configuration.files.write(*path);
-        const std::filesystem::path &plugin = output.plugins.front();
-        if (configuration.sandbox == sandbox::Mode::none || plugin.parent_path() == built_in_plugins)
-            return; // no warning for built-in plugins, which are trusted
-        if (const std::string warning = warning_of_output(*path, plugin.stem()); !warning.empty())
-            configuration.warnings.push_back(warning);
-    };
-    std::ranges::for_each(configuration.outputs, register_file);
-    for (const auto *output : {&configuration.snapshot, &configuration.record})
-        if (*output)
-            register_file(**output);
-    if (const auto node = root.find("live")) {
-        node->allow_keys(keys_of("live"));
-        configuration.max_latency =
-            std::chrono::milliseconds(integer_or_default(*node, "live.max_latency_ms", 1, max_ms));
-        if (const auto target = node->find("target_fps"))
-            configuration.target_fps = target->real(0, 10'000);
-        for (const char *key : {"min_scale", "min_samples"})
-            if (const auto limit = node->find(key); limit && configuration.target_fps == 0)
-                limit->fail("this limit needs 'target_fps', the frame rate for which the quality is reduced");
-        if (const auto scale = node->find("min_scale"))
-            configuration.min_scale = scale->real(0.1, 1);
-        configuration.min_samples =
-            static_cast<std::uint32_t>(integer_or_default(*node, "live.min_samples", 1, 65536));
-    }
-    for (const auto &[key, file] :
-         {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}})
-        if (const auto node = root.find(key)) {
-            *file = base::real_path(node->text()); // if it is a symbolic link, the link's target is replaced
-            std::error_code error;
-            const auto type = std::filesystem::status(**file, error).type();
-            using enum std::filesystem::file_type;
-            if (type != regular && type != not_found && type != character)
-                node->fail("'" + node->text() +
-                           (error ? "' cannot be accessed: " + error.message() : "' is not a regular file") +
-                           "; choose another path");
-            if (type != character) { // character devices such as /dev/null may be used several times
-                configuration.files.write(*node);
-                expect_writable(*node);
-            }
-        }
+    register_outputs(configuration, built_in_plugins);
+    if (const auto node = root.find("live"))
+        parse_live(configuration, *node);
+    parse_reports(configuration);
     if (!configuration.source && !configuration.raytracer)
-        trajectory_node->fail("a trajectory needs a 'source' that delivers frames or a 'raytracer' that renders it");
+        root.require("trajectory")
+            .fail("a trajectory needs a 'source' that delivers frames or a 'raytracer' that renders it");
     return configuration;
 }
 

@@ -88,7 +88,8 @@ struct Configuration {
     double target_fps = 0; // mode live: frame rate for which the quality of images is reduced; 0: never
     double min_scale = 0.5;
     std::uint32_t min_samples = 1;
-    // `arhost latency`: instead of the video, outputs get pictures that the tracker recognises in the video.
+    // `arhost latency`: outputs get pictures of time codes in place of the frames. The camera sees the display that
+    // shows them, and the tracker reads the codes.
     bool time_codes = false;
     std::vector<std::string> warnings{};
     std::optional<std::filesystem::path> stats{}, timeline{}; // absolute

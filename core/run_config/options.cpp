@@ -9,13 +9,9 @@
 
 namespace arhost::run_config {
 
-namespace {
-
-std::vector<std::string_view> choices_of(const model::OptionDeclaration &declared) {
+static std::vector<std::string_view> choices_of(const model::OptionDeclaration &declared) {
     return {declared.choices.begin(), declared.choices.end()};
 }
-
-} // namespace
 
 model::OptionValue value_of(const model::OptionDeclaration &declared, const yaml::Node &node) {
     model::OptionValue value{declared.key, declared.type, 0, 0.0, ""};
@@ -45,27 +41,19 @@ model::OptionValue value_of(const model::OptionDeclaration &declared, const yaml
             node.fail(problem);
         break;
     default:
-        if (declared.choices.empty()) {
-            value.text = node.text();
-        } else {
-            value.text = node.choice(choices_of(declared));
-        }
+        value.text = declared.choices.empty() ? node.text() : node.choice(choices_of(declared));
     }
     return value;
 }
 
-namespace {
-
 // Parses a default value. The message about an invalid default names the plugin, not the configuration.
-model::OptionValue default_of(const model::OptionDeclaration &declared, const std::string &plugin) {
+static model::OptionValue default_of(const model::OptionDeclaration &declared, const std::string &plugin) {
     if (declared.default_value->empty())
         return {declared.key, declared.type, declared.type == ARHOST_OPTION_LISTEN ? -1 : 0, 0.0, ""};
     const yaml::Node node =
         yaml::Node::scalar(*declared.default_value, plugin + "'s default of '" + declared.key + "'");
     return value_of(declared, node);
 }
-
-} // namespace
 
 std::vector<model::OptionValue> resolve_options(const model::PluginDescription &plugin,
                                                 const std::optional<yaml::Node> &options,

@@ -13,13 +13,16 @@ namespace arhost::run_config {
 
 enum class Type { map, list, text, input_path, output_path, integer, real, boolean, reals, free_map };
 
+constexpr std::string_view required =
+    "required"; // as a default value: the key is required if its parent map is present
+
 struct Key {
     std::string path; // "tracker.targets[].name": "[]" stands for each element of a list
     Type type;
-    bool required;                  // whether the key is required if its parent map is present
-    std::string_view default_value; // "" if there is no default
+    std::string_view default_value; // or `required`; "" if there is no default
     std::string meaning;            // description in one sentence, including the unit
-    std::vector<std::string_view> choices{};
+    std::span<const std::string_view> choices{};
+    bool is_required() const { return default_value == required; }
 };
 
 std::span<const Key> schema();
