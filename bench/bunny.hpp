@@ -3,7 +3,7 @@
 // Used by all ray tracer benchmarks: the test mesh, and an arhost_host that prints log messages.
 #pragma once
 
-#include "scene/arena.hpp"
+#include "scene/arena_builder.hpp"
 #include "scene/mesh_loader.hpp"
 
 #include <arhost/plugin.h>

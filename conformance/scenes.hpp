@@ -4,7 +4,7 @@
 // pixel covers 1 mm in the plane z = 0 (160×120 px, focal length 200 px).
 #pragma once
 
-#include "scene/arena.hpp"
+#include "scene/arena_builder.hpp"
 
 #include <arhost/camera.h>
 

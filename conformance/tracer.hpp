@@ -6,7 +6,7 @@
 #include "conformance/plugin_library.hpp"
 #include "conformance/scenes.hpp"
 #include "conformance/test.hpp"
-#include "scene/arena.hpp"
+#include "scene/arena_builder.hpp"
 
 #include <chrono>
 #include <optional>

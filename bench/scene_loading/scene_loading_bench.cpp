@@ -7,7 +7,7 @@
 // minimal parser.
 //
 //   scene-loading-bench dragon_vrip.ply.gz [runs]
-#include "scene/arena.hpp"
+#include "scene/arena_builder.hpp"
 #include "scene/mesh_loader.hpp"
 
 #include <sys/resource.h>

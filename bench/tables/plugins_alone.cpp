@@ -8,7 +8,7 @@
 #include "camera/trajectory.hpp"
 #include "compositor/compositor.hpp"
 #include "pixels/grey.hpp"
-#include "scene/loader.hpp"
+#include "scene/scene_loader.hpp"
 
 #include <fiducial_common/tracker_support.hpp>
 

@@ -15,7 +15,7 @@
 // Pixel centres are at integers as in arhost/frame.h: arGetLine.c uses the indices of pixels as observed positions.
 #include "camera/artoolkit.hpp"
 
-#include "camera/lens.hpp"
+#include "camera/lens_model.hpp"
 #include "yaml/yaml.hpp"
 
 #include <arhost/frame.h>

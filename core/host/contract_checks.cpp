@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/contract_checks.hpp"
 
-#include "camera/lens.hpp"
+#include "camera/lens_model.hpp"
 #include "scene/motion.hpp"
 
 #include <fmt/format.h>

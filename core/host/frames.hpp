@@ -8,7 +8,7 @@
 #include "host/slots.hpp"
 #include "host/statistics.hpp"
 #include "model/target.hpp"
-#include "run_config/session.hpp"
+#include "run_config/recorded_session.hpp"
 
 #include <arhost/sink.h>
 

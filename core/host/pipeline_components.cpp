@@ -6,7 +6,7 @@
 #include "base/text.hpp"
 #include "camera/calibration.hpp"
 #include "camera/coordinates.hpp"
-#include "camera/lens.hpp"
+#include "camera/lens_model.hpp"
 #include "host/outcome.hpp"
 #include "run_config/access.hpp"
 

@@ -3,7 +3,7 @@
 // The description of a run for the sinks that record it (docs/sessions.md).
 #include "host/pipeline.hpp"
 
-#include "run_config/session.hpp"
+#include "run_config/recorded_session.hpp"
 
 #include <arhost-cpp/url.hpp>
 #include <nlohmann/json.hpp>

@@ -2,7 +2,7 @@
 #include "host/commands.hpp"
 #include "host/read_configuration.hpp"
 #include "host/run_command.hpp"
-#include "run_config/session.hpp"
+#include "run_config/recorded_session.hpp"
 
 #include <algorithm>
 

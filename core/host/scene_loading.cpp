@@ -3,7 +3,7 @@
 
 #include "base/text.hpp"
 #include "host/outcome.hpp"
-#include "scene/arena.hpp"
+#include "scene/arena_builder.hpp"
 
 #include <arhost/tracker.h>
 

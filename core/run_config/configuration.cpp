@@ -2,7 +2,7 @@
 #include "run_config/configuration.hpp"
 
 #include "camera/calibration.hpp"
-#include "camera/lens.hpp"
+#include "camera/lens_model.hpp"
 #include "model/control.hpp"
 #include "run_config/access.hpp"
 #include "run_config/options.hpp"

@@ -3,7 +3,7 @@
 // glTF 2.0 files, .gltf and .glb: meshes, materials, textures, animations. Private to core/scene.
 #pragma once
 
-#include "scene/arena.hpp"
+#include "scene/arena_builder.hpp"
 #include "scene/callbacks.hpp"
 #include "scene/mesh.hpp"
 #include "scene/shapes.hpp"

@@ -3,7 +3,7 @@
 // Images for textures and environments: PNG, JPEG, PNM, Radiance HDR and OpenEXR. Private to core/scene.
 #pragma once
 
-#include "scene/arena.hpp"
+#include "scene/arena_builder.hpp"
 #include "scene/callbacks.hpp"
 
 #include <filesystem>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scene/motion.hpp"
 
-#include "scene/limits.hpp"
+#include "scene/arena_limits.hpp"
 
 #include <glm/geometric.hpp>
 #include <glm/matrix.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/arena.hpp"
+#include "scene/arena_builder.hpp"
 
 #include "scene/box.hpp"
 #include "scene/motion.hpp"

@@ -2,7 +2,7 @@
 #include "worker/loader.hpp"
 
 #include "base/file_identity.hpp"
-#include "scene/loader.hpp"
+#include "scene/scene_loader.hpp"
 
 #include <arhost/plugin.h>
 

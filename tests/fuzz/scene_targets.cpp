@@ -6,9 +6,9 @@
 #include "targets.hpp"
 
 #include "scene/gltf.hpp"
-#include "scene/loader.hpp"
 #include "scene/mesh_loader.hpp"
 #include "scene/motion.hpp"
+#include "scene/scene_loader.hpp"
 
 #include <stdexcept>
 

@@ -3,7 +3,7 @@
 // Tests the registration of the complete system with lens distortion: compares the silhouette of a virtual plate in
 // the augmented frames with the plate's projection, computed with the exact pose that the source reports.
 #include "arhost_run.hpp"
-#include "camera/lens.hpp"
+#include "camera/lens_model.hpp"
 
 #include <gmock/gmock.h>
 #include <opencv2/imgcodecs.hpp>

@@ -8,7 +8,7 @@
 #include "base/text.hpp"
 #include "base/write_all.hpp"
 #include "ray_tracer.hpp"
-#include "scene/loader.hpp"
+#include "scene/scene_loader.hpp"
 
 #include <glm/trigonometric.hpp>
 #include <opencv2/imgcodecs.hpp>

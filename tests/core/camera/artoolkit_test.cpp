@@ -2,7 +2,7 @@
 #include "camera/artoolkit.hpp"
 
 #include "artoolkit_bytes.hpp"
-#include "camera/lens.hpp"
+#include "camera/lens_model.hpp"
 #include "errors.hpp"
 #include "plugin_under_test.hpp"
 

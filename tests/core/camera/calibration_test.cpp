@@ -3,7 +3,7 @@
 
 #include "artoolkit_bytes.hpp"
 #include "camera/coordinates.hpp"
-#include "camera/lens.hpp"
+#include "camera/lens_model.hpp"
 #include "errors.hpp"
 #include "plugin_under_test.hpp"
 

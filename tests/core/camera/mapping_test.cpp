@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera/mapping.hpp"
 
-#include "camera/lens.hpp"
+#include "camera/lens_model.hpp"
 #include "plugin_under_test.hpp"
 
 #include <glm/geometric.hpp>

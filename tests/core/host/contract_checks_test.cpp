@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/contract_checks.hpp"
 
-#include "camera/lens.hpp"
-#include "scene/arena.hpp"
+#include "camera/lens_model.hpp"
+#include "scene/arena_builder.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "image_samples.hpp"
 #include "plugin_under_test.hpp"
-#include "scene/loader.hpp"
+#include "scene/scene_loader.hpp"
 #include "scene_samples.hpp"
 
 #include <gmock/gmock.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "scene/arena.hpp"
+#include "scene/arena_builder.hpp"
 
 #include <algorithm>
 #include <filesystem>

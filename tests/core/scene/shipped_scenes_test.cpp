@@ -3,9 +3,9 @@
 // Loads every scene in config/scenes twice: with stand-ins, as after a fresh checkout, and with the meshes that
 // tools/get-models downloads, if present.
 #include "plugin_under_test.hpp"
-#include "scene/loader.hpp"
 #include "scene/mesh_loader.hpp"
 #include "scene/motion.hpp"
+#include "scene/scene_loader.hpp"
 
 #include <directories.hpp>
 #include <glm/common.hpp>

@@ -6,8 +6,8 @@
 //
 // To update the references after an intended change, run:
 // ARHOST_UPDATE_GOLDEN=1 build/release/tests/rt-embree-test --gtest_filter='*Golden*'
-#include "scene/loader.hpp"
 #include "scene/motion.hpp"
+#include "scene/scene_loader.hpp"
 #include "tracer.hpp"
 
 #include <directories.hpp>

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "plugin_under_test.hpp"
-#include "scene/arena.hpp"
+#include "scene/arena_builder.hpp"
 
 #include <arhost/shading/srgb8.hpp>
 

@@ -6,7 +6,7 @@
 #include "copy_drivers.hpp"
 #include "drivers_leak.hpp"
 #include "environment_variable.hpp"
-#include "scene/loader.hpp"
+#include "scene/scene_loader.hpp"
 #include "two_tracers.hpp"
 
 #include <gmock/gmock.h>

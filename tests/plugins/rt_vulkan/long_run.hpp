@@ -3,8 +3,8 @@
 // Renders many images of alternating scenes with rt_vulkan, and measures memory and file descriptors to detect leaks.
 #pragma once
 
-#include "scene/loader.hpp"
 #include "scene/motion.hpp"
+#include "scene/scene_loader.hpp"
 #include "tracer.hpp"
 
 #include <malloc.h>

@@ -6,8 +6,8 @@
 #include "large_surfaces.hpp"
 #include "renderer.hpp"
 #include "rich_scene.hpp"
-#include "scene/loader.hpp"
 #include "scene/motion.hpp"
+#include "scene/scene_loader.hpp"
 #include "two_tracers.hpp"
 
 #include <directories.hpp>

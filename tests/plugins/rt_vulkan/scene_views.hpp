@@ -3,8 +3,8 @@
 // Lists the scenes and camera positions of the image comparisons.
 #pragma once
 
-#include "scene/loader.hpp"
 #include "scene/motion.hpp"
+#include "scene/scene_loader.hpp"
 #include "two_tracers.hpp"
 
 #include <directories.hpp>

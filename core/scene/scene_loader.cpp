@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scene/loader.hpp"
+#include "scene/scene_loader.hpp"
 
 #include "scene/box.hpp"
 #include "scene/gltf.hpp"

@@ -3,7 +3,7 @@
 // Writes and validates the arena of arhost/scene.h. Depends on no parser, since the host links it.
 #pragma once
 
-#include "scene/limits.hpp"
+#include "scene/arena_limits.hpp"
 #include "scene/mesh.hpp"
 
 #include <arhost/scene.h>

@@ -3,7 +3,7 @@
 // Loads scene files; docs/scenes.md describes the format.
 #pragma once
 
-#include "scene/arena.hpp"
+#include "scene/arena_builder.hpp"
 #include "scene/callbacks.hpp"
 #include "yaml/yaml.hpp"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "camera/lens.hpp"
+#include "camera/lens_model.hpp"
 
 #include <arhost/shading/lens.hpp>
 

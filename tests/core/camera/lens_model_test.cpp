@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera/calibration.hpp"
-#include "camera/lens.hpp"
+#include "camera/lens_model.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

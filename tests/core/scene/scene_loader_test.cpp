@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plugin_under_test.hpp"
-#include "scene/loader.hpp"
+#include "scene/scene_loader.hpp"
 #include "scene_samples.hpp"
 
 #include <directories.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run_config/session.hpp"
+#include "run_config/recorded_session.hpp"
 
 #include "base/text.hpp"
 #include "base/unique_fd.hpp"
