@@ -31,7 +31,7 @@ install(FILES LICENSE DESTINATION ${documentation} COMPONENT licence) # Debian h
 # The documentation has the folders of the repository, so that its relative links work: all documents, copies of the files
 # that they link to, and symbolic links to the headers.
 file(GLOB documents RELATIVE ${PROJECT_SOURCE_DIR} CONFIGURE_DEPENDS *.md bench/peers/*.md config/*.md docs/*.md docs/adr/*.md
-     plugins/*/*.md)
+     libs/*/*.md plugins/*/*.md)
 set(linked docs/images)
 foreach(document ${documents})
   get_filename_component(folder ${document} DIRECTORY)

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detector.hpp"
 
-#include <fiducial_common/apriltag_families.hpp>
-#include <fiducial_common/aruco_dictionaries.hpp>
-#include <fiducial_common/print_alignment.hpp>
+#include <fiducial/apriltag_families.hpp>
+#include <fiducial/aruco_dictionaries.hpp>
+#include <fiducial/print_alignment.hpp>
 
 #include <algorithm>
 #include <map>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "family.hpp"
 
-#include <fiducial_common/apriltag_families.hpp>
-#include <fiducial_common/aruco_dictionaries.hpp>
-#include <fiducial_common/matrix_codes.hpp>
-#include <fiducial_common/pattern_file.hpp>
+#include <fiducial/apriltag_families.hpp>
+#include <fiducial/aruco_dictionaries.hpp>
+#include <fiducial/matrix_codes.hpp>
+#include <fiducial/pattern_file.hpp>
 
 #include <fmt/format.h>
 

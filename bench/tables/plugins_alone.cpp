@@ -10,7 +10,7 @@
 #include "pixels/grey.hpp"
 #include "scene/scene_loader.hpp"
 
-#include <fiducial_common/tracker_support.hpp>
+#include <fiducial/tracker_support.hpp>
 
 #include <sys/resource.h>
 

@@ -5,8 +5,8 @@
 //   corner-sweep [aruco:key=value …] [apriltag:key=value …]
 #include "tracker_options.hpp"
 
-#include <fiducial_common/rbt_sequence.hpp>
-#include <fiducial_common/tag_pictures.hpp>
+#include <fiducial/rbt_sequence.hpp>
+#include <fiducial/tag_pictures.hpp>
 
 #include <cstdio>
 

@@ -4,7 +4,7 @@
 //   tracker-accuracy [aruco:key=value …] [apriltag:key=value …]
 #include "tracker_options.hpp"
 
-#include <fiducial_common/rbt_sequence.hpp>
+#include <fiducial/rbt_sequence.hpp>
 
 #include <cstdio>
 #include <exception>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <fiducial_common/tracker_support.hpp>
+#include <fiducial/tracker_support.hpp>
 
 #include <map>
 #include <stdexcept>

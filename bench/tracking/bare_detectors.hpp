@@ -3,11 +3,11 @@
 // The detectors of AprilTag and OpenCV without arhost, for tag36h11.
 #pragma once
 
-#include <fiducial_common/apriltag_families.hpp>
-#include <fiducial_common/aruco_dictionaries.hpp>
-#include <fiducial_common/observations.hpp>
-#include <fiducial_common/opencv_aruco.hpp>
-#include <fiducial_common/tracker_support.hpp>
+#include <fiducial/apriltag_families.hpp>
+#include <fiducial/aruco_dictionaries.hpp>
+#include <fiducial/observations.hpp>
+#include <fiducial/opencv_aruco.hpp>
+#include <fiducial/tracker_support.hpp>
 
 #include <map>
 #include <memory>

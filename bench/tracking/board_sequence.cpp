@@ -6,7 +6,7 @@
 #include "map/learning.hpp"
 #include "pose/track.hpp"
 
-#include <fiducial_common/rbt_sequence.hpp>
+#include <fiducial/rbt_sequence.hpp>
 
 #include <apriltag_pose.h>
 #include <opencv2/calib3d.hpp>

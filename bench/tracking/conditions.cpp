@@ -9,8 +9,8 @@
 
 #include "base/command_line.hpp"
 
-#include <fiducial_common/prints.hpp>
-#include <fiducial_common/rendered_marker.hpp>
+#include <fiducial/prints.hpp>
+#include <fiducial/rendered_marker.hpp>
 
 #include <fmt/format.h>
 

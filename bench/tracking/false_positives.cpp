@@ -7,10 +7,10 @@
 
 #include "base/command_line.hpp"
 
-#include <fiducial_common/aruco_dictionaries.hpp>
-#include <fiducial_common/clutter.hpp>
-#include <fiducial_common/matrix_codes.hpp>
-#include <fiducial_common/opencv_aruco.hpp>
+#include <fiducial/aruco_dictionaries.hpp>
+#include <fiducial/clutter.hpp>
+#include <fiducial/matrix_codes.hpp>
+#include <fiducial/opencv_aruco.hpp>
 
 #include <opencv2/imgcodecs.hpp>
 

@@ -7,9 +7,9 @@
 
 #include "base/command_line.hpp"
 
-#include <fiducial_common/clutter.hpp>
-#include <fiducial_common/prints.hpp>
-#include <fiducial_common/rendered_marker.hpp>
+#include <fiducial/clutter.hpp>
+#include <fiducial/prints.hpp>
+#include <fiducial/rendered_marker.hpp>
 
 #include <algorithm>
 #include <array>

@@ -5,7 +5,7 @@
 
 #include "worker/target_solver.hpp"
 
-#include <fiducial_common/tracker_support.hpp>
+#include <fiducial/tracker_support.hpp>
 
 #include <chrono>
 #include <span>

@@ -7,8 +7,8 @@
 
 #include "base/command_line.hpp"
 
-#include <fiducial_common/prints.hpp>
-#include <fiducial_common/rendered_marker.hpp>
+#include <fiducial/prints.hpp>
+#include <fiducial/rendered_marker.hpp>
 
 #include <cstdio>
 #include <deque>

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // tracker_apriltag: detects AprilTags with the AprilTag library, version 3.
-#include <fiducial_common/apriltag_families.hpp>
-#include <fiducial_common/edge_refinement.hpp>
-#include <fiducial_common/family_search.hpp>
-#include <fiducial_common/lens.hpp>
-#include <fiducial_common/observations.hpp>
-#include <fiducial_common/other_markers.hpp>
-#include <fiducial_common/print_alignment.hpp>
-#include <fiducial_common/search_regions.hpp>
+#include <fiducial/apriltag_families.hpp>
+#include <fiducial/edge_refinement.hpp>
+#include <fiducial/family_search.hpp>
+#include <fiducial/lens.hpp>
+#include <fiducial/observations.hpp>
+#include <fiducial/other_markers.hpp>
+#include <fiducial/print_alignment.hpp>
+#include <fiducial/search_regions.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 

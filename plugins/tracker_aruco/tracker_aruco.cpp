@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // tracker_aruco: detects ArUco markers and AprilTags with OpenCV.
-#include <fiducial_common/aruco_dictionaries.hpp>
-#include <fiducial_common/aruco_reading.hpp>
-#include <fiducial_common/edge_refinement.hpp>
-#include <fiducial_common/family_search.hpp>
-#include <fiducial_common/lens.hpp>
-#include <fiducial_common/observations.hpp>
-#include <fiducial_common/opencv_aruco.hpp>
-#include <fiducial_common/other_markers.hpp>
-#include <fiducial_common/print_alignment.hpp>
-#include <fiducial_common/search_regions.hpp>
+#include <fiducial/aruco_dictionaries.hpp>
+#include <fiducial/aruco_reading.hpp>
+#include <fiducial/edge_refinement.hpp>
+#include <fiducial/family_search.hpp>
+#include <fiducial/lens.hpp>
+#include <fiducial/observations.hpp>
+#include <fiducial/opencv_aruco.hpp>
+#include <fiducial/other_markers.hpp>
+#include <fiducial/print_alignment.hpp>
+#include <fiducial/search_regions.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 

@@ -3,7 +3,7 @@
 // tracker_image: detects plane pictures, such as posters and the covers of books.
 #include "picture.hpp"
 
-#include <fiducial_common/observations.hpp>
+#include <fiducial/observations.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 

@@ -5,7 +5,7 @@
 
 #include "pattern.hpp"
 
-#include <fiducial_common/matrix_codes.hpp>
+#include <fiducial/matrix_codes.hpp>
 
 #include <cstdint>
 #include <optional>

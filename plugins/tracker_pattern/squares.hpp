@@ -3,7 +3,7 @@
 // Dark squares on a bright ground.
 #pragma once
 
-#include <fiducial_common/observations.hpp>
+#include <fiducial/observations.hpp>
 
 #include <opencv2/core.hpp>
 

@@ -5,10 +5,10 @@
 #include "pattern.hpp"
 #include "squares.hpp"
 
-#include <fiducial_common/edge_refinement.hpp>
-#include <fiducial_common/family_search.hpp>
-#include <fiducial_common/lens.hpp>
-#include <fiducial_common/search_regions.hpp>
+#include <fiducial/edge_refinement.hpp>
+#include <fiducial/family_search.hpp>
+#include <fiducial/lens.hpp>
+#include <fiducial/search_regions.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 

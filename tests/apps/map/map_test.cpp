@@ -7,7 +7,7 @@
 
 #include <arhost/shading/srgb8.hpp>
 #include <directories.hpp>
-#include <fiducial_common/rbt_sequence.hpp>
+#include <fiducial/rbt_sequence.hpp>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

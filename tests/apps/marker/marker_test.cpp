@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Prints sheets with arhost-marker and measures them with the libraries that the trackers use.
-#include "fiducial_common/tracker_support.hpp"
+#include "fiducial/tracker_support.hpp"
 #include "plugin_under_test.hpp"
 #include "run_config/targets.hpp"
 
 #include <directories.hpp>
-#include <fiducial_common/apriltag_families.hpp>
-#include <fiducial_common/aruco_dictionaries.hpp>
-#include <fiducial_common/matrix_codes.hpp>
+#include <fiducial/apriltag_families.hpp>
+#include <fiducial/aruco_dictionaries.hpp>
+#include <fiducial/matrix_codes.hpp>
 
 #include <gmock/gmock.h>
 #include <opencv2/aruco/charuco.hpp>

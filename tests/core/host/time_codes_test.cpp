@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/time_codes.hpp"
 
-#include "fiducial_common/tracker_support.hpp"
+#include "fiducial/tracker_support.hpp"
 
 #include <gtest/gtest.h>
 #include <opencv2/imgproc.hpp>

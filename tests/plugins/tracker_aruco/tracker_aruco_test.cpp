@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/clutter.hpp>
-#include <fiducial_common/fiducial_tracker_test.hpp>
-#include <fiducial_common/real_photos.hpp>
+#include <fiducial/clutter.hpp>
+#include <fiducial/fiducial_tracker_test.hpp>
+#include <fiducial/real_photos.hpp>
 
 #include <nlohmann/json.hpp>
 

@@ -3,7 +3,7 @@
 // A generated video of a poster in motion, half of which is covered.
 #pragma once
 
-#include <fiducial_common/tracker_support.hpp>
+#include <fiducial/tracker_support.hpp>
 
 #include <opencv2/imgproc.hpp>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/clutter.hpp>
-#include <fiducial_common/matrix_codes.hpp>
-#include <fiducial_common/rendered_marker.hpp>
+#include <fiducial/clutter.hpp>
+#include <fiducial/matrix_codes.hpp>
+#include <fiducial/rendered_marker.hpp>
 
 #include <gmock/gmock.h>
 

@@ -3,8 +3,8 @@
 // Pictures of the patterns of ARToolKit, which are in shared/data/markers/artoolkit.
 #pragma once
 
-#include <fiducial_common/rendered_marker.hpp>
-#include <fiducial_common/tracker_support.hpp>
+#include <fiducial/rendered_marker.hpp>
+#include <fiducial/tracker_support.hpp>
 
 #include <fstream>
 #include <random>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <tracker_pattern/printed_patterns.hpp>
 
-#include <fiducial_common/matrix_codes.hpp>
-#include <fiducial_common/prints.hpp>
+#include <fiducial/matrix_codes.hpp>
+#include <fiducial/prints.hpp>
 
 #include <gmock/gmock.h>
 

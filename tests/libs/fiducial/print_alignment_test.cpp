@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/edge_refinement.hpp>
-#include <fiducial_common/print_alignment.hpp>
+#include <fiducial/edge_refinement.hpp>
+#include <fiducial/print_alignment.hpp>
 
 #include "prints.hpp"
 

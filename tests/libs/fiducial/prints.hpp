@@ -5,8 +5,8 @@
 
 #include "rendered_marker.hpp"
 
-#include <fiducial_common/apriltag_families.hpp>
-#include <fiducial_common/aruco_dictionaries.hpp>
+#include <fiducial/apriltag_families.hpp>
+#include <fiducial/aruco_dictionaries.hpp>
 
 #include <string_view>
 

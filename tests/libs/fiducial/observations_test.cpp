@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/observations.hpp>
+#include <fiducial/observations.hpp>
 
 #include <gmock/gmock.h>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/family_search.hpp>
+#include <fiducial/family_search.hpp>
 
-#include <fiducial_common/prints.hpp>
-#include <fiducial_common/rendered_marker.hpp>
+#include <fiducial/prints.hpp>
+#include <fiducial/rendered_marker.hpp>
 
 #include <gmock/gmock.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/other_markers.hpp>
+#include <fiducial/other_markers.hpp>
 
 #include <gmock/gmock.h>
 

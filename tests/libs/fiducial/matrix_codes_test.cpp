@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/matrix_codes.hpp>
+#include <fiducial/matrix_codes.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/search_regions.hpp>
+#include <fiducial/search_regions.hpp>
 
 #include <gmock/gmock.h>
 

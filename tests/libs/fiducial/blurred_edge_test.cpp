@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/blurred_edge.hpp>
+#include <fiducial/blurred_edge.hpp>
 
 #include <gtest/gtest.h>
 

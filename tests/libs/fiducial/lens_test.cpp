@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial_common/lens.hpp>
+#include <fiducial/lens.hpp>
 
 #include "rendered_marker.hpp"
 
