@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibrate/board.hpp"
 
-#include <fiducial/aruco_dictionaries.hpp>
+#include <fiducial/aruco.hpp>
 
 #include <fmt/format.h>
 #include <opencv2/calib3d.hpp>

@@ -3,7 +3,7 @@
 // Finds the corners of a ChArUco board or a chessboard in an image.
 #pragma once
 
-#include <fiducial/opencv_aruco.hpp>
+#include <fiducial/aruco.hpp>
 
 #include <opencv2/core.hpp>
 #if ARHOST_OPENCV_HAS_ARUCO_DETECTOR

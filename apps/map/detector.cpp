@@ -2,8 +2,8 @@
 #include "detector.hpp"
 
 #include <fiducial/apriltag_families.hpp>
-#include <fiducial/aruco_dictionaries.hpp>
-#include <fiducial/print_alignment.hpp>
+#include <fiducial/aruco.hpp>
+#include <fiducial/corner_refinement.hpp>
 
 #include <algorithm>
 #include <map>

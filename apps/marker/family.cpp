@@ -2,9 +2,8 @@
 #include "family.hpp"
 
 #include <fiducial/apriltag_families.hpp>
-#include <fiducial/aruco_dictionaries.hpp>
-#include <fiducial/matrix_codes.hpp>
-#include <fiducial/pattern_file.hpp>
+#include <fiducial/artoolkit.hpp>
+#include <fiducial/aruco.hpp>
 
 #include <fmt/format.h>
 

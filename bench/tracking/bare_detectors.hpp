@@ -4,9 +4,8 @@
 #pragma once
 
 #include <fiducial/apriltag_families.hpp>
-#include <fiducial/aruco_dictionaries.hpp>
+#include <fiducial/aruco.hpp>
 #include <fiducial/observations.hpp>
-#include <fiducial/opencv_aruco.hpp>
 #include <fiducial/tracker_support.hpp>
 
 #include <map>

@@ -7,10 +7,9 @@
 
 #include "base/command_line.hpp"
 
-#include <fiducial/aruco_dictionaries.hpp>
+#include <fiducial/artoolkit.hpp>
+#include <fiducial/aruco.hpp>
 #include <fiducial/clutter.hpp>
-#include <fiducial/matrix_codes.hpp>
-#include <fiducial/opencv_aruco.hpp>
 
 #include <opencv2/imgcodecs.hpp>
 

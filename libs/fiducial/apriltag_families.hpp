@@ -3,7 +3,7 @@
 // The tag families of the AprilTag library.
 #pragma once
 
-#include "print.hpp"
+#include "observations.hpp"
 
 #include <apriltag.h>
 #include <tag16h5.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "blurred_edge.hpp"
+#include "fits.hpp"
 
 #include <opencv2/core.hpp>
 
@@ -112,9 +112,7 @@ bool remove_outliers(std::vector<Pixel> &pixels, double min_error) {
     for (const Column &column : columns)
         if (column.pixels > 0)
             sorted.push_back(column.mean_square());
-    const auto median = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-    std::ranges::nth_element(sorted, median);
-    const double bound = std::max(max_ratio * *median, min_error * min_error);
+    const double bound = std::max(max_ratio * median(sorted), min_error * min_error);
     return std::erase_if(pixels, [&](const Pixel &pixel) { return columns[pixel.column].mean_square() > bound; }) > 0;
 }
 
@@ -166,9 +164,7 @@ Model first_model(std::span<const Pixel> pixels, double blur_px) {
         for (const Pixel &pixel : pixels)
             if (sign * pixel.across_px > blur_px)
                 light.push_back(pixel.light);
-        const auto median = light.begin() + static_cast<std::ptrdiff_t>(light.size() / 2);
-        std::ranges::nth_element(light, median);
-        return light.empty() ? 0 : *median;
+        return light.empty() ? 0 : median(light);
     };
     const double before = median_light(-1), after = median_light(1);
     return {0, 0, blur_px, before, after - before};

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "edge_refinement.hpp"
-
-#include "blurred_edge.hpp"
-#include "light_of_code.hpp"
+#include "corner_refinement.hpp"
+#include "fits.hpp"
 
 #include <opencv2/imgproc.hpp>
 
@@ -140,9 +138,7 @@ void reduce_noise(Slope &slope) {
     for (int row = 1; row < slope.rises.rows; ++row)
         for (int column = 0; column < slope.rises.cols; column += half_baseline)
             steps.push_back(std::abs(slope.rises(row, column) - slope.rises(row - 1, column)));
-    const auto median = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-    std::nth_element(steps.begin(), median, steps.end());
-    const double noise = 1.05 * *median; // standard deviation of a rise, if it is normally distributed
+    const double noise = 1.05 * median(steps); // standard deviation of a rise, if it is normally distributed
     const double ratio = noise / (max_noise * slope.peak);
     const int averaged = static_cast<int>(std::min(ratio * ratio, slope.rises.rows / 4.0));
     if (averaged > 2) {
@@ -227,15 +223,13 @@ std::optional<FittedEdge> fit_line_robustly(std::vector<cv::Point2f> points, std
         for (const cv::Point2f &point : points)
             residuals.push_back(std::abs(line.direction.cross(cv::Point2d(point) - line.point)));
         std::vector<double> sorted = residuals;
-        const auto median = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-        std::nth_element(sorted.begin(), median, sorted.end());
-        const double bound = std::max(min_inlier_px, 2.5 * *median);
+        const double median_px = median(sorted), bound = std::max(min_inlier_px, 2.5 * median_px);
         std::vector<cv::Point2f> kept;
         for (std::size_t i = 0; i < points.size(); ++i)
             if (residuals[i] <= bound)
                 kept.push_back(points[i]);
         if (kept.size() == points.size() || round == 5)
-            return *median < max_median_px ? std::optional(edge) : std::nullopt;
+            return median_px < max_median_px ? std::optional(edge) : std::nullopt;
         points = std::move(kept);
     }
 }

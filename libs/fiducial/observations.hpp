@@ -28,6 +28,14 @@ struct MeasuredCorners {
     bool is_doubtful = false; // they are imprecise, but not because of noise: something may hide an edge
 };
 
+// The cells of a print from the top left: 1 is white, 0 is black. `margin` cells around the square are known.
+struct Print {
+    cv::Mat_<float> cells;
+    int margin = 0;
+
+    int side() const { return cells.rows - 2 * margin; } // of the square
+};
+
 // arhost_observation.false_positive_rate of a code with so many bits, in any of four orientations:
 // 4 · Σ C(bits, k) / 2^bits, summed over k = 0 to `hamming`.
 double false_positive_rate(int bits, std::uint32_t hamming);

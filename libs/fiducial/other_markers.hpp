@@ -4,7 +4,7 @@
 // wrong family, dictionary or id.
 #pragma once
 
-#include <arhost-cpp/plugin.hpp>
+#include "observations.hpp"
 
 #include <opencv2/core.hpp>
 
@@ -50,5 +50,10 @@ private:
     bool is_done_ = false;
     cv::Mat previous_, last_; // frames
 };
+
+// Returns the markers in a picture that are not of the families `used`, if all of their bits are right and clear. Of
+// dictionaries that contain the same markers, names the smallest one that has all that were found. Reduces pictures
+// of more than 1280 px, so it misses small markers there.
+OtherMarkers::Markers markers_of_other_families(const cv::Mat &grey, std::span<const Family> used);
 
 } // namespace arhost::fiducial

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "print_alignment.hpp"
-
-#include "edge_refinement.hpp"
-#include "light_of_code.hpp"
+#include "corner_refinement.hpp"
+#include "fits.hpp"
 
 #include <opencv2/imgproc.hpp>
 
@@ -335,9 +333,7 @@ std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &ligh
     for (const Pixel &pixel : pixels)
         if (tells_its_light(pixel) && pixel.light > light_of_code.front()) // black may be clipped, too
             errors.push_back(code_error(pixel));
-    const auto median = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-    std::ranges::nth_element(errors, median);
-    const double deviation = 1.4826 * *median; // of a normal distribution
+    const double deviation = 1.4826 * median(errors); // of a normal distribution
     std::erase_if(outliers, [&](const Pixel *one) { return code_error(*one) <= max_deviations * deviation; });
     std::vector<bool> result;
     result.reserve(pixels.size());

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marker_cells.hpp"
 
-#include <fiducial/aruco_dictionaries.hpp>
+#include <fiducial/aruco.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 

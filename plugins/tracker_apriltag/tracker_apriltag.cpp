@@ -2,13 +2,11 @@
 //
 // tracker_apriltag: detects AprilTags with the AprilTag library, version 3.
 #include <fiducial/apriltag_families.hpp>
-#include <fiducial/edge_refinement.hpp>
-#include <fiducial/family_search.hpp>
-#include <fiducial/lens.hpp>
+#include <fiducial/corner_refinement.hpp>
 #include <fiducial/observations.hpp>
 #include <fiducial/other_markers.hpp>
-#include <fiducial/print_alignment.hpp>
 #include <fiducial/search_regions.hpp>
+#include <fiducial/undistortion.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 

@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // tracker_aruco: detects ArUco markers and AprilTags with OpenCV.
-#include <fiducial/aruco_dictionaries.hpp>
-#include <fiducial/aruco_reading.hpp>
-#include <fiducial/edge_refinement.hpp>
-#include <fiducial/family_search.hpp>
-#include <fiducial/lens.hpp>
+#include <fiducial/aruco.hpp>
+#include <fiducial/corner_refinement.hpp>
 #include <fiducial/observations.hpp>
-#include <fiducial/opencv_aruco.hpp>
 #include <fiducial/other_markers.hpp>
-#include <fiducial/print_alignment.hpp>
 #include <fiducial/search_regions.hpp>
+#include <fiducial/undistortion.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 

@@ -4,7 +4,7 @@
 // frame in which its place is roughly known.
 #pragma once
 
-#include <fiducial/lens.hpp>
+#include <fiducial/undistortion.hpp>
 
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>

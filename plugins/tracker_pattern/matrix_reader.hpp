@@ -5,7 +5,7 @@
 
 #include "pattern.hpp"
 
-#include <fiducial/matrix_codes.hpp>
+#include <fiducial/artoolkit.hpp>
 
 #include <cstdint>
 #include <optional>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pattern.hpp"
 
-#include <fiducial/pattern_file.hpp>
+#include <fiducial/artoolkit.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 

@@ -5,10 +5,10 @@
 #include "pattern.hpp"
 #include "squares.hpp"
 
-#include <fiducial/edge_refinement.hpp>
-#include <fiducial/family_search.hpp>
-#include <fiducial/lens.hpp>
+#include <fiducial/corner_refinement.hpp>
+#include <fiducial/other_markers.hpp>
 #include <fiducial/search_regions.hpp>
+#include <fiducial/undistortion.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 

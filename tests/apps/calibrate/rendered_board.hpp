@@ -5,7 +5,7 @@
 
 #include "calibrate/calibration.hpp"
 
-#include <fiducial/aruco_dictionaries.hpp>
+#include <fiducial/aruco.hpp>
 
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>

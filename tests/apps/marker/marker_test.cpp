@@ -7,8 +7,8 @@
 
 #include <directories.hpp>
 #include <fiducial/apriltag_families.hpp>
-#include <fiducial/aruco_dictionaries.hpp>
-#include <fiducial/matrix_codes.hpp>
+#include <fiducial/artoolkit.hpp>
+#include <fiducial/aruco.hpp>
 
 #include <gmock/gmock.h>
 #include <opencv2/aruco/charuco.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial/blurred_edge.hpp>
+#include <fiducial/fits.hpp>
 
 #include <gtest/gtest.h>
 

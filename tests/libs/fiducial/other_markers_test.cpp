@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fiducial/other_markers.hpp>
 
+#include <fiducial/prints.hpp>
+
 #include <gmock/gmock.h>
 
 #include <array>
@@ -9,9 +11,13 @@
 
 namespace {
 
+using namespace arhost::test;
+using arhost::fiducial::Family;
+using arhost::fiducial::markers_of_other_families;
 using arhost::fiducial::OtherMarkers;
 using testing::ElementsAre;
 using testing::IsEmpty;
+using testing::Pair;
 
 // Looks for the markers 3 and 5 of the first family, in pictures of one pixel whose code is the number of the frame.
 class OtherMarkersTest : public testing::Test {
@@ -138,6 +144,32 @@ TEST_F(OtherMarkersTest, ReportsASearchThatFails) {
 TEST_F(OtherMarkersTest, DoesNothingWithoutAFrame) {
     others_.finish();
     EXPECT_THAT(searched_, IsEmpty());
+}
+
+cv::Mat two_markers() {
+    const arhost_intrinsics camera = intrinsics_of({480, 360}, 450, 450, 239.5, 179.5);
+    return render(camera, {{april_tag("tagStandard41h12", 3).with_margin(1), 60, pose_of(-80, 0, 400, 10)},
+                           {aruco_marker("DICT_4X4_250", 77), 60, pose_of(80, 0, 400, 10)}});
+}
+
+TEST(MarkersOfOtherFamilies, AreOfBothLibrariesExceptUsedFamilies) {
+    const cv::Mat picture = two_markers();
+    EXPECT_THAT(markers_of_other_families(picture, {}),
+                ElementsAre(Pair("DICT_4X4_100", ElementsAre(77)), Pair("tagStandard41h12", ElementsAre(3))));
+    const Family used[] = {{"tagStandard41h12", 0, 2115, {}}, {"DICT_4X4_100", 1, 100, {}}};
+    EXPECT_THAT(markers_of_other_families(picture, used), IsEmpty());
+}
+
+TEST(MarkersOfOtherFamilies, AreFoundInLargePicturesThatAreReduced) {
+    cv::Mat large;
+    cv::resize(two_markers(), large, {}, 5, 5, cv::INTER_NEAREST);
+    EXPECT_THAT(markers_of_other_families(large, {}),
+                ElementsAre(Pair("DICT_4X4_100", ElementsAre(77)), Pair("tagStandard41h12", ElementsAre(3))));
+}
+
+TEST(MarkersOfOtherFamilies, AreNotInTinyPictures) {
+    for (const cv::Size size : {cv::Size(1, 1), {7, 7}, {5000, 1}, {3, 5000}})
+        EXPECT_THAT(markers_of_other_families(cv::Mat(size, CV_8UC1, cv::Scalar(90)), {}), IsEmpty()) << size;
 }
 
 } // namespace

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial/edge_refinement.hpp>
-#include <fiducial/print_alignment.hpp>
+#include <fiducial/corner_refinement.hpp>
 
 #include "prints.hpp"
 

@@ -6,7 +6,7 @@
 #include "rendered_marker.hpp"
 
 #include <fiducial/apriltag_families.hpp>
-#include <fiducial/aruco_dictionaries.hpp>
+#include <fiducial/aruco.hpp>
 
 #include <string_view>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial/opencv_aruco.hpp>
+#include <fiducial/aruco.hpp>
 #include <plugin_under_test.hpp>
 
 #include <gmock/gmock.h>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <fiducial/artoolkit.hpp>
 #include <fiducial/clutter.hpp>
-#include <fiducial/matrix_codes.hpp>
 #include <fiducial/rendered_marker.hpp>
 
 #include <gmock/gmock.h>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <tracker_pattern/printed_patterns.hpp>
 
-#include <fiducial/matrix_codes.hpp>
+#include <fiducial/artoolkit.hpp>
 #include <fiducial/prints.hpp>
 
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial/lens.hpp>
+#include <fiducial/undistortion.hpp>
 
 #include "rendered_marker.hpp"
 

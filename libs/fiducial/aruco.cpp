@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "aruco_reading.hpp"
+#include "aruco.hpp"
 
 #include <opencv2/imgproc.hpp>
 

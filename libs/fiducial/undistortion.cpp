@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "lens.hpp"
+#include "undistortion.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fiducial/matrix_codes.hpp>
+#include <fiducial/artoolkit.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The matrix codes ("barcodes") of ARToolKit: square cells inside a black border, as wide as half of them.
+// The markers of ARToolKit: a picture (a pattern) or a matrix code inside a black border. The border is as wide as
+// half of a matrix code.
 #pragma once
+
+#include <opencv2/core.hpp>
 
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -38,5 +42,10 @@ double matrix_false_positive_rate(int side, std::uint32_t wrong_cells);
 
 // Returns the word in the cells of a print; nullopt if it is not upright.
 std::optional<std::uint32_t> matrix_word(const std::vector<bool> &cells, int side);
+
+// Reads a pattern file (.patt). Returns the luma of the upright picture, as many rows as columns. The file has the
+// picture in four orientations, each with the planes blue, green and red, as rows of numbers from 0 to 255. Throws
+// Failure(ARHOST_STATUS_ERROR_CONFIGURATION), with the place of the error.
+cv::Mat_<float> read_pattern(const std::string &file);
 
 } // namespace arhost::fiducial

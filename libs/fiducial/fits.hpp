@@ -1,12 +1,45 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A straight blurred edge between two uniform areas.
+// What the fits of edges and of prints have in common: the light of codes, medians, and the fit of a blurred edge.
 #pragma once
 
+#include <arhost/frame.h>
+#include <arhost/shading/scalar.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <numeric>
 #include <optional>
 #include <span>
+#include <vector>
 
 namespace arhost::fiducial {
+
+// The light of each code of the grey plane.
+using LightOfCode = std::array<float, 256>; // 0 to 255
+
+inline const LightOfCode &light_of_code(arhost_transfer transfer) {
+    static const LightOfCode linear = [] {
+        LightOfCode light;
+        std::iota(light.begin(), light.end(), 0.0F);
+        return light;
+    }();
+    static const LightOfCode srgb = [] {
+        LightOfCode light;
+        for (int code = 0; code < 256; ++code)
+            light[code] = static_cast<float>(255 * shading::srgb_decode(code / 255.0));
+        return light;
+    }();
+    return transfer == ARHOST_TRANSFER_LINEAR ? linear : srgb;
+}
+
+// The upper median. Reorders the values.
+template <class T> T median(std::vector<T> &values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::ranges::nth_element(values, middle);
+    return *middle;
+}
 
 // A pixel near an edge. Its place is relative to a line near the edge.
 struct EdgePixel {
