@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detector.hpp"
 
-#include <fiducial/apriltag_families.hpp>
+#include <fiducial/april_tags.hpp>
 #include <fiducial/aruco.hpp>
 #include <fiducial/corner_refinement.hpp>
 
@@ -39,65 +39,36 @@ std::vector<Detection> best_of_each(const std::vector<Candidate> &candidates) {
 class AprilTags {
 public:
     AprilTags(const apriltag::FamilyType &type, const std::set<int> &ids, const arhost_intrinsics &camera)
-        : ids_(ids.begin(), ids.end()), lens_(camera), family_(type.create(), type.destroy),
-          library_codes_(family_->codes) {
-        if (!ids_.empty()) {
-            for (const int id : ids_)
-                codes_.push_back(library_codes_[id]);
-            family_->codes = codes_.data(); // a copy, because the library's table is static
-            family_->ncodes = static_cast<std::uint32_t>(codes_.size());
-        }
+        : lens_(camera), family_(type, [&](int id) { return ids.empty() || ids.contains(id); }) {
         detector_->quad_decimate = 1;
         detector_->quad_sigma = 0;
         detector_->refine_edges = true;
         detector_->decode_sharpening = 0.25;
         // The decoding table of a large family would take gigabytes with two bit errors.
-        const bool is_large = family_->ncodes > 10'000;
-        apriltag_detector_add_family_bits(detector_.get(), family_.get(),
+        const bool is_large = family_.tags()->ncodes > 10'000;
+        apriltag_detector_add_family_bits(detector_.get(), family_.tags(),
                                           std::min(type.default_max_hamming, is_large ? 1 : 2));
     }
-    ~AprilTags() {
-        detector_.reset();
-        family_->codes = library_codes_;
-    }
-    AprilTags(const AprilTags &) = delete;
-    AprilTags &operator=(const AprilTags &) = delete;
 
     std::vector<Detection> operator()(const cv::Mat &grey) const {
-        constexpr int min_side = 8; // the library reads out of bounds in smaller images
-        if (std::min(grey.cols, grey.rows) < min_side)
-            return {};
-        image_u8_t image{grey.cols, grey.rows, static_cast<int>(grey.step), grey.data};
-        const std::unique_ptr<zarray_t, decltype(&apriltag_detections_destroy)> tags(
-            apriltag_detector_detect(detector_.get(), &image), apriltag_detections_destroy);
         std::vector<Candidate> candidates;
-        for (int i = 0; tags && i < zarray_size(tags.get()); ++i) { // null if no thread could be started
-            apriltag_detection_t *tag = nullptr;
-            zarray_get(tags.get(), i, &tag);
-            Candidate candidate{
-                ids_.empty() ? tag->id : ids_[tag->id], {}, tag->decision_margin - 256.0 * tag->hamming};
-            // AprilTag's corners begin at the bottom left and are counter-clockwise; pixel centres are at +0.5.
-            for (int corner = 0; corner < 4; ++corner)
-                candidate.corners_px[corner] = {tag->p[3 - corner][0] - 0.5, tag->p[3 - corner][1] - 0.5};
-            candidate.corners_px =
-                fiducial::refine_corners(
-                    grey, ARHOST_TRANSFER_SRGB, candidate.corners_px, lens_, family_->width_at_border,
-                    [&] { return apriltag::print_of(*family_, tag->id); }, true)
-                    .value_or(fiducial::MeasuredCorners{candidate.corners_px})
-                    .corners_px;
-            candidates.push_back(candidate);
-        }
+        apriltag::detect(*detector_, grey, [&](const apriltag_detection_t &tag) {
+            const fiducial::Corners rough_px = apriltag::corners_of(tag);
+            candidates.push_back({family_.id(tag.id),
+                                  fiducial::refine_corners(
+                                      grey, ARHOST_TRANSFER_SRGB, rough_px, lens_, tag.family->width_at_border,
+                                      [&] { return apriltag::print_of(*tag.family, tag.id); }, true)
+                                      .value_or(fiducial::MeasuredCorners{rough_px})
+                                      .corners_px,
+                                  tag.decision_margin - 256.0 * tag.hamming});
+        });
         return best_of_each(candidates);
     }
 
 private:
-    std::vector<int> ids_;
     fiducial::Lens lens_;
-    std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t *)> family_;
-    std::uint64_t *library_codes_;
-    std::vector<std::uint64_t> codes_;
-    std::unique_ptr<apriltag_detector_t, decltype(&apriltag_detector_destroy)> detector_{apriltag_detector_create(),
-                                                                                         apriltag_detector_destroy};
+    apriltag::PartOfFamily family_;
+    apriltag::Detector detector_{apriltag_detector_create(), apriltag_detector_destroy};
 };
 
 // As tracker_aruco with its default options.
@@ -112,9 +83,7 @@ public:
             dictionary_.bytesList = listed;
         }
         parameters_.minMarkerDistanceRate = 0.02;
-        const int size = dictionary_.markerSize, errors = size <= 4 ? 0 : size == 5 ? 1 : 3;
-        if (size <= 6 && dictionary_.maxCorrectionBits > 0)
-            parameters_.errorCorrectionRate = std::min(0.6, (errors + 0.5) / dictionary_.maxCorrectionBits);
+        parameters_.errorCorrectionRate = aruco::default_correction_rate(dictionary_);
     }
 
     std::vector<Detection> operator()(const cv::Mat &grey) const {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "family.hpp"
 
-#include <fiducial/apriltag_families.hpp>
+#include <fiducial/april_tags.hpp>
 #include <fiducial/artoolkit.hpp>
 #include <fiducial/aruco.hpp>
 

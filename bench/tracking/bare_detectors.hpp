@@ -3,7 +3,7 @@
 // The detectors of AprilTag and OpenCV without arhost, for tag36h11.
 #pragma once
 
-#include <fiducial/apriltag_families.hpp>
+#include <fiducial/april_tags.hpp>
 #include <fiducial/aruco.hpp>
 #include <fiducial/observations.hpp>
 #include <fiducial/tracker_support.hpp>

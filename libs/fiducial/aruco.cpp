@@ -9,18 +9,7 @@ namespace arhost::aruco {
 namespace {
 
 using fiducial::Corners;
-
-// Samples the square of a marker at the centres of `count`² equal parts.
-cv::Mat_<std::uint8_t> unwarped(const cv::Mat &grey, const Corners &corners_px, int count) {
-    const float first = -0.5F, last = static_cast<float>(count) - 0.5F;
-    const cv::Point2f square[] = {{first, first}, {last, first}, {last, last}, {first, last}};
-    cv::Point2f corners[4];
-    std::ranges::copy(corners_px, corners);
-    cv::Mat_<std::uint8_t> samples;
-    cv::warpPerspective(grey, samples, cv::getPerspectiveTransform(corners, square), {count, count}, cv::INTER_LINEAR,
-                        cv::BORDER_REPLICATE);
-    return samples;
-}
+using fiducial::unwarped;
 
 // Whether the cells of a marker are uniform around their centres: on the side of the threshold that `white` tells.
 bool is_uniform(const cv::Mat &grey, const Corners &corners_px, const cv::Mat_<std::uint8_t> &white,
@@ -36,6 +25,15 @@ bool is_uniform(const cv::Mat &grey, const Corners &corners_px, const cv::Mat_<s
 }
 
 } // namespace
+
+double default_correction_rate(const cv::aruco::Dictionary &dictionary) {
+    constexpr double rate = 0.6;
+    const int size = dictionary.markerSize;
+    if (size > 6 || dictionary.maxCorrectionBits <= 0)
+        return rate;
+    const int errors = size <= 4 ? 0 : size == 5 ? 1 : 3;
+    return std::min(rate, (errors + 0.5) / dictionary.maxCorrectionBits); // OpenCV rounds the product down
+}
 
 Reading read(const cv::Mat &grey, const Corners &corners_px, const cv::aruco::Dictionary &dictionary, int id,
              int border_bits, bool is_oriented) {

@@ -111,6 +111,11 @@ inline constexpr std::array dictionary_types {
 #undef ARHOST_DICTIONARY
 };
 
+// Returns DetectorParameters::errorCorrectionRate. The more errors are corrected, the more squares of random bits are
+// taken for markers: with 50 markers of 4×4 bits, 3 of 1,000 without any error and 5 of 100 with one; with 50 of 5×5
+// bits, 2 of 10,000 with one error; with 50 of 6×6 bits, 2 of 100,000 with three.
+double default_correction_rate(const cv::aruco::Dictionary &dictionary);
+
 struct Reading {
     std::uint32_t wrong_bits;
     bool has_whole_border;      // each of its cells is black, or white if the marker is inverted

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the fits of edges and of prints have in common: the light of codes, medians, and the fit of a blurred edge.
+// Shared by the fits of edges and of prints: the light of codes, medians, and the fit of a blurred edge.
 #pragma once
 
 #include <arhost/frame.h>

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "observations.hpp"
 
+#include <opencv2/imgproc.hpp>
+
 #include <algorithm>
 #include <cmath>
 #include <tuple>
@@ -45,6 +47,18 @@ cv::Mat grey_of(const arhost_frame &frame) {
             const_cast<std::uint8_t *>(frame.grey), frame.format->grey_stride};
 }
 
+cv::Mat_<std::uint8_t> unwarped(const cv::Mat &grey, const Corners &corners_px, int side, double margin) {
+    const auto margin_samples = static_cast<float>(margin);
+    const float first = -margin_samples - 0.5F, last = static_cast<float>(side) + margin_samples - 0.5F;
+    const cv::Point2f square[] = {{first, first}, {last, first}, {last, last}, {first, last}};
+    cv::Point2f corners[4];
+    std::ranges::copy(corners_px, corners);
+    cv::Mat_<std::uint8_t> samples;
+    cv::warpPerspective(grey, samples, cv::getPerspectiveTransform(corners, square), {side, side}, cv::INTER_LINEAR,
+                        cv::BORDER_REPLICATE);
+    return samples;
+}
+
 std::string april_tag_name(std::string_view name) {
     for (const char *size : {"16h5", "25h9", "36h10", "36h11"})
         if (name == std::string("DICT_APRILTAG_") + size)
@@ -61,10 +75,14 @@ double false_positive_rate(int bits, std::uint32_t hamming) {
     return std::min(4 * std::ldexp(matching, -bits), 1.0);
 }
 
-arhost_observation observation_of(std::int32_t id, std::uint32_t family, const MeasuredCorners &corners) {
+arhost_observation observation_of(std::int32_t id, std::uint32_t family, const MeasuredCorners &corners,
+                                  const Decoding &decoding) {
     arhost_observation seen{};
     seen.id = id;
     seen.family = family;
+    seen.hamming = decoding.hamming;
+    seen.decision_margin = decoding.decision_margin;
+    seen.false_positive_rate = decoding.false_positive_rate;
     seen.corner_sigma_px = corners.sigma_px;
     for (int i = 0; i < 4; ++i) {
         seen.corners_px[i][0] = corners.corners_px[i].x;
@@ -73,9 +91,9 @@ arhost_observation observation_of(std::int32_t id, std::uint32_t family, const M
     return seen;
 }
 
-arhost_observation Family::observation(int id, const MeasuredCorners &corners) const {
+arhost_observation Family::observation(int id, const MeasuredCorners &corners, const Decoding &decoding) const {
     const auto found = listed.find(id);
-    return observation_of(id, found == listed.end() ? index : found->second, corners);
+    return observation_of(id, found == listed.end() ? index : found->second, corners, decoding);
 }
 
 void reject_prints_without_ids(std::string_view family, std::string_view tracker) {

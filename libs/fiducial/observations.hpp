@@ -40,11 +40,21 @@ struct Print {
 // 4 · Σ C(bits, k) / 2^bits, summed over k = 0 to `hamming`.
 double false_positive_rate(int bits, std::uint32_t hamming);
 
-// Returns an observation without decision margin.
-arhost_observation observation_of(std::int32_t id, std::uint32_t family, const MeasuredCorners &corners);
+// How well a marker was read: as arhost_observation has it.
+struct Decoding {
+    std::uint32_t hamming = 0;
+    double decision_margin = 0, false_positive_rate = 0;
+};
+
+arhost_observation observation_of(std::int32_t id, std::uint32_t family, const MeasuredCorners &corners,
+                                  const Decoding &decoding);
 
 // Returns the grey plane of a frame, without copying it.
 cv::Mat grey_of(const arhost_frame &frame);
+
+// Returns `side`² samples of a square, at the centres of equal parts. The square of the corners is larger: it reaches
+// `margin` samples further to each side.
+cv::Mat_<std::uint8_t> unwarped(const cv::Mat &grey, const Corners &corners_px, int side, double margin = 0);
 
 // AprilTag's name of a family: "tag36h11" for "DICT_APRILTAG_36h11". Other names remain as they are.
 std::string april_tag_name(std::string_view name);
@@ -62,8 +72,7 @@ struct Family {
         const auto found = listed.find(id);
         return found != listed.end() && found->second == name;
     }
-    // Returns an observation of a marker of the family, without decision margin.
-    arhost_observation observation(int id, const MeasuredCorners &corners) const;
+    arhost_observation observation(int id, const MeasuredCorners &corners, const Decoding &decoding = {}) const;
 };
 
 // Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION), which names the tracker to use, if the family is that of

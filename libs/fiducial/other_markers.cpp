@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "other_markers.hpp"
 
-#include "apriltag_families.hpp"
+#include "april_tags.hpp"
 #include "aruco.hpp"
 
 #include <opencv2/imgproc.hpp>
@@ -39,29 +39,20 @@ using aruco::dictionary_types;
 using aruco::DictionaryType;
 
 void add_april_tags(const cv::Mat &grey, std::span<const Family> used, OtherMarkers::Markers &markers) {
-    constexpr int min_side = 8;        // the library reads out of bounds in smaller images
     constexpr float min_contrast = 20; // grey levels; clutter of less contrast may read as a tag of a small family
-    if (std::min(grey.cols, grey.rows) < min_side)
-        return;
     using TagFamily = std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t *)>;
     std::vector<TagFamily> families; // outlive the detector
-    const std::unique_ptr<apriltag_detector_t, decltype(&apriltag_detector_destroy)> detector(
-        apriltag_detector_create(), apriltag_detector_destroy);
+    const apriltag::Detector detector(apriltag_detector_create(), apriltag_detector_destroy);
     detector->quad_decimate = 1;
     for (const apriltag::FamilyType &type : apriltag::family_types)
         if (std::ranges::find(used, type.name, &Family::name) == used.end()) {
             families.emplace_back(type.create(), type.destroy);
             apriltag_detector_add_family_bits(detector.get(), families.back().get(), 0);
         }
-    image_u8_t image{grey.cols, grey.rows, static_cast<int>(grey.step), grey.data};
-    const std::unique_ptr<zarray_t, decltype(&apriltag_detections_destroy)> tags(
-        apriltag_detector_detect(detector.get(), &image), apriltag_detections_destroy);
-    for (int i = 0; tags && i < zarray_size(tags.get()); ++i) {
-        apriltag_detection_t *tag = nullptr;
-        zarray_get(tags.get(), i, &tag);
-        if (tag->decision_margin >= min_contrast)
-            markers[tag->family->name].insert(tag->id);
-    }
+    apriltag::detect(*detector, grey, [&](const apriltag_detection_t &tag) {
+        if (tag.decision_margin >= min_contrast)
+            markers[tag.family->name].insert(tag.id);
+    });
 }
 
 // Each dictionary of "DICT_4X4_50", "DICT_4X4_100" and so on begins with the markers of the smaller ones.

@@ -111,7 +111,7 @@ Seen SearchRegions::search(const arhost_track_request &request, const RegionLimi
     for (const Pass &pass : passes)
         seen.add(detected(pass.detect, request.search_everywhere
                                            ? std::vector{whole}
-                                           : of(request, limits, pass.family, markers_of(verified))));
+                                           : rectangles(request, limits, pass.family, markers_of(verified))));
     const std::span<const arhost_observation> known = markers_of(verified);
     if (!request.search_everywhere)
         seen.candidates += known.size();
@@ -203,8 +203,9 @@ cv::Rect SearchRegions::tile_of(cv::Size frame, std::uint64_t sequence) {
             tile};
 }
 
-std::vector<cv::Rect> SearchRegions::of(const arhost_track_request &request, const RegionLimits &limits,
-                                        const Family *family, std::span<const arhost_observation> seen) const {
+std::vector<cv::Rect> SearchRegions::rectangles(const arhost_track_request &request, const RegionLimits &limits,
+                                                const Family *family,
+                                                std::span<const arhost_observation> seen) const {
     if (request.search_everywhere)
         return {whole_of(request)};
     return around_expected(request, limits, [&](const arhost_expected_marker &expected) {

@@ -48,8 +48,8 @@ struct Pass {
     std::vector<CloserLook> closer_looks = {};
 };
 
-// A closer look examines more squares with lower thresholds, so only markers whose false_positive_rate is at most
-// this count.
+// The greatest false_positive_rate of a marker that a closer look may add. It is low because a closer look examines
+// more squares, with lower thresholds.
 constexpr double max_rate_of_closer_look = 1e-7;
 
 struct FamilyTraits {
@@ -88,8 +88,9 @@ public:
 
     // Returns rectangles that do not overlap and contain all expected markers, or those of `family`, except those
     // that `seen` has. They are the whole frame if the request says so, or if they would cover most of it.
-    std::vector<cv::Rect> of(const arhost_track_request &request, const RegionLimits &limits,
-                             const Family *family = nullptr, std::span<const arhost_observation> seen = {}) const;
+    std::vector<cv::Rect> rectangles(const arhost_track_request &request, const RegionLimits &limits,
+                                     const Family *family = nullptr,
+                                     std::span<const arhost_observation> seen = {}) const;
 
     // Returns whether a target is not where it is expected: none of its expected markers has been seen. The tracker
     // must then search the whole frame.
@@ -120,7 +121,8 @@ private:
     // Returns the markers of the targets of which none has been seen, except those of families with so few bits that
     // a closer look would often find one by chance.
     Indices missed_markers(std::span<const arhost_observation> seen) const;
-    // As of(), for the expected markers that are accepted, also if everything is to be searched.
+    // Returns rectangles that do not overlap and contain the expected markers for which `accepts` returns true, or
+    // the whole frame if they would cover most of it. Ignores request.search_everywhere.
     std::vector<cv::Rect> around_expected(const arhost_track_request &request, const RegionLimits &limits,
                                           const std::function<bool(const arhost_expected_marker &)> &accepts) const;
 

@@ -3,10 +3,7 @@
 // tracker_aruco: detects ArUco markers and AprilTags with OpenCV.
 #include <fiducial/aruco.hpp>
 #include <fiducial/corner_refinement.hpp>
-#include <fiducial/observations.hpp>
-#include <fiducial/other_markers.hpp>
-#include <fiducial/search_regions.hpp>
-#include <fiducial/undistortion.hpp>
+#include <fiducial/marker_search.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -25,12 +22,15 @@
 
 namespace {
 
+namespace aruco = arhost::aruco;
+namespace fiducial = arhost::fiducial;
 using arhost::Failure;
 using arhost::aruco::dictionary_types;
 using arhost::aruco::DictionaryType;
 using arhost::aruco::Reading;
 using arhost::fiducial::Corners;
 using arhost::fiducial::Family;
+using arhost::fiducial::take;
 
 constexpr const char *refinements[] = {"edges", "none", "subpix", "contour", "apriltag", nullptr};
 
@@ -75,18 +75,18 @@ constexpr arhost_option_descriptor options[] = {
 };
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_TRACKER,
-    "tracker_aruco",
-    "ArUco tracker",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Detects ArUco markers and AprilTags with OpenCV.",
-    0,
-    std::size(options),
-    options,
-    nullptr,
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_TRACKER,
+    .id = "tracker_aruco",
+    .name = "ArUco tracker",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Detects ArUco markers and AprilTags with OpenCV.",
+    .capabilities = 0,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr,
 };
 
 // Returns whether `root` is a valid dictionary. OpenCV does not check this and reads past the end of strings that are
@@ -106,18 +106,6 @@ bool is_dictionary(const cv::FileNode &root) {
             return false;
     }
     return true;
-}
-
-// The more errors are corrected, the more squares of random bits are taken for markers: with 50 markers of 4×4 bits,
-// 3 of 1,000 without any error and 5 of 100 with one; with 50 of 5×5 bits, 2 of 10,000 with one error; with 50 of 6×6
-// bits, 2 of 100,000 with three.
-double default_correction_rate(const cv::aruco::Dictionary &dictionary) {
-    constexpr double rate = 0.6;
-    const int size = dictionary.markerSize;
-    if (size > 6 || dictionary.maxCorrectionBits <= 0)
-        return rate;
-    const int errors = size <= 4 ? 0 : size == 5 ? 1 : 3;
-    return std::min(rate, (errors + 0.5) / dictionary.maxCorrectionBits); // OpenCV rounds the product down
 }
 
 cv::aruco::Dictionary read_dictionary(const std::string &file) {
@@ -178,7 +166,7 @@ public:
     ArucoTracker(const arhost::Host &host, const arhost::Options &options) : host_(host) {
         if (const std::string file = options.text("dictionary_file"); !file.empty()) {
             file_table_ = read_dictionary(file);
-            file_name_ = arhost::fiducial::april_tag_name(std::filesystem::path(file).stem().string());
+            file_name_ = fiducial::april_tag_name(std::filesystem::path(file).stem().string());
         }
         const std::string refinement = options.text("corner_refinement");
         refine_edges_ = refinement == "edges";
@@ -205,27 +193,17 @@ public:
     // Takes the options that `changed` contains.
     void set(const arhost::Options &changed) {
         cv::aruco::DetectorParameters parameters = parameters_;
-        const auto take_integer = [&](const char *key, int &value) {
-            if (changed.contains(key))
-                value = static_cast<int>(changed.integer(key));
-        };
-        const auto take_real = [&](const char *key, double &value) {
-            if (changed.contains(key))
-                value = changed.real(key);
-        };
-        take_integer("subpix_window_px", parameters.cornerRefinementWinSize);
-        take_integer("threshold_window_min_px", parameters.adaptiveThreshWinSizeMin);
-        take_integer("threshold_window_max_px", parameters.adaptiveThreshWinSizeMax);
-        take_integer("threshold_window_step_px", parameters.adaptiveThreshWinSizeStep);
-        take_real("min_perimeter_rate", parameters.minMarkerPerimeterRate);
-        take_real("min_distance_rate", parameters.minMarkerDistanceRate);
+        take(changed, "subpix_window_px", parameters.cornerRefinementWinSize);
+        take(changed, "threshold_window_min_px", parameters.adaptiveThreshWinSizeMin);
+        take(changed, "threshold_window_max_px", parameters.adaptiveThreshWinSizeMax);
+        take(changed, "threshold_window_step_px", parameters.adaptiveThreshWinSizeStep);
+        take(changed, "min_perimeter_rate", parameters.minMarkerPerimeterRate);
+        take(changed, "min_distance_rate", parameters.minMarkerDistanceRate);
         double rate = correction_rate_;
-        take_real("error_correction_rate", rate);
-        take_integer("border_bits", parameters.markerBorderBits);
-        if (changed.contains("closer_look"))
-            looks_closer_ = changed.boolean("closer_look");
-        if (changed.contains("inverted"))
-            parameters.detectInvertedMarker = changed.boolean("inverted");
+        take(changed, "error_correction_rate", rate);
+        take(changed, "border_bits", parameters.markerBorderBits);
+        take(changed, "closer_look", looks_closer_);
+        take(changed, "inverted", parameters.detectInvertedMarker);
         if (parameters.adaptiveThreshWinSizeMax < parameters.adaptiveThreshWinSizeMin)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "threshold_window_max_px: must not be less than threshold_window_min_px");
@@ -236,60 +214,54 @@ public:
 
     void start(const arhost_tracker_setup &setup) {
         stop();
-        lens_.emplace(*setup.intrinsics);
-        for (Family &family : arhost::fiducial::families_of(
+        for (Family &family : fiducial::families_of(
                  setup, [&](const std::string &name) { return dictionary_of(name).table.bytesList.rows; })) {
             Dictionary dictionary = dictionary_of(family.name);
             detectables_.push_back({std::move(family), std::move(dictionary), {}});
         }
         make_parameters();
-        regions_.emplace(setup, [&](const std::string &name) {
+        const auto traits_of = [&](const std::string &name) {
             const cv::aruco::Dictionary table = dictionary_of(name).table;
-            return arhost::fiducial::FamilyTraits{1.0 / cells_of(table), table.markerSize * table.markerSize};
-        });
-        others_.emplace(host_, setup, [families = predefined_families()](const cv::Mat &grey) {
-            return arhost::fiducial::markers_of_other_families(grey, families);
+            return fiducial::FamilyTraits{1.0 / cells_of(table), table.markerSize * table.markerSize};
+        };
+        search_.emplace(host_, setup, traits_of, [families = predefined_families()](const cv::Mat &grey) {
+            return fiducial::markers_of_other_families(grey, families);
         });
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
-        const cv::Mat grey = arhost::fiducial::grey_of(*request.frame);
+        const cv::Mat grey = fiducial::grey_of(*request.frame);
         const arhost_transfer transfer = request.frame->format->transfer;
-        const arhost::fiducial::Verify verify = [&](const arhost_expected_marker &expected, std::int32_t id,
-                                                    std::uint32_t family) {
+        const fiducial::Verify verify = [&](const arhost_expected_marker &expected, std::int32_t id,
+                                            std::uint32_t family) {
             return verify_one(grey, transfer, expected, id, family);
         };
-        const auto verified = refine_edges_ ? regions_->verified(request, verify) : arhost::fiducial::Verified();
-        std::vector<arhost::fiducial::Pass> passes;
+        const auto verified = refine_edges_ ? search_->regions().verified(request, verify) : fiducial::Verified();
+        std::vector<fiducial::Pass> passes;
         for (const Detectable &detectable : detectables_) {
             const auto detection = [&](const Look &look) {
                 return [&, look](const cv::Rect &region, auto &seen) {
                     observe(grey, transfer, region, look, detectable, verified, seen);
                 };
             };
-            arhost::fiducial::Pass &pass =
-                passes.emplace_back(arhost::fiducial::Pass{&detectable.family, detection({})});
+            fiducial::Pass &pass = passes.emplace_back(fiducial::Pass{&detectable.family, detection({})});
             if (looks_closer_)
                 pass.closer_looks = {{detection(smoothed), false}, {detection(enlarged), true}};
         }
-        arhost::fiducial::Seen seen = regions_->search(request, {}, passes, verified);
-        others_->frame(grey, seen.markers);
-        observations.set_candidate_count(seen.candidates);
-        arhost::fiducial::report(std::move(seen.markers), observations);
+        search_->track(request, observations, {}, passes, verified);
     }
 
     void stop() {
-        if (others_)
-            others_->finish();
-        others_.reset();
+        if (search_)
+            search_->finish();
+        search_.reset();
         detectables_.clear();
     }
 
 private:
     // Adds the markers of a dictionary in a region of the frame to `seen`, except the verified ones.
     void observe(const cv::Mat &grey, arhost_transfer transfer, const cv::Rect &region, const Look &look,
-                 const Detectable &detectable, const arhost::fiducial::Verified &verified,
-                 arhost::fiducial::Seen &seen) const {
+                 const Detectable &detectable, const fiducial::Verified &verified, fiducial::Seen &seen) const {
         const cv::aruco::Dictionary &table = detectable.dictionary.table;
         cv::aruco::DetectorParameters parameters = detectable.parameters;
         parameters.adaptiveThreshConstant = look.threshold.value_or(parameters.adaptiveThreshConstant);
@@ -298,16 +270,16 @@ private:
         parameters.minMarkerPerimeterRate *=
             static_cast<double>(std::max(grey.cols, grey.rows)) / std::max(region.width, region.height);
         const cv::Mat pixels = look.prepared(grey(region));
-        const arhost::aruco::DetectedMarkers found = arhost::aruco::detect(pixels, table, parameters);
+        const aruco::DetectedMarkers found = aruco::detect(pixels, table, parameters);
         seen.candidates += found.ids.size() + found.rejected.size();
-        const std::span<const arhost_observation> known = arhost::fiducial::markers_of(verified);
+        const std::span<const arhost_observation> known = fiducial::markers_of(verified);
         const cv::Point2d half(0.5, 0.5), shift = half - cv::Point2d(centre_shift_px_, centre_shift_px_),
                                           origin = cv::Point2d(region.tl()) - half;
         std::vector<std::optional<arhost_observation>> observations(found.ids.size());
         const auto observe_one = [&](int i) {
             const int id = found.ids[i];
             const bool is_listed = detectable.family.lists(id);
-            arhost::fiducial::MeasuredCorners corners;
+            fiducial::MeasuredCorners corners;
             for (int corner = 0; corner < 4; ++corner) {
                 const cv::Point2d at =
                     found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner];
@@ -315,9 +287,8 @@ private:
             }
             if (is_listed) {
                 const arhost_observation rough = detectable.family.observation(id, corners);
-                if (std::ranges::any_of(known, [&](const arhost_observation &one) {
-                        return arhost::fiducial::are_of_one_print(one, rough);
-                    }))
+                if (std::ranges::any_of(
+                        known, [&](const arhost_observation &one) { return fiducial::are_of_one_print(one, rough); }))
                     return;
             }
             if (refine_edges_ && is_listed)
@@ -325,10 +296,9 @@ private:
             Corners in_pixels;
             for (int corner = 0; corner < 4; ++corner)
                 in_pixels[corner] = (corners.corners_px[corner] - origin) * look.scale - half;
-            const Reading reading =
-                arhost::aruco::read(pixels, in_pixels, table, id, parameters.markerBorderBits, false);
+            const Reading reading = aruco::read(pixels, in_pixels, table, id, parameters.markerBorderBits, false);
             if (is_listed || (reading.wrong_bits == 0 && reading.false_positive_rate < 1)) // else it may be anything
-                observations[i] = observation_of(detectable, id, corners, reading);
+                observations[i] = detectable.family.observation(id, corners, decoding_of(reading));
         };
         cv::parallel_for_({0, static_cast<int>(found.ids.size())}, [&](const cv::Range &range) {
             for (int i = range.start; i < range.end; ++i)
@@ -362,35 +332,30 @@ private:
         if (!measured)
             return std::nullopt;
         const Reading reading = read_upright(grey, measured->corners_px, found->dictionary, id);
-        return is_there(reading) ? std::optional(observation_of(*found, id, *measured, reading)) : std::nullopt;
+        return is_there(reading) ? std::optional(found->family.observation(id, *measured, decoding_of(reading)))
+                                 : std::nullopt;
     }
 
     // `corners_px`: as reported.
     Reading read_upright(const cv::Mat &grey, Corners corners_px, const Dictionary &dictionary, int id) const {
         if (dictionary.rotated_180)
             std::rotate(corners_px.begin(), corners_px.begin() + 2, corners_px.end());
-        return arhost::aruco::read(grey, corners_px, dictionary.table, id, parameters_.markerBorderBits, true);
+        return aruco::read(grey, corners_px, dictionary.table, id, parameters_.markerBorderBits, true);
     }
 
-    static arhost_observation observation_of(const Detectable &detectable, int id,
-                                             const arhost::fiducial::MeasuredCorners &corners,
-                                             const Reading &reading) {
-        arhost_observation one = detectable.family.observation(id, corners);
-        one.hamming = reading.wrong_bits;
-        one.decision_margin = reading.contrast;
-        one.false_positive_rate = reading.false_positive_rate;
-        return one;
+    static fiducial::Decoding decoding_of(const Reading &reading) {
+        return {reading.wrong_bits, reading.contrast, reading.false_positive_rate};
     }
 
-    std::optional<arhost::fiducial::MeasuredCorners> refined(const cv::Mat &grey, arhost_transfer transfer,
-                                                             const Dictionary &dictionary, int id,
-                                                             const Corners &rough_px) const {
-        return arhost::fiducial::refine_corners(grey, transfer, rough_px, *lens_, cells_of(dictionary.table),
-                                                [&] { return print_of(dictionary, id); });
+    std::optional<fiducial::MeasuredCorners> refined(const cv::Mat &grey, arhost_transfer transfer,
+                                                     const Dictionary &dictionary, int id,
+                                                     const Corners &rough_px) const {
+        return fiducial::refine_corners(grey, transfer, rough_px, search_->lens(), cells_of(dictionary.table),
+                                        [&] { return print_of(dictionary, id); });
     }
 
-    arhost::fiducial::Print print_of(const Dictionary &dictionary, int id) const {
-        arhost::fiducial::Print print = arhost::aruco::print_of(dictionary.table, id, parameters_.markerBorderBits);
+    fiducial::Print print_of(const Dictionary &dictionary, int id) const {
+        fiducial::Print print = aruco::print_of(dictionary.table, id, parameters_.markerBorderBits);
         if (dictionary.rotated_180)
             cv::rotate(print.cells, print.cells, cv::ROTATE_180);
         return print;
@@ -402,7 +367,7 @@ private:
     }
 
     static Dictionary predefined(const DictionaryType &type) {
-        Dictionary dictionary{arhost::aruco::predefined(type.name), type.is_april_tag()};
+        Dictionary dictionary{aruco::predefined(type.name), type.is_april_tag()};
         if (type.is_april_tag())
             dictionary.table.maxCorrectionBits = type.april_tag_bits;
         return dictionary;
@@ -417,7 +382,7 @@ private:
                 return predefined(type);
             names += std::string(names.empty() ? "" : ", ") + type.family;
         }
-        arhost::fiducial::reject_prints_without_ids(name, "tracker_aruco");
+        fiducial::reject_prints_without_ids(name, "tracker_aruco");
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "unknown dictionary '" + name + "': tracker_aruco has " +
                           (file_name_.empty() ? "" : file_name_ + " (dictionary_file), ") + names +
@@ -438,7 +403,7 @@ private:
         for (Detectable &detectable : detectables_) {
             detectable.parameters = parameters_;
             detectable.parameters.errorCorrectionRate =
-                correction_rate_ < 0 ? default_correction_rate(detectable.dictionary.table) : correction_rate_;
+                correction_rate_ < 0 ? aruco::default_correction_rate(detectable.dictionary.table) : correction_rate_;
         }
     }
 
@@ -450,9 +415,7 @@ private:
     double correction_rate_ = -1;
     double centre_shift_px_ = 0; // for CORNER_REFINE_APRILTAG, whose pixel centres are at +0.5
 
-    std::optional<arhost::fiducial::Lens> lens_;
-    std::optional<arhost::fiducial::SearchRegions> regions_;
-    std::optional<arhost::fiducial::OtherMarkers> others_;
+    std::optional<fiducial::MarkerSearch> search_;
     std::vector<Detectable> detectables_;
 };
 

@@ -17,21 +17,22 @@
 namespace tracker_image {
 namespace {
 
+namespace fiducial = arhost::fiducial;
 using arhost::Failure;
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_TRACKER,
-    "tracker_image",
-    "Pictures",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Detects plane pictures, such as posters and covers of books.",
-    0,
-    0,
-    nullptr,
-    nullptr,
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_TRACKER,
+    .id = "tracker_image",
+    .name = "Pictures",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Detects plane pictures, such as posters and covers of books.",
+    .capabilities = 0,
+    .option_count = 0,
+    .options = nullptr,
+    .needs = nullptr,
 };
 
 class ImageTracker {
@@ -58,7 +59,7 @@ public:
 
     // Pictures that are expected somewhere are aligned there. The features of the frame are needed only for others.
     void track(const arhost_track_request &request, arhost::Observations &observations) const {
-        const cv::Mat grey = arhost::fiducial::grey_of(*request.frame);
+        const cv::Mat grey = fiducial::grey_of(*request.frame);
         std::vector<bool> is_found(shown_.size()), is_missed(shown_.size());
         std::vector<arhost_observation> seen;
         for (const arhost_expected_marker &expected : arhost::elements(request.expected, request.expected_count)) {
@@ -80,7 +81,7 @@ public:
                     if (const auto place = shown_[i].picture.find(grey, *camera_, features))
                         seen.push_back(observation_of(shown_[i], *place));
         }
-        arhost::fiducial::report(std::move(seen), observations);
+        fiducial::report(std::move(seen), observations);
     }
 
     void stop() {
@@ -98,10 +99,8 @@ private:
 
     static arhost_observation observation_of(const Shown &shown, const Picture::Place &place) {
         const std::vector<cv::Point2d> &corners = place.corners_px;
-        arhost_observation one = arhost::fiducial::observation_of(shown.id, shown.family,
-                                                                  {{corners[0], corners[1], corners[2], corners[3]}});
-        one.decision_margin = 100 * place.inlier_share;
-        return one;
+        return fiducial::observation_of(shown.id, shown.family, {{corners[0], corners[1], corners[2], corners[3]}},
+                                        {0, 100 * place.inlier_share, 0});
     }
 
     std::optional<Camera> camera_;

@@ -6,9 +6,7 @@
 #include "squares.hpp"
 
 #include <fiducial/corner_refinement.hpp>
-#include <fiducial/other_markers.hpp>
-#include <fiducial/search_regions.hpp>
-#include <fiducial/undistortion.hpp>
+#include <fiducial/marker_search.hpp>
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -26,6 +24,7 @@
 namespace tracker_pattern {
 namespace {
 
+namespace fiducial = arhost::fiducial;
 using arhost::Failure;
 using arhost::fiducial::Corners;
 
@@ -37,18 +36,18 @@ constexpr arhost_option_descriptor options[] = {
 };
 
 constexpr arhost_descriptor descriptor = {
-    sizeof(arhost_descriptor),
-    ARHOST_KIND_TRACKER,
-    "tracker_pattern",
-    "ARToolKit patterns",
-    "0.1.0",
-    "arhost",
-    "Apache-2.0",
-    "Detects the square patterns and matrix codes of ARToolKit.",
-    0,
-    std::size(options),
-    options,
-    nullptr,
+    .struct_size = sizeof(arhost_descriptor),
+    .kind = ARHOST_KIND_TRACKER,
+    .id = "tracker_pattern",
+    .name = "ARToolKit patterns",
+    .version = "0.1.0",
+    .vendor = "arhost",
+    .licence = "Apache-2.0",
+    .description = "Detects the square patterns and matrix codes of ARToolKit.",
+    .capabilities = 0,
+    .option_count = std::size(options),
+    .options = options,
+    .needs = nullptr,
 };
 
 class PatternTracker {
@@ -57,18 +56,16 @@ public:
 
     static constexpr const char *changeable[] = {"min_correlation", "min_side_px", nullptr};
     void set(const arhost::Options &changed) {
-        if (changed.contains("min_correlation"))
-            min_correlation_ = changed.real("min_correlation");
-        if (changed.contains("min_side_px"))
-            min_side_px_ = changed.real("min_side_px");
+        fiducial::take(changed, "min_correlation", min_correlation_);
+        fiducial::take(changed, "min_side_px", min_side_px_);
     }
 
     void start(const arhost_tracker_setup &setup) {
         stop();
-        arhost::fiducial::families_of(setup, id_count);
+        fiducial::families_of(setup, id_count);
         for (const arhost_marker_config &marker : arhost::elements(setup.markers, setup.marker_count)) {
             const char *const family = setup.families[marker.family];
-            if (const auto *type = arhost::fiducial::find_matrix_family(family)) {
+            if (const auto *type = fiducial::find_matrix_family(family)) {
                 auto reader = std::ranges::find(matrix_readers_, type->side, &MatrixReader::cells);
                 if (reader == matrix_readers_.end())
                     reader = matrix_readers_.insert(reader, MatrixReader(type->side));
@@ -81,24 +78,24 @@ public:
                 throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "a marker of the family 'pattern' has no file");
             }
         }
-        lens_.emplace(*setup.intrinsics);
-        regions_.emplace(setup, [](const std::string &) { return arhost::fiducial::FamilyTraits{0.1, 0}; });
-        others_.emplace(host_, setup, [this](const cv::Mat &grey) { return other_markers(grey); });
+        search_.emplace(
+            host_, setup,
+            [](const std::string &) {
+                return fiducial::FamilyTraits{0.1, 0};
+            },
+            [this](const cv::Mat &grey) { return other_markers(grey); });
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
-        const arhost::fiducial::Pass pass{
-            nullptr, [&](const cv::Rect &region, auto &seen) { observe(*request.frame, region, seen); }};
-        arhost::fiducial::Seen seen = regions_->search(request, {}, {&pass, 1});
-        others_->frame(arhost::fiducial::grey_of(*request.frame), seen.markers);
-        observations.set_candidate_count(seen.candidates);
-        arhost::fiducial::report(std::move(seen.markers), observations);
+        const fiducial::Pass pass{nullptr,
+                                  [&](const cv::Rect &region, auto &seen) { observe(*request.frame, region, seen); }};
+        search_->track(request, observations, {}, {&pass, 1});
     }
 
     void stop() {
-        if (others_)
-            others_->finish();
-        others_.reset();
+        if (search_)
+            search_->finish();
+        search_.reset();
         patterns_.clear();
         matrix_readers_.clear();
         listed_families_.clear();
@@ -122,10 +119,10 @@ private:
     static int id_count(const std::string &family) {
         if (family == "pattern")
             return std::numeric_limits<int>::max();
-        if (const auto *type = arhost::fiducial::find_matrix_family(family))
+        if (const auto *type = fiducial::find_matrix_family(family))
             return type->id_count;
         std::string names;
-        for (const auto &type : arhost::fiducial::matrix_families())
+        for (const auto &type : fiducial::matrix_families())
             names += std::string(names.empty() ? "" : ", ") + type.name;
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "unknown family '" + family + "': tracker_pattern finds targets with a 'pattern', and has " +
@@ -158,14 +155,14 @@ private:
         }
         for (const MatrixReader &reader : matrix_readers_)
             if (const auto match = reader.match(interior(grey, corners_px, reader.ratio(), reader.side())))
-                consider(*match, *match, arhost::fiducial::matrix_ratio, match->wrong_cells,
-                         arhost::fiducial::matrix_false_positive_rate(reader.cells(), match->wrong_cells));
+                consider(*match, *match, fiducial::matrix_ratio, match->wrong_cells,
+                         fiducial::matrix_false_positive_rate(reader.cells(), match->wrong_cells));
         return best;
     }
 
     // Adds the markers in a region of the frame to `seen`.
-    void observe(const arhost_frame &frame, const cv::Rect &region, arhost::fiducial::Seen &seen) const {
-        const cv::Mat grey = arhost::fiducial::grey_of(frame);
+    void observe(const arhost_frame &frame, const cv::Rect &region, fiducial::Seen &seen) const {
+        const cv::Mat grey = fiducial::grey_of(frame);
         for (Corners corners_px : find_squares(grey(region), min_side_px_)) {
             ++seen.candidates;
             for (cv::Point2d &corner : corners_px)
@@ -175,22 +172,19 @@ private:
                 continue;
             // The search for an edge must not reach the picture inside the border.
             const int cells = static_cast<int>(std::ceil(2 / (1 - best.ratio)));
-            auto corners = arhost::fiducial::refine_edges(grey, frame.format->transfer, corners_px, *lens_, cells)
-                               .value_or(arhost::fiducial::MeasuredCorners{corners_px});
+            auto corners = fiducial::refine_edges(grey, frame.format->transfer, corners_px, search_->lens(), cells)
+                               .value_or(fiducial::MeasuredCorners{corners_px});
             // A print that is rotated clockwise begins with a later corner.
             std::rotate(corners.corners_px.begin(), corners.corners_px.begin() + best.quarter_turns,
                         corners.corners_px.end());
-            arhost_observation &one =
-                seen.markers.emplace_back(arhost::fiducial::observation_of(best.id, best.family, corners));
-            one.hamming = best.wrong_cells;
-            one.decision_margin = 100 * best.correlation;
-            one.false_positive_rate = best.false_positive_rate;
+            seen.markers.push_back(fiducial::observation_of(
+                best.id, best.family, corners, {best.wrong_cells, 100 * best.correlation, best.false_positive_rate}));
         }
     }
 
     // Squares of other markers may also read as matrix codes, which have few check bits or none.
-    arhost::fiducial::OtherMarkers::Markers other_markers(const cv::Mat &grey) const {
-        auto markers = arhost::fiducial::markers_of_other_families(grey, {});
+    fiducial::OtherMarkers::Markers other_markers(const cv::Mat &grey) const {
+        auto markers = fiducial::markers_of_other_families(grey, {});
         if (!markers.empty() || matrix_readers_.empty())
             return markers;
         for (const Corners &corners_px : find_squares(grey, min_side_px_))
@@ -220,27 +214,19 @@ private:
     static Samples interior(const cv::Mat &grey, const Corners &corners_px, double ratio, int side) {
         constexpr int oversampling = 4;
         const int size = side * oversampling;
-        const auto margin = static_cast<float>(size * (1 / ratio - 1) / 2);
-        const float first = -margin - 0.5F, last = static_cast<float>(size) + margin - 0.5F;
-        const cv::Point2f square[] = {{first, first}, {last, first}, {last, last}, {first, last}};
-        cv::Point2f corners[4];
-        std::ranges::copy(corners_px, corners);
-        cv::Mat unwarped, samples;
-        cv::warpPerspective(grey, unwarped, cv::getPerspectiveTransform(corners, square), {size, size},
-                            cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-        cv::resize(unwarped, samples, {side, side}, 0, 0, cv::INTER_AREA);
+        cv::Mat samples;
+        cv::resize(fiducial::unwarped(grey, corners_px, size, size * (1 / ratio - 1) / 2), samples, {side, side}, 0,
+                   0, cv::INTER_AREA);
         samples.convertTo(samples, CV_32F);
         return samples;
     }
 
     arhost::Host host_;
     double min_correlation_ = 0.6, min_side_px_ = 12;
-    std::optional<arhost::fiducial::Lens> lens_;
-    std::optional<arhost::fiducial::SearchRegions> regions_;
+    std::optional<fiducial::MarkerSearch> search_;
     std::map<Sampling, std::vector<Marked>> patterns_;
     std::vector<MatrixReader> matrix_readers_;
     std::set<std::string> listed_families_; // of matrix codes
-    std::optional<arhost::fiducial::OtherMarkers> others_;
 };
 
 } // namespace

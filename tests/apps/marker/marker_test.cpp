@@ -6,7 +6,7 @@
 #include "run_config/targets.hpp"
 
 #include <directories.hpp>
-#include <fiducial/apriltag_families.hpp>
+#include <fiducial/april_tags.hpp>
 #include <fiducial/artoolkit.hpp>
 #include <fiducial/aruco.hpp>
 

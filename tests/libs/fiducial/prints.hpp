@@ -5,7 +5,7 @@
 
 #include "rendered_marker.hpp"
 
-#include <fiducial/apriltag_families.hpp>
+#include <fiducial/april_tags.hpp>
 #include <fiducial/aruco.hpp>
 
 #include <string_view>

@@ -55,7 +55,7 @@ protected:
         request_.expected_count = static_cast<std::uint32_t>(expected_.size());
     }
     std::vector<cv::Rect> regions(const RegionLimits &limits = {}, const Family *family = nullptr) const {
-        return regions_->of(request_, limits, family);
+        return regions_->rectangles(request_, limits, family);
     }
     bool missed(const std::vector<arhost_observation> &seen) const { return regions_->miss_a_target(request_, seen); }
     static arhost_observation seen(std::int32_t id, std::uint32_t family = 0) {
