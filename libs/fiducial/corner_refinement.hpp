@@ -24,6 +24,10 @@ namespace arhost::fiducial {
 std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
                                             const Lens &lens, int cells, bool is_subpixel = false);
 
+struct AlignedPrint : MeasuredCorners {
+    double white = 0; // its light, where the illumination is brightest; 255 is the brightest code
+};
+
 // Fits a picture of the whole print to the frame: its corners, its blur, the light of black and of white, and how the
 // illumination changes across it, by the method of least squares (Levenberg–Marquardt). All cells contribute, so this
 // is accurate where blur mixes an edge with the cells beside it. Pixels that do not fit, and those that blur mixes
@@ -31,8 +35,8 @@ std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer
 // coordinates depend on each other, so `sigma_px` is the standard deviation of the independent noise for which the
 // 95 % ellipsoid of the pose contains the errors of the pose as often; it follows from the residuals. Returns
 // std::nullopt if the picture does not resemble the frame.
-std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
-                                           const Lens &lens, const Print &print);
+std::optional<AlignedPrint> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
+                                        const Lens &lens, const Print &print);
 
 // Refines corners by the edges of the square (refine_edges) or by the whole print: where the standard deviation of
 // the blur is more than 0.2 of a cell, more than 5 % of the light of white is clipped, the edges are not found, or

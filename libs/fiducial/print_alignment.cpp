@@ -537,14 +537,28 @@ private:
     Fit fit_;
 };
 
-struct AlignedPrint {
-    MeasuredCorners corners;
-    double white; // its light
-};
+// Whether the white at most of the edges is too bright for the camera, which shifts the edges into the black.
+bool is_overexposed(const cv::Mat &grey, const Corners &corners_px, int cells) {
+    const cv::Point2d centre = (corners_px[0] + corners_px[1] + corners_px[2] + corners_px[3]) / 4;
+    const cv::Rect2d inside(0, 0, grey.cols - 1, grey.rows - 1);
+    int bright = 0, all = 0;
+    for (int i = 0; i < 4; ++i)
+        for (const double part : {0.2, 0.4, 0.6, 0.8}) {
+            const cv::Point2d on_edge = corners_px[i] + part * (corners_px[(i + 1) % 4] - corners_px[i]);
+            const cv::Point2d half_cell = (on_edge - centre) / cells;
+            const auto is_bright = [&](const cv::Point2d &at) {
+                return inside.contains(at) && grey.at<std::uint8_t>(at) >= saturated;
+            };
+            bright += is_bright(on_edge + half_cell) || is_bright(on_edge - half_cell); // the border may be white
+            ++all;
+        }
+    return 2 * bright > all;
+}
 
-// As align_print().
-std::optional<AlignedPrint> aligned(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
-                                    const Lens &lens, const Print &print) {
+} // namespace
+
+std::optional<AlignedPrint> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
+                                        const Lens &lens, const Print &print) {
     constexpr double min_cell_px = 0.5;
     const auto corners = lens.undistort({corners_px.begin(), corners_px.end()});
     if (!corners || print.margin < 1 || !std::ranges::all_of(corners_px, [&](const cv::Point2d &corner) {
@@ -578,41 +592,16 @@ std::optional<AlignedPrint> aligned(const cv::Mat &grey, arhost_transfer transfe
     const auto distorted = lens.distort(found);
     if (!distorted)
         return std::nullopt;
-    AlignedPrint result{{}, fit.white()};
-    std::ranges::copy(*distorted, result.corners.corners_px.begin());
     const double variance_px2 =
         equivalent_variance(fit.covariance_px2(), corner_motions(fit.corners_px(), lens.focal_px()));
     const double sigma_px = noise_scale(found, *distorted) * std::sqrt(variance_px2);
     if (!(sigma_px > 0) || !std::isfinite(sigma_px))
         return std::nullopt;
-    result.corners.sigma_px = sigma_px;
+    AlignedPrint result;
+    std::ranges::copy(*distorted, result.corners_px.begin());
+    result.sigma_px = sigma_px;
+    result.white = fit.white();
     return result;
-}
-
-// Whether the white at most of the edges is too bright for the camera, which shifts the edges into the black.
-bool is_overexposed(const cv::Mat &grey, const Corners &corners_px, int cells) {
-    const cv::Point2d centre = (corners_px[0] + corners_px[1] + corners_px[2] + corners_px[3]) / 4;
-    const cv::Rect2d inside(0, 0, grey.cols - 1, grey.rows - 1);
-    int bright = 0, all = 0;
-    for (int i = 0; i < 4; ++i)
-        for (const double part : {0.2, 0.4, 0.6, 0.8}) {
-            const cv::Point2d on_edge = corners_px[i] + part * (corners_px[(i + 1) % 4] - corners_px[i]);
-            const cv::Point2d half_cell = (on_edge - centre) / cells;
-            const auto is_bright = [&](const cv::Point2d &at) {
-                return inside.contains(at) && grey.at<std::uint8_t>(at) >= saturated;
-            };
-            bright += is_bright(on_edge + half_cell) || is_bright(on_edge - half_cell); // the border may be white
-            ++all;
-        }
-    return 2 * bright > all;
-}
-
-} // namespace
-
-std::optional<MeasuredCorners> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
-                                           const Lens &lens, const Print &print) {
-    const auto result = aligned(grey, transfer, corners_px, lens, print);
-    return result ? std::optional(result->corners) : std::nullopt;
 }
 
 std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
@@ -628,11 +617,11 @@ std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transf
         return edges;
     const auto is_better = [&](const AlignedPrint &found) {
         return is_unreliable || (has_bright_edges && found.white > (1 + max_clipped) * max_light) ||
-               (edges->is_doubtful && found.corners.sigma_px < max_sigma_ratio * edges->sigma_px);
+               (edges->is_doubtful && found.sigma_px < max_sigma_ratio * edges->sigma_px);
     };
     const Print known = print();
-    if (const auto found = aligned(grey, transfer, edges ? edges->corners_px : rough_px, lens, known))
-        return is_better(*found) ? found->corners : *edges;
+    if (const auto found = align_print(grey, transfer, edges ? edges->corners_px : rough_px, lens, known))
+        return is_better(*found) ? *found : *edges;
     // A detector takes the end of what hides a corner for the corner. The others nearly tell where it is.
     const cv::Point2d skew_px = rough_px[0] - rough_px[1] + rough_px[2] - rough_px[3];
     const double diagonal_px = std::min(cv::norm(rough_px[2] - rough_px[0]), cv::norm(rough_px[3] - rough_px[1]));
@@ -640,8 +629,8 @@ std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transf
         for (std::size_t i = 0; i < 4; ++i) {
             Corners corners_px = rough_px;
             corners_px[i] = rough_px[(i + 1) % 4] - rough_px[(i + 2) % 4] + rough_px[(i + 3) % 4];
-            if (const auto found = aligned(grey, transfer, corners_px, lens, known); found && is_better(*found))
-                return found->corners;
+            if (const auto found = align_print(grey, transfer, corners_px, lens, known); found && is_better(*found))
+                return found;
         }
     return edges;
 }
