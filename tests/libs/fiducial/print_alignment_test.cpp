@@ -21,6 +21,10 @@ using arhost::fiducial::refine_edges;
 
 const cv::Size size(320, 240);
 const arhost_intrinsics camera = intrinsics_of(size, 300, 300, 159.5, 119.5);
+const Lens lens(camera);
+const Print tag = april_tag("tag36h11", 4);
+const Mt mt = pose_of(5, -3, 500, 20, 15, 25);
+const Corners truth = corners_of(mt, camera, 100);
 
 arhost::fiducial::Print print_of(const Print &tag) {
     arhost::fiducial::Print print{{}, (tag.cells.rows - tag.corner_cells) / 2};
@@ -36,8 +40,25 @@ cv::Mat reduced(const cv::Mat &fine_picture) {
     return picture;
 }
 
-cv::Mat finely_rendered(const arhost_intrinsics &intrinsics, const Placed &marker) {
-    return reduced(render(enlarged(intrinsics, fine), {marker}));
+cv::Mat blurred(double blur_px, const Mt &pose = mt, const Print &print = tag) {
+    cv::Mat picture = reduced(render(enlarged(camera, fine), {{print.with_margin(1), 100, pose}}));
+    if (blur_px > 0)
+        cv::GaussianBlur(picture, picture, {}, blur_px);
+    return picture;
+}
+
+auto aligned(const cv::Mat &picture, const Corners &corners_px, const Print &print = tag) {
+    return align_print(picture, ARHOST_TRANSFER_LINEAR, corners_px, lens, print_of(print));
+}
+
+auto edges_of(const cv::Mat &picture, const Corners &rough_px, bool is_subpixel = false) {
+    return refine_edges(picture, ARHOST_TRANSFER_LINEAR, rough_px, lens, 8, is_subpixel);
+}
+
+auto refined(const cv::Mat &picture, const Corners &rough_px, const Print &print = tag, bool is_subpixel = false) {
+    return refine_corners(
+        picture, ARHOST_TRANSFER_LINEAR, rough_px, lens, print.corner_cells, [&] { return print_of(print); },
+        is_subpixel);
 }
 
 void expect_near(const MeasuredCorners &found, const Corners &truth, double max_px) {
@@ -164,54 +185,42 @@ TEST(PrintAlignment, ModelsStrongBlurInPerspective) {
 }
 
 TEST(PrintAlignment, ReturnsNothingForAnotherPrint) {
-    const Lens lens(camera);
-    const Mt mt = pose_of(5, -3, 1000, 20, 15, 25);
-    cv::Mat picture = render(camera, {{april_tag("tag36h11", 4).with_margin(1), 100, mt}});
-    cv::GaussianBlur(picture, picture, {}, 0.7);
-    const auto corners = corners_of(mt, camera, 100);
-    EXPECT_TRUE(align_print(picture, ARHOST_TRANSFER_LINEAR, corners, lens, print_of(april_tag("tag36h11", 4))));
-    EXPECT_FALSE(align_print(picture, ARHOST_TRANSFER_LINEAR, corners, lens, print_of(april_tag("tag36h11", 5))));
-    EXPECT_FALSE(align_print(cv::Mat(size, CV_8U, cv::Scalar(90)), ARHOST_TRANSFER_LINEAR, corners, lens,
-                             print_of(april_tag("tag36h11", 4))));
+    const Mt far = pose_of(5, -3, 1000, 20, 15, 25);
+    const Corners corners = corners_of(far, camera, 100);
+    EXPECT_TRUE(aligned(blurred(0.7, far), corners));
+    EXPECT_FALSE(aligned(blurred(0.7, far), corners, april_tag("tag36h11", 5)));
+    EXPECT_FALSE(aligned(cv::Mat(size, CV_8U, cv::Scalar(90)), corners));
 }
 
 TEST(PrintAlignment, ReturnsNothingWithoutASquare) {
-    const Lens lens(camera);
     cv::Mat noise(size, CV_8U, cv::Scalar(128));
     add_noise(noise, 60, 5);
-    const arhost::fiducial::Print print = print_of(april_tag("tag36h11", 4));
     const double nan = std::numeric_limits<double>::quiet_NaN(), huge = 1e12;
     // A tag that would be found, and corners that are not its own.
-    const Mt mt = pose_of(5, -3, 600);
-    const cv::Mat picture = render(camera, {{april_tag("tag36h11", 4).with_margin(1), 100, mt}});
-    const auto [a, b, c, d] = corners_of(mt, camera, 100);
-    ASSERT_TRUE(align_print(picture, ARHOST_TRANSFER_LINEAR, {a, b, c, d}, lens, print));
+    const cv::Mat picture = blurred(0, pose_of(5, -3, 600));
+    const auto [a, b, c, d] = corners_of(pose_of(5, -3, 600), camera, 100);
+    ASSERT_TRUE(aligned(picture, {a, b, c, d}));
     for (const Corners &corners : {Corners{a, a, a, a}, Corners{{{nan, 80}, b, c, d}}, Corners{a, b, a, b},
                                    Corners{a, c, b, d}, Corners{a, d, c, b}, Corners{b, c, d, a}, Corners{a, b, c, c},
                                    Corners{{{400, 80}, {460, 80}, {460, 140}, {400, 140}}},
                                    Corners{{{-huge, -huge}, {huge, -huge}, {huge, huge}, {-huge, huge}}},
                                    Corners{{{100, 80}, {101, 80}, {101, 81}, {100, 81}}}})
-        EXPECT_FALSE(align_print(picture, ARHOST_TRANSFER_LINEAR, corners, lens, print)) << corners[1];
-    EXPECT_FALSE(align_print(noise, ARHOST_TRANSFER_LINEAR, {a, b, c, d}, lens, print));
-    EXPECT_FALSE(align_print(cv::Mat(1, 1, CV_8U, cv::Scalar(0)), ARHOST_TRANSFER_SRGB,
-                             {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}}, lens, print));
+        EXPECT_FALSE(aligned(picture, corners)) << corners[1];
+    EXPECT_FALSE(aligned(noise, {a, b, c, d}));
+    EXPECT_FALSE(aligned(cv::Mat(1, 1, CV_8U, cv::Scalar(0)), {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}}));
 }
 
 TEST(PrintAlignment, FitsAPrintThatTheFrameCuts) {
-    const Lens lens(camera);
-    const Mt mt = pose_of(0, 0, 1500, 0, 0, 20);
-    const Print tag = april_tag("tag36h11", 4);
-    cv::Mat picture = finely_rendered(camera, {tag.with_margin(1), 100, mt});
-    const auto truth = corners_of(mt, camera, 100);
+    const Mt far = pose_of(0, 0, 1500, 0, 0, 20);
+    const Corners truth = corners_of(far, camera, 100);
     const double left = std::min({truth[0].x, truth[1].x, truth[2].x, truth[3].x});
     const int cut = static_cast<int>(left) + 1;
-    const auto found = align_print(picture.colRange(cut, size.width).clone(), ARHOST_TRANSFER_LINEAR,
-                                   {truth[0] - cv::Point2d(cut, 0), truth[1] - cv::Point2d(cut, 0),
-                                    truth[2] - cv::Point2d(cut, 0), truth[3] - cv::Point2d(cut, 0)},
-                                   lens, print_of(tag));
+    const cv::Point2d shift(cut, 0);
+    const auto found = aligned(blurred(0, far).colRange(cut, size.width).clone(),
+                               {truth[0] - shift, truth[1] - shift, truth[2] - shift, truth[3] - shift});
     ASSERT_TRUE(found);
     for (int k = 0; k < 4; ++k)
-        EXPECT_LT(cv::norm(found->corners_px[k] + cv::Point2d(cut, 0) - truth[k]), 0.05);
+        EXPECT_LT(cv::norm(found->corners_px[k] + shift - truth[k]), 0.05);
 }
 
 // A tag one of whose corners something of one grey level hides.
@@ -220,8 +229,7 @@ struct HiddenCorner {
     cv::Mat picture;
 
     // `hidden`: side of the cover relative to that of the tag.
-    HiddenCorner(const Print &tag, double hidden, int level, double turn_degrees, int corner = 0,
-                 double tilt_degrees = 25)
+    HiddenCorner(double hidden, int level, double turn_degrees, int corner = 0, double tilt_degrees = 25)
         : mt(pose_of(5, -3, 500, tilt_degrees, 15, turn_degrees)) {
         const arhost_intrinsics fine_camera = enlarged(camera, fine);
         cv::Mat sharp = render(fine_camera, {{tag.with_margin(1), 100, mt}});
@@ -234,14 +242,12 @@ struct HiddenCorner {
 };
 
 TEST(PrintAlignment, IgnoresWhatHidesACorner) {
-    const Lens lens(camera);
-    const Print tag = april_tag("tag36h11", 4);
     for (const double hidden : {0.1, 0.2, 0.3})
         for (const int level : {0, 120, 255})
             for (const double turn_degrees : {0, 50}) {
-                const HiddenCorner view(tag, hidden, level, turn_degrees);
+                const HiddenCorner view(hidden, level, turn_degrees);
                 const Corners truth = view.corners_px();
-                const auto found = align_print(view.picture, ARHOST_TRANSFER_LINEAR, truth, lens, print_of(tag));
+                const auto found = aligned(view.picture, truth);
                 SCOPED_TRACE(testing::Message() << hidden << " " << level << " " << turn_degrees);
                 ASSERT_TRUE(found);
                 expect_near(*found, truth, 0.06);
@@ -256,11 +262,8 @@ TEST(PrintAlignment, ToleratesSharpEdges) {
 
 // The slope of sRGB's curve is steep there, so small errors of the light are large ones of the code.
 TEST(PrintAlignment, ToleratesFlareBesideDeepBlack) {
-    const Lens lens(camera);
-    const Print tag = april_tag("tag36h11", 4);
-    const Mt mt = pose_of(5, -3, 500, 20, 15, 25);
     cv::Mat light, flare;
-    finely_rendered(camera, {tag.with_margin(1), 100, mt}).convertTo(light, CV_32F, 1 / 255.0);
+    blurred(0).convertTo(light, CV_32F, 1 / 255.0);
     double black = 0, white = 0;
     cv::minMaxLoc(light, &black, &white);
     light = (light - black) * (0.8 / (white - black)) + 0.0002;
@@ -271,45 +274,35 @@ TEST(PrintAlignment, ToleratesFlareBesideDeepBlack) {
     for (int y = 0; y < light.rows; ++y)
         for (int x = 0; x < light.cols; ++x)
             picture(y, x) = static_cast<std::uint8_t>(arhost::shading::srgb8_exact(light.at<float>(y, x)));
-    const Corners truth = corners_of(mt, camera, 100);
     const auto found = align_print(picture, ARHOST_TRANSFER_SRGB, truth, lens, print_of(tag));
     ASSERT_TRUE(found);
     expect_near(*found, truth, 0.04);
 }
 
 TEST(PrintAlignment, ToleratesNoiseBesideClippedBlack) {
-    const Print tag = april_tag("tag36h11", 4);
-    const Mt mt = pose_of(5, -3, 500, 20, 15, 25);
-    cv::Mat picture = finely_rendered(camera, {tag.with_margin(1), 100, mt});
-    cv::GaussianBlur(picture, picture, {}, 0.7);
+    cv::Mat picture = blurred(0.7);
     picture.convertTo(picture, CV_16S, 1, -40); // black is below 0
     add_noise(picture, 8, 1);
-    const Corners truth = corners_of(mt, camera, 100);
-    const auto found = align_print(picture, ARHOST_TRANSFER_LINEAR, truth, Lens(camera), print_of(tag));
+    const auto found = aligned(picture, truth);
     ASSERT_TRUE(found);
     expect_near(*found, truth, 0.25); // clipped black shifts edges
 }
 
 TEST(PrintAlignment, ReturnsNothingIfHalfOfThePrintIsHidden) {
-    const Print tag = april_tag("tag36h11", 4);
     for (const int level : {0, 120, 255}) {
-        const HiddenCorner view(tag, 0.75, level, 20);
-        EXPECT_FALSE(
-            align_print(view.picture, ARHOST_TRANSFER_LINEAR, view.corners_px(), Lens(camera), print_of(tag)));
+        const HiddenCorner view(0.75, level, 20);
+        EXPECT_FALSE(aligned(view.picture, view.corners_px()));
     }
 }
 
 TEST(CornerRefinement, FindsACornerThatTheDetectorTakesForTheEndOfItsCover) {
-    const Lens lens(camera);
-    const Print tag = april_tag("tag36h11", 4);
     for (int i = 0; i < 8; ++i) {
         const int corner = i % 4;
-        const HiddenCorner view(tag, 0.3, 120, 50, corner, i < 4 ? 25 : 55);
+        const HiddenCorner view(0.3, 120, 50, corner, i < 4 ? 25 : 55);
         const Corners truth = view.corners_px();
         Corners rough = truth;
         rough[corner] = pixel_of(view.mt, camera, corner == 1 || corner == 2 ? 35 : -35, corner < 2 ? 35 : -35);
-        const auto found = refine_corners(view.picture, ARHOST_TRANSFER_LINEAR, rough, lens, tag.corner_cells,
-                                          [&] { return print_of(tag); });
+        const auto found = refined(view.picture, rough);
         SCOPED_TRACE(i);
         ASSERT_TRUE(found);
         expect_near(*found, truth, 0.06);
@@ -317,42 +310,28 @@ TEST(CornerRefinement, FindsACornerThatTheDetectorTakesForTheEndOfItsCover) {
 }
 
 TEST(CornerRefinement, KeepsTheEdgesBesideWhiteThatIsHardlyClipped) {
-    const Lens lens(camera);
-    const Print tag = april_tag("tag36h11", 4);
-    const Mt mt = pose_of(5, -3, 500, 20, 15, 25);
-    cv::Mat picture = finely_rendered(camera, {tag.with_margin(1), 100, mt});
-    cv::GaussianBlur(picture, picture, {}, 0.7);
+    cv::Mat picture = blurred(0.7);
     double white = 0;
     cv::minMaxLoc(picture, nullptr, &white);
     picture.convertTo(picture, CV_8U, 1.02 * 255 / white);
-    const Corners truth = corners_of(mt, camera, 100);
-    ASSERT_TRUE(align_print(picture, ARHOST_TRANSFER_LINEAR, truth, lens, print_of(tag)));
-    const auto found =
-        refine_corners(picture, ARHOST_TRANSFER_LINEAR, truth, lens, tag.corner_cells, [&] { return print_of(tag); });
-    const auto edges = refine_edges(picture, ARHOST_TRANSFER_LINEAR, truth, lens, tag.corner_cells);
+    ASSERT_TRUE(aligned(picture, truth));
+    const auto found = refined(picture, truth), edges = edges_of(picture, truth);
     ASSERT_TRUE(found && edges);
     EXPECT_EQ(found->corners_px, edges->corners_px);
 }
 
 TEST(CornerRefinement, AlignsThePrintOnlyWhereCellsAreNarrow) {
-    const Lens lens(camera);
-    const Print tag = april_tag("tag36h11", 4);
     for (const auto &[distance_mm, is_narrow] : {std::pair(400.0, false), {1600.0, true}}) {
-        const Mt mt = pose_of(5, -3, distance_mm, 20, 15, 25);
-        cv::Mat picture = finely_rendered(camera, {tag.with_margin(1), 100, mt});
-        cv::GaussianBlur(picture, picture, {}, 0.6);
-        const auto rough = corners_of(mt, camera, 100);
-        const auto found = refine_corners(picture, ARHOST_TRANSFER_LINEAR, rough, lens, tag.corner_cells,
-                                          [&] { return print_of(tag); });
-        const auto edges = refine_edges(picture, ARHOST_TRANSFER_LINEAR, rough, lens, 8);
+        const Mt pose = pose_of(5, -3, distance_mm, 20, 15, 25);
+        const cv::Mat picture = blurred(0.6, pose);
+        const Corners rough = corners_of(pose, camera, 100);
+        const auto found = refined(picture, rough), edges = edges_of(picture, rough);
         ASSERT_TRUE(found && edges);
         EXPECT_EQ(found->corners_px != edges->corners_px, is_narrow);
     }
 }
 
 TEST(CornerRefinement, NeedsNoPrintIfMarkersAreDarkNoisyOrPartlyHidden) {
-    const Lens lens(camera);
-    const Print tag = april_tag("tag36h11", 4);
     struct View {
         double hidden, exposure, noise, max_px;
     };
@@ -381,16 +360,9 @@ TEST(CornerRefinement, NeedsNoPrintIfMarkersAreDarkNoisyOrPartlyHidden) {
 }
 
 TEST(CornerRefinement, AlignsThePrintBesideSaturatedWhite) {
-    const Lens lens(camera);
     for (const char *family : {"tag36h11", "tagStandard41h12"}) { // the border of the second is white
-        const Print tag = april_tag(family, 4);
-        const Mt mt = pose_of(5, -3, 500, 20, 15, 25);
-        cv::Mat picture = finely_rendered(camera, {tag.with_margin(1), 100, mt});
-        cv::GaussianBlur(picture, picture, {}, 0.7);
-        picture *= 2;
-        const auto truth = corners_of(mt, camera, 100);
-        const auto found = refine_corners(picture, ARHOST_TRANSFER_LINEAR, truth, lens, tag.corner_cells,
-                                          [&] { return print_of(tag); });
+        const Print print = april_tag(family, 4);
+        const auto found = refined(2 * blurred(0.7, mt, print), truth, print);
         SCOPED_TRACE(family);
         ASSERT_TRUE(found);
         expect_near(*found, truth, 0.15);
@@ -398,28 +370,18 @@ TEST(CornerRefinement, AlignsThePrintBesideSaturatedWhite) {
 }
 
 TEST(CornerRefinement, AlignsThePrintIfEdgesAreNotFound) {
-    const Lens lens(camera);
-    const Print tag = april_tag("tag36h11", 4);
-    const Mt mt = pose_of(5, -3, 500, 20, 15, 25);
-    cv::Mat picture = finely_rendered(camera, {tag.with_margin(1), 100, mt});
-    cv::GaussianBlur(picture, picture, {}, 4);
-    const auto truth = corners_of(mt, camera, 100);
-    ASSERT_FALSE(refine_edges(picture, ARHOST_TRANSFER_LINEAR, truth, lens, 8, true));
-    const auto found = refine_corners(
-        picture, ARHOST_TRANSFER_LINEAR, truth, lens, 8, [&] { return print_of(tag); }, true);
+    const cv::Mat picture = blurred(4);
+    ASSERT_FALSE(edges_of(picture, truth, true));
+    const auto found = refined(picture, truth, tag, true);
     ASSERT_TRUE(found);
     expect_near(*found, truth, 0.1);
 }
 
 TEST(CornerRefinement, KeepsTheEdgesOfAPrintThatDoesNotFit) {
-    const Lens lens(camera);
-    const Mt mt = pose_of(5, -3, 1600, 20, 15, 25);
-    cv::Mat picture = finely_rendered(camera, {april_tag("tag36h11", 4).with_margin(1), 100, mt});
-    cv::GaussianBlur(picture, picture, {}, 0.6);
-    const auto rough = corners_of(mt, camera, 100);
-    const auto found = refine_corners(picture, ARHOST_TRANSFER_LINEAR, rough, lens, 8,
-                                      [] { return print_of(april_tag("tag36h11", 5)); });
-    const auto edges = refine_edges(picture, ARHOST_TRANSFER_LINEAR, rough, lens, 8);
+    const Mt far = pose_of(5, -3, 1600, 20, 15, 25);
+    const cv::Mat picture = blurred(0.6, far);
+    const Corners rough = corners_of(far, camera, 100);
+    const auto found = refined(picture, rough, april_tag("tag36h11", 5)), edges = edges_of(picture, rough);
     ASSERT_TRUE(found && edges);
     EXPECT_EQ(found->corners_px, edges->corners_px);
 }
