@@ -187,7 +187,7 @@ public:
         const auto detection = [&](const Look &look) {
             return [&, look](const cv::Rect &region, auto &seen) { observe(*request.frame, region, look, seen); };
         };
-        fiducial::Pass pass{nullptr, detection({})};
+        fiducial::Pass pass{.family = nullptr, .detect = detection({})};
         if (looks_closer_)
             pass.closer_looks.push_back({detection(enlarged), true});
         if (looks_closer_ && min_margin_ == 0 && sharpening_ < sharpened.min_sharpening)

@@ -87,8 +87,9 @@ public:
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
-        const fiducial::Pass pass{nullptr,
-                                  [&](const cv::Rect &region, auto &seen) { observe(*request.frame, region, seen); }};
+        const fiducial::Pass pass{.family = nullptr, .detect = [&](const cv::Rect &region, auto &seen) {
+                                      observe(*request.frame, region, seen);
+                                  }};
         search_->track(request, observations, {}, {&pass, 1});
     }
 

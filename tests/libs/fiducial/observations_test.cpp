@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fiducial/observations.hpp>
 
+#include "tracker_support.hpp"
+
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -22,19 +24,19 @@ struct Marker {
 
 // Each marker belongs to the target "cup". The families have 10 markers, "empty" is unknown.
 std::vector<Family> families_of(const std::vector<const char *> &names, const std::vector<Marker> &markers) {
-    const arhost_target_config target{sizeof target, 0, "cup", nullptr};
+    const arhost_target_config target{.struct_size = sizeof target, .reserved = 0, .name = "cup", .body = nullptr};
     std::vector<arhost_marker_config> configured;
     for (const auto &[family, id] : markers)
-        configured.push_back({sizeof(arhost_marker_config), id, family, 0, {}, nullptr, 0});
-    const arhost_tracker_setup setup{sizeof setup,
-                                     1,
-                                     nullptr,
-                                     nullptr,
-                                     &target,
-                                     configured.data(),
-                                     static_cast<std::uint32_t>(configured.size()),
-                                     static_cast<std::uint32_t>(names.size()),
-                                     names.data()};
+        configured.push_back(arhost::test::marker_config(id, family));
+    const arhost_tracker_setup setup{.struct_size = sizeof setup,
+                                     .target_count = 1,
+                                     .format = nullptr,
+                                     .intrinsics = nullptr,
+                                     .targets = &target,
+                                     .markers = configured.data(),
+                                     .marker_count = static_cast<std::uint32_t>(configured.size()),
+                                     .family_count = static_cast<std::uint32_t>(names.size()),
+                                     .families = names.data()};
     return arhost::fiducial::families_of(setup, [](const std::string &name) {
         if (name == "empty")
             throw arhost::Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "unknown");
@@ -102,7 +104,12 @@ std::vector<arhost_observation> report(const std::vector<arhost_observation> &se
     arhost_observation empty{};
     empty.struct_size = sizeof empty;
     std::vector<arhost_observation> buffer(ARHOST_MAX_OBSERVATIONS, empty);
-    arhost_tracker_result result{sizeof result, 0, buffer.data(), nullptr, 0, -1};
+    arhost_tracker_result result{.struct_size = sizeof result,
+                                 .observation_count = 0,
+                                 .observations = buffer.data(),
+                                 .poses = nullptr,
+                                 .pose_count = 0,
+                                 .candidate_count = -1};
     arhost::Observations observations(result);
     arhost::fiducial::report(seen, observations);
     buffer.resize(result.observation_count);

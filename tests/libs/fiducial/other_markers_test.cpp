@@ -47,7 +47,7 @@ protected:
 private:
     arhost_tracker_setup setup() {
         for (std::size_t i = 0; i < markers_of_setup_.size(); ++i)
-            markers_of_setup_[i] = {sizeof(arhost_marker_config), i == 0 ? 3 : 5, 0, 0, {}, nullptr, 0};
+            markers_of_setup_[i] = marker_config(i == 0 ? 3 : 5);
         arhost_tracker_setup setup{};
         setup.struct_size = sizeof setup;
         setup.markers = markers_of_setup_.data();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fiducial/search_regions.hpp>
 
+#include "tracker_support.hpp"
+
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -26,13 +28,7 @@ class Regions : public testing::Test {
 protected:
     Regions() {
         for (std::int32_t i = 0; i < 4; ++i)
-            markers_.push_back({sizeof(arhost_marker_config),
-                                i,
-                                i == 3 ? 1U : 0U,
-                                i < 2 ? 0U : static_cast<std::uint32_t>(i - 1),
-                                {},
-                                nullptr,
-                                0});
+            markers_.push_back(arhost::test::marker_config(i, i == 3 ? 1 : 0, std::max(i - 1, 0)));
         setup_.markers = markers_.data();
         setup_.marker_count = 4;
         setup_.families = families_;
@@ -204,7 +200,7 @@ TEST_F(Regions, OfVerifiedMarkersAreSearchedOnlyIfEverythingIs) {
         request_.search_everywhere = everywhere;
         const auto verified = regions_->verified(request_, verify);
         std::vector<cv::Rect> searched;
-        const Pass pass{nullptr, [&](const cv::Rect &region, auto &all) {
+        const Pass pass{.family = nullptr, .detect = [&](const cv::Rect &region, auto &all) {
                             searched.push_back(region);
                             all.candidates += 1;
                             EXPECT_EQ(arhost::fiducial::markers_of(verified).size(), 1u);
@@ -232,14 +228,15 @@ protected:
                 all.candidates += 7;
             };
         };
-        const Pass pass{nullptr,
-                        [&](const cv::Rect &region, auto &all) {
-                            searched_.emplace_back("normal", region);
-                            if (region.contains({100, 150}))
-                                all.markers.push_back(seen(0));
-                            all.candidates += 2;
-                        },
-                        {{look("fast"), false}, {look("slow"), true}}};
+        const Pass pass{.family = nullptr,
+                        .detect =
+                            [&](const cv::Rect &region, auto &all) {
+                                searched_.emplace_back("normal", region);
+                                if (region.contains({100, 150}))
+                                    all.markers.push_back(seen(0));
+                                all.candidates += 2;
+                            },
+                        .closer_looks = {{look("fast"), false}, {look("slow"), true}}};
         return regions_->search(request_, {}, {&pass, 1});
     }
     using Search = std::pair<std::string, cv::Rect>;
@@ -330,11 +327,12 @@ TEST_F(CloserLooks, DoNotCountIfTheMarkerIsProbablyChance) {
 TEST_F(CloserLooks, AreNotTakenIfAllTargetsAreSeen) {
     request_.search_everywhere = 1;
     int looks = 0;
-    const Pass pass{nullptr,
-                    [&](const cv::Rect &, auto &all) {
-                        all.markers = {seen(1), seen(2), seen(3, 1)};
-                    },
-                    {{[&](const cv::Rect &, auto &) { ++looks; }, false}}};
+    const Pass pass{.family = nullptr,
+                    .detect =
+                        [&](const cv::Rect &, auto &all) {
+                            all.markers = {seen(1), seen(2), seen(3, 1)};
+                        },
+                    .closer_looks = {{[&](const cv::Rect &, auto &) { ++looks; }, false}}};
     EXPECT_EQ(regions_->search(request_, {}, {&pass, 1}).markers.size(), 3u);
     EXPECT_EQ(looks, 0) << "one marker of the first target is enough";
 }

@@ -97,6 +97,17 @@ struct Listed {
     double pattern_ratio = 0;
 };
 
+// A marker of a family whose prints have no file, at any place in its target.
+inline arhost_marker_config marker_config(std::int32_t id, std::uint32_t family = 0, std::uint32_t target = 0) {
+    return {.struct_size = sizeof(arhost_marker_config),
+            .id = id,
+            .family = family,
+            .target = target,
+            .corners_mm = {},
+            .file = nullptr,
+            .pattern_ratio = 0};
+}
+
 // `marker`: its index in the list.
 inline arhost_expected_marker expected_at(std::uint32_t marker, const std::array<cv::Point2d, 4> &corners_px) {
     constexpr double margin_px = 6;
@@ -143,7 +154,8 @@ public:
         }
         std::vector<arhost_target_config> targets;
         for (const std::string &name : names)
-            targets.push_back({sizeof(arhost_target_config), 0, name.c_str(), nullptr});
+            targets.push_back(
+                {.struct_size = sizeof(arhost_target_config), .reserved = 0, .name = name.c_str(), .body = nullptr});
         std::vector<const char *> families;
         for (const std::string &family : families_)
             families.push_back(family.c_str());
@@ -178,17 +190,22 @@ public:
         arhost_observation empty{};
         empty.struct_size = sizeof empty;
         std::vector<arhost_observation> observations(ARHOST_MAX_OBSERVATIONS, empty);
-        arhost_tracker_result result{sizeof result, 0, observations.data(), nullptr, 0, -1};
+        arhost_tracker_result result{.struct_size = sizeof result,
+                                     .observation_count = 0,
+                                     .observations = observations.data(),
+                                     .poses = nullptr,
+                                     .pose_count = 0,
+                                     .candidate_count = -1};
         const arhost_frame frame = picture.frame();
-        const arhost_track_request request{sizeof request,
-                                           search_everywhere,
-                                           &frame,
-                                           nullptr,
-                                           nullptr,
-                                           0,
-                                           expected.data(),
-                                           static_cast<uint32_t>(expected.size()),
-                                           0};
+        const arhost_track_request request{.struct_size = sizeof request,
+                                           .search_everywhere = search_everywhere,
+                                           .frame = &frame,
+                                           .state_before = nullptr,
+                                           .state_after = nullptr,
+                                           .state_size = 0,
+                                           .expected = expected.data(),
+                                           .expected_count = static_cast<uint32_t>(expected.size()),
+                                           .reserved = 0};
         if (functions().track(plugin_.instance(), &request, &result) != ARHOST_STATUS_OK)
             throw std::runtime_error("track failed: " + log());
         observations.resize(result.observation_count);
