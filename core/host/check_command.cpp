@@ -5,8 +5,8 @@
 #include "base/text.hpp"
 #include "host/commands.hpp"
 #include "host/outcome.hpp"
-#include "host/pipeline.hpp"
 #include "host/read_configuration.hpp"
+#include "host/run.hpp"
 #include "host/run_command.hpp"
 #include "run_config/access.hpp"
 #include "scene/capabilities.hpp"
@@ -22,9 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 // Checks the plugins, fallbacks included, and their options. Returns the ray tracers.
-// `logs_notes`: warns of options that are set aside, which otherwise the pipeline does.
+// `logs_notes`: warns of options that are set aside, which otherwise the run does.
 std::vector<model::PluginDescription> check_plugins(const run_config::Configuration &configuration,
-                                                    supervise::Context &context, bool logs_notes) {
+                                                  supervise::Context &context, bool logs_notes) {
     const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
         std::vector<model::PluginDescription> plugins;
         for (std::size_t i = 0; i < component.plugins.size(); ++i) {
@@ -93,7 +93,7 @@ Folders redirect_outputs(run_config::Configuration &configuration, const fs::pat
         const auto path = run_config::path_of(output.node);
         if (!path || run_config::is_standard_output(*path))
             continue;
-        const fs::path folder = Pipeline::check_folder(scratch, i), own = path->output_path().parent_path();
+        const fs::path folder = Outputs::check_folder(scratch, i), own = path->output_path().parent_path();
         fs::create_directory(folder);
         folders.emplace_back(folder, own);
         if (fs::is_fifo(path->output_path()))
@@ -127,19 +127,22 @@ int check_by_opening(run_config::Configuration configuration, const Arguments &a
                                                 const std::string &text) {
         log(severity, component, with_own_folders(text, folders));
     };
-    Pipeline pipeline(configuration, context, [](const Progress &) {});
-    if (!pipeline.check(scratch.path(), arguments.frames.has_value())) {
-        const std::string reason = with_own_folders(pipeline.failure(), folders);
-        if (pipeline.failed_by_configuration())
+    Run::Options options;
+    options.check_scratch = scratch.path();
+    options.checks_frames = arguments.frames.has_value();
+    Run run(configuration, context, options);
+    if (!run.run()) {
+        const std::string reason = with_own_folders(run.failures().text(), folders);
+        if (run.failures().is_configuration_error())
             throw yaml::Error(reason);
         throw std::runtime_error(reason);
     }
-    for (const std::string &line : pipeline.findings())
+    for (const std::string &line : run.findings())
         std::printf("%s\n", base::printable(line).c_str());
-    const auto problem = problem_with_run(configuration, pipeline.statistics(), pipeline.targets());
+    const auto problem = problem_with_run(configuration, run.statistics(), run.targets());
     if (problem)
         context.log(ARHOST_SEVERITY_ERROR, problem->component, problem->text);
-    if (const std::string misfits = misfitting_targets(pipeline.statistics(), pipeline.targets()); !misfits.empty())
+    if (const std::string misfits = misfitting_targets(run.statistics(), run.targets()); !misfits.empty())
         context.log(ARHOST_SEVERITY_WARNING, "tracker", misfits);
     return problem ? base::failed : base::success;
 }

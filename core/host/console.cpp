@@ -2,7 +2,7 @@
 #include "host/console.hpp"
 
 #include "base/text.hpp"
-#include "host/pipeline.hpp"
+#include "host/run.hpp"
 
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/stdout_color_sinks.h>

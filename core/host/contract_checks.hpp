@@ -2,7 +2,7 @@
 //
 // The contract checks that `conform: true` enables (docs/conformance.md). They inspect a sample of the run's frames
 // and report violations of the ABI; they do not change the run. Values that could harm the host are always rejected,
-// with or without these checks (frames.hpp).
+// with or without these checks (frame_validation.hpp).
 #pragma once
 
 #include "compositor/compositor.hpp"

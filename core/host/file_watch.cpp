@@ -68,7 +68,7 @@ void FileWatch::on_events() {
         }
     }
     if (is_new)
-        quiet_ = reactor_.at(ipc::Reactor::Clock::now() + quiet_time, [this] { report(); });
+        quiet_ = reactor_.at(reactor_.now() + quiet_time, [this] { report(); });
 }
 
 void FileWatch::report() {

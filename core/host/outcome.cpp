@@ -140,8 +140,8 @@ std::string seen_instead(const Statistics &statistics, const std::vector<model::
                 found != statistics.unconfirmed.end())
                 (marker.file.empty() ? unconfirmed_ids : unconfirmed_files).insert(*found);
     std::string text;
-    if (const std::string strangers = strangers_text(statistics); !strangers.empty())
-        text += "; it saw " + strangers;
+    if (const std::string unlisted = unlisted_text(statistics); !unlisted.empty())
+        text += "; it saw " + unlisted;
     for (const std::string &hint : statistics.hints)
         text += "; " + hint;
     if (!unconfirmed_ids.empty())
@@ -174,8 +174,8 @@ std::string how_to_compare(const std::vector<model::Target> &unseen) {
            (has_files ? "; compare the files with the prints" : "");
 }
 
-std::string strangers_text(const Statistics &statistics) {
-    return frames_text(statistics.strangers);
+std::string unlisted_text(const Statistics &statistics) {
+    return frames_text(statistics.unlisted);
 }
 
 } // namespace arhost::host

@@ -42,6 +42,6 @@ std::string seen_instead(const Statistics &statistics, const std::vector<model::
 std::string how_to_compare(const std::vector<model::Target> &unseen);
 
 // Names the most frequent markers that belong to no target, as "tag36h11 5 (30 frames)"; "" if there are none.
-std::string strangers_text(const Statistics &statistics);
+std::string unlisted_text(const Statistics &statistics);
 
 } // namespace arhost::host

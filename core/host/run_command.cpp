@@ -5,8 +5,8 @@
 #include "base/program.hpp"
 #include "base/write_all.hpp"
 #include "host/outcome.hpp"
-#include "host/pipeline.hpp"
 #include "host/read_configuration.hpp"
+#include "host/run.hpp"
 
 #include <nlohmann/json.hpp>
 #include <spdlog/fmt/fmt.h>
@@ -34,7 +34,7 @@ public:
 
     // Writes those that the configuration has. Returns false if one cannot be written.
     bool write(const run_config::Configuration &configuration, const Statistics &statistics,
-               const std::vector<supervise::Component *> &components, Console &console) {
+               const ComponentTotals &components, Console &console) {
         if (statistics.frames_in == 0)
             return true;
         bool written = true;
@@ -128,7 +128,7 @@ void log_contract_checks(const ContractChecks &checks, Console &console) {
 }
 
 // Logs what the plugins have counted: "lost_by_driver 3, superseded 12".
-void log_counters(const EndedComponents &totals, Console &console) {
+void log_counters(const ComponentTotals &totals, Console &console) {
     for (const auto &[component, counters] : totals.counters) {
         std::vector<std::string> texts;
         for (const auto &[name, value] : counters)
@@ -194,29 +194,31 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     Console console(arguments.verbose);
     show_warnings(configuration, console);
     ipc::Reactor reactor;
-    Pipeline *running = nullptr;
-    Pipeline pipeline(configuration, make_context(reactor, launcher, console),
-                      [&](const Progress &progress) { console.show(progress, running->statistics()); });
-    running = &pipeline;
+    Run *running = nullptr;
+    Run::Options options;
+    options.on_progress = [&](const Progress &progress) { console.show(progress, running->statistics()); };
     if (arguments.watch)
-        pipeline.watch([&arguments] { return read_configuration(arguments); });
-    const auto watch = signals.watch(reactor, console, [&] { pipeline.interrupt(); });
+        options.read_configuration = [&arguments] { return read_configuration(arguments); };
+    Run run(configuration, make_context(reactor, launcher, console), options);
+    running = &run;
+    const auto watch = signals.watch(reactor, console, [&] { run.interrupt(); });
 
-    const bool completed = pipeline.run();
-    if (!completed && !pipeline.failure_was_logged())
-        console.log(ARHOST_SEVERITY_ERROR, "arhost", pipeline.failure());
-    const Statistics &statistics = pipeline.statistics();
+    const bool completed = run.run();
+    if (!completed && !run.failures().was_logged())
+        console.log(ARHOST_SEVERITY_ERROR, "arhost", run.failures().text());
+    const Statistics &statistics = run.statistics();
     const bool is_good =
-        log_problems(configuration, arguments, statistics, pipeline.targets(), completed, signals.arrived(), console);
+        log_problems(configuration, arguments, statistics, run.targets(), completed, signals.arrived(), console);
     log_latencies(configuration, statistics, console);
-    log_counters(statistics.ended.and_running(pipeline.components()), console);
+    const ComponentTotals totals = run.component_totals();
+    log_counters(totals, console);
     log_contract_checks(statistics.contract_checks, console);
-    const bool written = reports.write(configuration, statistics, pipeline.components(), console);
+    const bool written = reports.write(configuration, statistics, totals, console);
     signals.release(); // a stopped terminal may block the last log lines
     if (!written)
         return base::failed;
     if (!completed)
-        return pipeline.failed_by_configuration() ? base::invalid_input : base::failed;
+        return run.failures().is_configuration_error() ? base::invalid_input : base::failed;
     if (signals.arrived())
         return base::interrupted;
     return is_good ? base::success : base::failed;

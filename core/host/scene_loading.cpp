@@ -56,7 +56,7 @@ SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::p
     process_ = std::make_unique<supervise::Process>(context, budget_, std::move(process_callbacks),
                                                     messages::Load{scene_}, policy_of(sandbox));
     restart_deadline();
-    total_deadline_ = context_.reactor.at(Reactor::Clock::now() + limits.start_total, [this, limits] {
+    total_deadline_ = context_.reactor.at(context_.reactor.now() + limits.start_total, [this, limits] {
         process_->end("took longer than " + std::to_string(limits.start_total.count()) +
                       " ms, the limit in total (30 times raytracer.start_deadline_ms)");
     });
@@ -80,7 +80,7 @@ void SceneLoading::on_message(Message &message) {
 }
 
 void SceneLoading::restart_deadline() {
-    deadline_ = context_.reactor.at(Reactor::Clock::now() + timeout_, [this] {
+    deadline_ = context_.reactor.at(context_.reactor.now() + timeout_, [this] {
         process_->end("made no progress for " + std::to_string(timeout_.count()) +
                       " ms (raytracer.start_deadline_ms)");
     });

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/sink_queue.hpp"
 
+#include "base/clock.hpp"
+
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -15,7 +17,7 @@ namespace {
 std::chrono::nanoseconds latency_of(const OutputFrame &frame, const Result &result) {
     const std::int64_t captured_ns = std::chrono::nanoseconds(frame.captured.time_since_epoch()).count();
     // The worker may report any number.
-    return std::chrono::nanoseconds(std::clamp(result.ended_ns, captured_ns, monotonic_ns()) - captured_ns);
+    return std::chrono::nanoseconds(std::clamp(result.ended_ns, captured_ns, base::to_ns(base::steady_clock().now())) - captured_ns);
 }
 
 } // namespace

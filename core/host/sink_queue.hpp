@@ -3,10 +3,12 @@
 // One output: its sink, the frames waiting for it, and the frames that it has not confirmed.
 #pragma once
 
-#include "host/frames.hpp"
+#include "model/control.hpp"
+#include "host/frame.hpp"
 #include "host/statistics.hpp"
 #include "model/control.hpp"
 #include "run_config/configuration.hpp"
+#include "supervise/component.hpp"
 
 #include <deque>
 

@@ -4,11 +4,16 @@
 // worker.
 #pragma once
 
-#include "supervise/component.hpp"
-
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
+
+namespace arhost::supervise {
+struct Region;
+}
 
 namespace arhost::host {
 
@@ -29,8 +34,8 @@ public:
 
     explicit operator bool() const { return pool_ != nullptr; }
     std::uint32_t index() const { return index_; }
-    const supervise::RegionPointer &region() const;
-    std::span<std::byte> bytes() const { return region()->layout.slot(region()->mapping, index_); }
+    const std::shared_ptr<const supervise::Region> &region() const;
+    std::span<std::byte> bytes() const;
 
 private:
     std::shared_ptr<SlotPool> pool_;
@@ -41,29 +46,16 @@ private:
 // old pool keep the old region mapped until its last frame is done.
 class SlotPool : public std::enable_shared_from_this<SlotPool> {
 public:
-    explicit SlotPool(supervise::RegionPointer region) : region_(std::move(region)), in_use_(region_->layout.count) {}
+    explicit SlotPool(std::shared_ptr<const supervise::Region> region);
+    explicit SlotPool(std::size_t count) : in_use_(count) {} // slots without memory
 
-    std::optional<Lease> acquire() {
-        for (std::uint32_t i = 0; i < in_use_.size(); ++i)
-            if (!in_use_[i]) {
-                in_use_[i] = true;
-                return Lease(shared_from_this(), i);
-            }
-        return std::nullopt;
-    }
+    bool has_free() const;
+    std::optional<Lease> acquire();
 
 private:
     friend class Lease;
-    supervise::RegionPointer region_;
+    std::shared_ptr<const supervise::Region> region_;
     std::vector<bool> in_use_;
 };
-
-inline Lease::~Lease() {
-    if (pool_)
-        pool_->in_use_[index_] = false;
-}
-inline const supervise::RegionPointer &Lease::region() const {
-    return pool_->region_;
-}
 
 } // namespace arhost::host

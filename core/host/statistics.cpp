@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/statistics.hpp"
 
+#include "host/component_totals.hpp"
+
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -109,28 +111,6 @@ double StageTimings::recent_rate(const std::string &name, Clock::time_point now)
     return timing == timings.end() || seconds <= 0 ? 0 : static_cast<double>(timing->second.count()) / seconds;
 }
 
-void EndedComponents::add(const supervise::Component &component) {
-    cpu_seconds[component.name()] += component.cpu_seconds();
-    restarts[component.name()] += component.restarts();
-    for (const auto &[name, value] : component.counters())
-        if (auto &counted = counters[component.name()];
-            counted.contains(name) || counted.size() < ARHOST_MAX_COUNTERS) // the names are the plugin's
-            counted[name] += value;
-    for (const supervise::Crash &crash : component.crashes())
-        crashes.push_back({component.name(), crash});
-    const auto is_of_component = [&](const Crash &crash) { return crash.component == component.name(); };
-    auto count = std::ranges::count_if(crashes, is_of_component);
-    for (; std::cmp_greater(count, supervise::Crash::max_kept); --count)
-        crashes.erase(std::ranges::find_if(crashes, is_of_component));
-}
-
-EndedComponents EndedComponents::and_running(const std::vector<supervise::Component *> &components) const {
-    EndedComponents totals = *this;
-    for (const supervise::Component *component : components)
-        totals.add(*component);
-    return totals;
-}
-
 double Statistics::fps() const {
     const double seconds = std::chrono::duration<double>(last_frame - first_frame).count();
     return composited > 1 && seconds > 0 ? static_cast<double>(composited - 1) / seconds : 0;
@@ -182,8 +162,7 @@ std::string timeline_csv(const Statistics &statistics) {
     return text;
 }
 
-Json report(const Statistics &statistics, const std::vector<supervise::Component *> &components,
-            double host_cpu_seconds) {
+Json report(const Statistics &statistics, const ComponentTotals &components, double host_cpu_seconds) {
     Json json = {{"frames",
                   {{"in", statistics.frames_in},
                    {"tracked", statistics.tracked},
@@ -206,7 +185,7 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
                       {"expected", search.expected},
                       {"missed", search.missed},
                       {"candidates", search.frames_with_candidate_count > 0 ? Json(search.candidates) : Json()}};
-    json["unlisted_markers"] = statistics.strangers;
+    json["unlisted_markers"] = statistics.unlisted;
     json["unconfirmed_markers"] = statistics.unconfirmed;
     for (const auto &[name, timing] : statistics.stages.all())
         json["stages"][name] = timing.to_json();
@@ -218,18 +197,17 @@ Json report(const Statistics &statistics, const std::vector<supervise::Component
         if (check.violations > 0)
             entry["first_violation"] = check.first_violation;
     }
-    const EndedComponents totals = statistics.ended.and_running(components);
     double total = host_cpu_seconds;
     json["cpu_seconds"]["host"] = host_cpu_seconds;
-    for (const auto &[name, seconds] : totals.cpu_seconds) {
+    for (const auto &[name, seconds] : components.cpu_seconds) {
         json["cpu_seconds"][name] = seconds;
         total += seconds;
     }
     json["cpu_seconds"]["total"] = total;
-    json["restarts"] = totals.restarts;
-    json["counters"] = Json(totals.counters);
+    json["restarts"] = components.restarts;
+    json["counters"] = Json(components.counters);
     json["crashes"] = Json::array();
-    for (const auto &[name, crash] : totals.crashes) {
+    for (const auto &[name, crash] : components.crashes) {
         Json entry = {{"component", name}, {"plugin", crash.plugin}, {"how", crash.how}};
         if (crash.frame != supervise::Crash::no_frame)
             entry["frame"] = crash.frame;

@@ -5,20 +5,21 @@
 
 #include "host/contract_checks.hpp"
 #include "host/quality.hpp"
-#include "supervise/component.hpp"
 
 #include <nlohmann/json_fwd.hpp>
 
 #include <chrono>
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace arhost::host {
+
+struct ComponentTotals;
 
 // Histogram of a stage's durations. Each bucket is 1 % wider than the previous one, so memory use is bounded for runs
 // of any length.
@@ -63,20 +64,6 @@ private:
     Clock::time_point window_begin_{}, previous_begin_{};
 };
 
-// Totals of components that ended before the run did: replaced ones, and outputs that a command has stopped.
-struct EndedComponents {
-    struct Crash {
-        std::string component;
-        supervise::Crash crash;
-    };
-    std::map<std::string, double> cpu_seconds;       // by the component's name
-    std::map<std::string, std::uint32_t> restarts;   // by the component's name
-    std::map<std::string, model::Counters> counters; // by the component's name
-    std::deque<Crash> crashes;                       // the last supervise::Crash::max_kept of each component
-    void add(const supervise::Component &component);
-    EndedComponents and_running(const std::vector<supervise::Component *> &components) const;
-};
-
 // The frames in which a target was detected.
 struct TargetStatistics {
     std::uint64_t frames = 0;
@@ -94,7 +81,7 @@ struct SearchStatistics {
 };
 
 struct Statistics {
-    static constexpr std::size_t max_strangers = 64, max_hints = 4;
+    static constexpr std::size_t max_marker_names = 64, max_hints = 4;
     std::uint64_t frames_in = 0;                     // frames received from the source
     std::uint64_t tracker_results = 0;               // frames for which the tracker delivered a result in time
     std::uint64_t tracked = 0;                       // frames with at least one detected target
@@ -102,11 +89,12 @@ struct Statistics {
     std::uint64_t composited = 0;                    // frames sent to the outputs, augmented or not
     std::map<std::string, TargetStatistics> targets; // by name
     SearchStatistics search;
-    std::map<std::string, std::uint64_t> strangers;   // frames with a marker that no target lists, by name
+    std::map<std::string, std::uint64_t> unlisted;    // frames with a marker that no target lists, by name
     std::map<std::string, std::uint64_t> unconfirmed; // frames with a listed marker whose target got no pose
     std::vector<std::string> hints;                   // of the tracker: what it sees instead of the targets
     std::map<std::string, std::uint64_t> dropped;     // number of dropped frames by stage
     std::map<std::string, std::uint64_t> skipped;     // number of unaugmented frames by the failed stage
+    std::map<std::pair<std::string, arhost_status>, std::uint64_t> errors; // frames by stage and error
     StageTimings stages;
     // From the capture of a frame until an output has written it, by output; `latency` of `stages` ends when the
     // frame is composited. Both begin at the arrival of the frame if the source does not know when it was captured.
@@ -114,7 +102,6 @@ struct Statistics {
     bool latency_from_capture = false;
     std::optional<Quality> quality;    // requested from the ray tracer; only with `live.target_fps`
     std::uint64_t quality_changes = 0; // how often it was changed
-    EndedComponents ended;
     std::chrono::steady_clock::time_point first_frame{}, last_frame{};
     ContractChecks contract_checks;   // checks of the components with `conform: true`
     std::vector<FrameTimes> timeline; // only if the configuration requests it
@@ -136,7 +123,8 @@ nlohmann::ordered_json quality_json(const Statistics &statistics);
 // of the first frame.
 std::string timeline_csv(const Statistics &statistics);
 
-nlohmann::ordered_json report(const Statistics &statistics, const std::vector<supervise::Component *> &components,
+// `components`: of all components of the run.
+nlohmann::ordered_json report(const Statistics &statistics, const ComponentTotals &components,
                               double host_cpu_seconds);
 
 } // namespace arhost::host

@@ -24,8 +24,8 @@ void Reactor::Registration::cancel() {
     reactor_ = nullptr;
 }
 
-Reactor::Reactor()
-    : epoll_(base::checked(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")),
+Reactor::Reactor(const base::Clock &clock)
+    : clock_(clock), epoll_(base::checked(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1")),
       cpu_time_at_last_wait_end_(cpu_time_of_thread()) {}
 
 Reactor::Registration Reactor::watch(int fd, Callback callback) {
@@ -62,13 +62,13 @@ void Reactor::run_once() {
     std::optional<milliseconds> timeout;
     if (!deadlines_.empty()) {
         // Rounded up, because waking up just before a deadline would cause busy waiting.
-        const auto left = std::chrono::ceil<milliseconds>(deadlines_.begin()->first - Clock::now());
+        const auto left = std::chrono::ceil<milliseconds>(deadlines_.begin()->first - now());
         timeout = std::clamp(left, milliseconds(0), slice);
     }
     dispatch_events(timeout);
-    if (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now())
+    if (!deadlines_.empty() && deadlines_.begin()->first <= now())
         dispatch_events(milliseconds(0)); // events that arrived while this process was suspended precede the deadline
-    while (!deadlines_.empty() && deadlines_.begin()->first <= Clock::now()) {
+    while (!deadlines_.empty() && deadlines_.begin()->first <= now()) {
         auto due = deadlines_.extract(deadlines_.begin());
         due.mapped().callback();
     }

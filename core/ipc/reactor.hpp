@@ -4,6 +4,7 @@
 // deadlines. Single-threaded.
 #pragma once
 
+#include "base/clock.hpp"
 #include "base/unique_fd.hpp"
 
 #include <chrono>
@@ -41,11 +42,14 @@ public:
         std::uint64_t id_ = 0;
     };
 
-    Reactor();
+    explicit Reactor(const base::Clock &clock = base::steady_clock());
+
+    const base::Clock &clock() const { return clock_; }
+    Clock::time_point now() const { return clock_.now(); }
 
     // Calls `callback` whenever `fd` is readable or hung up. `fd` must stay open until the registration ends.
     [[nodiscard]] Registration watch(int fd, Callback callback);
-    // Calls `callback` once, at the time `when`.
+    // Calls `callback` once, at the time `when` of the clock.
     [[nodiscard]] Registration at(Clock::time_point when, Callback callback);
 
     // Waits for events or a deadline and calls the callbacks. Handles events before expired deadlines. Deadlines do
@@ -65,11 +69,12 @@ private:
     void dispatch_events(std::optional<std::chrono::milliseconds> timeout);
     void postpone_by_suspension(std::optional<std::chrono::milliseconds> timeout);
 
+    const base::Clock &clock_;
     base::UniqueFd epoll_;
     std::uint64_t next_id_ = 1;
     std::map<std::uint64_t, Watch> watches_;
     std::multimap<Clock::time_point, Deadline> deadlines_;
-    Clock::time_point last_wait_end_ = Clock::now();
+    Clock::time_point last_wait_end_ = Clock::now(); // of the system, also if `clock_` is another one
     std::chrono::nanoseconds cpu_time_at_last_wait_end_;
 };
 

@@ -264,7 +264,7 @@ void Component::on_result(const Result &result) {
         return process_->end("contract violation: its status is " + std::to_string(result.status));
     if (result.status == ARHOST_STATUS_ERROR_DEVICE_LOST) {
         has_lost_device_ = true;
-        device_losses_.push_back(Reactor::Clock::now());
+        device_losses_.push_back(context_.reactor.now());
     }
     if (needs_new_process(description_.kind, result.status))
         return process_->end(status_text(result.status)); // the command counts as unanswered, as after a crash
@@ -340,7 +340,7 @@ void Component::on_died(const Death &death) {
 // Restarts do not help against a device that is lost again and again, even if frames are delivered in between.
 bool Component::loses_its_device_often() {
     constexpr std::size_t often = 3;
-    std::erase_if(device_losses_, [minute_ago = Reactor::Clock::now() - std::chrono::minutes(1)](const auto &time) {
+    std::erase_if(device_losses_, [minute_ago = context_.reactor.now() - std::chrono::minutes(1)](const auto &time) {
         return time < minute_ago;
     });
     return device_losses_.size() >= often;
@@ -364,7 +364,7 @@ void Component::restart(const std::string &reason) {
 }
 
 void Component::spawn_after(std::chrono::milliseconds delay) {
-    restart_timer_ = context_.reactor.at(Reactor::Clock::now() + delay, [this] { spawn(); });
+    restart_timer_ = context_.reactor.at(context_.reactor.now() + delay, [this] { spawn(); });
 }
 
 // A camera that has worked may come back after any time. Sources have no fallback.
@@ -414,13 +414,13 @@ Counters Component::counters() const {
 }
 
 void Component::set_progress_deadline(std::chrono::milliseconds limit, const char *what) {
-    deadline_ = context_.reactor.at(Reactor::Clock::now() + limit, [this, limit, what] {
+    deadline_ = context_.reactor.at(context_.reactor.now() + limit, [this, limit, what] {
         process_->end(std::string(what) + " within " + std::to_string(limit.count()) + " ms");
     });
 }
 
 void Component::set_total_deadline(std::chrono::milliseconds limit, const char *what) {
-    total_deadline_ = context_.reactor.at(Reactor::Clock::now() + limit, [this, limit, what] {
+    total_deadline_ = context_.reactor.at(context_.reactor.now() + limit, [this, limit, what] {
         process_->end(std::string(what) + " within " + std::to_string(limit.count()) +
                       " ms in total, although it reported progress");
     });
@@ -440,7 +440,7 @@ void Component::set_frame_deadline() {
     deadline_.cancel();
     if (in_flight_.empty())
         return;
-    deadline_ = context_.reactor.at(Reactor::Clock::now() + limits_.frame, [this] {
+    deadline_ = context_.reactor.at(context_.reactor.now() + limits_.frame, [this] {
         process_->end("hung: no answer within " + std::to_string(limits_.frame.count()) + " ms (deadline_ms)");
     });
 }

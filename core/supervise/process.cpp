@@ -95,7 +95,7 @@ void Process::end(const std::string &reason) {
         wake(host_page_.as<HostPage>().wake);
     }
     kill_deadline_ =
-        context_.reactor.at(Reactor::Clock::now() + std::chrono::milliseconds(100), [this] { kill_now(); });
+        context_.reactor.at(context_.reactor.now() + std::chrono::milliseconds(100), [this] { kill_now(); });
 }
 
 void Process::kill_now() {
@@ -122,7 +122,7 @@ void Process::receive_messages(int max_messages) {
             channel_watch_.cancel();
             // A worker that closed its channel but does not exit within 1 s is killed.
             if (!ending())
-                kill_deadline_ = context_.reactor.at(Reactor::Clock::now() + std::chrono::seconds(1),
+                kill_deadline_ = context_.reactor.at(context_.reactor.now() + std::chrono::seconds(1),
                                                      [this] { end("closed its control channel"); });
             return;
         case ReceiveState::malformed:
@@ -208,7 +208,7 @@ void Process::watch_output() {
         if (!output_watch_.active())
             return;
         output_watch_.cancel();
-        output_pause_ = context_.reactor.at(Reactor::Clock::now() + std::chrono::milliseconds(10), [this] {
+        output_pause_ = context_.reactor.at(context_.reactor.now() + std::chrono::milliseconds(10), [this] {
             try {
                 watch_output();
             } catch (const std::system_error &error) { // the user's limit of epoll watches is reached

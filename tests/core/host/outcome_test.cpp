@@ -71,7 +71,7 @@ TEST_F(Outcome, ReportsATrackerThatFailsInEveryFrame) {
 TEST_F(Outcome, ReportsThatTheFirstTargetWasNeverSeen) {
     statistics.augmented = 0;
     statistics.targets["cup"].frames = 20;
-    statistics.strangers = {{"D 24", 29}};
+    statistics.unlisted = {{"D 24", 29}};
     for (const auto mode : {run_config::Mode::lockstep, run_config::Mode::live}) {
         configuration->mode = mode;
         ASSERT_TRUE(problem());
@@ -118,7 +118,7 @@ TEST_F(Outcome, ReportsThatEveryOverlayWasLateInModeLive) {
 
 TEST_F(Outcome, NamesTheMarkersThatWereSeenInsteadOfATarget) {
     statistics.tracked = statistics.augmented = 0;
-    statistics.strangers = {{"D 5", 1}, {"D 24", 29}};
+    statistics.unlisted = {{"D 5", 1}, {"D 24", 29}};
     ASSERT_TRUE(problem());
     EXPECT_THAT(problem()->text, HasSubstr("'cup' (D 7); it saw D 24 (29 frames), D 5 (1 frame); compare"));
 }
@@ -129,7 +129,7 @@ TEST_F(Outcome, NamesTargetsThatWereNeverSeenAlthoughOthersWere) {
     statistics.targets["desk"].frames = 20;
     EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets),
               "never seen in 30 frames: 'cup' (D 7)");
-    statistics.strangers = {{"D 8", 30}};
+    statistics.unlisted = {{"D 8", 30}};
     EXPECT_EQ(unseen_targets(*configuration, statistics, configuration->tracker->targets),
               "never seen in 30 frames: 'cup' (D 7); it saw D 8 (30 frames)");
     statistics.unconfirmed = {{"D 7", 2}};
@@ -157,7 +157,7 @@ TEST_F(Outcome, TellsWhetherThereWereQuadrilateralsIfNothingWasSeen) {
     EXPECT_EQ(seen_instead(statistics, targets),
               "; frame 30 has other markers: D 9; frame 60 has other markers: E 1");
     statistics.hints.clear();
-    statistics.strangers = {{"D 8", 30}};
+    statistics.unlisted = {{"D 8", 30}};
     EXPECT_EQ(seen_instead(statistics, targets), "; it saw D 8 (30 frames)");
 }
 

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A video frame in the pipeline, and the validation of what workers report about it.
+// A video frame on its way through a run.
 #pragma once
 
-#include "compositor/compositor.hpp"
 #include "host/quality.hpp"
 #include "host/slots.hpp"
 #include "host/statistics.hpp"
-#include "model/target.hpp"
-#include "run_config/recorded_session.hpp"
+#include "run_config/recording.hpp"
 
 #include <arhost/sink.h>
 
@@ -23,6 +21,7 @@ namespace arhost::host {
 struct Frame {
     using Clock = std::chrono::steady_clock;
 
+    // docs/images/frame-states.svg
     enum class Stage {
         to_track,  // waiting for the tracker
         tracking,  // being processed by the tracker
@@ -52,18 +51,18 @@ struct Frame {
     std::vector<arhost_target> targets; // those seen so far
     std::vector<arhost_observation> observations;
     std::vector<arhost_expected_marker> expected;
-    std::optional<std::array<double, 16>> world;              // the pose of the scene, as arhost_target.mt
+    std::optional<std::array<double, 16>> world; // the pose of the world, as arhost_target.mt
     std::optional<std::size_t> pixels_sample, overlay_sample; // hashes for the contract checks
     Clock::time_point captured; // arrival, unless the source reports capture times of CLOCK_MONOTONIC
     Clock::time_point received;
     FrameTimes times; // `shown` and `latency` are not set here
 
     bool in_worker() const { return stage == Stage::tracking || stage == Stage::rendering; }
+    bool has_overlay() const { return record.overlay != ARHOST_OVERLAY_NONE; }
 };
 
-// Returns the current time of CLOCK_MONOTONIC.
-inline std::int64_t monotonic_ns() {
-    return std::chrono::nanoseconds(Frame::Clock::now().time_since_epoch()).count();
+inline bool is_visible(const arhost_target &target) {
+    return target.state != ARHOST_TARGET_LOST;
 }
 
 // A composited frame. Shared by all sinks that have not written it yet.
@@ -71,25 +70,8 @@ struct OutputFrame {
     std::uint64_t sequence;
     Lease slot;
     Frame::Clock::time_point captured; // as in Frame
-    Quality quality;                   // of the overlay
     std::uint32_t inputs;              // what `slot` has: ARHOST_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT
 };
 using OutputFramePointer = std::shared_ptr<const OutputFrame>;
-
-// Copies a tracker's result into the frame and validates the copy. Returns nullptr if the copy is valid (finite
-// numbers, valid poses, indices in range), otherwise a description of the contract violation. Does not set
-// `search.unlisted_count`.
-const char *accept_tracker_result(std::span<const std::byte> slot, const std::vector<model::Target> &configured,
-                                  std::size_t family_count, Frame &frame);
-
-// Copies and validates a source's frame info, which the host received at `now_ns` of CLOCK_MONOTONIC. Returns nullptr
-// or the contract violation. Rejects capture times far in the future, because later frames with correct times would
-// then seem to run backwards.
-const char *accept_frame_info(const arhost_frame_info &info, std::int64_t previous_capture_ns, std::int64_t now_ns,
-                              arhost_record &record);
-
-// Returns the reported device time of an image. Returns 0 if none was reported or if it is longer than `busy`, the
-// duration of the render call.
-std::chrono::nanoseconds device_time(const arhost_render_info &info, std::chrono::nanoseconds busy);
 
 } // namespace arhost::host

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The status document of a running pipeline (docs/control.md).
-#include "host/pipeline.hpp"
+#include "host/status.hpp"
 
 #include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
 
 namespace arhost::host {
 
@@ -92,67 +93,71 @@ template <class Choice> Json names_of(const std::vector<Choice> &choices) {
     return names;
 }
 
-} // namespace
-
-Json Pipeline::status_of(const Component &component) const {
+Json component_json(const Component &component, const ComponentOptions &options) {
     const PluginDescription &plugin = component.description();
     Json json = {{"name", component.name()},         {"plugin", plugin.id},
                  {"version", plugin.version},        {"state", to_text(component.state())},
                  {"restarts", component.restarts()}, {"sandbox", component.sandbox_level()},
                  {"counters", component.counters()}};
     json["missing_device"] = component.missing_device().empty() ? Json() : Json(component.missing_device());
-    const auto options = options_.find(&component);
-    json["options"] = options == options_.end() ? Json::array() : changeable_options(plugin, options->second.values);
+    const ComponentOptions::InUse *const in_use = options.of(component);
+    json["options"] = in_use ? changeable_options(plugin, in_use->values) : Json::array();
     return json;
 }
 
-Json Pipeline::status() const {
+Json target_json(const arhost_target &target) {
+    return {{"name", target.name},
+            {"state", to_text(target)},
+            {"distance_mm", std::hypot(target.mt[12], target.mt[13], target.mt[14])},
+            {"reprojection_px", target.reprojection_px}};
+}
+
+} // namespace
+
+Json status_json(const RunParts &parts, const Assembly &assembly, const Outputs &outputs) {
+    const Statistics &statistics = parts.statistics;
+    const run_config::Configuration &latest = *assembly.latest();
     Json targets = Json::array();
-    for (const arhost_target &target : last_targets_)
-        targets.push_back({{"name", target.name},
-                           {"state", to_text(target)},
-                           {"distance_mm", std::hypot(target.mt[12], target.mt[13], target.mt[14])},
-                           {"reprojection_px", target.reprojection_px}});
+    for (const arhost_target &target : parts.flow.last_targets())
+        targets.push_back(target_json(target));
     Json stages = Json::object();
-    for (const auto &[name, timing] : statistics_.stages.recent())
+    for (const auto &[name, timing] : statistics.stages.recent())
         stages[name] = timing.to_json();
     Json components = Json::array();
-    if (source_)
-        components.push_back(status_of(*source_));
-    if (tracker_) {
-        components.push_back(status_of(*tracker_->component));
-        components.back().update(
-            {{"choice", tracker_->configuration->name}, {"choices", names_of(latest_->trackers)}});
-    }
-    if (raytracer_) {
-        components.push_back(status_of(*raytracer_->component));
-        components.back().update(
-            {{"choice", raytracer_->configuration->name}, {"choices", names_of(latest_->raytracers)}});
-    }
+    if (const Component *source = assembly.source().component())
+        components.push_back(component_json(*source, parts.options));
+    const auto add_stage = [&](const auto *stage, const auto &choices) {
+        if (!stage)
+            return;
+        components.push_back(component_json(stage->component(), parts.options));
+        components.back().update({{"choice", stage->configuration()->name}, {"choices", names_of(choices)}});
+    };
+    add_stage(assembly.tracker(), latest.trackers);
+    add_stage(assembly.raytracer(), latest.raytracers);
     Json recording = nullptr;
-    for (const auto &sink : sinks_) {
-        components.push_back(status_of(*sink->component));
+    for (const auto &sink : outputs.sinks()) {
+        components.push_back(component_json(*sink->component, parts.options));
         if (sink->on_demand && sink->component->name() == "record")
             recording = sink->path;
     }
     return {{"arhost", ARHOST_VERSION},
-            {"mode", live_ ? "live" : "lockstep"},
-            {"frozen", frozen_},
-            {"fps", statistics_.stages.recent_rate("latency")},
+            {"mode", parts.live() ? "live" : "lockstep"},
+            {"frozen", parts.flow.is_frozen()},
+            {"fps", statistics.stages.recent_rate("latency")},
             {"frames",
-             {{"in", statistics_.frames_in},
-              {"tracked", statistics_.tracked},
-              {"augmented", statistics_.augmented},
-              {"composited", statistics_.composited},
-              {"dropped", statistics_.dropped},
-              {"passed_unaugmented", statistics_.skipped}}},
+             {{"in", statistics.frames_in},
+              {"tracked", statistics.tracked},
+              {"augmented", statistics.augmented},
+              {"composited", statistics.composited},
+              {"dropped", statistics.dropped},
+              {"passed_unaugmented", statistics.skipped}}},
             {"stages", std::move(stages)},
-            {"latency", latency_json(statistics_, statistics_.latencies.recent())},
-            {"quality", quality_json(statistics_)},
+            {"latency", latency_json(statistics, statistics.latencies.recent())},
+            {"quality", quality_json(statistics)},
             {"targets", std::move(targets)},
             {"components", std::move(components)},
-            {"scene", raytracer_ ? Json(raytracer_->scene->source.name) : Json(nullptr)},
-            {"scenes", names_of(latest_->scenes)},
+            {"scene", assembly.raytracer() ? Json(assembly.raytracer()->scene()->source.name) : Json(nullptr)},
+            {"scenes", names_of(latest.scenes)},
             {"recording", std::move(recording)}};
 }
 

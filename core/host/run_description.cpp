@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// The description of a run for the sinks that record it (docs/sessions.md).
-#include "host/pipeline.hpp"
+#include "host/run_description.hpp"
 
 #include "run_config/recorded_session.hpp"
 
@@ -50,68 +48,79 @@ std::string utc_now() {
     return text;
 }
 
+// Returns the options that the command `set` has changed, by path; each value in YAML syntax.
+Json changed_options(const RunParts &parts, const Assembly &assembly) {
+    Json changed = Json::object();
+    const auto add = [&](const auto *stage) {
+        const ComponentOptions::InUse *const options = stage ? parts.options.of(stage->component()) : nullptr;
+        if (!options)
+            return;
+        for (const OptionValue &value : options->values)
+            if (options->changed.contains(value.key))
+                changed[options->path + ".options." + value.key] = run_config::yaml_text(value);
+    };
+    add(assembly.tracker());
+    add(assembly.raytracer());
+    return changed;
+}
+
+// Describes the files of the scene, with hashes of the first ones.
+Json scene_files(const LoadedScene &scene) {
+    std::set<std::filesystem::path> read = scene.files;
+    read.insert(scene.source.file);
+    Json files = Json::array();
+    std::uint64_t left = max_hashed_bytes;
+    for (const std::filesystem::path &file : read)
+        if (const auto fingerprint = run_config::fingerprint_of(file, left)) {
+            left -= fingerprint->hash.empty() ? 0 : fingerprint->bytes;
+            files.push_back({{"file", file.string()}, {"bytes", fingerprint->bytes}});
+            if (!fingerprint->hash.empty())
+                files.back()["fnv1a"] = fingerprint->hash;
+        }
+    return files;
+}
+
 } // namespace
 
-std::string Pipeline::run_description(const std::string &id) const {
-    const yaml::Node::Origin origin = latest_->node.origin();
+std::string run_description(const RunParts &parts, const Assembly &assembly, const std::string &id) {
+    const yaml::Node &configuration = assembly.latest()->node;
+    const yaml::Node::Origin origin = configuration.origin();
     Json overridden = Json::object();
     for (const auto &[path, folder] : origin.overridden)
         overridden[path] = folder.string();
-    Json changed = Json::object(); // by the command `set`; each value in YAML syntax
-    const auto add_changed = [&](const Component &component) {
-        const auto found = options_.find(&component);
-        if (found == options_.end())
-            return;
-        const OptionsInUse &options = found->second;
-        for (const OptionValue &value : options.values)
-            if (options.changed.contains(value.key))
-                changed[options.path + ".options." + value.key] = run_config::yaml_text(value);
-    };
-    if (tracker_)
-        add_changed(*tracker_->component);
-    if (raytracer_)
-        add_changed(*raytracer_->component);
+    const Video &video = parts.video;
     Json description = {{"format", "arhost-session"},
                         {"version", run_config::session_version},
                         {"id", id},
                         {"recorded", utc_now()},
                         {"arhost", ARHOST_VERSION},
                         {"abi", ARHOST_ABI_VERSION},
-                        {"mode", live_ ? "live" : "lockstep"},
-                        {"fps", format_->fps},
-                        {"camera", intrinsics_.width > 0 ? camera_json(intrinsics_) : Json(nullptr)},
+                        {"mode", parts.live() ? "live" : "lockstep"},
+                        {"fps", video.format.fps},
+                        {"camera", video.intrinsics.width > 0 ? camera_json(video.intrinsics) : Json(nullptr)},
                         {"plugins", Json::object()}};
     Json &plugins = description["plugins"];
-    if (source_)
-        plugins["source"] = plugin_json(*source_);
-    if (tracker_) {
-        plugins["tracker"] = plugin_json(*tracker_->component);
-        plugins["tracker"]["name"] = tracker_->configuration->name;
-    }
-    Json files = Json::array();
-    if (raytracer_) {
-        plugins["raytracer"] = plugin_json(*raytracer_->component);
-        plugins["raytracer"]["name"] = raytracer_->configuration->name;
-        description["scene"] = raytracer_->scene->source.name;
-        std::set<std::filesystem::path> read = raytracer_->scene->files;
-        read.insert(raytracer_->scene->source.file);
-        std::uint64_t left = max_hashed_bytes;
-        for (const std::filesystem::path &file : read)
-            if (const auto fingerprint = run_config::fingerprint_of(file, left)) {
-                left -= fingerprint->hash.empty() ? 0 : fingerprint->bytes;
-                files.push_back({{"file", file.string()}, {"bytes", fingerprint->bytes}});
-                if (!fingerprint->hash.empty())
-                    files.back()["fnv1a"] = fingerprint->hash;
-            }
-    }
-    description.update({{"scene_files", std::move(files)},
+    const auto add_stage = [&](const char *kind, const auto *stage) {
+        if (!stage)
+            return;
+        plugins[kind] = plugin_json(stage->component());
+        plugins[kind]["name"] = stage->configuration()->name;
+    };
+    if (assembly.source().component())
+        plugins["source"] = plugin_json(*assembly.source().component());
+    add_stage("tracker", assembly.tracker());
+    add_stage("raytracer", assembly.raytracer());
+    const Raytracer *const raytracer = assembly.raytracer();
+    if (raytracer)
+        description["scene"] = raytracer->scene()->source.name;
+    description.update({{"scene_files", raytracer ? scene_files(*raytracer->scene()) : Json::array()},
                         {"folder", origin.folder.string()},
                         {"overridden", std::move(overridden)},
-                        {"changed_options", std::move(changed)}});
+                        {"changed_options", changed_options(parts, assembly)}});
     // Any sink can read the description, and sessions are passed on: it contains neither the outputs, whose options
     // may be secret and which a replay does not use, nor names, passwords and queries of URLs.
     description["configuration"] =
-        without_url_credentials(latest_->node.to_yaml({"outputs", "snapshot", "record"}), "") + "\n";
+        without_url_credentials(configuration.to_yaml({"outputs", "snapshot", "record"}), "") + "\n";
     std::string text = description.dump(-1, ' ', false, Json::error_handler_t::replace);
     if (Json(text).dump(-1, ' ', false, Json::error_handler_t::replace).size() > messages::max_run_description)
         throw std::runtime_error("the configuration is too long to be recorded in a session: more than " +

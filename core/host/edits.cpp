@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-//
-// Applies edits of the configuration's file, of the targets' files and of the scene's files while the video runs
-// (`--watch`).
-#include "host/pipeline.hpp"
+#include "host/edits.hpp"
+
+#include "base/text.hpp"
 
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
 namespace arhost::host {
 
@@ -69,77 +70,85 @@ bool has_edited_print(const run_config::TrackerConfiguration &tracker, const Fil
 
 } // namespace
 
-void Pipeline::watch(std::function<run_config::Configuration()> read) {
-    read_configuration_ = std::move(read);
-    file_watch_.emplace(context_.reactor,
-                        [this](const FileWatch::Files &files) { edited_files_.insert(files.begin(), files.end()); });
-    watch_files(configuration_files(configuration_));
+Edits::Edits(const RunParts &parts, Assembly &assembly, std::function<run_config::Configuration()> read)
+    : parts_(parts), assembly_(assembly), read_(std::move(read)),
+      file_watch_(parts.context.reactor,
+                  [this](const FileWatch::Files &files) { edited_.insert(files.begin(), files.end()); }) {
+    watch(configuration_files(parts.configuration));
 }
 
-// `files` may be names from the scene loader, which is not trusted: only their folders are opened.
-void Pipeline::watch_files(const FileWatch::Files &files) {
-    if (!file_watch_)
-        return;
+void Edits::watch(const FileWatch::Files &files) {
     try {
-        file_watch_->add(files);
+        file_watch_.add(files);
     } catch (const std::system_error &error) {
-        context_.log(ARHOST_SEVERITY_WARNING, "arhost", std::string(error.what()) + "; edits there have no effect");
+        parts_.log(ARHOST_SEVERITY_WARNING, std::string(error.what()) + "; edits there have no effect");
     }
 }
 
-// Waits for the swaps in progress, so that the last edit is the one that stays.
-void Pipeline::apply_edits() {
-    if (edited_files_.empty() || next_tracker_ || raytracer_swap_in_progress())
+void Edits::on_swapped(const Assembly::Exchanged &exchanged) {
+    if (exchanged.tracker)
+        tracker_edit_failed_ = false;
+    if (exchanged.raytracer)
+        failed_raytracer_edit_.reset();
+}
+
+void Edits::apply() {
+    if (edited_.empty() || assembly_.swaps_tracker() || assembly_.swaps_raytracer())
         return;
-    const FileWatch::Files files = std::exchange(edited_files_, {});
+    const FileWatch::Files files = std::exchange(edited_, {});
     const auto is_edited = [&](const std::filesystem::path &file) { return files.contains(file); };
-    const std::shared_ptr<const run_config::Configuration> previous = latest_;
-    if (std::ranges::any_of(configuration_files(*previous), is_edited)) {
-        try {
-            auto edited = std::make_shared<const run_config::Configuration>(read_configuration_());
-            for (const std::string_view key : shared_keys)
-                if (content_of(edited->node, key) != content_of(previous->node, key))
-                    throw std::runtime_error("an edit of '" + std::string(key) + "' needs a new run");
-            latest_ = std::move(edited);
-            watch_files(configuration_files(*latest_));
-        } catch (const std::exception &error) {
-            context_.log(ARHOST_SEVERITY_WARNING, "arhost",
-                         std::string(error.what()) + "; the run continues with the previous configuration");
-        }
-    }
-    const bool scene_changed =
-        raytracer_ && std::ranges::any_of(files, [&](const auto &each) {
-            return each == raytracer_->scene->source.file || raytracer_->scene->files.contains(each);
-        });
-    const bool print_changed = latest_->tracker && has_edited_print(*latest_->tracker, files);
+    const std::shared_ptr<const run_config::Configuration> previous = assembly_.latest();
+    if (std::ranges::any_of(configuration_files(*previous), is_edited))
+        read_configuration(*previous);
+    const run_config::Configuration &latest = *assembly_.latest();
+    const Raytracer *const raytracer = assembly_.raytracer();
+    const bool scene_changed = raytracer && std::ranges::any_of(files, [&](const auto &each) {
+                                   return each == raytracer->scene()->source.file ||
+                                          raytracer->scene()->files.contains(each);
+                               });
     try {
-        apply(*latest_, *previous, scene_changed, print_changed);
+        apply(latest, *previous, scene_changed, latest.tracker && has_edited_print(*latest.tracker, files));
     } catch (const std::exception &error) {
-        context_.log(ARHOST_SEVERITY_WARNING, "arhost", std::string(error.what()) + "; the edit is not applied");
+        parts_.log(ARHOST_SEVERITY_WARNING, std::string(error.what()) + "; the edit is not applied");
     }
 }
 
-void Pipeline::apply(const run_config::Configuration &edited, const run_config::Configuration &previous,
+void Edits::read_configuration(const run_config::Configuration &previous) {
+    try {
+        auto edited = std::make_shared<const run_config::Configuration>(read_());
+        for (const std::string_view key : shared_keys)
+            if (content_of(edited->node, key) != content_of(previous.node, key))
+                throw std::runtime_error("an edit of '" + std::string(key) + "' needs a new run");
+        watch(configuration_files(*edited));
+        assembly_.set_latest(std::move(edited));
+    } catch (const std::exception &error) {
+        parts_.log(ARHOST_SEVERITY_WARNING,
+                   std::string(error.what()) + "; the run continues with the previous configuration");
+    }
+}
+
+void Edits::apply(const run_config::Configuration &edited, const run_config::Configuration &previous,
                      bool scene_changed, bool print_changed) {
     if (const auto keys = unapplied_edits(edited, previous); !keys.empty())
-        context_.log(ARHOST_SEVERITY_WARNING, "arhost",
+        parts_.log(ARHOST_SEVERITY_WARNING,
                      fmt::format("the edit of '{}' takes effect in the next run", fmt::join(keys, "', '")));
     const auto differs = [&](std::string_view key) {
         return content_of(edited.node, key) != content_of(previous.node, key);
     };
     // An edit that fails is tried again with the next one. The run logs the outcome of each.
-    if (tracker_ && edited.tracker &&
+    if (assembly_.tracker() && edited.tracker &&
         (differs("tracker") || edited.tracker->targets != previous.tracker->targets || print_changed ||
          std::exchange(tracker_edit_failed_, false)))
-        start_next_tracker(shared(edited.trackers.front()),
+        assembly_.swap_tracker(assembly_.shared(edited.trackers.front()),
                            [this](const std::string &error, const auto &) { tracker_edit_failed_ = !error.empty(); });
-    if (!raytracer_ || !edited.raytracer)
+    const Raytracer *const raytracer = assembly_.raytracer();
+    if (!raytracer || !edited.raytracer)
         return;
     const auto failed = std::exchange(failed_raytracer_edit_, std::nullopt);
     RaytracerEdit edit =
-        failed.value_or(RaytracerEdit{.raytracer = raytracer_->configuration, .scene = raytracer_->scene->source});
+        failed.value_or(RaytracerEdit{.raytracer = raytracer->configuration(), .scene = raytracer->scene()->source});
     if (differs("raytracer"))
-        edit.raytracer = shared(edited.raytracers.front());
+        edit.raytracer = assembly_.shared(edited.raytracers.front());
     const bool other_scene = edited.raytracer->scene != previous.raytracer->scene;
     if (other_scene)
         edit.scene = edited.scenes.front();
@@ -149,9 +158,9 @@ void Pipeline::apply(const run_config::Configuration &edited, const run_config::
     failed_raytracer_edit_ = edit; // until the ray tracer has been replaced
     const auto ignored = [](const std::string &, const nlohmann::ordered_json &) {};
     if (loads_scene)
-        load_next_scene(edit.scene, edit.raytracer, ignored);
+        assembly_.swap_scene(edit.scene, edit.raytracer, ignored);
     else
-        start_next_raytracer(edit.raytracer, raytracer_->scene, ignored);
+        assembly_.swap_raytracer(edit.raytracer, ignored);
 }
 
 } // namespace arhost::host

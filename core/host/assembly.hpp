@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The source, the tracker and the ray tracer of a run: starts them, and replaces the tracker, the ray tracer and the
+// scene while the video runs.
+#pragma once
+
+#include "host/component_totals.hpp"
+#include "host/raytracer.hpp"
+#include "host/source.hpp"
+#include "host/tracker.hpp"
+
+namespace arhost::host {
+
+class Assembly {
+public:
+    // `watch_files` is called with files that are read: those of scenes. They may be names from the scene loader,
+    // which is not trusted.
+    using WatchFiles = std::function<void(const std::set<std::filesystem::path> &)>;
+    Assembly(const RunParts &parts, Sightings &sightings, WatchFiles watch_files);
+
+    // Starts the source and loads the scene; calls advance() whenever an event was handled, until it returns true:
+    // then the tracker and the ray tracer run, too.
+    void start();
+    bool advance();
+    FrameFlow::Intakes intakes() const;
+    void cancel_calls(); // of the tracker and the ray tracer, whose frames will not be shown
+    void stop_loading();
+
+    const Source &source() const { return source_; }
+    Source &source() { return source_; }
+    Tracker *tracker() const { return tracker_.get(); } // null if none runs; likewise:
+    Raytracer *raytracer() const { return raytracer_.get(); }
+    std::vector<supervise::Component *> components() const; // including those that start or end
+
+    // The configuration, or its last edit: the choices for swaps.
+    const std::shared_ptr<const run_config::Configuration> &latest() const { return latest_; }
+    void set_latest(std::shared_ptr<const run_config::Configuration> latest) { latest_ = std::move(latest); }
+    // Returns a pointer to a part of the latest configuration, which keeps that configuration alive.
+    template <class Part> std::shared_ptr<const Part> shared(const Part &part) const { return {latest_, &part}; }
+
+    // ---- swaps: `done` is called when the new component has replaced the previous one, or has failed -----------
+    bool swaps_tracker() const { return next_tracker_ != nullptr; }
+    bool swaps_raytracer() const { return next_raytracer_ || next_scene_loading_; }
+    void swap_tracker(Tracker::Configuration configuration, const control::Done &done);
+    void swap_raytracer(Raytracer::Configuration configuration, const control::Done &done);
+    void swap_scene(const run_config::Scene &scene, const Raytracer::Configuration &raytracer,
+                    const control::Done &done);
+    // Exchanges stages for their successors, once these run and no frame is in the old stage.
+    struct Exchanged {
+        bool tracker = false, raytracer = false;
+        explicit operator bool() const { return tracker || raytracer; }
+    };
+    Exchanged finish_swaps();
+    bool has_retired() const { return !retired_.empty(); } // replaced components that have not ended yet
+    // Removes replaced components that have ended, and adds them to `totals`.
+    void remove_ended(ComponentTotals &totals);
+
+private:
+    std::unique_ptr<SceneLoading> load(const run_config::Scene &scene,
+                                       const run_config::RaytracerConfiguration &raytracer,
+                                       const std::function<void(std::shared_ptr<LoadedScene>)> &on_loaded,
+                                       const std::function<void(const std::string &reason)> &on_failed);
+    const run_config::TrackerConfiguration *tracker_of_anchors() const;
+    std::unique_ptr<Tracker> make_tracker(Tracker::Configuration configuration);
+    std::unique_ptr<Raytracer> make_raytracer(Raytracer::Configuration configuration,
+                                              std::shared_ptr<LoadedScene> scene);
+    void start_next_raytracer(Raytracer::Configuration configuration, std::shared_ptr<LoadedScene> scene,
+                              const control::Done &done);
+    bool abandon_swap(const Stage &stage, const std::string &reason);
+    template <class Kind> bool finish_swap(std::unique_ptr<Kind> &current, std::unique_ptr<Kind> &next);
+    void retire(std::unique_ptr<Stage> stage);
+    void warn_of_hidden_objects() const;
+
+    const RunParts parts_;
+    Sightings &sightings_;
+    const WatchFiles watch_files_;
+    std::shared_ptr<const run_config::Configuration> latest_;
+
+    Source source_;
+    std::unique_ptr<SceneLoading> scene_loading_, next_scene_loading_;
+    std::shared_ptr<LoadedScene> scene_; // the first one
+    std::unique_ptr<Tracker> tracker_, next_tracker_;
+    std::unique_ptr<Raytracer> raytracer_, next_raytracer_;
+    std::vector<std::unique_ptr<Stage>> retired_;
+    bool has_started_stages_ = false;
+    // A swap has changed the targets or the scene, and warn_of_hidden_objects has not been called since.
+    bool anchors_unchecked_ = false;
+};
+
+} // namespace arhost::host

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Decides from where the ray tracer sees the scene in each frame: the camera follows the targets, or a recording.
+#pragma once
+
+#include "camera/coordinates.hpp"
+#include "host/frame.hpp"
+#include "host/world.hpp"
+
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace arhost::host {
+
+class Cameras {
+public:
+    // What the configuration says about the targets of the tracker in use.
+    struct Targets {
+        std::string world;                // name of the target whose pose is that of the world
+        std::uint64_t grace_frames = 0;   // World::locate
+        std::uint64_t held_frames = 0;    // for how many frames a frame without the world uses the last camera
+    };
+
+    // `trajectory`: cameras to use instead of those from the targets; null: none.
+    explicit Cameras(const camera::Trajectory *trajectory) : trajectory_(trajectory) {}
+
+    void set_intrinsics(const arhost_intrinsics &intrinsics) { intrinsics_ = intrinsics; }
+    void set_coordinates(const camera::Coordinates &coordinates);
+    // `is_same_world`: whether the poses of the previous targets and of these are in the same frame of reference.
+    void set_targets(Targets targets, bool is_same_world);
+
+    bool follows_trajectory() const { return trajectory_ != nullptr; }
+    // Each sets the frame's camera, unless there is none for it.
+    void set_from_targets(Frame &frame); // must be called for the frames in their order
+    void set_from_recording(Frame &frame) const;
+    // Also sets the recorded time, which determines the positions of animated objects.
+    void set_from_trajectory(Frame &frame) const;
+    // Sets the camera again after `set_coordinates`, from the pose that `set_from_targets` has found.
+    void update(Frame &frame);
+
+private:
+    void set_or_hold(Frame &frame);
+
+    const camera::Trajectory *trajectory_;
+    arhost_intrinsics intrinsics_{};
+    camera::Coordinates coordinates_;
+    Targets targets_;
+    World world_;
+    std::optional<std::pair<std::uint64_t, arhost_camera>> last_; // with the number of its frame
+};
+
+} // namespace arhost::host

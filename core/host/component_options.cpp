@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/component_options.hpp"
+
+#include <algorithm>
+
+namespace arhost::host {
+
+using namespace ipc;
+using namespace model;
+
+const OptionValue *ComponentOptions::InUse::find(std::string_view key) const {
+    const auto found = std::ranges::find(values, key, &OptionValue::key);
+    return found == values.end() ? nullptr : &*found;
+}
+
+std::vector<OptionValue> ComponentOptions::choose(const supervise::Component &component, arhost_kind kind,
+                                                  const run_config::ComponentConfiguration &configuration,
+                                                  std::size_t candidate) {
+    std::vector<std::string> notes;
+    std::vector<OptionValue> values =
+        run_config::options_for(component.description(), kind, configuration, candidate, notes);
+    const auto [entry, is_first] = in_use_.try_emplace(&component);
+    InUse &in_use = entry->second;
+    for (const std::string &note : notes)
+        if (is_first)
+            log_(ARHOST_SEVERITY_WARNING, component.description().id, note);
+    in_use.path = configuration.node.path();
+    if (candidate > 0)
+        in_use.changed.clear();
+    for (OptionValue &value : values)
+        if (in_use.changed.contains(value.key))
+            value = *in_use.find(value.key);
+    in_use.values = values;
+    return values;
+}
+
+void ComponentOptions::change(const supervise::Component &component, const OptionValue &value) {
+    InUse &in_use = in_use_[&component];
+    const auto old = std::ranges::find(in_use.values, value.key, &OptionValue::key);
+    if (old == in_use.values.end())
+        return;
+    *old = value;
+    in_use.changed.insert(value.key);
+}
+
+const ComponentOptions::InUse *ComponentOptions::of(const supervise::Component &component) const {
+    const auto found = in_use_.find(&component);
+    return found == in_use_.end() ? nullptr : &found->second;
+}
+
+} // namespace arhost::host

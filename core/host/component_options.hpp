@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The options with which the plugins of a run were created, and what the command `set` has changed since.
+#pragma once
+
+#include "run_config/configuration.hpp"
+#include "supervise/component.hpp"
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace arhost::host {
+
+class ComponentOptions {
+public:
+    struct InUse {
+        std::string path; // of the component in the configuration
+        std::vector<model::OptionValue> values;
+        std::set<std::string> changed; // keys
+        const model::OptionValue *find(std::string_view key) const;
+    };
+
+    explicit ComponentOptions(const supervise::LogFunction &log) : log_(log) {}
+
+    // Returns the options for creating a component's plugin: the configured ones, except for those that were changed.
+    // Throws as run_config::options_for.
+    std::vector<model::OptionValue> choose(const supervise::Component &component, arhost_kind kind,
+                                         const run_config::ComponentConfiguration &configuration,
+                                         std::size_t candidate);
+    void change(const supervise::Component &component, const model::OptionValue &value);
+    // Returns nullptr if the component's plugin was never created.
+    const InUse *of(const supervise::Component &component) const;
+    void copy(const supervise::Component &from, const supervise::Component &to) { in_use_[&to] = in_use_[&from]; }
+    void forget(const supervise::Component &component) { in_use_.erase(&component); }
+
+private:
+    const supervise::LogFunction &log_;
+    std::map<const supervise::Component *, InUse> in_use_;
+};
+
+} // namespace arhost::host

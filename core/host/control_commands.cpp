@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/control_commands.hpp"
+
+#include "base/text.hpp"
+#include "host/status.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+
+namespace arhost::host {
+
+using namespace ipc;
+using namespace model;
+using supervise::Component;
+
+namespace {
+
+// Returns the element of `choices` with this name. Throws control::Error, which lists the names.
+template <class Choice> const Choice &find_choice(const std::vector<Choice> &choices, const std::string &name) {
+    const auto found = std::ranges::find(choices, name, &Choice::name);
+    if (found != choices.end())
+        return *found;
+    std::string names;
+    for (const Choice &choice : choices)
+        names += (names.empty() ? "; choose one of: " : ", ") + choice.name;
+    throw control::Error("there is no '" + base::printable(name, 100) + "'" + names);
+}
+
+void expect_no_swap(bool in_progress, const char *component) {
+    if (in_progress)
+        throw control::Error(std::string("the ") + component + " is being replaced; retry when this has ended");
+}
+
+} // namespace
+
+void Commands::execute(SinkQueue &sink, const messages::Request &request) {
+    const auto done = [&sink, id = request.id, restarts = sink.component->restarts()](
+                          const std::string &error, const nlohmann::ordered_json &members) {
+        sink.component->answer({id, control::answer_text(error, members)}, restarts);
+    };
+    try {
+        const control::Command command = control::parse(request.command, sink.configuration->control);
+        const bool changes_run = !std::holds_alternative<control::Status>(command);
+        if (changes_run && !parts_.failures.video_runs())
+            throw control::Error("the run is starting or ending");
+        if (changes_run)
+            sink.component->log(ARHOST_SEVERITY_INFO, "command: " + request.command);
+        std::visit([&](const auto &each) { execute(each, done); }, command);
+    } catch (const control::Error &error) {
+        done(error.what(), {});
+    }
+}
+
+void Commands::execute(const control::Quit &, const control::Done &done) {
+    end_run_();
+    done("", {});
+}
+
+void Commands::execute(const control::Freeze &freeze, const control::Done &done) {
+    parts_.flow.set_frozen(freeze.on.value_or(!parts_.flow.is_frozen()));
+    done("", {{"frozen", parts_.flow.is_frozen()}});
+}
+
+void Commands::execute(const control::Status &command, const control::Done &done) {
+    done("", {{"status", status_json(parts_, assembly_, outputs_)}, {"granted", command.granted}});
+}
+
+void Commands::execute(const control::Swap &swap, const control::Done &done) {
+    const run_config::Configuration &choices = *assembly_.latest();
+    if (swap.component == "tracker") {
+        expect_no_swap(assembly_.swaps_tracker(), "tracker");
+        assembly_.swap_tracker(assembly_.shared(find_choice(choices.trackers, swap.plugin)), done);
+    } else {
+        expect_no_swap(assembly_.swaps_raytracer(), "ray tracer");
+        assembly_.swap_raytracer(assembly_.shared(find_choice(choices.raytracers, swap.plugin)), done);
+    }
+}
+
+void Commands::execute(const control::LoadScene &command, const control::Done &done) {
+    expect_no_swap(assembly_.swaps_raytracer(), "ray tracer");
+    const run_config::Scene &chosen = find_choice(assembly_.latest()->scenes, command.scene);
+    assembly_.swap_scene(chosen, assembly_.raytracer()->configuration(), done);
+}
+
+void Commands::execute(const control::Snapshot &, const control::Done &done) {
+    outputs_.take_snapshot(done);
+}
+
+void Commands::execute(const control::Record &record, const control::Done &done) {
+    if (record.on.value_or(!outputs_.is_recording()))
+        outputs_.start_recording(done);
+    else
+        outputs_.stop_recording(done);
+}
+
+Component &Commands::running_component(const std::string &name) const {
+    std::vector<Component *> all = assembly_.components();
+    for (const auto &sink : outputs_.sinks())
+        all.push_back(sink->component.get());
+    const auto found =
+        std::ranges::find_if(all, [&](const Component *each) { return each->name() == name && each->running(); });
+    if (found == all.end())
+        throw control::Error("there is no running component '" + base::printable(name, 100) + "'");
+    return **found;
+}
+
+void Commands::execute(const control::Set &set, const control::Done &done) {
+    Component &component = running_component(set.component);
+    const PluginDescription &plugin = component.description();
+    const auto declared = std::ranges::find(plugin.options, set.option, &OptionDeclaration::key);
+    if (declared == plugin.options.end() || !std::ranges::count(plugin.changeable, set.option)) {
+        std::string names;
+        for (const std::string &key : plugin.changeable)
+            names += (names.empty() ? "" : ", ") + key;
+        throw control::Error("'" + base::printable(set.option, 100) + "' cannot be changed while " + plugin.id +
+                             " runs; " + (names.empty() ? "none of its options can" : "these can: " + names));
+    }
+    OptionValue value;
+    try {
+        value = run_config::option_value(*declared, set.value);
+    } catch (const yaml::Error &error) {
+        throw control::Error(error.what());
+    }
+    component.set_option(value, [this, value, done, &component](const std::string &error) {
+        if (error.empty()) {
+            parts_.options.change(component, value);
+            Raytracer *const raytracer = assembly_.raytracer();
+            if (raytracer && &raytracer->component() == &component && value.key == "samples")
+                raytracer->on_samples_changed();
+        }
+        done(error, {});
+    });
+}
+
+} // namespace arhost::host

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Executes the commands of outputs: freezes the video, exchanges the tracker, the ray tracer and the scene, starts and
+// stops outputs, changes options.
+#pragma once
+
+#include "host/assembly.hpp"
+#include "host/outputs.hpp"
+
+namespace arhost::host {
+
+class Commands {
+public:
+    // `end_run`: as if the source had ended.
+    Commands(const RunParts &parts, Assembly &assembly, Outputs &outputs, std::function<void()> end_run)
+        : parts_(parts), assembly_(assembly), outputs_(outputs), end_run_(std::move(end_run)) {}
+
+    // Executes the command of a sink, and answers it now or later.
+    void execute(SinkQueue &sink, const ipc::messages::Request &request);
+
+private:
+    void execute(const control::Quit &command, const control::Done &done);
+    void execute(const control::Freeze &command, const control::Done &done);
+    void execute(const control::Snapshot &command, const control::Done &done);
+    void execute(const control::Record &command, const control::Done &done);
+    void execute(const control::LoadScene &command, const control::Done &done);
+    void execute(const control::Swap &command, const control::Done &done);
+    void execute(const control::Set &command, const control::Done &done);
+    void execute(const control::Status &command, const control::Done &done);
+    supervise::Component &running_component(const std::string &name) const;
+
+    const RunParts parts_;
+    Assembly &assembly_;
+    Outputs &outputs_;
+    const std::function<void()> end_run_;
+};
+
+} // namespace arhost::host

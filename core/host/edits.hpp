@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Applies edits of the configuration's file, of the targets' files and of the scene's files while the video runs
+// (`--watch`): exchanges the tracker, the ray tracer and the scene that they change.
+#pragma once
+
+#include "host/assembly.hpp"
+#include "host/file_watch.hpp"
+
+namespace arhost::host {
+
+class Edits {
+public:
+    // `read` parses the configuration again and throws yaml::Error.
+    Edits(const RunParts &parts, Assembly &assembly, std::function<run_config::Configuration()> read);
+
+    // `files` may be names from the scene loader, which is not trusted: only their folders are opened.
+    void watch(const FileWatch::Files &files);
+    // Applies the edits since the last call. Waits for the swaps in progress, so that the last edit is the one that
+    // stays.
+    void apply();
+    void on_swapped(const Assembly::Exchanged &exchanged);
+
+private:
+    void read_configuration(const run_config::Configuration &previous);
+    void apply(const run_config::Configuration &edited, const run_config::Configuration &previous, bool scene_changed,
+               bool print_changed);
+
+    const RunParts parts_;
+    Assembly &assembly_;
+    const std::function<run_config::Configuration()> read_;
+    FileWatch file_watch_;
+    FileWatch::Files edited_; // to be applied
+    // Edits that have failed are tried again with the next one.
+    struct RaytracerEdit {
+        Raytracer::Configuration raytracer;
+        run_config::Scene scene;
+    };
+    bool tracker_edit_failed_ = false;
+    std::optional<RaytracerEdit> failed_raytracer_edit_;
+};
+
+} // namespace arhost::host

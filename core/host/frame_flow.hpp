@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Takes each frame from the source to the outputs: decides which frame goes to which component and when, and which
+// frames are dropped. Events go in: a frame has arrived, a component has answered or has died. Actions come out: read,
+// track, render, show. Neither starts processes nor accesses the memory of frames, and takes the time from a clock.
+//
+// In mode lockstep, every frame passes through all stages, and frames are shown in order; after the death of a worker,
+// its frames are processed again. In mode live, a newer frame replaces a frame that is still waiting, and frames skip
+// a component that has no worker at present.
+#pragma once
+
+#include "base/clock.hpp"
+#include "host/frame.hpp"
+
+#include <deque>
+#include <map>
+#include <span>
+#include <variant>
+
+namespace arhost::host {
+
+class Cameras;
+
+class FrameFlow {
+public:
+    using Clock = base::Clock;
+
+    struct Settings {
+        bool live = false;
+        bool has_source = true; // otherwise the frames are those of `trajectory`
+        bool has_tracker = false, has_raytracer = false;
+        std::uint64_t max_frames = 0;               // 0: no limit
+        std::chrono::milliseconds max_latency{500}; // mode live: of a frame in a worker, before others pass it
+        bool has_timeline = false;
+        const camera::Trajectory *trajectory = nullptr;      // cameras to use instead of the tracker's
+        const run_config::Recording *recording = nullptr;    // the frames of a session, which the source plays
+    };
+
+    enum class Readiness {
+        ready,
+        busy,    // processes other frames, or is being replaced
+        down,    // has no worker, but will have one again
+        disabled // has no worker any more
+    };
+    struct Intake {
+        Readiness readiness = Readiness::disabled;
+        SlotPool *slots = nullptr;   // for what the component writes
+        SlotPool *anchors = nullptr; // of a ray tracer whose scene has anchors
+    };
+    struct Intakes {
+        Intake source, tracker, raytracer;
+        bool outputs_are_full = false; // no memory is free for a composited frame
+    };
+
+    struct Read {
+        std::uint64_t sequence;
+        std::uint32_t slot;
+    };
+    struct Track {
+        Frame &frame;
+    };
+    struct Render {
+        Frame &frame;
+    };
+    struct Show {
+        std::unique_ptr<Frame> frame; // with the overlay, if it has one; to be passed to on_shown()
+    };
+    using Action = std::variant<Read, Track, Render, Show>;
+
+    FrameFlow(const Settings &settings, const Clock &clock, Cameras &cameras, Statistics &statistics);
+
+    // Returns the next action, which must be executed before the next call; nullopt if all frames wait for events.
+    std::optional<Action> next(const Intakes &intakes);
+    // Until when the next frame waits, because the run is paced; nullopt if it does not.
+    std::optional<Clock::time_point> due() const { return due_; }
+
+    // ---- events ------------------------------------------------------------------------------------
+    // The oldest read was answered. Returns its slot.
+    Lease take_read();
+    // Whether the frame `sequence` of the source is missing; false for a read after one that has failed.
+    bool expects(std::uint64_t sequence) const { return sequence < next_read_; }
+    void read_again(std::uint64_t sequence) { next_read_ = sequence; } // and all later frames
+    void on_arrived(std::unique_ptr<Frame> frame);
+    // `unanswered`: the frames whose reads were not answered.
+    void on_source_lost(std::span<const std::uint64_t> unanswered);
+    void on_input_ended() { input_ended_ = true; } // the source has no more frames, or none are to be read
+
+    // A component has answered for the frame `sequence`. Returns the frame; nullptr if it is not needed any more.
+    // Must be followed by on_tracked, on_rendered or on_failed for that frame.
+    Frame *answered(std::uint64_t sequence);
+    void on_tracked(Frame &frame, std::chrono::nanoseconds busy); // the frame has the targets
+    void on_rendered(Frame &frame, std::chrono::nanoseconds busy); // the frame has the overlay
+    void on_failed(Frame &frame, const char *stage);               // the frame passes without an overlay
+    // The worker has died. `waiting`: the stage of a frame that waits for it. `unanswered`: its frames, oldest first;
+    // it was processing the first one.
+    void on_lost(Frame::Stage waiting, std::span<const std::uint64_t> unanswered);
+    void on_tracker_replaced() { tracker_pace_ = {}; }
+    void on_raytracer_replaced() { raytracer_pace_ = {}; }
+    void on_coordinates_changed(); // of the cameras, because the scene was replaced
+
+    void on_shown(Frame &frame, Clock::time_point composited);
+    void on_interrupted() { interrupted_ = true; } // frames are not delayed any more
+
+    // ---- state -------------------------------------------------------------------------------------
+    void set_rate(double fps) { fps_ = fps; } // of the source; 0: unknown
+    // Mode lockstep: frames of films are shown when their time stamps say.
+    void set_paced(bool paced) { paced_ = paced; }
+    void set_frozen(bool frozen) { frozen_ = frozen; } // no further frames are shown
+    bool is_frozen() const { return frozen_; }
+    std::uint64_t next_read() const { return next_read_; } // number of the next frame of the source
+    bool input_has_ended() const { return input_ended_; }
+    bool was_interrupted() const { return interrupted_; }
+    bool discards_arrivals() const { return settings_.live && input_ended_ && interrupted_; }
+    bool expects_more_frames() const { return !no_more_frames() || !reads_.empty(); }
+    bool is_empty() const { return frames_.empty(); }
+    const Frame *find(std::uint64_t sequence) const; // nullptr if there is no such frame
+    bool has_only_overtaken() const; // at least one frame, and none will be shown
+    bool repeats_decisions(const Frame &frame) const { return frame.recorded && settings_.recording->repeats_decisions; }
+    const run_config::RecordedFrame *recorded(std::uint64_t sequence) const {
+        return settings_.recording ? &settings_.recording->frames[sequence] : nullptr;
+    }
+    const std::vector<arhost_target> &last_targets() const { return last_targets_; } // of the last shown frame
+
+private:
+    // Whether a worker catches up after a delay.
+    class Pace {
+    public:
+        void add(std::chrono::nanoseconds duration);
+        // Whether calls usually take less than three quarters of the time from frame to frame. True before the first
+        // result; false if the rate is unknown.
+        bool keeps_up(double fps) const { return fps > 0 && mean_s_.value_or(0) < 0.75 / fps; }
+
+    private:
+        std::optional<double> mean_s_; // exponential moving average
+    };
+
+    bool no_more_frames() const {
+        return input_ended_ || (settings_.max_frames && next_read_ >= settings_.max_frames);
+     }
+    std::optional<Action> read(const Intake &source);
+    bool read_from_trajectory(const Intake &source);
+    std::optional<Action> track(const Intake &tracker);
+    std::optional<Action> render(const Intake &raytracer);
+    std::optional<Action> show(bool outputs_are_full);
+
+    bool skips(const Intake &intake) const;
+    void start(std::unique_ptr<Frame> frame);
+    void on_camera_known(Frame &frame);
+    void enqueue(Frame &frame, Frame::Stage stage);
+    Frame *next_waiting(Frame::Stage stage);
+    bool is_behind() const;
+    bool is_early(const Frame &frame);
+    void finish(Frame &frame, bool is_shown, Clock::time_point when);
+    void drop_overtaken(std::uint64_t shown);
+
+    const Settings settings_;
+    const Clock &clock_;
+    Cameras &cameras_;
+    Statistics &statistics_;
+
+    double fps_ = 0;
+    bool paced_ = false, frozen_ = false, input_ended_ = false, interrupted_ = false;
+    std::deque<Lease> reads_; // slots of the reads without an answer, oldest first
+    std::uint64_t next_read_ = 0;
+    std::map<std::uint64_t, std::unique_ptr<Frame>> frames_; // by number in the run
+    Pace tracker_pace_, raytracer_pace_;
+    struct Paced {
+        std::int64_t media_ns;
+        Clock::time_point due;
+    };
+    std::optional<Paced> last_paced_;
+    std::optional<Clock::time_point> due_;
+    std::vector<arhost_target> last_targets_;
+};
+
+} // namespace arhost::host

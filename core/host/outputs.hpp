@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The outputs of a run: the configured ones, and those that commands start (recordings and snapshots).
+#pragma once
+
+#include "base/listening_socket.hpp"
+#include "host/component_totals.hpp"
+#include "host/compositing.hpp"
+#include "host/run_parts.hpp"
+#include "host/sink_queue.hpp"
+
+#include <map>
+
+namespace arhost::host {
+
+class Outputs {
+public:
+    struct Callbacks {
+        std::function<std::string(const std::string &id)> run_description; // for the sink with this id
+        std::function<void(SinkQueue &, const ipc::messages::Request &)> request;
+        std::function<void()> end_run; // as if the source had ended
+    };
+    // `check_scratch`: sinks write to check_folder(*check_scratch, …) instead of their own folders.
+    Outputs(const RunParts &parts, Callbacks callbacks, std::optional<std::filesystem::path> check_scratch);
+    static std::filesystem::path check_folder(const std::filesystem::path &scratch, std::size_t output);
+
+    void start();             // the configured outputs
+    bool have_started() const;
+    void begin_video();       // from now on, the run ends if all outputs have ended
+
+    // Composites a frame and offers it to the outputs. Returns when the frame was composited.
+    Frame::Clock::time_point show(Frame &frame);
+    bool are_full() const; // no memory is free for a frame
+    void pump();           // submits waiting frames, stops outputs that end
+    bool have_written_all() const;
+    void stop();
+    void stop_waiting();   // lets sinks return that wait for their receivers
+    void remove_ended(ComponentTotals &totals);
+
+    // ---- outputs that commands start; each throws control::Error -----------------------------------
+    void take_snapshot(const control::Done &done);
+    void start_recording(const control::Done &done);
+    void stop_recording(const control::Done &done);
+    bool is_recording() const { return recording() != nullptr; }
+
+    const std::vector<std::unique_ptr<SinkQueue>> &sinks() const { return sinks_; }
+
+private:
+    static constexpr std::size_t max_started = 4; // by commands, at the same time
+
+    SinkQueue &make_sink(const run_config::ComponentConfiguration &output, const std::string &name,
+                         const std::string &path = "");
+    SinkQueue &start_output(const run_config::ComponentConfiguration &output, const std::string &name,
+                            const control::Done &done);
+    std::filesystem::path free_path(const std::filesystem::path &pattern) const;
+    SinkQueue *recording() const;
+    supervise::Component::Create on_hello(SinkQueue &sink, const model::PluginDescription &plugin,
+                                          std::size_t candidate);
+    std::vector<int> open_sockets(const run_config::ComponentConfiguration &output,
+                                  std::vector<model::OptionValue> &options);
+    void expect_distinct_files(const run_config::ComponentConfiguration &output,
+                               const model::PluginDescription &plugin);
+    void on_running(SinkQueue &sink);
+    void on_result(SinkQueue &sink, const ipc::Command &command, const ipc::Result &result);
+    void end_sink(SinkQueue &sink); // the sink has returned ARHOST_STATUS_END
+    void close_sink(SinkQueue &sink);
+    void end_without_sinks(); // ends the run if all outputs are closed
+
+    const RunParts parts_;
+    const Callbacks callbacks_;
+    const std::optional<std::filesystem::path> check_scratch_;
+    std::vector<std::unique_ptr<SinkQueue>> sinks_;
+    std::shared_ptr<SlotPool> slots_;
+    Compositing compositing_;
+    OutputFramePointer last_frame_; // for snapshots
+    std::map<const run_config::ComponentConfiguration *, run_config::OutputFile> files_;
+    std::map<std::pair<const run_config::ComponentConfiguration *, std::string>, base::ListeningSocket>
+        sockets_; // by output and option
+};
+
+} // namespace arhost::host

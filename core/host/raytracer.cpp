@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "host/raytracer.hpp"
+
+#include "camera/mapping.hpp"
+#include "host/frame_validation.hpp"
+
+#include <arhost/shading/lens.hpp>
+#include <glm/gtc/type_ptr.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace arhost::host {
+
+using namespace ipc;
+using namespace model;
+using supervise::Component;
+
+std::pair<std::uint32_t, std::uint32_t> overlay_size(const arhost_frame_format &format, const Quality &quality) {
+    const auto scaled = [&](std::uint32_t side) {
+        return std::max(1u, static_cast<std::uint32_t>(std::lround(side * quality.scale)));
+    };
+    return {scaled(format.width), scaled(format.height)};
+}
+
+ImageView overlay_of(const Frame &frame, const arhost_frame_format &format) {
+    return {reinterpret_cast<const std::uint8_t *>(frame.overlay.bytes().data()),
+            overlay_stride(overlay_size(format, frame.quality).first)};
+}
+
+Raytracer::Raytracer(const RunParts &parts, Configuration configuration, std::shared_ptr<LoadedScene> scene,
+                     Abandon abandon)
+    : Stage(parts, Frame::Stage::to_render, parts.live() ? 1 : 2), configuration_(std::move(configuration)),
+      scene_(std::move(scene)) {
+    if (const std::size_t count = scene_->anchors.size(); count > 0)
+        anchor_slots_ = std::make_shared<SlotPool>(
+            supervise::make_host_region("arhost-anchors", {count * sizeof(AnchorPose), stage_slot_count}));
+    Component::Callbacks callbacks = parts.callbacks("raytracer", configuration_->node);
+    callbacks.hello = [this](const PluginDescription &plugin, std::size_t candidate) {
+        return on_hello(plugin, candidate);
+    };
+    callbacks.ready = [this](const messages::Ready &) {
+        const arhost_frame_format &format = parts_.video.format;
+        return SlotLayout{std::uint64_t(overlay_stride(format.width)) * format.height, stage_slot_count};
+    };
+    callbacks.running = [this] { start_quality(); };
+    callbacks.result = [this](const Command &command, const Result &result) { on_result(command, result); };
+    callbacks.disabled = [this, abandon = std::move(abandon), report = callbacks.disabled](const std::string &reason,
+                                                                                   bool is_configuration_error) {
+        if (!abandon(*this, reason))
+            report(reason, is_configuration_error);
+    };
+    make_component("raytracer", *configuration_, std::move(callbacks));
+}
+
+Component::Create Raytracer::on_hello(const PluginDescription &plugin, std::size_t candidate) const {
+    const Video &video = parts_.video;
+    std::vector<OptionValue> options =
+        parts_.options.choose(component(), ARHOST_KIND_RAYTRACER, *configuration_, candidate);
+    if (video.intrinsics.distortion != ARHOST_DISTORTION_NONE &&
+        !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION))
+        component().log(ARHOST_SEVERITY_WARNING,
+                        plugin.id + " does not support lens distortion: its worker warps the rendered images, which "
+                                    "costs sharpness and time");
+    return {
+        {std::move(options), messages::RaytracerSetup{video.format.width, video.format.height, video.intrinsics}},
+        {scene_->arena.fd()}};
+}
+
+void Raytracer::take_over(const Raytracer *previous) {
+    if (previous)
+        parts_.flow.on_raytracer_replaced();
+    if (previous && previous->scene_ == scene_)
+        return;
+    parts_.cameras.set_coordinates(scene_->coordinates);
+    parts_.flow.on_coordinates_changed();
+}
+
+FrameFlow::Intake Raytracer::intake() const {
+    FrameFlow::Intake intake = Stage::intake();
+    intake.anchors = anchor_slots_.get();
+    return intake;
+}
+
+void Raytracer::render(Frame &frame) {
+    if (parts_.flow.repeats_decisions(frame))
+        frame.quality = {frame.recorded->scale, frame.recorded->samples};
+    else
+        frame.quality = quality_ ? quality_->current() : Quality();
+    request_samples(frame.quality.samples);
+    Command command{};
+    command.kind = CommandKind::render;
+    command.slot = frame.overlay.index();
+    command.sequence = frame.record.sequence;
+    command.time_s = 1e-9 * static_cast<double>(frame.record.capture_ns);
+    command.camera = frame.record.camera;
+    if (frame.quality.scale < 1) {
+        const auto [width, height] = overlay_size(parts_.video.format, frame.quality);
+        command.camera.intrinsics = shading::scaled(frame.record.camera.intrinsics, width, height);
+    }
+    if (!frame.anchors)
+        return component().submit(command);
+    write_anchors(frame);
+    command.input_slot = frame.anchors.index();
+    component().submit(command, frame.anchors.region());
+}
+
+// Writes where the targets are that objects belong to. With them, an object is where its target is seen, also if the
+// pose of the world is that of an earlier frame.
+void Raytracer::write_anchors(const Frame &frame) const {
+    auto *poses = reinterpret_cast<AnchorPose *>(frame.anchors.bytes().data());
+    for (std::size_t i = 0; i < scene_->anchors.size(); ++i) {
+        const auto target = std::ranges::find_if(frame.targets, [&](const arhost_target &one) {
+            return is_visible(one) && one.name == scene_->anchors[i].target;
+        });
+        poses[i] = {};
+        if (target == frame.targets.end())
+            continue;
+        poses[i].is_visible = 1;
+        const glm::dmat4 pose =
+            camera::scene_from_target(frame.record.camera, target->mt, scene_->coordinates);
+        std::copy_n(glm::value_ptr(pose), 16, poses[i].world_from_anchor);
+    }
+}
+
+void Raytracer::on_result(const Command &command, const Result &result) {
+    Statistics &statistics = parts_.statistics;
+    const std::chrono::nanoseconds busy(result.busy_ns), device = device_time(result.render, busy);
+    if (device.count())
+        statistics.stages.add("device", device);
+    if (const Frame *frame = parts_.flow.find(command.sequence); frame && quality_) {
+        if (result.status >= 0)
+            statistics.quality_changes +=
+                quality_->add(frame->quality, busy, parts_.context.reactor.now());
+        statistics.quality = quality_->current();
+    }
+    Frame *const frame = accept(command, result);
+    if (!frame)
+        return;
+    frame->render = result.render;
+    frame->times.raytracer = busy;
+    frame->times.device = device;
+    frame->record.overlay_scale = frame->quality.scale < 1 ? frame->quality.scale : 0;
+    frame->record.overlay_samples = frame->quality.samples;
+    parts_.flow.on_rendered(*frame, busy);
+    if (auto &checks = scene_->overlay_checks; checks && frame->quality.scale == 1) {
+        const arhost_frame_format &format = parts_.video.format;
+        checks->check(statistics.contract_checks, command.sequence, command.camera,
+                      region_of(frame->render, format.width, format.height), overlay_of(*frame, format));
+        frame->overlay_sample = sample_hash(frame->overlay.bytes(), command.sequence);
+    }
+}
+
+// Begins to adapt the quality of images to `live.target_fps`, unless it is already adapted within the same limits.
+void Raytracer::start_quality() {
+    samples_in_use_ = 0; // a new worker has the configured number
+    const run_config::Configuration &run = parts_.configuration;
+    if (!parts_.live() || run.target_fps == 0)
+        return;
+    const PluginDescription &plugin = component().description();
+    const auto supports = [&](std::uint32_t capability) { return (plugin.capabilities & capability) != 0; };
+    QualityController::Limits limits{.target_fps = run.target_fps};
+    // The worker that warps the images of a plugin without support for lenses needs them in full size.
+    if (supports(ARHOST_CAPABILITY_SCALED_IMAGES) &&
+        (supports(ARHOST_CAPABILITY_LENS_DISTORTION) ||
+         parts_.video.intrinsics.distortion == ARHOST_DISTORTION_NONE))
+        limits.min_scale = run.min_scale;
+    const ComponentOptions::InUse *const options = parts_.options.of(component());
+    const OptionValue *const samples = options ? options->find("samples") : nullptr;
+    if (samples && samples->type == ARHOST_OPTION_INTEGER && samples->integer > 0 &&
+        std::ranges::count(plugin.changeable, "samples"))
+        limits.max_samples = static_cast<std::uint32_t>(samples->integer);
+    limits.min_samples = std::min(run.min_samples, limits.max_samples);
+    samples_in_use_ = limits.max_samples;
+    if (quality_ && quality_->limits() == limits)
+        return;
+    quality_.emplace(limits);
+    if (quality_->is_lowest() && limits.min_samples == 0 && run.min_scale < 1)
+        component().log(ARHOST_SEVERITY_WARNING, plugin.id + " can render neither smaller images nor fewer samples; "
+                                                             "'live.target_fps' has no effect");
+}
+
+void Raytracer::on_samples_changed() {
+    start_quality();     // its limit is the new value
+    samples_in_use_ = 0; // a reduction may have followed the new value
+}
+
+// Lets the images that are requested from now on have this number of samples; 0: does not change it.
+void Raytracer::request_samples(std::uint32_t samples) {
+    if (samples == 0 || samples == samples_in_use_)
+        return;
+    const std::uint32_t previous = std::exchange(samples_in_use_, samples);
+    OptionValue value;
+    value.key = "samples";
+    value.type = ARHOST_OPTION_INTEGER;
+    value.integer = samples;
+    // If a worker dies before it answers, start_quality() is called for the next one.
+    component().set_option(value, [this, previous](const std::string &error) {
+        if (!error.empty() && parts_.configuration.recording)
+            component().log(ARHOST_SEVERITY_WARNING, "the recorded number of samples cannot be set: " + error);
+        if (!error.empty())
+            samples_in_use_ = previous; // requested again with the next image
+    });
+}
+
+} // namespace arhost::host

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The ray tracer of a run, and the quality of the images that are requested from it.
+#pragma once
+
+#include "compositor/compositor.hpp"
+#include "host/contract_checks.hpp"
+#include "host/scene_loading.hpp"
+#include "host/stage.hpp"
+
+namespace arhost::host {
+
+struct LoadedScene {
+    run_config::Scene source;
+    std::set<std::filesystem::path> files; // as in SceneLoading::Callbacks
+    ipc::SharedMemory arena;
+    std::vector<Anchor> anchors;
+    camera::Coordinates coordinates;             // from the configuration or from the scene's axes
+    std::optional<OverlayChecks> overlay_checks; // only for `conform: true`
+};
+
+// Returns the width and the height in px of an overlay for frames of this format.
+std::pair<std::uint32_t, std::uint32_t> overlay_size(const arhost_frame_format &format, const Quality &quality);
+// Returns the overlay in the frame's slot of the ray tracer.
+ImageView overlay_of(const Frame &frame, const arhost_frame_format &format);
+
+class Raytracer final : public Stage {
+public:
+    using Configuration = std::shared_ptr<const run_config::RaytracerConfiguration>;
+
+    Raytracer(const RunParts &parts, Configuration configuration, std::shared_ptr<LoadedScene> scene,
+              Abandon abandon);
+
+    FrameFlow::Intake intake() const;
+    void render(Frame &frame);
+    // From now on, its images count. `previous`: the stage that it replaces, or null.
+    void take_over(const Raytracer *previous);
+    void on_samples_changed(); // by the command `set`
+
+    const Configuration &configuration() const { return configuration_; }
+    const std::shared_ptr<LoadedScene> &scene() const { return scene_; }
+
+private:
+    supervise::Component::Create on_hello(const model::PluginDescription &plugin, std::size_t candidate) const;
+    void on_result(const ipc::Command &command, const ipc::Result &result);
+    void start_quality();
+    void request_samples(std::uint32_t samples);
+    void write_anchors(const Frame &frame) const;
+
+    const Configuration configuration_;
+    const std::shared_ptr<LoadedScene> scene_;
+    std::shared_ptr<SlotPool> anchor_slots_;   // of AnchorPose; null if the scene has no anchors
+    std::optional<QualityController> quality_; // only with `live.target_fps`
+    std::uint32_t samples_in_use_ = 0;         // the option of the current worker
+};
+
+} // namespace arhost::host

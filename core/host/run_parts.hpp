@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the components of a run share. `Run` owns it.
+#pragma once
+
+#include "host/component_options.hpp"
+#include "host/failures.hpp"
+#include "host/frame_flow.hpp"
+#include "host/cameras.hpp"
+
+namespace arhost::host {
+
+// The frames of the source. Known once it has started.
+struct Video {
+    arhost_frame_format format{};
+    arhost_intrinsics intrinsics{};  // width 0: unknown
+    std::uint64_t frame_count = 0;   // 0: unknown
+    bool is_known() const { return format.width > 0; }
+};
+
+struct RunParts {
+    const run_config::Configuration &configuration; // with which the run has begun
+    supervise::Context &context;
+    Statistics &statistics;
+    Failures &failures;
+    ComponentOptions &options;
+    Cameras &cameras;
+    FrameFlow &flow;
+    Video &video;
+
+    bool live() const { return configuration.mode == run_config::Mode::live; }
+    std::int64_t now_ns() const { return base::to_ns(context.reactor.now()); }
+    void log(arhost_severity severity, const std::string &text) const { context.log(severity, "arhost", text); }
+
+    // Returns callbacks that report failures of the component `name`; the others do nothing.
+    supervise::Component::Callbacks callbacks(const std::string &name, const yaml::Node &node) const;
+};
+
+// The memory that a component's worker writes; null if there is none.
+std::shared_ptr<SlotPool> slots_of(const supervise::Component &component);
+
+// Whether the component has stopped, or will not be restarted.
+bool has_ended(const supervise::Component &component);
+
+std::vector<std::uint64_t> sequences_of(const std::vector<ipc::Command> &commands);
+
+// Slots for frames, for the results of a stage, and for frames that an output has not written yet (mode live).
+constexpr std::uint32_t source_slot_count = 8, stage_slot_count = 4;
+constexpr std::size_t live_sink_depth = 3;
+
+} // namespace arhost::host

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The tracker of a run. The host owns its state: what a call writes is committed with its result, and survives the
+// worker (docs/adr/0026).
+#pragma once
+
+#include "host/sightings.hpp"
+#include "host/stage.hpp"
+
+namespace arhost::host {
+
+class Tracker final : public Stage {
+public:
+    using Configuration = std::shared_ptr<const run_config::TrackerConfiguration>;
+
+    Tracker(const RunParts &parts, Sightings &sightings, Configuration configuration, Abandon abandon);
+
+    void track(Frame &frame);
+    const Configuration &configuration() const { return configuration_; }
+    // From now on, its results count. `previous`: the stage that it replaces, or null. Continues with the poses of
+    // its targets, if these are the same.
+    void take_over(Tracker *previous);
+
+private:
+    // Who can read the plugin's part of a state: a worker with the same plugin.
+    struct StateOwner {
+        std::size_t candidate = 0;
+        std::string version;
+        std::uint64_t size = 0;
+        bool operator==(const StateOwner &) const = default;
+    };
+    supervise::Component::Create on_hello(const model::PluginDescription &plugin, std::size_t candidate) const;
+    ipc::SlotLayout on_ready(const ipc::messages::Ready &ready);
+    void on_disabled(const std::string &reason, bool is_configuration_error) const;
+    void on_result(const ipc::Command &command, const ipc::Result &result);
+
+    Sightings &sightings_;
+    const Configuration configuration_;
+    const ipc::SharedMemory targets_; // those of the configuration, for its workers
+    const std::size_t family_count_;
+    StateOwner state_owner_; // the current worker
+    Lease state_;            // what the last accepted call has written
+    bool state_is_of_solver_only_ = false; // another plugin wrote the rest (ipc::Command)
+};
+
+} // namespace arhost::host
