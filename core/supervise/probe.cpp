@@ -32,7 +32,7 @@ std::string query(Context &context, const std::filesystem::path &plugin, sandbox
     WorkerBudget budget(context.log, plugin.stem().string());
     Process process(context, budget, std::move(callbacks), ipc::messages::Open{plugin.string()}, policy);
     running = &process;
-    const auto deadline = context.reactor.at(ipc::Reactor::Clock::now() + timeout, [&] {
+    const auto deadline = context.reactor.at(context.reactor.now() + timeout, [&] {
         process.end("did not respond within " + std::to_string(timeout.count()) + " s");
     });
     while (!dead)

@@ -7,7 +7,7 @@
 #include "input.hpp"
 #include "targets.hpp"
 
-#include "host/pipeline.hpp"
+#include "host/run.hpp"
 #include "ipc/fd_passing.hpp"
 #include "ipc/messages.hpp"
 
@@ -336,18 +336,17 @@ void run_host(Bytes bytes) {
     const run_config::Configuration &configuration = input.number() % 2 ? live : lockstep;
     SimulatedWorkers workers;
     Reactor reactor;
-    host::Pipeline pipeline(configuration, {reactor, workers, "", [](arhost_severity, auto &, auto &) {}},
-                            [](const host::Progress &) {});
+    host::Run run(configuration, {reactor, workers, "", [](arhost_severity, auto &, auto &) {}}, {});
     // This descriptor is always readable, so each iteration of the reactor does one action.
     const base::UniqueFd always = base::checked(::eventfd(1, EFD_CLOEXEC), "eventfd");
     const auto acting = reactor.watch(always.get(), [&] {
         if (input.empty())
-            pipeline.interrupt(); // the second interrupt stops the host immediately
+            run.interrupt(); // the second interrupt stops the host immediately
         else
             workers.act(input);
     });
-    pipeline.run();
-    (void)host::report(pipeline.statistics(), pipeline.components(), 0)
+    run.run();
+    (void)host::report(run.statistics(), run.component_totals(), 0)
         .dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/frames.hpp"
+#include "host/frame_validation.hpp"
 
 #include "ipc/protocol.hpp"
 
