@@ -233,7 +233,8 @@ Assembly::Exchanged Assembly::finish_swaps() {
 void Assembly::warn_of_hidden_objects() const {
     if (!raytracer_)
         return;
-    const auto *tracker = tracker_ ? tracker_->configuration().get() : tracker_of_anchors(); // a replay has no tracker
+    const auto *tracker =
+        tracker_ ? tracker_->configuration().get() : tracker_of_anchors(); // a replay has no tracker
     for (const Anchor &anchor : raytracer_->scene()->anchors)
         if (const std::string problem = problem_with({anchor}, tracker); !problem.empty())
             parts_.log(ARHOST_SEVERITY_WARNING, problem + "; until then, objects on it are hidden");

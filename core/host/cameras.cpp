@@ -19,8 +19,7 @@ void Cameras::set_targets(Targets targets, bool is_same_world) {
 }
 
 void Cameras::set_from_targets(Frame &frame) {
-    frame.world =
-        world_.locate(targets_.world, frame.targets, frame.record.sequence, targets_.grace_frames);
+    frame.world = world_.locate(targets_.world, frame.targets, frame.record.sequence, targets_.grace_frames);
     if (!trajectory_)
         set_or_hold(frame);
 }

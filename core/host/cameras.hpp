@@ -17,9 +17,9 @@ class Cameras {
 public:
     // What the configuration says about the targets of the tracker in use.
     struct Targets {
-        std::string world;                // name of the target whose pose is that of the world
-        std::uint64_t grace_frames = 0;   // World::locate
-        std::uint64_t held_frames = 0;    // for how many frames a frame without the world uses the last camera
+        std::string world;              // name of the target whose pose is that of the world
+        std::uint64_t grace_frames = 0; // World::locate
+        std::uint64_t held_frames = 0;  // for how many frames a frame without the world uses the last camera
     };
 
     // `trajectory`: cameras to use instead of those from the targets; null: none.

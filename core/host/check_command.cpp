@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 // Checks the plugins, fallbacks included, and their options. Returns the ray tracers.
 // `logs_notes`: warns of options that are set aside, which otherwise the run does.
 std::vector<model::PluginDescription> check_plugins(const run_config::Configuration &configuration,
-                                                  supervise::Context &context, bool logs_notes) {
+                                                    supervise::Context &context, bool logs_notes) {
     const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
         std::vector<model::PluginDescription> plugins;
         for (std::size_t i = 0; i < component.plugins.size(); ++i) {

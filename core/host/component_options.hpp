@@ -27,8 +27,8 @@ public:
     // Returns the options for creating a component's plugin: the configured ones, except for those that were changed.
     // Throws as run_config::options_for.
     std::vector<model::OptionValue> choose(const supervise::Component &component, arhost_kind kind,
-                                         const run_config::ComponentConfiguration &configuration,
-                                         std::size_t candidate);
+                                           const run_config::ComponentConfiguration &configuration,
+                                           std::size_t candidate);
     void change(const supervise::Component &component, const model::OptionValue &value);
     // Returns nullptr if the component's plugin was never created.
     const InUse *of(const supervise::Component &component) const;

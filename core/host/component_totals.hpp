@@ -20,7 +20,7 @@ struct ComponentTotals {
     std::map<std::string, double> cpu_seconds;
     std::map<std::string, std::uint32_t> restarts;
     std::map<std::string, model::Counters> counters;
-    std::deque<Crash> crashes;                     // the last supervise::Crash::max_kept of each component
+    std::deque<Crash> crashes; // the last supervise::Crash::max_kept of each component
     void add(const supervise::Component &component);
     ComponentTotals plus(const std::vector<supervise::Component *> &components) const;
 };

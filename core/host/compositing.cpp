@@ -108,9 +108,10 @@ void Compositing::exchange_time_code(std::span<const arhost_observation> observa
     if (const auto age = time_codes_->see(observations, now))
         statistics_.stages.add("glass_to_glass", *age);
     if (time_codes_->is_overdue(std::chrono::seconds(5), now))
-        log_(ARHOST_SEVERITY_WARNING, "latency",
-             "the camera has not shown a time code for 5 s: point it at the output's picture, so that the whole black "
-             "square with its white border is in view, sharp, without reflections and not mirrored");
+        log_(
+            ARHOST_SEVERITY_WARNING, "latency",
+            "the camera has not shown a time code for 5 s: point it at the output's picture, so that the whole black "
+            "square with its white border is in view, sharp, without reflections and not mirrored");
     time_codes_->draw(out, format.width, format.height, now);
 }
 

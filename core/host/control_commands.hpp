@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Executes the commands of outputs: freezes the video, exchanges the tracker, the ray tracer and the scene, starts and
-// stops outputs, changes options.
+// Executes the commands of outputs: freezes the video, exchanges the tracker, the ray tracer and the scene, starts
+// and stops outputs, changes options.
 #pragma once
 
 #include "host/assembly.hpp"

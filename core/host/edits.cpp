@@ -102,10 +102,10 @@ void Edits::apply() {
         read_configuration(*previous);
     const run_config::Configuration &latest = *assembly_.latest();
     const Raytracer *const raytracer = assembly_.raytracer();
-    const bool scene_changed = raytracer && std::ranges::any_of(files, [&](const auto &each) {
-                                   return each == raytracer->scene()->source.file ||
-                                          raytracer->scene()->files.contains(each);
-                               });
+    const bool scene_changed =
+        raytracer && std::ranges::any_of(files, [&](const auto &each) {
+            return each == raytracer->scene()->source.file || raytracer->scene()->files.contains(each);
+        });
     try {
         apply(latest, *previous, scene_changed, latest.tracker && has_edited_print(*latest.tracker, files));
     } catch (const std::exception &error) {
@@ -128,10 +128,10 @@ void Edits::read_configuration(const run_config::Configuration &previous) {
 }
 
 void Edits::apply(const run_config::Configuration &edited, const run_config::Configuration &previous,
-                     bool scene_changed, bool print_changed) {
+                  bool scene_changed, bool print_changed) {
     if (const auto keys = unapplied_edits(edited, previous); !keys.empty())
         parts_.log(ARHOST_SEVERITY_WARNING,
-                     fmt::format("the edit of '{}' takes effect in the next run", fmt::join(keys, "', '")));
+                   fmt::format("the edit of '{}' takes effect in the next run", fmt::join(keys, "', '")));
     const auto differs = [&](std::string_view key) {
         return content_of(edited.node, key) != content_of(previous.node, key);
     };
@@ -139,8 +139,9 @@ void Edits::apply(const run_config::Configuration &edited, const run_config::Con
     if (assembly_.tracker() && edited.tracker &&
         (differs("tracker") || edited.tracker->targets != previous.tracker->targets || print_changed ||
          std::exchange(tracker_edit_failed_, false)))
-        assembly_.swap_tracker(assembly_.shared(edited.trackers.front()),
-                           [this](const std::string &error, const auto &) { tracker_edit_failed_ = !error.empty(); });
+        assembly_.swap_tracker(
+            assembly_.shared(edited.trackers.front()),
+            [this](const std::string &error, const auto &) { tracker_edit_failed_ = !error.empty(); });
     const Raytracer *const raytracer = assembly_.raytracer();
     if (!raytracer || !edited.raytracer)
         return;

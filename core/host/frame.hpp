@@ -51,7 +51,7 @@ struct Frame {
     std::vector<arhost_target> targets; // those seen so far
     std::vector<arhost_observation> observations;
     std::vector<arhost_expected_marker> expected;
-    std::optional<std::array<double, 16>> world; // the pose of the world, as arhost_target.mt
+    std::optional<std::array<double, 16>> world;              // the pose of the world, as arhost_target.mt
     std::optional<std::size_t> pixels_sample, overlay_sample; // hashes for the contract checks
     Clock::time_point captured; // arrival, unless the source reports capture times of CLOCK_MONOTONIC
     Clock::time_point received;

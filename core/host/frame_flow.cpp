@@ -328,7 +328,8 @@ const Frame *FrameFlow::find(std::uint64_t sequence) const {
 }
 
 bool FrameFlow::has_only_overtaken() const {
-    return !frames_.empty() && std::ranges::all_of(frames_, [](const auto &entry) { return entry.second->overtaken; });
+    return !frames_.empty() &&
+           std::ranges::all_of(frames_, [](const auto &entry) { return entry.second->overtaken; });
 }
 
 void FrameFlow::on_shown(Frame &frame, Clock::time_point composited) {

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Takes each frame from the source to the outputs: decides which frame goes to which component and when, and which
-// frames are dropped. Events go in: a frame has arrived, a component has answered or has died. Actions come out: read,
-// track, render, show. Neither starts processes nor accesses the memory of frames, and takes the time from a clock.
+// frames are dropped. Events go in: a frame has arrived, a component has answered or has died. Actions come out:
+// read, track, render, show. Neither starts processes nor accesses the memory of frames, and takes the time from a
+// clock.
 //
-// In mode lockstep, every frame passes through all stages, and frames are shown in order; after the death of a worker,
-// its frames are processed again. In mode live, a newer frame replaces a frame that is still waiting, and frames skip
-// a component that has no worker at present.
+// In mode lockstep, every frame passes through all stages, and frames are shown in order; after the death of a
+// worker, its frames are processed again. In mode live, a newer frame replaces a frame that is still waiting, and
+// frames skip a component that has no worker at present.
 #pragma once
 
 #include "base/clock.hpp"
@@ -32,8 +33,8 @@ public:
         std::uint64_t max_frames = 0;               // 0: no limit
         std::chrono::milliseconds max_latency{500}; // mode live: of a frame in a worker, before others pass it
         bool has_timeline = false;
-        const camera::Trajectory *trajectory = nullptr;      // cameras to use instead of the tracker's
-        const run_config::Recording *recording = nullptr;    // the frames of a session, which the source plays
+        const camera::Trajectory *trajectory = nullptr;   // cameras to use instead of the tracker's
+        const run_config::Recording *recording = nullptr; // the frames of a session, which the source plays
     };
 
     enum class Readiness {
@@ -88,7 +89,7 @@ public:
     // A component has answered for the frame `sequence`. Returns the frame; nullptr if it is not needed any more.
     // Must be followed by on_tracked, on_rendered or on_failed for that frame.
     Frame *answered(std::uint64_t sequence);
-    void on_tracked(Frame &frame, std::chrono::nanoseconds busy); // the frame has the targets
+    void on_tracked(Frame &frame, std::chrono::nanoseconds busy);  // the frame has the targets
     void on_rendered(Frame &frame, std::chrono::nanoseconds busy); // the frame has the overlay
     void on_failed(Frame &frame, const char *stage);               // the frame passes without an overlay
     // The worker has died. `waiting`: the stage of a frame that waits for it. `unanswered`: its frames, oldest first;
@@ -114,8 +115,10 @@ public:
     bool expects_more_frames() const { return !no_more_frames() || !reads_.empty(); }
     bool is_empty() const { return frames_.empty(); }
     const Frame *find(std::uint64_t sequence) const; // nullptr if there is no such frame
-    bool has_only_overtaken() const; // at least one frame, and none will be shown
-    bool repeats_decisions(const Frame &frame) const { return frame.recorded && settings_.recording->repeats_decisions; }
+    bool has_only_overtaken() const;                 // at least one frame, and none will be shown
+    bool repeats_decisions(const Frame &frame) const {
+        return frame.recorded && settings_.recording->repeats_decisions;
+    }
     const run_config::RecordedFrame *recorded(std::uint64_t sequence) const {
         return settings_.recording ? &settings_.recording->frames[sequence] : nullptr;
     }
@@ -136,7 +139,7 @@ private:
 
     bool no_more_frames() const {
         return input_ended_ || (settings_.max_frames && next_read_ >= settings_.max_frames);
-     }
+    }
     std::optional<Action> read(const Intake &source);
     bool read_from_trajectory(const Intake &source);
     std::optional<Action> track(const Intake &tracker);

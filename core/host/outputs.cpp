@@ -199,8 +199,8 @@ Frame::Clock::time_point Outputs::show(Frame &frame) {
         inputs |= sink->inputs();
     if (std::ranges::all_of(sinks_, [](const auto &sink) { return sink->closed; }))
         return parts_.context.reactor.now();
-    auto output = std::make_shared<OutputFrame>(
-        OutputFrame{frame.record.sequence, *slots_->acquire(), frame.captured, inputs});
+    auto output =
+        std::make_shared<OutputFrame>(OutputFrame{frame.record.sequence, *slots_->acquire(), frame.captured, inputs});
     compositing_.write(frame, parts_.video.format, inputs, output->slot.bytes());
     const auto composited = parts_.context.reactor.now(); // before an output can have written the frame
     if (parts_.configuration.snapshot)

@@ -24,9 +24,9 @@ public:
     Outputs(const RunParts &parts, Callbacks callbacks, std::optional<std::filesystem::path> check_scratch);
     static std::filesystem::path check_folder(const std::filesystem::path &scratch, std::size_t output);
 
-    void start();             // the configured outputs
+    void start(); // the configured outputs
     bool have_started() const;
-    void begin_video();       // from now on, the run ends if all outputs have ended
+    void begin_video(); // from now on, the run ends if all outputs have ended
 
     // Composites a frame and offers it to the outputs. Returns when the frame was composited.
     Frame::Clock::time_point show(Frame &frame);
@@ -34,7 +34,7 @@ public:
     void pump();           // submits waiting frames, stops outputs that end
     bool have_written_all() const;
     void stop();
-    void stop_waiting();   // lets sinks return that wait for their receivers
+    void stop_waiting(); // lets sinks return that wait for their receivers
     void remove_ended(ComponentTotals &totals);
 
     // ---- outputs that commands start; each throws control::Error -----------------------------------

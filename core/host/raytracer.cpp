@@ -46,8 +46,8 @@ Raytracer::Raytracer(const RunParts &parts, Configuration configuration, std::sh
     };
     callbacks.running = [this] { start_quality(); };
     callbacks.result = [this](const Command &command, const Result &result) { on_result(command, result); };
-    callbacks.disabled = [this, abandon = std::move(abandon), report = callbacks.disabled](const std::string &reason,
-                                                                                   bool is_configuration_error) {
+    callbacks.disabled = [this, abandon = std::move(abandon),
+                          report = callbacks.disabled](const std::string &reason, bool is_configuration_error) {
         if (!abandon(*this, reason))
             report(reason, is_configuration_error);
     };
@@ -63,9 +63,8 @@ Component::Create Raytracer::on_hello(const PluginDescription &plugin, std::size
         component().log(ARHOST_SEVERITY_WARNING,
                         plugin.id + " does not support lens distortion: its worker warps the rendered images, which "
                                     "costs sharpness and time");
-    return {
-        {std::move(options), messages::RaytracerSetup{video.format.width, video.format.height, video.intrinsics}},
-        {scene_->arena.fd()}};
+    return {{std::move(options), messages::RaytracerSetup{video.format.width, video.format.height, video.intrinsics}},
+            {scene_->arena.fd()}};
 }
 
 void Raytracer::take_over(const Raytracer *previous) {
@@ -118,8 +117,7 @@ void Raytracer::write_anchors(const Frame &frame) const {
         if (target == frame.targets.end())
             continue;
         poses[i].is_visible = 1;
-        const glm::dmat4 pose =
-            camera::scene_from_target(frame.record.camera, target->mt, scene_->coordinates);
+        const glm::dmat4 pose = camera::scene_from_target(frame.record.camera, target->mt, scene_->coordinates);
         std::copy_n(glm::value_ptr(pose), 16, poses[i].world_from_anchor);
     }
 }
@@ -131,8 +129,7 @@ void Raytracer::on_result(const Command &command, const Result &result) {
         statistics.stages.add("device", device);
     if (const Frame *frame = parts_.flow.find(command.sequence); frame && quality_) {
         if (result.status >= 0)
-            statistics.quality_changes +=
-                quality_->add(frame->quality, busy, parts_.context.reactor.now());
+            statistics.quality_changes += quality_->add(frame->quality, busy, parts_.context.reactor.now());
         statistics.quality = quality_->current();
     }
     Frame *const frame = accept(command, result);
@@ -163,8 +160,7 @@ void Raytracer::start_quality() {
     QualityController::Limits limits{.target_fps = run.target_fps};
     // The worker that warps the images of a plugin without support for lenses needs them in full size.
     if (supports(ARHOST_CAPABILITY_SCALED_IMAGES) &&
-        (supports(ARHOST_CAPABILITY_LENS_DISTORTION) ||
-         parts_.video.intrinsics.distortion == ARHOST_DISTORTION_NONE))
+        (supports(ARHOST_CAPABILITY_LENS_DISTORTION) || parts_.video.intrinsics.distortion == ARHOST_DISTORTION_NONE))
         limits.min_scale = run.min_scale;
     const ComponentOptions::InUse *const options = parts_.options.of(component());
     const OptionValue *const samples = options ? options->find("samples") : nullptr;

@@ -34,10 +34,12 @@ FrameFlow::Settings settings_of(const run_config::Configuration &configuration) 
 } // namespace
 
 Run::Run(const run_config::Configuration &configuration, const supervise::Context &context, Options options)
-    : configuration_(configuration),
-      context_{context.reactor, context.launcher, context.worker_program,
-               [this, log = context.log](arhost_severity severity, const std::string &component,
-                                         const std::string &text) { this->log(log, severity, component, text); }},
+    : configuration_(configuration), context_{context.reactor, context.launcher, context.worker_program,
+                                              [this, log = context.log](arhost_severity severity,
+                                                                        const std::string &component,
+                                                                        const std::string &text) {
+                                                  this->log(log, severity, component, text);
+                                              }},
       options_(std::move(options)), failures_(context_.log), component_options_(context_.log),
       cameras_(configuration.trajectory ? &*configuration.trajectory : nullptr),
       flow_(settings_of(configuration), context_.reactor.clock(), cameras_, statistics_),

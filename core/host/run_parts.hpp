@@ -3,18 +3,18 @@
 // What the components of a run share. `Run` owns it.
 #pragma once
 
+#include "host/cameras.hpp"
 #include "host/component_options.hpp"
 #include "host/failures.hpp"
 #include "host/frame_flow.hpp"
-#include "host/cameras.hpp"
 
 namespace arhost::host {
 
 // The frames of the source. Known once it has started.
 struct Video {
     arhost_frame_format format{};
-    arhost_intrinsics intrinsics{};  // width 0: unknown
-    std::uint64_t frame_count = 0;   // 0: unknown
+    arhost_intrinsics intrinsics{}; // width 0: unknown
+    std::uint64_t frame_count = 0;  // 0: unknown
     bool is_known() const { return format.width > 0; }
 };
 

@@ -41,7 +41,7 @@ private:
     const supervise::LogFunction &log_;
     Statistics &statistics_;
     std::shared_ptr<const run_config::TrackerConfiguration> tracker_;
-    std::vector<std::string> families_; // of the targets' markers
+    std::vector<std::string> families_;                                  // of the targets' markers
     std::map<std::pair<std::string, std::int32_t>, std::string> listed_; // the targets' markers, by family and id
     bool has_warned_ = false;
 };

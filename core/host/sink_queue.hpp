@@ -3,7 +3,6 @@
 // One output: its sink, the frames waiting for it, and the frames that it has not confirmed.
 #pragma once
 
-#include "model/control.hpp"
 #include "host/frame.hpp"
 #include "host/statistics.hpp"
 #include "model/control.hpp"

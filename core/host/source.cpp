@@ -70,9 +70,9 @@ SlotLayout Source::on_ready(const messages::Ready &ready) {
     if (!ready.format)
         throw ProtocolViolation("the source's 'ready' lacks the frame format");
     const arhost_frame_format &format = *ready.format, &before = parts_.video.format;
-    if (parts_.video.is_known() &&
-        (format.pixel_format != before.pixel_format || format.width != before.width ||
-         format.height != before.height || format.has_depth != before.has_depth || format.transfer != before.transfer))
+    if (parts_.video.is_known() && (format.pixel_format != before.pixel_format || format.width != before.width ||
+                                    format.height != before.height || format.has_depth != before.has_depth ||
+                                    format.transfer != before.transfer))
         throw std::runtime_error("the frame format differs after the restart");
     parts_.video.format = format;
     parts_.video.frame_count = ready.frame_count;

@@ -4,15 +4,15 @@
 // swap starts a second stage of the same kind and then exchanges the two.
 #pragma once
 
-#include "model/control.hpp"
 #include "host/run_parts.hpp"
+#include "model/control.hpp"
 
 namespace arhost::host {
 
 class Stage {
 public:
-    // Called when the stage is disabled. Returns whether it only was to replace another stage, so that the run does not
-    // fail.
+    // Called when the stage is disabled. Returns whether it only was to replace another stage, so that the run does
+    // not fail.
     using Abandon = std::function<bool(const Stage &stage, const std::string &reason)>;
 
     virtual ~Stage() = default;

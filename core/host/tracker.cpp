@@ -53,7 +53,8 @@ Tracker::Tracker(const RunParts &parts, Sightings &sightings, Configuration conf
     };
     callbacks.ready = [this](const messages::Ready &ready) { return on_ready(ready); };
     callbacks.result = [this](const Command &command, const Result &result) { on_result(command, result); };
-    callbacks.disabled = [this, abandon = std::move(abandon)](const std::string &reason, bool is_configuration_error) {
+    callbacks.disabled = [this, abandon = std::move(abandon)](const std::string &reason,
+                                                              bool is_configuration_error) {
         if (!abandon(*this, reason))
             on_disabled(reason, is_configuration_error);
     };
@@ -130,9 +131,9 @@ void Tracker::take_over(Tracker *previous) {
         state_is_of_solver_only_ = true;
     }
     sightings_.set_tracker(configuration_);
-    parts_.cameras.set_targets({configuration_->targets.front().name, configuration_->world_grace_frames,
-                                configuration_->hold_frames},
-                               has_same_targets);
+    parts_.cameras.set_targets(
+        {configuration_->targets.front().name, configuration_->world_grace_frames, configuration_->hold_frames},
+        has_same_targets);
     if (previous)
         parts_.flow.on_tracker_replaced();
 }

@@ -38,8 +38,8 @@ private:
     const Configuration configuration_;
     const ipc::SharedMemory targets_; // those of the configuration, for its workers
     const std::size_t family_count_;
-    StateOwner state_owner_; // the current worker
-    Lease state_;            // what the last accepted call has written
+    StateOwner state_owner_;               // the current worker
+    Lease state_;                          // what the last accepted call has written
     bool state_is_of_solver_only_ = false; // another plugin wrote the rest (ipc::Command)
 };
 
