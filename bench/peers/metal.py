@@ -37,7 +37,7 @@ def write_sun(path):
 def main():
     arguments = [word for word in sys.argv[1:] if word != "--quick"]
     if not os.path.exists(render_scene):
-        raise SystemExit("metal: build/release/bin/render-scene is missing: build it with tools/test")
+        raise SystemExit("metal: build/release/bin/render-scene is missing: run tools/bench metal")
     os.makedirs(peers.folder, exist_ok=True)
     peers.install({name: peers.packages.get(name) for name in ("mitsuba", "pillow", "numpy")})
     images = [os.path.abspath(path) for path in arguments]

@@ -134,7 +134,7 @@ def measure(renderers, rounds, frames):
 def main():
     quick = "--quick" in sys.argv[1:]
     if not os.path.exists(os.path.join(binaries, "rt-embree-peers")):
-        raise SystemExit("peers: build/release/bin/rt-embree-peers is missing: build it with tools/test")
+        raise SystemExit("peers: build/release/bin/rt-embree-peers is missing: run tools/bench peers")
     os.makedirs(folder, exist_ok=True)
     install_llvm()
     install(packages)
