@@ -45,15 +45,9 @@ endfunction()
 # the shading headers of core/.
 include(${CMAKE_CURRENT_LIST_DIR}/arhost_add_plugin.cmake)
 
-# arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…] [STATISTICAL filter]
-# [EXHAUSTIVE]): a GoogleTest program; each of its tests is a CTest test. STATISTICAL: these tests measure over many
-# samples, check all values or repeat others; sanitizers omit them, because other tests execute the same code. With
-# EXHAUSTIVE, those of instantiations named `Exhaustive` are registered, too, with that label and ten times the timeout.
-function(arhost_add_test name)
-  cmake_parse_arguments(ARG "EXHAUSTIVE" "TIMEOUT;STATISTICAL" "SOURCES;LIBRARIES;LABELS;DEPENDS" ${ARGN})
-  if(NOT ARG_TIMEOUT)
-    set(ARG_TIMEOUT 60)
-  endif()
+# arhost_add_test_program(name SOURCES … [LIBRARIES …] [DEPENDS targets…]): a GoogleTest program that another command runs.
+function(arhost_add_test_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LIBRARIES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LIBRARIES} arhost-test-support)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/tests)
@@ -62,16 +56,32 @@ function(arhost_add_test name)
   if(ARG_DEPENDS)
     add_dependencies(${name} ${ARG_DEPENDS})
   endif()
+endfunction()
+
+# arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…] [STATISTICAL filter]
+# [EXHAUSTIVE filter]): a GoogleTest program; each of its tests is a CTest test. For each label, the target `<label>-tests`
+# builds all programs that have it. STATISTICAL: these tests measure over many samples, check all values or repeat others;
+# sanitizers omit them, because other tests execute the same code. EXHAUSTIVE: these tests have the label `exhaustive` and
+# ten times the timeout, and sanitizers omit them, too.
+function(arhost_add_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT;STATISTICAL;EXHAUSTIVE" "SOURCES;LIBRARIES;LABELS;DEPENDS" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 60)
+  endif()
+  arhost_add_test_program(${name} SOURCES ${ARG_SOURCES} LIBRARIES ${ARG_LIBRARIES} DEPENDS ${ARG_DEPENDS})
+  foreach(label ${ARG_LABELS})
+    if(NOT TARGET ${label}-tests)
+      add_custom_target(${label}-tests)
+    endif()
+    add_dependencies(${label}-tests ${name})
+  endforeach()
   if(ARHOST_SANITIZE AND "slow" IN_LIST ARG_LABELS)
     set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON) # never run under sanitizers
     return()
   endif()
-  set(omitted)
-  if(ARG_EXHAUSTIVE)
-    list(APPEND omitted "Exhaustive/*")
-  endif()
-  if(ARHOST_SANITIZE AND ARG_STATISTICAL)
-    list(APPEND omitted "${ARG_STATISTICAL}")
+  set(omitted ${ARG_EXHAUSTIVE})
+  if(ARHOST_SANITIZE)
+    list(APPEND omitted ${ARG_STATISTICAL})
   endif()
   if(omitted)
     list(JOIN omitted ":" omitted)
@@ -83,9 +93,9 @@ function(arhost_add_test name)
                        PROPERTIES TIMEOUT ${ARG_TIMEOUT}
                        ENVIRONMENT "LSAN_OPTIONS=${lsan_options}"
                        LABELS "${ARG_LABELS}")
-  if(ARG_EXHAUSTIVE)
+  if(ARG_EXHAUSTIVE AND NOT ARHOST_SANITIZE)
     math(EXPR exhaustive_timeout "10 * ${ARG_TIMEOUT}")
-    gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_FILTER "Exhaustive/*"
+    gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST TEST_FILTER "${ARG_EXHAUSTIVE}"
                          PROPERTIES TIMEOUT ${exhaustive_timeout} LABELS exhaustive)
   endif()
 endfunction()

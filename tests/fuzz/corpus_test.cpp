@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <tuple>
 #include <unistd.h>
 #include <vector>
 
@@ -35,6 +36,7 @@ Mutator::Content content_of(const std::filesystem::path &file) {
 } // namespace
 
 class Corpus : public testing::TestWithParam<Target> {};
+class CorpusMutations : public testing::TestWithParam<std::tuple<Target, unsigned>> {}; // the part of its tries: 1/n
 
 TEST_P(Corpus, InputsPass) {
     const auto files = corpus_of(GetParam());
@@ -45,23 +47,37 @@ TEST_P(Corpus, InputsPass) {
     }
 }
 
-TEST_P(Corpus, MutationsPass) {
+TEST_P(CorpusMutations, Pass) {
+    const auto &[target, divisor] = GetParam();
     std::vector<Mutator::Content> corpus;
-    for (const auto &file : corpus_of(GetParam()))
+    for (const auto &file : corpus_of(target))
         corpus.push_back(content_of(file));
     constexpr std::uint32_t seed = 1;
     Mutator mutator(std::move(corpus), seed);
     // This file remains if the input crashes the process.
-    const std::filesystem::path last = testing::TempDir() + "arhost-fuzz-" + std::string(GetParam().name) + "-" +
-                                       std::to_string(::getpid()) + ".input";
-    for (unsigned i = 0; i < GetParam().tries; ++i) {
+    const std::filesystem::path last =
+        testing::TempDir() + "arhost-fuzz-" + std::string(target.name) + "-" + std::to_string(::getpid()) + ".input";
+    for (unsigned i = 0; i < target.tries / divisor; ++i) {
         const Mutator::Content content = mutator.next();
         std::ofstream(last, std::ios::binary)
             .write(reinterpret_cast<const char *>(content.data()), static_cast<std::streamsize>(content.size()));
-        ASSERT_NO_THROW(GetParam().run(content)) << "try " << i << ", the input is " << last;
+        ASSERT_NO_THROW(target.run(content)) << "try " << i << ", the input is " << last;
     }
     std::filesystem::remove(last);
 }
 
 INSTANTIATE_TEST_SUITE_P(Fuzz, Corpus, testing::ValuesIn(targets),
                          [](const auto &info) { return std::string(info.param.name); });
+
+namespace {
+
+std::string name_of(const testing::TestParamInfo<std::tuple<Target, unsigned>> &info) {
+    return std::string(std::get<0>(info.param).name);
+}
+
+} // namespace
+
+INSTANTIATE_TEST_SUITE_P(Fuzz, CorpusMutations, testing::Combine(testing::ValuesIn(targets), testing::Values(20u)),
+                         name_of);
+INSTANTIATE_TEST_SUITE_P(Exhaustive, CorpusMutations,
+                         testing::Combine(testing::ValuesIn(targets), testing::Values(1u)), name_of);
