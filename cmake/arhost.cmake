@@ -59,12 +59,15 @@ function(arhost_add_test_program name)
 endfunction()
 
 # arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…] [STATISTICAL filter]
-# [EXHAUSTIVE filter]): a GoogleTest program; each of its tests is a CTest test. For each label, the target `<label>-tests`
+# [EXHAUSTIVE [filter]]): a GoogleTest program; each of its tests is a CTest test. For each label, the target `<label>-tests`
 # builds all programs that have it. STATISTICAL: these tests measure over many samples, check all values or repeat others;
-# sanitizers omit them, because other tests execute the same code. EXHAUSTIVE: these tests have the label `exhaustive` and
-# ten times the timeout, and sanitizers omit them, too.
+# sanitizers omit them, because other tests execute the same code. EXHAUSTIVE: these tests, or those of instantiations
+# named `Exhaustive`, have the label `exhaustive` and ten times the timeout, and sanitizers omit them, too.
 function(arhost_add_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT;STATISTICAL;EXHAUSTIVE" "SOURCES;LIBRARIES;LABELS;DEPENDS" ${ARGN})
+  cmake_parse_arguments(ARG "" "TIMEOUT;STATISTICAL" "SOURCES;LIBRARIES;LABELS;DEPENDS;EXHAUSTIVE" ${ARGN})
+  if("EXHAUSTIVE" IN_LIST ARG_KEYWORDS_MISSING_VALUES)
+    set(ARG_EXHAUSTIVE "Exhaustive/*")
+  endif()
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 60)
   endif()
