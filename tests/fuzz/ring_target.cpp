@@ -6,7 +6,7 @@
 #include "targets.hpp"
 
 #include "compositor/compositor.hpp"
-#include "host/frames.hpp"
+#include "host/frame_validation.hpp"
 #include "ipc/protocol.hpp"
 
 #include <chrono>
