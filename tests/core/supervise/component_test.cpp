@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests start, commands, death and stop of a component without a pipeline.
+// Tests start, commands, death and stop of a component without a run. Deadlines and back-off are in virtual time.
 #include "supervise/component.hpp"
 
 #include <directories.hpp>
 #include <gtest/gtest.h>
+#include <manual_clock.hpp>
 
+#include <algorithm>
 #include <csignal>
+#include <utility>
 
 using namespace arhost::supervise;
 using namespace arhost::ipc;
@@ -16,6 +19,9 @@ using namespace std::chrono_literals;
 namespace {
 
 struct Bench {
+    explicit Bench(const arhost::base::Clock *real = nullptr) : reactor(real ? *real : clock) {}
+
+    arhost::test::ManualClock clock;
     Reactor reactor;
     Launcher launcher{arhost::test::build_directory() + "/bin/arhost-launcher"};
     std::string log;
@@ -65,16 +71,22 @@ struct Bench {
             arhost::sandbox::Policy{}, std::move(callbacks));
         component->start();
     }
-    // Runs the reactor until `event` has occurred `times` times. Returns false after 20 s.
+    // Runs the reactor until `event` has occurred `times` times. Returns false after 20 s. Meanwhile, virtual time
+    // passes so slowly that only back-off ends, but no deadline.
     bool until(const std::string &event, std::size_t times = 1) {
-        bool timed_out = false;
-        const auto limit = reactor.at(Reactor::Clock::now() + 20s, [&] { timed_out = true; });
-        while (!timed_out) {
-            if (static_cast<std::size_t>(std::count(events.begin(), events.end(), event)) >= times)
-                return true;
+        const auto limit = std::chrono::steady_clock::now() + 20s;
+        while (std::cmp_less(std::ranges::count(events, event), times)) {
+            if (std::chrono::steady_clock::now() > limit)
+                return false;
             reactor.run_once();
+            clock.advance(1ms);
         }
-        return false;
+        return true;
+    }
+    // Lets virtual time pass, and then the deadlines that end.
+    void advance(std::chrono::milliseconds time) {
+        clock.advance(time);
+        reactor.run_once();
     }
     void read(std::uint64_t sequence) {
         Command command{};
@@ -124,13 +136,19 @@ TEST(Component, IsRestartedIfItsProcessIsStoppedBeyondTheDeadline) {
     ASSERT_TRUE(bench.until("running"));
     ::kill(bench.component->pid(), SIGSTOP);
     bench.read(0);
+    bench.advance(199ms);
+    EXPECT_TRUE(bench.component->running());
+    bench.advance(1ms);
+    EXPECT_FALSE(bench.component->running());
+    bench.advance(100ms); // a stopped process only reacts to SIGKILL
     ASSERT_TRUE(bench.until("lost 1"));
     EXPECT_NE(bench.component->crashes()[0].how.find("hung: no answer within 200 ms"), std::string::npos);
     ASSERT_TRUE(bench.until("running", 2));
 }
 
+// In real time, because each report of progress restarts the deadline.
 TEST(Component, ALiveSourceThatReportsProgressMayExceedTheDeadlineOfAFrame) {
-    Bench bench;
+    Bench bench(&arhost::base::steady_clock());
     bench.make("source_waiting_live", {.frame = 300ms, .restart = {}});
     ASSERT_TRUE(bench.until("running")) << bench.log;
     bench.read(0);
@@ -143,6 +161,7 @@ TEST(Component, OtherSourcesMustMeetTheDeadlineOfAFrameDespiteProgress) {
     bench.make("source_waiting", {.frame = 300ms, .restart = {.first_delay = 1ms}});
     ASSERT_TRUE(bench.until("running")) << bench.log;
     bench.read(0);
+    bench.advance(300ms);
     ASSERT_TRUE(bench.until("lost 1")) << bench.log;
     EXPECT_NE(bench.component->crashes()[0].how.find("hung: no answer within 300 ms"), std::string::npos);
 }
@@ -152,6 +171,8 @@ TEST(Component, EndsAStartThatReportsProgressForever) {
     Bench bench;
     bench.make("hostile_source", {.start_total = 300ms, .restart = {.quarantine_after = 1}},
                {{"attack", "endless_start"}});
+    ASSERT_TRUE(bench.until("hello hostile_source")) << bench.log;
+    bench.advance(300ms);
     ASSERT_TRUE(bench.until("disabled")) << bench.log;
     ASSERT_EQ(bench.component->crashes().size(), 1u);
     EXPECT_NE(bench.component->crashes()[0].how.find("did not start within 300 ms in total, although it reported "
@@ -164,6 +185,9 @@ TEST(Component, EndsAStopThatReportsProgressForever) {
     bench.make("hostile_source", {.stop_total = 300ms, .restart = {}}, {{"attack", "endless_stop"}});
     ASSERT_TRUE(bench.until("running")) << bench.log;
     bench.component->stop();
+    bench.advance(299ms);
+    EXPECT_TRUE(bench.component->running());
+    bench.advance(1ms);
     ASSERT_TRUE(bench.until("stopped")) << bench.log;
     ASSERT_EQ(bench.component->crashes().size(), 1u);
     EXPECT_NE(bench.component->crashes()[0].how.find("did not stop within 300 ms in total, although it reported "
