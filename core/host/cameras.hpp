@@ -15,7 +15,7 @@ namespace arhost::host {
 
 class Cameras {
 public:
-    // What the configuration says about the targets of the tracker in use.
+    // Settings of the tracker in use that concern its targets.
     struct Targets {
         std::string world;              // name of the target whose pose is that of the world
         std::uint64_t grace_frames = 0; // World::locate

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the components of a run have used and counted, by name.
+// Totals of the components of a run, by name: processor time, restarts, counters and crashes.
 #pragma once
 
 #include "supervise/component.hpp"

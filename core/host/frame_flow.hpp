@@ -104,7 +104,7 @@ public:
 
     // ---- state -------------------------------------------------------------------------------------
     void set_rate(double fps) { fps_ = fps; } // of the source; 0: unknown
-    // Mode lockstep: frames of films are shown when their time stamps say.
+    // Mode lockstep: shows films at their own rate.
     void set_paced(bool paced) { paced_ = paced; }
     void set_frozen(bool frozen) { frozen_ = frozen; } // no further frames are shown
     bool is_frozen() const { return frozen_; }

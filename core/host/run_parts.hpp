@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the components of a run share. `Run` owns it.
+// The parts of a run that its components use. `Run` owns them.
 #pragma once
 
 #include "host/cameras.hpp"
