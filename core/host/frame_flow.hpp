@@ -104,7 +104,7 @@ public:
 
     // ---- state -------------------------------------------------------------------------------------
     void set_rate(double fps) { fps_ = fps; } // of the source; 0: unknown
-    // Mode lockstep: shows films at their own rate.
+    // Mode lockstep: shows films at the rate of their time stamps.
     void set_paced(bool paced) { paced_ = paced; }
     void set_frozen(bool frozen) { frozen_ = frozen; } // no further frames are shown
     bool is_frozen() const { return frozen_; }
