@@ -17,9 +17,11 @@ public:
     // which is not trusted.
     using WatchFiles = std::function<void(const std::set<std::filesystem::path> &)>;
     Assembly(const RunParts &parts, Sightings &sightings, WatchFiles watch_files);
+    Assembly(const Assembly &) = delete;
+    Assembly &operator=(const Assembly &) = delete;
 
-    // Starts the source and loads the scene; calls advance() whenever an event was handled, until it returns true:
-    // then the tracker and the ray tracer run, too.
+    // Starts the source and loads the scene. Call advance() after each event, until it returns true: then the tracker
+    // and the ray tracer run, too.
     void start();
     bool advance();
     FrameFlow::Intakes intakes() const;
@@ -28,7 +30,9 @@ public:
 
     const Source &source() const { return source_; }
     Source &source() { return source_; }
-    Tracker *tracker() const { return tracker_.get(); } // null if none runs; likewise:
+    Tracker *tracker() const {
+        return tracker_.get();
+    } // null before the source has started, or without one; likewise:
     Raytracer *raytracer() const { return raytracer_.get(); }
     std::vector<supervise::Component *> components() const; // including those that start or end
 

@@ -30,7 +30,6 @@ public:
     // `is_same_world`: whether the poses of the previous targets and of these are in the same frame of reference.
     void set_targets(Targets targets, bool is_same_world);
 
-    bool follows_trajectory() const { return trajectory_ != nullptr; }
     // Each sets the frame's camera, unless there is none for it.
     void set_from_targets(Frame &frame); // must be called for the frames in their order
     void set_from_recording(Frame &frame) const;

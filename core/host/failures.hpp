@@ -24,7 +24,7 @@ public:
     void add_disabled(const std::string &name, const yaml::Node &node, const std::string &reason,
                       bool is_configuration_error);
 
-    bool end_run() const { return ends_run_; } // whether the run must end at once
+    bool ends_run() const { return ends_run_; } // whether the run must end at once
     // The first failure, as a message for the user; "" if there was none.
     const std::string &text() const { return text_; }
     bool was_logged() const { return was_logged_; }

@@ -31,7 +31,7 @@ std::optional<FrameFlow::Action> FrameFlow::next(const Intakes &intakes) {
         return action;
     if (auto action = render(intakes.raytracer))
         return action;
-    return show(intakes.outputs_are_full);
+    return show(intakes);
 }
 
 // ---- source → frames ------------------------------------------------------------------------------------
@@ -268,27 +268,27 @@ void FrameFlow::on_lost(Frame::Stage waiting, std::span<const std::uint64_t> una
 
 // ---- frames → outputs -----------------------------------------------------------------------------------
 
-std::optional<FrameFlow::Action> FrameFlow::show(bool outputs_are_full) {
-    for (;;) {
-        // The oldest frame; in mode live, the newest frame that is done.
-        auto ready = frames_.begin();
-        if (settings_.live)
-            for (auto it = frames_.begin(); it != frames_.end(); ++it)
-                if (it->second->stage == Frame::Stage::done)
-                    ready = it;
-        if (ready == frames_.end() || ready->second->stage != Frame::Stage::done || is_early(*ready->second))
-            return std::nullopt;
-        if (outputs_are_full && !settings_.live) // waits for the outputs, and the source has to wait, too
-            return std::nullopt;
-        std::unique_ptr<Frame> frame = std::move(ready->second);
-        frames_.erase(ready);
-        if (settings_.live)
-            drop_overtaken(frame->record.sequence);
-        if (!outputs_are_full)
-            return Show{std::move(frame)};
-        ++statistics_.dropped["output"];
-        finish(*frame, false, clock_.now());
-    }
+std::optional<FrameFlow::Action> FrameFlow::show(const Intakes &intakes) {
+    // The oldest frame; in mode live, the newest frame that is done.
+    auto ready = frames_.begin();
+    if (settings_.live)
+        for (auto it = frames_.begin(); it != frames_.end(); ++it)
+            if (it->second->stage == Frame::Stage::done)
+                ready = it;
+    if (ready == frames_.end() || ready->second->stage != Frame::Stage::done || is_early(*ready->second))
+        return std::nullopt;
+    if (intakes.outputs_are_full && !settings_.live) // waits for the outputs, and the source has to wait, too
+        return std::nullopt;
+    std::unique_ptr<Frame> frame = std::move(ready->second);
+    frames_.erase(ready);
+    if (settings_.live)
+        drop_overtaken(frame->record.sequence);
+    if (!intakes.outputs_are_full)
+        return Show{std::move(frame)};
+    ++statistics_.dropped["output"];
+    finish(*frame, false, clock_.now());
+    frame.reset();
+    return next(intakes); // its slots are free
 }
 
 // Whether a frame of a film must wait because the run is paced. A run that is too slow for the film shows the
@@ -341,7 +341,7 @@ void FrameFlow::finish(Frame &frame, bool is_shown, Clock::time_point when) {
     statistics_.augmented += is_shown && frame.has_overlay();
     statistics_.last_frame = when;
     const Clock::duration latency = when - frame.captured;
-    statistics_.stages.add("latency", latency);
+    statistics_.stages.add("latency", latency, when);
     if (settings_.has_timeline && is_shown) {
         FrameTimes &times = statistics_.timeline.emplace_back(frame.times);
         times.frame = frame.record.sequence;

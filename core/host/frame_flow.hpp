@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Takes each frame from the source to the outputs: decides which frame goes to which component and when, and which
-// frames are dropped. Events go in: a frame has arrived, a component has answered or has died. Actions come out:
-// read, track, render, show. Neither starts processes nor accesses the memory of frames, and takes the time from a
-// clock.
+// Decides which frame goes to which component and when, and which frames are dropped. Events go in: a frame has
+// arrived, a component has answered or has died. Actions come out: read, track, render, show. FrameFlow starts no
+// process, does not access the memory of frames, and takes the time from a clock.
 //
 // In mode lockstep, every frame passes through all stages, and frames are shown in order; after the death of a
 // worker, its frames are processed again. In mode live, a newer frame replaces a frame that is still waiting, and
@@ -30,7 +29,7 @@ public:
         bool live = false;
         bool has_source = true; // otherwise the frames are those of `trajectory`
         bool has_tracker = false, has_raytracer = false;
-        std::uint64_t max_frames = 0;               // 0: no limit
+        std::uint64_t max_frames = 0;               // 0: no limit; always set without a source
         std::chrono::milliseconds max_latency{500}; // mode live: of a frame in a worker, before others pass it
         bool has_timeline = false;
         const camera::Trajectory *trajectory = nullptr;   // cameras to use instead of the tracker's
@@ -104,9 +103,9 @@ public:
 
     // ---- state -------------------------------------------------------------------------------------
     void set_rate(double fps) { fps_ = fps; } // of the source; 0: unknown
-    // Mode lockstep: shows films at the rate of their time stamps.
+    // Mode lockstep: shows recorded video at the rate of its time stamps.
     void set_paced(bool paced) { paced_ = paced; }
-    void set_frozen(bool frozen) { frozen_ = frozen; } // no further frames are shown
+    void set_frozen(bool frozen) { frozen_ = frozen; } // no further frames are taken from the source
     bool is_frozen() const { return frozen_; }
     std::uint64_t next_read() const { return next_read_; } // number of the next frame of the source
     bool input_has_ended() const { return input_ended_; }
@@ -144,7 +143,7 @@ private:
     bool read_from_trajectory(const Intake &source);
     std::optional<Action> track(const Intake &tracker);
     std::optional<Action> render(const Intake &raytracer);
-    std::optional<Action> show(bool outputs_are_full);
+    std::optional<Action> show(const Intakes &intakes);
 
     bool skips(const Intake &intake) const;
     void start(std::unique_ptr<Frame> frame);

@@ -62,7 +62,7 @@ private:
                                const model::PluginDescription &plugin);
     void on_running(SinkQueue &sink);
     void on_result(SinkQueue &sink, const ipc::Command &command, const ipc::Result &result);
-    void end_sink(SinkQueue &sink); // the sink has returned ARHOST_STATUS_END
+    void end_sink(SinkQueue &sink); // the sink has ended
     void close_sink(SinkQueue &sink);
     void end_without_sinks(); // ends the run if all outputs are closed
 

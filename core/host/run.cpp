@@ -97,7 +97,7 @@ bool Run::run() {
 }
 
 void Run::pump() {
-    if (killed_ || failures_.end_run())
+    if (killed_ || failures_.ends_run())
         return kill_components();
     if (phase_ < Phase::running)
         start_next();

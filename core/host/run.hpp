@@ -29,6 +29,8 @@ public:
         bool checks_frames = false;
     };
     Run(const run_config::Configuration &configuration, const supervise::Context &context, Options options);
+    Run(const Run &) = delete;
+    Run &operator=(const Run &) = delete;
 
     // Runs until all frames are output. Returns false if the run failed or a component was disabled.
     bool run();

@@ -16,7 +16,7 @@
 
 namespace arhost::host {
 
-// Counts the frame's targets.
+// Counts the frame's targets and its search.
 void count_targets(const Frame &frame, Statistics &statistics);
 
 class Sightings {

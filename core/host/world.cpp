@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/world.hpp"
 
+#include "host/frame.hpp"
+
 #include <glm/gtc/matrix_inverse.hpp>
 #include <glm/gtc/type_ptr.hpp>
 
@@ -24,7 +26,6 @@ glm::dmat4 product(const glm::dmat4 &a, const glm::dmat4 &b) {
 
 std::optional<std::array<double, 16>> World::locate(const std::string &first, std::span<const arhost_target> targets,
                                                     std::uint64_t frame, std::uint64_t grace_frames) {
-    const auto is_visible = [](const arhost_target &target) { return target.state != ARHOST_TARGET_LOST; };
     std::array<double, 16> world;
     if (const auto own = std::ranges::find_if(
             targets, [&](const auto &target) { return is_visible(target) && target.name == first; });

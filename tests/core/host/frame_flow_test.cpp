@@ -81,7 +81,8 @@ struct Bench {
         };
         intakes.source = {source, source_slots.get()};
         intakes.tracker = {state(tracker, in_tracker.size(), 1), stage_slots.get()};
-        intakes.raytracer = {state(raytracer, in_raytracer.size(), raytracer_limit), overlay_slots.get()};
+        intakes.raytracer = {state(raytracer, in_raytracer.size(), raytracer_limit), overlay_slots.get(),
+                             anchor_slots.get()};
         intakes.outputs_are_full = outputs_are_full;
         return intakes;
     }
@@ -94,6 +95,9 @@ struct Bench {
         frame->record.clock = ARHOST_CLOCK_MEDIA;
         frame->record.capture_ns = capture_ns;
         frame->captured = clock.now();
+        frame->recorded = flow.recorded(frame->record.sequence);
+        if (flow.repeats_decisions(*frame))
+            cameras.set_from_recording(*frame);
         flow.on_arrived(std::move(frame));
     }
     // The tracker answers for its frame; `sees_target`: it has found the target 'desk'.
@@ -134,7 +138,7 @@ struct Bench {
     FrameFlow flow;
     std::shared_ptr<SlotPool> source_slots = std::make_shared<SlotPool>(std::size_t{8}),
                               stage_slots = std::make_shared<SlotPool>(std::size_t{4}),
-                              overlay_slots = std::make_shared<SlotPool>(std::size_t{4});
+                              overlay_slots = std::make_shared<SlotPool>(std::size_t{4}), anchor_slots;
     Readiness source = Readiness::ready, tracker = Readiness::ready, raytracer = Readiness::ready;
     std::size_t raytracer_limit = 2;
     bool outputs_are_full = false;
@@ -218,7 +222,8 @@ TEST(FrameFlow, WaitsForTheOutputsAndThenTheSourceHasToWait) {
     EXPECT_THAT(bench.go(), IsEmpty());
     EXPECT_TRUE(bench.pending.empty()) << "all slots of the source are in use";
     bench.outputs_are_full = false;
-    EXPECT_THAT(bench.go(), testing::Contains("show 7"));
+    EXPECT_THAT(bench.go(), testing::IsSupersetOf(
+                                {"show 0", "show 1", "show 2", "show 3", "show 4", "show 5", "show 6", "show 7"}));
     EXPECT_TRUE(bench.statistics.dropped.empty());
 }
 
@@ -279,6 +284,8 @@ TEST(FrameFlow, IgnoresAReadAfterOneThatFailed) {
     bench.flow.take_read();
     bench.flow.read_again(0);
     EXPECT_FALSE(bench.flow.expects(1));
+    bench.flow.take_read();
+    EXPECT_THAT(bench.go(), ElementsAre("read 0", "read 1"));
 }
 
 TEST(FrameFlow, EndsAtTheLimitOfFrames) {
@@ -314,6 +321,85 @@ TEST(FrameFlow, GivesAFrameInAReplacedSceneTheCameraOfTheNewAxes) {
     EXPECT_NEAR(bench.flow.find(0)->record.camera.eye[1], 500, 1e-9) << "z up has become y up";
 }
 
+TEST(FrameFlow, KeepsNoSlotOfAnOverlayIfNoneForAnchorsIsFree) {
+    Bench bench(lockstep());
+    bench.anchor_slots = std::make_shared<SlotPool>(std::size_t{1});
+    arrive(bench, 2);
+    bench.go();
+    bench.tracked();
+    EXPECT_THAT(bench.go(), ElementsAre("track 1", "render 0"));
+    bench.tracked();
+    EXPECT_THAT(bench.go(), IsEmpty());
+    bench.rendered();
+    EXPECT_THAT(bench.go(), testing::IsSupersetOf({"render 1", "show 0+"}));
+    std::vector<Lease> free;
+    while (auto slot = bench.overlay_slots->acquire())
+        free.push_back(std::move(*slot));
+    EXPECT_EQ(free.size(), 3u) << "frame 1 has the fourth";
+}
+
+TEST(FrameFlow, CountsTheDeathsOfEachWorkerApart) {
+    Bench bench(lockstep());
+    arrive(bench, 1);
+    bench.go();
+    bench.tracker_dies();
+    bench.go();
+    bench.tracked();
+    bench.go();
+    bench.raytracer_dies();
+    EXPECT_THAT(bench.go(), ElementsAre("render 0"));
+}
+
+// ---- recordings -----------------------------------------------------------------------------------------
+
+TEST(FrameFlow, TakesItsFramesFromATrajectoryIfThereIsNoSource) {
+    arhost::camera::Trajectory trajectory;
+    for (const std::uint64_t frame : {0, 3, 4})
+        trajectory.frames.push_back(
+            {frame, std::int64_t(frame) * 10, arhost::camera::View{{0, 0, 500}, {}, {0, 1, 0}}});
+    FrameFlow::Settings settings;
+    settings.has_source = false;
+    settings.has_raytracer = true;
+    settings.trajectory = &trajectory;
+    settings.max_frames = 4;
+    Bench bench(settings);
+    EXPECT_THAT(bench.go(), ElementsAre("render 0", "render 3")) << "the recorded run has dropped frames 1 and 2";
+    EXPECT_EQ(bench.flow.find(3)->record.capture_ns, 30);
+    EXPECT_FALSE(bench.flow.expects_more_frames()) << "frame 4 is beyond the limit";
+    bench.rendered();
+    bench.rendered();
+    EXPECT_THAT(bench.go(), ElementsAre("show 0+", "show 3+"));
+    EXPECT_TRUE(bench.flow.is_empty());
+}
+
+TEST(FrameFlow, RepeatsTheDecisionsOfARecordedRun) {
+    arhost::run_config::Recording recording;
+    for (const arhost_overlay overlay : {ARHOST_OVERLAY_RENDERED, ARHOST_OVERLAY_NONE})
+        recording.frames.push_back({.number = recording.frames.size(),
+                                    .capture_ns = 0,
+                                    .clock = ARHOST_CLOCK_MEDIA,
+                                    .overlay = overlay,
+                                    .scale = 1,
+                                    .samples = 0,
+                                    .targets = {},
+                                    .observations = {},
+                                    .view = arhost::camera::View{{0, 0, 500}, {}, {0, 1, 0}},
+                                    .truth = {}});
+    for (const bool repeats : {true, false}) {
+        recording.repeats_decisions = repeats;
+        FrameFlow::Settings settings = lockstep();
+        settings.recording = &recording;
+        Bench bench(settings);
+        bench.go();
+        bench.arrive();
+        bench.arrive();
+        if (repeats)
+            EXPECT_THAT(bench.go(), ElementsAre("read 2", "read 3", "render 0")) << "frame 1 had no overlay";
+        else
+            EXPECT_THAT(bench.go(), ElementsAre("read 2", "read 3", "track 0"));
+    }
+}
+
 // ---- paced ----------------------------------------------------------------------------------------------
 
 TEST(FrameFlow, ShowsAFilmAtItsOwnRate) {
@@ -343,6 +429,7 @@ TEST(FrameFlow, DoesNotCatchUpMoreThanAMomentOfAFilm) {
     EXPECT_THAT(bench.go(), testing::Contains("show 1"));
     bench.arrive(80'000'000);
     EXPECT_THAT(bench.go(), testing::Not(testing::Contains("show 2")));
+    ASSERT_TRUE(bench.flow.due());
     EXPECT_EQ(*bench.flow.due() - bench.clock.now(), 40ms);
 }
 
@@ -414,7 +501,18 @@ TEST(FrameFlow, PassesFramesWhileAWorkerRestarts) {
     bench.tracker = Readiness::down;
     bench.tracker_dies();
     EXPECT_THAT(bench.go(), ElementsAre("show 0"));
-    EXPECT_EQ(bench.statistics.skipped["tracker"], 1u);
+    bench.arrive();
+    EXPECT_THAT(bench.go(), testing::Contains("show 1"));
+    EXPECT_EQ(bench.statistics.skipped["tracker"], 2u);
+}
+
+TEST(FrameFlow, LetsFramesWaitWhileAComponentIsReplaced) {
+    Bench bench(live());
+    bench.tracker = Readiness::busy;
+    arrive(bench, 1);
+    EXPECT_THAT(bench.go(), testing::Not(testing::Contains("show 0")));
+    bench.tracker = Readiness::ready;
+    EXPECT_THAT(bench.go(), ElementsAre("track 0"));
 }
 
 TEST(FrameFlow, PassesFramesWhileOneIsInAWorkerForTooLong) {
@@ -451,6 +549,16 @@ TEST(FrameFlow, DropsAFrameIfAllOutputsAreFull) {
     EXPECT_TRUE(bench.flow.is_empty());
     EXPECT_EQ(bench.statistics.dropped["output"], 1u);
     EXPECT_EQ(bench.statistics.composited, 0u);
+}
+
+TEST(FrameFlow, ReadsAgainOnceADroppedFrameHasFreedItsSlot) {
+    Bench bench(live());
+    bench.source_slots = std::make_shared<SlotPool>(std::size_t{1});
+    bench.outputs_are_full = true;
+    arrive(bench, 1);
+    bench.go();
+    bench.tracked(false);
+    EXPECT_THAT(bench.go(), ElementsAre("read 1"));
 }
 
 TEST(FrameFlow, DropsTheFramesOfAFrozenCamera) {
