@@ -248,14 +248,8 @@ void Assembly::retire(std::unique_ptr<Stage> stage) {
     retired_.push_back(std::move(stage));
 }
 
-void Assembly::remove_ended(ComponentTotals &totals) {
-    std::erase_if(retired_, [&](const auto &stage) {
-        if (!has_ended(stage->component()))
-            return false;
-        totals.add(stage->component());
-        parts_.options.forget(stage->component());
-        return true;
-    });
+void Assembly::remove_ended() {
+    std::erase_if(retired_, [this](const auto &stage) { return parts_.take_if_ended(stage->component()); });
 }
 
 } // namespace arhost::host

@@ -4,7 +4,6 @@
 // scene while the video runs.
 #pragma once
 
-#include "host/component_totals.hpp"
 #include "host/raytracer.hpp"
 #include "host/source.hpp"
 #include "host/tracker.hpp"
@@ -56,8 +55,7 @@ public:
     };
     Exchanged finish_swaps();
     bool has_retired() const { return !retired_.empty(); } // replaced components that have not ended yet
-    // Removes replaced components that have ended, and adds them to `totals`.
-    void remove_ended(ComponentTotals &totals);
+    void remove_ended();                                   // the replaced components that have ended
 
 private:
     std::unique_ptr<SceneLoading> load(const run_config::Scene &scene,

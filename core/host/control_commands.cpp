@@ -88,10 +88,7 @@ void Commands::execute(const control::Snapshot &, const control::Done &done) {
 }
 
 void Commands::execute(const control::Record &record, const control::Done &done) {
-    if (record.on.value_or(!outputs_.is_recording()))
-        outputs_.start_recording(done);
-    else
-        outputs_.stop_recording(done);
+    outputs_.set_recording(record.on, done);
 }
 
 Component &Commands::running_component(const std::string &name) const {

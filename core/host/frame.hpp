@@ -58,6 +58,12 @@ struct Frame {
     FrameTimes times; // `shown` and `latency` are not set here
 
     bool in_worker() const { return stage == Stage::tracking || stage == Stage::rendering; }
+    // Returns the memory of components that have not finished the frame.
+    void release_results() {
+        result = Lease();
+        anchors = Lease();
+        overlay = Lease();
+    }
     bool has_overlay() const { return record.overlay != ARHOST_OVERLAY_NONE; }
 };
 

@@ -118,21 +118,13 @@ bool FrameFlow::is_behind() const {
 // ---- frames → tracker -----------------------------------------------------------------------------------
 
 std::optional<FrameFlow::Action> FrameFlow::track(const Intake &tracker) {
-    for (Frame *frame = nullptr; (frame = next_waiting(Frame::Stage::to_track));) {
-        if (skips(tracker)) {
-            on_failed(*frame, "tracker");
-            continue;
-        }
-        if (tracker.readiness != Readiness::ready)
-            break;
-        std::optional<Lease> slot = tracker.slots->acquire();
-        if (!slot)
-            break;
-        frame->result = std::move(*slot);
-        frame->stage = Frame::Stage::tracking;
-        return Track{*frame};
-    }
-    return std::nullopt;
+    Frame *const frame = next_for(Frame::Stage::to_track, tracker);
+    std::optional<Lease> slot = frame ? tracker.slots->acquire() : std::nullopt;
+    if (!slot)
+        return std::nullopt;
+    frame->result = std::move(*slot);
+    frame->stage = Frame::Stage::tracking;
+    return Track{*frame};
 }
 
 Frame *FrameFlow::answered(std::uint64_t sequence) {
@@ -177,23 +169,17 @@ void FrameFlow::on_coordinates_changed() {
 }
 
 std::optional<FrameFlow::Action> FrameFlow::render(const Intake &raytracer) {
-    for (Frame *frame = nullptr; (frame = next_waiting(Frame::Stage::to_render));) {
-        if (skips(raytracer)) {
-            on_failed(*frame, "raytracer");
-            continue;
-        }
-        if (raytracer.readiness != Readiness::ready)
-            break;
-        std::optional<Lease> slot = raytracer.slots->acquire(),
-                             anchors = raytracer.anchors ? raytracer.anchors->acquire() : Lease();
-        if (!slot || !anchors)
-            break;
-        frame->overlay = std::move(*slot);
-        frame->anchors = std::move(*anchors);
-        frame->stage = Frame::Stage::rendering;
-        return Render{*frame};
-    }
-    return std::nullopt;
+    Frame *const frame = next_for(Frame::Stage::to_render, raytracer);
+    if (!frame)
+        return std::nullopt;
+    std::optional<Lease> slot = raytracer.slots->acquire(),
+                         anchors = raytracer.anchors ? raytracer.anchors->acquire() : Lease();
+    if (!slot || !anchors)
+        return std::nullopt;
+    frame->overlay = std::move(*slot);
+    frame->anchors = std::move(*anchors);
+    frame->stage = Frame::Stage::rendering;
+    return Render{*frame};
 }
 
 void FrameFlow::on_rendered(Frame &frame, std::chrono::nanoseconds busy) {
@@ -205,10 +191,16 @@ void FrameFlow::on_rendered(Frame &frame, std::chrono::nanoseconds busy) {
 
 // ---- waiting for a component, passing without it --------------------------------------------------------
 
-Frame *FrameFlow::next_waiting(Frame::Stage stage) {
-    for (const auto &[sequence, frame] : frames_)
-        if (frame->stage == stage)
-            return frame.get();
+// Returns the oldest frame that waits for a component, if the component takes one. Lets frames pass that need not
+// wait.
+Frame *FrameFlow::next_for(Frame::Stage waiting, const Intake &intake) {
+    for (const auto &[sequence, frame] : frames_) {
+        if (frame->stage != waiting)
+            continue;
+        if (!skips(intake))
+            return intake.readiness == Readiness::ready ? frame.get() : nullptr;
+        on_failed(*frame, name_of(waiting));
+    }
     return nullptr;
 }
 
@@ -239,9 +231,7 @@ bool FrameFlow::skips(const Intake &intake) const {
 }
 
 void FrameFlow::on_failed(Frame &frame, const char *stage) {
-    frame.result = Lease();
-    frame.anchors = Lease();
-    frame.overlay = Lease();
+    frame.release_results();
     frame.record.overlay = ARHOST_OVERLAY_NONE;
     frame.stage = Frame::Stage::done;
     ++statistics_.skipped[stage];
@@ -253,9 +243,7 @@ void FrameFlow::on_lost(Frame::Stage waiting, std::span<const std::uint64_t> una
         if (found == frames_.end())
             continue;
         Frame &frame = *found->second;
-        frame.result = Lease();
-        frame.anchors = Lease();
-        frame.overlay = Lease();
+        frame.release_results();
         const bool was_processed = &sequence == &unanswered.front();
         if (frame.overtaken)
             frames_.erase(found);

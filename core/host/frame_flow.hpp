@@ -149,7 +149,7 @@ private:
     void start(std::unique_ptr<Frame> frame);
     void on_camera_known(Frame &frame);
     void enqueue(Frame &frame, Frame::Stage stage);
-    Frame *next_waiting(Frame::Stage stage);
+    Frame *next_for(Frame::Stage waiting, const Intake &intake);
     bool is_behind() const;
     bool is_early(const Frame &frame);
     void finish(Frame &frame, bool is_shown, Clock::time_point when);

@@ -289,14 +289,9 @@ void Outputs::stop_waiting() {
             sink->component->cancel_call();
 }
 
-void Outputs::remove_ended(ComponentTotals &totals) {
-    std::erase_if(sinks_, [&](const auto &sink) {
-        if (!sink->on_demand || !has_ended(*sink->component))
-            return false;
-        totals.add(*sink->component);
-        parts_.options.forget(*sink->component);
-        return true;
-    });
+void Outputs::remove_ended() {
+    std::erase_if(sinks_,
+                  [this](const auto &sink) { return sink->on_demand && parts_.take_if_ended(*sink->component); });
 }
 
 // ---- outputs that commands start ------------------------------------------------------------------------
@@ -309,27 +304,22 @@ void Outputs::take_snapshot(const control::Done &done) {
     sink.offer(last_frame_);
 }
 
-SinkQueue *Outputs::recording() const {
+void Outputs::set_recording(std::optional<bool> on, const control::Done &done) {
     const auto active = std::ranges::find_if(sinks_, [](const auto &sink) {
         return sink->on_demand && sink->component->name() == "record" && !sink->ending;
     });
-    return active == sinks_.end() ? nullptr : active->get();
-}
-
-void Outputs::start_recording(const control::Done &done) {
-    if (is_recording())
-        throw control::Error("a recording is already in progress");
-    start_output(*parts_.configuration.record, "record", done);
-}
-
-void Outputs::stop_recording(const control::Done &done) {
-    SinkQueue *const sink = recording();
-    if (!sink)
-        throw control::Error("there is no recording to stop");
-    if (!sink->component->running())
+    const bool is_recording = active != sinks_.end();
+    if (on.value_or(!is_recording) == is_recording)
+        throw control::Error(is_recording ? "a recording is already in progress" : "there is no recording to stop");
+    if (!is_recording) {
+        start_output(*parts_.configuration.record, "record", done);
+        return;
+    }
+    SinkQueue &sink = **active;
+    if (!sink.component->running())
         throw control::Error("the recording is starting; retry when it has started");
-    sink->done = done;
-    sink->ending = true;
+    sink.done = done;
+    sink.ending = true;
 }
 
 SinkQueue &Outputs::start_output(const run_config::ComponentConfiguration &output, const std::string &name,

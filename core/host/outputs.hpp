@@ -4,7 +4,6 @@
 #pragma once
 
 #include "base/listening_socket.hpp"
-#include "host/component_totals.hpp"
 #include "host/compositing.hpp"
 #include "host/run_parts.hpp"
 #include "host/sink_queue.hpp"
@@ -35,13 +34,11 @@ public:
     bool have_written_all() const;
     void stop();
     void stop_waiting(); // lets sinks return that wait for their receivers
-    void remove_ended(ComponentTotals &totals);
+    void remove_ended(); // the outputs that commands have started, and that have ended
 
     // ---- outputs that commands start; each throws control::Error -----------------------------------
     void take_snapshot(const control::Done &done);
-    void start_recording(const control::Done &done);
-    void stop_recording(const control::Done &done);
-    bool is_recording() const { return recording() != nullptr; }
+    void set_recording(std::optional<bool> on, const control::Done &done); // nullopt: toggle
 
     const std::vector<std::unique_ptr<SinkQueue>> &sinks() const { return sinks_; }
 
@@ -53,7 +50,6 @@ private:
     SinkQueue &start_output(const run_config::ComponentConfiguration &output, const std::string &name,
                             const control::Done &done);
     std::filesystem::path free_path(const std::filesystem::path &pattern) const;
-    SinkQueue *recording() const;
     supervise::Component::Create on_hello(SinkQueue &sink, const model::PluginDescription &plugin,
                                           std::size_t candidate);
     std::vector<int> open_sockets(const run_config::ComponentConfiguration &output,

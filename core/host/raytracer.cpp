@@ -31,30 +31,23 @@ ImageView overlay_of(const Frame &frame, const arhost_frame_format &format) {
 
 Raytracer::Raytracer(const RunParts &parts, Configuration configuration, std::shared_ptr<LoadedScene> scene,
                      Abandon abandon)
-    : Stage(parts, Frame::Stage::to_render, parts.live() ? 1 : 2), configuration_(std::move(configuration)),
-      scene_(std::move(scene)) {
+    : Stage(parts, "raytracer", *configuration, Frame::Stage::to_render, parts.live() ? 1 : 2, std::move(abandon)),
+      configuration_(std::move(configuration)), scene_(std::move(scene)) {
     if (const std::size_t count = scene_->anchors.size(); count > 0)
         anchor_slots_ = std::make_shared<SlotPool>(
             supervise::make_host_region("arhost-anchors", {count * sizeof(AnchorPose), stage_slot_count}));
-    Component::Callbacks callbacks = parts.callbacks("raytracer", configuration_->node);
-    callbacks.hello = [this](const PluginDescription &plugin, std::size_t candidate) {
-        return on_hello(plugin, candidate);
-    };
-    callbacks.ready = [this](const messages::Ready &) {
-        const arhost_frame_format &format = parts_.video.format;
-        return SlotLayout{std::uint64_t(overlay_stride(format.width)) * format.height, stage_slot_count};
-    };
-    callbacks.running = [this] { start_quality(); };
-    callbacks.result = [this](const Command &command, const Result &result) { on_result(command, result); };
-    callbacks.disabled = [this, abandon = std::move(abandon),
-                          report = callbacks.disabled](const std::string &reason, bool is_configuration_error) {
-        if (!abandon(*this, reason))
-            report(reason, is_configuration_error);
-    };
-    make_component("raytracer", *configuration_, std::move(callbacks));
 }
 
-Component::Create Raytracer::on_hello(const PluginDescription &plugin, std::size_t candidate) const {
+SlotLayout Raytracer::on_ready(const messages::Ready &) {
+    const arhost_frame_format &format = parts_.video.format;
+    return {std::uint64_t(overlay_stride(format.width)) * format.height, stage_slot_count};
+}
+
+void Raytracer::on_disabled(const std::string &reason, bool is_configuration_error) {
+    parts_.failures.add_disabled("raytracer", configuration_->node, reason, is_configuration_error);
+}
+
+Component::Create Raytracer::on_hello(const PluginDescription &plugin, std::size_t candidate) {
     const Video &video = parts_.video;
     std::vector<OptionValue> options =
         parts_.options.choose(component(), ARHOST_KIND_RAYTRACER, *configuration_, candidate);

@@ -31,7 +31,7 @@ public:
     Raytracer(const RunParts &parts, Configuration configuration, std::shared_ptr<LoadedScene> scene,
               Abandon abandon);
 
-    FrameFlow::Intake intake() const;
+    FrameFlow::Intake intake() const override;
     void render(Frame &frame);
     // From now on, its images count. `previous`: the stage that it replaces, or null.
     void take_over(const Raytracer *previous);
@@ -41,8 +41,11 @@ public:
     const std::shared_ptr<LoadedScene> &scene() const { return scene_; }
 
 private:
-    supervise::Component::Create on_hello(const model::PluginDescription &plugin, std::size_t candidate) const;
-    void on_result(const ipc::Command &command, const ipc::Result &result);
+    supervise::Component::Create on_hello(const model::PluginDescription &plugin, std::size_t candidate) override;
+    ipc::SlotLayout on_ready(const ipc::messages::Ready &ready) override;
+    void on_running() override { start_quality(); }
+    void on_result(const ipc::Command &command, const ipc::Result &result) override;
+    void on_disabled(const std::string &reason, bool is_configuration_error) override;
     void start_quality();
     void request_samples(std::uint32_t samples);
     void write_anchors(const Frame &frame) const;

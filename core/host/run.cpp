@@ -43,7 +43,7 @@ Run::Run(const run_config::Configuration &configuration, const supervise::Contex
       options_(std::move(options)), failures_(context_.log), component_options_(context_.log),
       cameras_(configuration.trajectory ? &*configuration.trajectory : nullptr),
       flow_(settings_of(configuration), context_.reactor.clock(), cameras_, statistics_),
-      parts_{configuration, context_, statistics_, failures_, component_options_, cameras_, flow_, video_},
+      parts_{configuration, context_, statistics_, failures_, component_options_, totals_, cameras_, flow_, video_},
       sightings_(configuration, context_.reactor.clock(), context_.log, statistics_),
       assembly_(parts_, sightings_,
                 [this](const FileWatch::Files &files) {
@@ -141,8 +141,8 @@ void Run::run_frames() {
         std::visit([this](auto &each) { execute(each); }, *action);
     }
     due_ = flow_.due() ? context_.reactor.at(*flow_.due(), [] {}) : Reactor::Registration(); // wakes this run
-    assembly_.remove_ended(totals_);
-    outputs_.remove_ended(totals_);
+    assembly_.remove_ended();
+    outputs_.remove_ended();
     if (edits_)
         edits_->apply();
     outputs_.pump();

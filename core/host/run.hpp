@@ -71,6 +71,7 @@ private:
     Statistics statistics_;
     Failures failures_;
     ComponentOptions component_options_;
+    ComponentTotals totals_;
     Cameras cameras_;
     FrameFlow flow_;
     Video video_;
@@ -80,7 +81,6 @@ private:
     Outputs outputs_;
     Commands commands_;
     std::optional<Edits> edits_;
-    ComponentTotals totals_; // of the components that have ended before the run
 
     Phase phase_ = Phase::starting_stages;
     bool killed_ = false; // the run must end immediately

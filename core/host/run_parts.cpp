@@ -29,8 +29,12 @@ std::shared_ptr<SlotPool> slots_of(const Component &component) {
     return component.output() ? std::make_shared<SlotPool>(component.output()) : nullptr;
 }
 
-bool has_ended(const Component &component) {
-    return component.state() == Component::State::stopped || component.state() == Component::State::disabled;
+bool RunParts::take_if_ended(const Component &component) const {
+    if (component.state() != Component::State::stopped && component.state() != Component::State::disabled)
+        return false;
+    totals.add(component);
+    options.forget(component);
+    return true;
 }
 
 std::vector<std::uint64_t> sequences_of(const std::vector<Command> &commands) {

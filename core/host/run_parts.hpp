@@ -5,6 +5,7 @@
 
 #include "host/cameras.hpp"
 #include "host/component_options.hpp"
+#include "host/component_totals.hpp"
 #include "host/failures.hpp"
 #include "host/frame_flow.hpp"
 
@@ -24,12 +25,15 @@ struct RunParts {
     Statistics &statistics;
     Failures &failures;
     ComponentOptions &options;
+    ComponentTotals &totals; // of the components that have ended before the run
     Cameras &cameras;
     FrameFlow &flow;
     Video &video;
 
     bool live() const { return configuration.mode == run_config::Mode::live; }
     std::int64_t now_ns() const { return base::to_ns(context.reactor.now()); }
+    // If the component has stopped, or will not be restarted, keeps its totals and returns true.
+    bool take_if_ended(const supervise::Component &component) const;
     void log(arhost_severity severity, const std::string &text) const { context.log(severity, "arhost", text); }
 
     // Returns callbacks that report failures of the component `name`; the others do nothing.
@@ -38,9 +42,6 @@ struct RunParts {
 
 // The memory that a component's worker writes; null if there is none.
 std::shared_ptr<SlotPool> slots_of(const supervise::Component &component);
-
-// Whether the component has stopped, or will not be restarted.
-bool has_ended(const supervise::Component &component);
 
 std::vector<std::uint64_t> sequences_of(const std::vector<ipc::Command> &commands);
 

@@ -7,17 +7,29 @@ using namespace ipc;
 using namespace model;
 using supervise::Component;
 
-void Stage::make_component(const char *name, const run_config::ComponentConfiguration &configuration,
-                           Component::Callbacks callbacks) {
-    callbacks.running = [this, on_running = callbacks.running] {
+Stage::Stage(const RunParts &parts, const char *name, const run_config::ComponentConfiguration &configuration,
+             Frame::Stage waiting, std::size_t max_in_flight, Abandon abandon)
+    : parts_(parts), max_in_flight_(max_in_flight) {
+    Component::Callbacks callbacks = parts.callbacks(name, configuration.node);
+    callbacks.hello = [this](const PluginDescription &plugin, std::size_t candidate) {
+        return on_hello(plugin, candidate);
+    };
+    callbacks.ready = [this](const messages::Ready &ready) { return on_ready(ready); };
+    callbacks.running = [this] {
         slots_ = slots_of(*component_);
         on_running();
     };
-    callbacks.lost = [this](const std::vector<Command> &unanswered) {
+    callbacks.result = [this](const Command &command, const Result &result) { on_result(command, result); };
+    callbacks.lost = [this, waiting](const std::vector<Command> &unanswered) {
         slots_.reset();
-        parts_.flow.on_lost(waiting_, sequences_of(unanswered));
+        parts_.flow.on_lost(waiting, sequences_of(unanswered));
     };
-    component_ = std::make_unique<Component>(parts_.context, name, configuration.plugins, configuration.limits,
+    callbacks.disabled = [this, abandon = std::move(abandon)](const std::string &reason,
+                                                              bool is_configuration_error) {
+        if (!abandon(*this, reason))
+            on_disabled(reason, is_configuration_error);
+    };
+    component_ = std::make_unique<Component>(parts.context, name, configuration.plugins, configuration.limits,
                                              configuration.policy, std::move(callbacks));
 }
 

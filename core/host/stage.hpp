@@ -20,17 +20,22 @@ public:
     supervise::Component &component() const { return *component_; }
     bool running() const { return component_->running(); }
     void start() { component_->start(); }
-    FrameFlow::Intake intake() const;
+    virtual FrameFlow::Intake intake() const;
 
     control::Done swapped; // answers the command that has started this stage as the successor of another one
 
 protected:
-    Stage(const RunParts &parts, Frame::Stage waiting, std::size_t max_in_flight)
-        : parts_(parts), waiting_(waiting), max_in_flight_(max_in_flight) {}
+    // `waiting`: stage of a frame that waits for this one. `max_in_flight`: frames that the worker gets at a time.
+    Stage(const RunParts &parts, const char *name, const run_config::ComponentConfiguration &configuration,
+          Frame::Stage waiting, std::size_t max_in_flight, Abandon abandon);
 
-    // Adds what the stages have in common to `callbacks`, and creates the component.
-    void make_component(const char *name, const run_config::ComponentConfiguration &configuration,
-                        supervise::Component::Callbacks callbacks);
+    // As in supervise::Component::Callbacks.
+    virtual supervise::Component::Create on_hello(const model::PluginDescription &plugin, std::size_t candidate) = 0;
+    virtual ipc::SlotLayout on_ready(const ipc::messages::Ready &ready) = 0;
+    virtual void on_running() {}
+    virtual void on_result(const ipc::Command &command, const ipc::Result &result) = 0;
+    virtual void on_disabled(const std::string &reason, bool is_configuration_error) = 0;
+
     // Returns the frame that was answered successfully. Otherwise returns nullptr, and the frame passes without this
     // stage.
     Frame *accept(const ipc::Command &command, const ipc::Result &result);
@@ -39,7 +44,6 @@ protected:
     std::shared_ptr<SlotPool> slots_; // of the current worker; null unless it is running
 
 private:
-    const Frame::Stage waiting_; // of a frame that waits for this one
     const std::size_t max_in_flight_;
     std::unique_ptr<supervise::Component> component_;
 };

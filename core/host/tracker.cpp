@@ -45,23 +45,11 @@ std::optional<yaml::Node> quoted_target(const std::string &message, const run_co
 
 // A tracker processes one frame at a time, because a frame needs the state after the previous one.
 Tracker::Tracker(const RunParts &parts, Sightings &sightings, Configuration configuration, Abandon abandon)
-    : Stage(parts, Frame::Stage::to_track, 1), sightings_(sightings), configuration_(std::move(configuration)),
-      targets_(to_memory(configuration_->targets)), family_count_(families_of(configuration_->targets).size()) {
-    Component::Callbacks callbacks = parts.callbacks("tracker", configuration_->node);
-    callbacks.hello = [this](const PluginDescription &plugin, std::size_t candidate) {
-        return on_hello(plugin, candidate);
-    };
-    callbacks.ready = [this](const messages::Ready &ready) { return on_ready(ready); };
-    callbacks.result = [this](const Command &command, const Result &result) { on_result(command, result); };
-    callbacks.disabled = [this, abandon = std::move(abandon)](const std::string &reason,
-                                                              bool is_configuration_error) {
-        if (!abandon(*this, reason))
-            on_disabled(reason, is_configuration_error);
-    };
-    make_component("tracker", *configuration_, std::move(callbacks));
-}
+    : Stage(parts, "tracker", *configuration, Frame::Stage::to_track, 1, std::move(abandon)), sightings_(sightings),
+      configuration_(std::move(configuration)), targets_(to_memory(configuration_->targets)),
+      family_count_(families_of(configuration_->targets).size()) {}
 
-Component::Create Tracker::on_hello(const PluginDescription &plugin, std::size_t candidate) const {
+Component::Create Tracker::on_hello(const PluginDescription &plugin, std::size_t candidate) {
     const run_config::TrackerConfiguration &own = *configuration_;
     if (const auto body = std::ranges::find_if(own.targets, [](const auto &target) { return !target.body.empty(); });
         body != own.targets.end() && !(plugin.capabilities & ARHOST_CAPABILITY_REPORTS_POSES))
@@ -85,7 +73,7 @@ SlotLayout Tracker::on_ready(const messages::Ready &ready) {
     return {TrackerSlot(configuration_->targets.size()).byte_size(ready.state_size), stage_slot_count};
 }
 
-void Tracker::on_disabled(const std::string &reason, bool is_configuration_error) const {
+void Tracker::on_disabled(const std::string &reason, bool is_configuration_error) {
     // While the video runs, it continues without the whole tracker.
     const auto target = parts_.failures.video_runs() ? std::nullopt : quoted_target(reason, *configuration_);
     parts_.failures.add_disabled(target ? target->path() : "tracker", target.value_or(configuration_->node), reason,

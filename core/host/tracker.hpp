@@ -29,10 +29,10 @@ private:
         std::uint64_t size = 0;
         bool operator==(const StateOwner &) const = default;
     };
-    supervise::Component::Create on_hello(const model::PluginDescription &plugin, std::size_t candidate) const;
-    ipc::SlotLayout on_ready(const ipc::messages::Ready &ready);
-    void on_disabled(const std::string &reason, bool is_configuration_error) const;
-    void on_result(const ipc::Command &command, const ipc::Result &result);
+    supervise::Component::Create on_hello(const model::PluginDescription &plugin, std::size_t candidate) override;
+    ipc::SlotLayout on_ready(const ipc::messages::Ready &ready) override;
+    void on_result(const ipc::Command &command, const ipc::Result &result) override;
+    void on_disabled(const std::string &reason, bool is_configuration_error) override;
 
     Sightings &sightings_;
     const Configuration configuration_;
