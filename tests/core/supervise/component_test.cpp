@@ -75,6 +75,7 @@ struct Bench {
     // passes so slowly that only back-off ends, but no deadline.
     bool until(const std::string &event, std::size_t times = 1) {
         const auto limit = std::chrono::steady_clock::now() + 20s;
+        const auto never = reactor.at(reactor.now() + 24h, [] {}); // without a deadline, the reactor waits forever
         while (std::cmp_less(std::ranges::count(events, event), times)) {
             if (std::chrono::steady_clock::now() > limit)
                 return false;
