@@ -24,9 +24,9 @@ const char *problem_with(std::span<const double, 16> mt);
 std::optional<arhost_camera> camera_from_marker(std::span<const double, 16> mt, const Coordinates &coordinates,
                                                 const arhost_intrinsics &intrinsics);
 
-// Returns the transform from the coordinates of a target, with the axes of the scene, to those of the scene. `mt`:
-// the pose of the target, for which problem_with returns nullptr. `camera`: from camera_from_marker in the same
-// frame.
+// Returns the transform from the target's coordinates, whose axes are oriented as in the scene, to the scene's
+// coordinates. `mt`: the pose of the target; problem_with(mt) must be nullptr. `camera`: the result of
+// camera_from_marker for the same video frame.
 glm::dmat4 scene_from_target(const arhost_camera &camera, std::span<const double, 16> mt,
                              const Coordinates &coordinates);
 

@@ -39,16 +39,17 @@ constexpr Region region_of(const arhost_render_info &info, std::uint32_t width, 
 }
 
 // Enlarges an image of the size `from_width` × `from_height` to that of `format`, bilinearly with premultiplied
-// alpha. The edges of both images coincide. Writes only the pixels in the returned region, which contains what
-// `region` of the image becomes; the overlay is transparent elsewhere, where `rgba` is unchanged. The region may come
+// alpha. The edges of both images coincide. Writes only the pixels of the returned region, which covers the enlarged
+// `region`; the others keep their values, and callers must treat them as transparent. Clips `region`, which may come
 // from an untrusted worker. `rgba` has `stride` bytes per row.
 Region enlarge(const ImageView &image, std::uint32_t from_width, std::uint32_t from_height, const Region &region,
                const arhost_frame_format &format, std::uint8_t *rgba, std::size_t stride);
 
-// Writes (A·(255 − α) + B·α) / 255 for each 8-bit channel inside the region, and a copy of A outside the region.
-// Results are rounded to nearest; there are no ties because 255 is odd. The region may come from an untrusted worker,
-// as it is clipped to the image. `format` must have passed arhost_frame_layout. Accesses only bytes of pixels, not
-// the padding of rows. Pointers and strides need no alignment. Uses one thread and allocates no memory.
+// Let A be the video frame, B the overlay's colour and α its alpha. Writes (A·(255 − α) + B·α) / 255 for each 8-bit
+// channel inside the region, and a copy of A outside of it. Results are rounded to nearest; there are no ties because
+// 255 is odd. Clips the region, which may come from an untrusted worker. `format` must have passed
+// arhost_frame_layout. Accesses only bytes of pixels, not the padding of rows. Pointers and strides need no
+// alignment. Uses one thread and allocates no memory.
 //
 // Formats other than BGR8 are first converted to R'G'B'; subsampled chroma is replicated, not interpolated. With y =
 // Y − 16 (limited range) or Y, u = U − 128 and v = V − 128, the matrices of ITU-R BT.601-7 §2.5 and BT.709-6 §3 are

@@ -27,7 +27,7 @@ public:
 
     void set_intrinsics(const arhost_intrinsics &intrinsics) { intrinsics_ = intrinsics; }
     void set_coordinates(const camera::Coordinates &coordinates);
-    // `is_same_world`: whether the poses of the previous targets and of these are in the same frame of reference.
+    // `is_same_world`: whether the previous and the new targets have the same world coordinates.
     void set_targets(Targets targets, bool is_same_world);
 
     // Each sets the frame's camera, unless there is none for it.

@@ -18,7 +18,8 @@ namespace {
 constexpr std::array<std::string_view, 5> applied_keys = {"tracker", "raytracer", "scenes", "alternatives",
                                                           "coordinates"};
 
-// The keys that all components use. A part of an edit could not be applied without the edits of these.
+// All components use these keys. If one of them changes, the whole edit is rejected, because applying only a part of
+// it would mix old and new settings.
 constexpr std::array<std::string_view, 3> shared_keys = {"sandbox", "restart", "plugin_path"};
 
 std::string content_of(const yaml::Node &root, std::string_view key) {

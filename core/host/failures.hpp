@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Why a run fails. A failure before the video runs ends it; later, the video continues without the component.
+// Records why a run has failed. Before the video runs, a failure ends the run; later, the video continues without the
+// failed component.
 #pragma once
 
 #include "supervise/launcher.hpp"

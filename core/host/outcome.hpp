@@ -37,8 +37,8 @@ std::string describe_targets(const std::vector<model::Target> &targets);
 // Tells what the tracker saw instead of the unseen targets, as "; it saw tag36h11 5 (30 frames)"; "" if nothing.
 std::string seen_instead(const Statistics &statistics, const std::vector<model::Target> &unseen);
 
-// Tells how to find out why targets are not seen, as "; compare the numbers and the family with the print"; "" for
-// bodies.
+// Returns a hint on what to check if targets are not seen, such as "; compare the numbers and the family with the
+// print"; "" for bodies.
 std::string how_to_compare(const std::vector<model::Target> &unseen);
 
 // Names the most frequent markers that belong to no target, as "tag36h11 5 (30 frames)"; "" if there are none.

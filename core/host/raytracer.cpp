@@ -98,8 +98,8 @@ void Raytracer::render(Frame &frame) {
     component().submit(command, frame.anchors.region());
 }
 
-// Writes where the targets are that objects belong to. With them, an object is where its target is seen, also if the
-// pose of the world is that of an earlier frame.
+// Writes the poses of the anchors, the targets to which objects of the scene are attached. They come from this frame,
+// so that an object stays on its target even if the pose of the world comes from an earlier frame.
 void Raytracer::write_anchors(const Frame &frame) const {
     auto *poses = reinterpret_cast<AnchorPose *>(frame.anchors.bytes().data());
     for (std::size_t i = 0; i < scene_->anchors.size(); ++i) {

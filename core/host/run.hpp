@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // One run of a configuration: source → tracker → camera → ray tracer → composite → outputs. Workers do everything
-// except compositing. The run handles one event at a time on the thread that calls run(): the handlers pass what has
-// happened to the flow of the frames, and `pump` then executes the flow's actions.
+// except compositing. The run handles one event at a time on the thread that calls run(): the handlers report each
+// event to FrameFlow, and `pump` then executes the actions that FrameFlow returns.
 #pragma once
 
 #include "host/control_commands.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Ownership of a region's slots. Only the host assigns slots; destroying the leases releases the slots of a dead
-// worker.
+// Manages the slots of a shared-memory region. Only the host assigns slots. A slot is free again when its Lease is
+// destroyed, even if the worker has died.
 #pragma once
 
 #include <cstddef>

@@ -36,8 +36,8 @@ protected:
     virtual void on_result(const ipc::Command &command, const ipc::Result &result) = 0;
     virtual void on_disabled(const std::string &reason, bool is_configuration_error) = 0;
 
-    // Returns the frame that was answered successfully. Otherwise returns nullptr, and the frame passes without this
-    // stage.
+    // Returns the frame if the worker has processed it successfully. Otherwise returns nullptr, and the frame skips
+    // this stage.
     Frame *accept(const ipc::Command &command, const ipc::Result &result);
 
     const RunParts parts_;

@@ -14,8 +14,9 @@ using supervise::Component;
 
 namespace {
 
-// Returns the key of the target that a message of the tracker quotes first: by its name, or by the family or the file
-// of a marker. Later quotes may be keys, such as 'image', that other targets have as their family.
+// Finds the first quoted text in a tracker's message that is the name of a target, or the family or the file of one
+// of its markers. Returns the matching key. Later quotes may be names of keys, such as 'image', which are also
+// families.
 std::optional<yaml::Node> quoted_target(const std::string &message, const run_config::TrackerConfiguration &tracker) {
     std::optional<yaml::Node> quoted;
     std::size_t first = std::string::npos;

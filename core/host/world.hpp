@@ -16,8 +16,8 @@
 
 namespace arhost::host {
 
-// While the first target is lost, the other targets tell where it is: each keeps its relation to the world from the
-// last frame in which both were detected. So the world never jumps from one target to another.
+// While the first target is lost, the pose of the world is computed from another target and the relative pose of
+// both, which is stored whenever both are detected. Therefore the world does not jump when the target changes.
 class World {
 public:
     // Returns the pose of the world in a frame, as arhost_target.mt. `first`: name of the first target.

@@ -35,8 +35,8 @@ struct RecordedFrame {
 // Frame i of the source is frames[i].
 struct Recording {
     std::vector<RecordedFrame> frames;
-    // Whether frames have the recorded poses, and an overlay exactly where the recorded run has one. Otherwise every
-    // frame is tracked and rendered as in any other run.
+    // True: the run uses the recorded poses, and a frame gets an overlay only if it had one in the recorded run.
+    // False: frames are tracked and rendered as in any other run.
     bool repeats_decisions = true;
 };
 

@@ -171,7 +171,7 @@ std::vector<std::int32_t> parse_ids(const yaml::Node &node) {
     return ids;
 }
 
-// In {ids: 0-3,7, …}, YAML takes 7 as a key.
+// Rejects `ids` that is a list without brackets: YAML parses {ids: 0-3,7} as ids: 0-3 and a key 7.
 void expect_no_ids_as_keys(const yaml::Node &target) {
     const auto ids = target.find("ids");
     if (!ids || !ids->is_scalar())
@@ -401,7 +401,7 @@ std::vector<TargetMarker> parse_map(const yaml::Node &root, std::vector<std::str
                         "{id: 0, side_mm: 80, position_mm: [0, 0, 0]}", warnings);
 }
 
-// Parses a file of AprilRobotics' apriltag_ros. Of several bundles, takes that with the name of the target.
+// Parses a bundle file of AprilRobotics' apriltag_ros. If it has several bundles, uses the one named `target_name`.
 std::vector<TargetMarker> parse_bundle(const yaml::Node &bundles, const std::string &target_name,
                                        const std::string &family, std::vector<std::string> &warnings) {
     std::optional<yaml::Node> chosen;

@@ -24,8 +24,8 @@ std::vector<Target> parse_targets(const yaml::Node &targets, std::vector<yaml::N
 // Reads a map of markers (docs/markers.md).
 std::vector<TargetMarker> read_map(const std::filesystem::path &file, std::vector<std::string> &warnings);
 
-// Rejects the keys and options of earlier versions, for which `targets` is the replacement, in a tracker or an
-// alternative to it.
+// Both reject the configuration of a tracker, or of an alternative tracker, that has a key or an option of earlier
+// versions, which `targets` has replaced.
 void reject_markers(const yaml::Node &tracker);
 void reject_family_option(const yaml::Node &tracker);
 

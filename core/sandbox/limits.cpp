@@ -70,8 +70,8 @@ Layer set_limits(const Policy &policy) {
     lower(layer, "queues", RLIMIT_MSGQUEUE, 0);
     lower(layer, "priorities", RLIMIT_RTPRIO, 0); // a real-time thread could starve all others
     lower(layer, "nice", RLIMIT_NICE, 0);
-    // Counted per user namespace since Linux 5.14, otherwise for all processes of the user; not enforced for root.
-    // Pools of threads have one thread for each processor.
+    // Since 5.14, Linux counts threads per user namespace, before that per user; it does not enforce the limit for
+    // root. The limit grows with the number of processors, because thread pools have one thread for each.
     const bool is_own_count = has_pid_namespace() && kernel_is_at_least(5, 14);
     lower(layer, "threads", RLIMIT_NPROC, is_own_count ? 1024 + 4 * ::get_nprocs() : 8192);
     return layer;
