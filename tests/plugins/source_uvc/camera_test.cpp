@@ -501,9 +501,8 @@ TEST_F(UvcRun, WaitsUntilTheCameraIsPluggedInAgain) {
     EXPECT_TRUE(eventually([&] { return run.output().rfind("waiting for") > run.output().rfind("is back"); }));
     arhost::test::send_signal(run.pid(), SIGINT);
     EXPECT_EQ(run.wait(), 130) << run.output();
-    // Each unplug counts once, however many processes look for the camera meanwhile: at least ten in 20 s. On a slow
-    // machine, a camera that is back may be lost again before its first frame.
-    EXPECT_THAT(run.stats()["restarts"]["source"].get<int>(), testing::AllOf(testing::Ge(2), testing::Le(5)));
+    // Each unplug counts once, however many processes look for the camera meanwhile.
+    EXPECT_EQ(run.stats()["restarts"]["source"], 2) << run.output();
     connect({});
 }
 

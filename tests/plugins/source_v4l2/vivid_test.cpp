@@ -654,9 +654,8 @@ TEST_F(VividRun, WaitsUntilTheCameraIsPluggedInAgain) {
     for (int i = 0; i < 2000 && run.output().rfind("waiting for") < run.output().rfind("is back"); ++i)
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
     end();
-    // Each unplug counts once, however many processes look for the camera meanwhile: at least ten in 20 s. On a slow
-    // machine, a camera that is back may be lost again before its first frame.
-    EXPECT_THAT(run.stats()["restarts"]["source"].get<int>(), testing::AllOf(testing::Ge(2), testing::Le(5)));
+    // Each unplug counts once, however many processes look for the camera meanwhile.
+    EXPECT_EQ(run.stats()["restarts"]["source"], 2) << run.output();
 }
 
 TEST_F(VividRun, SurvivesASuspend) {
