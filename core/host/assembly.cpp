@@ -11,7 +11,6 @@
 namespace arhost::host {
 
 using namespace ipc;
-using namespace model;
 using supervise::Component;
 
 Assembly::Assembly(const RunParts &parts, Sightings &sightings, WatchFiles watch_files)

@@ -5,7 +5,6 @@
 
 namespace arhost::host {
 
-using namespace ipc;
 using namespace model;
 
 const OptionValue *ComponentOptions::InUse::find(std::string_view key) const {

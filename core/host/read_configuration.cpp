@@ -5,8 +5,6 @@
 #include "base/program.hpp"
 #include "camera/coordinates.hpp"
 
-#include <algorithm>
-
 namespace arhost::host {
 namespace {
 

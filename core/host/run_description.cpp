@@ -6,7 +6,6 @@
 #include <arhost-cpp/url.hpp>
 #include <nlohmann/json.hpp>
 
-#include <algorithm>
 #include <ctime>
 
 namespace arhost::host {
