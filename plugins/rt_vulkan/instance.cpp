@@ -9,6 +9,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <dlfcn.h>
+#include <link.h>
+#include <set>
 
 namespace rt_vulkan {
 namespace {
@@ -79,6 +81,26 @@ std::string driver_variable_hint() {
             return std::string("; ") + variable + " is '" + files +
                    "', so the loader looks for these drivers only; allow the plugin to read the files with 'reads'";
     return "";
+}
+
+// Returns the paths of all libraries that this process has loaded.
+std::set<std::string> loaded_libraries() {
+    std::set<std::string> paths;
+    dl_iterate_phdr(
+        [](dl_phdr_info *library, std::size_t, void *into) {
+            static_cast<std::set<std::string> *>(into)->insert(library->dlpi_name);
+            return 0;
+        },
+        &paths);
+    return paths;
+}
+
+// Keeps all libraries that were loaded after `before` was listed in memory until the process ends.
+void keep_new_libraries(const std::set<std::string> &before) {
+    for (const std::string &path : loaded_libraries())
+        if (!before.contains(path))
+            if (void *library = dlopen(path.c_str(), RTLD_LAZY | RTLD_NOLOAD | RTLD_NODELETE))
+                dlclose(library);
 }
 
 // Returns a device's preference for `auto`: higher is better, and −1 means unusable.
@@ -328,7 +350,9 @@ void Instance::create(bool validate) {
         info.enabledExtensionCount = 2;
         info.ppEnabledExtensionNames = extensions;
     }
+    const std::set<std::string> before = loaded_libraries();
     const VkResult result = vkCreateInstance(&info, nullptr, &instance_);
+    keep_new_libraries(before); // NVIDIA's driver 580 fails to load again after some ten unloads
     if (result == VK_ERROR_INCOMPATIBLE_DRIVER || result == VK_ERROR_INITIALIZATION_FAILED)
         throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                       std::string("no Vulkan driver: ") + install_driver + driver_variable_hint());

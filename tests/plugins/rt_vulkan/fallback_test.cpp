@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests a run in which the Vulkan driver disappears and the worker of rt_vulkan is killed. The fallback ray tracer
-// must take over.
+// Tests runs of rt_vulkan in the sandbox: each path, and a run in which the Vulkan driver disappears and the worker
+// of rt_vulkan is killed. The fallback ray tracer must take over.
 #include "arhost_run.hpp"
 #include "copy_drivers.hpp"
 #include "two_tracers.hpp"
@@ -89,6 +89,27 @@ TEST_F(LostDriver, ContinuesAsPlainVideoWithoutAFallback) {
     EXPECT_THAT(run_.output(), HasSubstr("Vulkan"));
     const nlohmann::json stats = nlohmann::json::parse(run_.read("stats.json"));
     EXPECT_EQ(stats["frames"]["composited"], frames);
+}
+
+class SandboxedPath : public testing::TestWithParam<std::string> {};
+INSTANTIATE_TEST_SUITE_P(Paths, SandboxedPath, testing::Values("plain", "query", "pipeline"),
+                         [](const auto &info) { return info.param; });
+
+TEST_P(SandboxedPath, Renders) {
+#if defined(__SANITIZE_ADDRESS__)
+    GTEST_SKIP() << "the leak checker would report leaks of Vulkan drivers, and the worker would fail";
+#endif
+    ARHOST_REQUIRE_VULKAN(GetParam());
+    ArhostRun run;
+    run.write("scene.yaml", small_scene);
+    run.write("run.yaml",
+              "version: 1\nsource: {plugin: source_counter, options: {frames: 3, width: 64, height: 48}}\n"
+              "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"
+              "raytracer: {plugin: rt_vulkan, scene: scene.yaml, allow: [gpu], options: {path: " +
+                  GetParam() + "}}\noutputs: [{plugin: sink_counter, path: out/counted.txt}]\n");
+    run.start({"--config", "run.yaml"});
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("path " + GetParam() + ", "));
 }
 
 } // namespace arhost::test
