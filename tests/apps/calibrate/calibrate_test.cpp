@@ -168,9 +168,8 @@ TEST_F(Calibrate, SaysIfTheBoardNeverRests) {
         video.write(renderer.image({0.4 + 0.04 * i, 0.5, 1.05, 10, 0, 0}));
     video.release();
     EXPECT_EQ(calibrate(charuco_arguments + "--video video.avi -o camera.yaml"), 2);
-    EXPECT_THAT(printed(),
-                HasSubstr("no view was taken; hold the board still in each one (video.avi: 5 frames, 0 views "
-                          "taken; 0 frames without the board, 5 in motion, "));
+    EXPECT_THAT(printed(), HasSubstr("no view was taken; hold the board still in each one (video.avi: 5 frames, 0 "
+                                     "views taken; 0 frames without the board, 5 in motion, "));
 }
 
 TEST_F(Calibrate, AdvisesWhichViewACameraNeeds) {
@@ -255,10 +254,9 @@ TEST_F(Calibrate, RefusesPoorCoverage) {
     const std::string arguments =
         chessboard_arguments + "--images images/*.png -o camera.yaml --coverage coverage.png ";
     EXPECT_EQ(calibrate(arguments), 2);
-    EXPECT_THAT(printed(),
-                HasSubstr("the views do not determine the lens well: move the board to the top right of the "
-                          "image; move the board to the bottom right of the image; move the board to the "
-                          "right of the image (or use --accept-poor-coverage)"));
+    EXPECT_THAT(printed(), HasSubstr("the views do not determine the lens well: move the board to the top right of "
+                                     "the image; move the board to the bottom right of the image; move the board to "
+                                     "the right of the image (or use --accept-poor-coverage)"));
     EXPECT_THAT(files(), ElementsAre("coverage.png", "images"));
     EXPECT_EQ(calibrate(arguments + "--accept-poor-coverage"), 0) << printed();
     EXPECT_THAT(printed(), HasSubstr("warning: the views do not determine the lens well: move the board to the top"));
@@ -267,17 +265,17 @@ TEST_F(Calibrate, RefusesPoorCoverage) {
 
 TEST_F(Calibrate, SaysWhichOtherBoardItSees) {
     write_images(brown_camera(), charuco, {good_poses()[4]});
-    EXPECT_EQ(calibrate("--charuco 10x7 --square 36 --marker 28 --dictionary DICT_6X6_50 --images images/10.png -o "
-                        "camera.yaml"),
-              2);
-    EXPECT_THAT(printed(), HasSubstr("the board is in no image; expected a ChArUco board of 10 x 7 squares of 36 mm, "
-                                     "markers of 28 mm, DICT_6X6_50 from id 0 on, but the images show 35 markers of "
-                                     "DICT_5X5_"));
+    EXPECT_EQ(
+        calibrate(
+            "--charuco 10x7 --square 36 --marker 28 --dictionary DICT_6X6_50 --images images/10.png -o camera.yaml"),
+        2);
+    EXPECT_THAT(printed(),
+                HasSubstr("the board is in no image; expected a ChArUco board of 10 x 7 squares of 36 mm, markers of "
+                          "28 mm, DICT_6X6_50 from id 0 on, but the images show 35 markers of DICT_5X5_"));
     write_images(brown_camera(), chessboard, {good_poses()[4]});
     EXPECT_EQ(calibrate("--chessboard 11x8 --square 36 --images images/10.png -o camera.yaml"), 2);
-    EXPECT_THAT(printed(),
-                HasSubstr("expected a chessboard with 11 x 8 inner corners, squares of 36 mm, but the images "
-                          "show a chessboard with about "));
+    EXPECT_THAT(printed(), HasSubstr("expected a chessboard with 11 x 8 inner corners, squares of 36 mm, but the "
+                                     "images show a chessboard with about "));
 }
 
 TEST_F(Calibrate, RejectsABoardOfAnotherShape) {
@@ -341,8 +339,7 @@ TEST_F(Calibrate, RejectsInvalidInputWithoutWritingAFile) {
         {"--images images/10.png images/small.png " + rest,
          "images/small.png has 600 x 480 px, but images/10.png has 640 x 480 px; all images must be of one camera"},
         {"--images images/grey.png " + rest,
-         "the board is in no image; expected a chessboard with 9 x 6 inner corners, "
-         "squares of 36 mm\n"},
+         "the board is in no image; expected a chessboard with 9 x 6 inner corners, squares of 36 mm\n"},
         {images + rest, "the board was found in 1 view, but a calibration needs at least 3, and a good one 10"},
         {"--images images/10.png images/11.png " + rest, "the board was found in 2 views"},
         {"--video missing.avi " + rest, "missing.avi: there is no such file"},

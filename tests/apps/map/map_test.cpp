@@ -196,9 +196,8 @@ TEST_F(MapProgram, ReadsAVideo) {
 
 TEST_F(MapProgram, IsACommandOfArhost) {
     write_photos("tag36h11", 6);
-    ASSERT_EQ(execute(arhost::test::build_directory() +
-                      "/bin/arhost map --images photo-*.png --camera camera.yaml --family "
-                      "DICT_APRILTAG_36h11 --side 40 -o desk.map.yaml"),
+    ASSERT_EQ(execute(arhost::test::build_directory() + "/bin/arhost map --images photo-*.png --camera camera.yaml "
+                                                        "--family DICT_APRILTAG_36h11 --side 40 -o desk.map.yaml"),
               0)
         << printed();
     EXPECT_THAT(read("desk.map.yaml"), HasSubstr("family: tag36h11"));
@@ -331,11 +330,10 @@ TEST_F(MapProgram, LeavesTheOldMapIfItIsInterrupted) {
 TEST_F(MapProgram, LearnsARealBoard) {
     ARHOST_REQUIRE_SHARED_DATA("markers/rbt_sequence");
     const arhost_intrinsics camera = arhost::test::RbtSequence::camera();
-    write("camera.yaml",
-          fmt::format("image_width: 640\nimage_height: 480\ncamera_matrix: {{rows: 3, cols: 3, data: [{}, "
-                      "0, {}, 0, {}, {}, 0, 0, 1]}}\ndistortion_model: plumb_bob\n"
-                      "distortion_coefficients: {{rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}}\n",
-                      camera.fx, camera.cx, camera.fy, camera.cy));
+    write("camera.yaml", fmt::format("image_width: 640\nimage_height: 480\ncamera_matrix: {{rows: 3, cols: 3, data: "
+                                     "[{}, 0, {}, 0, {}, {}, 0, 0, 1]}}\ndistortion_model: plumb_bob\n"
+                                     "distortion_coefficients: {{rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}}\n",
+                                     camera.fx, camera.cx, camera.fy, camera.cy));
     ASSERT_EQ(
         learn("--images " + arhost::test::shared_data("markers/rbt_sequence").string() +
               "/color_image_00?[02468].png --camera camera.yaml --family tag36h11 --side 95.5 -o board.map.yaml"),

@@ -335,10 +335,9 @@ TEST_P(EveryFormat, HasBoardsThatAgreeWithTheirMap) {
 }
 
 TEST_F(Marker, PrintsBoardsOfMatrixCodesWithTheirMap) {
-    ASSERT_EQ(
-        print("artoolkit-4x4-bch-13-9-3:5 --grid 3x2 --side 12 --paper 90x80 --margin 5 --map board.map.yaml -o "
-              "board.png"),
-        0)
+    ASSERT_EQ(print("artoolkit-4x4-bch-13-9-3:5 --grid 3x2 --side 12 --paper 90x80 --margin 5 --map board.map.yaml "
+                    "-o board.png"),
+              0)
         << printed();
     EXPECT_THAT(read("board.map.yaml"), HasSubstr("\nversion: 1\nfamily: artoolkit-4x4-bch-13-9-3\n"));
     const auto positions = positions_in("board.map.yaml", 12);
@@ -500,8 +499,7 @@ TEST_F(Marker, RejectsInvalidArgumentsWithoutWritingAFile) {
         {"tag36h11:0 --side nan -o a.pdf", "--side: must be from 1 to 1000 mm, is nan"},
         {"tag36h11:0 --side wide -o a.pdf", "--side: "},
         {"tag36h11:0 --side 300 -o a.pdf",
-         "a marker needs 375 x 379 mm with its quiet zone and label, but the paper has "
-         "room for 190 x 264 mm"},
+         "a marker needs 375 x 379 mm with its quiet zone and label, but the paper has room for 190 x 264 mm"},
         {"tag36h11 --grid 6x4 --side 40 -o a.pdf", "the board needs "},
         {"tag36h11:0 --side 10 --margin 100 -o a.pdf", "--margin 100: only 10 mm of the paper's width remain"},
         {"tag36h11:0-500 --side 150 -o a.pdf", "501 markers need 501 pages"},
@@ -529,8 +527,7 @@ TEST_F(Marker, RejectsInvalidArgumentsWithoutWritingAFile) {
         {"DICT_4X4_50 " + charuco, "--charuco needs --square and --marker"},
         {"DICT_4X4_50 --side 9 --marker 9 " + charuco, "--side does not apply to --charuco"},
         {"DICT_4X4_50 --marker 12 " + charuco,
-         "--marker 12: each marker needs a quiet zone of one cell in its square of 14 "
-         "mm; use --marker 10.5 or less"},
+         "--marker 12: each marker needs a quiet zone of one cell in its square of 14 mm; use --marker 10.5 or less"},
         {"missing.patt --side 40 -o a.pdf", "'missing.patt' cannot be read"},
         {"missing.patt --grid 3x2 --side 12 -o a.pdf", "--grid and --charuco need a family of markers; print the "},
         {"tag36h11:0 --pattern-ratio 0.5 --side 12 -o a.pdf", "--pattern-ratio needs a pattern file of ARToolKit"},

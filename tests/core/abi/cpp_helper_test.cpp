@@ -135,11 +135,10 @@ TEST(CppHelper, AddsTheDevicesExtensionToAClassWithDevices) {
         static_cast<std::vector<std::string> *>(context)->push_back(line.str());
     };
     ASSERT_EQ(devices.list(&host, take, &listed), ARHOST_STATUS_OK);
-    EXPECT_EQ(listed, (std::vector<std::string>{
-                          "3 3 1 default Thrower's none a-b throws none 0x0@0",
-                          "4 6 4 Else /dev/else none none broken 0x0@0 grey0:4x3@1,30,5 yuyv1 gain1:-1..9/2 3 15 "
-                          "reset5:0..0/0 0 00",
-                          "5 7 1 Screen none none none none 8x6@60"}));
+    EXPECT_EQ(listed, (std::vector<std::string>{"3 3 1 default Thrower's none a-b throws none 0x0@0",
+                                                "4 6 4 Else /dev/else none none broken 0x0@0 grey0:4x3@1,30,5 yuyv1 "
+                                                "gain1:-1..9/2 3 15 reset5:0..0/0 0 00",
+                                                "5 7 1 Screen none none none none 8x6@60"}));
 
     Thrower::no_devices = true;
     EXPECT_EQ(devices.list(&host, take, &listed), ARHOST_STATUS_ERROR_IO);

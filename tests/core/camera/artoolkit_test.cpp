@@ -22,13 +22,13 @@ namespace {
 
 using test::artoolkit_version_4;
 using test::ArtoolkitParameters;
-using test::error_of;
 using testing::AllOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
+// Returns the error message without the name of the file.
 std::string error_in(const std::string &bytes) {
-    return error_of([&] { parse_artoolkit(bytes, "camera_para.dat"); });
+    return test::after("camera_para.dat: ", test::error_of([&] { parse_artoolkit(bytes, "camera_para.dat"); }));
 }
 std::string error_in(const ArtoolkitParameters &parameters) {
     return error_in(parameters.bytes());
@@ -178,8 +178,7 @@ TEST(ArtoolkitFile, RejectsALensThatArhostLacks) {
                                            .dist_factor = {265, 185, -78.5, 0.9153}};
     EXPECT_THAT(
         error_in(stretched),
-        AllOf(StartsWith("camera_para.dat: the lens model of version 1 of ARToolKit's distortion differs from "
-                         "arhost's by up to "),
+        AllOf(StartsWith("the lens model of version 1 of ARToolKit's distortion differs from arhost's by up to "),
               HasSubstr("which is more than 0.1 px; calibrate again with artoolkitX or OpenCV")));
     ArtoolkitParameters skewed = artoolkit_version_4();
     skewed.mat[1] = 3;
@@ -194,13 +193,11 @@ TEST(ArtoolkitFile, RejectsTruncatedFiles) {
         EXPECT_THAT(error_in(bytes + "\n"), HasSubstr("is a binary file of"));
     }
     EXPECT_EQ(error_in(artoolkit_version_4().bytes().substr(0, 100)),
-              "camera_para.dat: is a binary file of 100 bytes, but ARToolKit's camera parameters have 136, 144, 152, "
-              "176 or 240; if the file is truncated, copy it again; if it is YAML, save it as UTF-8 without NUL "
-              "characters");
-    EXPECT_EQ(
-        error_in(artoolkit_version_4().bytes().substr(0, 136)),
-        "camera_para.dat: dist_factor[3]: must be 0.1 to 10 as a scale, but is 0.0013; if the file is truncated, "
-        "copy it again, otherwise calibrate again");
+              "is a binary file of 100 bytes, but ARToolKit's camera parameters have 136, 144, 152, 176 or 240; if "
+              "the file is truncated, copy it again; if it is YAML, save it as UTF-8 without NUL characters");
+    EXPECT_EQ(error_in(artoolkit_version_4().bytes().substr(0, 136)),
+              "dist_factor[3]: must be 0.1 to 10 as a scale, but is 0.0013; if the file is truncated, copy it again, "
+              "otherwise calibrate again");
 }
 
 TEST(ArtoolkitFile, RejectsRandomBytes) {
@@ -210,7 +207,7 @@ TEST(ArtoolkitFile, RejectsRandomBytes) {
             std::string bytes(size, '\0');
             for (char &byte : bytes)
                 byte = static_cast<char>(random());
-            EXPECT_THAT(error_in(bytes), StartsWith("camera_para.dat: xsize: must be 1 to 16384, but is "));
+            EXPECT_THAT(error_in(bytes), StartsWith("xsize: must be 1 to 16384, but is "));
         }
 }
 
@@ -221,22 +218,20 @@ TEST(ArtoolkitFile, ErrorsNameFieldAndFix) {
         return error_in(parameters);
     };
     EXPECT_EQ(with([](auto &p) { p.ysize = 0; }),
-              "camera_para.dat: ysize: must be 1 to 16384, but is 0; is this a calibration of ARToolKit?");
+              "ysize: must be 1 to 16384, but is 0; is this a calibration of ARToolKit?");
     EXPECT_EQ(with([](auto &p) { p.mat[6] = std::numeric_limits<double>::infinity(); }),
-              "camera_para.dat: mat[1][2]: must be a finite number; calibrate again");
+              "mat[1][2]: must be a finite number; calibrate again");
     EXPECT_EQ(with([](auto &p) { p.dist_factor[2] = std::numeric_limits<double>::quiet_NaN(); }),
-              "camera_para.dat: dist_factor[2]: must be a finite number; calibrate again");
+              "dist_factor[2]: must be a finite number; calibrate again");
     EXPECT_EQ(with([](auto &p) { p.mat[0] = -600; }),
-              "camera_para.dat: mat[0][0], the focal length in px: must be greater than 0, but is -600; calibrate "
-              "again");
+              "mat[0][0], the focal length in px: must be greater than 0, but is -600; calibrate again");
     for (const int index : {3, 4, 7, 8, 9, 10, 11})
         EXPECT_THAT(with([&](auto &p) { p.mat[index] = 2; }),
-                    StartsWith("camera_para.dat: mat: must be [fx, skew, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0]"));
+                    StartsWith("mat: must be [fx, skew, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0]"));
     EXPECT_EQ(with([](auto &p) { p.dist_factor[5] = 0; }),
-              "camera_para.dat: dist_factor[5]: must be greater than 0, but is 0; calibrate again");
+              "dist_factor[5]: must be greater than 0, but is 0; calibrate again");
     EXPECT_EQ(with([](auto &p) { p.dist_factor[0] = -5; }),
-              "camera_para.dat: dist_factor: the distortion folds the image: no direction has the pixel (0, 0); "
-              "calibrate again");
+              "dist_factor: the distortion folds the image: no direction has the pixel (0, 0); calibrate again");
 }
 
 } // namespace arhost::camera

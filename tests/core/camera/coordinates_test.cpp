@@ -16,14 +16,17 @@
 namespace arhost::camera {
 namespace {
 
-using test::error_of;
-
 glm::dvec3 to_scene(const Coordinates &coordinates, const glm::dvec3 &marker_point) {
     return glm::dvec3(glm::inverse(rotation_of(coordinates)) * glm::dvec4(marker_point, 1));
 }
 
 Coordinates parsed(const std::string &text) {
     return parse_coordinates(yaml::Node::parse(text, "lab.yaml"));
+}
+
+// Returns the error message without the name of the file.
+std::string error_in(const std::string &text) {
+    return test::after("lab.yaml:", test::error_of([&] { parsed(text); }));
 }
 
 } // namespace
@@ -83,23 +86,23 @@ TEST(Coordinates, FollowTheScenesAxes) {
 
 TEST(Coordinates, ExplainsInvalidCoordinates) {
     const double nan = std::numeric_limits<double>::quiet_NaN(), inf = std::numeric_limits<double>::infinity();
-    EXPECT_EQ(problem_with({1, 2, {{90, {0, 0, 0}}}}),
-              "rotation 1: the axis must not be (0, 0, 0); for the x axis, write [1, 0, 0]");
-    EXPECT_EQ(problem_with({1, 2, {{90, {1, 0, 0}}, {nan, {1, 0, 0}}}}),
-              "rotation 2: the angle must be a finite number of degrees");
-    EXPECT_EQ(problem_with({1, 2, {{inf, {1, 0, 0}}}}), "rotation 1: the angle must be a finite number of degrees");
-    EXPECT_EQ(problem_with({1, 2, {{90, {1, nan, 0}}}}), "rotation 1: the axis must be three finite numbers");
-    EXPECT_EQ(problem_with({1, 2, {}}), "the profiles ar 1 and rt 2 differ, so a rotation is needed; from 1 to 2 it "
-                                        "is 90 degrees about [1, 0, 0]");
-    EXPECT_EQ(problem_with({2, 2, {{90, {1, 0, 0}}}}),
-              "the profiles ar and rt are both 2, so the rotations would have no effect; remove them, or set rt to "
-              "the ray tracer's profile");
-    EXPECT_EQ(problem_with({1, 2, {{1, {1, 0, 0}}, {2, {1, 0, 0}}, {3, {1, 0, 0}}}}),
-              "at most two rotations are allowed, not 3");
-    EXPECT_EQ(
-        problem_with({1, 4, {{90, {1, 0, 0}}}}),
-        "the profiles ar and rt must be 1 (x right, y back, z up), 2 (x right, y up, z front) or 3 (other); they "
-        "are 1 and 4");
+    const std::pair<Coordinates, const char *> cases[] = {
+        {{1, 2, {{90, {0, 0, 0}}}}, "rotation 1: the axis must not be (0, 0, 0); for the x axis, write [1, 0, 0]"},
+        {{1, 2, {{90, {1, 0, 0}}, {nan, {1, 0, 0}}}}, "rotation 2: the angle must be a finite number of degrees"},
+        {{1, 2, {{inf, {1, 0, 0}}}}, "rotation 1: the angle must be a finite number of degrees"},
+        {{1, 2, {{90, {1, nan, 0}}}}, "rotation 1: the axis must be three finite numbers"},
+        {{1, 2, {}},
+         "the profiles ar 1 and rt 2 differ, so a rotation is needed; from 1 to 2 it is 90 degrees about [1, 0, 0]"},
+        {{2, 2, {{90, {1, 0, 0}}}},
+         "the profiles ar and rt are both 2, so the rotations would have no effect; remove them, or set rt to the "
+         "ray tracer's profile"},
+        {{1, 2, {{1, {1, 0, 0}}, {2, {1, 0, 0}}, {3, {1, 0, 0}}}}, "at most two rotations are allowed, not 3"},
+        {{1, 4, {{90, {1, 0, 0}}}},
+         "the profiles ar and rt must be 1 (x right, y back, z up), 2 (x right, y up, z front) or 3 (other); they "
+         "are 1 and 4"},
+    };
+    for (const auto &[coordinates, problem] : cases)
+        EXPECT_EQ(problem_with(coordinates), problem);
 }
 
 TEST(Coordinates, AreParsedFromYaml) {
@@ -116,20 +119,17 @@ TEST(Coordinates, AreParsedFromYaml) {
 }
 
 TEST(Coordinates, ErrorsInYamlNameTheLine) {
-    EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotations:\n  - {degrees: 90, axis: [0, 0, 0]}\n"); }),
-              "lab.yaml:4:25: rotations[0].axis: the axis must not be (0, 0, 0); for the x axis, write [1, 0, 0]");
-    EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotations:\n  - {degrees: .nan, axis: [1, 0, 0]}\n"); }),
-              "lab.yaml:4:15: rotations[0].degrees: must be a finite number, but is .nan");
-    EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotations:\n  - {degrees: 90, axis: [1, 0]}\n"); }),
-              "lab.yaml:4:25: rotations[0].axis: must be a list of 3 numbers, but has 2");
-    EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 4\n"); }), "lab.yaml:2:5: rt: must be 1 to 3, but is 4");
-    EXPECT_EQ(error_of([] { parsed("ar: 1\n"); }), "lab.yaml:1:1: the key 'rt' is missing");
-    EXPECT_EQ(
-        error_of([] { parsed("ar: 1\nrt: 2\n"); }),
-        "lab.yaml:1:1: the profiles ar 1 and rt 2 differ, so a rotation is needed; from 1 to 2 it is 90 degrees "
-        "about [1, 0, 0]");
-    EXPECT_EQ(error_of([] { parsed("ar: 1\nrt: 2\nrotation: []\n"); }),
-              "lab.yaml:3:1: rotation: unknown key; did you mean 'rotations'?");
+    EXPECT_EQ(error_in("ar: 1\nrt: 2\nrotations:\n  - {degrees: 90, axis: [0, 0, 0]}\n"),
+              "4:25: rotations[0].axis: the axis must not be (0, 0, 0); for the x axis, write [1, 0, 0]");
+    EXPECT_EQ(error_in("ar: 1\nrt: 2\nrotations:\n  - {degrees: .nan, axis: [1, 0, 0]}\n"),
+              "4:15: rotations[0].degrees: must be a finite number, but is .nan");
+    EXPECT_EQ(error_in("ar: 1\nrt: 2\nrotations:\n  - {degrees: 90, axis: [1, 0]}\n"),
+              "4:25: rotations[0].axis: must be a list of 3 numbers, but has 2");
+    EXPECT_EQ(error_in("ar: 1\nrt: 4\n"), "2:5: rt: must be 1 to 3, but is 4");
+    EXPECT_EQ(error_in("ar: 1\n"), "1:1: the key 'rt' is missing");
+    EXPECT_EQ(error_in("ar: 1\nrt: 2\n"), "1:1: the profiles ar 1 and rt 2 differ, so a rotation is needed; from 1 "
+                                          "to 2 it is 90 degrees about [1, 0, 0]");
+    EXPECT_EQ(error_in("ar: 1\nrt: 2\nrotation: []\n"), "3:1: rotation: unknown key; did you mean 'rotations'?");
 }
 
 } // namespace arhost::camera

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "errors.hpp"
 #include "plugin_under_test.hpp"
 #include "run_config/access.hpp"
 
@@ -22,12 +23,7 @@ struct Access : testing::Test {
         return access_of(Node::load(folder / "run.yaml"), is_output, arhost::sandbox::Mode::standard);
     }
     std::string error_of(const std::string &component) {
-        try {
-            of(component, false);
-        } catch (const Error &error) {
-            return error.what();
-        }
-        return "no error";
+        return arhost::test::error_of([&] { of(component, false); });
     }
     void file(const std::string &name) {
         fs::create_directories((folder / name).parent_path());
@@ -184,11 +180,5 @@ TEST_F(Access, WarnsIfAnOutputMayWriteToHomeOrTheWorkingDirectory) {
 }
 
 TEST_F(Access, UnknownPermissionsAreErrors) {
-    try {
-        of("{plugin: p, allow: [everything]}", false);
-        FAIL();
-    } catch (const Error &error) {
-        EXPECT_THAT(error.what(), HasSubstr("allow[0]"));
-        EXPECT_THAT(error.what(), HasSubstr("network"));
-    }
+    EXPECT_THAT(error_of("{plugin: p, allow: [everything]}"), AllOf(HasSubstr("allow[0]"), HasSubstr("network")));
 }

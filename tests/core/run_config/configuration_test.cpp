@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "errors.hpp"
 #include "plugin_under_test.hpp"
 #include "run_config/configuration.hpp"
 
@@ -26,8 +27,7 @@ struct Warnings : testing::Test {
             (scratch.path() / "lab.yaml").string());
         std::vector<std::string> warnings = run_config::parse(root, scratch.path()).warnings;
         for (std::string &warning : warnings)
-            if (warning.starts_with(scratch.path().string()))
-                warning.erase(0, scratch.path().string().size() + 1);
+            warning = test::without_folder(warning, scratch.path());
         return warnings;
     }
     test::ScratchFolder scratch;
@@ -41,10 +41,9 @@ TEST_F(Warnings, AreForImplausibleFocalLengths) {
     EXPECT_THAT(of("{width: 640, height: 480, fx: 100}", "80"), IsEmpty());
     EXPECT_THAT(of("{width: 64, height: 48, fx: 60}", "80"), IsEmpty()) << "a small image";
     EXPECT_THAT(of("{width: 320, height: 240, fx: 90}", "80"), testing::SizeIs(1));
-    EXPECT_THAT(
-        of("{width: 640, height: 480, fx: 600, fy: 35.5}", "80"),
-        ElementsAre("lab.yaml:3:9: camera: a focal length of 35.5 px is implausible for an image width of 640 "
-                    "px; check the unit, which is px"));
+    EXPECT_THAT(of("{width: 640, height: 480, fx: 600, fy: 35.5}", "80"),
+                ElementsAre("lab.yaml:3:9: camera: a focal length of 35.5 px is implausible for an image width of "
+                            "640 px; check the unit, which is px"));
     std::ofstream(scratch.path() / "camera.yaml")
         << "{width: 640, height: 480, K: [99, 0, 320, 0, 99, 240, 0, 0, 1], D: [0, 0, 0, 0]}\n";
     EXPECT_THAT(of("{file: camera.yaml}", "80"),

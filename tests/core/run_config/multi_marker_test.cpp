@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_config/multi_marker.hpp"
 
-#include "yaml/yaml.hpp"
+#include "errors.hpp"
 
 #include <gmock/gmock.h>
 
@@ -14,13 +14,10 @@ namespace {
 
 const std::string rows = "1 0 0 35\n0 0 1.0 -7\n0 -1 0 0.5\n";
 
+// Returns the error message without the name of the file.
 std::string error_in(const std::string &text) {
-    try {
-        parse_multi_marker_file("marker.dat", text);
-    } catch (const arhost::yaml::Error &error) {
-        return error.what();
-    }
-    return "no error";
+    return arhost::test::after("marker.dat:",
+                               arhost::test::error_of([&] { parse_multi_marker_file("marker.dat", text); }));
 }
 
 } // namespace
@@ -48,34 +45,30 @@ TEST(MultiMarkerFile, HasPatternsAndIdsWithTheirPlaces) {
 }
 
 TEST(MultiMarkerFile, RejectsErrorsWithTheirLine) {
-    EXPECT_THAT(error_in("0\n"), StartsWith("marker.dat:1: the number of markers must be 1 to 1024, but is '0'"));
-    EXPECT_THAT(error_in("1.5\n"), StartsWith("marker.dat:1: the number of markers must be"));
-    EXPECT_THAT(error_in("1e300\n"), StartsWith("marker.dat:1: the number of markers must be"));
-    EXPECT_THAT(
-        error_in("2\na.patt\n40\n" + rows),
-        StartsWith("marker.dat:6: the file ends where marker 2 is expected; complete it, or correct the number "
-                   "of markers"));
-    EXPECT_THAT(error_in("1\na.patt\n"), StartsWith("marker.dat:2: the file ends where the width of marker 1"));
-    EXPECT_THAT(error_in("1\na.patt\nwide\n" + rows),
-                StartsWith("marker.dat:3: the width of marker 1 must be a number from 0.01 to 1e+06, in mm, but is "
-                           "'wide'"));
-    EXPECT_THAT(error_in("1\na.patt\n-40\n" + rows), StartsWith("marker.dat:3: the width of marker 1 must be"));
-    EXPECT_THAT(
-        error_in("1\na.patt\n40\n1 0 0\n"),
-        StartsWith("marker.dat:4: row 1 of the matrix of marker 1 must be 4 numbers, such as '1 0 0 35', but is "
-                   "'1 0 0'"));
-    EXPECT_THAT(error_in("1\na.patt\n40\n1 0 0 nan\n"), StartsWith("marker.dat:4: row 1 of the matrix"));
-    EXPECT_THAT(
-        error_in("1\na.patt\n40\n1 0 0 35\n0 1 0 \x01\n"),
-        StartsWith("marker.dat:5: row 2 of the matrix of marker 1 must be 4 numbers, such as '1 0 0 35', but is "
-                   "'0 1 0  '"));
-    EXPECT_THAT(error_in("1\na.patt\n40\n1 0 0 35\n0 1 0 0\n"),
-                StartsWith("marker.dat:5: the file ends where the matrix of marker 1 is expected"));
+    const arhost::test::ErrorCase cases[] = {
+        {"0\n", StartsWith("1: the number of markers must be 1 to 1024, but is '0'")},
+        {"1.5\n", StartsWith("1: the number of markers must be")},
+        {"1e300\n", StartsWith("1: the number of markers must be")},
+        {"2\na.patt\n40\n" + rows,
+         StartsWith("6: the file ends where marker 2 is expected; complete it, or correct the number of markers")},
+        {"1\na.patt\n", StartsWith("2: the file ends where the width of marker 1")},
+        {"1\na.patt\nwide\n" + rows,
+         StartsWith("3: the width of marker 1 must be a number from 0.01 to 1e+06, in mm, but is 'wide'")},
+        {"1\na.patt\n-40\n" + rows, StartsWith("3: the width of marker 1 must be")},
+        {"1\na.patt\n40\n1 0 0\n",
+         StartsWith("4: row 1 of the matrix of marker 1 must be 4 numbers, such as '1 0 0 35', but is '1 0 0'")},
+        {"1\na.patt\n40\n1 0 0 nan\n", StartsWith("4: row 1 of the matrix")},
+        {"1\na.patt\n40\n1 0 0 35\n0 1 0 \x01\n",
+         StartsWith("5: row 2 of the matrix of marker 1 must be 4 numbers, such as '1 0 0 35', but is '0 1 0  '")},
+        {"1\na.patt\n40\n1 0 0 35\n0 1 0 0\n",
+         StartsWith("5: the file ends where the matrix of marker 1 is expected")},
+    };
+    expect_errors([&](const std::string &text) { return error_in(text); }, cases);
     for (const char *matrix :
          {"1 0 0 0\n0 1 0 0\n0 0 -1 0\n", "2 0 0 0\n0 2 0 0\n0 0 2 0\n", "1 0 0 0\n1 0 0 0\n0 0 1 0\n"})
         EXPECT_THAT(error_in(std::string("1\na.patt\n40\n") + matrix),
-                    StartsWith("marker.dat:6: the first three columns of the matrix of marker 1 must be a rotation"))
+                    StartsWith("6: the first three columns of the matrix of marker 1 must be a rotation"))
             << matrix;
     EXPECT_THAT(error_in("1\na.patt\n40\n" + rows + "b.patt\n"),
-                StartsWith("marker.dat:7: more follows after 1 markers; correct the number of markers"));
+                StartsWith("7: more follows after 1 markers; correct the number of markers"));
 }

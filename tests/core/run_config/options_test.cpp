@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "errors.hpp"
 #include "run_config/options.hpp"
 
 #include <gmock/gmock.h>
@@ -29,13 +30,8 @@ std::vector<model::OptionValue> resolve(const std::string &yaml, std::vector<std
                                        notes ? *notes : ignored);
 }
 
-std::string error_of(const std::string &yaml) {
-    try {
-        resolve(yaml);
-    } catch (const yaml::Error &error) {
-        return error.what();
-    }
-    return "no error";
+std::string option_error(const std::string &yaml) {
+    return test::error_of([&] { resolve(yaml); });
 }
 
 } // namespace
@@ -51,15 +47,15 @@ TEST(Options, UseDefaultsAndGivenValuesInDeclaredOrder) {
 }
 
 TEST(Options, ReportErrorsWithTheirPosition) {
-    EXPECT_EQ(error_of("{path: x, options: {threads: 9}}"),
+    EXPECT_EQ(option_error("{path: x, options: {threads: 9}}"),
               "/lab/a.yaml:1:30: options.threads: must be 1 to 8, but is 9");
-    EXPECT_THAT(error_of("{path: x, options: {family: tag36h12}}"), HasSubstr("did you mean 'tag36h11'?"));
-    EXPECT_THAT(error_of("{path: x, options: {family: TAG36H11}}"), HasSubstr("did you mean 'tag36h11'?"));
-    EXPECT_THAT(error_of("{path: x, options: {refine: 1}}"), HasSubstr("options.refine: must be true or false"));
-    EXPECT_THAT(error_of("{path: x, options: {tread: 1}}"),
+    EXPECT_THAT(option_error("{path: x, options: {family: tag36h12}}"), HasSubstr("did you mean 'tag36h11'?"));
+    EXPECT_THAT(option_error("{path: x, options: {family: TAG36H11}}"), HasSubstr("did you mean 'tag36h11'?"));
+    EXPECT_THAT(option_error("{path: x, options: {refine: 1}}"), HasSubstr("options.refine: must be true or false"));
+    EXPECT_THAT(option_error("{path: x, options: {tread: 1}}"),
                 HasSubstr("options.tread: unknown key; did you mean 'threads'?"));
-    EXPECT_THAT(error_of("{options: {}}"), HasSubstr("tracker_x needs 'path': The file."));
-    EXPECT_THAT(error_of("{path: x, options: {path: y}}"), HasSubstr("remove one of them"));
+    EXPECT_THAT(option_error("{options: {}}"), HasSubstr("tracker_x needs 'path': The file."));
+    EXPECT_THAT(option_error("{path: x, options: {path: y}}"), HasSubstr("remove one of them"));
 }
 
 TEST(Options, OfAnotherTrackerAreSetAsideWithANote) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_config/recorded_session.hpp"
 
+#include "errors.hpp"
 #include "plugin_under_test.hpp"
 
 #include <gmock/gmock.h>
@@ -11,6 +12,7 @@ namespace arhost::run_config {
 namespace {
 
 using testing::HasSubstr;
+using testing::StartsWith;
 
 const std::string description =
     R"({"format": "arhost-session", "version": 2, "fps": 30, "folder": "/lab", "overridden": {"raytracer": "/cwd"}, )"
@@ -46,19 +48,14 @@ protected:
     void write(const std::string &name, const std::string &text) const {
         std::ofstream(folder() / name, std::ios::binary | std::ios::trunc) << text;
     }
-    // Returns the error without the folder at its start.
+    // Returns the error without the folder.
     std::string error() const {
-        try {
-            (void)read_session(folder());
-        } catch (const yaml::Error &error) {
-            const std::string text = error.what(), start = folder().string() + "/";
-            return text.starts_with(start) ? text.substr(start.size()) : text;
-        }
-        return "no error";
+        return test::without_folder(test::error_of([&] { (void)read_session(folder()); }), folder());
     }
+    // Returns the error without the name of the file.
     std::string error_of_log(const std::string &log) const {
         write("frames.jsonl", log);
-        return error();
+        return test::after("frames.jsonl:", error());
     }
 
     test::ScratchFolder scratch_;
@@ -140,36 +137,34 @@ TEST_F(SessionFolder, AnInterruptedRecordingEndsAtItsLastCompleteLine) {
 }
 
 TEST_F(SessionFolder, DamagedLinesAreReportedWithTheirPosition) {
-    EXPECT_THAT(
-        error_of_log(line(0) + "{\"frame\": 1, ]\n" + line(2)),
-        HasSubstr("frames.jsonl:2:14: is not valid JSON; to replay the frames before it, delete this line and "
-                  "all that follow"));
-    EXPECT_THAT(
-        error_of_log(line(0) +
-                     line(1, R"("overlay": "none", "targets": [], "search": {"everywhere": 1}, "camera": null)")),
-        HasSubstr("frames.jsonl:2:1: is not the record of a frame: type must be boolean"));
-    EXPECT_THAT(error_of_log(line(0) + "[]\n"), HasSubstr("frames.jsonl:2:1: is not the record of a frame: "));
-    EXPECT_THAT(error_of_log(line(0) + "\n"), HasSubstr("frames.jsonl:2:1: is not valid JSON"));
-    EXPECT_THAT(error_of_log("{\"frame\": 0}\n"), HasSubstr("frames.jsonl:1:1: is not the record of a frame: key "
-                                                            "'capture_ns' not found"));
-    EXPECT_THAT(error_of_log(line(0, R"("overlay": "none", "targets": 3, "camera": null)")),
-                HasSubstr("frames.jsonl:1:1: is not the record of a frame: "));
-    EXPECT_THAT(error_of_log(line(0, R"("overlay": "none", "targets": [], "camera": null, "truth": {"mt": )"
-                                     "[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]}")),
-                HasSubstr("frames.jsonl:1:1: is not the record of a frame: key 'target' not found"));
-    EXPECT_THAT(error_of_log(line(1) + line(1)), HasSubstr("frames.jsonl:2:1: frame: must be greater than in the "
-                                                           "line before, 1"));
-    EXPECT_THAT(error_of_log(line(0, R"("overlay": "all", "targets": [], "camera": null)")),
-                HasSubstr("frames.jsonl:1:1: overlay: 'all' is not one of rendered, held, none"));
-    EXPECT_THAT(error_of_log(line(0, R"("overlay": "held", "targets": [], "camera": null)")),
-                HasSubstr("frames.jsonl:1:1: camera: is null, but the frame has an overlay"));
-    EXPECT_THAT(error_of_log(line(0, R"("overlay": "none", "targets": [], "camera": {"eye": [0, 0, 0], )"
-                                     R"("look_at": [0, 0, 0], "up": [0, 1, 0]})")),
-                HasSubstr("frames.jsonl:1:1: camera: look_at must differ from eye"));
-    EXPECT_THAT(error_of_log(line(0) + end + line(1)),
-                HasSubstr("frames.jsonl:3:1: follows the line that ends the recording"));
-    EXPECT_THAT(error_of_log(end), HasSubstr("contains no complete frame; record the session again"));
-    EXPECT_THAT(error_of_log(""), HasSubstr("contains no complete frame"));
+    const test::ErrorCase cases[] = {
+        {line(0) + "{\"frame\": 1, ]\n" + line(2),
+         StartsWith("2:14: is not valid JSON; to replay the frames before it, delete this line and all that follow")},
+        {line(0) + line(1, R"("overlay": "none", "targets": [], "search": {"everywhere": 1}, "camera": null)"),
+         StartsWith("2:1: is not the record of a frame: type must be boolean")},
+        {line(0) + "[]\n", StartsWith("2:1: is not the record of a frame: ")},
+        {line(0) + "\n", StartsWith("2:1: is not valid JSON")},
+        {"{\"frame\": 0}\n", StartsWith("1:1: is not the record of a frame: key 'capture_ns' not found")},
+        {line(0, R"("overlay": "none", "targets": 3, "camera": null)"),
+         StartsWith("1:1: is not the record of a frame: ")},
+        {line(0, R"("overlay": "none", "targets": [], "camera": null, "truth": {"mt": )"
+                 "[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]}"),
+         StartsWith("1:1: is not the record of a frame: key 'target' not found")},
+        {line(1) + line(1), StartsWith("2:1: frame: must be greater than in the line before, 1")},
+        {line(0, R"("overlay": "all", "targets": [], "camera": null)"),
+         StartsWith("1:1: overlay: 'all' is not one of rendered, held, none")},
+        {line(0, R"("overlay": "held", "targets": [], "camera": null)"),
+         StartsWith("1:1: camera: is null, but the frame has an overlay")},
+        {line(0, R"("overlay": "none", "targets": [], "camera": {"eye": [0, 0, 0], )"
+                 R"("look_at": [0, 0, 0], "up": [0, 1, 0]})"),
+         StartsWith("1:1: camera: look_at must differ from eye")},
+        {line(0) + end + line(1), StartsWith("3:1: follows the line that ends the recording")},
+    };
+    expect_errors([&](const std::string &text) { return error_of_log(text); }, cases);
+    for (const std::string &log : {end, std::string()}) {
+        write("frames.jsonl", log);
+        EXPECT_THAT(error(), HasSubstr("contains no complete frame; record the session again"));
+    }
 }
 
 TEST_F(SessionFolder, MissingPartsAreReported) {

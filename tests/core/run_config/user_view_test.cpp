@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "errors.hpp"
 #include "plugin_under_test.hpp"
 #include "run_config/user_view.hpp"
 
@@ -11,6 +12,7 @@
 
 using namespace arhost::run_config;
 using namespace arhost::yaml;
+using arhost::test::error_of;
 using testing::HasSubstr;
 namespace fs = std::filesystem;
 
@@ -22,14 +24,6 @@ struct UserView : testing::Test {
         std::ofstream(folder / "video.mp4") << "x";
         std::ofstream(folder / "f-0001.png") << "x";
         std::ofstream(folder / "100%.png") << "x";
-    }
-    template <class Check> static std::string error_of(const Check &check) {
-        try {
-            check();
-        } catch (const Error &error) {
-            return error.what();
-        }
-        return "";
     }
     Node node(const std::string &path) const {
         return Node::parse("{path: '" + (folder / path).string() + "'}", "run.yaml").require("path");
@@ -57,7 +51,7 @@ struct UserView : testing::Test {
 
 TEST_F(UserView, AcceptsReadableInputs) {
     for (const char *path : {"video.mp4", "f-%04d.png", "100%.png", "."})
-        EXPECT_EQ(input_error(path), "") << path;
+        EXPECT_EQ(input_error(path), "no error") << path;
 }
 
 TEST_F(UserView, ReportsMissingInputs) {
@@ -79,10 +73,10 @@ TEST_F(UserView, ReportsNumberedFilesInTheHomeFolder) {
                 HasSubstr("run.yaml:1:8: path: the sandbox hides the folder '" + folder.string() +
                           "' from the plugin, because it contains your whole home; move the files to a folder"));
     EXPECT_THAT(input_error("g-%04d.png"), HasSubstr("no file matches"));
-    EXPECT_EQ(input_error("f-0001.png"), "");
+    EXPECT_EQ(input_error("f-0001.png"), "no error");
     arhost::sandbox::Policy policy;
     policy.mode = arhost::sandbox::Mode::none;
-    EXPECT_EQ(error_of([&] { expect_readable(node("f-%04d.png"), policy); }), "");
+    EXPECT_EQ(error_of([&] { expect_readable(node("f-%04d.png"), policy); }), "no error");
     ::setenv("HOME", usual.c_str(), 1);
 }
 
@@ -100,10 +94,10 @@ TEST_F(UserView, ReportsInputsWithoutPermission) {
 
 TEST_F(UserView, AcceptsWritableOutputsAndCreatesNothing) {
     for (const char *path : {"video.mp4", "new.mp4", "a/b/c.mp4"})
-        EXPECT_EQ(output_error(path), "") << path;
+        EXPECT_EQ(output_error(path), "no error") << path;
     EXPECT_FALSE(fs::exists(folder / "a"));
     EXPECT_FALSE(fs::exists(folder / "new.mp4"));
-    EXPECT_EQ(output_error("/dev/null"), "");
+    EXPECT_EQ(output_error("/dev/null"), "no error");
 }
 
 TEST_F(UserView, ReportsOutputsWithoutPermission) {

@@ -29,32 +29,7 @@ namespace {
 
 constexpr int layer_is_missing = 77;
 
-// Runs `checks` in a child process; returns the number of the first failed check, or 0.
-int in_child(const std::function<int()> &checks) {
-    const pid_t child = ::fork();
-    if (child == 0)
-        ::_exit(checks());
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-}
-
-// Like in_child, in process 2 of a PID namespace, as arhost-launcher starts workers.
-int in_pid_namespace(const std::function<int()> &checks) {
-    return in_child([&] {
-        if (::unshare(CLONE_NEWPID) != 0 && (!enter_user_namespace().empty() || ::unshare(CLONE_NEWPID) != 0))
-            return layer_is_missing;
-        const pid_t first = ::fork();
-        if (first == 0)
-            for (;;)
-                ::pause();
-        const int result = in_child(checks);
-        ::kill(first, SIGKILL);
-        return result;
-    });
-}
-
-// Identifies a failed check by its number, because a child process cannot use GoogleTest's expectations.
+// Checks in a child process, which cannot use GoogleTest's expectations: a failed check is identified by its number.
 class Checks {
 public:
     void that(bool holds) {
@@ -62,11 +37,57 @@ public:
         if (!holds && first_failed_ == 0)
             first_failed_ = count_;
     }
+    // Ends the process if a layer is not available on this machine.
+    void needs(bool has_layer) const {
+        if (!has_layer)
+            ::_exit(layer_is_missing);
+    }
     int result() const { return first_failed_; }
 
 private:
     int count_ = 0, first_failed_ = 0;
 };
+
+using Run = std::function<void(Checks &)>;
+
+// Runs `checks` in a child process; returns the number of the first failed check, or 0.
+int in_child(const Run &checks) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+        Checks check;
+        checks(check);
+        ::_exit(check.result());
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+// Like in_child, in process 2 of a PID namespace, as arhost-launcher starts workers.
+int in_pid_namespace(const Run &checks) {
+    return in_child([&](Checks &check) {
+        check.needs(::unshare(CLONE_NEWPID) == 0 || (enter_user_namespace().empty() && ::unshare(CLONE_NEWPID) == 0));
+        const pid_t first = ::fork();
+        if (first == 0)
+            for (;;)
+                ::pause();
+        const int result = in_child(checks);
+        ::kill(first, SIGKILL);
+        ::_exit(result);
+    });
+}
+
+bool has(const Layer &layer, const char *name) {
+    return layer.active.find(name) != std::string::npos;
+}
+bool enters_landlock(const Policy &policy) {
+    ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+    return !enter_landlock(policy).active.empty();
+}
+bool filters_system_calls(const Policy &policy) {
+    ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+    return !filter_system_calls(policy).active.empty();
+}
 
 bool opens(const fs::path &file, int flags) {
     const int fd = ::open(file.c_str(), flags | O_CLOEXEC, 0600);
@@ -112,10 +133,8 @@ TEST_F(Sandbox, NamespacesHideAllPathsThatAreNotGranted) {
     fs::create_symlink(outside / "old", scratch.path() / "link");
     std::ofstream(outside / "hidden") << "hidden";
     policy.readable = {scratch.path() / "link"};
-    EXPECT_CHECKS(in_child([&] {
-        if (enter_namespaces(policy).active.find("mount") == std::string::npos)
-            return layer_is_missing;
-        Checks check;
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        check.needs(has(enter_namespaces(policy), "mount"));
         check.that(opens(inside / "new", O_WRONLY | O_CREAT));
         check.that(opens(inside / "old", O_RDWR));
         check.that(!opens(outside / "new", O_WRONLY | O_CREAT));
@@ -131,17 +150,14 @@ TEST_F(Sandbox, NamespacesHideAllPathsThatAreNotGranted) {
         check.that(opens("/proc/self/status", O_RDONLY));
         check.that(opens("/dev/fd/0", O_RDONLY) || errno != ENOENT);
         check.that(opens("/dev/null", O_WRONLY));
-        return check.result();
     }));
 }
 
 TEST_F(Sandbox, NamespacesShowOnlyTheOwnProcessInProc) {
-    const auto checks = [&] {
+    const auto checks = [&](Checks &check) {
         const bool is_second = ::getppid() == 0;
-        if (enter_namespaces(policy).active.find("mount") == std::string::npos)
-            return layer_is_missing;
+        check.needs(has(enter_namespaces(policy), "mount"));
         drop_capabilities(); // with those of PID 1, this process could trace it
-        Checks check;
         for (const char *file : {"/proc/1/status", "/proc/keys", "/proc/cmdline", "/proc/sys/kernel/hostname"})
             check.that(!opens(file, O_RDONLY) && errno == ENOENT);
         for (const char *file : {"/proc/cpuinfo", "/proc/meminfo", "/proc/stat", "/proc/sys/vm/max_map_count"})
@@ -151,28 +167,25 @@ TEST_F(Sandbox, NamespacesShowOnlyTheOwnProcessInProc) {
         if (is_second) {
             check.that(!fs::exists("/proc/pids/1"));
             check.that(opens("/proc/thread-self/comm", O_RDONLY));
-            check.that(in_child([&] { return fs::equivalent("/proc/self/maps", self + "/maps"); }) == 0);
+            check.that(in_child([&](Checks &child) {
+                           child.that(!fs::equivalent("/proc/self/maps", self + "/maps"));
+                       }) == 0);
         }
-        return check.result();
     };
     EXPECT_CHECKS(in_child(checks));
     EXPECT_CHECKS(in_pid_namespace(checks));
     // The kernel refuses another /proc to a user who does not own the PID namespace.
-    EXPECT_CHECKS(in_pid_namespace([&] {
-        if (::geteuid() != 0 || ::setuid(65534) != 0 || ::prctl(PR_SET_DUMPABLE, 1, 0, 0, 0) != 0)
-            return layer_is_missing;
-        if (enter_namespaces(policy).active.find("mount") == std::string::npos)
-            return layer_is_missing;
-        Checks check;
+    EXPECT_CHECKS(in_pid_namespace([&](Checks &check) {
+        check.needs(::geteuid() == 0 && ::setuid(65534) == 0 && ::prctl(PR_SET_DUMPABLE, 1, 0, 0, 0) == 0);
+        check.needs(has(enter_namespaces(policy), "mount"));
         check.that(!opens("/proc/1/status", O_RDONLY) && errno == ENOENT);
         check.that(opens("/proc/self/status", O_RDONLY));
         check.that(opens("/proc/2/status", O_RDONLY));
-        return check.result();
     }));
 }
 
 TEST_F(Sandbox, NamespacesHideOtherControlGroups) {
-    EXPECT_CHECKS(in_child([&] {
+    EXPECT_CHECKS(in_child([&](Checks &check) {
         std::vector<fs::path> others;
         std::error_code ignored;
         std::string line;
@@ -181,46 +194,37 @@ TEST_F(Sandbox, NamespacesHideOtherControlGroups) {
         for (fs::directory_iterator entry("/sys/fs/cgroup", ignored), end; !is_root && entry != end; ++entry)
             if (entry->is_directory())
                 others.push_back(entry->path());
-        if (others.empty() || enter_namespaces(policy).active.find("cgroup, mount") == std::string::npos)
-            return layer_is_missing;
-        Checks check;
+        check.needs(!others.empty() && has(enter_namespaces(policy), "cgroup, mount"));
         for (const fs::path &other : others)
             check.that(!fs::exists(other));
         groups = std::ifstream("/proc/self/cgroup");
         while (std::getline(groups, line))
             check.that(line.ends_with(":/"));
-        return check.result();
     }));
 }
 
 TEST_F(Sandbox, NamespacesReportPathsThatCannotBeShown) {
-    EXPECT_CHECKS(in_child([&] {
+    EXPECT_CHECKS(in_child([&](Checks &check) {
         const rlimit few{16, 16}; // each path needs a descriptor
-        if (::setrlimit(RLIMIT_NOFILE, &few) != 0)
-            return layer_is_missing;
+        check.needs(::setrlimit(RLIMIT_NOFILE, &few) == 0);
         const Layer layer = enter_namespaces(policy);
-        if (layer.active.find("mount") == std::string::npos)
-            return layer_is_missing;
-        return layer.missing.find("mount: " + inside.string() + ": Too many open files") != std::string::npos ? 0 : 1;
+        check.needs(has(layer, "mount"));
+        check.that(layer.missing.find("mount: " + inside.string() + ": Too many open files") != std::string::npos);
     }));
 }
 
 TEST_F(Sandbox, NamespacesReportAUserNamespaceOfRoot) {
-    EXPECT_CHECKS(in_child([&] {
+    EXPECT_CHECKS(in_child([&](Checks &check) {
         __user_cap_header_struct header{_LINUX_CAPABILITY_VERSION_3, 0};
         __user_cap_data_struct data[2] = {};
         ::syscall(SYS_capget, &header, data);
         for (std::uint32_t *set : {&data[0].effective, &data[0].permitted})
             *set &= ~(1u << CAP_SYS_ADMIN);
-        if (::geteuid() != 0 || ::syscall(SYS_capset, &header, data) != 0)
-            return layer_is_missing;
+        check.needs(::geteuid() == 0 && ::syscall(SYS_capset, &header, data) == 0);
         const Layer layer = enter_namespaces(policy);
-        if (layer.active.find("mount") == std::string::npos)
-            return layer_is_missing;
-        Checks check;
+        check.needs(has(layer, "mount"));
         check.that(layer.active.starts_with("user, "));
         check.that(layer.missing.starts_with("pid: "));
-        return check.result();
     }));
 }
 
@@ -270,71 +274,59 @@ TEST_F(Sandbox, NetworkDoesNotGrantPrivateKeys) {
 }
 
 TEST_F(Sandbox, NamespacesBlockUnlistedDevices) {
-    EXPECT_CHECKS(in_child([&] {
-        if (!opens("/dev/ptmx", O_RDWR | O_NOCTTY) ||
-            enter_namespaces(policy).active.find("mount") == std::string::npos)
-            return layer_is_missing;
-        Checks check;
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        check.needs(opens("/dev/ptmx", O_RDWR | O_NOCTTY) && has(enter_namespaces(policy), "mount"));
         check.that(!opens("/dev/ptmx", O_RDWR | O_NOCTTY));
         check.that(opens("/dev/null", O_RDWR));
         check.that(opens("/dev/urandom", O_RDONLY));
         check.that(!opens("/dev/zero", O_RDWR));
-        return check.result();
     }));
 }
 
 TEST_F(Sandbox, EnvironmentKeepsStandardAndGrantedVariables) {
-    EXPECT_EQ(in_child([&] {
-                  constexpr const char *secrets[] = {
-                      "A_TOKEN",   "NVIDIA_API_KEY", "LD_ACCESS_TOKEN", "VK_TOKEN",     "LP_API_KEY",   "MESA_TOKEN",
-                      "LC_SECRET", "OMP_KEY",        "PYTHON_API_KEY",  "OPENCV_TOKEN", "ARHOST_TOKEN", "PATHS"};
-                  for (const char *variable : secrets)
-                      ::setenv(variable, "value", 1);
-                  for (const char *variable : {"GIVEN", "LC_NUMERIC", "XDG_CACHE_HOME", "LD_LIBRARY_PATH"})
-                      ::setenv(variable, "value", 1);
-                  policy.environment = {"GIVEN"};
-                  char *const secret = ::getenv("A_TOKEN");
-                  drop_environment(policy);
-                  Checks check;
-                  check.that(!::getenv("A_TOKEN"));
-                  check.that(*secret == '\0');
-                  for (const char *variable : secrets)
-                      check.that(!::getenv(variable));
-                  for (const char *variable : {"GIVEN", "LC_NUMERIC", "XDG_CACHE_HOME", "LD_LIBRARY_PATH", "PATH"})
-                      check.that(::getenv(variable));
-                  return check.result();
-              }),
-              0);
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        constexpr const char *secrets[] = {"A_TOKEN",        "NVIDIA_API_KEY", "LD_ACCESS_TOKEN", "VK_TOKEN",
+                                           "LP_API_KEY",     "MESA_TOKEN",     "LC_SECRET",       "OMP_KEY",
+                                           "PYTHON_API_KEY", "OPENCV_TOKEN",   "ARHOST_TOKEN",    "PATHS"};
+        for (const char *variable : secrets)
+            ::setenv(variable, "value", 1);
+        for (const char *variable : {"GIVEN", "LC_NUMERIC", "XDG_CACHE_HOME", "LD_LIBRARY_PATH"})
+            ::setenv(variable, "value", 1);
+        policy.environment = {"GIVEN"};
+        char *const secret = ::getenv("A_TOKEN");
+        drop_environment(policy);
+        check.that(!::getenv("A_TOKEN"));
+        check.that(*secret == '\0');
+        for (const char *variable : secrets)
+            check.that(!::getenv(variable));
+        for (const char *variable : {"GIVEN", "LC_NUMERIC", "XDG_CACHE_HOME", "LD_LIBRARY_PATH", "PATH"})
+            check.that(::getenv(variable));
+    }));
 }
 
 TEST_F(Sandbox, NamespacesKeepAWritableWorkingDirectoryWritable) {
-    EXPECT_CHECKS(in_child([&] {
+    EXPECT_CHECKS(in_child([&](Checks &check) {
         fs::current_path(inside);
-        if (enter_namespaces(policy).active.find("mount") == std::string::npos)
-            return layer_is_missing;
-        return opens("new", O_WRONLY | O_CREAT) ? 0 : 1;
+        check.needs(has(enter_namespaces(policy), "mount"));
+        check.that(opens("new", O_WRONLY | O_CREAT));
     }));
 }
 
 TEST_F(Sandbox, NamespacesBlockTheNetworkUnlessAllowed) {
-    EXPECT_CHECKS(in_child([&] {
-        if (enter_namespaces(policy).active.find("net") == std::string::npos)
-            return layer_is_missing;
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        check.needs(has(enter_namespaces(policy), "net"));
         std::ifstream devices("/proc/self/net/dev");
         int lines = 0;
         for (std::string line; std::getline(devices, line);)
             ++lines;
-        return lines <= 3 ? 0 : 1; // two header lines and lo
+        check.that(lines <= 3); // two header lines and lo
     }));
 }
 
 TEST_F(Sandbox, LandlockAllowsOnlyListedPaths) {
     policy.readable = {outside / "old"};
-    EXPECT_CHECKS(in_child([&] {
-        ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-        if (enter_landlock(policy).active.empty())
-            return layer_is_missing;
-        Checks check;
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        check.needs(enters_landlock(policy));
         check.that(opens(outside / "old", O_RDONLY));
         check.that(!opens(outside / "old", O_WRONLY));
         check.that(!opens(outside / "new", O_WRONLY | O_CREAT));
@@ -347,29 +339,21 @@ TEST_F(Sandbox, LandlockAllowsOnlyListedPaths) {
         check.that(opens("/proc/self/status", O_RDONLY));
         check.that(opens("/usr/bin/env", O_RDONLY));
         check.that(opens("/dev/null", O_RDWR));
-        return check.result();
     }));
 }
 
 TEST_F(Sandbox, LandlockBlocksMakingLinksAndPipes) {
-    EXPECT_CHECKS(in_child([&] {
-        ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-        if (enter_landlock(policy).active.empty())
-            return layer_is_missing;
-        Checks check;
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        check.needs(enters_landlock(policy));
         check.that(::symlink("/etc/passwd", (inside / "link").c_str()) != 0);
         check.that(::mkfifo((inside / "pipe").c_str(), 0600) != 0);
         check.that(::link((outside / "old").c_str(), (inside / "link").c_str()) != 0);
-        return check.result();
     }));
 }
 
 TEST_F(Sandbox, SystemCallsCannotAffectOtherProcesses) {
-    EXPECT_CHECKS(in_child([&] {
-        ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-        if (filter_system_calls(policy).active.empty())
-            return layer_is_missing;
-        Checks check;
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        check.needs(filters_system_calls(policy));
         const rlimit limit{1000, 1000};
         check.that(::kill(::getpid(), 0) == 0);
         check.that(::getrlimit(RLIMIT_CPU, const_cast<rlimit *>(&limit)) == 0);
@@ -390,7 +374,6 @@ TEST_F(Sandbox, SystemCallsCannotAffectOtherProcesses) {
             check.that(::kill(0, 0) != 0);
             check.that(::kill(-1, 0) != 0);
         }
-        return check.result();
     }));
 }
 
@@ -400,25 +383,21 @@ TEST_F(Sandbox, SystemCallListsContainOnlyKnownNames) {
         all.push_back({std::string(allowance)});
     for (const auto &allow : all) {
         policy.allow = allow;
-        EXPECT_EQ(in_child([&] {
-                      ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-                      const std::string missing = filter_system_calls(policy).missing;
-                      return missing.find("unknown to libseccomp") == std::string::npos ? 0 : 1;
-                  }),
-                  0);
+        EXPECT_CHECKS(in_child([&](Checks &check) {
+            ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
+            const std::string missing = filter_system_calls(policy).missing;
+            check.that(missing.find("unknown to libseccomp") == std::string::npos);
+        }));
     }
 }
 
 TEST_F(Sandbox, SystemCallsBlockFiltersAndProcessDescriptorsOfSockets) {
     for (const char *allow : {"video", "network", "usb"}) {
         policy.allow = {allow};
-        EXPECT_CHECKS(in_child([&] {
+        EXPECT_CHECKS(in_child([&](Checks &check) {
             int ends[2];
             ::socketpair(AF_UNIX, SOCK_STREAM, 0, ends);
-            ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-            if (filter_system_calls(policy).active.empty())
-                return layer_is_missing;
-            Checks check;
+            check.needs(filters_system_calls(policy));
             const bool has_usb = policy.allows("usb");
             sock_filter all{BPF_RET | BPF_K, 0, 0, 0xffffffff};
             const sock_fprog program{1, &all};
@@ -434,38 +413,29 @@ TEST_F(Sandbox, SystemCallsBlockFiltersAndProcessDescriptorsOfSockets) {
             check.that(::getsockopt(ends[0], SOL_SOCKET, 77 /* SO_PEERPIDFD */, &pidfd, &size) != 0 &&
                        errno == EPERM);
             check.that(under_sanitizer || (::syscall(SYS_flock, 0, 0) != 0 && errno == ENOSYS));
-            return check.result();
         }));
     }
 }
 
 TEST_F(Sandbox, SystemCallsAllowThreadsButNotProcesses) {
-    EXPECT_CHECKS(in_child([&] {
-        ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-        if (filter_system_calls(policy).active.empty())
-            return layer_is_missing;
-        Checks check;
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        check.needs(filters_system_calls(policy));
         bool ran = false;
         std::thread([&] { ran = true; }).join();
         check.that(ran);
         check.that(under_sanitizer || !forks());
         check.that(::unshare(CLONE_NEWNS) != 0);
-        return check.result();
     }));
 }
 
 TEST_F(Sandbox, SystemCallsBlockSocketsToOtherProcesses) {
-    EXPECT_CHECKS(in_child([&] {
-        ::prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0);
-        if (filter_system_calls(policy).active.empty())
-            return layer_is_missing;
-        Checks check;
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        check.needs(filters_system_calls(policy));
         int ends[2];
         for (const int family : {AF_UNIX, AF_INET, AF_INET6, AF_NETLINK, AF_PACKET, AF_VSOCK, 63, 64, 1000})
             check.that(!opens_socket(family));
         check.that(::socketpair(AF_UNIX, SOCK_STREAM, 0, ends) == 0);
         check.that(::socketpair(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0, ends) != 0);
-        return check.result();
     }));
 }
 
@@ -478,104 +448,85 @@ TEST_F(Sandbox, AllowancesGrantWhatTheyName) {
                           Case{"network", false, true, true}, Case{"gpu", false, false, false},
                           Case{"video", false, false, false}, Case{"usb", false, false, false}}) {
         policy.allow = {c.allow};
-        EXPECT_EQ(in_child([&] {
-                      enter(policy);
-                      Checks check;
-                      check.that((forks() == c.forks) || under_sanitizer);
-                      check.that(opens_socket(AF_UNIX) == c.unix);
-                      check.that(opens_socket(AF_INET) == c.internet);
-                      return check.result();
-                  }),
-                  0)
-            << c.allow;
+        EXPECT_CHECKS(in_child([&](Checks &check) {
+            enter(policy);
+            check.that((forks() == c.forks) || under_sanitizer);
+            check.that(opens_socket(AF_UNIX) == c.unix);
+            check.that(opens_socket(AF_INET) == c.internet);
+        })) << c.allow;
     }
 }
 
 TEST_F(Sandbox, SetsTheHighestOomScore) {
-    EXPECT_EQ(in_child([&] {
-                  const Level level = enter(policy);
-                  int score = 0;
-                  std::ifstream("/proc/self/oom_score_adj") >> score;
-                  Checks check;
-                  check.that((score == 1000) == level.front().missing.empty());
-                  return check.result();
-              }),
-              0);
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        const Level level = enter(policy);
+        int score = 0;
+        std::ifstream("/proc/self/oom_score_adj") >> score;
+        check.that((score == 1000) == level.front().missing.empty());
+    }));
 }
 
 TEST_F(Sandbox, LimitsMemoryFilesAndDescriptors) {
     policy.writable.clear();
     policy.memory_bytes = 256u << 20;
-    EXPECT_EQ(in_child([&] {
-                  enter(policy);
-                  Checks check;
-                  const auto map = [](std::size_t size, int flags) {
-                      return ::mmap(nullptr, size, PROT_READ | PROT_WRITE, flags | MAP_ANONYMOUS, -1, 0) !=
-                             MAP_FAILED;
-                  };
-                  check.that(map(64u << 20, MAP_PRIVATE));
-                  check.that(!map(512u << 20, MAP_PRIVATE) || under_sanitizer);
-                  check.that(!map(64u << 20, MAP_SHARED) || under_sanitizer);
-                  check.that(!map(64u << 20, MAP_PRIVATE | MAP_GROWSDOWN) || under_sanitizer);
-                  check.that(::memfd_create("mine", 0) < 0 || under_sanitizer);
-                  int held = 0;
-                  while (held < 2000 && ::open("/dev/null", O_RDONLY) >= 0)
-                      ++held;
-                  check.that(held < 512);
-                  rlimit priority{1, 1};
-                  ::getrlimit(RLIMIT_RTPRIO, &priority);
-                  check.that(priority.rlim_max == 0);
-                  return check.result();
-              }),
-              0);
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        enter(policy);
+        const auto map = [](std::size_t size, int flags) {
+            return ::mmap(nullptr, size, PROT_READ | PROT_WRITE, flags | MAP_ANONYMOUS, -1, 0) != MAP_FAILED;
+        };
+        check.that(map(64u << 20, MAP_PRIVATE));
+        check.that(!map(512u << 20, MAP_PRIVATE) || under_sanitizer);
+        check.that(!map(64u << 20, MAP_SHARED) || under_sanitizer);
+        check.that(!map(64u << 20, MAP_PRIVATE | MAP_GROWSDOWN) || under_sanitizer);
+        check.that(::memfd_create("mine", 0) < 0 || under_sanitizer);
+        int held = 0;
+        while (held < 2000 && ::open("/dev/null", O_RDONLY) >= 0)
+            ++held;
+        check.that(held < 512);
+        rlimit priority{1, 1};
+        ::getrlimit(RLIMIT_RTPRIO, &priority);
+        check.that(priority.rlim_max == 0);
+    }));
 }
 
 TEST_F(Sandbox, DoesNotLimitMemoryForAGpu) {
     policy.allow = {"gpu"};
     policy.memory_bytes = 256u << 20;
-    EXPECT_EQ(in_child([&] {
-                  enter(policy);
-                  Checks check;
-                  check.that(::mmap(nullptr, 512u << 20, PROT_READ | PROT_WRITE,
-                                    MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0) != MAP_FAILED);
-                  check.that(::memfd_create("mine", 0) >= 0);
-                  check.that(::mmap(nullptr, 4096, PROT_READ | PROT_WRITE | PROT_EXEC, MAP_PRIVATE | MAP_ANONYMOUS,
-                                    -1, 0) != MAP_FAILED); // a shader compiler
-                  return check.result();
-              }),
-              0);
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        enter(policy);
+        check.that(::mmap(nullptr, 512u << 20, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE,
+                          -1, 0) != MAP_FAILED);
+        check.that(::memfd_create("mine", 0) >= 0);
+        check.that(::mmap(nullptr, 4096, PROT_READ | PROT_WRITE | PROT_EXEC, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0) !=
+                   MAP_FAILED); // a shader compiler
+    }));
 }
 
 TEST_F(Sandbox, CreatesWritableFolders) {
     policy.writable = {outside / "a/b"};
-    EXPECT_EQ(in_child([&] {
-                  enter(policy);
-                  return opens(outside / "a/b/new", O_WRONLY | O_CREAT) ? 0 : 1;
-              }),
-              0);
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        enter(policy);
+        check.that(opens(outside / "a/b/new", O_WRONLY | O_CREAT));
+    }));
 }
 
 TEST_F(Sandbox, KeepsTheParentDeathSignal) {
-    EXPECT_EQ(in_child([&] {
-                  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-                  enter(policy);
-                  int signal = 0;
-                  ::prctl(PR_GET_PDEATHSIG, &signal);
-                  return signal == SIGKILL ? 0 : 1;
-              }),
-              0);
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+        enter(policy);
+        int signal = 0;
+        ::prctl(PR_GET_PDEATHSIG, &signal);
+        check.that(signal == SIGKILL);
+    }));
 }
 
 TEST_F(Sandbox, ReportsEachLayer) {
-    EXPECT_EQ(in_child([&] {
-                  const Level level = enter(policy);
-                  Checks check;
-                  check.that(level.size() == 8);
-                  for (const Layer &layer : level)
-                      check.that(!layer.active.empty() || !layer.missing.empty());
-                  return check.result();
-              }),
-              0);
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        const Level level = enter(policy);
+        check.that(level.size() == 8);
+        for (const Layer &layer : level)
+            check.that(!layer.active.empty() || !layer.missing.empty());
+    }));
     const Level level = {{"a", "x, y", ""}, {"b", "z", "no w"}, {"c", "", "no v"}};
     EXPECT_EQ(to_text(level), "a: x, y; b: z; MISSING b: no w; c: no v");
     EXPECT_FALSE(complete(level));
@@ -584,14 +535,11 @@ TEST_F(Sandbox, ReportsEachLayer) {
 
 TEST_F(Sandbox, ModeNoneRestrictsNothing) {
     policy.mode = Mode::none;
-    EXPECT_EQ(in_child([&] {
-                  Checks check;
-                  check.that(enter(policy).empty());
-                  check.that(forks());
-                  check.that(opens(outside / "old", O_RDWR));
-                  return check.result();
-              }),
-              0);
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        check.that(enter(policy).empty());
+        check.that(forks());
+        check.that(opens(outside / "old", O_RDWR));
+    }));
 }
 
 TEST_F(Sandbox, PolicySurvivesAJsonRoundTrip) {

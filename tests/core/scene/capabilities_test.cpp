@@ -113,10 +113,9 @@ TEST(Capabilities, EverySceneHasABitForEachPart) {
 }
 
 TEST(Capabilities, TheWarningNamesThePluginAndTheParts) {
-    EXPECT_EQ(
-        missing_capabilities_text("rt_small", ARHOST_CAPABILITY_GLASS | ARHOST_CAPABILITY_MOTION),
-        "rt_small does not support parts of the scene: glass, motion. The image will lack them; use another ray "
-        "tracer or a simpler scene");
+    EXPECT_EQ(missing_capabilities_text("rt_small", ARHOST_CAPABILITY_GLASS | ARHOST_CAPABILITY_MOTION),
+              "rt_small does not support parts of the scene: glass, motion. The image will lack them; use another "
+              "ray tracer or a simpler scene");
     EXPECT_EQ(missing_capabilities_text("rt_small", ARHOST_CAPABILITY_LENS_DISTORTION), "");
 }
 

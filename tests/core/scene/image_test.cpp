@@ -126,12 +126,11 @@ TEST(Textures, HaveWrapModeAndEncoding) {
 }
 
 TEST(Textures, TheSameFileIsStoredOnce) {
-    const Arena arena =
-        Scene("a.png", png(1, 1, 1, {7}))
-            .load("materials:\n  a: {model: metallic-roughness, texture: a.png, emission_texture: ./a.png, "
-                  "metallic_roughness_texture: a.png,\n"
-                  "    normal_texture: {image: a.png, wrap: clamp}}\n" +
-                  plane);
+    const Arena arena = Scene("a.png", png(1, 1, 1, {7}))
+                            .load("materials:\n  a: {model: metallic-roughness, texture: a.png, emission_texture: "
+                                  "./a.png, metallic_roughness_texture: a.png,\n"
+                                  "    normal_texture: {image: a.png, wrap: clamp}}\n" +
+                                  plane);
     ASSERT_EQ(arena.scene().textures.count, 3u);
     EXPECT_EQ(material(arena).colour_texture, 0u);
     EXPECT_EQ(material(arena).emission_texture, 0u);
@@ -168,12 +167,11 @@ TEST(Textures, ErrorsNameFileAndKey) {
 }
 
 TEST(Textures, NeedTextureCoordinates) {
-    EXPECT_EQ(
-        Scene("a.png", png(1, 1, 1, {7}))
-            .error_of("materials:\n  a: {model: diffuse, texture: a.png}\nobjects:\n  - {sphere: {radius: 1}, "
-                      "material: a}\n"),
-        "s.yaml:6:14: objects[0].sphere: has no texture coordinates, so its material cannot have textures; give it "
-        "another material, or a mesh with texture coordinates");
+    EXPECT_EQ(Scene("a.png", png(1, 1, 1, {7}))
+                  .error_of("materials:\n  a: {model: diffuse, texture: a.png}\nobjects:\n  - {sphere: {radius: 1}, "
+                            "material: a}\n"),
+              "s.yaml:6:14: objects[0].sphere: has no texture coordinates, so its material cannot have textures; "
+              "give it another material, or a mesh with texture coordinates");
 }
 
 TEST(Textures, CanBeCancelledWhileLoading) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "yaml/yaml.hpp"
 
+#include "errors.hpp"
 #include "plugin_under_test.hpp"
 
 #include <gmock/gmock.h>
@@ -8,20 +9,11 @@
 
 #include <fstream>
 
-using arhost::yaml::Error;
+using arhost::test::error_of;
 using arhost::yaml::Node;
 using testing::HasSubstr;
 
 namespace {
-
-template <class Call> std::string error_of(Call &&call) {
-    try {
-        call();
-    } catch (const Error &error) {
-        return error.what();
-    }
-    return "no error";
-}
 
 Node sample() {
     return Node::parse("mode: lockstep\ntracker:\n  side_mm: -3\n  ids: [1, x]\noutputs: [{path: a.mp4}]\n",
