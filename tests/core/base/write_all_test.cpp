@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/unique_fd.hpp"
 #include "base/write_all.hpp"
+#include "processes.hpp"
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <csignal>
 #include <fcntl.h>
 #include <pty.h>
-#include <sys/ioctl.h>
 #include <sys/signalfd.h>
 #include <thread>
 
@@ -27,6 +28,23 @@ struct WriteAll : testing::Test {
         ::sigaddset(&taken, SIGUSR1);
         ::pthread_sigmask(SIG_BLOCK, &taken, nullptr);
         signals = checked(::signalfd(-1, &taken, SFD_CLOEXEC), "signalfd");
+    }
+    // Writes until the descriptor accepts no more, then sends a signal.
+    void expect_interrupted_while_blocked(int fd) const {
+        std::atomic<pid_t> writer_id = 0;
+        std::jthread writer([&] {
+            writer_id = ::gettid();
+            try {
+                write_all(fd, std::string(1'000'000, 'x'), signals.get());
+                ADD_FAILURE() << "more was written than the descriptor accepts";
+            } catch (const Interrupted &interrupted) {
+                EXPECT_EQ(interrupted.signal, SIGUSR1);
+            }
+        });
+        while (writer_id == 0)
+            std::this_thread::yield();
+        arhost::test::wait_asleep(writer_id);
+        ::kill(::getpid(), SIGUSR1);
     }
     UniqueFd to_read, to_write, signals;
 };
@@ -48,29 +66,14 @@ TEST_F(WriteAll, WritesMoreThanAPipeHolds) {
 }
 
 TEST_F(WriteAll, IsInterruptedByASignalWhileAPipeIsFull) {
-    std::jthread writer([&] {
-        try {
-            write_all(to_write.get(), std::string(1'000'000, 'x'), signals.get());
-            ADD_FAILURE() << "more than the pipe holds was written";
-        } catch (const Interrupted &interrupted) {
-            EXPECT_EQ(interrupted.signal, SIGUSR1);
-        }
-    });
-    int waiting = 0; // number of bytes in the pipe
-    while (waiting < 4096 * 16)
-        ASSERT_EQ(::ioctl(to_read.get(), FIONREAD, &waiting), 0);
-    std::this_thread::sleep_for(std::chrono::milliseconds(50)); // usually enough for the write to block
-    ::kill(::getpid(), SIGUSR1);
+    expect_interrupted_while_blocked(to_write.get());
 }
 
 TEST_F(WriteAll, IsInterruptedByASignalWhileATerminalIsStopped) {
     int main_end = -1, other_end = -1;
     ASSERT_EQ(::openpty(&main_end, &other_end, nullptr, nullptr, nullptr), 0);
     const UniqueFd reader(main_end), terminal(other_end);
-    std::jthread writer(
-        [&] { EXPECT_THROW(write_all(terminal.get(), std::string(1'000'000, 'x'), signals.get()), Interrupted); });
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    ::kill(::getpid(), SIGUSR1);
+    expect_interrupted_while_blocked(terminal.get());
 }
 
 TEST_F(WriteAll, ThrowsIfItCannotWrite) {

@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <ctime>
+#include <manual_clock.hpp>
 #include <optional>
 #include <thread>
 
 using namespace arhost::ipc;
+using arhost::test::ManualClock;
 using namespace std::chrono_literals;
 
 namespace {
@@ -64,15 +66,16 @@ TEST(Reactor, LetsACallbackCancelItsOwnWatchAndAnother) {
 }
 
 TEST(Reactor, HandlesEventsBeforeExpiredDeadlines) {
-    Reactor reactor;
+    ManualClock clock;
+    Reactor reactor(clock);
     const Pipe pipe;
     bool missed = false;
-    auto deadline = reactor.at(Reactor::Clock::now() + 5ms, [&] { missed = true; });
+    auto deadline = reactor.at(clock.now() + 5ms, [&] { missed = true; });
     Reactor::Registration watch, delay;
     watch = reactor.watch(pipe.read.get(), [&] { deadline.cancel(), watch.cancel(); });
     const Pipe busy;
     delay = reactor.watch(busy.read.get(), [&] {
-        std::this_thread::sleep_for(10ms); // the event arrives while this process is busy
+        clock.advance(10ms); // the event arrives while this process is busy
         pipe.put();
         delay.cancel();
     });
@@ -83,20 +86,24 @@ TEST(Reactor, HandlesEventsBeforeExpiredDeadlines) {
 }
 
 TEST(Reactor, ExtendsDeadlinesByTimeInWhichTheProcessDidNotRun) {
-    Reactor reactor;
+    ManualClock clock;
+    Reactor reactor(clock);
     const Pipe pipe;
     bool missed = false;
-    auto deadline = reactor.at(Reactor::Clock::now() + 50ms, [&] { missed = true; });
+    auto deadline = reactor.at(clock.now() + 50ms, [&] { missed = true; });
     Reactor::Registration watch;
     watch = reactor.watch(pipe.read.get(), [&] {
-        std::this_thread::sleep_for(400ms);
+        std::this_thread::sleep_for(100ms); // a longer time has the same result
+        clock.advance(100ms);
         watch.cancel();
     });
     pipe.put();
     reactor.run_once();
     EXPECT_FALSE(missed);
-    while (!missed)
+    while (!missed) {
+        clock.advance(1s);
         reactor.run_once();
+    }
 }
 
 TEST(Reactor, CallsDeadlinesAlthoughTheThreadIsBusy) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "ipc/memory.hpp"
 #include "ipc/wake.hpp"
+#include "processes.hpp"
 
 #include <gtest/gtest.h>
 
@@ -19,7 +20,7 @@ TEST(Wake, ReachesAnotherProcessThroughAReadOnlyMapping) {
         const Mapping reader = memory.map(Access::read_only);
         ::_exit(wait_for_wake(reader.as<WakeWord>(), 0, 20s) ? 0 : 1);
     }
-    ::usleep(20'000); // the child is usually asleep after this time; the test passes even if it is not
+    arhost::test::wait_asleep(child);
     wake(writer.as<WakeWord>());
     int status = -1;
     ASSERT_EQ(::waitpid(child, &status, 0), child);

@@ -5,9 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cmath>
-#include <cstdlib>
 
 using namespace arhost::scene;
 using namespace arhost::scene::test;
@@ -290,7 +288,6 @@ TEST(Motion, MorphsUnskinnedObjectsInObjectSpace) {
                 ElementsAre(FloatNear(half_root, 1e-6f), 0, FloatNear(half_root, 1e-6f)));
 }
 
-// Reports the time but does not limit it, because a slow machine could exceed any limit.
 TEST(Motion, EvaluatesASkinOfAHundredThousandVertices) {
     ArenaBuilder builder;
     builder.settings.duration_s = 1;
@@ -312,14 +309,6 @@ TEST(Motion, EvaluatesASkinOfAHundredThousandVertices) {
                        glm::mat4x3(1), {false, true, ARHOST_NONE, builder.add_skin(skin)});
     const Arena arena = std::move(builder).build();
     MotionEvaluator evaluator(arena.scene());
-    double best_ms = 1e9;
-    for (int round = 0; round < 10; ++round) {
-        const auto begin = std::chrono::steady_clock::now();
-        const arhost_motion motion = evaluator.at(0.1 * round);
-        best_ms = std::min(
-            best_ms, std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count());
-        EXPECT_EQ(motion.deformed[0].positions[3 * 99'999], 99'999 % 300);
-    }
-    RecordProperty("best_ms", std::to_string(best_ms));
-    std::printf("%.2f ms\n", best_ms);
+    for (int round = 0; round < 10; ++round)
+        EXPECT_EQ(evaluator.at(0.1 * round).deformed[0].positions[3 * 99'999], 99'999 % 300);
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "supervise/launcher.hpp"
 
+#include "errors.hpp"
 #include "plugin_under_test.hpp"
 #include "processes.hpp"
 
@@ -15,7 +16,7 @@
 #include <sys/wait.h>
 
 using namespace arhost::supervise;
-using arhost::test::is_alive;
+using namespace arhost::test;
 
 namespace {
 
@@ -36,23 +37,13 @@ const std::string program = arhost::test::build_directory() + "/bin/arhost-launc
 const LogFunction no_log = [](arhost_severity, const std::string &, const std::string &) {};
 
 pid_t parent_of(pid_t pid) {
-    std::ifstream status("/proc/" + std::to_string(pid) + "/status");
-    for (std::string key; status >> key && key != "PPid:";) {
-    }
-    pid_t parent = 0;
-    status >> parent;
-    return parent;
+    return std::atoi(status_of(pid, "PPid").c_str());
 }
 
 // Returns the process's pid in its own PID namespace.
 pid_t innermost_pid(pid_t pid) {
-    std::ifstream status("/proc/" + std::to_string(pid) + "/status");
-    for (std::string key; status >> key && key != "NSpid:";) {
-    }
-    pid_t innermost = 0;
-    for (pid_t next; status >> next;)
-        innermost = next;
-    return innermost;
+    const std::string pids = status_of(pid, "NSpid");
+    return std::atoi(pids.substr(pids.rfind('\t') + 1).c_str());
 }
 
 // Returns the child of `parent` that is PID 1 of a namespace; 0 if there is none.
@@ -65,21 +56,8 @@ pid_t init_started_by(pid_t parent) {
     return 0;
 }
 
-// Waits until the process sleeps.
-void wait_idle(pid_t pid) {
-    for (char state = 0; state != 'S'; ::usleep(1000)) {
-        std::ifstream stat("/proc/" + std::to_string(pid) + "/stat");
-        stat.ignore(1000, ')') >> state;
-    }
-}
-
 std::string spawn_error(Launcher &launcher) {
-    try {
-        launcher.spawn("/bin/true", Isolation{false}, no_log);
-    } catch (const std::runtime_error &error) {
-        return error.what();
-    }
-    return "";
+    return error_of<std::runtime_error>([&] { launcher.spawn("/bin/true", Isolation{false}, no_log); });
 }
 
 } // namespace
@@ -159,16 +137,14 @@ TEST(Launcher, StartsAWorkerAsPid2WhosePid1EndsWithIt) {
     ASSERT_GT(init, 0);
     ::kill(worker.pid, SIGKILL);
     launcher.wait_exit(worker.pid);
-    for (int i = 0; i < 5000 && is_alive(init); ++i)
-        ::usleep(2000);
-    EXPECT_FALSE(is_alive(init));
+    EXPECT_TRUE(becomes_true([&] { return !is_alive(init); }));
 }
 
 TEST(Launcher, ReportsThatItCanNotStartAProcess) {
     Launcher launcher(program);
     const Spawned first = launcher.spawn("/usr/bin/yes", Isolation{false}, no_log);
     const pid_t pid = parent_of(first.pid);
-    wait_idle(pid); // it has then closed the descriptors of the request
+    wait_asleep(pid); // it has then closed the descriptors of the request
     const std::filesystem::directory_iterator open_files("/proc/" + std::to_string(pid) + "/fd"), end;
     rlimit usual{};
     ASSERT_EQ(::prlimit(pid, RLIMIT_NOFILE, nullptr, &usual), 0);
@@ -177,13 +153,13 @@ TEST(Launcher, ReportsThatItCanNotStartAProcess) {
     ASSERT_EQ(::prlimit(pid, RLIMIT_NOFILE, &few, nullptr), 0);
     EXPECT_EQ(spawn_error(launcher), "no process can be started: Too many open files");
     ASSERT_EQ(::prlimit(pid, RLIMIT_NOFILE, &usual, nullptr), 0);
-    EXPECT_EQ(spawn_error(launcher), "");
+    EXPECT_EQ(spawn_error(launcher), "no error");
     EXPECT_TRUE(is_alive(first.pid)) << "the launcher was replaced";
 }
 
 TEST(Launcher, ReportsThatItsHostHasNoFreeDescriptors) {
     Launcher launcher(program);
-    ASSERT_EQ(spawn_error(launcher), "");
+    ASSERT_EQ(spawn_error(launcher), "no error");
     rlimit usual{};
     ASSERT_EQ(::getrlimit(RLIMIT_NOFILE, &usual), 0);
     const int unused = ::dup(STDIN_FILENO);
@@ -194,7 +170,7 @@ TEST(Launcher, ReportsThatItsHostHasNoFreeDescriptors) {
         ::setrlimit(RLIMIT_NOFILE, &few);
         const std::string error = spawn_error(launcher);
         ::setrlimit(RLIMIT_NOFILE, &usual);
-        if (error.empty())
+        if (error == "no error")
             break;
         errors.push_back(error);
     }
@@ -204,14 +180,8 @@ TEST(Launcher, ReportsThatItsHostHasNoFreeDescriptors) {
 }
 
 TEST(Launcher, ReportsThatItCanNotBeStarted) {
-    const auto reason = [](const char *wrong) -> std::string {
-        try {
-            Launcher launcher(wrong);
-            launcher.spawn("/bin/true", Isolation{}, no_log);
-        } catch (const std::runtime_error &error) {
-            return error.what();
-        }
-        return "";
+    const auto reason = [](const char *wrong) {
+        return error_of<std::runtime_error>([&] { Launcher(wrong).spawn("/bin/true", Isolation{}, no_log); });
     };
     EXPECT_EQ(reason("/no/such/program"), "/no/such/program cannot be started: No such file or directory; is it "
                                           "installed in the same folder as arhost?");
@@ -299,9 +269,7 @@ TEST(Launcher, ExitsWithItsHostEvenIfStopped) {
     ASSERT_EQ(::read(ends[0], pids, sizeof pids), static_cast<ssize_t>(sizeof pids));
     ::waitpid(host, nullptr, 0);
     for (const pid_t pid : pids) {
-        for (int i = 0; i < 5000 && is_alive(pid); ++i)
-            ::usleep(2000);
-        EXPECT_FALSE(is_alive(pid));
+        EXPECT_TRUE(becomes_true([&] { return !is_alive(pid); }));
         ::kill(pid, SIGKILL);
     }
     ::close(ends[0]);
