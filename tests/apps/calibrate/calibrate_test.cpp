@@ -2,7 +2,7 @@
 //
 // Calibrates cameras with arhost-calibrate: rendered ones, whose lens is known, and those of OpenCV's photos.
 #include "camera/calibration.hpp"
-#include "plugin_under_test.hpp"
+#include "program_test.hpp"
 #include "rendered_board.hpp"
 
 #include <directories.hpp>
@@ -11,8 +11,6 @@
 #include <opencv2/videoio.hpp>
 
 #include <fstream>
-#include <iterator>
-#include <sys/wait.h>
 
 namespace {
 
@@ -22,7 +20,6 @@ using arhost::camera::read_calibration;
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
-using testing::IsEmpty;
 using testing::Not;
 
 const BoardOptions charuco{true, 10, 7, 36, 28, "DICT_5X5_100", 0};
@@ -36,33 +33,9 @@ std::vector<Pose> poses_for(const BoardOptions &board) {
     return good_poses(board.is_charuco ? 1.05 : 1.45);
 }
 
-class Calibrate : public testing::Test {
+class Calibrate : public arhost::test::ProgramTest {
 protected:
-    Calibrate() { fs::create_directory(folder()); }
-
-    fs::path folder() const { return scratch_.path() / "work"; }
-    // Runs a command in the folder, without a display, and returns its exit status.
-    int execute(const std::string &command) const {
-        const int status = std::system(("cd " + folder().string() + " && unset DISPLAY WAYLAND_DISPLAY && " +
-                                        command + " > " + (scratch_.path() / "output.txt").string() + " 2>&1")
-                                           .c_str());
-        return WEXITSTATUS(status);
-    }
-    int calibrate(const std::string &arguments) const {
-        return execute(arhost::test::build_directory() + "/bin/arhost-calibrate " + arguments);
-    }
-    std::string read(const fs::path &file) const {
-        std::ifstream stream(folder() / file, std::ios::binary);
-        return {std::istreambuf_iterator<char>(stream), {}};
-    }
-    std::string printed() const { return read("../output.txt"); }
-    std::vector<std::string> files() const {
-        std::vector<std::string> names;
-        for (const auto &entry : fs::directory_iterator(folder()))
-            names.push_back(entry.path().filename());
-        std::ranges::sort(names);
-        return names;
-    }
+    const std::string arhost_calibrate = program("arhost-calibrate");
     void write_images(const TrueCamera &camera, const BoardOptions &board, const std::vector<Pose> &poses) const {
         Renderer renderer(camera, board);
         fs::create_directory(folder() / "images");
@@ -86,8 +59,6 @@ protected:
             video.write(renderer.image(between, 2));
         }
     }
-
-    arhost::test::ScratchFolder scratch_;
 };
 
 void expect_lens(const fs::path &file, const TrueCamera &camera, double focal_length_percent,
@@ -130,8 +101,8 @@ INSTANTIATE_TEST_SUITE_P(Calibrate, EveryBoardAndLens,
 
 TEST_P(EveryBoardAndLens, GivesTheLensOfRenderedImages) {
     write_images(GetParam().camera, GetParam().board, poses_for(GetParam().board));
-    ASSERT_EQ(calibrate(GetParam().arguments + "--images images/*.png -o camera.yaml --coverage coverage.png"), 0)
-        << printed();
+    ASSERT_TRUE(succeeds(arhost_calibrate + GetParam().arguments +
+                         "--images images/*.png -o camera.yaml --coverage coverage.png"));
     EXPECT_THAT(files(), ElementsAre("camera.yaml", "coverage.png", "images"));
     expect_lens(folder() / "camera.yaml", GetParam().camera, 0.2, 1);
     for (const char *text : {"RMS error: 0.", " corners of 1", " views)", "\n27.png", "focal length: fx ", " ± ",
@@ -146,16 +117,15 @@ TEST_F(Calibrate, AcceptsABoardThatDoesNotBeginWithId0) {
     BoardOptions board = charuco;
     board.first_id = 40;
     write_images(brown_camera(), board, poses_for(board));
-    ASSERT_EQ(calibrate("--charuco 10x7 --square 36 --marker 28 --dictionary DICT_5X5_100:40 --images images/*.png "
-                        "-o camera.yaml"),
-              0)
-        << printed();
+    ASSERT_TRUE(succeeds(
+        arhost_calibrate +
+        "--charuco 10x7 --square 36 --marker 28 --dictionary DICT_5X5_100:40 --images images/*.png -o camera.yaml"));
     expect_lens(folder() / "camera.yaml", brown_camera(), 0.2, 1);
 }
 
 TEST_F(Calibrate, ChoosesViewsFromAVideo) {
     write_video(brown_camera(), charuco, poses_for(charuco));
-    ASSERT_EQ(calibrate(charuco_arguments + "--video video.avi --max-views 14 -o camera.yaml"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_calibrate + charuco_arguments + "--video video.avi --max-views 14 -o camera.yaml"));
     expect_lens(folder() / "camera.yaml", brown_camera(), 0.4, 2);
     EXPECT_THAT(printed(), HasSubstr("video.avi: 54 frames, 18 views taken; "));
     EXPECT_THAT(printed(), HasSubstr(" corners of 14 views)"));
@@ -167,35 +137,34 @@ TEST_F(Calibrate, SaysIfTheBoardNeverRests) {
     for (int i = 0; i < 5; ++i)
         video.write(renderer.image({0.4 + 0.04 * i, 0.5, 1.05, 10, 0, 0}));
     video.release();
-    EXPECT_EQ(calibrate(charuco_arguments + "--video video.avi -o camera.yaml"), 2);
+    EXPECT_EQ(execute(arhost_calibrate + charuco_arguments + "--video video.avi -o camera.yaml"), 2);
     EXPECT_THAT(printed(), HasSubstr("no view was taken; hold the board still in each one (video.avi: 5 frames, 0 "
                                      "views taken; 0 frames without the board, 5 in motion, "));
 }
 
 TEST_F(Calibrate, AdvisesWhichViewACameraNeeds) {
     write_video(brown_camera(), charuco, poses_for(charuco));
-    ASSERT_EQ(calibrate(charuco_arguments + "--camera video.avi -o camera.yaml"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_calibrate + charuco_arguments + "--camera video.avi -o camera.yaml"));
     for (const char *line : {"0 views: move the board to the top left of the image\n",
                              "1 view: move the board to the top right of the image\n",
                              "3 views: move the board to the bottom left of the image\n",
                              ": the views are complete\n", "\ncamera.yaml written\n"})
         EXPECT_THAT(printed(), HasSubstr(line));
     expect_lens(folder() / "camera.yaml", brown_camera(), 0.4, 2);
-    EXPECT_EQ(calibrate(charuco_arguments + "--camera video.avi --size 800x600 -o camera.yaml"), 2);
+    EXPECT_EQ(execute(arhost_calibrate + charuco_arguments + "--camera video.avi --size 800x600 -o camera.yaml"), 2);
     EXPECT_THAT(printed(), HasSubstr("--size 800x600: the camera delivers 640 x 480 px"));
 }
 
 TEST_F(Calibrate, ShowsAWindowIfThereIsADisplay) {
     write_video(brown_camera(), charuco, poses_for(charuco));
-    const std::string command = arhost::test::build_directory() + "/bin/arhost-calibrate " + charuco_arguments +
-                                "--camera video.avi -o camera.yaml";
-    EXPECT_EQ(execute("DISPLAY=:9977 " + command), 0) << printed();
+    const std::string command = arhost_calibrate + charuco_arguments + "--camera video.avi -o camera.yaml";
+    EXPECT_TRUE(succeeds("DISPLAY=:9977 " + command));
     EXPECT_THAT(printed(), HasSubstr("warning: the display cannot be opened, so there is no window"));
-    EXPECT_EQ(execute("DISPLAY=:9977 " + command + " --no-window"), 0) << printed();
+    EXPECT_TRUE(succeeds("DISPLAY=:9977 " + command + " --no-window"));
     EXPECT_THAT(printed(), Not(HasSubstr("warning")));
     if (std::system("command -v xvfb-run > /dev/null") != 0)
         GTEST_SKIP() << "xvfb-run is not installed";
-    EXPECT_EQ(execute("xvfb-run -a " + command), 0) << printed();
+    EXPECT_TRUE(succeeds("xvfb-run -a " + command));
     EXPECT_THAT(printed(), Not(HasSubstr("warning")));
 }
 
@@ -203,14 +172,14 @@ TEST_F(Calibrate, AgreesWithOpenCvOnItsChessboardPhotos) {
     const fs::path data = fs::path(photos) / "examples/data";
     if (!fs::exists(data / "left01.jpg"))
         GTEST_SKIP() << "needs the photos of the Debian package opencv-doc in " << data;
-    ASSERT_EQ(calibrate("--images " + data.string() + "/left??.jpg --chessboard 9x6 --square 25 -o left.yaml"), 2);
+    ASSERT_EQ(execute(arhost_calibrate + "--images " + data.string() +
+                      "/left??.jpg --chessboard 9x6 --square 25 -o left.yaml"),
+              2);
     EXPECT_THAT(printed(),
                 AllOf(HasSubstr("move the board to the top left of the image; "), Not(HasSubstr("tilt the"))))
         << "no photo has corners there";
-    ASSERT_EQ(calibrate("--images " + data.string() +
-                        "/left??.jpg --chessboard 9x6 --square 25 --accept-poor-coverage -o left.yaml"),
-              0)
-        << printed();
+    ASSERT_TRUE(succeeds(arhost_calibrate + "--images " + data.string() +
+                         "/left??.jpg --chessboard 9x6 --square 25 --accept-poor-coverage -o left.yaml"));
     EXPECT_THAT(printed(), HasSubstr(" corners of 13 views)"));
     const arhost_intrinsics found = read_calibration(folder() / "left.yaml"),
                             expected = read_calibration(data / "left_intrinsics.yml"); // OpenCV's result for them
@@ -240,8 +209,8 @@ TEST_F(Calibrate, AgreesWithOpenCvOnItsCharucoPhoto) {
     cv::projectPoints(view->board_mm, rotation, translation, matrix, coefficients, expected);
     EXPECT_LT(cv::norm(expected, view->image_px) / std::sqrt(24), 0.3);
 
-    EXPECT_EQ(calibrate("--images " + (data / "choriginal.jpg").string() +
-                        " --charuco 5x7 --square 40 --marker 20 --dictionary DICT_6X6_250 -o camera.yaml"),
+    EXPECT_EQ(execute(arhost_calibrate + "--images " + (data / "choriginal.jpg").string() +
+                      " --charuco 5x7 --square 40 --marker 20 --dictionary DICT_6X6_250 -o camera.yaml"),
               2);
     EXPECT_THAT(printed(), HasSubstr("the board was found in 1 view, but a calibration needs at least 3"));
 }
@@ -253,12 +222,12 @@ TEST_F(Calibrate, RefusesPoorCoverage) {
     write_images(brown_camera(), chessboard, poses);
     const std::string arguments =
         chessboard_arguments + "--images images/*.png -o camera.yaml --coverage coverage.png ";
-    EXPECT_EQ(calibrate(arguments), 2);
+    EXPECT_EQ(execute(arhost_calibrate + arguments), 2);
     EXPECT_THAT(printed(), HasSubstr("the views do not determine the lens well: move the board to the top right of "
                                      "the image; move the board to the bottom right of the image; move the board to "
                                      "the right of the image (or use --accept-poor-coverage)"));
     EXPECT_THAT(files(), ElementsAre("coverage.png", "images"));
-    EXPECT_EQ(calibrate(arguments + "--accept-poor-coverage"), 0) << printed();
+    EXPECT_TRUE(succeeds(arhost_calibrate + arguments + "--accept-poor-coverage"));
     EXPECT_THAT(printed(), HasSubstr("warning: the views do not determine the lens well: move the board to the top"));
     EXPECT_THAT(files(), ElementsAre("camera.yaml", "coverage.png", "images"));
 }
@@ -266,22 +235,23 @@ TEST_F(Calibrate, RefusesPoorCoverage) {
 TEST_F(Calibrate, SaysWhichOtherBoardItSees) {
     write_images(brown_camera(), charuco, {good_poses()[4]});
     EXPECT_EQ(
-        calibrate(
+        execute(
+            arhost_calibrate +
             "--charuco 10x7 --square 36 --marker 28 --dictionary DICT_6X6_50 --images images/10.png -o camera.yaml"),
         2);
     EXPECT_THAT(printed(),
                 HasSubstr("the board is in no image; expected a ChArUco board of 10 x 7 squares of 36 mm, markers of "
                           "28 mm, DICT_6X6_50 from id 0 on, but the images show 35 markers of DICT_5X5_"));
     write_images(brown_camera(), chessboard, {good_poses()[4]});
-    EXPECT_EQ(calibrate("--chessboard 11x8 --square 36 --images images/10.png -o camera.yaml"), 2);
+    EXPECT_EQ(execute(arhost_calibrate + "--chessboard 11x8 --square 36 --images images/10.png -o camera.yaml"), 2);
     EXPECT_THAT(printed(), HasSubstr("expected a chessboard with 11 x 8 inner corners, squares of 36 mm, but the "
                                      "images show a chessboard with about "));
 }
 
 TEST_F(Calibrate, RejectsABoardOfAnotherShape) {
     write_images(brown_camera(), charuco, poses_for(charuco));
-    EXPECT_EQ(calibrate("--charuco 7x10 --square 36 --marker 28 --dictionary DICT_5X5_100 --accept-poor-coverage "
-                        "--images images/*.png -o camera.yaml"),
+    EXPECT_EQ(execute(arhost_calibrate + "--charuco 7x10 --square 36 --marker 28 --dictionary DICT_5X5_100 "
+                                         "--accept-poor-coverage --images images/*.png -o camera.yaml"),
               2);
     EXPECT_THAT(printed(), HasSubstr("; expected a ChArUco board of 7 x 10 squares"));
     EXPECT_THAT(files(), ElementsAre("images"));
@@ -346,24 +316,22 @@ TEST_F(Calibrate, RejectsInvalidInputWithoutWritingAFile) {
         {"--video images/text.png " + rest, "images/text.png: "},
         {"--camera /dev/video-missing " + rest, "/dev/video-missing: the camera cannot be opened"},
     };
-    for (const auto &[arguments, message] : cases) {
-        EXPECT_EQ(calibrate(arguments), 2) << arguments;
-        EXPECT_THAT(printed(), HasSubstr(message)) << arguments;
-        EXPECT_THAT(files(), ElementsAre("images")) << arguments;
-    }
+    expect_rejected(arhost_calibrate, cases);
 }
 
 TEST_F(Calibrate, KeepsAnExistingFileIfItFails) {
     std::ofstream(folder() / "camera.yaml") << "before";
     write_images(brown_camera(), chessboard, {good_poses()[4]});
-    EXPECT_EQ(calibrate(chessboard_arguments + "--images images/*.png -o camera.yaml"), 2);
+    EXPECT_EQ(execute(arhost_calibrate + chessboard_arguments + "--images images/*.png -o camera.yaml"), 2);
     EXPECT_EQ(read("camera.yaml"), "before");
 }
 
 TEST_F(Calibrate, FailsIfTheDiskIsFull) {
     fs::create_symlink("/dev/full", folder() / "camera.yaml");
     write_images(brown_camera(), chessboard, {good_poses()[0], good_poses()[4], good_poses()[8]});
-    EXPECT_EQ(calibrate(chessboard_arguments + "--images images/*.png --accept-poor-coverage -o camera.yaml"), 2);
+    EXPECT_EQ(execute(arhost_calibrate + chessboard_arguments +
+                      "--images images/*.png --accept-poor-coverage -o camera.yaml"),
+              2);
     EXPECT_THAT(printed(), HasSubstr("No space left on device"));
 }
 
@@ -383,14 +351,14 @@ TEST_F(Calibrate, FindsTheBoardThatArhostPrints) {
     ASSERT_NE(calibrate.find("--camera /dev/video0 --size 1280x720"), std::string::npos);
     print.replace(print.find("board.pdf"), 9, "board.png --dpi 150");
     calibrate.replace(calibrate.find("--camera"), 36, "--images board.png");
-    ASSERT_EQ(execute(arhost::test::build_directory() + "/bin/" + print), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost::test::build_directory() + "/bin/" + print));
     EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/" + calibrate), 2);
     EXPECT_THAT(printed(), HasSubstr("the board was found in 1 view, but"));
 }
 
 TEST_F(Calibrate, IsACommandOfArhost) {
-    EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/arhost calibrate --chessboard 9x6 -o a.yaml"), 2);
+    EXPECT_EQ(execute(program("arhost") + "calibrate --chessboard 9x6 -o a.yaml"), 2);
     EXPECT_THAT(printed(), HasSubstr("error: --square is missing"));
-    EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/arhost help calibrate"), 0);
+    EXPECT_TRUE(succeeds(program("arhost") + "help calibrate"));
     EXPECT_THAT(printed(), HasSubstr("Usage: arhost calibrate [OPTIONS]"));
 }

@@ -2,7 +2,7 @@
 //
 // Runs arhost-map on rendered pictures of boards that arhost-marker has printed, and on a real sequence.
 #include "map/map_file.hpp"
-#include "plugin_under_test.hpp"
+#include "program_test.hpp"
 #include "simulated_markers.hpp"
 
 #include <arhost/shading/srgb8.hpp>
@@ -17,11 +17,7 @@
 #include <opencv2/videoio.hpp>
 
 #include <csignal>
-#include <cstdlib>
 #include <fstream>
-#include <iterator>
-#include <sys/wait.h>
-#include <unistd.h>
 
 namespace {
 
@@ -29,56 +25,27 @@ namespace fs = std::filesystem;
 using arhost::map::Marker;
 using arhost::pose::pose_at;
 using arhost::pose::Rigid;
-using testing::ElementsAre;
 using testing::HasSubstr;
-using testing::IsEmpty;
 using testing::Not;
 
 constexpr double print_dpi = 150, print_px_per_mm = print_dpi / 25.4;
 constexpr double focal_px = 600;
 constexpr int width = 640, height = 480;
 
-class MapProgram : public testing::Test {
+class MapProgram : public arhost::test::ProgramTest {
 protected:
-    MapProgram() { fs::create_directory(folder()); }
-
-    fs::path folder() const { return scratch_.path() / "work"; }
-    int execute(const std::string &command) const {
-        const int status = std::system(("cd " + folder().string() + " && " + command + " > " +
-                                        (scratch_.path() / "output.txt").string() + " 2>&1")
-                                           .c_str());
-        return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-    }
-    int learn(const std::string &arguments) const {
-        return execute(arhost::test::build_directory() + "/bin/arhost-map " + arguments);
-    }
-    std::string read(const fs::path &file) const {
-        std::ifstream stream(folder() / file, std::ios::binary);
-        return {std::istreambuf_iterator<char>(stream), {}};
-    }
-    std::string printed() const { return read("../output.txt"); }
-    void write(const fs::path &file, const std::string &text) const { std::ofstream(folder() / file) << text; }
+    const std::string arhost_map = program("arhost-map");
     void write_camera(const std::string &file = "camera.yaml", int wide = width) const {
         write(file, fmt::format("image_width: {}\nimage_height: {}\ncamera_matrix: {{rows: 3, cols: 3, data: [{}, 0, "
                                 "{}, 0, {}, {}, 0, 0, 1]}}\ndistortion_model: plumb_bob\ndistortion_coefficients: "
                                 "{{rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}}\n",
                                 wide, height, focal_px, (width - 1) / 2.0, focal_px, (height - 1) / 2.0));
     }
-    std::vector<std::string> files() const {
-        std::vector<std::string> names;
-        for (const auto &entry : fs::directory_iterator(folder()))
-            names.push_back(entry.path().filename());
-        std::ranges::sort(names);
-        return names;
-    }
-
     // Prints a board and its map, and returns the print.
     cv::Mat print_board(const std::string &family) const {
-        EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/arhost-marker " + family +
-                          " --grid 3x2 --side 40 --gap 12 --paper 280x230 --margin 5 --dpi 150 -o board.png --map "
-                          "board.map.yaml"),
-                  0)
-            << printed();
+        EXPECT_TRUE(succeeds(program("arhost-marker") + family +
+                             " --grid 3x2 --side 40 --gap 12 --paper 280x230 --margin 5 --dpi 150 -o board.png --map "
+                             "board.map.yaml"));
         return cv::imread(folder() / "board.png", cv::IMREAD_GRAYSCALE);
     }
     // Pictures of a print from different directions.
@@ -147,9 +114,6 @@ protected:
         }
         return largest;
     }
-
-private:
-    arhost::test::ScratchFolder scratch_;
 };
 
 class MapOfFamily : public MapProgram, public testing::WithParamInterface<const char *> {};
@@ -158,9 +122,8 @@ INSTANTIATE_TEST_SUITE_P(Every, MapOfFamily, testing::Values("tag36h11", "DICT_6
 TEST_P(MapOfFamily, IsThatOfThePrintedBoard) {
     const std::string family = GetParam();
     write_photos(family, 12);
-    ASSERT_EQ(learn("--images photo-*.png --camera camera.yaml --family " + family + " --side 40 -o desk.map.yaml"),
-              0)
-        << printed();
+    ASSERT_TRUE(succeeds(arhost_map + "--images photo-*.png --camera camera.yaml --family " + family +
+                         " --side 40 -o desk.map.yaml"));
     EXPECT_LE(difference_mm("desk.map.yaml", "board.map.yaml", family), 0.3) << read("desk.map.yaml");
     EXPECT_THAT(printed(), HasSubstr("desk.map.yaml: 6 markers from 12 of 12 frames; RMS reprojection error 0.0"));
     EXPECT_THAT(printed(), HasSubstr("\n     0       40      12    0.0"));
@@ -172,7 +135,7 @@ TEST_P(MapOfFamily, IsThatOfThePrintedBoard) {
 TEST_F(MapProgram, IsPreciseInBlurredImages) {
     write_photos("tag36h11", 12, 2);
     const std::string arguments = "--images photo-*.png --camera camera.yaml --family tag36h11 --ids 1-4 --side 40";
-    ASSERT_EQ(learn(arguments + " -o desk.map.yaml"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_map + arguments + " -o desk.map.yaml"));
     EXPECT_THAT(printed(), HasSubstr("4 markers from 12 of 12 frames; RMS reprojection error 0.0"));
 }
 
@@ -187,34 +150,32 @@ TEST_F(MapProgram, ReadsAVideo) {
     write_camera();
     const std::string arguments =
         "--video desk.avi --camera camera.yaml --family tag36h11 --side 40 -o desk.map.yaml";
-    ASSERT_EQ(learn(arguments), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_map + arguments));
     EXPECT_THAT(printed(), HasSubstr("6 markers from 20 of 20 frames"));
     EXPECT_LE(difference_mm("desk.map.yaml", "board.map.yaml", "tag36h11"), 0.3);
-    ASSERT_EQ(learn(arguments + " --every 3"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_map + arguments + " --every 3"));
     EXPECT_THAT(printed(), HasSubstr("6 markers from 7 of 7 frames"));
 }
 
 TEST_F(MapProgram, IsACommandOfArhost) {
     write_photos("tag36h11", 6);
-    ASSERT_EQ(execute(arhost::test::build_directory() + "/bin/arhost map --images photo-*.png --camera camera.yaml "
-                                                        "--family DICT_APRILTAG_36h11 --side 40 -o desk.map.yaml"),
-              0)
-        << printed();
+    ASSERT_TRUE(succeeds(program("arhost") + "map --images photo-*.png --camera camera.yaml "
+                                             "--family DICT_APRILTAG_36h11 --side 40 -o desk.map.yaml"));
     EXPECT_THAT(read("desk.map.yaml"), HasSubstr("family: tag36h11"));
-    EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/arhost help map"), 0);
+    EXPECT_TRUE(succeeds(program("arhost") + "help map"));
     EXPECT_THAT(printed(), HasSubstr("Usage: arhost map [OPTIONS]"));
 }
 
 TEST_F(MapProgram, TakesSidesIdsAndALayout) {
     write_photos("tag36h11", 6);
     const std::string images = "--images photo-*.png --camera camera.yaml --family tag36h11 ";
-    ASSERT_EQ(learn(images + "--side 40 --side 1-2=20 --ids 0,3-5 -o a.map.yaml"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_map + images + "--side 40 --side 1-2=20 --ids 0,3-5 -o a.map.yaml"));
     EXPECT_THAT(read("a.map.yaml"), Not(HasSubstr("id: 1")));
     EXPECT_THAT(printed(), HasSubstr("4 markers"));
-    EXPECT_EQ(learn(images + "--side 0-4=40 -o b.map.yaml"), 2);
+    EXPECT_EQ(execute(arhost_map + images + "--side 0-4=40 -o b.map.yaml"), 2);
     EXPECT_THAT(printed(),
                 HasSubstr("photo-00.png: shows marker 5, whose side is unknown; add --side 5=MM, or list"));
-    ASSERT_EQ(learn(images + "--layout board.map.yaml -o c.map.yaml"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_map + images + "--layout board.map.yaml -o c.map.yaml"));
     const auto family = arhost::marker::find_family("tag36h11");
     const auto learned = arhost::map::read_map(folder() / "c.map.yaml", family),
                truth = arhost::map::read_map(folder() / "board.map.yaml", family);
@@ -222,7 +183,7 @@ TEST_F(MapProgram, TakesSidesIdsAndALayout) {
     for (std::size_t i = 0; i < 6; ++i)
         EXPECT_LE((learned[i].map_from_marker.translation_mm - truth[i].map_from_marker.translation_mm).norm(), 0.3);
     EXPECT_THAT(read("c.map.yaml"), HasSubstr("# Frame: as in the layout.\n"));
-    ASSERT_EQ(learn(images + "--side 40 --origin 4 --plane -o d.map.yaml"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_map + images + "--side 40 --origin 4 --plane -o d.map.yaml"));
     EXPECT_THAT(read("d.map.yaml"), HasSubstr("# Frame: z = 0 is the best plane, x as on marker 4.\n"));
 }
 
@@ -237,15 +198,15 @@ TEST_F(MapProgram, RefusesMarkersThatAreNotConnected) {
     write_camera();
     const std::string arguments =
         "--images photo-*.png --camera camera.yaml --family tag36h11 --side 40 -o desk.map.yaml";
-    EXPECT_EQ(learn(arguments), 2);
+    EXPECT_EQ(execute(arhost_map + arguments), 2);
     EXPECT_THAT(printed(),
                 HasSubstr("error: marker 2 was seen in only 2 frames; at least 3 are needed; marker 5 was "));
     EXPECT_THAT(printed(), HasSubstr("(--skip-unconnected leaves such markers out)"));
     EXPECT_THAT(files(), Not(testing::Contains("desk.map.yaml")));
-    EXPECT_EQ(learn(arguments + " --skip-unconnected"), 0) << printed();
+    EXPECT_TRUE(succeeds(arhost_map + arguments + " --skip-unconnected"));
     EXPECT_THAT(printed(), HasSubstr("warning: left out: marker 2 was seen"));
     EXPECT_THAT(printed(), HasSubstr("4 markers from 6 of 6 frames"));
-    EXPECT_EQ(learn(arguments + " --skip-unconnected --origin 5"), 2);
+    EXPECT_EQ(execute(arhost_map + arguments + " --skip-unconnected --origin 5"), 2);
     EXPECT_THAT(printed(), HasSubstr("marker 5 cannot be the origin"));
 }
 
@@ -303,12 +264,7 @@ TEST_F(MapProgram, RejectsInvalidArgumentsWithoutWritingAFile) {
         {"--video missing.avi" + camera + side + out, "missing.avi: there is no such file"},
         {"--video . " + camera + side + out, "there is no such file"},
     };
-    const auto before = files();
-    for (const auto &[arguments, message] : cases) {
-        EXPECT_EQ(learn(arguments), 2) << arguments;
-        EXPECT_THAT(printed(), HasSubstr(message)) << arguments;
-        EXPECT_EQ(files(), before) << arguments;
-    }
+    expect_rejected(arhost_map, cases);
 }
 
 TEST_F(MapProgram, LeavesTheOldMapIfItIsInterrupted) {
@@ -318,8 +274,7 @@ TEST_F(MapProgram, LeavesTheOldMapIfItIsInterrupted) {
     std::string images;
     for (int i = 0; i < 3000; ++i)
         images += " photo-00.png";
-    EXPECT_EQ(execute("timeout --preserve-status -s INT 0.3 " + arhost::test::build_directory() +
-                      "/bin/arhost-map --images" + images +
+    EXPECT_EQ(execute("timeout --preserve-status -s INT 0.3 " + arhost_map + "--images" + images +
                       " --camera camera.yaml --family tag36h11 --side 40 -o desk.map.yaml"),
               128 + SIGINT)
         << printed();
@@ -334,11 +289,9 @@ TEST_F(MapProgram, LearnsARealBoard) {
                                      "[{}, 0, {}, 0, {}, {}, 0, 0, 1]}}\ndistortion_model: plumb_bob\n"
                                      "distortion_coefficients: {{rows: 1, cols: 5, data: [0, 0, 0, 0, 0]}}\n",
                                      camera.fx, camera.cx, camera.fy, camera.cy));
-    ASSERT_EQ(
-        learn("--images " + arhost::test::shared_data("markers/rbt_sequence").string() +
-              "/color_image_00?[02468].png --camera camera.yaml --family tag36h11 --side 95.5 -o board.map.yaml"),
-        0)
-        << printed();
+    ASSERT_TRUE(
+        succeeds(arhost_map + "--images " + arhost::test::shared_data("markers/rbt_sequence").string() +
+                 "/color_image_00?[02468].png --camera camera.yaml --family tag36h11 --side 95.5 -o board.map.yaml"));
     const auto map = arhost::map::read_map(folder() / "board.map.yaml", arhost::marker::find_family("tag36h11"));
     EXPECT_EQ(map.size(), 10u);
     for (const Marker &marker : map) {

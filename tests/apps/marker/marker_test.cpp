@@ -2,7 +2,7 @@
 //
 // Prints sheets with arhost-marker and measures them with the libraries that the trackers use.
 #include "fiducial/tracker_support.hpp"
-#include "plugin_under_test.hpp"
+#include "program_test.hpp"
 #include "run_config/targets.hpp"
 
 #include <directories.hpp>
@@ -18,10 +18,8 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
-#include <iterator>
 #include <map>
 #include <set>
-#include <sys/wait.h>
 
 namespace {
 
@@ -30,7 +28,6 @@ using arhost::apriltag::family_types;
 using arhost::aruco::dictionary_types;
 using testing::ElementsAre;
 using testing::HasSubstr;
-using testing::IsEmpty;
 
 constexpr double dpi = 600, tolerance_mm = 0.1;
 constexpr double px_per_mm = dpi / 25.4;
@@ -138,26 +135,9 @@ double ruler_mm(const cv::Mat &page) {
     return longest / px_per_mm;
 }
 
-class Marker : public testing::Test {
+class Marker : public arhost::test::ProgramTest {
 protected:
-    Marker() { fs::create_directory(folder()); }
-
-    fs::path folder() const { return scratch_.path() / "work"; }
-    // Runs a command in the folder and returns its exit status.
-    int execute(const std::string &command) const {
-        const int status = std::system(("cd " + folder().string() + " && " + command + " > " +
-                                        (scratch_.path() / "output.txt").string() + " 2>&1")
-                                           .c_str());
-        return WEXITSTATUS(status);
-    }
-    int print(const std::string &arguments) const {
-        return execute(arhost::test::build_directory() + "/bin/arhost-marker " + arguments);
-    }
-    std::string read(const fs::path &file) const {
-        std::ifstream stream(folder() / file, std::ios::binary);
-        return {std::istreambuf_iterator<char>(stream), {}};
-    }
-    std::string printed() const { return read("../output.txt"); }
+    const std::string arhost_marker = program("arhost-marker");
     // Writes a pattern file of ARToolKit: grey levels from 20 on, and a white corner at the top left.
     fs::path write_pattern() const {
         const fs::path file = folder() / "hiro.patt";
@@ -167,22 +147,13 @@ protected:
                 stream << (i == 0 ? 255 : 20 + 10 * i) << (i % 4 == 3 ? '\n' : ' ');
         return file;
     }
-    std::vector<std::string> files() const {
-        std::vector<std::string> names;
-        for (const auto &entry : fs::directory_iterator(folder()))
-            names.push_back(entry.path().filename());
-        std::ranges::sort(names);
-        return names;
-    }
     cv::Mat picture(const fs::path &file) const { return cv::imread(folder() / file, cv::IMREAD_GRAYSCALE); }
     // Renders the first page of a PNG, PDF or SVG at 600 dpi.
     cv::Mat page(const std::string &file) const {
         if (file.ends_with(".png"))
             return picture(file);
-        EXPECT_EQ(execute(file.ends_with(".pdf") ? "pdftoppm -singlefile -r 600 -gray -png " + file + " rendered"
-                                                 : "rsvg-convert -d 600 -p 600 -b white -o rendered.png " + file),
-                  0)
-            << printed();
+        EXPECT_TRUE(succeeds(file.ends_with(".pdf") ? "pdftoppm -singlefile -r 600 -gray -png " + file + " rendered"
+                                                    : "rsvg-convert -d 600 -p 600 -b white -o rendered.png " + file));
         return picture("rendered.png");
     }
 
@@ -217,9 +188,6 @@ protected:
         }
         return origin;
     }
-
-private:
-    arhost::test::ScratchFolder scratch_;
 };
 
 bool is_installed(const char *program) {
@@ -251,7 +219,7 @@ INSTANTIATE_TEST_SUITE_P(Marker, EveryFormat, testing::Values("pdf", "svg", "png
 } // namespace
 
 TEST_P(EveryFamily, IsPrintedUprightInItsTrueSize) {
-    ASSERT_EQ(print(GetParam() + ":0,3,29 --side 12 --paper 120x70 --margin 5 -o sheet.png"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_marker + GetParam() + ":0,3,29 --side 12 --paper 120x70 --margin 5 -o sheet.png"));
     const Found found = markers(GetParam(), picture("sheet.png"));
     EXPECT_THAT(ids_of(found), ElementsAre(0, 3, 29));
     expect_upright_squares(found, 12);
@@ -262,10 +230,8 @@ TEST_P(EveryFormat, HasMarkersInTheirTrueSize) {
     for (const auto &[name, side_mm] :
          {std::pair("tag36h11", 17.3), {"tagStandard41h12", 11.0}, {"DICT_5X5_100", 14.0}, {"artoolkit-3x3", 15.0}}) {
         const std::string file = std::string("sheet.") + GetParam();
-        ASSERT_EQ(print(std::string(name) + ":1-4 --side " + std::to_string(side_mm) +
-                        " --paper 110x90 --margin 5 --cut-marks -o " + file),
-                  0)
-            << printed();
+        ASSERT_TRUE(succeeds(arhost_marker + std::string(name) + ":1-4 --side " + std::to_string(side_mm) +
+                             " --paper 110x90 --margin 5 --cut-marks -o " + file));
         const Found found = markers(name, page(file));
         EXPECT_THAT(ids_of(found), ElementsAre(1, 2, 3, 4));
         expect_upright_squares(found, side_mm);
@@ -275,8 +241,8 @@ TEST_P(EveryFormat, HasMarkersInTheirTrueSize) {
 TEST_F(Marker, PrintsTheMatrixCodesOfArToolKit) {
     for (const auto &family : arhost::fiducial::matrix_families()) {
         SCOPED_TRACE(family.name);
-        ASSERT_EQ(print(std::string(family.name) + ":0,3,7 --side 12 --paper 120x70 --margin 5 -o sheet.png"), 0)
-            << printed();
+        ASSERT_TRUE(succeeds(arhost_marker + std::string(family.name) +
+                             ":0,3,7 --side 12 --paper 120x70 --margin 5 -o sheet.png"));
         const Found found = markers(family.name, picture("sheet.png"));
         EXPECT_THAT(ids_of(found), ElementsAre(0, 3, 7));
         expect_upright_squares(found, 12);
@@ -287,7 +253,7 @@ TEST_P(EveryFormat, HasPatternsOfArToolKit) {
     ARHOST_REQUIRE_RENDERER(GetParam());
     const std::string pattern = write_pattern(), file = std::string("sheet.") + GetParam();
     for (const auto &[option, ratio] : {std::pair("", 0.5), {" --pattern-ratio 0.7", 0.7}}) {
-        ASSERT_EQ(print("hiro.patt --side 20 --paper 60x70 --margin 5 -o " + file + option), 0) << printed();
+        ASSERT_TRUE(succeeds(arhost_marker + "hiro.patt --side 20 --paper 60x70 --margin 5 -o " + file + option));
         const cv::Mat page = this->page(file);
         const Found found = artoolkit_markers({{0, 20, "pattern", pattern, ratio}}, page);
         ASSERT_THAT(ids_of(found), ElementsAre(0));
@@ -305,7 +271,7 @@ TEST_P(EveryFormat, HasARulerInItsTrueLength) {
     ARHOST_REQUIRE_RENDERER(GetParam());
     const std::string file = std::string("sheet.") + GetParam();
     for (const auto &[paper, length_mm] : {std::pair("130x60", 100), {"60x60", 40}}) {
-        ASSERT_EQ(print("tag36h11:0 --side 12 --paper " + std::string(paper) + " -o " + file), 0) << printed();
+        ASSERT_TRUE(succeeds(arhost_marker + "tag36h11:0 --side 12 --paper " + std::string(paper) + " -o " + file));
         EXPECT_NEAR(ruler_mm(page(file)), length_mm, tolerance_mm) << paper;
     }
 }
@@ -313,7 +279,7 @@ TEST_P(EveryFormat, HasARulerInItsTrueLength) {
 TEST_P(EveryFormat, HasThePaperInItsTrueSize) {
     ARHOST_REQUIRE_RENDERER(GetParam());
     const std::string file = std::string("sheet.") + GetParam();
-    ASSERT_EQ(print("tag36h11:0 --side 12 --paper 62.5x80 -o " + file), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_marker + "tag36h11:0 --side 12 --paper 62.5x80 -o " + file));
     EXPECT_NEAR(page(file).cols / px_per_mm, 62.5, 0.05);
     EXPECT_NEAR(page(file).rows / px_per_mm, 80, 0.05);
 }
@@ -321,9 +287,9 @@ TEST_P(EveryFormat, HasThePaperInItsTrueSize) {
 TEST_P(EveryFormat, HasBoardsThatAgreeWithTheirMap) {
     ARHOST_REQUIRE_RENDERER(GetParam());
     const std::string file = std::string("board.") + GetParam();
-    ASSERT_EQ(
-        print("tag25h9:10 --grid 4x3 --side 12 --gap 3 --paper 90x80 --margin 5 --map board.map.yaml -o " + file), 0)
-        << printed();
+    ASSERT_TRUE(succeeds(arhost_marker +
+                         "tag25h9:10 --grid 4x3 --side 12 --gap 3 --paper 90x80 --margin 5 --map board.map.yaml -o " +
+                         file));
     EXPECT_THAT(read("board.map.yaml"), HasSubstr("\nversion: 1\nfamily: tag25h9\nmarkers:\n  - {id: 10, "));
     const auto positions = positions_in("board.map.yaml", 12);
     EXPECT_EQ(positions.size(), 12u);
@@ -335,10 +301,8 @@ TEST_P(EveryFormat, HasBoardsThatAgreeWithTheirMap) {
 }
 
 TEST_F(Marker, PrintsBoardsOfMatrixCodesWithTheirMap) {
-    ASSERT_EQ(print("artoolkit-4x4-bch-13-9-3:5 --grid 3x2 --side 12 --paper 90x80 --margin 5 --map board.map.yaml "
-                    "-o board.png"),
-              0)
-        << printed();
+    ASSERT_TRUE(succeeds(arhost_marker + "artoolkit-4x4-bch-13-9-3:5 --grid 3x2 --side 12 --paper 90x80 --margin 5 "
+                                         "--map board.map.yaml -o board.png"));
     EXPECT_THAT(read("board.map.yaml"), HasSubstr("\nversion: 1\nfamily: artoolkit-4x4-bch-13-9-3\n"));
     const auto positions = positions_in("board.map.yaml", 12);
     EXPECT_EQ(positions.at(5), cv::Point2d(-13.5, 6.75));
@@ -348,10 +312,8 @@ TEST_F(Marker, PrintsBoardsOfMatrixCodesWithTheirMap) {
 TEST_F(Marker, PrintsTheChArucoBoardsOfOpenCv) {
     for (const auto &[columns, rows] : {std::pair(5, 4), {4, 3}}) {
         const std::string size = std::to_string(columns) + "x" + std::to_string(rows);
-        ASSERT_EQ(print("DICT_6X6_250 --charuco " + size +
-                        " --square 14 --marker 10 --paper 100x90 --margin 5 -o board.png --map board.map.yaml"),
-                  0)
-            << printed();
+        ASSERT_TRUE(succeeds(arhost_marker + "DICT_6X6_250 --charuco " + size +
+                             " --square 14 --marker 10 --paper 100x90 --margin 5 -o board.png --map board.map.yaml"));
         EXPECT_THAT(read("board.map.yaml"), HasSubstr("\nversion: 1\ndictionary: DICT_6X6_250\n"));
         const cv::Mat picture = this->picture("board.png");
         const cv::Point2d origin =
@@ -374,8 +336,8 @@ TEST_F(Marker, PrintsTheChArucoBoardsOfOpenCv) {
 }
 
 TEST_F(Marker, PrintsTheSameTagForBothOfItsNames) {
-    ASSERT_EQ(print("tag36h11:23 --side 12 --paper 60x60 -o a.png"), 0) << printed();
-    ASSERT_EQ(print("DICT_APRILTAG_36h11:23 --side 12 --paper 60x60 -o b.png"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_marker + "tag36h11:23 --side 12 --paper 60x60 -o a.png"));
+    ASSERT_TRUE(succeeds(arhost_marker + "DICT_APRILTAG_36h11:23 --side 12 --paper 60x60 -o b.png"));
     EXPECT_EQ(read("a.png"), read("b.png"));
 }
 
@@ -383,7 +345,8 @@ TEST_F(Marker, KeepsAQuietZoneOfOneCell) {
     // Cells of the print per side between the corners.
     for (const auto &[name, border_cells, cells] :
          {std::tuple("tag36h11", 8, 8), {"tagStandard41h12", 5, 9}, {"DICT_4X4_50", 6, 6}}) {
-        ASSERT_EQ(print(std::string(name) + ":0-1 --side 12 --paper 100x70 --margin 5 --cut-marks -o sheet.png"), 0);
+        ASSERT_TRUE(succeeds(arhost_marker + std::string(name) +
+                             ":0-1 --side 12 --paper 100x70 --margin 5 --cut-marks -o sheet.png"));
         const cv::Mat page = picture("sheet.png");
         const Found found = markers(name, page);
         EXPECT_EQ(found.size(), 2u);
@@ -403,7 +366,7 @@ TEST_F(Marker, KeepsAQuietZoneOfOneCell) {
 }
 
 TEST_F(Marker, PlacesTheEdgesOfCellsAtWholePixels) {
-    ASSERT_EQ(print("tag36h11:0 --side 17.3 --paper 60x60 -o sheet.png"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_marker + "tag36h11:0 --side 17.3 --paper 60x60 -o sheet.png"));
     const cv::Mat page = picture("sheet.png");
     const cv::Point2d centre = centre_of(markers("tag36h11", page).at(0)) * px_per_mm;
     const int half = static_cast<int>(8.65 * px_per_mm) + 10;
@@ -413,7 +376,7 @@ TEST_F(Marker, PlacesTheEdgesOfCellsAtWholePixels) {
 }
 
 TEST_F(Marker, WritesTheResolutionIntoAPng) {
-    ASSERT_EQ(print("tag36h11:0 --side 12 --paper 60x60 --dpi 300 -o sheet.png"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_marker + "tag36h11:0 --side 12 --paper 60x60 --dpi 300 -o sheet.png"));
     const std::string bytes = read("sheet.png");
     const std::size_t at = bytes.find("pHYs");
     ASSERT_NE(at, std::string::npos);
@@ -423,9 +386,9 @@ TEST_F(Marker, WritesTheResolutionIntoAPng) {
 
 TEST_F(Marker, UsesSeveralPagesOfAPdf) {
     ARHOST_REQUIRE_RENDERER("pdf");
-    ASSERT_EQ(print("tag36h11:0-35 --side 40 -o sheet.pdf"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_marker + "tag36h11:0-35 --side 40 -o sheet.pdf"));
     EXPECT_EQ(printed(), "sheet.pdf: 3 pages of 210 x 297 mm; print at 100 %\n");
-    ASSERT_EQ(execute("pdftoppm -r 100 -gray -png sheet.pdf page"), 0) << printed();
+    ASSERT_TRUE(succeeds("pdftoppm -r 100 -gray -png sheet.pdf page"));
     EXPECT_THAT(files(), ElementsAre("page-1.png", "page-2.png", "page-3.png", "sheet.pdf"));
     std::set<int> ids;
     for (const char *page : {"page-1.png", "page-2.png", "page-3.png"}) {
@@ -438,8 +401,9 @@ TEST_F(Marker, UsesSeveralPagesOfAPdf) {
 }
 
 TEST_F(Marker, NumbersTheFilesOfSeveralPages) {
-    ASSERT_EQ(print("tag36h11:0-23 --side 12 --paper 100x70 --margin 5 -o sheet.svg"), 0) << printed();
-    ASSERT_EQ(print("tag36h11:0-140 --side 12 --paper 100x70 --margin 5 --dpi 150 -o sheet.png"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_marker + "tag36h11:0-23 --side 12 --paper 100x70 --margin 5 -o sheet.svg"));
+    ASSERT_TRUE(
+        succeeds(arhost_marker + "tag36h11:0-140 --side 12 --paper 100x70 --margin 5 --dpi 150 -o sheet.png"));
     const std::vector<std::string> names = files();
     ASSERT_EQ(names.size(), 2u + 9u);
     EXPECT_EQ(names[0], "sheet-1.png");
@@ -448,19 +412,19 @@ TEST_F(Marker, NumbersTheFilesOfSeveralPages) {
 }
 
 TEST_F(Marker, TurnsThePaperIfThatSavesPages) {
-    ASSERT_EQ(print("tag36h11:0-14 --side 40 -o sheet.pdf"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_marker + "tag36h11:0-14 --side 40 -o sheet.pdf"));
     EXPECT_EQ(printed(), "sheet.pdf: 1 page of 297 x 210 mm; print at 100 %\n");
-    ASSERT_EQ(print("tag36h11 --grid 6x4 --side 30 --gap 10 -o board.pdf"), 0) << printed();
+    ASSERT_TRUE(succeeds(arhost_marker + "tag36h11 --grid 6x4 --side 30 --gap 10 -o board.pdf"));
     EXPECT_THAT(printed(), HasSubstr("1 page of 297 x 210 mm"));
 }
 
 TEST_F(Marker, IsACommandOfArhost) {
     const std::string arguments = " tag36h11:7 --side 12 --paper 60x60 -o ";
-    ASSERT_EQ(execute(arhost::test::build_directory() + "/bin/arhost marker" + arguments + "a.png"), 0) << printed();
-    ASSERT_EQ(print(arguments + "b.png"), 0) << printed();
+    ASSERT_TRUE(succeeds(program("arhost") + "marker" + arguments + "a.png"));
+    ASSERT_TRUE(succeeds(arhost_marker + arguments + "b.png"));
     EXPECT_EQ(read("a.png"), read("b.png"));
-    EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/arhost marker tag36h11:7 --side 0 -o c.png"), 2);
-    EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/arhost help marker"), 0);
+    EXPECT_EQ(execute(program("arhost") + "marker tag36h11:7 --side 0 -o c.png"), 2);
+    EXPECT_TRUE(succeeds(program("arhost") + "help marker"));
     for (const char *text : {"Usage: arhost marker [OPTIONS] MARKERS", "tagStandard52h13", "DICT_ARUCO_ORIGINAL"})
         EXPECT_THAT(printed(), HasSubstr(text));
 }
@@ -471,7 +435,7 @@ TEST_F(Marker, RunsTheCommandsOfItsDocumentation) {
     int count = 0;
     for (std::string line; std::getline(document, line);)
         if (line.starts_with("arhost marker ")) {
-            EXPECT_EQ(execute(arhost::test::build_directory() + "/bin/" + line), 0) << line << "\n" << printed();
+            EXPECT_TRUE(succeeds(arhost::test::build_directory() + "/bin/" + line)) << line;
             ++count;
         }
     EXPECT_GE(count, 4);
@@ -541,23 +505,19 @@ TEST_F(Marker, RejectsInvalidArgumentsWithoutWritingAFile) {
         {"artoolkit-4x4 --marker 10 " + charuco, "--charuco: artoolkit-4x4 is not an ArUco dictionary"},
         {"tag36h11 --marker 10 " + charuco, "--charuco: tag36h11 is not an ArUco dictionary"},
     };
-    for (const auto &[arguments, message] : cases) {
-        EXPECT_EQ(print(arguments), 2) << arguments;
-        EXPECT_THAT(printed(), HasSubstr(message)) << arguments;
-        EXPECT_THAT(files(), IsEmpty()) << arguments;
-    }
+    expect_rejected(arhost_marker, cases);
 }
 
 TEST_F(Marker, RemovesAllPagesIfOneCannotBeWritten) {
     fs::create_symlink("/dev/full", folder() / "sheet-2.svg");
-    EXPECT_EQ(print("tag36h11:0-23 --side 12 --paper 100x70 --margin 5 -o sheet.svg"), 2);
+    EXPECT_EQ(execute(arhost_marker + "tag36h11:0-23 --side 12 --paper 100x70 --margin 5 -o sheet.svg"), 2);
     EXPECT_THAT(printed(), HasSubstr("No space left on device"));
     EXPECT_THAT(files(), ElementsAre("sheet-2.svg"));
 }
 
 TEST_F(Marker, KeepsAnExistingFileIfItFails) {
-    ASSERT_EQ(print("tag36h11:0 --side 12 --paper 60x60 -o sheet.svg"), 0);
+    ASSERT_TRUE(succeeds(arhost_marker + "tag36h11:0 --side 12 --paper 60x60 -o sheet.svg"));
     const std::string before = read("sheet.svg");
-    EXPECT_EQ(print("tag36h11:0 --side 120 --paper 60x60 -o sheet.svg"), 2);
+    EXPECT_EQ(execute(arhost_marker + "tag36h11:0 --side 120 --paper 60x60 -o sheet.svg"), 2);
     EXPECT_EQ(read("sheet.svg"), before);
 }

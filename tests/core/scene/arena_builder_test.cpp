@@ -58,8 +58,7 @@ TEST(ArenaBuilder, WritesAllInput) {
     EXPECT_EQ(builder.triangle_count(), 2u);
     EXPECT_EQ(builder.object_count(), 2u);
     const std::size_t size = builder.byte_size();
-    Arena arena = std::move(builder).build();
-    ASSERT_EQ(validate(arena.bytes()), "");
+    Arena arena = build(std::move(builder));
 
     const arhost_scene &scene = arena.scene();
     EXPECT_EQ(scene.byte_size, size);
@@ -123,8 +122,7 @@ TEST(ArenaBuilder, IncludesTransformedObjectsInTheBounds) {
     const std::uint32_t material = builder.add_material(grey());
     const glm::mat4x3 moved(glm::vec3(2, 0, 0), glm::vec3(0, 2, 0), glm::vec3(0, 0, 2), glm::vec3(100, 0, 0));
     builder.add_object("ball", builder.add_spheres({{0, 0, 0, 5}}), material, ARHOST_ROLE_VIRTUAL, moved);
-    const Arena arena = std::move(builder).build();
-    EXPECT_EQ(validate(arena.bytes()), "");
+    const Arena arena = build(std::move(builder));
     EXPECT_THAT(arena.scene().bounds_min, testing::ElementsAre(90, -10, -10));
     EXPECT_THAT(arena.scene().bounds_max, testing::ElementsAre(110, 10, 10));
 }
@@ -144,8 +142,7 @@ TEST(ArenaBuilder, WritesMovingObjectsAtTheirPoseAtTimeZero) {
     builder.add_channel({0, ARHOST_CHANNEL_TRANSLATION, ARHOST_INTERPOLATION_LINEAR, {0, 1}, {5, 0, 0, 0, 0, 0}});
     builder.add_object("ball", builder.add_spheres({{0, 0, 0, 1}}), builder.add_material(grey()), ARHOST_ROLE_VIRTUAL,
                        glm::mat4x3(1), {true, false, 0, ARHOST_NONE});
-    Arena arena = std::move(builder).build();
-    EXPECT_EQ(validate(arena.bytes()), "");
+    Arena arena = build(std::move(builder));
     EXPECT_EQ(Parts(arena).objects[0].world_from_object[9], 5);
     EXPECT_EQ(arena.scene().bounds_min[0], 4);
     EXPECT_EQ(arena.scene().bounds_max[0], 6);
@@ -154,8 +151,7 @@ TEST(ArenaBuilder, WritesMovingObjectsAtTheirPoseAtTimeZero) {
 TEST(ArenaBuilder, WritesTexturesEnvironmentAndMotion) {
     ArenaBuilder builder = full_scene();
     const std::size_t size = builder.byte_size();
-    Arena arena = std::move(builder).build();
-    ASSERT_EQ(validate(arena.bytes()), "");
+    Arena arena = build(std::move(builder));
     const Parts parts(arena);
     const arhost_scene &scene = parts.scene;
     EXPECT_EQ(scene.byte_size, size);
@@ -184,8 +180,7 @@ std::string name_of(const testing::TestParamInfo<Corruption> &info) {
 class Rejects : public testing::TestWithParam<Corruption> {};
 
 TEST_P(Rejects, Field) {
-    Arena arena = small_scene().build();
-    ASSERT_EQ(validate(arena.bytes()), "");
+    Arena arena = build(small_scene());
     GetParam().corrupt(Parts(arena));
     EXPECT_THAT(validate(arena.bytes()), HasSubstr(GetParam().message));
 }
@@ -335,8 +330,7 @@ TEST(Validate, RejectsMemoryThatIsTooShortOrMisaligned) {
 class RejectsInFullScene : public testing::TestWithParam<Corruption> {};
 
 TEST_P(RejectsInFullScene, Field) {
-    Arena arena = full_scene().build();
-    ASSERT_EQ(validate(arena.bytes()), "");
+    Arena arena = build(full_scene());
     GetParam().corrupt(Parts(arena));
     EXPECT_THAT(validate(arena.bytes()), HasSubstr(GetParam().message));
 }
@@ -486,8 +480,7 @@ TEST(Validate, RejectsGeometriesThatShareABuffer) {
         builder.add_object("square", builder.add_triangles(square()), material);
     Spheres many(1000, glm::vec4(0, 0, 0, 1));
     builder.add_object("spheres", builder.add_spheres(many), material);
-    Arena arena = std::move(builder).build();
-    ASSERT_EQ(validate(arena.bytes()), "");
+    Arena arena = build(std::move(builder));
     for (int i = 0; i < 1000; ++i)
         Parts(arena).geometries[i] = Parts(arena).geometries[1000];
     EXPECT_THAT(validate(arena.bytes()), HasSubstr("overlaps other buffers"));

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "errors.hpp"
 #include "image_samples.hpp"
 #include "plugin_under_test.hpp"
 #include "scene/motion.hpp"
@@ -125,34 +126,16 @@ Loaded load(const std::string &gltf, const std::string &object = "", const std::
     LoadCallbacks callbacks;
     std::vector<std::string> info;
     callbacks.info = [&](const std::string &text) { info.push_back(text); };
-    Arena arena = load_scene(folder.path() / "s.yaml", callbacks).build();
-    EXPECT_EQ(validate(arena.bytes()), "");
+    Arena arena = build(load_scene(folder.path() / "s.yaml", callbacks));
     return {std::move(arena), info};
 }
 
 std::string error_of(const std::string &gltf, const std::string &object = "") {
-    try {
-        load(gltf, object);
-    } catch (const arhost::yaml::Error &error) {
-        return error.what();
-    }
-    return "no error";
+    return arhost::test::error_of([&] { load(gltf, object); });
 }
 
-template <class T> const T *at(const Arena &arena, const arhost_buffer &buffer) {
-    return reinterpret_cast<const T *>(arena.bytes().data() + buffer.offset);
-}
-const arhost_geometry &geometry(const Arena &a, std::size_t i = 0) {
-    return at<arhost_geometry>(a, a.scene().geometries)[i];
-}
-const arhost_object &object(const Arena &a, std::size_t i = 0) {
-    return at<arhost_object>(a, a.scene().objects)[i];
-}
-const arhost_material &material(const Arena &a, std::size_t i = 0) {
-    return at<arhost_material>(a, a.scene().materials)[i];
-}
 std::vector<float> vertex(const Arena &a, std::size_t i) {
-    const float *p = at<float>(a, geometry(a).positions) + 3 * i;
+    const float *p = elements<float>(a, geometry(a).positions) + 3 * i;
     return {p[0], p[1], p[2]};
 }
 auto near(float value) {
@@ -167,10 +150,10 @@ TEST(Gltf, TransformsStaticMeshesToWorldSpace) {
     const Loaded loaded = load(gltf.text(), ", name: tree, transform: [{translate: [100, 0, 0]}]");
     const Arena &arena = loaded.arena;
     ASSERT_EQ(arena.scene().objects.count, 1u);
-    EXPECT_STREQ(at<char>(arena, arena.scene().names) + object(arena).name, "tree/leaf");
+    EXPECT_STREQ(name(arena), "tree/leaf");
     EXPECT_THAT(vertex(arena, 0), ElementsAre(100, 0, 10));
     EXPECT_THAT(vertex(arena, 1), ElementsAre(102, 0, 10));
-    EXPECT_EQ(at<glm::vec2>(arena, geometry(arena).texcoords)[2], glm::vec2(0, 1))
+    EXPECT_EQ(elements<glm::vec2>(arena, geometry(arena).texcoords)[2], glm::vec2(0, 1))
         << "v starts at the top, as in the arena";
     EXPECT_EQ(arena.scene().nodes.count, 0u);
     EXPECT_EQ(material(arena, object(arena).material).model, ARHOST_MATERIAL_METALLIC_ROUGHNESS);
@@ -209,7 +192,7 @@ TEST(Gltf, ReadsStridesIndicesAndSparseAccessors) {
     EXPECT_THAT(vertex(arena, 2), ElementsAre(0, 1, 0));
     EXPECT_THAT(vertex(arena, 3), ElementsAre(1, 1, 0));
     ASSERT_EQ(geometry(arena).indices.count, 2u);
-    const auto *triangles = at<glm::uvec3>(arena, geometry(arena).indices);
+    const auto *triangles = elements<glm::uvec3>(arena, geometry(arena).indices);
     EXPECT_EQ(triangles[0], glm::uvec3(0, 1, 2));
     EXPECT_EQ(triangles[1], glm::uvec3(1, 3, 2)) << "a strip flips every second triangle";
 }
@@ -233,14 +216,14 @@ TEST(Gltf, ReadsMaterialsAndTextures) {
     EXPECT_EQ(m.roughness, 0.2f);
     EXPECT_EQ(m.alpha_cutoff, 0.5f) << "the cutoff applies to the texture alpha, which the factor halves";
     ASSERT_EQ(arena.scene().textures.count, 3u);
-    const auto *textures = at<arhost_texture>(arena, arena.scene().textures);
+    const auto *textures = elements<arhost_texture>(arena, arena.scene().textures);
     EXPECT_EQ(textures[m.colour_texture].format, ARHOST_TEXEL_SRGB8);
     EXPECT_EQ(textures[m.colour_texture].wrap_u, ARHOST_WRAP_CLAMP);
     EXPECT_EQ(textures[m.colour_texture].wrap_v, ARHOST_WRAP_MIRROR);
     EXPECT_EQ(textures[m.metallic_roughness_texture].format, ARHOST_TEXEL_RGBA8);
     EXPECT_EQ(textures[m.normal_texture].wrap_u, ARHOST_WRAP_REPEAT);
     EXPECT_EQ(m.emission_texture, ARHOST_NONE);
-    EXPECT_EQ(at<std::uint8_t>(arena, textures[m.colour_texture].texels)[2], 3);
+    EXPECT_EQ(elements<std::uint8_t>(arena, textures[m.colour_texture].texels)[2], 3);
 }
 
 TEST(Gltf, ReportsAllFilesItReads) {
@@ -281,16 +264,11 @@ TEST(Gltf, ReadsOnlyFilesBelowItsFolderAndThoseOfTheKeyReads) {
     fs::create_symlink(folder.path() / "home/.ssh/id_rsa", folder.path() / "scene/models/file-link.bin");
     fs::create_directory_symlink(folder.path() / "home", folder.path() / "scene/models/folder-link");
     fs::create_symlink("parts/a.bin", folder.path() / "scene/models/inner-link.bin");
-    const auto error_with = [&](const std::string &uri, const std::string &reads) -> std::string {
+    const auto error_with = [&](const std::string &uri, const std::string &reads) {
         write_file(folder.path() / "scene/models/a.gltf", gltf.json(R"(, "uri": ")" + uri + "\""));
         write_file(folder.path() / "scene/s.yaml",
                    "version: 1\naxes: y-up\nmaterials: {}\n" + reads + "objects:\n  - {gltf: models/a.gltf}\n");
-        try {
-            load_scene(folder.path() / "scene/s.yaml");
-        } catch (const arhost::yaml::Error &error) {
-            return error.what();
-        }
-        return "no error";
+        return arhost::test::error_of([&] { load_scene(folder.path() / "scene/s.yaml"); });
     };
     for (const char *inside : {"parts/a.bin", "parts/../parts/a.bin", "inner-link.bin"})
         EXPECT_EQ(error_with(inside, ""), "no error") << inside;
@@ -466,16 +444,12 @@ TEST(Gltf, ErrorsNameTheProblem) {
 }
 
 TEST(YamlMotion, MovesAnyObject) {
-    const Arena arena =
-        load_scene(
-            arhost::yaml::Node::parse(
-                "version: 1\naxes: z-up\nmaterials: {grey: {model: mirror}}\nobjects:\n"
-                "  - {cuboid: {size: 2}, material: grey, transform: [{translate: [5, 0, 0]}], motion: {keys: [\n"
-                "      {at_s: 0}, {at_s: 2, translate: [0, 0, 6], rotate: {axis: [0, 0, 1], degrees: 90}, scale: "
-                "3}]}}\n",
-                "s.yaml"))
-            .build();
-    EXPECT_EQ(validate(arena.bytes()), "");
+    const Arena arena = build(load_scene(arhost::yaml::Node::parse(
+        "version: 1\naxes: z-up\nmaterials: {grey: {model: mirror}}\nobjects:\n"
+        "  - {cuboid: {size: 2}, material: grey, transform: [{translate: [5, 0, 0]}], motion: {keys: [\n"
+        "      {at_s: 0}, {at_s: 2, translate: [0, 0, 6], rotate: {axis: [0, 0, 1], degrees: 90}, scale: "
+        "3}]}}\n",
+        "s.yaml")));
     EXPECT_EQ(arena.scene().duration_s, 2);
     EXPECT_EQ(arena.scene().bounds_max[0], 6);
     MotionEvaluator evaluator(arena.scene());
@@ -485,16 +459,11 @@ TEST(YamlMotion, MovesAnyObject) {
 }
 
 TEST(YamlMotion, ErrorsNameTheProblem) {
-    const auto error = [](const std::string &keys) -> std::string {
-        try {
-            load_scene(arhost::yaml::Node::parse("version: 1\naxes: z-up\nmaterials: {a: {model: mirror}}\nobjects:\n"
-                                                 "  - {sphere: {radius: 2}, material: a, motion: {keys: " +
-                                                     keys + "}}\n",
-                                                 "s.yaml"));
-        } catch (const arhost::yaml::Error &error) {
-            return error.what();
-        }
-        return "no error";
+    const auto error = [](const std::string &keys) {
+        const std::string text = "version: 1\naxes: z-up\nmaterials: {a: {model: mirror}}\nobjects:\n"
+                                 "  - {sphere: {radius: 2}, material: a, motion: {keys: " +
+                                 keys + "}}\n";
+        return arhost::test::error_of([&] { load_scene(arhost::yaml::Node::parse(text, "s.yaml")); });
     };
     EXPECT_EQ(error("[{at_s: 0, scale: 1}]"), "s.yaml:5:55: objects[0].motion.keys: needs at least two keys");
     EXPECT_THAT(error("[{at_s: 0}, {at_s: 1}]"), HasSubstr("must set at least one of translate, rotate and scale"));

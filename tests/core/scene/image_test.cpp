@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "errors.hpp"
 #include "image_samples.hpp"
 #include "plugin_under_test.hpp"
 #include "scene/scene_loader.hpp"
@@ -28,46 +29,26 @@ public:
     Scene(const std::string &image_name, const std::string &image) { write_file(folder_.path() / image_name, image); }
     Arena load(const std::string &text, const LoadCallbacks &callbacks = {}) {
         write_file(folder_.path() / "s.yaml", start + text);
-        Arena arena = load_scene(folder_.path() / "s.yaml", callbacks).build();
-        EXPECT_EQ(validate(arena.bytes()), "");
-        return arena;
+        return build(load_scene(folder_.path() / "s.yaml", callbacks));
     }
     Arena load_texture(const std::string &texture, const LoadCallbacks &callbacks = {}) {
         return load("materials: {a: {model: diffuse, texture: " + texture + "}}\n" + plane, callbacks);
     }
     // Returns the error message without the folder.
     std::string error_of(const std::string &text) {
-        try {
-            load(text);
-        } catch (const arhost::yaml::Error &error) {
-            std::string what = error.what();
-            const std::string path = folder_.path().string() + "/";
-            for (std::size_t at; (at = what.find(path)) != std::string::npos;)
-                what.erase(at, path.size());
-            return what;
-        }
-        return "no error";
+        return arhost::test::without_folder(arhost::test::error_of([&] { load(text); }), folder_.path());
     }
 
 private:
     ScratchFolder folder_;
 };
 
-template <class T> const T *at(const Arena &arena, const arhost_buffer &buffer) {
-    return reinterpret_cast<const T *>(arena.bytes().data() + buffer.offset);
-}
-const arhost_texture &texture(const Arena &a, std::size_t i = 0) {
-    return at<arhost_texture>(a, a.scene().textures)[i];
-}
-const arhost_material &material(const Arena &a) {
-    return *at<arhost_material>(a, a.scene().materials);
-}
 std::vector<int> bytes(const Arena &a, std::size_t i = 0) {
-    const auto *p = at<std::uint8_t>(a, texture(a, i).texels);
+    const auto *p = elements<std::uint8_t>(a, texture(a, i).texels);
     return {p, p + 4 * texture(a, i).texels.count};
 }
 std::vector<float> floats(const Arena &a, std::size_t i = 0) {
-    const auto *p = at<float>(a, texture(a, i).texels);
+    const auto *p = elements<float>(a, texture(a, i).texels);
     return {p, p + 4 * texture(a, i).texels.count};
 }
 
@@ -188,8 +169,7 @@ TEST(Environments, AreOrientedByTheScenesUpAxis) {
         write_file(folder.path() / "s.yaml", "version: 1\naxes: " + axes +
                                                  "\nenvironment: {image: a.png, rotate_degrees: " +
                                                  std::to_string(degrees) + "}\nmaterials: {}\nobjects: []\n");
-        const Arena arena = load_scene(folder.path() / "s.yaml").build();
-        EXPECT_EQ(validate(arena.bytes()), "");
+        const Arena arena = build(load_scene(folder.path() / "s.yaml"));
         const float *m = arena.scene().environment.environment_from_world;
         const auto row = [&](int i) { return m[i] * d.x + m[3 + i] * d.y + m[6 + i] * d.z + 0.f; };
         return std::vector<float>{std::round(row(0) * 1e5f) / 1e5f + 0.f, std::round(row(1) * 1e5f) / 1e5f + 0.f,
@@ -213,7 +193,8 @@ TEST(Environments, HaveCumulativeSums) {
     EXPECT_EQ(environment.intensity, 3);
     EXPECT_EQ(texture(arena).format, ARHOST_TEXEL_RGBA32F);
     EXPECT_THAT(floats(arena), ElementsAre(1, 1, 1, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1));
-    const auto *rows = at<float>(arena, environment.rows), *columns = at<float>(arena, environment.columns);
+    const auto *rows = elements<float>(arena, environment.rows),
+               *columns = elements<float>(arena, environment.columns);
     // Interpolation extends the light by half a texel, horizontally across the image's edge.
     EXPECT_THAT(std::vector<float>(rows, rows + 2), ElementsAre(0.875f, 1));
     EXPECT_THAT(std::vector<float>(columns, columns + 4), ElementsAre(0.75f, 1, 0.75f, 1));
@@ -223,14 +204,14 @@ TEST(Environments, HaveCumulativeSums) {
 TEST(Environments, AreSampledUniformlyIfBlack) {
     const Arena arena =
         Scene("a.png", png(2, 1, 1, {0, 0})).load("environment: {image: a.png}\nmaterials: {}\nobjects: []\n");
-    const auto *columns = at<float>(arena, arena.scene().environment.columns);
+    const auto *columns = elements<float>(arena, arena.scene().environment.columns);
     EXPECT_THAT(std::vector<float>(columns, columns + 2), ElementsAre(0.5f, 1));
 }
 
 TEST(Environments, WeightRowsBySolidAngle) {
     const Arena arena = Scene("a.png", png(1, 3, 1, {'\xbc', '\xbc', '\xbc'}))
                             .load("ambient: 0.1\nenvironment: {image: a.png}\nmaterials: {}\nobjects: []\n");
-    const auto *rows = at<float>(arena, arena.scene().environment.rows);
+    const auto *rows = elements<float>(arena, arena.scene().environment.rows);
     EXPECT_NEAR(rows[0], 0.25, 1e-6) << "sin 30° : sin 90° : sin 150°";
     EXPECT_NEAR(rows[1], 0.75, 1e-6);
     EXPECT_EQ(rows[2], 1);

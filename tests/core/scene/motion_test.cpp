@@ -26,9 +26,7 @@ Arena ball_with(Channel channel, float duration_s = 2) {
     builder.add_channel(std::move(channel));
     builder.add_object("ball", builder.add_spheres({{0, 0, 0, 1}}), builder.add_material(grey()), ARHOST_ROLE_VIRTUAL,
                        glm::mat4x3(1), {true, false, 0, ARHOST_NONE});
-    Arena arena = std::move(builder).build();
-    EXPECT_EQ(validate(arena.bytes()), "");
-    return arena;
+    return build(std::move(builder));
 }
 
 float x_at(const Arena &arena, double time_s) {
@@ -62,9 +60,7 @@ Arena bend(const std::vector<Channel> &channels, const glm::mat4x3 &root = glm::
         mesh.morph_positions = mesh.morph_normals = {};
     builder.add_object("bend", builder.add_triangles(mesh), builder.add_material(grey()), ARHOST_ROLE_VIRTUAL,
                        glm::mat4x3(1), {false, true, morphs ? 3 : ARHOST_NONE, skin});
-    Arena arena = std::move(builder).build();
-    EXPECT_EQ(validate(arena.bytes()), "");
-    return arena;
+    return build(std::move(builder));
 }
 
 std::vector<float> triple(const float *values, std::size_t i) {
@@ -178,9 +174,7 @@ Arena anchored_balls() {
     for (const std::uint32_t on : {cup, moving})
         builder.add_object("ball", builder.add_spheres({{0, 0, 0, 1}}), builder.add_material(grey()),
                            ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), {true, false, on, ARHOST_NONE});
-    Arena arena = std::move(builder).build();
-    EXPECT_EQ(validate(arena.bytes()), "");
-    return arena;
+    return build(std::move(builder));
 }
 
 Anchored at_mm(double x, double y, double z) {
@@ -232,8 +226,7 @@ TEST(Motion, BlendsJointsByWeight) {
     const std::uint32_t skin = builder.add_skin({{0, 1}, {glm::mat4x3(1), glm::mat4x3(1)}});
     builder.add_object("s", builder.add_triangles(mesh), builder.add_material(grey()), ARHOST_ROLE_VIRTUAL,
                        glm::mat4x3(1), {false, true, ARHOST_NONE, skin});
-    const Arena arena = std::move(builder).build();
-    ASSERT_EQ(validate(arena.bytes()), "");
+    const Arena arena = build(std::move(builder));
     EXPECT_EQ(arena.scene().bounds_max[2], 7) << "5 and a quarter of 8";
     MotionEvaluator evaluator(arena.scene());
     EXPECT_THAT(triple(evaluator.at(0).deformed[0].positions, 2), ElementsAre(10, 10, 7));
@@ -278,8 +271,7 @@ TEST(Motion, MorphsUnskinnedObjectsInObjectSpace) {
     mesh.morph_normals.assign(4, {1, 0, 0});
     builder.add_object("s", builder.add_triangles(mesh), builder.add_material(grey()), ARHOST_ROLE_VIRTUAL,
                        glm::mat4x3(1), {true, true, 0, ARHOST_NONE});
-    const Arena arena = std::move(builder).build();
-    ASSERT_EQ(validate(arena.bytes()), "");
+    const Arena arena = build(std::move(builder));
     MotionEvaluator evaluator(arena.scene());
     const arhost_motion motion = evaluator.at(1);
     EXPECT_EQ(motion.moved[0].world_from_object[9], 100);

@@ -26,9 +26,7 @@ namespace {
 const std::string start = "version: 1\naxes: z-up\nmaterials:\n  grey: {model: diffuse, diffuse: 0.5}\n";
 
 Arena load(const std::string &text) {
-    Arena arena = load_scene(Node::parse(text, "s.yaml")).build();
-    EXPECT_EQ(validate(arena.bytes()), "");
-    return arena;
+    return build(load_scene(Node::parse(text, "s.yaml")));
 }
 
 // Returns the error message without the name of the file.
@@ -36,38 +34,23 @@ std::string error_of(const std::string &text) {
     return arhost::test::after("s.yaml:", arhost::test::error_of([&] { load_scene(Node::parse(text, "s.yaml")); }));
 }
 
-template <class T> const T *at(const Arena &arena, const arhost_buffer &buffer) {
-    return reinterpret_cast<const T *>(arena.bytes().data() + buffer.offset);
-}
-const arhost_material &material(const Arena &a, std::size_t i = 0) {
-    return at<arhost_material>(a, a.scene().materials)[i];
-}
 const arhost_light &light(const Arena &a, std::size_t i = 0) {
-    return at<arhost_light>(a, a.scene().lights)[i];
-}
-const arhost_object &object(const Arena &a, std::size_t i = 0) {
-    return at<arhost_object>(a, a.scene().objects)[i];
-}
-const arhost_geometry &geometry(const Arena &a, std::size_t i = 0) {
-    return at<arhost_geometry>(a, a.scene().geometries)[i];
+    return elements<arhost_light>(a, a.scene().lights)[i];
 }
 glm::vec3 position(const Arena &a, std::size_t i) {
-    return at<glm::vec3>(a, geometry(a).positions)[i];
+    return elements<glm::vec3>(a, geometry(a).positions)[i];
 }
 glm::vec4 sphere(const Arena &a) {
-    return *at<glm::vec4>(a, geometry(a).positions);
-}
-const char *name(const Arena &a, std::size_t i = 0) {
-    return at<char>(a, a.scene().names) + object(a, i).name;
+    return *elements<glm::vec4>(a, geometry(a).positions);
 }
 
 // Returns the geometric normal of a triangle.
 glm::vec3 facing(const Arena &a, std::size_t triangle) {
-    const glm::uvec3 t = at<glm::uvec3>(a, geometry(a).indices)[triangle];
+    const glm::uvec3 t = elements<glm::uvec3>(a, geometry(a).indices)[triangle];
     return glm::normalize(glm::cross(position(a, t.y) - position(a, t.x), position(a, t.z) - position(a, t.x)));
 }
 glm::vec3 middle(const Arena &a, std::size_t triangle) {
-    const glm::uvec3 t = at<glm::uvec3>(a, geometry(a).indices)[triangle];
+    const glm::uvec3 t = elements<glm::uvec3>(a, geometry(a).indices)[triangle];
     return (position(a, t.x) + position(a, t.y) + position(a, t.z)) / 3.f;
 }
 
@@ -85,9 +68,7 @@ Arena load_with_mesh(const std::string &obj, const std::string &more, const Load
     const ScratchFolder folder;
     write_file(folder.path() / "mesh.obj", obj);
     write_file(folder.path() / "scene.yaml", start + "objects:\n  - {mesh: mesh.obj, material: grey" + more + "}\n");
-    Arena arena = load_scene(folder.path() / "scene.yaml", callbacks).build();
-    EXPECT_EQ(validate(arena.bytes()), "");
-    return arena;
+    return build(load_scene(folder.path() / "scene.yaml", callbacks));
 }
 
 const std::string triangle_with_normals = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0.6 0.8\nf 1//1 2//1 3//1\n";
@@ -290,9 +271,9 @@ TEST(Shapes, FacesShowTheWholeTextureUpright) {
         const Arena arena = load("version: 1\naxes: " + axes + "\nmaterials: {a: {model: mirror}}\nobjects:\n" +
                                  "  - {cuboid: {size: [2, 4, 6]}, material: a}\n");
         const glm::vec3 up = axes == "z-up" ? glm::vec3(0, 0, 1) : glm::vec3(0, 1, 0);
-        const auto *texcoords = at<glm::vec2>(arena, geometry(arena).texcoords);
+        const auto *texcoords = elements<glm::vec2>(arena, geometry(arena).texcoords);
         for (std::size_t i = 0; i < 12; ++i) {
-            const glm::uvec3 t = at<glm::uvec3>(arena, geometry(arena).indices)[i];
+            const glm::uvec3 t = elements<glm::uvec3>(arena, geometry(arena).indices)[i];
             // p = u · across + v · down, where `across` and `down` are derived from the sides of the triangle
             const glm::vec3 a = position(arena, t.y) - position(arena, t.x),
                             b = position(arena, t.z) - position(arena, t.x);
@@ -336,7 +317,7 @@ TEST(Transforms, TransformNormalsByTheInverseTranspose) {
     // A 45° slope is scaled to twice the height, so its normal (0, 1, 1) becomes (0, 1/1, 1/2).
     const Arena arena = load_with_mesh("v 0 0 1\nv 1 0 1\nv 0 1 0\nvn 0 1 1\nf 1//1 2//1 3//1\n",
                                        ", transform: [{scale: [1, 1, 2]}]");
-    const glm::vec3 normal = *at<glm::vec3>(arena, geometry(arena).normals);
+    const glm::vec3 normal = *elements<glm::vec3>(arena, geometry(arena).normals);
     expect_near(normal, glm::normalize(glm::vec3(0, 2, 1)));
     expect_near(facing(arena, 0), normal);
 }
@@ -345,7 +326,7 @@ TEST(Transforms, KeepFrontFacesIfTheyMirror) {
     const std::string slope = "v 0 0 1\nv 1 0 1\nv 0 1 0\nvn 0 1 1\nf 1//1 2//1 3//1\n";
     for (const std::string scale : {"[-1, 1, 1]", "[1, -1, 1]", "[1, 1, -1]", "-2", "[-1, -1, 1]"}) {
         const Arena arena = load_with_mesh(slope, ", transform: [{scale: " + scale + "}]");
-        expect_near(facing(arena, 0), *at<glm::vec3>(arena, geometry(arena).normals));
+        expect_near(facing(arena, 0), *elements<glm::vec3>(arena, geometry(arena).normals));
     }
 }
 
@@ -519,8 +500,7 @@ TEST(SceneLoading, ReplacesAMissingMeshWithAStandIn) {
     callbacks.info = [&](const std::string &text) { info.push_back(text); };
     callbacks.warning = [&](const std::string &text) { warnings.push_back(text); };
     const std::string text = absent + "{faces: 4968, size: [2, 1, 0.5]}\n    transform: [{scale: 10}]\n";
-    const Arena arena = load_scene(Node::parse(text, "s.yaml"), callbacks).build();
-    EXPECT_EQ(validate(arena.bytes()), "");
+    const Arena arena = build(load_scene(Node::parse(text, "s.yaml"), callbacks));
     EXPECT_EQ(geometry(arena).indices.count, 4968u);
     EXPECT_EQ(geometry(arena).normals.count, geometry(arena).positions.count);
     ASSERT_EQ(warnings.size(), 1u);
@@ -561,8 +541,7 @@ TEST(SceneDocumentation, ExampleLoads) {
                "property float z\nelement face 1\nproperty list uchar int vertex_indices\n"
                "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
     write_file(folder.path() / "scene.yaml", example);
-    const Arena arena = load_scene(folder.path() / "scene.yaml").build();
-    EXPECT_EQ(validate(arena.bytes()), "");
+    const Arena arena = build(load_scene(folder.path() / "scene.yaml"));
     EXPECT_GT(arena.scene().objects.count, 3u);
 }
 
@@ -575,15 +554,15 @@ TEST(Anchors, ObjectsBelongToTargets) {
                                      "  - {name: c, sphere: {radius: 1}, material: grey, on: cup}\n");
     const arhost_scene &scene = arena.scene();
     ASSERT_EQ(scene.anchors.count, 2u);
-    const auto *anchors = at<arhost_anchor>(arena, scene.anchors);
-    const auto *names = at<char>(arena, scene.names);
+    const auto *anchors = elements<arhost_anchor>(arena, scene.anchors);
+    const auto *names = elements<char>(arena, scene.names);
     EXPECT_STREQ(names + anchors[0].target, "cup");
     EXPECT_STREQ(names + anchors[1].target, "lid");
     EXPECT_FALSE(object(arena, 0).moves);
     EXPECT_TRUE(object(arena, 1).moves);
     EXPECT_EQ(object(arena, 1).node, anchors[0].node);
     EXPECT_EQ(object(arena, 3).node, anchors[0].node);
-    EXPECT_EQ(at<arhost_node>(arena, scene.nodes)[object(arena, 2).node].parent, anchors[1].node)
+    EXPECT_EQ(elements<arhost_node>(arena, scene.nodes)[object(arena, 2).node].parent, anchors[1].node)
         << "the motion is relative to the target";
 }
 

@@ -3,10 +3,13 @@
 
 #include "scene/arena_builder.hpp"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <string_view>
+#include <utility>
 
 namespace arhost::scene::test {
 
@@ -100,9 +103,34 @@ inline ArenaBuilder full_scene() {
     return builder;
 }
 
-// Returns the elements of a buffer, writable.
+// Returns the elements of a buffer.
 template <class T> T *elements(Arena &arena, const arhost_buffer &buffer) {
     return reinterpret_cast<T *>(arena.bytes().data() + buffer.offset);
+}
+template <class T> const T *elements(const Arena &arena, const arhost_buffer &buffer) {
+    return reinterpret_cast<const T *>(arena.bytes().data() + buffer.offset);
+}
+inline const arhost_material &material(const Arena &a, std::size_t i = 0) {
+    return elements<arhost_material>(a, a.scene().materials)[i];
+}
+inline const arhost_object &object(const Arena &a, std::size_t i = 0) {
+    return elements<arhost_object>(a, a.scene().objects)[i];
+}
+inline const arhost_geometry &geometry(const Arena &a, std::size_t i = 0) {
+    return elements<arhost_geometry>(a, a.scene().geometries)[i];
+}
+inline const arhost_texture &texture(const Arena &a, std::size_t i = 0) {
+    return elements<arhost_texture>(a, a.scene().textures)[i];
+}
+inline const char *name(const Arena &a, std::size_t i = 0) {
+    return elements<char>(a, a.scene().names) + object(a, i).name;
+}
+
+// Builds a scene, which must be valid.
+inline Arena build(ArenaBuilder builder) {
+    Arena arena = std::move(builder).build();
+    EXPECT_EQ(validate(arena.bytes()), "");
+    return arena;
 }
 
 inline void write_file(const std::filesystem::path &path, std::string_view content) {

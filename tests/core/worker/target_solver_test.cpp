@@ -18,6 +18,7 @@ using testing::HasSubstr;
 constexpr double side_mm = 80;
 constexpr std::uint32_t full_search_every = 6;
 constexpr std::int64_t frame_ns = 33'333'333;
+constexpr double small_family = 6e-5; // the false positive rate of tag16h5
 const arhost_intrinsics pinhole = intrinsics_of(ARHOST_DISTORTION_NONE, {});
 
 using Corners = std::array<Eigen::Vector3d, 4>;
@@ -59,11 +60,25 @@ arhost_observation observed(const ObservedMarker &seen, std::int32_t id, std::ui
 
 class TargetSolverTest : public testing::Test {
 protected:
-    TargetSolverTest() : solver(pinhole, targets, {full_search_every}), before(solver.state_size()), after(before) {}
+    TargetSolverTest() { use({full_search_every}); }
+
+    // Continues with another solver, without a state.
+    void use(const TargetSolver::Settings &settings) {
+        solver.emplace(pinhole, targets, settings);
+        before.assign(solver->state_size(), {});
+        after = before;
+        is_first = true;
+    }
 
     arhost_observation see(const Rigid &truth, std::int32_t id, const Corners &corners = single, double noise_px = 0,
                            std::uint32_t family = 0, double margin = 1) {
         return observed(camera.observe(truth, corners, noise_px), id, family, margin);
+    }
+    // A marker of tag16h5 without corrected bits may be seen by chance.
+    arhost_observation doubtful(const Rigid &truth, std::int32_t id = 5, const Corners &corners = single) {
+        arhost_observation observation = see(truth, id, corners);
+        observation.false_positive_rate = small_family;
+        return observation;
     }
     std::vector<arhost_observation> see_board(const Rigid &truth, double noise_px = 0) {
         std::vector<arhost_observation> seen;
@@ -81,10 +96,10 @@ protected:
         result.pose_count = static_cast<std::uint32_t>(poses.size());
         observations.assign(seen.size(), {});
         const void *const known = is_first ? nullptr : before.data();
-        expectation = solver.expect(frame * frame_ns, known);
-        solver.solve(result, expectation.search_everywhere, frame * frame_ns, known, after.data(),
-                     {solved, observations});
-        missed = solver.move_missed_to_end(expectation, result);
+        expectation = solver->expect(frame * frame_ns, known);
+        solver->solve(result, expectation.search_everywhere, frame * frame_ns, known, after.data(),
+                      {solved, observations});
+        missed = solver->move_missed_to_end(expectation, result);
         before.swap(after);
         is_first = false;
     }
@@ -98,7 +113,7 @@ protected:
     }
     Rigid pose_of(Index index) const { return rigid_of(solved[index].mt); }
 
-    TargetSolver solver;
+    std::optional<TargetSolver> solver;
     Camera camera{pinhole, 1};
     std::vector<std::byte> before, after;
     bool is_first = true;
@@ -383,26 +398,18 @@ TEST_F(TargetSolverTest, RequestsAFullSearchFirstAtIntervalsAndAfterALoss) {
     const std::vector<bool> expected = {true, false, false, false, false, false, true, false, false, true,
                                         true, false, false, false, false, false, true, false, false, false};
     EXPECT_EQ(full, expected) << "lost in frame 8, found again in frame 10";
-    TargetSolver always(pinhole, targets, {1});
+    const TargetSolver always(pinhole, targets, {1});
     EXPECT_TRUE(always.expect(20 * frame_ns, before.data()).search_everywhere);
 }
 
 TEST_F(TargetSolverTest, FiltersPosesOnRequest) {
     const Rigid truth = pose_at({20, 10, 900}, 30);
     const auto jitter_mm = [&](bool smooth) {
-        const TargetSolver own(pinhole, targets, {full_search_every, smooth});
-        Camera noisy(pinhole, 4);
-        std::vector<std::byte> state, next(own.state_size());
+        use({full_search_every, smooth});
+        camera = Camera(pinhole, 4);
         double sum = 0;
         for (int frame = 0; frame < 300; ++frame) {
-            arhost_observation seen = observed(noisy.observe(truth, single, 0.1), 5);
-            arhost_tracker_result result{};
-            result.observations = &seen;
-            result.observation_count = 1;
-            std::array<arhost_observation, 1> sorted;
-            own.solve(result, true, frame * frame_ns, state.empty() ? nullptr : state.data(), next.data(),
-                      {solved, sorted});
-            state = next;
+            solve({see(truth, 5, single, 0.1)}, frame);
             EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
             if (frame >= 30)
                 sum += (pose_of(cup).translation_mm - truth.translation_mm).squaredNorm();
@@ -412,41 +419,32 @@ TEST_F(TargetSolverTest, FiltersPosesOnRequest) {
     EXPECT_LT(jitter_mm(true), 0.6 * jitter_mm(false));
 }
 
-// The rate of tag16h5 without corrected bits.
-constexpr double small_family = 6e-5;
-
 TEST_F(TargetSolverTest, ReportsAMarkerThatMayBeChanceInTheSecondFrame) {
-    const auto seen = [&](const Rigid &at) {
-        arhost_observation observation = see(at, 5);
-        observation.false_positive_rate = small_family;
-        return observation;
-    };
     const Rigid truth = pose_at({20, 10, 900}, 30);
-    solve({seen(truth)});
+    solve({doubtful(truth)});
     EXPECT_EQ(solved[cup].state, 0) << "it may be chance";
     EXPECT_EQ(solved[cup].observation_count, 1u);
-    solve({seen(truth)}, 1);
+    solve({doubtful(truth)}, 1);
     ASSERT_EQ(expectation.markers.size(), 1u) << "it is searched there, too";
     EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
     expect_near(pose_of(cup), truth);
     solve({}, 2);
     EXPECT_EQ(solved[cup].state, ARHOST_TARGET_LOST);
-    solve({seen(truth)}, 3);
+    solve({doubtful(truth)}, 3);
     EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED) << "it is where it was";
     solve({}, 4);
-    solve({seen(pose_at({-200, 10, 900}, 30))}, 5);
+    solve({doubtful(pose_at({-200, 10, 900}, 30))}, 5);
     EXPECT_EQ(solved[cup].state, ARHOST_TARGET_LOST) << "it jumped";
     EXPECT_EQ(solved[cup].age_frames, 2u);
     expect_near(pose_of(cup), truth);
-    solve({seen(truth)}, 6);
+    solve({doubtful(truth)}, 6);
     EXPECT_EQ(solved[cup].state, ARHOST_TARGET_LOST) << "it jumped back";
-    solve({seen(truth)}, 7);
+    solve({doubtful(truth)}, 7);
     EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
 }
 
 TEST_F(TargetSolverTest, ForgetsAMarkerThatMayBeChanceAfterAGap) {
-    arhost_observation seen = see(pose_at({20, 10, 900}, 30), 5);
-    seen.false_positive_rate = small_family;
+    const arhost_observation seen = doubtful(pose_at({20, 10, 900}, 30));
     solve({seen});
     solve({}, 1);
     solve({seen}, 2);
@@ -465,23 +463,15 @@ TEST_F(TargetSolverTest, CountsTheListedMarkersAgainAfterAGap) {
 }
 
 TEST_F(TargetSolverTest, WithoutConfirmationAJumpKeepsTheBranch) {
-    const TargetSolver own(pinhole, targets, {.full_search_every = full_search_every, .confirm = false});
     const auto branches_after_a_jump = [&](double rate) {
-        std::vector<std::byte> state(own.state_size()), next(own.state_size());
-        Camera noisy(pinhole, 7);
+        use({.full_search_every = full_search_every, .confirm = false});
+        camera = Camera(pinhole, 7);
         for (int frame = 0; frame < 4; ++frame) {
-            arhost_observation seen =
-                observed(noisy.observe(pose_at({frame < 3 ? 0.0 : 150.0, 0, 2500}, 20), single, 0.1), 5);
+            arhost_observation seen = see(pose_at({frame < 3 ? 0.0 : 150.0, 0, 2500}, 20), 5, single, 0.1);
             seen.false_positive_rate = rate;
-            arhost_tracker_result result{};
-            result.observations = &seen;
-            result.observation_count = 1;
-            arhost_observation sorted;
-            own.solve(result, true, frame * frame_ns, frame == 0 ? nullptr : state.data(), next.data(),
-                      {solved, {&sorted, 1}});
-            state.swap(next);
+            solve({seen}, frame);
         }
-        return state;
+        return before;
     };
     const auto certain = branches_after_a_jump(0), doubtful = branches_after_a_jump(small_family);
     EXPECT_EQ(certain, doubtful);
@@ -507,43 +497,29 @@ TEST_F(TargetSolverTest, NeedsMoreSightingsTheMoreLikelyChanceIs) {
 
 TEST_F(TargetSolverTest, ReportsSeveralMarkersThatAgreeAtOnce) {
     const Rigid truth = pose_at({20, 10, 900}, 30);
-    std::vector<arhost_observation> seen = see_board(truth);
-    for (arhost_observation &one : seen)
-        one.false_positive_rate = small_family;
-    solve({seen[0], seen[1]});
+    const arhost_observation first = doubtful(truth, 10, on_board(10));
+    solve({first, doubtful(truth, 11, on_board(11))});
     EXPECT_EQ(solved[board].state, ARHOST_TARGET_DETECTED);
     is_first = true;
-    solve({seen[0]});
+    solve({first});
     EXPECT_EQ(solved[board].state, 0);
     is_first = true;
-    const Rigid elsewhere = pose_at({-300, 150, 900}, -10);
-    arhost_observation stray = see(elsewhere, 11, on_board(11));
-    stray.false_positive_rate = small_family;
-    solve({seen[0], stray});
+    solve({first, doubtful(pose_at({-300, 150, 900}, -10), 11, on_board(11))});
     EXPECT_EQ(solved[board].state, 0) << "they do not agree";
 }
 
 TEST_F(TargetSolverTest, AFalseMarkerDoesNotHideTheTrueOneOfAMap) {
     const Rigid truth = pose_at({20, 10, 900}, 30);
-    const auto doubtful = [&](const Rigid &at, std::int32_t id) {
-        arhost_observation observation = see(at, id, on_board(id));
-        observation.false_positive_rate = small_family;
-        return observation;
-    };
-    solve({doubtful(truth, 12), doubtful(truth, 13)});
-    solve({doubtful(truth, 12), doubtful(truth, 13), doubtful(pose_at({-300, 150, 900}, -10), 10)}, 1);
+    const arhost_observation left = doubtful(truth, 12, on_board(12)), right = doubtful(truth, 13, on_board(13));
+    solve({left, right});
+    solve({left, right, doubtful(pose_at({-300, 150, 900}, -10), 10, on_board(10))}, 1);
     EXPECT_EQ(solved[board].state, ARHOST_TARGET_DETECTED);
     expect_near(pose_of(board), truth);
 }
 
 TEST_F(TargetSolverTest, ReportsEachMarkerAtOnceOnRequest) {
-    arhost_observation seen = see(pose_at({20, 10, 900}, 30), 5), sorted;
-    seen.false_positive_rate = small_family;
-    const TargetSolver own(pinhole, targets, {.full_search_every = full_search_every, .confirm = false});
-    arhost_tracker_result result{};
-    result.observations = &seen;
-    result.observation_count = 1;
-    own.solve(result, true, 0, nullptr, after.data(), {solved, {&sorted, 1}});
+    use({.full_search_every = full_search_every, .confirm = false});
+    solve({doubtful(pose_at({20, 10, 900}, 30))});
     EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
 }
 
@@ -588,7 +564,7 @@ TEST_F(TargetSolverTest, RejectsAReportThatViolatesTheContract) {
 TEST_F(TargetSolverTest, SurvivesAStateOfArbitraryBytes) {
     std::mt19937 random(6);
     is_first = false;
-    const std::size_t memory_size = solver.state_size() / targets.size();
+    const std::size_t memory_size = solver->state_size() / targets.size();
     for (int round = 0; round < 400; ++round) {
         for (std::byte &byte : before)
             byte = static_cast<std::byte>(random());
