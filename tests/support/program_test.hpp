@@ -29,7 +29,7 @@ protected:
                 .c_str());
         return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     }
-    // What the last command has printed.
+    // Returns the output of the last command.
     std::string printed() const { return read("../output.txt"); }
     testing::AssertionResult succeeds(const std::string &command) const {
         const int status = execute(command);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "map/map_file.hpp"
 
+#include "errors.hpp"
 #include "plugin_under_test.hpp"
 #include "simulated_markers.hpp"
 #include "yaml/yaml.hpp"
@@ -24,12 +25,7 @@ protected:
         return file;
     }
     std::string error_of(const std::string &text) const {
-        try {
-            read_map(write(text), family_);
-        } catch (const std::exception &error) {
-            return error.what();
-        }
-        return "";
+        return test::error_of<std::exception>([&] { read_map(write(text), family_); });
     }
     const marker::Family family_ = marker::find_family("tag36h11");
 

@@ -3,6 +3,7 @@
 // Tests what `arhost new-plugin` writes and rejects. tests/sdk builds and tests the skeletons.
 #include "plugin_tools/new_plugin.hpp"
 
+#include "errors.hpp"
 #include "plugin_under_test.hpp"
 
 #include <directories.hpp>
@@ -26,13 +27,8 @@ std::string text_of(const fs::path &file) {
     return text.str();
 }
 
-std::string rejection_of(const NewPlugin &plugin) {
-    try {
-        new_plugin(plugin, prefix);
-    } catch (const std::runtime_error &error) {
-        return error.what();
-    }
-    return "accepted";
+std::string rejection_of(const NewPlugin &plugin, const fs::path &installed = prefix) {
+    return arhost::test::error_of<std::runtime_error>([&] { new_plugin(plugin, installed); });
 }
 
 } // namespace
@@ -115,11 +111,7 @@ TEST(NewPlugin, DoesNotOverwriteAnExistingFile) {
 
 TEST(NewPlugin, ReportsMissingTemplates) {
     const arhost::test::ScratchFolder folder;
-    try {
-        new_plugin({"sink", "mine", "c", folder.path()}, folder.path());
-        FAIL();
-    } catch (const std::runtime_error &error) {
-        EXPECT_THAT(error.what(), HasSubstr("share/arhost/templates"));
-    }
+    EXPECT_THAT(rejection_of({"sink", "mine", "c", folder.path()}, folder.path()),
+                HasSubstr("share/arhost/templates"));
     EXPECT_TRUE(fs::is_empty(folder.path()));
 }

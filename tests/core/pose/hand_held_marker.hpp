@@ -34,4 +34,23 @@ inline Rigid in_hand(double seconds) {
                    35 + 15 * std::sin(2.5 * seconds), 30 * seconds, 40 * std::sin(seconds));
 }
 
+// Adds by how many frames of 1/30 s a found pose lags behind the hand, if the corner moves: otherwise, noise decides
+// which earlier position is the nearest.
+inline void add_lag(std::vector<double> &lags, const Camera &camera, const Rigid &found, double now_s) {
+    const auto error_px = [&](double frames) {
+        return (corner_px(camera, found) - corner_px(camera, in_hand(now_s - frames / 30))).norm();
+    };
+    double lag = 0;
+    for (double frames = 0; frames <= 5; frames += 0.1)
+        if (error_px(frames) < error_px(lag))
+            lag = frames;
+    if ((corner_px(camera, in_hand(now_s)) - corner_px(camera, in_hand(now_s - 1 / 30.0))).norm() > 1)
+        lags.push_back(lag);
+}
+inline void expect_less_than_a_frame(std::vector<double> lags) {
+    ASSERT_GT(lags.size(), 300u);
+    std::ranges::sort(lags);
+    EXPECT_LE(lags[lags.size() * 95 / 100], 1);
+}
+
 } // namespace arhost::pose

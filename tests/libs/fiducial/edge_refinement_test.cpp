@@ -159,9 +159,8 @@ TEST(EdgeRefinement, LocatesEdgesOfSimpleSlopes) {
                                                        std::sin(turn_rad + (2 * k - 3) * std::numbers::pi / 4));
             const auto fine = refine_edges(blurred_square(centre_px, side_px, turn_rad, 0.4), ARHOST_TRANSFER_LINEAR,
                                            truth, lens, cells);
-            ASSERT_TRUE(fine);
-            for (int k = 0; k < 4; ++k)
-                EXPECT_LT(cv::norm(fine->corners_px[k] - truth[k]), 0.008) << turn_degrees << " " << centre_px;
+            SCOPED_TRACE(testing::Message() << turn_degrees << " " << centre_px);
+            expect_near(fine, truth, 0.008);
         }
 }
 
@@ -177,9 +176,8 @@ TEST(EdgeRefinement, ToleratesUnevenLight) {
         picture.convertTo(picture, CV_16S);
         add_noise(picture, 1, 1);
         const auto fine = refine_edges(picture, ARHOST_TRANSFER_LINEAR, truth, lens, cells);
-        ASSERT_TRUE(fine);
-        for (int k = 0; k < 4; ++k)
-            EXPECT_LT(cv::norm(fine->corners_px[k] - truth[k]), 0.03) << slope;
+        SCOPED_TRACE(slope);
+        expect_near(fine, truth, 0.03);
     }
 }
 
@@ -223,9 +221,8 @@ TEST(EdgeRefinement, FindsAHiddenCorner) {
         Corners rough = truth;
         rough[2] += (truth[0] - truth[2]) / cv::norm(truth[0] - truth[2]) * 6;
         const auto fine = refine_edges(picture, ARHOST_TRANSFER_LINEAR, rough, lens, cells);
-        ASSERT_TRUE(fine);
-        for (int k = 0; k < 4; ++k)
-            EXPECT_LT(cv::norm(fine->corners_px[k] - truth[k]), 0.05) << grey << " " << k;
+        SCOPED_TRACE(grey);
+        expect_near(fine, truth, 0.05);
     }
 }
 

@@ -7,6 +7,7 @@
 
 #include <fiducial/april_tags.hpp>
 #include <fiducial/aruco.hpp>
+#include <fiducial/corner_refinement.hpp>
 
 #include <string_view>
 
@@ -40,6 +41,13 @@ inline Print aruco_marker(std::string_view dictionary, int id, int border_bits =
             return Print{drawn, cells}.with_margin(1);
         }
     throw std::runtime_error("unknown dictionary");
+}
+
+inline void expect_near(const std::optional<fiducial::MeasuredCorners> &found, const fiducial::Corners &truth,
+                        double max_px) {
+    ASSERT_TRUE(found);
+    for (std::size_t k = 0; k < 4; ++k)
+        EXPECT_LT(cv::norm(found->corners_px[k] - truth[k]), max_px) << k;
 }
 
 } // namespace arhost::test
