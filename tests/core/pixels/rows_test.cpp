@@ -21,14 +21,14 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 using test::FencedBytes;
 
-// A kernel, the number of bytes that each input has per two pixels, and the number of output bytes per pixel.
+using Run = std::function<void(const std::vector<const std::uint8_t *> &in, std::uint8_t *out, std::size_t count)>;
+
 struct Kernel {
     std::string name;
-    std::vector<std::size_t> bytes_per_2px;
+    std::vector<std::size_t> bytes_per_2px; // of each input
     std::size_t out_bytes_per_px;
-    bool even_only;
-    std::function<void(const std::vector<const std::uint8_t *> &, std::uint8_t *, std::size_t)> run;
-    std::function<void(const std::vector<const std::uint8_t *> &, std::uint8_t *, std::size_t)> expected;
+    std::size_t step_px; // the number of pixels is a multiple of it
+    Run run, expected;
 };
 
 void put(const Bgr &pixel, std::uint8_t *to) {
@@ -39,98 +39,56 @@ void put(const Bgr &pixel, std::uint8_t *to) {
 
 std::vector<Kernel> kernels() {
     const YuvMatrix m = yuv_matrix(0.2126, 0.0722, true);
+    std::vector<Kernel> kernels;
     // `pixel(in, i, to)` writes the expected value of pixel i to `to`.
-    const auto each = [](std::size_t out_bytes, auto pixel) {
-        return [=](const std::vector<const std::uint8_t *> &in, std::uint8_t *out, std::size_t count) {
+    const auto add = [&](Kernel kernel, auto pixel) {
+        kernel.expected = [=, bytes = kernel.out_bytes_per_px](auto &in, auto *out, auto count) {
             for (std::size_t i = 0; i < count; ++i)
-                pixel(in, i, out + out_bytes * i);
+                pixel(in, i, out + bytes * i);
         };
+        kernels.push_back(std::move(kernel));
     };
-    return {
-        {"blend",
-         {6, 8},
-         3,
-         false,
-         [](auto &in, auto *out, auto n) { rows::blend(in[0], in[1], out, n); },
-         each(3,
-              [](auto &in, auto i, auto *to) {
-                  for (std::size_t c = 0; c < 3; ++c)
-                      to[c] = blended(in[0][3 * i + c], in[1][4 * i + 2 - c], in[1][4 * i + 3]);
-              })},
-        {"bgr_from_grey",
-         {2},
-         3,
-         false,
-         [](auto &in, auto *out, auto n) { rows::bgr_from_grey(in[0], out, n); },
-         each(3,
-              [](auto &in, auto i, auto *to) {
-                  put({in[0][i], in[0][i], in[0][i]}, to);
-              })},
-        {"bgr_from_rgb",
-         {6},
-         3,
-         false,
-         [](auto &in, auto *out, auto n) { rows::bgr_from_rgb(in[0], out, n); },
-         each(3,
-              [](auto &in, auto i, auto *to) {
-                  put({in[0][3 * i + 2], in[0][3 * i + 1], in[0][3 * i]}, to);
-              })},
-        {"bgr_from_yuyv",
-         {4},
-         3,
-         true,
-         [=](auto &in, auto *out, auto n) { rows::bgr_from_yuyv(in[0], m, out, n); },
-         each(3,
-              [=](auto &in, auto i, auto *to) {
-                  put(bgr_from_yuv(m, in[0][2 * i], in[0][i / 2 * 4 + 1], in[0][i / 2 * 4 + 3]), to);
-              })},
-        {"bgr_from_nv12",
-         {2, 2},
-         3,
-         true,
-         [=](auto &in, auto *out, auto n) { rows::bgr_from_nv12(in[0], in[1], m, out, n); },
-         each(3, [=](auto &in, auto i,
-                     auto *to) { put(bgr_from_yuv(m, in[0][i], in[1][i / 2 * 2], in[1][i / 2 * 2 + 1]), to); })},
-        {"bgr_from_i420",
-         {2, 1, 1},
-         3,
-         true,
-         [=](auto &in, auto *out, auto n) { rows::bgr_from_i420(in[0], in[1], in[2], m, out, n); },
-         each(3,
-              [=](auto &in, auto i, auto *to) { put(bgr_from_yuv(m, in[0][i], in[1][i / 2], in[2][i / 2]), to); })},
-        {"grey_from_bgr",
-         {6},
-         1,
-         false,
-         [](auto &in, auto *out, auto n) { rows::grey_from_bgr(in[0], out, n); },
-         each(1, [](auto &in, auto i,
-                    auto *to) { *to = grey_from_rgb(in[0][3 * i + 2], in[0][3 * i + 1], in[0][3 * i]); })},
-        {"grey_from_rgb",
-         {6},
-         1,
-         false,
-         [](auto &in, auto *out, auto n) { rows::grey_from_rgb(in[0], out, n); },
-         each(1, [](auto &in, auto i,
-                    auto *to) { *to = grey_from_rgb(in[0][3 * i], in[0][3 * i + 1], in[0][3 * i + 2]); })},
-        {"grey_from_yuyv, limited",
-         {4},
-         1,
-         true,
-         [](auto &in, auto *out, auto n) { rows::grey_from_yuyv(in[0], true, out, n); },
-         each(1, [](auto &in, auto i, auto *to) { *to = full_range(in[0][2 * i]); })},
-        {"grey_from_yuyv, full",
-         {4},
-         1,
-         true,
-         [](auto &in, auto *out, auto n) { rows::grey_from_yuyv(in[0], false, out, n); },
-         each(1, [](auto &in, auto i, auto *to) { *to = in[0][2 * i]; })},
-        {"grey_from_limited_luma",
-         {2},
-         1,
-         false,
-         [](auto &in, auto *out, auto n) { rows::grey_from_limited_luma(in[0], out, n); },
-         each(1, [](auto &in, auto i, auto *to) { *to = full_range(in[0][i]); })},
+    const Run blend = [](auto &in, auto *out, auto n) { rows::blend(in[0], in[1], out, n); };
+    add({"blend", {6, 8}, 3, 1, blend, {}}, [](auto &in, auto i, auto *to) {
+        for (std::size_t c = 0; c < 3; ++c)
+            to[c] = blended(in[0][3 * i + c], in[1][4 * i + 2 - c], in[1][4 * i + 3]);
+    });
+    const Run bgr_from_grey = [](auto &in, auto *out, auto n) { rows::bgr_from_grey(in[0], out, n); };
+    add({"bgr_from_grey", {2}, 3, 1, bgr_from_grey, {}}, [](auto &in, auto i, auto *to) {
+        put(Bgr{in[0][i], in[0][i], in[0][i]}, to);
+    });
+    const Run bgr_from_rgb = [](auto &in, auto *out, auto n) { rows::bgr_from_rgb(in[0], out, n); };
+    add({"bgr_from_rgb", {6}, 3, 1, bgr_from_rgb, {}}, [](auto &in, auto i, auto *to) {
+        put(Bgr{in[0][3 * i + 2], in[0][3 * i + 1], in[0][3 * i]}, to);
+    });
+    const Run bgr_from_yuyv = [=](auto &in, auto *out, auto n) { rows::bgr_from_yuyv(in[0], m, out, n); };
+    add({"bgr_from_yuyv", {4}, 3, 2, bgr_from_yuyv, {}}, [=](auto &in, auto i, auto *to) {
+        put(bgr_from_yuv(m, in[0][2 * i], in[0][i / 2 * 4 + 1], in[0][i / 2 * 4 + 3]), to);
+    });
+    const Run bgr_from_nv12 = [=](auto &in, auto *out, auto n) { rows::bgr_from_nv12(in[0], in[1], m, out, n); };
+    add({"bgr_from_nv12", {2, 2}, 3, 2, bgr_from_nv12, {}}, [=](auto &in, auto i, auto *to) {
+        put(bgr_from_yuv(m, in[0][i], in[1][i / 2 * 2], in[1][i / 2 * 2 + 1]), to);
+    });
+    const Run bgr_from_i420 = [=](auto &in, auto *out, auto n) {
+        rows::bgr_from_i420(in[0], in[1], in[2], m, out, n);
     };
+    add({"bgr_from_i420", {2, 1, 1}, 3, 2, bgr_from_i420, {}},
+        [=](auto &in, auto i, auto *to) { put(bgr_from_yuv(m, in[0][i], in[1][i / 2], in[2][i / 2]), to); });
+    const Run grey_from_bgr = [](auto &in, auto *out, auto n) { rows::grey_from_bgr(in[0], out, n); };
+    add({"grey_from_bgr", {6}, 1, 1, grey_from_bgr, {}},
+        [](auto &in, auto i, auto *to) { *to = grey_from_rgb(in[0][3 * i + 2], in[0][3 * i + 1], in[0][3 * i]); });
+    const Run grey_from_rgb_row = [](auto &in, auto *out, auto n) { rows::grey_from_rgb(in[0], out, n); };
+    add({"grey_from_rgb", {6}, 1, 1, grey_from_rgb_row, {}},
+        [](auto &in, auto i, auto *to) { *to = grey_from_rgb(in[0][3 * i], in[0][3 * i + 1], in[0][3 * i + 2]); });
+    for (const bool is_limited : {true, false}) {
+        const Run run = [=](auto &in, auto *out, auto n) { rows::grey_from_yuyv(in[0], is_limited, out, n); };
+        add({is_limited ? "grey_from_yuyv, limited" : "grey_from_yuyv, full", {4}, 1, 2, run, {}},
+            [=](auto &in, auto i, auto *to) { *to = is_limited ? full_range(in[0][2 * i]) : in[0][2 * i]; });
+    }
+    const Run expand = [](auto &in, auto *out, auto n) { rows::grey_from_limited_luma(in[0], out, n); };
+    add({"grey_from_limited_luma", {2}, 1, 1, expand, {}},
+        [](auto &in, auto i, auto *to) { *to = full_range(in[0][i]); });
+    return kernels;
 }
 
 } // namespace
@@ -141,7 +99,7 @@ TEST(Rows, MatchTheFormulasForEveryLengthAndAccessNoOtherBytes) {
         std::mt19937 random(1);
         for (const Kernel &kernel : kernels())
             for (const FencedBytes::Side side : {FencedBytes::at_front, FencedBytes::at_back})
-                for (std::size_t count = kernel.even_only ? 2 : 1; count <= 130; count += kernel.even_only ? 2 : 1) {
+                for (std::size_t count = kernel.step_px; count <= 130; count += kernel.step_px) {
                     std::vector<std::unique_ptr<FencedBytes>> inputs;
                     std::vector<const std::uint8_t *> in;
                     for (const std::size_t per_2px : kernel.bytes_per_2px) {
