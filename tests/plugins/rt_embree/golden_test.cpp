@@ -40,10 +40,7 @@ cv::Mat render(const View &view) {
     Tracer tracer(scene::load_scene(scene), {{"samples", view.samples}});
     const arhost_camera from = camera(view.eye, view.look_at, view.up);
     EXPECT_EQ(tracer.start(from.intrinsics), ARHOST_STATUS_OK);
-    scene::MotionEvaluator motion(tracer.scene());
-    const arhost_motion at_time = motion.at(view.time_s);
-    Picture picture(from.intrinsics);
-    EXPECT_EQ(tracer.try_render(from, picture, &at_time), ARHOST_STATUS_OK);
+    const Picture picture = tracer.render_at(view.time_s, from);
     cv::Mat image(static_cast<int>(picture.height), static_cast<int>(picture.width), CV_8UC4);
     for (int y = 0; y < image.rows; ++y)
         for (int x = 0; x < image.cols; ++x) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Tests very large scenes: ten million triangles, and the largest texture.
-#include "tracer.hpp"
+#include "rich_scene.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,6 @@
 
 namespace arhost::test {
 namespace {
-
-using scene::ArenaBuilder;
 
 double available_gib() {
     std::ifstream info("/proc/meminfo");
@@ -42,9 +40,8 @@ TEST(Huge, TracesTenMillionTriangles) {
             }
         }
     ASSERT_GT(mesh.triangles.size(), 10'000'000u);
-    ArenaBuilder builder;
-    builder.settings.ambient = glm::vec3(1);
-    builder.add_object("sheet", builder.add_triangles(std::move(mesh)), builder.add_material(flat(0.5f, 0.5f, 0.5f)));
+    SceneBuilder builder({.ambient = glm::vec3(1)});
+    builder.add_mesh("sheet", mesh, flat(0.5f, 0.5f, 0.5f));
     // A triangle is a twentieth of a pixel wide. Without `robust`, one ray in a few hundred passes between two
     // adjacent triangles.
     const Picture picture = Tracer(std::move(builder), {{"robust", "true"}}).render(from_above());
@@ -70,13 +67,10 @@ TEST(Huge, SamplesTheLastRowsOfA16384By16384Texture) {
     // The last quarter of each of the last 2000 rows is white. These texels are at byte offsets beyond 2^29.
     for (std::size_t y = side - 2000; y < side; ++y)
         std::memset(texture.texels.bytes.get() + 4 * (y * side + 3 * side / 4), 0xff, side);
-    ArenaBuilder builder;
-    builder.settings.ambient = glm::vec3(1);
+    SceneBuilder builder({.ambient = glm::vec3(1)});
     arhost_material material = flat(1, 1, 1);
     material.colour_texture = builder.add_texture("map", std::move(texture));
-    scene::TriangleMesh mesh = square(50);
-    mesh.texcoords = {{0, 1}, {1, 1}, {1, 0}, {0, 0}};
-    builder.add_object("sheet", builder.add_triangles(std::move(mesh)), builder.add_material(material));
+    builder.add_mesh("sheet", textured_square(50, 0), material);
     const Picture picture = Tracer(std::move(builder)).render(from_above());
     EXPECT_EQ(picture.at(140, 120)[0], 255) << "the white area is at the bottom right";
     EXPECT_EQ(picture.at(110, 120)[0], 0);

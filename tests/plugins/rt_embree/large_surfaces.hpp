@@ -50,16 +50,14 @@ inline glm::dmat3 surface_axes() {
     return {right, glm::cross(out, right), out};
 }
 
-inline scene::ArenaBuilder scene_with(const LargeSurface &surface) {
+inline SceneBuilder scene_with(const LargeSurface &surface) {
     const glm::dmat3 axes = surface_axes();
     const bool is_built = surface.placement == Placement::BUILT || surface.placement == Placement::MOVED;
     const double size = is_built ? surface.size_mm : 1;
     const auto scale = static_cast<float>(surface.size_mm);
     const glm::dvec3 away = surface.placement == Placement::MOVED ? glm::dvec3(2e5, -1e5, 5e4) : glm::dvec3(0);
 
-    scene::ArenaBuilder builder;
-    builder.settings.ambient = glm::vec3(0);
-    builder.settings.duration_s = 2;
+    SceneBuilder builder({.ambient = glm::vec3(0), .duration_s = 2});
     scene::Motion motion{.moves = surface.placement == Placement::SCALED_IN_MOTION,
                          .deforms = surface.placement == Placement::MORPHED};
     if (motion.moves || motion.deforms)
@@ -102,9 +100,8 @@ inline arhost_camera camera_at_surface() {
 
 // Returns a scene with a plate of 20 × 20 × 1 mm on a horizontal floor of `side_mm`. A low lamp is far to the left of
 // the plate, so the plate's shadow is on its right and 5.8 mm long.
-inline scene::ArenaBuilder plate_on_floor(float side_mm) {
-    scene::ArenaBuilder builder;
-    builder.settings.ambient = glm::vec3(0);
+inline SceneBuilder plate_on_floor(float side_mm) {
+    SceneBuilder builder({.ambient = glm::vec3(0)});
     const std::uint32_t white = builder.add_material(diffuse(1, 1, 1));
     builder.add_object("floor", builder.add_triangles(square(side_mm / 2)), white);
     scene::TriangleMesh plate = cube(10);
@@ -128,17 +125,11 @@ inline arhost_camera camera_over_plate() {
 inline int pixels_out_of_light(const LargeSurface &surface, const std::string &plugin, const Options &options = {}) {
     Tracer tracer(scene_with(surface), options, plugin);
     const arhost_camera camera = camera_at_surface();
-    EXPECT_EQ(tracer.start(camera.intrinsics), ARHOST_STATUS_OK) << tracer.plugin().log();
-    scene::MotionEvaluator evaluator(tracer.scene());
-    Picture picture(camera.intrinsics);
-    for (const double time_s : {0, 1}) {
-        const arhost_motion motion = evaluator.at(time_s);
-        EXPECT_EQ(tracer.try_render(camera, picture, &motion), ARHOST_STATUS_OK) << tracer.plugin().log();
-    }
-    int out_of_light = 0;
-    for (const Pixel &pixel : picture.pixels())
-        out_of_light += pixel[3] != 255 || pixel[0] < 150;
-    return out_of_light;
+    EXPECT_EQ(tracer.start(camera.intrinsics), ARHOST_STATUS_OK) << tracer.log();
+    tracer.render_at(0, camera);
+    const std::vector<Pixel> pixels = tracer.render_at(1, camera).pixels();
+    return static_cast<int>(
+        std::ranges::count_if(pixels, [](const Pixel &pixel) { return pixel[3] != 255 || pixel[0] < 150; }));
 }
 
 } // namespace arhost::test

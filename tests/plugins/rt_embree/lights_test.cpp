@@ -12,12 +12,9 @@
 namespace arhost::test {
 namespace {
 
-using scene::ArenaBuilder;
-
 Picture over_a_plane(const arhost_light &lamp, const Options &options = {}) {
-    ArenaBuilder builder;
-    builder.settings.ambient = glm::vec3(0);
-    builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(diffuse(1, 1, 1)));
+    SceneBuilder builder({.ambient = glm::vec3(0)});
+    builder.add_mesh("plane", square(200), diffuse(1, 1, 1));
     builder.add_light(lamp);
     return Tracer(std::move(builder), options).render(from_above());
 }
@@ -29,19 +26,11 @@ void expect_irradiance(const Picture &picture, const std::function<double(glm::d
             ASSERT_TRUE(is_code_of(picture.at(x, y)[0], expected(on_the_floor(x, y)), tolerance)) << x << " " << y;
 }
 
-arhost_light placed(arhost_light_type type, glm::vec3 position, float intensity) {
-    arhost_light lamp = scene::make_light(type);
-    set3(lamp.position, position.x, position.y, position.z);
-    set3(lamp.intensity, intensity, intensity, intensity);
-    return lamp;
-}
-
 // Renders a ball over a catcher and returns the number of pixels for each alpha.
 std::map<int, int> shadow_of_a_ball(const arhost_light &lamp) {
-    ArenaBuilder builder;
-    builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)),
-                       ARHOST_ROLE_CATCHER);
-    builder.add_object("ball", builder.add_spheres({{0, 0, 25, 12}}), builder.add_material(diffuse(1, 0, 0)));
+    SceneBuilder builder;
+    builder.add_mesh("floor", square(80), diffuse(1, 1, 1), ARHOST_ROLE_CATCHER);
+    builder.add_ball("ball", {0, 0, 25, 12}, diffuse(1, 0, 0));
     builder.add_light(lamp);
     return Tracer(std::move(builder), {{"light_samples", "64"}}).render(from_the_side()).alphas();
 }
@@ -49,20 +38,19 @@ std::map<int, int> shadow_of_a_ball(const arhost_light &lamp) {
 } // namespace
 
 TEST(DirectionalLight, IsUniform) {
-    arhost_light sun = placed(ARHOST_LIGHT_DIRECTIONAL, {0, 0, 0}, 0.8f);
-    set3(sun.direction, 0.6f, 0, -0.8f);
-    expect_irradiance(over_a_plane(sun), [](glm::dvec3) { return 0.8 * 0.8; });
+    arhost_light lamp = placed(ARHOST_LIGHT_DIRECTIONAL, {0, 0, 0}, 0.8f);
+    set3(lamp.direction, 0.6f, 0, -0.8f);
+    expect_irradiance(over_a_plane(lamp), [](glm::dvec3) { return 0.8 * 0.8; });
 }
 
 TEST(DirectionalLight, CastsHardShadows) {
-    const auto near = shadow_of_a_ball(placed(ARHOST_LIGHT_DIRECTIONAL, {0, 0, 0}, 1));
+    const auto near = shadow_of_a_ball(sun());
     EXPECT_EQ(near.size(), 3u);
     EXPECT_GT(near.at(153), 100);
 }
 
 TEST(SpotLight, LightsOnlyItsCone) {
-    arhost_light spot = placed(ARHOST_LIGHT_SPOT, {30, -20, 90}, 5000);
-    spot.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
+    arhost_light spot = placed(ARHOST_LIGHT_SPOT, {30, -20, 90}, 5000, ARHOST_FALLOFF_INVERSE_SQUARE);
     const glm::dvec3 axis = glm::normalize(glm::dvec3(-0.3, 0.2, -0.9));
     set3(spot.direction, static_cast<float>(axis.x), static_cast<float>(axis.y), static_cast<float>(axis.z));
     spot.cosine_inner = 0.9f;
@@ -79,12 +67,9 @@ TEST(SpotLight, LightsOnlyItsCone) {
 }
 
 TEST(RectangleLight, IsTheMeanOverItsArea) {
-    arhost_light panel = placed(ARHOST_LIGHT_RECTANGLE, {10, 0, 80}, 4000);
-    panel.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
-    set3(panel.axis_u, 40, 0, 0);
-    set3(panel.axis_v, 0, 25, 0);
     expect_irradiance(
-        over_a_plane(panel, {{"samples", "64"}, {"light_samples", "16"}}),
+        over_a_plane(panel({10, 0, 80}, {40, 25}, 4000, ARHOST_FALLOFF_INVERSE_SQUARE),
+                     {{"samples", "64"}, {"light_samples", "16"}}),
         [](glm::dvec3 p) {
             double sum = 0;
             constexpr int n = 40;
@@ -99,24 +84,20 @@ TEST(RectangleLight, IsTheMeanOverItsArea) {
 }
 
 TEST(RectangleLight, EmitsToOneSideOnly) {
-    arhost_light panel = placed(ARHOST_LIGHT_RECTANGLE, {10, 0, 80}, 4000);
-    set3(panel.direction, 0, 0, 1);
-    expect_irradiance(over_a_plane(panel), [](glm::dvec3) { return 0; });
+    arhost_light upwards = placed(ARHOST_LIGHT_RECTANGLE, {10, 0, 80}, 4000);
+    set3(upwards.direction, 0, 0, 1);
+    expect_irradiance(over_a_plane(upwards), [](glm::dvec3) { return 0; });
 }
 
 TEST(SphereLight, IsAPointLightIfItsRadiusIsZero) {
-    arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {30, -20, 90}, 0.7f);
-    bulb.radius = 1e-3f;
-    expect_irradiance(over_a_plane(bulb), [](glm::dvec3 p) {
+    expect_irradiance(over_a_plane(bulb({30, -20, 90}, 1e-3f, 0.7f)), [](glm::dvec3 p) {
         const glm::dvec3 to_point = glm::dvec3(30, -20, 90) - p;
         return 0.7 * to_point.z / glm::length(to_point);
     });
 }
 
 TEST(SphereLight, CastsSoftShadowsWithAFullyDarkCore) {
-    arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, -20, 200}, 1);
-    bulb.radius = 20;
-    const auto alphas = shadow_of_a_ball(bulb);
+    const auto alphas = shadow_of_a_ball(bulb({0, -20, 200}, 20));
     EXPECT_GT(alphas.at(153), 50);
     int between = 0;
     for (const auto &[alpha, count] : alphas) {
@@ -128,9 +109,8 @@ TEST(SphereLight, CastsSoftShadowsWithAFullyDarkCore) {
 
 // A mirror of reflectivity 0.8 in the plane z = 0, whose surroundings are black.
 Picture of_a_mirror(const arhost_light &lamp) {
-    ArenaBuilder builder;
-    builder.settings.background = glm::vec3(0);
-    builder.add_object("mirror", builder.add_triangles(square(200)), builder.add_material(mirror(0.8f)));
+    SceneBuilder builder({.background = glm::vec3(0)});
+    builder.add_mesh("mirror", square(200), mirror(0.8f));
     builder.add_light(lamp);
     return Tracer(std::move(builder)).render(from_above());
 }
@@ -144,11 +124,8 @@ TEST(RectangleLight, IsVisibleInMirrors) {
     constexpr double pi = 3.14159265;
     for (const arhost_falloff falloff : {ARHOST_FALLOFF_NONE, ARHOST_FALLOFF_INVERSE_SQUARE}) {
         const bool falls_off = falloff == ARHOST_FALLOFF_INVERSE_SQUARE;
-        arhost_light panel = placed(ARHOST_LIGHT_RECTANGLE, {10, -5, 80}, falls_off ? 500.0f : 0.05f);
-        panel.falloff = falloff;
-        set3(panel.axis_u, 40, 0, 0);
-        set3(panel.axis_v, 0, 25, 0);
-        const Picture picture = of_a_mirror(panel);
+        arhost_light lamp = panel({10, -5, 80}, {40, 25}, falls_off ? 500.0f : 0.05f, falloff);
+        const Picture picture = of_a_mirror(lamp);
         int seen = 0;
         for (int y = 0; y < 150; y += 3)
             for (int x = 0; x < 200; x += 3) {
@@ -158,47 +135,38 @@ TEST(RectangleLight, IsVisibleInMirrors) {
                     continue;
                 // The radiance that illuminates a surface at the mirror as the lamp does.
                 const double squared = falls_off ? 1 : glm::dot(at - from, at - from);
-                const double radiance = panel.intensity[0] * squared * pi / (80 * 50);
+                const double radiance = lamp.intensity[0] * squared * pi / (80 * 50);
                 ASSERT_TRUE(is_code_of(picture.at(x, y)[0], beyond < 0 ? 0.8 * radiance : 0, 1e-3)) << x << " " << y;
                 seen += beyond < 0;
             }
         EXPECT_GT(seen, 100);
-        set3(panel.direction, 0, 0, 1);
-        EXPECT_EQ(of_a_mirror(panel).at(100, 74)[0], 0) << "its back is invisible";
+        set3(lamp.direction, 0, 0, 1);
+        EXPECT_EQ(of_a_mirror(lamp).at(100, 74)[0], 0) << "its back is invisible";
     }
 }
 
 TEST(SphereLight, IsVisibleInMirrorsAndThroughGlass) {
-    arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, 0, 80}, 500);
-    bulb.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
-    bulb.radius = 30;
-    const Picture picture = of_a_mirror(bulb);
+    const arhost_light lamp = bulb({0, 0, 80}, 30, 500, ARHOST_FALLOFF_INVERSE_SQUARE);
+    const Picture picture = of_a_mirror(lamp);
     EXPECT_NEAR(shading::srgb_decode(picture.at(100, 74)[0] / 255.0), 0.8 * 500 / (30 * 30), 0.01);
     EXPECT_EQ(picture.at(160, 74)[0], 0);
 
-    ArenaBuilder builder;
-    builder.settings.background = glm::vec3(0);
-    arhost_material glass = scene::make_material(ARHOST_MATERIAL_GLASS);
+    SceneBuilder builder({.background = glm::vec3(0)});
+    arhost_material glass = glass_of(1.5f);
     glass.fresnel_minimum = glass.fresnel_maximum = 0;
-    builder.add_object("pane", builder.add_triangles(square(60, 150)), builder.add_material(glass));
-    builder.add_light(bulb);
-    arhost_camera towards_the_bulb = from_above();
-    EXPECT_NEAR(shading::srgb_decode(Tracer(std::move(builder)).render(towards_the_bulb).at(100, 74)[0] / 255.0),
+    builder.add_mesh("pane", square(60, 150), glass);
+    builder.add_light(lamp);
+    EXPECT_NEAR(shading::srgb_decode(Tracer(std::move(builder)).render(from_above()).at(100, 74)[0] / 255.0),
                 500.0 / (30 * 30), 0.02);
 }
 
 TEST(AreaLights, BehindAnObjectAreNotVisibleInMirrors) {
-    arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, 0, 80}, 1);
-    bulb.radius = 10;
     for (const bool screen : {false, true}) {
-        ArenaBuilder builder;
-        builder.settings.background = glm::vec3(0);
-        builder.settings.ambient = glm::vec3(0);
-        builder.add_object("mirror", builder.add_triangles(square(200)), builder.add_material(mirror(1)));
+        SceneBuilder builder({.ambient = glm::vec3(0), .background = glm::vec3(0)});
+        builder.add_mesh("mirror", square(200), mirror(1));
         if (screen)
-            builder.add_object("screen", builder.add_triangles(square(20, 60)),
-                               builder.add_material(diffuse(1, 1, 1)));
-        builder.add_light(bulb);
+            builder.add_mesh("screen", square(20, 60), diffuse(1, 1, 1));
+        builder.add_light(bulb({0, 0, 80}, 10));
         // The screen is between the mirror and the lamp. Its lower side is not lit.
         const Picture picture =
             Tracer(std::move(builder)).render(camera({0, -100, 40}, {0, 0, -80}, {0, 0, 1}, pinhole(3, 3, 100)));
@@ -207,9 +175,9 @@ TEST(AreaLights, BehindAnObjectAreNotVisibleInMirrors) {
 }
 
 TEST(AreaLights, AreIdenticalOnEachRunAndThreadCount) {
-    arhost_light bulb = placed(ARHOST_LIGHT_SPHERE, {0, -20, 200}, 1);
-    bulb.radius = 30;
-    const auto pixels = [&](const char *threads) { return over_a_plane(bulb, {{"threads", threads}}).pixels(); };
+    const auto pixels = [](const char *threads) {
+        return over_a_plane(bulb({0, -20, 200}, 30), {{"threads", threads}}).pixels();
+    };
     EXPECT_EQ(pixels("1"), pixels("3"));
 }
 

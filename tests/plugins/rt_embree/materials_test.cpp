@@ -17,11 +17,8 @@
 namespace arhost::test {
 namespace {
 
-using scene::ArenaBuilder;
-
 arhost_material clear_glass(float index = 1.5f) {
-    arhost_material glass = scene::make_material(ARHOST_MATERIAL_GLASS);
-    glass.index = index;
+    arhost_material glass = glass_of(index);
     glass.importance_cutoff = 0;
     return glass;
 }
@@ -37,19 +34,19 @@ scene::TriangleMesh box(glm::vec3 low, glm::vec3 high) {
     return mesh;
 }
 
-ArenaBuilder in_a_room_of_light(float light) {
-    ArenaBuilder builder;
-    builder.settings.ambient = glm::vec3(0);
-    builder.settings.background = glm::vec3(light);
-    builder.settings.max_depth = 60;
-    return builder;
+SceneBuilder in_a_room_of_light(float light, std::uint32_t max_depth = 60) {
+    return SceneBuilder({.max_depth = max_depth, .ambient = glm::vec3(0), .background = glm::vec3(light)});
+}
+constexpr glm::vec4 centre_ball(0, 0, 0, 60);
+
+// Renders a ball of this material in the centre of a room of light.
+Picture ball_in_a_room(float light, const arhost_material &material, std::uint32_t max_depth = 60) {
+    SceneBuilder builder = in_a_room_of_light(light, max_depth);
+    builder.add_ball("ball", centre_ball, material);
+    return Tracer(std::move(builder)).render(from_above());
 }
 
-void add_ball(ArenaBuilder &builder, const arhost_material &material) {
-    builder.add_object("ball", builder.add_spheres({{0, 0, 0, 60}}), builder.add_material(material));
-}
-
-// Returns the cosine of the angle at which a pixel's ray hits the ball of add_ball(), or nothing if the ray misses.
+// Returns the cosine of the angle at which a pixel's ray hits the ball in the centre, or nothing if the ray misses.
 // The distance t of the hit solves t² + 2 b t + c = 0.
 std::optional<double> cosine_on_ball(int x, int y) {
     const glm::dvec3 eye(0, 0, 200), d = glm::normalize(on_the_floor(x, y) - eye);
@@ -64,9 +61,7 @@ std::optional<double> cosine_on_ball(int x, int y) {
 TEST(Metal, FollowsSchlick) {
     arhost_material metal = scene::make_material(ARHOST_MATERIAL_METAL);
     set3(metal.reflectivity, 0.5f, 0.3f, 0.1f);
-    ArenaBuilder builder = in_a_room_of_light(0.6f);
-    add_ball(builder, metal);
-    const Picture picture = Tracer(std::move(builder)).render(from_above());
+    const Picture picture = ball_in_a_room(0.6f, metal);
     for (int x = 100; x < 155; x += 2)
         if (const auto cosine = cosine_on_ball(x, 74))
             for (int i = 0; i < 3; ++i) {
@@ -79,11 +74,9 @@ TEST(Glass, ConservesEnergy) {
     for (const char *mode : {"tree", "path"}) {
         arhost_material glass = clear_glass();
         set3(glass.cutoff_colour, 0.5f, 0.5f, 0.5f); // rays cut off inside the glass get the environment's radiance
-        ArenaBuilder builder = in_a_room_of_light(0.5f);
-        builder.settings.max_depth = std::string(mode) == "tree" ? 12 : 60;
-        add_ball(builder, glass);
-        builder.add_object("box", builder.add_triangles(box({50, -60, -20}, {90, 60, 30})),
-                           builder.add_material(glass));
+        SceneBuilder builder = in_a_room_of_light(0.5f, std::string(mode) == "tree" ? 12 : 60);
+        builder.add_ball("ball", centre_ball, glass);
+        builder.add_mesh("box", box({50, -60, -20}, {90, 60, 30}), glass);
         const Picture picture = Tracer(std::move(builder), {{"glass", mode}}).render(from_the_side());
         int covered = 0;
         for (const Pixel &pixel : picture.pixels())
@@ -98,20 +91,11 @@ TEST(Glass, ConservesEnergy) {
 TEST(Glass, RefractsBySnellsLaw) {
     // The scene is a glass slab over a floor that is black for y < 7 and white for y > 7.
     constexpr double top = 40, bottom = 10, index = 1.5;
-    ArenaBuilder builder = in_a_room_of_light(0);
-    builder.settings.ambient = glm::vec3(1);
-    builder.add_object("slab", builder.add_triangles(box({-300, -300, bottom}, {300, 300, top})),
-                       builder.add_material(without_reflection(clear_glass(index))));
-    scene::TriangleMesh left = square(400), right = square(400);
-    for (glm::vec3 &p : left.positions)
-        p.y -= 393;
-    for (glm::vec3 &p : right.positions)
-        p.y += 407;
-    builder.add_object("left", builder.add_triangles(left), builder.add_material(flat(0, 0, 0)));
-    builder.add_object("right", builder.add_triangles(right), builder.add_material(flat(1, 1, 1)));
-    const arhost_camera view = from_the_side();
-    const Picture picture = Tracer(std::move(builder)).render(view);
-
+    SceneBuilder builder({.max_depth = 60, .ambient = glm::vec3(1), .background = glm::vec3(0)});
+    builder.add_mesh("slab", box({-300, -300, bottom}, {300, 300, top}), without_reflection(clear_glass(index)));
+    builder.add_mesh("left", moved(square(400), {0, -393, 0}), flat(0, 0, 0));
+    builder.add_mesh("right", moved(square(400), {0, 407, 0}), flat(1, 1, 1));
+    const Picture picture = Tracer(std::move(builder)).render(from_the_side());
     const glm::dvec3 eye(0, -150, 110), w = glm::normalize(eye), u(1, 0, 0), v = glm::cross(w, u);
     int sure = 0;
     for (int y = 0; y < 150; ++y)
@@ -133,9 +117,8 @@ TEST(Glass, RefractsBySnellsLaw) {
 TEST(Glass, AbsorbsByBouguersLaw) {
     arhost_material glass = without_reflection(clear_glass(1)); // index 1: no refraction
     set3(glass.extinction, 0.01f, 0.02f, 0);
-    ArenaBuilder builder = in_a_room_of_light(1);
-    builder.add_object("slab", builder.add_triangles(box({-300, -300, -30}, {300, 300, 0})),
-                       builder.add_material(glass));
+    SceneBuilder builder = in_a_room_of_light(1);
+    builder.add_mesh("slab", box({-300, -300, -30}, {300, 300, 0}), glass);
     const Picture picture = Tracer(std::move(builder)).render(from_above());
     for (int x = 0; x < 200; x += 7) {
         const double distance = 30 * glm::length(on_the_floor(x, 60) - glm::dvec3(0, 0, 200)) / 200;
@@ -146,26 +129,22 @@ TEST(Glass, AbsorbsByBouguersLaw) {
 }
 
 TEST(Glass, ShowsItsCutoffColourForCutOffRays) {
-    const auto with = [](auto change) {
+    const auto with = [](auto change, std::uint32_t max_depth = 60) {
         arhost_material glass = clear_glass();
         set3(glass.cutoff_colour, 0.34f, 0.55f, 0.85f);
-        ArenaBuilder builder = in_a_room_of_light(0);
-        change(glass, builder);
-        add_ball(builder, glass);
-        return Tracer(std::move(builder)).render(from_above()).at(100, 74);
+        change(glass);
+        return ball_in_a_room(0, glass, max_depth).at(100, 74);
     };
     const Pixel cutoff{shading::srgb8_exact(0.34f), shading::srgb8_exact(0.55f), shading::srgb8_exact(0.85f), 255};
-    EXPECT_EQ(
-        with([](arhost_material &glass, ArenaBuilder &) { glass.reflection_depth = glass.refraction_depth = 0; }),
-        cutoff);
-    EXPECT_EQ(with([](arhost_material &, ArenaBuilder &builder) { builder.settings.max_depth = 0; }), cutoff);
-    EXPECT_EQ(with([](arhost_material &glass, ArenaBuilder &) { glass.importance_cutoff = 1; }), cutoff);
+    EXPECT_EQ(with([](arhost_material &glass) { glass.reflection_depth = glass.refraction_depth = 0; }), cutoff);
+    EXPECT_EQ(with([](arhost_material &) {}, 0), cutoff);
+    EXPECT_EQ(with([](arhost_material &glass) { glass.importance_cutoff = 1; }), cutoff);
     // At normal incidence, the surface reflects 4 % of the light that enters and 4 % of the rest when it leaves. Only
     // these reflected rays are cut off.
-    const Pixel thin = with([](arhost_material &glass, ArenaBuilder &) { glass.reflection_depth = 0; });
+    const Pixel thin = with([](arhost_material &glass) { glass.reflection_depth = 0; });
     EXPECT_TRUE(is_code_of(thin[1], 0.55 * (0.04 + 0.96 * 0.04), 1e-3));
     // The reflected rays have a throughput of at most 4 %, all other rays of at least 92 %.
-    EXPECT_EQ(with([](arhost_material &glass, ArenaBuilder &) { glass.importance_cutoff = 0.05f; }), thin);
+    EXPECT_EQ(with([](arhost_material &glass) { glass.importance_cutoff = 0.05f; }), thin);
 }
 
 TEST(Glass, ReflectanceFollowsTheMaterialsExponentWithinItsLimits) {
@@ -175,9 +154,7 @@ TEST(Glass, ReflectanceFollowsTheMaterialsExponentWithinItsLimits) {
         glass.fresnel_exponent = static_cast<float>(exponent);
         glass.fresnel_minimum = 0.1f;
         glass.fresnel_maximum = 0.6f;
-        ArenaBuilder builder = in_a_room_of_light(0.8f);
-        add_ball(builder, glass);
-        const Picture picture = Tracer(std::move(builder)).render(from_above());
+        const Picture picture = ball_in_a_room(0.8f, glass);
         int between = 0;
         for (int x = 102; x < 160; ++x)
             if (const auto cosine = cosine_on_ball(x, 74)) {
@@ -203,25 +180,19 @@ TEST(Glass, LimitsReflectionAndRefractionDepthSeparately) {
         arhost_material glass = clear_glass();
         glass.reflection_depth = static_cast<std::uint32_t>(reflection_depth);
         glass.refraction_depth = static_cast<std::uint32_t>(refraction_depth);
-        ArenaBuilder builder = in_a_room_of_light(0.8f);
-        add_ball(builder, glass);
-        const Picture picture = Tracer(std::move(builder)).render(from_above());
-        EXPECT_TRUE(is_code_of(picture.at(100, 74)[0], 0.8 * arriving, 1e-3))
+        EXPECT_TRUE(is_code_of(ball_in_a_room(0.8f, glass).at(100, 74)[0], 0.8 * arriving, 1e-3))
             << reflection_depth << " " << refraction_depth;
     }
 }
 
 TEST(Glass, MeanOfRandomPathsMatchesTheRayTree) {
     const auto scene = [] {
-        ArenaBuilder builder = in_a_room_of_light(0.9f);
-        builder.settings.ambient = glm::vec3(0.5f);
-        builder.settings.max_depth = 10;
+        SceneBuilder builder({.max_depth = 10, .ambient = glm::vec3(0.5f), .background = glm::vec3(0.9f)});
         arhost_material glass = clear_glass();
         glass.fresnel_minimum = 0.3f;
         set3(glass.extinction, 0.01f, 0, 0.02f);
-        builder.add_object("floor", builder.add_triangles(square(200, -70)),
-                           builder.add_material(flat(0.8f, 0.2f, 0.1f)));
-        add_ball(builder, glass);
+        builder.add_mesh("floor", square(200, -70), flat(0.8f, 0.2f, 0.1f));
+        builder.add_ball("ball", centre_ball, glass);
         return builder;
     };
     const auto mean = [&](const char *mode) {
@@ -235,13 +206,11 @@ TEST(Glass, MeanOfRandomPathsMatchesTheRayTree) {
 }
 
 TEST(Glass, ShadowAlphaOnACatcherIs77AndOfOpaqueObjects153) {
-    ArenaBuilder builder;
-    builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
-                       ARHOST_ROLE_CATCHER);
-    builder.add_object("glass", builder.add_spheres({{-20, 0, 25, 12}}), builder.add_material(clear_glass()));
-    builder.add_object("ball", builder.add_spheres({{20, 0, 25, 12}}), builder.add_material(diffuse(1, 0, 0)));
-    builder.add_object("over both", builder.add_triangles(box({-40, -3, 60}, {40, 3, 62})),
-                       builder.add_material(clear_glass()));
+    SceneBuilder builder;
+    builder.add_mesh("floor", square(80), diffuse(0.8f, 0.8f, 0.8f), ARHOST_ROLE_CATCHER);
+    builder.add_ball("glass", {-20, 0, 25, 12}, clear_glass());
+    builder.add_ball("ball", {20, 0, 25, 12}, diffuse(1, 0, 0));
+    builder.add_mesh("over both", box({-40, -3, 60}, {40, 3, 62}), clear_glass());
     builder.add_light(light(0, -20, 300, 1));
     const auto counts = Tracer(std::move(builder)).render(from_the_side()).alphas();
     EXPECT_EQ(counts.size(), 4u);
@@ -249,49 +218,39 @@ TEST(Glass, ShadowAlphaOnACatcherIs77AndOfOpaqueObjects153) {
     EXPECT_GT(counts.at(153), 100);
 }
 
+// A catcher that is entirely in the shadow of a glass roof.
+SceneBuilder under_glass(const std::vector<arhost_light> &lamps) {
+    SceneBuilder builder;
+    builder.add_mesh("floor", square(400), diffuse(0.8f, 0.8f, 0.8f), ARHOST_ROLE_CATCHER);
+    builder.add_mesh("roof", box({-900, -900, 300}, {900, 900, 302}), clear_glass());
+    for (const arhost_light &lamp : lamps)
+        builder.add_light(lamp);
+    return builder;
+}
+const std::map<int, int> only_glass_shadow{{77, 200 * 150}};
+
 TEST(Glass, ShadowAlphaIs77ForAnySampleCount) {
-    const auto under_glass = [] {
-        ArenaBuilder builder;
-        builder.add_object("floor", builder.add_triangles(square(400)),
-                           builder.add_material(diffuse(0.8f, 0.8f, 0.8f)), ARHOST_ROLE_CATCHER);
-        builder.add_object("roof", builder.add_triangles(box({-900, -900, 300}, {900, 900, 302})),
-                           builder.add_material(clear_glass()));
-        builder.add_light(light(0, -20, 500, 1));
-        return builder;
-    };
     for (const char *samples : {"1", "2", "8", "11", "12", "13", "64"}) {
-        Tracer tracer(under_glass(), {{"samples", samples}, {"accumulate", "true"}});
+        Tracer tracer(under_glass({light(0, -20, 500, 1)}), {{"samples", samples}, {"accumulate", "true"}});
         ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
-        for (int frame = 0; frame < 5; ++frame) {
-            Picture picture(pinhole());
-            ASSERT_EQ(tracer.try_render(from_above(), picture), ARHOST_STATUS_OK);
-            EXPECT_EQ(picture.alphas(), (std::map<int, int>{{77, 200 * 150}})) << samples << ", frame " << frame;
-        }
+        for (int frame = 0; frame < 5; ++frame)
+            EXPECT_EQ(tracer.render_next(from_above()).alphas(), only_glass_shadow) << samples << ", frame " << frame;
     }
 }
 
 TEST(Glass, ShadowAlphaIs77ForAnyNumberOfLamps) {
-    ArenaBuilder builder;
-    builder.add_object("floor", builder.add_triangles(square(400)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
-                       ARHOST_ROLE_CATCHER);
-    builder.add_object("roof", builder.add_triangles(box({-900, -900, 300}, {900, 900, 302})),
-                       builder.add_material(clear_glass()));
-    for (const float x : {-70.0f, 13.0f, 90.0f})
-        builder.add_light(light(x, 2 * x, 500, 0.3f + 0.001f * x));
-    const auto counts = Tracer(std::move(builder)).render(from_above()).alphas();
-    EXPECT_EQ(counts, (std::map<int, int>{{77, 200 * 150}}));
+    Tracer tracer(
+        under_glass({light(-70, -140, 500, 0.23f), light(13, 26, 500, 0.313f), light(90, 180, 500, 0.39f)}));
+    EXPECT_EQ(tracer.render(from_above()).alphas(), only_glass_shadow);
 }
 
 TEST(Glass, ShadowIsColouredIfTheSceneEnablesIt) {
     const auto shadow = [](bool coloured) {
-        ArenaBuilder builder;
-        builder.settings.coloured_shadows = coloured;
+        SceneBuilder builder({.coloured_shadows = coloured});
         arhost_material glass = clear_glass();
         set3(glass.shadow_attenuation, 0.4f, 0.8f, 0.4f);
-        builder.add_object("floor", builder.add_triangles(square(80)),
-                           builder.add_material(diffuse(0.8f, 0.8f, 0.8f)), ARHOST_ROLE_CATCHER);
-        builder.add_object("pane", builder.add_triangles(box({-20, -20, 50}, {20, 20, 51})),
-                           builder.add_material(glass));
+        builder.add_mesh("floor", square(80), diffuse(0.8f, 0.8f, 0.8f), ARHOST_ROLE_CATCHER);
+        builder.add_mesh("pane", box({-20, -20, 50}, {20, 20, 51}), glass);
         builder.add_light(light(0, 150, 300, 1));
         return Tracer(std::move(builder)).render(camera({0, -150, 20}, {0, -30, 0}, {0, 0, 1})).at(100, 74);
     };
@@ -303,28 +262,27 @@ TEST(Glass, ShadowIsColouredIfTheSceneEnablesIt) {
     EXPECT_NEAR(green[3], 255 * shading::shadow_alpha(0.84, 0, 0.6, 0), 2);
 }
 
+// Returns the light of the sun on a white floor under a block of glass.
+Pixel under_a_block(const arhost_material &glass, float thickness) {
+    SceneBuilder builder = in_a_room_of_light(0);
+    builder.add_mesh("floor", square(80), diffuse(1, 1, 1));
+    builder.add_mesh("block", box({-20, -20, 50}, {20, 20, 50 + thickness}), glass);
+    builder.add_light(sun());
+    return Tracer(std::move(builder)).render(camera({0, -150, 20}, {0, -15, 0}, {0, 0, 1})).at(100, 74);
+}
+
 TEST(Glass, ShadowTintsTheLightOnObjects) {
-    ArenaBuilder builder = in_a_room_of_light(0);
     arhost_material glass = clear_glass();
     set3(glass.shadow_attenuation, 0.5f, 0.8f, 0.2f);
-    builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)));
-    builder.add_object("pane", builder.add_triangles(box({-20, -20, 50}, {20, 20, 51})), builder.add_material(glass));
-    arhost_light sun = scene::make_light(ARHOST_LIGHT_DIRECTIONAL);
-    builder.add_light(sun);
-    const Pixel pixel = Tracer(std::move(builder)).render(camera({0, -150, 20}, {0, -15, 0}, {0, 0, 1})).at(100, 74);
+    const Pixel pixel = under_a_block(glass, 1);
     for (int i = 0; i < 3; ++i)
         EXPECT_TRUE(is_code_of(pixel[i], glass.shadow_attenuation[i] * glass.shadow_attenuation[i], 1e-4));
 }
 
 TEST(Glass, ShadowOnObjectsIsAbsorbedInsideTheGlass) {
-    ArenaBuilder builder = in_a_room_of_light(0);
     arhost_material glass = clear_glass();
     set3(glass.extinction, 0.01f, 0.002f, 0);
-    builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(1, 1, 1)));
-    builder.add_object("block", builder.add_triangles(box({-20, -20, 50}, {20, 20, 90})),
-                       builder.add_material(glass));
-    builder.add_light(scene::make_light(ARHOST_LIGHT_DIRECTIONAL));
-    const Pixel pixel = Tracer(std::move(builder)).render(camera({0, -150, 20}, {0, -15, 0}, {0, 0, 1})).at(100, 74);
+    const Pixel pixel = under_a_block(glass, 40);
     for (int i = 0; i < 3; ++i)
         EXPECT_TRUE(is_code_of(pixel[i], 0.6 * 0.6 * std::exp(-40.0 * glass.extinction[i]), 1e-3)) << i;
 }
@@ -344,10 +302,7 @@ double albedo_at_normal_incidence(double roughness) {
 }
 
 arhost_material white_metal(float roughness) {
-    arhost_material metal = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
-    set3(metal.diffuse, 1, 1, 1);
-    metal.roughness = roughness;
-    return metal;
+    return metallic_roughness(glm::vec3(1), 1, roughness);
 }
 
 // Mean linear light of the 25 central pixels.
@@ -361,10 +316,10 @@ double light_in_the_middle(const Picture &picture) {
 TEST(Rough, WhiteMetalLosesOnlyMaskedLight) {
     for (const bool environment : {false, true})
         for (const float roughness : {0.0f, 0.3f, 0.6f, 1.0f}) {
-            ArenaBuilder builder = in_a_room_of_light(0.5f);
+            SceneBuilder builder = in_a_room_of_light(0.5f);
             if (environment)
                 add_environment(builder, [](std::uint32_t) { return glm::vec3(0.5f); });
-            add_ball(builder, white_metal(roughness));
+            builder.add_ball("ball", centre_ball, white_metal(roughness));
             const Picture picture = Tracer(std::move(builder), {{"samples", "64"}}).render(from_above());
             const double expected = 0.5 * albedo_at_normal_incidence(roughness);
             EXPECT_NEAR(light_in_the_middle(picture) / expected, 1, 0.01) << roughness << " " << environment;
@@ -372,9 +327,8 @@ TEST(Rough, WhiteMetalLosesOnlyMaskedLight) {
 }
 
 TEST(Rough, BackgroundIsReflectedAtTheDepthLimit) {
-    ArenaBuilder builder = in_a_room_of_light(0.5f);
-    builder.settings.max_depth = 0;
-    add_ball(builder, white_metal(0.6f));
+    SceneBuilder builder = in_a_room_of_light(0.5f, 0);
+    builder.add_ball("ball", centre_ball, white_metal(0.6f));
     const Picture picture =
         Tracer(std::move(builder), {{"samples", "64"}, {"light_samples", "16"}}).render(from_above());
     EXPECT_NEAR(light_in_the_middle(picture) / (0.5 * albedo_at_normal_incidence(0.6)), 1, 0.03);
@@ -393,17 +347,10 @@ double noise_in_the_middle(const Picture &picture, double light) {
 TEST(Rough, ReflectionsOfAreaLightsAreRightAndSmoothForEveryRoughness) {
     for (const float roughness : {0.0f, 0.15f, 0.5f, 1.0f}) {
         // A panel of 60 mm × 60 mm is 100 mm above a metal plane.
-        ArenaBuilder builder = in_a_room_of_light(0);
-        builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(white_metal(roughness)));
-        arhost_light panel = scene::make_light(ARHOST_LIGHT_RECTANGLE);
-        panel.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
-        set3(panel.position, 0, 0, 100);
-        set3(panel.axis_u, 30, 0, 0);
-        set3(panel.axis_v, 0, 30, 0);
+        SceneBuilder builder = in_a_room_of_light(0);
+        builder.add_mesh("plane", square(200), white_metal(roughness));
         constexpr float radiance = 0.8f;
-        const float intensity = radiance * 3600 / 3.14159265f;
-        set3(panel.intensity, intensity, intensity, intensity);
-        builder.add_light(panel);
+        builder.add_light(panel({0, 0, 100}, {30, 30}, radiance * 3600 / 3.14159265f, ARHOST_FALLOFF_INVERSE_SQUARE));
         const Picture picture = Tracer(std::move(builder), {{"samples", "64"}}).render(from_above());
         // Compare the central pixels with the integral over reflected directions.
         const double alpha = shading::ggx_alpha(roughness);
@@ -423,9 +370,9 @@ TEST(Rough, ReflectionsOfAreaLightsAreRightAndSmoothForEveryRoughness) {
 
 TEST(Rough, ReflectionsOfEnvironmentsWithFewBrightTexelsAreRightAndSmooth) {
     for (const float roughness : {0.5f, 0.75f, 1.0f}) {
-        ArenaBuilder builder = in_a_room_of_light(0);
+        SceneBuilder builder = in_a_room_of_light(0);
         add_environment(builder, [](std::uint32_t column) { return glm::vec3(column == 2 ? 4.0f : 0.0f); });
-        builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(white_metal(roughness)));
+        builder.add_mesh("plane", square(200), white_metal(roughness));
         const Picture picture = Tracer(std::move(builder), {{"samples", "64"}}).render(from_above());
         // The lobe is rotationally symmetric, and one of eight columns is bright.
         const double expected = 4 / 8.0 * albedo_at_normal_incidence(roughness);
@@ -438,16 +385,10 @@ TEST(Rough, ReflectionsOfEnvironmentsWithFewBrightTexelsAreRightAndSmooth) {
 // Linear light of a metal plane beside a ball, which reflects a small, bright lamp to the plane or lets its light
 // through.
 Picture beside_a_ball(const arhost_material &ball, float roughness) {
-    ArenaBuilder builder = in_a_room_of_light(0);
-    builder.settings.max_depth = 4;
-    builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(white_metal(roughness)));
-    builder.add_object("ball", builder.add_spheres({{0, 0, 30, 30}}), builder.add_material(ball));
-    arhost_light bulb = scene::make_light(ARHOST_LIGHT_SPHERE);
-    bulb.falloff = ARHOST_FALLOFF_NONE;
-    set3(bulb.position, 100, 0, 250);
-    set3(bulb.intensity, 0.1f, 0.1f, 0.1f);
-    bulb.radius = 10;
-    builder.add_light(bulb);
+    SceneBuilder builder = in_a_room_of_light(0, 4);
+    builder.add_mesh("plane", square(200), white_metal(roughness));
+    builder.add_ball("ball", {0, 0, 30, 30}, ball);
+    builder.add_light(bulb({100, 0, 250}, 10, 0.1f));
     return Tracer(std::move(builder), {{"samples", "16"}}).render(from_above());
 }
 
@@ -470,13 +411,10 @@ TEST(Rough, ReflectionsOfLampsInMirrorsAndGlassHaveNoBrightSpots) {
 }
 
 TEST(Rough, PlasticPlaneMatchesTheGltfFormulas) {
-    arhost_material plastic = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
-    set3(plastic.diffuse, 0.6f, 0.3f, 0.1f);
-    plastic.metallic = 0.25f;
-    plastic.roughness = 0.5f;
+    arhost_material plastic = metallic_roughness({0.6f, 0.3f, 0.1f}, 0.25f, 0.5f);
     set3(plastic.emission, 0, 0, 0.05f);
-    ArenaBuilder builder = in_a_room_of_light(0);
-    builder.add_object("plane", builder.add_triangles(square(200)), builder.add_material(plastic));
+    SceneBuilder builder = in_a_room_of_light(0);
+    builder.add_mesh("plane", square(200), plastic);
     builder.add_light(light(30, -20, 90, 0.9f));
     const Picture picture = Tracer(std::move(builder)).render(from_above());
     for (int y = 0; y < 150; y += 5)

@@ -15,14 +15,11 @@
 namespace arhost::test {
 namespace {
 
-using scene::ArenaBuilder;
 using scene::Motion;
 
-ArenaBuilder with_floor_and_light() {
-    ArenaBuilder builder;
-    builder.settings.ambient = glm::vec3(0.3f);
-    builder.add_object("floor", builder.add_triangles(square(80)), builder.add_material(diffuse(0.8f, 0.8f, 0.8f)),
-                       ARHOST_ROLE_CATCHER);
+SceneBuilder with_floor_and_light() {
+    SceneBuilder builder({.ambient = glm::vec3(0.3f), .duration_s = 1});
+    builder.add_mesh("floor", square(80), diffuse(0.8f, 0.8f, 0.8f), ARHOST_ROLE_CATCHER);
     builder.add_light(light(60, -20, 200, 0.7f));
     return builder;
 }
@@ -44,17 +41,23 @@ scene::TriangleMesh sheet(float height, unsigned n = 40) {
     return mesh;
 }
 
-Picture at_time(ArenaBuilder builder, double time_s, const arhost_camera &view = from_the_side()) {
+scene::TriangleMesh flat_sheet_that_becomes_wavy() {
+    scene::TriangleMesh mesh = sheet(0);
+    const scene::TriangleMesh waves = sheet(16);
+    for (std::size_t i = 0; i < mesh.positions.size(); ++i)
+        mesh.morph_positions.push_back(waves.positions[i] - mesh.positions[i]);
+    return mesh;
+}
+arhost_material blue() {
+    return diffuse(0.2f, 0.4f, 0.8f);
+}
+
+Picture at_time(SceneBuilder builder, double time_s, const arhost_camera &view = from_the_side()) {
     Tracer tracer(std::move(builder));
     EXPECT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK);
-    scene::MotionEvaluator evaluator(tracer.scene());
-    Picture picture(view.intrinsics);
-    for (const double t : {0.0, 0.9, time_s}) { // earlier frames must not affect the picture
-        const arhost_motion motion = evaluator.at(t);
-        picture = Picture(view.intrinsics);
-        EXPECT_EQ(tracer.try_render(view, picture, &motion), ARHOST_STATUS_OK);
-    }
-    return picture;
+    for (const double earlier : {0.0, 0.9}) // must not affect the picture
+        tracer.render_at(earlier, view);
+    return tracer.render_at(time_s, view);
 }
 
 void expect_alike(const Picture &a, const Picture &b) {
@@ -72,14 +75,9 @@ constexpr float albedo = 0.8f;
 arhost_material white() {
     return diffuse(albedo, albedo, albedo);
 }
-ArenaBuilder under_the_sun() {
-    ArenaBuilder builder;
-    builder.settings.ambient = glm::vec3(0);
-    builder.settings.duration_s = 2;
-    arhost_light sun = scene::make_light(ARHOST_LIGHT_DIRECTIONAL);
-    set3(sun.direction, 0, 0, -1);
-    set3(sun.intensity, 1, 1, 1);
-    builder.add_light(sun);
+SceneBuilder under_the_sun() {
+    SceneBuilder builder({.ambient = glm::vec3(0), .duration_s = 2});
+    builder.add_light(sun());
     return builder;
 }
 scene::TriangleMesh square_with_normals() {
@@ -100,17 +98,12 @@ rt_embree::MeshView view_of(const scene::TriangleMesh &mesh) {
 // not depend on this.
 TEST(Moving, CatchersReceiveShadowsInAnyBvh) {
     const auto scene = [](const glm::mat4x3 &place, bool moves, float raised) {
-        ArenaBuilder builder = with_floor_and_light();
-        builder.settings.duration_s = 1;
-        const std::uint32_t node = builder.add_node({.animated = true, .morph_weights = {}});
-        builder.add_channel({.node = node, .times = {0, 1}, .values = {0, 0, 0, 0, 0, 20}});
-        scene::TriangleMesh shelf = square(15);
-        for (glm::vec3 &p : shelf.positions)
-            p += glm::vec3(30, 10, raised);
-        builder.add_object("shelf", builder.add_triangles(shelf), builder.add_material(white()), ARHOST_ROLE_CATCHER,
-                           place, moves ? Motion{.moves = true, .node = node} : Motion{});
+        SceneBuilder builder = with_floor_and_light();
+        const std::uint32_t node = builder.add_moving_node({0, 0, 0}, {0, 0, 20});
+        builder.add_mesh("shelf", moved(square(15), {30, 10, raised}), white(), ARHOST_ROLE_CATCHER, place,
+                         moves ? Motion{.moves = true, .node = node} : Motion{});
         // This sheet has enough triangles for the plugin to build a separate BVH for catchers.
-        builder.add_object("sheet", builder.add_triangles(sheet(10)), builder.add_material(shiny(0.5f, 0.4f, 30)));
+        builder.add_mesh("sheet", sheet(10), shiny(0.5f, 0.4f, 30));
         return builder;
     };
     glm::mat4x3 up(1);
@@ -124,33 +117,20 @@ TEST(Moving, CatchersReceiveShadowsInAnyBvh) {
 }
 
 TEST(Moving, ObjectFollowsItsNode) {
-    ArenaBuilder moving = with_floor_and_light();
-    moving.settings.duration_s = 1;
-    const std::uint32_t node = moving.add_node({.animated = true, .morph_weights = {}});
-    moving.add_channel({.node = node, .times = {0, 1}, .values = {-40, 0, 0, 40, 20, 0}});
-    moving.add_object("box", moving.add_triangles(cube(10)), moving.add_material(shiny(0.5f, 0.4f, 30)),
-                      ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), {.moves = true, .node = node});
-    ArenaBuilder still = with_floor_and_light();
-    scene::TriangleMesh box = cube(10);
-    for (glm::vec3 &p : box.positions)
-        p += glm::vec3(20, 15, 0);
-    still.add_object("box", still.add_triangles(box), still.add_material(shiny(0.5f, 0.4f, 30)));
+    SceneBuilder moving = with_floor_and_light();
+    const std::uint32_t node = moving.add_moving_node({-40, 0, 0}, {40, 20, 0});
+    moving.add_animated("box", cube(10), shiny(0.5f, 0.4f, 30), {.moves = true, .node = node});
+    SceneBuilder still = with_floor_and_light();
+    still.add_mesh("box", moved(cube(10), {20, 15, 0}), shiny(0.5f, 0.4f, 30));
     expect_alike(at_time(std::move(moving), 0.75), Tracer(std::move(still)).render(from_the_side()));
 }
 
 TEST(Moving, MeshFollowsItsMorphTargets) {
-    ArenaBuilder deforming = with_floor_and_light();
-    deforming.settings.duration_s = 1;
-    const std::uint32_t node = deforming.add_node({.animated = true, .morph_weights = {0}});
-    deforming.add_channel({.node = node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, 1}, .values = {0, 1}});
-    scene::TriangleMesh mesh = sheet(0);
-    const scene::TriangleMesh waves = sheet(16);
-    for (std::size_t i = 0; i < mesh.positions.size(); ++i)
-        mesh.morph_positions.push_back(waves.positions[i] - mesh.positions[i]);
-    deforming.add_object("sheet", deforming.add_triangles(mesh), deforming.add_material(diffuse(0.2f, 0.4f, 0.8f)),
-                         ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), {.deforms = true, .node = node});
-    ArenaBuilder still = with_floor_and_light();
-    still.add_object("sheet", still.add_triangles(sheet(8)), still.add_material(diffuse(0.2f, 0.4f, 0.8f)));
+    SceneBuilder deforming = with_floor_and_light();
+    const std::uint32_t node = deforming.add_morphing_node();
+    deforming.add_animated("sheet", flat_sheet_that_becomes_wavy(), blue(), {.deforms = true, .node = node});
+    SceneBuilder still = with_floor_and_light();
+    still.add_mesh("sheet", sheet(8), blue());
     expect_alike(at_time(std::move(deforming), 0.5), Tracer(std::move(still)).render(from_the_side()));
 }
 
@@ -158,7 +138,7 @@ TEST(Moving, MeshFollowsItsMorphTargets) {
 // were not rotated, the brightness would not change.
 TEST(Moving, SkinRotatesNormals) {
     const auto turning = [] {
-        ArenaBuilder builder = under_the_sun();
+        SceneBuilder builder = under_the_sun();
         const std::uint32_t joint = builder.add_node({.animated = true, .morph_weights = {}});
         const float sine = std::sin(glm::radians(30.0f)), cosine = std::cos(glm::radians(30.0f)); // half of 60°
         builder.add_channel({.node = joint,
@@ -169,8 +149,7 @@ TEST(Moving, SkinRotatesNormals) {
         mesh.joints.assign(4, glm::u16vec4(0));
         mesh.weights.assign(4, glm::vec4(1, 0, 0, 0));
         const std::uint32_t skin = builder.add_skin({{joint}, {glm::mat4x3(1)}});
-        builder.add_object("square", builder.add_triangles(mesh), builder.add_material(white()), ARHOST_ROLE_VIRTUAL,
-                           glm::mat4x3(1), {.deforms = true, .skin = skin});
+        builder.add_animated("square", mesh, white(), {.deforms = true, .skin = skin});
         return builder;
     };
     const Picture before = at_time(turning(), 0, from_above()), after = at_time(turning(), 1, from_above());
@@ -184,15 +163,12 @@ TEST(Moving, SkinRotatesNormals) {
 // tilts the normal by 60°.
 TEST(Moving, MorphTargetTiltsNormals) {
     const auto leaning = [] {
-        ArenaBuilder builder = under_the_sun();
-        const std::uint32_t node = builder.add_node({.animated = true, .morph_weights = {0}});
-        builder.add_channel(
-            {.node = node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, 2}, .values = {0, 1}});
+        SceneBuilder builder = under_the_sun();
+        const std::uint32_t node = builder.add_morphing_node(2);
         scene::TriangleMesh mesh = square_with_normals();
         mesh.morph_positions.assign(4, glm::vec3(0));
         mesh.morph_normals.assign(4, {0, 2 * std::tan(glm::radians(60.0f)), 0});
-        builder.add_object("square", builder.add_triangles(mesh), builder.add_material(white()), ARHOST_ROLE_VIRTUAL,
-                           glm::mat4x3(1), {.deforms = true, .node = node});
+        builder.add_animated("square", mesh, white(), {.deforms = true, .node = node});
         return builder;
     };
     EXPECT_TRUE(is_code_of(at_time(leaning(), 0, from_above()).at(100, 75)[1], albedo));
@@ -212,41 +188,26 @@ TEST(BvhQuality, IsUnaffectedByTranslationScalingAndSlightDeformation) {
 
 // A glTF mesh without a skin can move and deform at the same time.
 TEST(Moving, MeshCanMoveAndDeform) {
-    ArenaBuilder both = with_floor_and_light();
-    both.settings.duration_s = 1;
-    const std::uint32_t node = both.add_node({.animated = true, .morph_weights = {0}});
-    both.add_channel({.node = node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, 1}, .values = {0, 1}});
+    SceneBuilder both = with_floor_and_light();
+    const std::uint32_t node = both.add_morphing_node();
     both.add_channel({.node = node, .times = {0, 1}, .values = {500, 0, 0, 540, 0, 0}});
-    scene::TriangleMesh mesh = sheet(0), there = sheet(8);
-    const scene::TriangleMesh waves = sheet(16);
-    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-        mesh.morph_positions.push_back(waves.positions[i] - mesh.positions[i]);
-        mesh.positions[i].x -= 500; // the mesh is out of view unless its node moves it back
-        there.positions[i].x += 20;
-    }
-    const arhost_material blue = diffuse(0.2f, 0.4f, 0.8f);
-    both.add_object("sheet", both.add_triangles(mesh), both.add_material(blue), ARHOST_ROLE_VIRTUAL, glm::mat4x3(1),
-                    {.moves = true, .deforms = true, .node = node});
-    ArenaBuilder still = with_floor_and_light();
-    still.add_object("sheet", still.add_triangles(there), still.add_material(blue));
+    // The mesh is out of view unless its node moves it back.
+    both.add_animated("sheet", moved(flat_sheet_that_becomes_wavy(), {-500, 0, 0}), blue(),
+                      {.moves = true, .deforms = true, .node = node});
+    SceneBuilder still = with_floor_and_light();
+    still.add_mesh("sheet", moved(sheet(8), {20, 0, 0}), blue());
     expect_alike(at_time(std::move(both), 0.5), Tracer(std::move(still)).render(from_the_side()));
 }
 
 // The plugin skips tiles that the bounds of no object overlap, so the bounds must follow the deformation.
 TEST(Moving, DeformedMeshIsTracedOutsideItsOriginalTiles) {
     constexpr float left = -60, right = 60;
-    ArenaBuilder deforming = under_the_sun(), still = under_the_sun();
-    const std::uint32_t node = deforming.add_node({.animated = true, .morph_weights = {0}});
-    deforming.add_channel({.node = node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, 2}, .values = {0, 1}});
-    scene::TriangleMesh mesh = square(8), there = mesh;
-    for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
-        mesh.positions[i].x += left;
-        there.positions[i].x += right;
-    }
+    SceneBuilder deforming = under_the_sun(), still = under_the_sun();
+    const std::uint32_t node = deforming.add_morphing_node(2);
+    scene::TriangleMesh mesh = moved(square(8), {left, 0, 0});
     mesh.morph_positions.assign(mesh.positions.size(), {2 * (right - left), 0, 0});
-    deforming.add_object("square", deforming.add_triangles(mesh), deforming.add_material(white()),
-                         ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), {.deforms = true, .node = node});
-    still.add_object("square", still.add_triangles(there), still.add_material(white()));
+    deforming.add_animated("square", mesh, white(), {.deforms = true, .node = node});
+    still.add_mesh("square", moved(square(8), {right, 0, 0}), white());
     expect_alike(at_time(std::move(deforming), 1, from_above()), Tracer(std::move(still)).render(from_above()));
 }
 
@@ -272,24 +233,13 @@ TEST(BvhQuality, DegradesWhenNeighboursSeparate) {
 TEST(BvhQuality, TriggersRebuilds) {
     scene::TriangleMesh mesh = sheet(4, 200);
     const auto vertices = static_cast<std::uint32_t>(mesh.positions.size());
-    ArenaBuilder builder;
-    builder.settings.duration_s = 1;
-    const std::uint32_t node = builder.add_node({.animated = true, .morph_weights = {0}});
-    builder.add_channel({.node = node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, 1}, .values = {0, 1}});
+    SceneBuilder builder({.duration_s = 1});
+    const std::uint32_t node = builder.add_morphing_node();
     mesh.morph_positions.resize(mesh.positions.size());
-    builder.add_object("sheet", builder.add_triangles(mesh), builder.add_material(flat(1, 1, 1)), ARHOST_ROLE_VIRTUAL,
-                       glm::mat4x3(1), {.deforms = true, .node = node});
+    builder.add_animated("sheet", mesh, flat(1, 1, 1), {.deforms = true, .node = node});
     const scene::Arena arena = std::move(builder).build();
-    const arhost_host host = {sizeof host,
-                              ARHOST_ABI_VERSION,
-                              "test",
-                              "0",
-                              nullptr,
-                              [](const arhost_host *, arhost_severity, const char *) {},
-                              [](const arhost_host *, double, const char *) {},
-                              [](const arhost_host *) { return 0; },
-                              [](const arhost_host *, const char *) -> const void * { return nullptr; }};
-    rt_embree::EmbreeScene scene(arena.scene(), 1, false, Host(&host));
+    const PluginUnderTest plugin("rt_embree"); // for its host
+    rt_embree::EmbreeScene scene(arena.scene(), 1, false, Host(plugin.host()));
     std::vector<std::uint64_t> rebuilds;
     for (const float amount : {0.1f, 200.0f, 200.0f, 0.1f}) {
         std::vector<glm::vec3> positions = sheared(amount, 200).positions;

@@ -8,8 +8,6 @@
 
 namespace arhost::test {
 
-using scene::ArenaBuilder;
-
 inline scene::Texture texture_of(std::uint32_t width, std::uint32_t height, const std::vector<Pixel> &pixels) {
     scene::Texture texture;
     texture.width = width;
@@ -22,21 +20,26 @@ inline scene::Texture texture_of(std::uint32_t width, std::uint32_t height, cons
     return texture;
 }
 
-// Adds an environment map of 8×4 texels. `colour(column)` returns the colour of a column's texels.
-template <class Colour> void add_environment(ArenaBuilder &builder, Colour colour) {
+// Returns a texture of floating-point texels.
+inline scene::Texture float_texture_of(std::uint32_t width, std::uint32_t height,
+                                       const std::vector<glm::vec4> &texels) {
     scene::Texture texture;
     texture.format = ARHOST_TEXEL_RGBA32F;
-    texture.width = 8;
-    texture.height = 4;
-    texture.wrap_v = ARHOST_WRAP_CLAMP;
-    std::vector<float> texels;
-    for (std::uint32_t i = 0; i < texture.width * texture.height; ++i) {
-        const glm::vec3 c = colour(i % texture.width);
-        texels.insert(texels.end(), {c.x, c.y, c.z, 1});
-    }
-    texture.texels.size = texels.size() * sizeof(float);
+    texture.width = width;
+    texture.height = height;
+    texture.texels.size = texels.size() * sizeof(glm::vec4);
     texture.texels.bytes = std::make_unique<std::byte[]>(texture.texels.size);
     std::memcpy(texture.texels.bytes.get(), texels.data(), texture.texels.size);
+    return texture;
+}
+
+// Adds an environment map of 8×4 texels. `colour(column)` returns the colour of a column's texels.
+template <class Colour> void add_environment(SceneBuilder &builder, Colour colour) {
+    std::vector<glm::vec4> texels;
+    for (std::uint32_t i = 0; i < 8 * 4; ++i)
+        texels.emplace_back(colour(i % 8), 1);
+    scene::Texture texture = float_texture_of(8, 4, texels);
+    texture.wrap_v = ARHOST_WRAP_CLAMP;
     scene::Environment environment;
     scene::add_cumulative_sums(environment, texture, scene::Reporter({}, "sky"));
     environment.texture = builder.add_texture("sky", std::move(texture));
@@ -45,7 +48,7 @@ template <class Colour> void add_environment(ArenaBuilder &builder, Colour colou
 }
 
 // Returns a material whose texture is opaque on the left half and transparent on the right half.
-inline arhost_material half_a_hole(ArenaBuilder &builder, float cutoff) {
+inline arhost_material half_a_hole(SceneBuilder &builder, float cutoff) {
     scene::Texture texture = texture_of(2, 1, {{255, 255, 255, 255}, {255, 255, 255, 0}});
     texture.wrap_u = texture.wrap_v = ARHOST_WRAP_CLAMP;
     arhost_material material = flat(1, 1, 1);
@@ -80,51 +83,47 @@ inline scene::TriangleMesh coarse_ball(float radius) {
 }
 
 // Returns a scene that exercises random numbers, ray queues, textures and transcendental functions.
-inline ArenaBuilder rich_scene() {
-    ArenaBuilder builder;
-    builder.settings.max_depth = 6;
-    builder.settings.coloured_shadows = true;
+inline SceneBuilder rich_scene() {
+    SceneBuilder builder({.max_depth = 6, .coloured_shadows = true});
     add_environment(builder, [](std::uint32_t column) {
         return glm::vec3(0.1f * static_cast<float>(column), 0.3f, 0.8f - 0.1f * static_cast<float>(column));
     });
-    arhost_light bulb = scene::make_light(ARHOST_LIGHT_SPHERE);
-    set3(bulb.position, -60, -20, 200);
-    set3(bulb.intensity, 0.6f, 0.5f, 0.4f);
-    bulb.radius = 30;
-    builder.add_light(bulb);
-    arhost_light panel = scene::make_light(ARHOST_LIGHT_RECTANGLE);
-    set3(panel.position, 60, 40, 150);
-    set3(panel.intensity, 0.2f, 0.2f, 0.3f);
-    set3(panel.axis_u, 20, 0, 0);
-    set3(panel.axis_v, 0, 30, 0);
-    builder.add_light(panel);
-    builder.add_object("desk", builder.add_triangles(square(90)), builder.add_material(flat(0.7f, 0.6f, 0.5f)),
-                       ARHOST_ROLE_CATCHER);
-    arhost_material glass = scene::make_material(ARHOST_MATERIAL_GLASS);
-    glass.index = 1.5f;
+    arhost_light lamp = bulb({-60, -20, 200}, 30);
+    set3(lamp.intensity, 0.6f, 0.5f, 0.4f);
+    builder.add_light(lamp);
+    arhost_light bluish = panel({60, 40, 150}, {20, 30}, 0.2f);
+    bluish.intensity[2] = 0.3f;
+    builder.add_light(bluish);
+    builder.add_mesh("desk", square(90), flat(0.7f, 0.6f, 0.5f), ARHOST_ROLE_CATCHER);
+    arhost_material glass = glass_of(1.5f);
     set3(glass.extinction, 0.02f, 0.005f, 0.01f);
     set3(glass.shadow_attenuation, 0.4f, 0.7f, 0.4f);
-    builder.add_object("glass", builder.add_spheres({{-25, 0, 25, 20}}), builder.add_material(glass));
-    arhost_material rough = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
-    set3(rough.diffuse, 0.9f, 0.7f, 0.4f);
-    rough.metallic = 0.8f;
-    rough.roughness = 0.35f;
+    builder.add_ball("glass", {-25, 0, 25, 20}, glass);
+    arhost_material rough = metallic_roughness({0.9f, 0.7f, 0.4f}, 0.8f, 0.35f);
     rough.normal_texture = builder.add_texture(
         "bumps",
         texture_of(2, 2, {{128, 128, 255, 255}, {160, 128, 250, 255}, {128, 160, 250, 255}, {100, 110, 240, 255}}));
-    scene::TriangleMesh sheet = textured_square(25, 0);
     const glm::mat4x3 upright(1, 0, 0, 0, 0.3f, 1, 0, -1, 0.3f, 30, 20, 26);
-    builder.add_object("rough", builder.add_triangles(sheet), builder.add_material(rough), ARHOST_ROLE_VIRTUAL,
-                       upright);
-    arhost_material plastic = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
-    set3(plastic.diffuse, 0.3f, 0.5f, 0.8f);
-    plastic.metallic = 0;
-    plastic.roughness = 0.2f;
-    builder.add_object("smooth", builder.add_triangles(coarse_ball(12)), builder.add_material(plastic),
-                       ARHOST_ROLE_VIRTUAL, glm::mat4x3(1, 0, 0, 0, 1, 0, 0, 0, 1.3f, 10, -40, 16));
-    builder.add_object("holed", builder.add_triangles(textured_square(15, 60)),
-                       builder.add_material(half_a_hole(builder, 0.5f)));
+    builder.add_mesh("rough", textured_square(25, 0), rough, ARHOST_ROLE_VIRTUAL, upright);
+    const arhost_material plastic = metallic_roughness({0.3f, 0.5f, 0.8f}, 0, 0.2f);
+    builder.add_mesh("smooth", coarse_ball(12), plastic, ARHOST_ROLE_VIRTUAL,
+                     glm::mat4x3(1, 0, 0, 0, 1, 0, 0, 0, 1.3f, 10, -40, 16));
+    builder.add_mesh("holed", textured_square(15, 60), half_a_hole(builder, 0.5f));
     return builder;
+}
+
+// Returns the instruction sets, besides "base", with which rt_embree can trace on this processor.
+inline std::vector<std::string> instruction_sets() {
+    std::vector<std::string> sets;
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx2"))
+        sets.emplace_back("avx2");
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) // those builds have no AVX-512
+    if (__builtin_cpu_supports("avx512dq"))
+        sets.emplace_back("avx512");
+#endif
+#endif
+    return sets;
 }
 
 // Checks that changed options have the same effect on a running plugin as on a new one.
@@ -132,14 +131,14 @@ inline void expect_changed_options_apply(const std::string &plugin, const Option
                                          const arhost_intrinsics &intrinsics) {
     const arhost_camera view = from_the_side(intrinsics);
     Tracer tracer(rich_scene(), options, plugin);
-    ASSERT_EQ(tracer.start(intrinsics), ARHOST_STATUS_OK) << tracer.plugin().log();
+    ASSERT_EQ(tracer.start(intrinsics), ARHOST_STATUS_OK) << tracer.log();
     Picture picture(intrinsics); // its memory remains the same
     ASSERT_EQ(tracer.try_render(view, picture), ARHOST_STATUS_OK);
     Options changed = options;
     for (const auto &[key, value] : {std::pair{"samples", "3"}, {"light_samples", "2"}, {"samples", "1"}}) {
         changed[key] = value;
-        ASSERT_EQ(tracer.plugin().set_text(key, value), ARHOST_STATUS_OK) << tracer.plugin().log();
-        ASSERT_EQ(tracer.try_render(view, picture), ARHOST_STATUS_OK) << tracer.plugin().log();
+        ASSERT_EQ(tracer.plugin().set_text(key, value), ARHOST_STATUS_OK) << tracer.log();
+        ASSERT_EQ(tracer.try_render(view, picture), ARHOST_STATUS_OK) << tracer.log();
         EXPECT_EQ(picture.pixels(), Tracer(rich_scene(), changed, plugin).render(view).pixels())
             << key << " " << value;
     }

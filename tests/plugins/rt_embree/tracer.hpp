@@ -5,6 +5,7 @@
 
 #include "plugin_under_test.hpp"
 #include "scene/arena_builder.hpp"
+#include "scene/motion.hpp"
 
 #include <arhost/shading/srgb8.hpp>
 
@@ -14,6 +15,7 @@
 #include <array>
 #include <cstring>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,17 +25,24 @@ using Options = std::map<std::string, std::string>;
 using Pixel = std::array<int, 4>;
 
 inline arhost_intrinsics pinhole(std::uint32_t width = 200, std::uint32_t height = 150, double focal = 200) {
-    return {sizeof(arhost_intrinsics),
-            width,
-            height,
-            ARHOST_DISTORTION_NONE,
-            focal,
-            focal,
-            (width - 1) / 2.0,
-            (height - 1) / 2.0,
-            0,
-            0,
-            {}};
+    return {.struct_size = sizeof(arhost_intrinsics),
+            .width = width,
+            .height = height,
+            .distortion = ARHOST_DISTORTION_NONE,
+            .fx = focal,
+            .fy = focal,
+            .cx = (width - 1) / 2.0,
+            .cy = (height - 1) / 2.0,
+            .coefficient_count = 0,
+            .reserved = 0,
+            .coefficients = {}};
+}
+inline arhost_intrinsics with_lens(arhost_intrinsics in, arhost_distortion distortion,
+                                   const std::vector<double> &coefficients) {
+    in.distortion = distortion;
+    in.coefficient_count = static_cast<std::uint32_t>(coefficients.size());
+    std::ranges::copy(coefficients, in.coefficients);
+    return in;
 }
 
 inline arhost_camera camera(std::array<double, 3> eye, std::array<double, 3> look_at, std::array<double, 3> up,
@@ -72,6 +81,18 @@ public:
             ++counts[pixel[3]];
         return counts;
     }
+    // Returns the bounding box of the pixels whose alpha is not 0: the first column and row, and those beyond the
+    // last.
+    std::array<std::uint32_t, 4> bounds() const {
+        std::uint32_t x0 = width, y0 = height, x1 = 0, y1 = 0;
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t x = 0; x < width; ++x)
+                if (alpha(x, y)) {
+                    x0 = std::min(x0, x), x1 = std::max(x1, x + 1);
+                    y0 = std::min(y0, y), y1 = std::max(y1, y + 1);
+                }
+        return {x0, y0, x1, y1};
+    }
     bool only_pixels_written() const {
         for (std::uint32_t y = 0; y < height; ++y)
             for (std::uint32_t i = 4 * width; i < stride_; ++i)
@@ -86,6 +107,38 @@ public:
 private:
     std::uint32_t stride_;
     GuardedBuffer buffer_;
+};
+
+class SceneBuilder : public scene::ArenaBuilder {
+public:
+    explicit SceneBuilder(const scene::Settings &with = {}) { settings = with; }
+
+    // Add an object with a geometry and a material of its own.
+    void add_mesh(const std::string &name, scene::TriangleMesh mesh, const arhost_material &material,
+                  arhost_role role = ARHOST_ROLE_VIRTUAL, const glm::mat4x3 &world_from_object = glm::mat4x3(1),
+                  const scene::Motion &motion = {}) {
+        add_object(name, add_triangles(std::move(mesh)), add_material(material), role, world_from_object, motion);
+    }
+    void add_ball(const std::string &name, const glm::vec4 &sphere, const arhost_material &material) {
+        add_object(name, add_spheres({sphere}), add_material(material));
+    }
+    void add_animated(const std::string &name, scene::TriangleMesh mesh, const arhost_material &material,
+                      const scene::Motion &motion) {
+        add_mesh(name, std::move(mesh), material, ARHOST_ROLE_VIRTUAL, glm::mat4x3(1), motion);
+    }
+    // Adds a node that moves from the first position to the last within a second.
+    std::uint32_t add_moving_node(const glm::vec3 &from, const glm::vec3 &to) {
+        const std::uint32_t node = add_node({.animated = true, .morph_weights = {}});
+        add_channel({.node = node, .times = {0, 1}, .values = {from.x, from.y, from.z, to.x, to.y, to.z}});
+        return node;
+    }
+    // Adds a node that morphs its mesh from the first shape to the last within `duration_s`.
+    std::uint32_t add_morphing_node(float duration_s = 1) {
+        const std::uint32_t node = add_node({.animated = true, .morph_weights = {0}});
+        add_channel(
+            {.node = node, .target = ARHOST_CHANNEL_MORPH_WEIGHTS, .times = {0, duration_s}, .values = {0, 1}});
+        return node;
+    }
 };
 
 // A plugin and its scene. The scene's arena is in read-only memory, so a plugin that writes to it crashes.
@@ -121,13 +174,32 @@ public:
     }
     Picture render(const arhost_camera &camera) {
         EXPECT_EQ(start(camera.intrinsics), ARHOST_STATUS_OK) << plugin_.log();
+        return render_next(camera);
+    }
+    // Renders without starting the plugin again.
+    Picture render_next(const arhost_camera &camera) {
         Picture picture(camera.intrinsics);
         EXPECT_EQ(try_render(camera, picture), ARHOST_STATUS_OK) << plugin_.log();
         EXPECT_TRUE(picture.only_pixels_written());
         return picture;
     }
 
+    arhost_status try_render_at(double time_s, const arhost_camera &camera, Picture &picture) {
+        if (!motion_)
+            motion_.emplace(scene());
+        const arhost_motion motion = motion_->at(time_s);
+        return try_render(camera, picture, &motion);
+    }
+    // Renders the animated scene at this time, without starting the plugin again.
+    Picture render_at(double time_s, const arhost_camera &camera) {
+        Picture picture(camera.intrinsics);
+        EXPECT_EQ(try_render_at(time_s, camera, picture), ARHOST_STATUS_OK) << plugin_.log();
+        EXPECT_TRUE(picture.only_pixels_written());
+        return picture;
+    }
+
     PluginUnderTest &plugin() { return plugin_; }
+    std::string log() const { return plugin_.log(); }
     const arhost_scene &scene() const { return *static_cast<const arhost_scene *>(memory_); }
 
 private:
@@ -141,6 +213,7 @@ private:
     PluginUnderTest plugin_;
     std::size_t size_;
     void *memory_;
+    std::optional<scene::MotionEvaluator> motion_;
     bool started_ = false;
 };
 
@@ -167,22 +240,61 @@ inline arhost_material shiny(float diffuse_grey, float specular, float exponent)
     material.exponent = exponent;
     return material;
 }
+inline arhost_material glass_of(float index = 1.5f) {
+    arhost_material material = scene::make_material(ARHOST_MATERIAL_GLASS);
+    material.index = index;
+    return material;
+}
+inline arhost_material metallic_roughness(const glm::vec3 &colour, float metallic, float roughness) {
+    arhost_material material = scene::make_material(ARHOST_MATERIAL_METALLIC_ROUGHNESS);
+    set3(material.diffuse, colour.r, colour.g, colour.b);
+    material.metallic = metallic;
+    material.roughness = roughness;
+    return material;
+}
 inline arhost_material mirror(float reflectivity) {
     arhost_material material = scene::make_material(ARHOST_MATERIAL_MIRROR);
     set3(material.reflectivity, reflectivity, reflectivity, reflectivity);
     return material;
 }
-inline arhost_light light(float x, float y, float z, float intensity, arhost_falloff falloff = ARHOST_FALLOFF_NONE) {
-    arhost_light light = scene::make_light(ARHOST_LIGHT_POINT);
+// Returns a directional light.
+inline arhost_light sun(float x = 0, float y = 0, float z = -1) {
+    arhost_light light = scene::make_light(ARHOST_LIGHT_DIRECTIONAL);
+    set3(light.direction, x, y, z);
+    return light;
+}
+inline arhost_light placed(arhost_light_type type, const glm::vec3 &position, float intensity,
+                           arhost_falloff falloff = ARHOST_FALLOFF_NONE) {
+    arhost_light light = scene::make_light(type);
     light.falloff = falloff;
-    set3(light.position, x, y, z);
+    set3(light.position, position.x, position.y, position.z);
     set3(light.intensity, intensity, intensity, intensity);
     return light;
+}
+inline arhost_light light(float x, float y, float z, float intensity, arhost_falloff falloff = ARHOST_FALLOFF_NONE) {
+    return placed(ARHOST_LIGHT_POINT, {x, y, z}, intensity, falloff);
+}
+inline arhost_light bulb(const glm::vec3 &position, float radius, float intensity = 1,
+                         arhost_falloff falloff = ARHOST_FALLOFF_NONE) {
+    arhost_light light = placed(ARHOST_LIGHT_SPHERE, position, intensity, falloff);
+    light.radius = radius;
+    return light;
+}
+// Returns a horizontal rectangle that shines downwards.
+inline arhost_light panel(const glm::vec3 &position, const glm::vec2 &half_sides, float intensity,
+                          arhost_falloff falloff = ARHOST_FALLOFF_NONE) {
+    arhost_light light = placed(ARHOST_LIGHT_RECTANGLE, position, intensity, falloff);
+    set3(light.axis_u, half_sides.x, 0, 0);
+    set3(light.axis_v, 0, half_sides.y, 0);
+    return light;
+}
+inline scene::TriangleMesh quad(const glm::vec3 &a, const glm::vec3 &b, const glm::vec3 &c, const glm::vec3 &d) {
+    return {{a, b, c, d}, {}, {}, {{0, 1, 2}, {0, 2, 3}}};
 }
 // Returns a square at the height `z`; its front face is up.
 inline scene::TriangleMesh square(float half_side, float z = 0) {
     const float s = half_side;
-    return {{{-s, -s, z}, {s, -s, z}, {s, s, z}, {-s, s, z}}, {}, {}, {{0, 1, 2}, {0, 2, 3}}};
+    return quad({-s, -s, z}, {s, -s, z}, {s, s, z}, {-s, s, z});
 }
 inline scene::TriangleMesh cube(float half_side) {
     scene::TriangleMesh mesh;
@@ -191,6 +303,12 @@ inline scene::TriangleMesh cube(float half_side) {
                                   corner & 4 ? half_side : -half_side});
     mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
                       {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    return mesh;
+}
+
+inline scene::TriangleMesh moved(scene::TriangleMesh mesh, const glm::vec3 &by) {
+    for (glm::vec3 &position : mesh.positions)
+        position += by;
     return mesh;
 }
 

@@ -97,15 +97,15 @@ protected:
     }
     // Runs `call`, checks that it returns `status`, and returns the messages that it adds to the plugin's log.
     template <class Call> std::string log_of(arhost_status status, Call call) {
-        const std::size_t before = tracer_->plugin().log().size();
+        const std::size_t before = tracer_->log().size();
         EXPECT_EQ(call(), status);
-        return tracer_->plugin().log().substr(before);
+        return tracer_->log().substr(before);
     }
     // Checks that the plugin works again when no failure is injected.
     void expect_recovery() {
         inject_failure("");
-        ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->plugin().log();
-        ASSERT_EQ(render(), ARHOST_STATUS_OK) << tracer_->plugin().log();
+        ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->log();
+        ASSERT_EQ(render(), ARHOST_STATUS_OK) << tracer_->log();
         EXPECT_GT(picture_->alphas().rbegin()->first, 0);
     }
 
@@ -126,10 +126,10 @@ TEST_P(FailingDevice, FallsBackIfAnAnnouncedPathFails) {
     ::setenv("ARHOST_TEST_VULKAN_IS_A_GPU", GetParam().c_str(), 1);
     Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {}, "rt_vulkan");
     ::unsetenv("ARHOST_TEST_VULKAN_IS_A_GPU");
-    ASSERT_EQ(tracer.start(small_), ARHOST_STATUS_OK) << tracer.plugin().log();
+    ASSERT_EQ(tracer.start(small_), ARHOST_STATUS_OK) << tracer.log();
     const std::string next = path_before(GetParam());
-    EXPECT_THAT(tracer.plugin().log(), AllOf(HasSubstr("path '" + GetParam() + "' failed, trying '" + next + "'"),
-                                             HasSubstr("path " + next + ", ")));
+    EXPECT_THAT(tracer.log(), AllOf(HasSubstr("path '" + GetParam() + "' failed, trying '" + next + "'"),
+                                    HasSubstr("path " + next + ", ")));
     EXPECT_GT(tracer.render(from_the_side(small_)).alphas().rbegin()->first, 0);
     // A path that is selected by name has no fallback.
     tracer_.emplace(scene::load_scene(folder_.path() / "scene.yaml"), Options{{"path", GetParam()}}, "rt_vulkan");
@@ -145,15 +145,15 @@ TEST_P(FailingDevice, FallsBackIfAPathDrawsWrongPictures) {
     for (const char *failure : {"no-picture", ""}) {
         inject_failure(failure);
         Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {}, "rt_vulkan");
-        ASSERT_EQ(tracer.start(small_), ARHOST_STATUS_OK) << tracer.plugin().log();
+        ASSERT_EQ(tracer.start(small_), ARHOST_STATUS_OK) << tracer.log();
         if (*failure)
-            EXPECT_THAT(tracer.plugin().log(),
+            EXPECT_THAT(tracer.log(),
                         testing::AllOf(testing::ContainsRegex("path 'pipeline' failed, trying '" + next +
                                                               "': [0-9]+ of [0-9]+ drawn pixels of a small picture "
                                                               "differ from those of the path 'plain'"),
                                        HasSubstr("path " + next + ", ")));
         else
-            EXPECT_THAT(tracer.plugin().log(), HasSubstr("path pipeline, "));
+            EXPECT_THAT(tracer.log(), HasSubstr("path pipeline, "));
     }
 }
 
@@ -179,7 +179,7 @@ TEST_P(FailingDevice, ReportsLossAtStart) {
 TEST_P(FailingDevice, ReportsLossInMidRun) {
     for (const char *when : {"submit:1", "wait:1"}) {
         inject_failure("");
-        ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->plugin().log();
+        ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->log();
         ASSERT_EQ(render(), ARHOST_STATUS_OK);
         inject_failure(when);
         EXPECT_THAT(log_of(ARHOST_STATUS_ERROR_DEVICE_LOST, [&] { return render(); }), HasSubstr(lost)) << when;
@@ -190,7 +190,7 @@ TEST_P(FailingDevice, ReportsLossInMidRun) {
 }
 
 TEST_P(FailingDevice, LossAtTheFirstImageEndsCleanly) {
-    ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->plugin().log();
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->log();
     inject_failure("wait:1");
     EXPECT_EQ(render(), ARHOST_STATUS_ERROR_DEVICE_LOST);
     tracer_.reset();
@@ -201,12 +201,12 @@ TEST_P(FailingDevice, ReportsOutOfMemoryAtStart) {
     int nth = 1;
     for (;; ++nth) {
         inject_failure("allocate:" + std::to_string(nth));
-        const std::size_t before = tracer_->plugin().log().size();
+        const std::size_t before = tracer_->log().size();
         const arhost_status status = start();
         if (status == ARHOST_STATUS_OK)
             break;
         ASSERT_EQ(status, ARHOST_STATUS_ERROR_OUT_OF_MEMORY) << nth;
-        EXPECT_THAT(tracer_->plugin().log().substr(before), HasSubstr(out_of_memory)) << nth;
+        EXPECT_THAT(tracer_->log().substr(before), HasSubstr(out_of_memory)) << nth;
     }
     EXPECT_GT(nth, 10);
     expect_recovery();
@@ -214,7 +214,7 @@ TEST_P(FailingDevice, ReportsOutOfMemoryAtStart) {
 
 // Memory for the image is allocated when the first image is rendered.
 TEST_P(FailingDevice, ReportsOutOfMemoryInMidRun) {
-    ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->plugin().log();
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->log();
     inject_failure("allocate:1");
     EXPECT_THAT(log_of(ARHOST_STATUS_ERROR_OUT_OF_MEMORY, [&] { return render(); }), HasSubstr(out_of_memory));
     inject_failure("");
@@ -240,8 +240,8 @@ TEST_F(OldDevice, IsRejectedIfSelected) {
     std::ofstream(folder_.path() / "scene.yaml") << small_scene;
     Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {{"device", "0"}}, "rt_vulkan");
     EXPECT_EQ(tracer.start(pinhole(48, 36, 48)), ARHOST_STATUS_ERROR_UNSUPPORTED);
-    EXPECT_THAT(tracer.plugin().log(), HasSubstr("supports Vulkan 1.0 only; 1.1 is required; choose another with "
-                                                 "option 'device'"));
+    EXPECT_THAT(tracer.log(), HasSubstr("supports Vulkan 1.0 only; 1.1 is required; choose another with "
+                                        "option 'device'"));
 }
 
 TEST_F(OldDevice, IsSkippedWithAReasonIfAnotherIsUsable) {

@@ -14,16 +14,12 @@ TEST_P(PathImages, MatchThePlainPath) {
     const std::filesystem::path file = file_of(view);
     Tracer traced(scene::load_scene(file), {{"samples", view.samples}, {"path", path}}, "rt_vulkan"),
         plain(scene::load_scene(file), {{"samples", view.samples}, {"path", "plain"}}, "rt_vulkan");
-    ASSERT_EQ(traced.start(small), ARHOST_STATUS_OK) << traced.plugin().log();
-    ASSERT_EQ(plain.start(small), ARHOST_STATUS_OK) << plain.plugin().log();
-    scene::MotionEvaluator motion(traced.scene());
+    ASSERT_EQ(traced.start(small), ARHOST_STATUS_OK) << traced.log();
+    ASSERT_EQ(plain.start(small), ARHOST_STATUS_OK) << plain.log();
     int shown = 0;
     for (const double nearness : nearnesses) {
         const arhost_camera camera = camera_for(traced.scene(), nearness, small);
-        const arhost_motion then = motion.at(view.time_s);
-        Picture got(small), expected(small);
-        ASSERT_EQ(traced.try_render(camera, got, &then), ARHOST_STATUS_OK) << traced.plugin().log();
-        ASSERT_EQ(plain.try_render(camera, expected, &then), ARHOST_STATUS_OK) << plain.plugin().log();
+        const Picture got = traced.render_at(view.time_s, camera), expected = plain.render_at(view.time_s, camera);
         const std::string name = view.name + (nearness < 1 ? "-near-" : "-far-") + path;
         keep(got, name);
         const Likeness like = likeness(got, expected);
@@ -31,7 +27,7 @@ TEST_P(PathImages, MatchThePlainPath) {
         // Where two triangles are adjacent or coplanar, devices differ in which of them a ray hits.
         EXPECT_LE(like.alphas_off, like.pixels / 1000) << like;
         EXPECT_EQ(like.alphas_off_inside, 0) << like;
-        if (traced.plugin().log().find("llvmpipe") != std::string::npos) {
+        if (traced.log().find("llvmpipe") != std::string::npos) {
             EXPECT_EQ(like.squares, 0) << like; // llvmpipe does not reorder floating-point operations
         } else if (!(has_glass(traced.scene()) && 50 * like.colours_off <= like.inside)) {
             EXPECT_GE(like.psnr(), 45) << like;

@@ -4,9 +4,8 @@
 #include "drivers_leak.hpp"
 #include "environment_variable.hpp"
 #include "large_surfaces.hpp"
+#include "rejected_input.hpp"
 #include "renderer.hpp"
-#include "rich_scene.hpp"
-#include "scene/motion.hpp"
 #include "scene/scene_loader.hpp"
 #include "two_tracers.hpp"
 
@@ -62,14 +61,6 @@ template <class Call> std::string rejection(arhost_status status, Call call) {
 
 const arhost_intrinsics small = pinhole(96, 72, 96);
 
-arhost_intrinsics with_lens(arhost_distortion distortion, std::vector<double> coefficients) {
-    arhost_intrinsics in = small;
-    in.distortion = distortion;
-    in.coefficient_count = static_cast<std::uint32_t>(coefficients.size());
-    std::copy(coefficients.begin(), coefficients.end(), in.coefficients);
-    return in;
-}
-
 void expect_rt_embrees_picture(const arhost_camera &view, const Options &options, const std::string &path = "auto") {
     Options with_path = options;
     with_path["path"] = path;
@@ -101,40 +92,32 @@ TEST_F(RichScene, OnePathThroughGlassMatchesRtEmbree) {
     expect_rt_embrees_picture(from_the_side(small), {{"glass", "path"}});
 }
 TEST_F(RichScene, LensMatchesRtEmbree) {
-    expect_rt_embrees_picture(from_the_side(with_lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.001, -0.002})), {});
-    expect_rt_embrees_picture(from_the_side(with_lens(ARHOST_DISTORTION_FISHEYE, {0.02, -0.01, 0, 0})),
+    expect_rt_embrees_picture(from_the_side(with_lens(small, ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.001, -0.002})),
+                              {});
+    expect_rt_embrees_picture(from_the_side(with_lens(small, ARHOST_DISTORTION_FISHEYE, {0.02, -0.01, 0, 0})),
                               {{"samples", "2"}});
 }
 TEST_F(RichScene, AccumulatedMatchesRtEmbree) {
     const Options options{{"accumulate", "true"}, {"samples", "2"}};
     Tracer vulkan(rich_scene(), options, "rt_vulkan"), embree(rich_scene(), options);
-    ASSERT_EQ(vulkan.start(small), ARHOST_STATUS_OK);
-    ASSERT_EQ(embree.start(small), ARHOST_STATUS_OK);
-    Picture got(small), expected(small);
-    std::vector<Pixel> first;
-    for (int frame = 0; frame < 3; ++frame) {
-        got = Picture(small);
-        ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
-        ASSERT_EQ(embree.try_render(from_the_side(small), expected), ARHOST_STATUS_OK);
-        if (frame == 0)
-            first = got.pixels();
-    }
-    const Likeness like = likeness(got, expected);
+    const arhost_camera view = from_the_side(small);
+    const auto first = vulkan.render(view).pixels();
+    embree.render(view);
+    for (Tracer *tracer : {&vulkan, &embree})
+        tracer->render_next(view);
+    const Likeness like = likeness(vulkan.render_next(view), embree.render_next(view));
     EXPECT_EQ(like.alphas_off, 0) << like;
     EXPECT_GE(like.psnr(), 45) << like;
     // Each change of the camera restarts the accumulation, including a change back to the first camera.
-    ASSERT_EQ(vulkan.try_render(camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, small), got), ARHOST_STATUS_OK);
-    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
-    EXPECT_EQ(got.pixels(), first);
+    vulkan.render_next(camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, small));
+    EXPECT_EQ(vulkan.render_next(view).pixels(), first);
     // A cancelled image restarts the accumulation as well. The second image after a start is still traced in bands,
     // so it can be cancelled after the first band.
-    ASSERT_EQ(vulkan.start(small), ARHOST_STATUS_OK);
-    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
+    Picture picture = vulkan.render(view);
     vulkan.plugin().cancel(1);
-    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_ERROR_CANCELLED);
+    ASSERT_EQ(vulkan.try_render(view, picture), ARHOST_STATUS_ERROR_CANCELLED);
     vulkan.plugin().reset_cancel();
-    ASSERT_EQ(vulkan.try_render(from_the_side(small), got), ARHOST_STATUS_OK);
-    EXPECT_EQ(got.pixels(), first);
+    EXPECT_EQ(vulkan.render_next(view).pixels(), first);
 }
 TEST_F(RichScene, RepeatedGivesTheSameBytes) {
     Tracer tracer(rich_scene(), {}, "rt_vulkan");
@@ -198,26 +181,18 @@ TEST_P(EachPath, KeepsContactShadowsOnALargeFloor) {
 }
 
 TEST_P(EachPath, CancelsAnImageAndContinues) {
-    const auto scene = [] { return scene::load_scene(moving_scene); };
-    Tracer tracer(scene(), {{"path", GetParam()}}, "rt_vulkan");
-    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    scene::MotionEvaluator evaluator(tracer.scene());
+    Tracer tracer(scene::load_scene(moving_scene), {{"path", GetParam()}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
     Picture picture(small);
     const std::vector<Pixel> untouched = picture.pixels();
-    const auto rendered = [&](double time_s) {
-        const arhost_motion motion = evaluator.at(time_s);
-        return tracer.try_render(moving_camera(), picture, &motion);
-    };
     tracer.plugin().cancel(1); // cancels after the first band
-    EXPECT_EQ(rendered(0.7), ARHOST_STATUS_ERROR_CANCELLED);
-    EXPECT_THAT(tracer.plugin().log(), HasSubstr("cancelled while tracing the image"));
+    EXPECT_EQ(tracer.try_render_at(0.7, moving_camera(), picture), ARHOST_STATUS_ERROR_CANCELLED);
+    EXPECT_THAT(tracer.log(), HasSubstr("cancelled while tracing the image"));
     EXPECT_EQ(picture.pixels(), untouched);
     tracer.plugin().reset_cancel();
-    ASSERT_EQ(rendered(0.3), ARHOST_STATUS_OK);
-    const std::vector<Pixel> after = picture.pixels();
+    const std::vector<Pixel> after = tracer.render_at(0.3, moving_camera()).pixels();
     ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK);
-    ASSERT_EQ(rendered(0.3), ARHOST_STATUS_OK);
-    EXPECT_EQ(after, picture.pixels());
+    EXPECT_EQ(after, tracer.render_at(0.3, moving_camera()).pixels());
 }
 
 TEST_P(EachPath, TracesTheSamePictureInBandsAndAtOnce) {
@@ -256,33 +231,25 @@ TEST_P(EachPath, AcceptsChangesOfOptions) {
 TEST_P(EachPath, IsLogged) {
     Tracer tracer(rich_scene(), {{"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK);
-    EXPECT_THAT(tracer.plugin().log(), HasSubstr("path " + GetParam() + ","));
+    EXPECT_THAT(tracer.log(), HasSubstr("path " + GetParam() + ","));
 }
 
 // Some of these images also rebuild acceleration structures, which counts as device time.
 TEST_P(EachPath, ReportsTheDeviceTimeIfTheStructHasTheField) {
-    LoggingHost logging;
-    const Host host(&logging.host);
-    const rt_vulkan::Instance instance(host, false);
-    const auto devices = instance.devices();
-    const bool has_clock = rt_vulkan::choose_device(devices, "auto").timestamp_bits > 0;
+    const bool has_clock = RendererParts(GetParam()).device.timestamp_bits > 0;
     Tracer tracer(scene::load_scene(moving_scene), {{"path", GetParam()}}, "rt_vulkan");
-    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    scene::MotionEvaluator evaluator(tracer.scene());
-    Picture picture(small);
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
     for (const double time_s : {0.0, 0.5, 1.0}) {
-        const arhost_motion motion = evaluator.at(time_s);
-        picture.info = {sizeof picture.info, 0, 0, 0, 0, 0, 0};
         const auto begin = std::chrono::steady_clock::now();
-        ASSERT_EQ(tracer.try_render(moving_camera(), picture, &motion), ARHOST_STATUS_OK) << tracer.plugin().log();
+        const arhost_render_info info = tracer.render_at(time_s, moving_camera()).info;
         const std::chrono::nanoseconds took = std::chrono::steady_clock::now() - begin;
-        EXPECT_EQ(picture.info.device_time_ns > 0, has_clock);
-        EXPECT_LE(picture.info.device_time_ns, static_cast<std::uint64_t>(took.count()));
+        EXPECT_EQ(info.device_time_ns > 0, has_clock);
+        EXPECT_LE(info.device_time_ns, static_cast<std::uint64_t>(took.count()));
     }
     constexpr std::uint64_t untouched = 7;
+    Picture picture(small);
     picture.info = {offsetof(arhost_render_info, device_time_ns), 0, 0, 0, 0, 0, untouched};
-    const arhost_motion motion = evaluator.at(1.5);
-    ASSERT_EQ(tracer.try_render(moving_camera(), picture, &motion), ARHOST_STATUS_OK);
+    ASSERT_EQ(tracer.try_render_at(1.5, moving_camera(), picture), ARHOST_STATUS_OK);
     EXPECT_EQ(picture.info.device_time_ns, untouched) << "an older host's struct lacks the field";
     EXPECT_TRUE(picture.info.has_region);
 }
@@ -292,18 +259,14 @@ TEST_P(EachPath, FollowsMotion) {
     const arhost_intrinsics tiny = pinhole(48, 36, 48);
     Tracer tracer(scene::load_scene(moving_scene), {{"path", GetParam()}}, "rt_vulkan"),
         embree(scene::load_scene(moving_scene));
-    ASSERT_EQ(tracer.start(tiny), ARHOST_STATUS_OK) << tracer.plugin().log();
+    ASSERT_EQ(tracer.start(tiny), ARHOST_STATUS_OK) << tracer.log();
     ASSERT_EQ(embree.start(tiny), ARHOST_STATUS_OK);
-    scene::MotionEvaluator evaluator(tracer.scene());
     constexpr int frames = 130; // includes more than two rebuild intervals
     for (int frame = 0; frame < frames; ++frame) {
-        const arhost_motion motion = evaluator.at(0.1 * frame);
-        Picture got(tiny), expected(tiny);
-        ASSERT_EQ(tracer.try_render(moving_camera(tiny), got, &motion), ARHOST_STATUS_OK) << tracer.plugin().log();
+        const Picture got = tracer.render_at(0.1 * frame, moving_camera(tiny));
         if (frame % 13)
             continue;
-        ASSERT_EQ(embree.try_render(moving_camera(tiny), expected, &motion), ARHOST_STATUS_OK);
-        const Likeness like = likeness(got, expected);
+        const Likeness like = likeness(got, embree.render_at(0.1 * frame, moving_camera(tiny)));
         EXPECT_LE(like.alphas_off, like.pixels / 500) << "frame " << frame << ": " << like;
         EXPECT_EQ(like.alphas_off_inside, 0) << "frame " << frame << ": " << like;
         EXPECT_GE(like.psnr(), 40) << "frame " << frame << ": " << like;
@@ -375,19 +338,7 @@ TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
     EXPECT_EQ(touched, 0u) << "number of changed bytes outside the image";
     munmap(memory, pages);
 
-    // The region must be the bounding box of the pixels whose alpha is not 0.
-    rt_vulkan::Rectangle tight{small.width, small.height, 0, 0};
-    std::uint32_t x1 = 0, y1 = 0;
-    for (std::uint32_t y = 0; y < small.height; ++y)
-        for (std::uint32_t x = 0; x < small.width; ++x)
-            if (copied.alpha(x, y)) {
-                tight.x = std::min(tight.x, x);
-                tight.y = std::min(tight.y, y);
-                x1 = std::max(x1, x + 1);
-                y1 = std::max(y1, y + 1);
-            }
-    EXPECT_EQ(std::tuple(drawn.x, drawn.y, drawn.x + drawn.width, drawn.y + drawn.height),
-              std::tuple(tight.x, tight.y, x1, y1));
+    EXPECT_EQ((std::array{drawn.x, drawn.y, drawn.x + drawn.width, drawn.y + drawn.height}), copied.bounds());
 }
 
 // ---- Vulkan loader, device, traversal path, pipeline cache -----------------------------------------
@@ -545,7 +496,7 @@ TEST(PipelineCache, IsKeptAndSurvivesBadFiles) {
                 files.push_back(entry);
         return files;
     };
-    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
     ASSERT_THAT(files(), testing::SizeIs(1));
     const auto file = files()[0];
     EXPECT_THAT(file.filename(), testing::ResultOf([](const auto &name) { return name.string(); },
@@ -553,17 +504,17 @@ TEST(PipelineCache, IsKeptAndSurvivesBadFiles) {
         << "the name must identify the device";
     const auto size = std::filesystem::file_size(file);
     std::ofstream(file) << "garbage";
-    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
+    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
     EXPECT_EQ(std::filesystem::file_size(file), size) << "the plugin must rewrite the file";
     std::filesystem::resize_file(file, (std::uintmax_t{64} << 20) + 1); // larger than the plugin's limit
-    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
+    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
     EXPECT_EQ(std::filesystem::file_size(file), size) << "the plugin must rewrite the file";
     std::filesystem::remove(file);
     std::filesystem::create_directory(file); // rename() cannot replace a folder
-    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
+    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
     EXPECT_EQ(files(), std::vector{file}) << "a temporary file was left";
     const EnvironmentVariable relative("XDG_CACHE_HOME", "a-relative-folder");
-    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
+    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
     EXPECT_FALSE(std::filesystem::exists("a-relative-folder"));
 }
 
@@ -579,39 +530,32 @@ protected:
             GTEST_SKIP() << failure.what();
         }
     }
+    // Writes zeros to a buffer with this usage, without barriers between the writes.
+    void write_buffer(VkBufferUsageFlags usage, int times) {
+        const Host host(&logging.host);
+        const rt_vulkan::Instance instance(host, true);
+        const auto devices = instance.devices();
+        const rt_vulkan::Device device(devices[0]);
+        ASSERT_EQ(logging.text, "");
+        const rt_vulkan::Submission submission(device);
+        const rt_vulkan::Buffer buffer(device, 64, usage, rt_vulkan::Buffer::Place::device);
+        const VkCommandBuffer commands = submission.new_commands();
+        submission.begin(commands);
+        const std::int32_t zeros[4] = {};
+        for (int i = 0; i < times; ++i)
+            device.functions().vkCmdUpdateBuffer(commands, buffer.get(), 0, sizeof zeros, zeros);
+        submission.end(commands);
+    }
     LoggingHost logging;
 };
 
 TEST_F(Validation, ReportsAMissingUsageFlag) {
-    const Host host(&logging.host);
-    const rt_vulkan::Instance instance(host, true);
-    const auto devices = instance.devices();
-    const rt_vulkan::Device device(devices[0]);
-    ASSERT_EQ(logging.text, "");
-    const rt_vulkan::Submission submission(device);
-    const rt_vulkan::Buffer buffer(device, 64, VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, rt_vulkan::Buffer::Place::device);
-    const VkCommandBuffer commands = submission.new_commands();
-    submission.begin(commands);
-    const std::int32_t zeros[4] = {};
-    device.functions().vkCmdUpdateBuffer(commands, buffer.get(), 0, sizeof zeros,
-                                         zeros); // invalid: the buffer lacks the usage TRANSFER_DST
-    submission.end(commands);
+    write_buffer(VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, 1); // invalid: the buffer lacks the usage TRANSFER_DST
     EXPECT_THAT(logging.text, HasSubstr("Vulkan validation: "));
 }
 
 TEST_F(Validation, ReportsAWriteAfterWriteHazard) {
-    const Host host(&logging.host);
-    const rt_vulkan::Instance instance(host, true);
-    const auto devices = instance.devices();
-    const rt_vulkan::Device device(devices[0]);
-    const rt_vulkan::Submission submission(device);
-    const rt_vulkan::Buffer buffer(device, 64, VK_BUFFER_USAGE_TRANSFER_DST_BIT, rt_vulkan::Buffer::Place::device);
-    const VkCommandBuffer commands = submission.new_commands();
-    submission.begin(commands);
-    const std::int32_t zeros[4] = {};
-    for (int twice = 0; twice < 2; ++twice)
-        device.functions().vkCmdUpdateBuffer(commands, buffer.get(), 0, sizeof zeros, zeros);
-    submission.end(commands);
+    write_buffer(VK_BUFFER_USAGE_TRANSFER_DST_BIT, 2);
     EXPECT_THAT(logging.text, HasSubstr("HAZARD"));
 }
 
@@ -626,86 +570,50 @@ INSTANTIATE_TEST_SUITE_P(Paths, ValidationOfPath, all_paths, name_of_path);
 
 TEST_P(ValidationOfPath, ReportsNothing) {
     Tracer tracer(rich_scene(), {{"validate", "true"}, {"accumulate", "true"}, {"path", GetParam()}}, "rt_vulkan");
-    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    for (int frame = 0; frame < 5; ++frame) { // the first image is traced in bands, the third and later ones at once
-        Picture picture(small);
-        EXPECT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_STATUS_OK);
-    }
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
+    for (int frame = 0; frame < 5; ++frame) // the first image is traced in bands, the third and later ones at once
+        tracer.render_next(from_the_side(small));
     tracer.render(from_the_side(pinhole(65, 47, 65))); // restarts the plugin with another image size
-    EXPECT_THAT(tracer.plugin().log(), testing::Not(HasSubstr("Vulkan validation: ")));
-    EXPECT_THAT(tracer.plugin().log(), HasSubstr("with the validation layers"));
+    EXPECT_THAT(tracer.log(), testing::Not(HasSubstr("Vulkan validation: ")));
+    EXPECT_THAT(tracer.log(), HasSubstr("with the validation layers"));
 }
 
 TEST_P(ValidationOfPath, ReportsNothingForChangedOptions) {
     Tracer tracer(rich_scene(), {{"validate", "true"}, {"path", GetParam()}}, "rt_vulkan");
-    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    Picture picture(small);
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
     for (const char *samples : {"1", "2", "1"}) {
         EXPECT_EQ(tracer.plugin().set_text("samples", samples), ARHOST_STATUS_OK);
-        EXPECT_EQ(tracer.try_render(from_the_side(small), picture), ARHOST_STATUS_OK);
+        tracer.render_next(from_the_side(small));
     }
-    EXPECT_THAT(tracer.plugin().log(), testing::Not(HasSubstr("Vulkan validation: ")));
+    EXPECT_THAT(tracer.log(), testing::Not(HasSubstr("Vulkan validation: ")));
 }
 
 TEST_P(ValidationOfPath, ReportsNothingForMotion) {
     Tracer tracer(scene::load_scene(moving_scene), {{"validate", "true"}, {"path", GetParam()}}, "rt_vulkan");
-    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.plugin().log();
-    scene::MotionEvaluator evaluator(tracer.scene());
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
     std::vector<std::vector<Pixel>> pictures;
-    for (const double time_s : {0.0, 0.7, 0.0, 0.3}) {
-        const arhost_motion motion = evaluator.at(time_s);
-        Picture picture(small);
-        EXPECT_EQ(tracer.try_render(moving_camera(), picture, &motion), ARHOST_STATUS_OK);
-        pictures.push_back(picture.pixels());
-    }
+    for (const double time_s : {0.0, 0.7, 0.0, 0.3})
+        pictures.push_back(tracer.render_at(time_s, moving_camera()).pixels());
     EXPECT_NE(pictures[0], pictures[1]);
     EXPECT_EQ(pictures[0], pictures[2]);
-    EXPECT_THAT(tracer.plugin().log(), testing::Not(HasSubstr("Vulkan validation: ")));
+    EXPECT_THAT(tracer.log(), testing::Not(HasSubstr("Vulkan validation: ")));
 }
 
 // ---- Invalid input ---------------------------------------------------------------------------------
 
-class InvalidInput : public testing::Test {
-protected:
-    void SetUp() override {
-        ARHOST_REQUIRE_VULKAN();
-        tracer.emplace(rich_scene(), Options{}, "rt_vulkan");
-    }
-    arhost_status render(const arhost_camera &view) {
-        EXPECT_EQ(tracer->start(small), ARHOST_STATUS_OK);
-        Picture picture(small);
-        return tracer->try_render(view, picture);
-    }
-    std::optional<Tracer> tracer;
-};
-
-TEST_F(InvalidInput, CamerasAreRejected) {
-    const double nan = std::numeric_limits<double>::quiet_NaN();
-    EXPECT_EQ(render(camera({0, 0, 0}, {0, 0, 1}, {0, 0, 2}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
-    EXPECT_THAT(tracer->plugin().log(), HasSubstr("up is parallel"));
-    EXPECT_EQ(render(camera({1, 2, 3}, {1, 2, 3}, {0, 0, 1}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(render(camera({nan, 0, 0}, {0, 0, 1}, {0, 1, 0}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(render(camera({1e13, 0, 0}, {0, 0, 1}, {0, 1, 0}, small)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(render(from_the_side(pinhole(96, 72, 97))), ARHOST_STATUS_ERROR_INVALID_ARGUMENT)
-        << "the camera's intrinsics must be those of start";
-    Picture other(pinhole(72, 96));
-    EXPECT_EQ(tracer->try_render(from_the_side(small), other), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+TEST(InvalidInput, CamerasAreRejected) {
+    ARHOST_REQUIRE_VULKAN();
+    expect_invalid_cameras_are_rejected("rt_vulkan", 1e13);
 }
 
-TEST_F(InvalidInput, IntrinsicsAreRejected) {
-    arhost_intrinsics in = small;
-    in.fx = 0;
-    EXPECT_EQ(tracer->start(in), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(tracer->start(with_lens(ARHOST_DISTORTION_BROWN, {1, 2, 3})), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
-    EXPECT_EQ(tracer->start(pinhole(0, 10)), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+TEST(InvalidInput, IntrinsicsAreRejected) {
+    ARHOST_REQUIRE_VULKAN();
+    expect_invalid_intrinsics_are_rejected("rt_vulkan");
 }
 
-TEST_F(InvalidInput, CancelledCallsFail) {
-    ASSERT_EQ(tracer->start(small), ARHOST_STATUS_OK);
-    tracer->plugin().cancel();
-    Picture picture(small);
-    EXPECT_EQ(tracer->try_render(from_the_side(small), picture), ARHOST_STATUS_ERROR_CANCELLED);
-    EXPECT_EQ(tracer->start(small), ARHOST_STATUS_ERROR_CANCELLED);
+TEST(InvalidInput, CancelledCallsFail) {
+    ARHOST_REQUIRE_VULKAN();
+    expect_cancelled_calls_fail("rt_vulkan");
 }
 
 TEST(Plugin, DeclaresLensDistortionAndGpuUse) {

@@ -155,8 +155,7 @@ TEST(ImageSequence, MatchesOpenCvByteForByteOnARealSequence) {
 TEST(ImageSequence, StartsAtTheLowestNumberOrTheOptionStart) {
     ScratchFolder folder;
     write_images(folder.path(), {1, 2, 3, 4});
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source("source_file", {{"path", pattern_in(folder)}});
     EXPECT_EQ(source.properties().frame_count, 4u);
     EXPECT_EQ(source.read(0).bytes, bytes_of(colourful(48, 32, 1)));
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"start", "3"}}), ARHOST_STATUS_OK) << source.log();
@@ -167,8 +166,7 @@ TEST(ImageSequence, StartsAtTheLowestNumberOrTheOptionStart) {
 TEST(ImageSequence, EndsBeforeAMissingFileWithAWarning) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2, 5});
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", {{"path", pattern_in(folder)}});
     EXPECT_EQ(source.read_all().size(), 4u); // 3 frames and the end status
     EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("image_0003.png' is missing"));
     EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("up to 5"));
@@ -189,8 +187,7 @@ TEST(ImageSequence, RejectsAChangedSizeAndNamesTheFile) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1});
     write_images(folder.path(), {2}, 50, 32);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", {{"path", pattern_in(folder)}});
     EXPECT_EQ(source.read(1).status, ARHOST_STATUS_OK);
     EXPECT_EQ(source.read(2).status, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0002.png' is 50×32"));
@@ -202,8 +199,7 @@ TEST(ImageSequence, FirstImageDeterminesGreyOrColour) {
     cv::Mat grey(32, 48, CV_8UC1, cv::Scalar(77));
     cv::imwrite((folder.path() / "image_0000.png").string(), grey);
     write_images(folder.path(), {1});
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", {{"path", pattern_in(folder)}});
     EXPECT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_GREY8);
     EXPECT_EQ(source.read(0).bytes, bytes_of(grey));
     EXPECT_EQ(source.read(1).bytes,
@@ -217,8 +213,7 @@ TEST(ImageSequence, NamesADamagedImage) {
     half.resize(half.size() / 2);
     write_bytes(folder.path() / "image_0001.png", half);
     write_bytes(folder.path() / "image_0002.png", {});
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", {{"path", pattern_in(folder)}});
     EXPECT_EQ(source.read(1).status, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr("image_0001.png' cannot be read: damaged"));
     EXPECT_EQ(source.read(2).status, ARHOST_STATUS_ERROR_CONFIGURATION);
@@ -228,8 +223,7 @@ TEST(ImageSequence, NamesADamagedImage) {
 TEST(ImageSequence, DeliversAnyFrameAfterARestart) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2, 3, 4});
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, from(3)), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", {{"path", pattern_in(folder)}}, from(3));
     EXPECT_EQ(source.read(3).bytes, bytes_of(colourful(48, 32, 3)));
     EXPECT_EQ(source.read(1).bytes, bytes_of(colourful(48, 32, 1)));
     ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, from(5)), ARHOST_STATUS_OK);
@@ -239,8 +233,7 @@ TEST(ImageSequence, DeliversAnyFrameAfterARestart) {
 TEST(ImageSequence, LoopsAndStopsAtTheLimit) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2});
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}, {"loop", "true"}, {"frames", "7"}}), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", {{"path", pattern_in(folder)}, {"loop", "true"}, {"frames", "7"}});
     EXPECT_EQ(source.properties().frame_count, 7u);
     const auto frames = source.read_all();
     ASSERT_EQ(frames.size(), 8u);
@@ -260,8 +253,7 @@ TEST(SingleImage, IsDeliveredOnceOrFramesTimes) {
     ScratchFolder folder;
     const fs::path file = folder.path() / "100%.png"; // the name of an existing file is not parsed as a pattern
     cv::imwrite(file.string(), colourful(33, 21));
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", file.string()}}), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source("source_file", {{"path", file.string()}});
     EXPECT_EQ(source.properties().frame_count, 1u);
     EXPECT_EQ(source.read(0).bytes, bytes_of(colourful(33, 21)));
     EXPECT_EQ(source.read(1).status, ARHOST_STATUS_END);
@@ -341,8 +333,7 @@ TEST(Rejection, NumberedNamesMayHavePercentSignsAndVaryingDigits) {
     ScratchFolder folder;
     cv::imwrite((folder.path() / "50%_9.png").string(), colourful(8, 8, 9));
     cv::imwrite((folder.path() / "50%_10.png").string(), colourful(8, 8, 10));
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", (folder.path() / "50%%_%d.png").string()}}), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source("source_file", {{"path", (folder.path() / "50%%_%d.png").string()}});
     EXPECT_EQ(source.properties().frame_count, 2u);
     EXPECT_EQ(source.read(1).bytes, bytes_of(colourful(8, 8, 10)));
 }
@@ -436,8 +427,7 @@ TEST(Video, PassesPlanarYuvUnchanged) {
           Case{"d.avi", "-c:v mjpeg -q:v 3 -pix_fmt yuvj420p", ARHOST_YUV_RANGE_FULL, ARHOST_YUV_MATRIX_BT601}}) {
         SCOPED_TRACE(c.name);
         const VideoFile video(c.name, c.codec);
-        SourceUnderTest source("source_file");
-        ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+        SourceUnderTest source("source_file", video.options());
         EXPECT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_I420);
         EXPECT_EQ(source.format().yuv_matrix, c.matrix);
         EXPECT_EQ(source.format().yuv_range, c.range);
@@ -463,16 +453,14 @@ TEST(Video, PassesPlanarYuvUnchanged) {
 TEST(Video, GuessesBt709ForUntaggedHighDefinition) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("hd.mp4", h264, "1280x720", 2);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", video.options());
     EXPECT_EQ(source.format().yuv_matrix, ARHOST_YUV_MATRIX_BT709);
 }
 
 TEST(Video, GreyStaysGrey) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("grey.mkv", "-vf scale=33:21 -c:v ffv1 -pix_fmt gray", "96x64", 5);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source("source_file", video.options());
     EXPECT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_GREY8);
     const auto expected = reference_frames(video.file(), "gray", 33 * 21);
     ASSERT_EQ(expected.size(), 5u);
@@ -483,8 +471,7 @@ TEST(Video, GreyStaysGrey) {
 TEST(Video, GreyOfLimitedRangeIsExpanded) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("grey.mkv", "-c:v ffv1 -pix_fmt gray -color_range tv", "64x48", 1);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source("source_file", video.options());
     ASSERT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_GREY8);
     const Bytes stored = reference_frames(video.file(), "gray", 64 * 48).at(0);
     const Bytes given = source.read(0).bytes;
@@ -507,8 +494,7 @@ TEST(Video, OddSizesAndOtherFormatsBecomeBgrWithCorrectColours) {
         SCOPED_TRACE(c.name);
         // The picture has one colour, so the scaler's filter and the chroma siting do not affect it.
         const VideoFile video(c.name, c.codec, c.size, 1, "color=c=0xC86432");
-        SourceUnderTest source("source_file");
-        ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+        SourceUnderTest source("source_file", video.options());
         ASSERT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_BGR8);
         EXPECT_EQ(source.format().width, static_cast<unsigned>(c.w));
         EXPECT_EQ(source.format().height, static_cast<unsigned>(c.h));
@@ -525,8 +511,7 @@ TEST(Video, OddSizesAndOtherFormatsBecomeBgrWithCorrectColours) {
 TEST(Video, RgbIsLossless) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("rgb.mkv", "-c:v ffv1 -pix_fmt bgr0", "50x30", 3);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source("source_file", video.options());
     const auto expected = reference_frames(video.file(), "bgr24", 50 * 30 * 3);
     for (std::size_t n = 0; n < 3; ++n)
         EXPECT_EQ(source.read(n).bytes, expected.at(n));
@@ -541,9 +526,7 @@ TEST(Video, AppliesTheRotationOfItsMetadata) {
             const VideoFile video("video.mp4", codec, "96x64", 3);
             ffmpeg(video.folder(),
                    "-i video.mp4 -c copy -metadata:s:v rotate=" + std::string(degrees) + " turned.mp4");
-            SourceUnderTest source("source_file");
-            ASSERT_EQ(source.start({{"path", (video.folder() / "turned.mp4").string()}}), ARHOST_STATUS_OK)
-                << source.log();
+            SourceUnderTest source("source_file", {{"path", (video.folder() / "turned.mp4").string()}});
             const bool upright = std::string(degrees) == "180";
             EXPECT_EQ(source.format().width, upright ? 96u : 64u);
             EXPECT_EQ(source.format().height, upright ? 64u : 96u);
@@ -566,8 +549,7 @@ TEST(Video, ARestartAtAnyFrameGivesTheSameFrames) {
          {h264, "-c:v libx264 -x264-params open-gop=1:keyint=10:bframes=3:b-pyramid=strict", "-c:v mpeg4 -bf 2"}) {
         SCOPED_TRACE(codec);
         const VideoFile video("video.mp4", codec);
-        SourceUnderTest source("source_file");
-        ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
+        SourceUnderTest source("source_file", video.options());
         const auto whole = source.read_all();
         ASSERT_EQ(whole.size(), 41u);
         for (const std::size_t n : {0u, 1u, 9u, 10u, 11u, 25u, 39u}) {
@@ -610,8 +592,7 @@ TEST(Video, TimeContinuesInALoop) {
 TEST(Video, KeepsVariableRateTimesUnlessARateIsConfigured) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("video.mkv", "-vf setpts=N*N/25/TB -vsync vfr -c:v libx264", "96x64", 5);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", video.options());
     for (std::uint64_t n = 0; n < 5; ++n)
         EXPECT_NEAR(static_cast<double>(source.read(n).info.capture_ns), static_cast<double>(n * n) * 4e7, 1e6);
     arhost_source_setup setup{};
@@ -624,8 +605,7 @@ TEST(Video, KeepsVariableRateTimesUnlessARateIsConfigured) {
 TEST(Video, DeliversASingleFrame) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("one.mp4", h264, "96x64", 1);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", video.options());
     EXPECT_EQ(source.properties().frame_count, 1u);
     EXPECT_EQ(source.read(0).status, ARHOST_STATUS_OK);
     EXPECT_EQ(source.read(1).status, ARHOST_STATUS_END);
@@ -641,8 +621,7 @@ TEST(Video, TruncatedIsPlayedToTheLastFrameWithAWarning) {
                           Case{"video.avi", "-c:v mjpeg -q:v 2"}, Case{"video.mkv", "-c:v libx264 -g 5"}}) {
         SCOPED_TRACE(c.name);
         const VideoFile video(c.name, c.codec, "160x120", 40);
-        SourceUnderTest source("source_file");
-        ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
+        SourceUnderTest source("source_file", video.options());
         const auto whole = source.read_all();
         Bytes half = bytes_of(video.file());
         half.resize(half.size() * 6 / 10);
@@ -682,8 +661,7 @@ TEST(Video, MatroskaCutBetweenTwoFramesIsTruncated) {
         --frame;
     bytes.erase(frame, bytes.end());
     write_bytes(video.file(), bytes);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source("source_file", video.options());
     const auto frames = source.read_all();
     ASSERT_EQ(frames.size(), 4u);
     EXPECT_EQ(frames.back().status, ARHOST_STATUS_END_TRUNCATED);
@@ -693,8 +671,7 @@ TEST(Video, MatroskaCutBetweenTwoFramesIsTruncated) {
 TEST(Video, MatroskaOfUnknownSizeIsNotTruncated) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("film.mkv", "-c:v mjpeg -q:v 2 -live 1", "96x64", 5);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source("source_file", video.options());
     EXPECT_EQ(source.read_all().back().status, ARHOST_STATUS_END);
     EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "");
 }
@@ -703,8 +680,7 @@ TEST(Video, AviMayHaveFewerFramesThanHeaderSlots) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("video.mp4", "-c:v mpeg4 -bf 0", "96x64", 40);
     ffmpeg(video.folder(), "-i video.mp4 -c copy copied.avi"); // the header of copied.avi says 80 frames
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", (video.folder() / "copied.avi").string()}}), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source("source_file", {{"path", (video.folder() / "copied.avi").string()}});
     const auto frames = source.read_all();
     EXPECT_EQ(frames.size(), 41u);
     EXPECT_EQ(frames.back().status, ARHOST_STATUS_END);
@@ -727,8 +703,7 @@ TEST(Video, DamagedInTheMiddleContinuesWithAWarningAndSeeksToTheSameBytes) {
     for (std::size_t i = bytes.size() / 2; i < bytes.size() / 2 + 1500; ++i)
         bytes[i] = static_cast<std::uint8_t>(i * 37);
     write_bytes(video.file(), bytes);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source("source_file", video.options());
     const auto whole = source.read_all();
     EXPECT_GT(whole.size(), 30u);
     EXPECT_THAT(source.log(ARHOST_SEVERITY_WARNING), HasSubstr("is damaged near frame"));
@@ -743,8 +718,7 @@ TEST(Video, RejectsAChangedSize) {
     const Bytes second = bytes_of(large.file());
     both.insert(both.end(), second.begin(), second.end());
     write_bytes(small.file(), both);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(small.options()), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source("source_file", small.options());
     EXPECT_EQ(source.read_all().back().status, ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source.log(ARHOST_SEVERITY_ERROR), HasSubstr(" is 128×96, but earlier frames are 96×64"));
 }
@@ -757,8 +731,7 @@ TEST(Video, DecoderMessagesGoToTheDebugLogNotStderr) {
         bytes[i] = static_cast<std::uint8_t>(i * 37);
     write_bytes(video.file(), bytes);
     testing::internal::CaptureStderr();
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", video.options());
     source.read_all();
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
     EXPECT_THAT(source.log(ARHOST_SEVERITY_DEBUG), HasSubstr("libav: "));
@@ -767,8 +740,7 @@ TEST(Video, DecoderMessagesGoToTheDebugLogNotStderr) {
 TEST(Video, StopsDecodingWhenCancelled) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("video.mp4", h264);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", video.options());
     source.plugin().cancel();
     EXPECT_EQ(source.read(39).status, ARHOST_STATUS_ERROR_CANCELLED);
     EXPECT_EQ(source.log(ARHOST_SEVERITY_ERROR), "");
@@ -795,8 +767,7 @@ arhost_source_setup paced(double fps = 0) {
 TEST(Paced, DeliversNoFrameEarly) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1, 2, 3, 4, 5, 6, 7, 8, 9});
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, paced(20)), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", {{"path", pattern_in(folder)}}, paced(20));
     std::chrono::steady_clock::time_point first;
     std::uint64_t skipped = 0;
     for (std::uint64_t n = 0; n < 6; ++n) {
@@ -813,8 +784,7 @@ TEST(Paced, DeliversNoFrameEarly) {
 TEST(Paced, SkipsAndCountsLateFrames) {
     ARHOST_REQUIRE_FFMPEG();
     const VideoFile video("video.mp4", h264);
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start(video.options()), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", video.options());
     const auto whole = source.read_all();
     ASSERT_EQ(source.start(video.options(), paced()), ARHOST_STATUS_OK);
     ASSERT_EQ(source.read(0).info.skipped, 0u);
@@ -832,8 +802,7 @@ TEST(Paced, SkipsAndCountsLateFrames) {
 TEST(Paced, StopsWaitingWhenCancelled) {
     ScratchFolder folder;
     write_images(folder.path(), {0, 1});
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", pattern_in(folder)}}, paced(0.05)), ARHOST_STATUS_OK);
+    SourceUnderTest source("source_file", {{"path", pattern_in(folder)}}, paced(0.05));
     ASSERT_EQ(source.read(0).status, ARHOST_STATUS_OK);
     std::thread canceller([&] {
         std::this_thread::sleep_for(std::chrono::milliseconds(50));

@@ -21,9 +21,25 @@ struct SourceFrame {
     std::vector<std::uint16_t> depth_mm; // empty without depth
 };
 
+// Returns a calibration for frames of this size, of which a source uses only the size.
+inline arhost_intrinsics intrinsics_of_size(std::uint32_t width, std::uint32_t height) {
+    arhost_intrinsics camera{};
+    camera.struct_size = sizeof camera;
+    camera.width = width;
+    camera.height = height;
+    return camera;
+}
+
 class SourceUnderTest {
 public:
     explicit SourceUnderTest(const std::string &id) : plugin_(id), source_(plugin_.functions<arhost_source>()) {}
+    // Starts the source; throws if that fails.
+    SourceUnderTest(const std::string &id, const std::map<std::string, std::string> &options,
+                    arhost_source_setup setup = {})
+        : SourceUnderTest(id) {
+        if (start(options, setup) != ARHOST_STATUS_OK)
+            throw std::runtime_error(log());
+    }
     ~SourceUnderTest() { stop(); }
 
     // Creates an instance of the plugin and starts it. Returns the status of the first call that fails, else
@@ -113,6 +129,17 @@ public:
             line.clear();
         }
         return found;
+    }
+
+    // Returns the error message of a start that must fail with this status and one message.
+    static std::string rejection(const std::string &id, const std::map<std::string, std::string> &options,
+                                 arhost_status expected = ARHOST_STATUS_ERROR_CONFIGURATION,
+                                 arhost_source_setup setup = {}) {
+        SourceUnderTest source(id);
+        EXPECT_EQ(source.start(options, setup), expected) << source.log();
+        const std::string errors = source.log(ARHOST_SEVERITY_ERROR);
+        EXPECT_EQ(std::ranges::count(errors, '\n'), 1) << "expected one error message, got:\n" << errors;
+        return errors;
     }
 
 private:

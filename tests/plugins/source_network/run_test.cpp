@@ -3,6 +3,7 @@
 // Runs arhost with network cameras, inside the sandbox.
 #include "arhost_run.hpp"
 #include "camera_server.hpp"
+#include "eventually.hpp"
 
 #include <gmock/gmock.h>
 
@@ -83,14 +84,12 @@ TEST(NetworkRun, ContinuesWhenTheCameraComesBack) {
                                 100));
     run.start();
     const auto wait_for = [&](const char *text) {
-        for (int n = 0; n < 3000 && run.output().find(text) == std::string::npos; ++n)
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
-        EXPECT_THAT(run.output(), HasSubstr(text));
+        EXPECT_TRUE(eventually([&] { return run.output().find(text) != std::string::npos; })) << run.output();
     };
     wait_for("160×120 px");
     server.kill();
     wait_for("reconnecting until it is back");
-    std::this_thread::sleep_for(std::chrono::milliseconds(2500));
+    std::this_thread::sleep_for(std::chrono::milliseconds(2500)); // longer than deadline_ms
     server.start();
     EXPECT_EQ(run.wait(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("is back"));
