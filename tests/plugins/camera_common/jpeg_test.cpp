@@ -67,6 +67,10 @@ Decoded decode(const Bytes &jpeg, const Bytes &like) {
     return result;
 }
 
+Decoded decode(const Bytes &jpeg) {
+    return decode(jpeg, jpeg);
+}
+
 // Returns a copy of the JPEG picture without its segments of type `marker`. 0xc4 are the Huffman tables.
 Bytes without_segments(const Bytes &jpeg, std::uint8_t marker) {
     Bytes result(jpeg.begin(), jpeg.begin() + 2);
@@ -85,8 +89,7 @@ Bytes without_segments(const Bytes &jpeg, std::uint8_t marker) {
 } // namespace
 
 TEST(Jpeg, Chroma420BecomesI420WithoutConversion) {
-    const Bytes jpeg = make_jpeg(96, 64, TJSAMP_420);
-    const Decoded frame = decode(jpeg, jpeg);
+    const Decoded frame = decode(make_jpeg(96, 64, TJSAMP_420));
     ASSERT_TRUE(frame.good) << frame.fault;
     ASSERT_EQ(frame.format.pixel_format, ARHOST_PIXEL_FORMAT_I420);
     EXPECT_EQ(frame.format.yuv_matrix, ARHOST_YUV_MATRIX_BT601);
@@ -109,8 +112,7 @@ TEST(Jpeg, OtherSubsamplingsAndOddSizesBecomeBgr) {
     for (const Case &c : {Case{96, 64, TJSAMP_422}, Case{96, 64, TJSAMP_444}, Case{96, 64, TJSAMP_440},
                           Case{97, 63, TJSAMP_420}, Case{1, 1, TJSAMP_420}}) {
         SCOPED_TRACE(std::to_string(c.width) + "×" + std::to_string(c.height) + " " + std::to_string(c.subsampling));
-        const Bytes jpeg = make_jpeg(c.width, c.height, c.subsampling);
-        const Decoded frame = decode(jpeg, jpeg);
+        const Decoded frame = decode(make_jpeg(c.width, c.height, c.subsampling));
         ASSERT_TRUE(frame.good) << frame.fault;
         ASSERT_EQ(frame.format.pixel_format, ARHOST_PIXEL_FORMAT_BGR8);
         const Bytes pixels = smooth_bgr(c.width, c.height);
@@ -121,8 +123,7 @@ TEST(Jpeg, OtherSubsamplingsAndOddSizesBecomeBgr) {
 }
 
 TEST(Jpeg, GreyStaysGrey) {
-    const Bytes jpeg = make_jpeg(33, 21, TJSAMP_GRAY);
-    const Decoded frame = decode(jpeg, jpeg);
+    const Decoded frame = decode(make_jpeg(33, 21, TJSAMP_GRAY));
     ASSERT_TRUE(frame.good) << frame.fault;
     ASSERT_EQ(frame.format.pixel_format, ARHOST_PIXEL_FORMAT_GREY8);
     const Bytes pixels = smooth_bgr(33, 21);

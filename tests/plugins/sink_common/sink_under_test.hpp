@@ -193,12 +193,23 @@ public:
                 return status;
         return ARHOST_STATUS_OK;
     }
+    // Starts the sink and writes the frames [first, end). Throws if a call fails.
+    void start_and_write(int width, int height, std::uint64_t first, std::uint64_t end, double fps = 30) {
+        if (start(width, height, first, fps) != ARHOST_STATUS_OK || write(first, end) != ARHOST_STATUS_OK)
+            throw std::runtime_error(log());
+    }
+    // Like start_and_write(), then stops the sink.
+    void run(int width, int height, std::uint64_t first, std::uint64_t end, double fps = 30) {
+        start_and_write(width, height, first, end, fps);
+        if (stop() != ARHOST_STATUS_OK)
+            throw std::runtime_error(log());
+    }
     arhost_status idle() { return functions().idle(plugin_.instance()); }
     arhost_status stop() { return functions().stop(plugin_.instance()); }
 
     const arhost_sink &functions() const { return plugin_.functions<arhost_sink>(); }
     const arhost_descriptor &descriptor() const { return plugin_.descriptor(); }
-    void cancel() { plugin_.cancel(); }
+    void cancel(int after = 0) { plugin_.cancel(after); }
     std::string log() const { return plugin_.log(); }
 
 private:

@@ -120,9 +120,10 @@ arhost_source_setup from(std::uint64_t sequence) {
     return setup;
 }
 arhost_source_setup at_rate(double fps) {
-    arhost_source_setup setup{};
-    setup.fps = fps;
-    return setup;
+    return arhost::test::source_setup(fps, false);
+}
+arhost_source_setup paced(double fps) {
+    return arhost::test::source_setup(fps, true);
 }
 
 // A short video in a scratch folder.
@@ -696,17 +697,6 @@ TEST_F(Video, StopsDecodingWhenCancelled) {
 }
 
 // ---- Live mode: frames are delivered in real time --------------------------------------------------
-
-namespace {
-
-arhost_source_setup paced(double fps = 0) {
-    arhost_source_setup setup{};
-    setup.paced = 1;
-    setup.fps = fps;
-    return setup;
-}
-
-} // namespace
 
 TEST_F(Paced, DeliversNoFrameEarly) {
     write_images({0});

@@ -30,6 +30,13 @@ inline arhost_intrinsics intrinsics_of_size(std::uint32_t width, std::uint32_t h
     return camera;
 }
 
+inline arhost_source_setup source_setup(double fps, bool is_live) {
+    arhost_source_setup setup{};
+    setup.fps = fps;
+    setup.paced = is_live;
+    return setup;
+}
+
 class SourceUnderTest {
 public:
     explicit SourceUnderTest(const std::string &id) : plugin_(id), source_(plugin_.functions<arhost_source>()) {}

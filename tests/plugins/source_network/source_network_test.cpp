@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera_server.hpp"
 #include "eventually.hpp"
+#include "process_state.hpp"
 #include "source_under_test.hpp"
 
 #include <gmock/gmock.h>
@@ -19,10 +20,6 @@ namespace {
 
 constexpr const char *id = "source_network";
 
-std::int64_t now_ns() {
-    return std::chrono::nanoseconds(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
-
 // The number of the picture, from its mean luma; −1 if it is none of the pictures.
 int number_of(const SourceFrame &frame, const SourceUnderTest &source) {
     const std::size_t count = std::size_t{source.format().width} * source.format().height;
@@ -34,9 +31,7 @@ int number_of(const SourceFrame &frame, const SourceUnderTest &source) {
 }
 
 arhost_source_setup live() {
-    arhost_source_setup setup{};
-    setup.paced = 1;
-    return setup;
+    return source_setup(0, true);
 }
 
 // Reads `count` frames and checks that they are the camera's pictures in order, with ascending times.
@@ -48,8 +43,8 @@ void expect_pictures(SourceUnderTest &source, int count) {
         ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << source.log();
         EXPECT_EQ(frame.info.clock, ARHOST_CLOCK_MONOTONIC);
         EXPECT_GT(frame.info.capture_ns, last_ns) << "frame " << n;
-        EXPECT_LE(frame.info.capture_ns, now_ns());
-        EXPECT_GT(frame.info.capture_ns, now_ns() - 20'000'000'000);
+        EXPECT_LE(frame.info.capture_ns, monotonic_ns());
+        EXPECT_GT(frame.info.capture_ns, monotonic_ns() - 20'000'000'000);
         const int number = number_of(frame, source);
         ASSERT_NE(number, -1) << "frame " << n;
         if (last >= 0) {
@@ -166,7 +161,7 @@ TEST_F(Rtsp, ComesBackAfterTheServerHasDied) {
             const SourceFrame frame = source_.read(0);
             ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << source_.log();
             EXPECT_GT(frame.info.capture_ns, last_ns);
-            EXPECT_LE(frame.info.capture_ns, now_ns());
+            EXPECT_LE(frame.info.capture_ns, monotonic_ns());
             EXPECT_NE(number_of(frame, source_), -1);
             last_ns = frame.info.capture_ns;
         }

@@ -2,14 +2,16 @@
 //
 // Captures from a USB camera in user space, through the kernel's USB stack. To be run in a virtual machine:
 //   tools/vm/run-in-vm -m vhci_hcd -m uvcvideo …/source_uvc-camera-test
+#include "../../support/eventually.hpp"
+#include "../../support/process_state.hpp"
 #include "../../support/usb_camera.hpp"
 #include "../../system/arhost_run.hpp"
+#include "../../system/listed_devices.hpp"
 #include "../../system/suspend.hpp"
 #include "../source_file/source_under_test.hpp"
 
 #include <gmock/gmock.h>
 
-#include <grp.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -20,40 +22,11 @@
 #include <memory>
 
 namespace fs = std::filesystem;
-using arhost::test::CameraControl;
-using arhost::test::Octets;
-using arhost::test::SourceFrame;
-using arhost::test::SourceUnderTest;
-using arhost::test::UsbCamera;
+using namespace arhost::test;
 using testing::HasSubstr;
 using testing::Not;
 
 namespace {
-
-std::int64_t monotonic_ns() {
-    timespec time{};
-    clock_gettime(CLOCK_MONOTONIC, &time);
-    return time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec;
-}
-
-std::size_t open_files() {
-    return static_cast<std::size_t>(std::distance(fs::directory_iterator("/proc/self/fd"), {}));
-}
-
-[[maybe_unused]] std::size_t resident_kib() {
-    std::ifstream status("/proc/self/status");
-    for (std::string line; std::getline(status, line);)
-        if (line.starts_with("VmRSS:"))
-            return std::stoul(line.substr(6));
-    return 0;
-}
-
-// Waits until a condition holds, for at most 20 s.
-template <class Condition> bool eventually(Condition &&condition) {
-    for (int i = 0; i < 2000 && !condition(); ++i)
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    return condition();
-}
 
 // The number of camera interfaces that the kernel's driver uses. Each camera has two.
 std::ptrdiff_t kernel_driven() {
@@ -80,24 +53,29 @@ protected:
     // Captures small pictures, because the virtual machine is emulated and slow.
     arhost_status start(std::map<std::string, std::string> options = {}, bool live = true, double fps = 30) {
         options.try_emplace("usb", "1d6b:0104");
-        arhost_source_setup setup{};
-        setup.fps = fps;
-        setup.paced = live;
-        return source_.start(options, setup);
+        return source_.start(options, source_setup(fps, live));
     }
-    std::string start_error(const std::map<std::string, std::string> &options, arhost_status expected) {
-        SourceUnderTest source("source_uvc");
-        std::map<std::string, std::string> all = options;
-        all.try_emplace("usb", "1d6b:0104");
-        EXPECT_EQ(source.start(all), expected) << source.log();
-        const std::string errors = source.log(ARHOST_SEVERITY_ERROR);
-        EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << "expected one error message, got:\n"
-                                                                     << errors;
-        return errors;
+    static std::string start_error(std::map<std::string, std::string> options,
+                                   arhost_status expected = ARHOST_STATUS_ERROR_CONFIGURATION) {
+        options.try_emplace("usb", "1d6b:0104");
+        return SourceUnderTest::rejection("source_uvc", options, expected);
+    }
+    struct Setting {
+        std::uint8_t unit, selector;
+        Octets value;
+    };
+    void expect_controls(const std::vector<Setting> &settings) {
+        for (const auto &[unit, selector, value] : settings)
+            EXPECT_EQ(camera_->value(unit, selector), value) << "unit " << +unit << ", selector " << +selector;
     }
 
     std::unique_ptr<UsbCamera> camera_;
     SourceUnderTest source_{"source_uvc"};
+    const Setting manual_exposure{UsbCamera::terminal, 0x02, {1}};
+    const Setting exposure_of_10_ms{UsbCamera::terminal, 0x04, {100, 0, 0, 0}};
+    const Setting gain_7{UsbCamera::processing, 0x04, {7, 0}};
+    const Setting power_line_60_hz{UsbCamera::processing, 0x05, {2}};
+    const Setting brightness_minus_5{UsbCamera::processing, 0x02, {0xfb, 0xff}};
 };
 
 class UvcCamera : public Connected, public testing::Test {
@@ -218,17 +196,17 @@ TEST_F(UvcCamera, SetsControlsByName) {
                      {"extension", "4:2=0a0bff"}}),
               ARHOST_STATUS_OK)
         << source_.log();
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x02), Octets{1}) << "manual";
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x04), (Octets{100, 0, 0, 0}));
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x08), Octets{0}) << "no automatic focus";
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x06), (Octets{40, 0}));
-    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x04), (Octets{7, 0}));
-    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x0b), Octets{0});
-    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x0a), (Octets{0x88, 0x13}));
-    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x05), Octets{2});
-    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x02), (Octets{0xfb, 0xff}));
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x0d), (Octets{7, 0, 0, 0, 0xfd, 0xff, 0xff, 0xff}));
-    EXPECT_EQ(camera_->value(UsbCamera::extension, 2), (Octets{0x0a, 0x0b, 0xff}));
+    expect_controls({manual_exposure,
+                     exposure_of_10_ms,
+                     {UsbCamera::terminal, 0x08, {0}}, // no automatic focus
+                     {UsbCamera::terminal, 0x06, {40, 0}},
+                     {UsbCamera::terminal, 0x0d, {7, 0, 0, 0, 0xfd, 0xff, 0xff, 0xff}},
+                     gain_7,
+                     {UsbCamera::processing, 0x0b, {0}},
+                     {UsbCamera::processing, 0x0a, {0x88, 0x13}},
+                     power_line_60_hz,
+                     brightness_minus_5,
+                     {UsbCamera::extension, 2, {0x0a, 0x0b, 0xff}}});
     EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
 
     ASSERT_EQ(start({{"exposure", "auto"},
@@ -236,11 +214,10 @@ TEST_F(UvcCamera, SetsControlsByName) {
                      {"extension", "43424140-4544-4746-4849-4a4b4c4d4e4f:2=000000"}}),
               ARHOST_STATUS_OK)
         << source_.log();
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x02), Octets{8})
-        << "aperture priority; it has no fully automatic mode";
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x08), Octets{1});
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x06), (Octets{40, 0})) << "unchanged";
-    EXPECT_EQ(camera_->value(UsbCamera::extension, 2), (Octets{0, 0, 0}));
+    expect_controls({{UsbCamera::terminal, 0x02, {8}}, // aperture priority; it has no fully automatic mode
+                     {UsbCamera::terminal, 0x08, {1}},
+                     {UsbCamera::terminal, 0x06, {40, 0}}, // unchanged
+                     {UsbCamera::extension, 2, {0, 0, 0}}});
 }
 
 TEST_F(UvcCamera, SetsControlsWhileItCaptures) {
@@ -251,48 +228,43 @@ TEST_F(UvcCamera, SetsControlsWhileItCaptures) {
                                     {"power_line_frequency", "60_hz"},
                                     {"controls", "brightness=-5"}})
         EXPECT_EQ(source_.plugin().set_text(key, text), ARHOST_STATUS_OK) << key << "\n" << source_.log();
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x02), Octets{1}) << "manual";
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x04), (Octets{100, 0, 0, 0}));
-    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x04), (Octets{7, 0}));
-    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x05), Octets{2});
-    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x02), (Octets{0xfb, 0xff}));
+    expect_controls({manual_exposure, exposure_of_10_ms, gain_7, power_line_60_hz, brightness_minus_5});
     EXPECT_EQ(source_.plugin().set_text("exposure", "2"), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("does not accept '2' for 'exposure_time_absolute'; "
                                                               "valid: 3 to 2047"));
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x04), (Octets{100, 0, 0, 0})) << "unchanged";
+    expect_controls({exposure_of_10_ms});
     EXPECT_EQ(source_.read(1).status, ARHOST_STATUS_OK);
 }
 
 TEST_F(UvcCamera, RejectsControlsAndValuesThatItDoesNotHave) {
-    const auto error = [&](const std::string &option, const std::string &value) {
-        return start_error({{option, value}}, ARHOST_STATUS_ERROR_CONFIGURATION);
+    const struct {
+        const char *option, *value, *error;
+    } cases[] = {
+        {"controls", "sharpnes=3", "has no control 'sharpnes'; it has: auto_exposure, exposure_time_absolute, "},
+        {"controls", "hue=3", "has no control 'hue'"},
+        {"controls", "gain", "'gain' is not of the form NAME=VALUE"},
+        {"exposure", "2", "does not accept '2' for 'exposure_time_absolute'; valid: 3 to 2047"},
+        {"focus", "12", "valid: 0 to 250 in steps of 5"},
+        {"gain", "auto", "has no control 'auto gain'"},
+        {"controls", "auto_exposure=auto_mode", "valid: 1 (manual_mode), 3 (aperture_priority_mode)"},
+        {"power_line_frequency", "auto", "valid: 0 (disabled), 1 (50_hz), 2 (60_hz)"},
+        {"extension", "5:2=00", "has no extension unit '5'; it has: 4 (43424140-4544-"},
+        {"extension", "4:2=00", "expects 3 bytes for extension unit 4, selector 2, not 1"},
     };
-    EXPECT_THAT(error("controls", "sharpnes=3"),
-                HasSubstr("has no control 'sharpnes'; it has: auto_exposure, exposure_time_absolute, "));
-    EXPECT_THAT(error("controls", "hue=3"), HasSubstr("has no control 'hue'"));
-    EXPECT_THAT(error("controls", "gain"), HasSubstr("'gain' is not of the form NAME=VALUE"));
-    EXPECT_THAT(error("exposure", "2"),
-                HasSubstr("does not accept '2' for 'exposure_time_absolute'; valid: 3 to 2047"));
-    EXPECT_THAT(error("focus", "12"), HasSubstr("valid: 0 to 250 in steps of 5"));
-    EXPECT_THAT(error("gain", "auto"), HasSubstr("has no control 'auto gain'"));
-    EXPECT_THAT(error("controls", "auto_exposure=auto_mode"),
-                HasSubstr("valid: 1 (manual_mode), 3 (aperture_priority_mode)"));
-    EXPECT_THAT(error("power_line_frequency", "auto"), HasSubstr("valid: 0 (disabled), 1 (50_hz), 2 (60_hz)"));
-    EXPECT_THAT(error("extension", "5:2=00"), HasSubstr("has no extension unit '5'; it has: 4 (43424140-4544-"));
-    EXPECT_THAT(error("extension", "4:2=00"), HasSubstr("expects 3 bytes for extension unit 4, selector 2, not 1"));
+    for (const auto &[option, value, error] : cases)
+        EXPECT_THAT(start_error({{option, value}}), HasSubstr(error)) << option;
     for (const char *malformed : {"4=00", "4:2", "4:2=", "4:2=0", "4:2=0g", "4:0=00", ":2=00", "=00", "4:300=00"})
-        EXPECT_THAT(error("extension", malformed), HasSubstr("extension: ")) << malformed;
+        EXPECT_THAT(start_error({{"extension", malformed}}), HasSubstr("extension: ")) << malformed;
     camera_->change(UsbCamera::processing, 0x04, [](CameraControl &gain) { gain.info = 1; });
-    EXPECT_THAT(error("gain", "3"), HasSubstr("does not let programs set 'gain'"));
+    EXPECT_THAT(start_error({{"gain", "3"}}), HasSubstr("does not let programs set 'gain'"));
     camera_->change(UsbCamera::processing, 0x04, [](CameraControl &gain) { gain.info = 5; });
-    EXPECT_THAT(error("gain", "3"), HasSubstr("controls 'gain' automatically"));
+    EXPECT_THAT(start_error({{"gain", "3"}}), HasSubstr("controls 'gain' automatically"));
 }
 
 TEST_F(UvcCamera, NamesWhatItOffersIfASizeOrFormatIsMissing) {
-    EXPECT_THAT(start_error({{"width", "640"}, {"height", "480"}}, ARHOST_STATUS_ERROR_CONFIGURATION),
+    EXPECT_THAT(start_error({{"width", "640"}, {"height", "480"}}),
                 HasSubstr("has no size 640×480; it offers YUY2 (320×180 30 fps), NV12 (320×180 30 fps), MJPEG"));
-    EXPECT_THAT(start_error({{"camera", "1"}}, ARHOST_STATUS_ERROR_CONFIGURATION),
-                HasSubstr("has no camera number 1, only 1"));
+    EXPECT_THAT(start_error({{"camera", "1"}}), HasSubstr("has no camera number 1, only 1"));
     ASSERT_EQ(start({}, true, 10), ARHOST_STATUS_OK) << source_.log();
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_WARNING),
                 HasSubstr("delivers 30 fps at YUY2 320×180, not the configured 10 fps"));
@@ -302,8 +274,7 @@ TEST_F(UvcCamera, IsChosenBySerialNumber) {
     UsbCamera second({.serial = "0002:b"});
     ASSERT_TRUE(eventually([] { return kernel_driven() == 4; }));
     second.change(UsbCamera::processing, 0x04, [](CameraControl &gain) { gain.maximum = {3, 0}; });
-    EXPECT_THAT(start_error({{"usb", "1d6b:0104:0002:b"}, {"gain", "50"}}, ARHOST_STATUS_ERROR_CONFIGURATION),
-                HasSubstr("valid: 0 to 3"));
+    EXPECT_THAT(start_error({{"usb", "1d6b:0104:0002:b"}, {"gain", "50"}}), HasSubstr("valid: 0 to 3"));
     EXPECT_EQ(start({{"usb", "1d6b:0104:0001"}, {"gain", "50"}}), ARHOST_STATUS_OK) << source_.log();
     EXPECT_THAT(
         start_error({{"usb", "1d6b:0104:0003"}}, ARHOST_STATUS_ERROR_DEVICE_LOST),
@@ -334,10 +305,7 @@ TEST_F(UvcCamera, ReportsAnUnplugAndReconnects) {
         ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
         ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
         camera_.reset();
-        SourceFrame frame;
-        for (std::uint64_t n = 1; n < 10 && (frame = source_.read(n)).status == ARHOST_STATUS_OK; ++n) {
-        }
-        EXPECT_EQ(frame.status, ARHOST_STATUS_ERROR_DEVICE_LOST);
+        EXPECT_EQ(source_.read_all(1, 9).back().status, ARHOST_STATUS_ERROR_DEVICE_LOST);
         EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has disappeared; was it unplugged?"));
         source_.stop();
         connect({});
@@ -353,10 +321,8 @@ TEST_F(UvcReplug, IsBackAThousandTimesWithoutLeaks) {
         ASSERT_EQ(start({{"format", "mjpeg"}}), ARHOST_STATUS_OK) << "round " << round << "\n" << source_.log();
         ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK) << "round " << round << "\n" << source_.log();
         camera_.reset();
-        SourceFrame frame;
-        for (std::uint64_t n = 1; n < 10 && (frame = source_.read(n)).status == ARHOST_STATUS_OK; ++n) {
-        }
-        ASSERT_EQ(frame.status, ARHOST_STATUS_ERROR_DEVICE_LOST) << "round " << round << "\n" << source_.log();
+        ASSERT_EQ(source_.read_all(1, 9).back().status, ARHOST_STATUS_ERROR_DEVICE_LOST) << "round " << round << "\n"
+                                                                                         << source_.log();
         source_.stop();
         connect({});
         if (round == 20) {
@@ -371,8 +337,7 @@ TEST_F(UvcReplug, IsBackAThousandTimesWithoutLeaks) {
 }
 
 TEST_F(UvcCamera, StopsWaitingWhenCancelled) {
-    camera_.reset();
-    ASSERT_TRUE(eventually([] { return kernel_driven() == 0; }));
+    unplug();
     connect({.is_silent = true});
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
     source_.plugin().cancel(3);
@@ -381,8 +346,7 @@ TEST_F(UvcCamera, StopsWaitingWhenCancelled) {
 }
 
 TEST_F(UvcCamera, ThatSendsNothingIsLost) {
-    camera_.reset();
-    ASSERT_TRUE(eventually([] { return kernel_driven() == 0; }));
+    unplug();
     connect({.is_silent = true});
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_ERROR_DEVICE_LOST);
@@ -402,17 +366,22 @@ protected:
                "outputs: [{plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n" +
                more;
     }
-    static std::ptrdiff_t frames(const arhost::test::ArhostRun &run) {
+    void start(const std::string &more = "") {
+        run.write("run.yaml", configuration(usb, more));
+        run.start({"run.yaml", "--allow-no-target"});
+        ASSERT_TRUE(proceeds()) << run.output();
+    }
+    std::ptrdiff_t frames() const {
         const std::string text = run.exists("out/poses.jsonl") ? run.read("out/poses.jsonl") : "";
         return std::count(text.begin(), text.end(), '\n');
     }
     // Waits for further frames.
-    static bool proceeds(arhost::test::ArhostRun &run, std::ptrdiff_t count = 15) {
-        const std::ptrdiff_t before = frames(run);
-        return eventually([&] { return !run.running() || frames(run) >= before + count; }) && run.running();
+    bool proceeds(std::ptrdiff_t count = 15) const {
+        const std::ptrdiff_t before = frames();
+        return eventually([&] { return !run.running() || frames() >= before + count; }) && run.running();
     }
-    static void end(arhost::test::ArhostRun &run) {
-        arhost::test::send_signal(run.pid(), SIGINT);
+    void end() {
+        send_signal(run.pid(), SIGINT);
         run.wait();
     }
     // The worker that uses the camera's node.
@@ -429,46 +398,45 @@ protected:
         return -1;
     }
     const std::string usb = "usb: {vendor: 1d6b, product: 0104, serial: 0001}";
+    ArhostRun run;
 };
 
 } // namespace
 
 TEST_F(UvcRun, CapturesInTheSandboxWithAccessToOneDevice) {
-    arhost::test::ArhostRun run(configuration(usb));
-    run.start({"run.yaml", "--allow-no-target"});
-    EXPECT_TRUE(proceeds(run)) << run.output();
+    ASSERT_NO_FATAL_FAILURE(start());
     EXPECT_EQ(kernel_driven(), 0);
-    end(run);
+    end();
     EXPECT_THAT(run.output(), HasSubstr("YUY2 320×180"));
     EXPECT_TRUE(eventually([] { return kernel_driven() == 2; }));
 }
 
 TEST_F(UvcRun, OtherDevicesDoNotExistInTheSandbox) {
-    arhost::test::ArhostRun absent(configuration("usb: {vendor: 1d6b, product: 0104, serial: 9}"));
-    EXPECT_NE(absent.run({"check", "run.yaml"}), 0);
-    EXPECT_THAT(absent.output(),
-                HasSubstr("there is no camera 1d6b:0104 with the serial number '9'; no USB camera is "
-                          "visible"));
-    arhost::test::ArhostRun forbidden(configuration("allow: []"));
-    EXPECT_NE(forbidden.run({"check", "run.yaml"}), 0);
-    EXPECT_THAT(forbidden.output(), HasSubstr("or better 'usb: {vendor: …, product: …}'"));
-    arhost::test::ArhostRun twice(configuration(usb + ", options: {usb: '1d6b:0104'}"));
-    EXPECT_NE(twice.run({"check", "run.yaml"}), 0);
-    EXPECT_THAT(twice.output(), HasSubstr("the device is also given by the key 'usb'"));
-    arhost::test::ArhostRun all(configuration("allow: [usb]"));
-    EXPECT_EQ(all.run({"check", "run.yaml"}), 0) << all.output();
+    const struct {
+        std::string access;
+        const char *error; // empty: none
+    } cases[] = {
+        {"usb: {vendor: 1d6b, product: 0104, serial: 9}",
+         "there is no camera 1d6b:0104 with the serial number '9'; no USB camera is visible"},
+        {"allow: []", "or better 'usb: {vendor: …, product: …}'"},
+        {usb + ", options: {usb: '1d6b:0104'}", "the device is also given by the key 'usb'"},
+        {"allow: [usb]", ""},
+    };
+    for (const auto &[access, error] : cases) {
+        run.write("run.yaml", configuration(access));
+        EXPECT_EQ(run.run({"check", "run.yaml"}) != 0, *error != '\0') << access << run.output();
+        EXPECT_THAT(run.output(), HasSubstr(error)) << access;
+    }
 }
 
 TEST_F(UvcRun, SurvivesAnUnplug) {
-    arhost::test::ArhostRun run(configuration(usb));
-    run.start({"run.yaml", "--allow-no-target"});
-    ASSERT_TRUE(proceeds(run)) << run.output();
+    ASSERT_NO_FATAL_FAILURE(start());
     for (int round = 0; round < 2; ++round) {
         camera_.reset();
         camera_ = std::make_unique<UsbCamera>(UsbCamera::Setup{});
-        EXPECT_TRUE(proceeds(run, 30)) << run.output();
+        EXPECT_TRUE(proceeds(30)) << run.output();
     }
-    end(run);
+    end();
     EXPECT_THAT(run.output(), HasSubstr("was it unplugged?"));
     EXPECT_GE(run.stats()["restarts"]["source"], 2);
     EXPECT_TRUE(eventually([] { return kernel_driven() == 2; }));
@@ -476,30 +444,26 @@ TEST_F(UvcRun, SurvivesAnUnplug) {
 
 // The keys `restart` have their defaults, by which five failures in about four seconds disable a component.
 TEST_F(UvcRun, SurvivesASuspend) {
-    arhost::test::ArhostRun run(configuration(usb));
-    run.start({"run.yaml", "--allow-no-target"});
-    ASSERT_TRUE(proceeds(run)) << run.output();
-    ASSERT_TRUE(arhost::test::suspend_processes());
-    EXPECT_TRUE(proceeds(run, 40)) << run.output();
-    end(run);
+    ASSERT_NO_FATAL_FAILURE(start());
+    ASSERT_TRUE(suspend_processes());
+    EXPECT_TRUE(proceeds(40)) << run.output();
+    end();
     const nlohmann::json stats = run.stats();
     for (const auto &[component, restarts] : stats["restarts"].items())
         EXPECT_EQ(restarts, 0) << component << ":\n" << run.output();
 }
 
 TEST_F(UvcRun, WaitsUntilTheCameraIsPluggedInAgain) {
-    arhost::test::ArhostRun run(configuration(usb));
-    run.start({"run.yaml", "--allow-no-target"});
-    ASSERT_TRUE(proceeds(run)) << run.output();
+    ASSERT_NO_FATAL_FAILURE(start());
     unplug();
     std::this_thread::sleep_for(std::chrono::seconds(20));
     connect({});
-    EXPECT_TRUE(proceeds(run)) << run.output();
+    EXPECT_TRUE(proceeds()) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("is it connected?; waiting for its device"));
     EXPECT_THAT(run.output(), HasSubstr("its device is back"));
     unplug();
     EXPECT_TRUE(eventually([&] { return run.output().rfind("waiting for") > run.output().rfind("is back"); }));
-    arhost::test::send_signal(run.pid(), SIGINT);
+    send_signal(run.pid(), SIGINT);
     EXPECT_EQ(run.wait(), 130) << run.output();
     // Each unplug counts once, however many processes look for the camera meanwhile.
     EXPECT_EQ(run.stats()["restarts"]["source"], 2) << run.output();
@@ -508,33 +472,27 @@ TEST_F(UvcRun, WaitsUntilTheCameraIsPluggedInAgain) {
 
 TEST_F(UvcRun, TheKernelsDriverReturnsIfTheWorkerIsKilled) {
     // Without further attempts, nothing else returns the camera.
-    arhost::test::ArhostRun run(configuration(usb, "restart: {proven_after_frames: 1000000, quarantine_after: 1}\n"));
-    run.start({"run.yaml", "--allow-no-target"});
-    ASSERT_TRUE(proceeds(run)) << run.output();
+    ASSERT_NO_FATAL_FAILURE(start("restart: {proven_after_frames: 1000000, quarantine_after: 1}\n"));
     const pid_t worker = worker_of_camera();
     ASSERT_GT(worker, 0);
-    arhost::test::send_signal(worker, SIGKILL);
+    send_signal(worker, SIGKILL);
     EXPECT_TRUE(eventually([] { return kernel_driven() == 2; })) << run.output();
     run.wait();
 }
 
 TEST_F(UvcRun, ContinuesIfTheWorkerIsKilled) {
-    arhost::test::ArhostRun run(configuration(usb));
-    run.start({"run.yaml", "--allow-no-target"});
-    ASSERT_TRUE(proceeds(run)) << run.output();
+    ASSERT_NO_FATAL_FAILURE(start());
     for (int round = 0; round < 3; ++round) {
-        arhost::test::send_signal(worker_of_camera(), SIGKILL);
-        EXPECT_TRUE(proceeds(run, 30)) << run.output();
+        send_signal(worker_of_camera(), SIGKILL);
+        EXPECT_TRUE(proceeds(30)) << run.output();
     }
-    end(run);
+    end();
     EXPECT_TRUE(eventually([] { return kernel_driven() == 2; }));
 }
 
 TEST_F(UvcRun, TheKernelsDriverReturnsIfArhostIsKilled) {
-    arhost::test::ArhostRun run(configuration(usb));
-    run.start({"run.yaml", "--allow-no-target"});
-    ASSERT_TRUE(proceeds(run)) << run.output();
-    arhost::test::send_signal(run.pid(), SIGKILL);
+    ASSERT_NO_FATAL_FAILURE(start());
+    send_signal(run.pid(), SIGKILL);
     EXPECT_TRUE(eventually([] { return kernel_driven() == 2; }));
 }
 
@@ -543,14 +501,7 @@ TEST_F(UvcRun, TheKernelsDriverReturnsIfArhostIsKilled) {
 namespace {
 
 nlohmann::json listed_cameras(uid_t user = 0, const char *plugin = "source_uvc") {
-    arhost::test::ArhostRun run;
-    run.start({"devices", "--json", plugin}, [user] {
-        if (user != 0 && (setgroups(0, nullptr) != 0 || setgid(user) != 0 || setuid(user) != 0))
-            _exit(126);
-    });
-    EXPECT_EQ(run.wait(), 0) << run.output();
-    const nlohmann::json json = nlohmann::json::parse(run.messages(), nullptr, false);
-    EXPECT_TRUE(json.is_object()) << run.messages();
+    const nlohmann::json json = listed_devices(plugin, user);
     EXPECT_TRUE(json["problems"].empty()) << json;
     return json["cameras"];
 }
@@ -580,12 +531,10 @@ TEST_F(UvcCamera, IsListedWithControlsIfNoDriverUsesIt) {
             std::ofstream(driver / "unbind") << entry.filename().string();
     ASSERT_EQ(kernel_driven(), 0);
     const nlohmann::json controls = listed_cameras().at(0)["controls"];
-    const auto focus =
-        std::ranges::find_if(controls, [](const auto &control) { return control["name"] == "focus_absolute"; });
-    ASSERT_NE(focus, controls.end()) << controls;
-    EXPECT_EQ((*focus)["minimum"], 0);
-    EXPECT_EQ((*focus)["maximum"], 250);
-    EXPECT_EQ((*focus)["step"], 5);
+    const nlohmann::json focus = element_with(controls, "name", "focus_absolute");
+    EXPECT_EQ(focus["minimum"], 0) << controls;
+    EXPECT_EQ(focus["maximum"], 250);
+    EXPECT_EQ(focus["step"], 5);
 }
 
 TEST_F(UvcCamera, IsListedWithTheReasonWhyItCannotBeOpened) {
@@ -613,39 +562,35 @@ TEST_F(UvcCamera, IsListedWhileItCaptures) {
 
 TEST_F(UvcCamera, IsCapturedByTheV4l2SourceToo) {
     ASSERT_TRUE(eventually([] { return fs::exists("/dev/video0"); }));
-    SourceUnderTest v4l2("source_v4l2");
-    arhost_source_setup setup{};
-    setup.fps = 30;
-    ASSERT_EQ(v4l2.start({{"device", "/dev/video0"},
+    const arhost_source_setup setup = source_setup(30, false);
+    SourceUnderTest v4l2("source_v4l2",
+                         {{"device", "/dev/video0"},
                           {"format", "yuyv"},
                           {"exposure", "100"},
                           {"focus", "40"},
                           {"white_balance", "5000"},
                           {"power_line_frequency", "60_hz"},
                           {"controls", "gain=7, tilt_absolute=-3"}},
-                         setup),
-              ARHOST_STATUS_OK)
-        << v4l2.log();
+                         setup);
     for (std::uint64_t n = 0; n < 10; ++n) {
         const SourceFrame frame = v4l2.read(n);
         ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << v4l2.log();
         EXPECT_TRUE(frame.bytes == UsbCamera::picture(number_of(frame.bytes), false));
     }
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x02), Octets{1});
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x04), (Octets{100, 0, 0, 0}));
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x08), Octets{0});
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x06), (Octets{40, 0}));
-    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x0a), (Octets{0x88, 0x13}));
-    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x05), Octets{2});
-    EXPECT_EQ(camera_->value(UsbCamera::processing, 0x04), (Octets{7, 0}));
+    expect_controls({manual_exposure,
+                     exposure_of_10_ms,
+                     {UsbCamera::terminal, 0x08, {0}},
+                     {UsbCamera::terminal, 0x06, {40, 0}},
+                     {UsbCamera::processing, 0x0a, {0x88, 0x13}},
+                     power_line_60_hz,
+                     gain_7});
     v4l2.stop();
     ASSERT_EQ(
         v4l2.start({{"device", "/dev/video0"}, {"format", "mjpeg"}, {"exposure", "auto"}, {"focus", "auto"}}, setup),
         ARHOST_STATUS_OK)
         << v4l2.log();
     EXPECT_EQ(v4l2.read(0).status, ARHOST_STATUS_OK);
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x02), Octets{8});
-    EXPECT_EQ(camera_->value(UsbCamera::terminal, 0x08), Octets{1});
+    expect_controls({{UsbCamera::terminal, 0x02, {8}}, {UsbCamera::terminal, 0x08, {1}}});
 }
 
 // ---- A depth camera beside a colour camera ---------------------------------------------------------
@@ -706,10 +651,7 @@ protected:
 TEST_F(DepthBesideColour, EachFrameHasTheDepthThatWasCapturedNearest) {
     for (const bool is_live : {false, true}) {
         SCOPED_TRACE(is_live);
-        arhost_source_setup setup{};
-        setup.fps = 10;
-        setup.paced = is_live;
-        ASSERT_EQ(v4l2_.start(options(), setup), ARHOST_STATUS_OK) << v4l2_.log();
+        ASSERT_EQ(v4l2_.start(options(), source_setup(10, is_live)), ARHOST_STATUS_OK) << v4l2_.log();
         ASSERT_TRUE(v4l2_.format().has_depth);
         int without_depth = 0, far = 0;
         for (std::uint64_t n = 0; n < 40; ++n) {
@@ -754,15 +696,10 @@ TEST_F(DepthBesideColour, DepthIsConvertedToMillimetres) {
 }
 
 TEST_F(DepthBesideColour, ALostDepthCameraIsALostDevice) {
-    arhost_source_setup setup{};
-    setup.paced = 1;
-    ASSERT_EQ(v4l2_.start(options(), setup), ARHOST_STATUS_OK) << v4l2_.log();
+    ASSERT_EQ(v4l2_.start(options(), source_setup(0, true)), ARHOST_STATUS_OK) << v4l2_.log();
     ASSERT_EQ(v4l2_.read(0).status, ARHOST_STATUS_OK);
     depth_.reset();
-    arhost_status status = ARHOST_STATUS_OK;
-    for (std::uint64_t n = 1; n < 200 && status == ARHOST_STATUS_OK; ++n)
-        status = v4l2_.read(n).status;
-    EXPECT_EQ(status, ARHOST_STATUS_ERROR_DEVICE_LOST) << v4l2_.log();
+    EXPECT_EQ(v4l2_.read_all(1, 199).back().status, ARHOST_STATUS_ERROR_DEVICE_LOST) << v4l2_.log();
 }
 
 TEST_F(DepthBesideColour, ASilentDepthCameraLeavesTheVideoRunning) {
@@ -794,18 +731,15 @@ TEST_F(DepthBesideColour, UnsuitableDepthDevicesAreRejected) {
 
 TEST_F(DepthBesideColour, TheDepthCameraIsListed) {
     const nlohmann::json cameras = listed_cameras(0, "source_v4l2");
-    const auto depth = std::ranges::find_if(cameras, [](const auto &camera) { return camera["serial"] == "0002"; });
-    ASSERT_NE(depth, cameras.end()) << cameras;
-    EXPECT_EQ((*depth)["formats"][0]["pixel_format"], "z16");
+    EXPECT_EQ(element_with(cameras, "serial", "0002")["formats"][0]["pixel_format"], "z16") << cameras;
 }
 
 TEST_F(DepthBesideColour, ARunWritesDepthFromTheSandbox) {
-    arhost::test::ArhostRun run(
-        "version: 1\nmode: live\nsandbox: strict\nframes: 20\n"
-        "source: {plugin: source_v4l2, allow: [video], fps: 10, options: {device: " +
-        node_of("0001") + ", format: yuyv, depth_device: " + node_of("0002") +
-        "}}\noutputs: [{plugin: sink_images, path: out/depth_%d.png, options: {content: depth}}]\n"
-        "stats: stats.json\n");
+    ArhostRun run("version: 1\nmode: live\nsandbox: strict\nframes: 20\n"
+                  "source: {plugin: source_v4l2, allow: [video], fps: 10, options: {device: " +
+                  node_of("0001") + ", format: yuyv, depth_device: " + node_of("0002") +
+                  "}}\noutputs: [{plugin: sink_images, path: out/depth_%d.png, options: {content: depth}}]\n"
+                  "stats: stats.json\n");
     EXPECT_EQ(run.run({"run.yaml"}), 0) << run.output();
     EXPECT_TRUE(run.stats()["counters"]["source"].contains("without_depth")) << run.stats()["counters"];
     const auto files = std::distance(fs::directory_iterator(run.path("out")), {});

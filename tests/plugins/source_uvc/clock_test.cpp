@@ -32,6 +32,12 @@ struct Camera {
                    std::max(last_arrival_ns, sent_ns + ms / 10 + (random() % 10 == 0 ? 50 * ms : jitter));
     }
     std::int64_t last_arrival_ns = 0;
+    // Sends the start of a frame; returns when.
+    std::int64_t send(int frame, DeviceClock &clock) {
+        const std::int64_t sent = start_ns + frame * frame_ns;
+        clock.add(ticks_at(sent), arrival_of(sent));
+        return sent;
+    }
 };
 
 } // namespace
@@ -40,8 +46,7 @@ TEST(DeviceClock, FollowsTheCameraInSpiteOfLateArrivals) {
     Camera camera;
     DeviceClock clock(frequency);
     for (int frame = 0; frame < 1500; ++frame) { // 50 s
-        const std::int64_t sent = camera.start_ns + frame * frame_ns;
-        clock.add(camera.ticks_at(sent), camera.arrival_of(sent));
+        const std::int64_t sent = camera.send(frame, clock);
         if (frame < 100)
             continue;
         const auto host = clock.host_ns(camera.ticks_at(sent - 20 * ms));
@@ -56,8 +61,7 @@ TEST(DeviceClock, IsUnknownUntilThereAreSamples) {
     EXPECT_FALSE(clock.host_ns(0));
     for (int frame = 0; frame < 8; ++frame) {
         EXPECT_FALSE(clock.host_ns(camera.ticks_at(camera.start_ns))) << frame;
-        const std::int64_t sent = camera.start_ns + frame * frame_ns;
-        clock.add(camera.ticks_at(sent), camera.arrival_of(sent));
+        camera.send(frame, clock);
     }
     EXPECT_TRUE(clock.host_ns(camera.ticks_at(camera.start_ns)));
 }
@@ -66,10 +70,8 @@ TEST(DeviceClock, IsUnknownIfItDoesNotRunAtTheStatedFrequency) {
     Camera camera;
     for (const std::uint32_t stated : {0u, frequency / 10 * 11, frequency / 10 * 9, frequency / 100}) {
         DeviceClock clock(stated);
-        for (int frame = 0; frame < 300; ++frame) {
-            const std::int64_t sent = camera.start_ns + frame * frame_ns;
-            clock.add(camera.ticks_at(sent), camera.arrival_of(sent));
-        }
+        for (int frame = 0; frame < 300; ++frame)
+            camera.send(frame, clock);
         EXPECT_FALSE(clock.host_ns(camera.ticks_at(camera.start_ns + 300 * frame_ns))) << stated;
     }
 }
@@ -78,10 +80,8 @@ TEST(DeviceClock, StartsAgainAfterAReset) {
     Camera camera;
     DeviceClock clock(frequency);
     const auto run = [&](int from, int to) {
-        for (int frame = from; frame < to; ++frame) {
-            const std::int64_t sent = camera.start_ns + frame * frame_ns;
-            clock.add(camera.ticks_at(sent), camera.arrival_of(sent));
-        }
+        for (int frame = from; frame < to; ++frame)
+            camera.send(frame, clock);
     };
     run(0, 200);
     camera.start_ticks += 10 * frequency;

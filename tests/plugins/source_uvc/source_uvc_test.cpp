@@ -10,32 +10,20 @@
 using arhost::test::SourceUnderTest;
 using testing::HasSubstr;
 
-namespace {
-
-std::string rejection(const std::map<std::string, std::string> &options, arhost_status expected) {
-    SourceUnderTest source("source_uvc");
-    EXPECT_EQ(source.start(options), expected) << source.log();
-    const std::string errors = source.log(ARHOST_SEVERITY_ERROR);
-    EXPECT_EQ(std::count(errors.begin(), errors.end(), '\n'), 1) << "expected one error message, got:\n" << errors;
-    return errors;
-}
-
-} // namespace
-
 TEST(UvcRejection, DescribesTheFormOfAnIdentity) {
     for (const char *text : {"046d", "046d:", ":0825", "046d:0825x", "046g:0825", "12345:0825", "046d;0825"})
-        EXPECT_THAT(rejection({{"usb", text}}, ARHOST_STATUS_ERROR_CONFIGURATION),
+        EXPECT_THAT(SourceUnderTest::rejection("source_uvc", {{"usb", text}}),
                     HasSubstr("is not of the form VENDOR:PRODUCT[:SERIAL], such as 046d:0825"))
             << text;
 }
 
 TEST(UvcRejection, NamesTheCameraThatIsMissing) {
-    EXPECT_THAT(rejection({{"usb", "ffff:fffe:a:b"}}, ARHOST_STATUS_ERROR_DEVICE_LOST),
+    EXPECT_THAT(SourceUnderTest::rejection("source_uvc", {{"usb", "ffff:fffe:a:b"}}, ARHOST_STATUS_ERROR_DEVICE_LOST),
                 HasSubstr("there is no camera ffff:fffe with the serial number 'a:b'"));
 }
 
 TEST(UvcRejection, RequiresBothSidesOfASizeOrNeither) {
-    EXPECT_THAT(rejection({{"width", "640"}}, ARHOST_STATUS_ERROR_CONFIGURATION), HasSubstr("set both or neither"));
+    EXPECT_THAT(SourceUnderTest::rejection("source_uvc", {{"width", "640"}}), HasSubstr("set both or neither"));
 }
 
 TEST(Uvc, DeclaresUsbNeedsAndLiveCapability) {

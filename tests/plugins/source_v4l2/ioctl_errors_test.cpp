@@ -146,8 +146,7 @@ protected:
     MockCamera camera_;
     SourceUnderTest source_{"source_v4l2"};
     arhost_status start(std::uint64_t first_sequence = 0) {
-        arhost_source_setup setup{};
-        setup.fps = 30;
+        arhost_source_setup setup = arhost::test::source_setup(30, false);
         setup.first_sequence = first_sequence;
         return source_.start({{"device", "/dev/video0"}}, setup);
     }

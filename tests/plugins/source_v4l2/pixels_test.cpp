@@ -167,29 +167,26 @@ TEST(V4l2Pixels, WithTooShortRowsAreADefectOfTheDriver) {
 }
 
 TEST(V4l2Pixels, HaveTheMatrixAndRangeOfTheDriver) {
+    const auto picture = [](std::uint32_t fourcc, std::uint32_t colorspace, std::uint32_t encoding = 0,
+                            std::uint32_t quantization = 0, std::uint32_t transfer = 0) {
+        return PictureFormat{fourcc, width, height, colorspace, encoding, quantization, transfer, {width}};
+    };
     arhost_frame_format format{};
-    ASSERT_TRUE(describe({V4L2_PIX_FMT_NV12, width, height, V4L2_COLORSPACE_REC709, 0, 0, 0, {width}}, format));
+    ASSERT_TRUE(describe(picture(V4L2_PIX_FMT_NV12, V4L2_COLORSPACE_REC709), format));
     EXPECT_EQ(format.yuv_matrix, ARHOST_YUV_MATRIX_BT709);
     EXPECT_EQ(format.yuv_range, ARHOST_YUV_RANGE_LIMITED);
-    ASSERT_TRUE(describe({V4L2_PIX_FMT_NV12,
-                          width,
-                          height,
-                          V4L2_COLORSPACE_REC709,
-                          V4L2_YCBCR_ENC_601,
-                          V4L2_QUANTIZATION_FULL_RANGE,
-                          0,
-                          {width}},
-                         format));
+    ASSERT_TRUE(
+        describe(picture(V4L2_PIX_FMT_NV12, V4L2_COLORSPACE_REC709, V4L2_YCBCR_ENC_601, V4L2_QUANTIZATION_FULL_RANGE),
+                 format));
     EXPECT_EQ(format.yuv_matrix, ARHOST_YUV_MATRIX_BT601);
     EXPECT_EQ(format.yuv_range, ARHOST_YUV_RANGE_FULL);
     EXPECT_EQ(format.transfer, ARHOST_TRANSFER_SRGB);
-    ASSERT_TRUE(describe({V4L2_PIX_FMT_GREY, width, height, V4L2_COLORSPACE_RAW, 0, 0, 0, {width}}, format));
+    ASSERT_TRUE(describe(picture(V4L2_PIX_FMT_GREY, V4L2_COLORSPACE_RAW), format));
     EXPECT_EQ(format.transfer, ARHOST_TRANSFER_LINEAR);
-    ASSERT_TRUE(describe({V4L2_PIX_FMT_GREY, width, height, V4L2_COLORSPACE_SRGB, 0, 0, V4L2_XFER_FUNC_NONE, {width}},
-                         format));
+    ASSERT_TRUE(describe(picture(V4L2_PIX_FMT_GREY, V4L2_COLORSPACE_SRGB, 0, 0, V4L2_XFER_FUNC_NONE), format));
     EXPECT_EQ(format.transfer, ARHOST_TRANSFER_LINEAR);
-    EXPECT_TRUE(has_known_matrix({V4L2_PIX_FMT_NV12, width, height, V4L2_COLORSPACE_REC709, 0, 0, 0, {width}}));
-    EXPECT_FALSE(has_known_matrix({V4L2_PIX_FMT_NV12, width, height, V4L2_COLORSPACE_BT2020, 0, 0, 0, {width}}));
-    EXPECT_TRUE(has_known_matrix({V4L2_PIX_FMT_RGB24, width, height, V4L2_COLORSPACE_BT2020, 0, 0, 0, {width}}));
-    EXPECT_FALSE(describe({V4L2_PIX_FMT_MJPEG, width, height, 0, 0, 0, 0, {}}, format));
+    EXPECT_TRUE(has_known_matrix(picture(V4L2_PIX_FMT_NV12, V4L2_COLORSPACE_REC709)));
+    EXPECT_FALSE(has_known_matrix(picture(V4L2_PIX_FMT_NV12, V4L2_COLORSPACE_BT2020)));
+    EXPECT_TRUE(has_known_matrix(picture(V4L2_PIX_FMT_RGB24, V4L2_COLORSPACE_BT2020)));
+    EXPECT_FALSE(describe(picture(V4L2_PIX_FMT_MJPEG, 0), format));
 }

@@ -2,8 +2,11 @@
 //
 // Captures from vivid, the kernel's virtual camera, and makes vivid inject faults. To be run in a virtual machine:
 //   tools/vm/run-in-vm -m "vivid n_devs=1 node_types=0x1" …/source_v4l2-vivid-test
+#include "../../support/eventually.hpp"
+#include "../../support/process_state.hpp"
 #include "../../system/arhost_run.hpp"
 #include "../../system/device_schema.hpp"
+#include "../../system/listed_devices.hpp"
 #include "../../system/suspend.hpp"
 #include "../source_file/source_under_test.hpp"
 #include "frame_colours.hpp"
@@ -11,7 +14,7 @@
 #include <gmock/gmock.h>
 
 #include <fcntl.h>
-#include <grp.h>
+
 #include <linux/videodev2.h>
 #include <sys/ioctl.h>
 #include <sys/stat.h>
@@ -23,13 +26,11 @@
 #include <chrono>
 #include <ctime>
 #include <fstream>
+#include <regex>
 #include <thread>
 
 namespace fs = std::filesystem;
-using arhost::test::colour_at;
-using arhost::test::rgb_of;
-using arhost::test::SourceFrame;
-using arhost::test::SourceUnderTest;
+using namespace arhost::test;
 using testing::HasSubstr;
 
 namespace {
@@ -91,11 +92,8 @@ protected:
         v4l2_query_ext_ctrl query{};
         for (query.id = V4L2_CTRL_FLAG_NEXT_CTRL; ioctl(fd_, VIDIOC_QUERY_EXT_CTRL, &query) == 0;
              query.id |= V4L2_CTRL_FLAG_NEXT_CTRL)
-            for (const char *word : {"Inject", "Wrap", "Disconnect", "Drop", "Error"})
-                if (std::string(query.name).find(word) != std::string::npos) {
-                    names.emplace_back(query.name);
-                    break;
-                }
+            if (std::regex_search(query.name, std::regex("Inject|Wrap|Disconnect|Drop|Error")))
+                names.emplace_back(query.name);
         return names;
     }
     int get(std::uint32_t id) const {
@@ -110,25 +108,39 @@ protected:
             options["width"] = "320";
             options["height"] = "180";
         }
-        arhost_source_setup setup{};
-        setup.fps = fps;
-        setup.paced = live;
-        return source_.start(options, setup);
+        return source_.start(options, source_setup(fps, live));
+    }
+    // Checks that a start with these options fails with messages that contain `words`.
+    void expect_rejection(const std::map<std::string, std::string> &options, const std::vector<const char *> &words,
+                          arhost_status status = ARHOST_STATUS_ERROR_CONFIGURATION) {
+        EXPECT_EQ(start(30, options), status) << source_.log();
+        for (const char *word : words)
+            EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr(word));
+    }
+    // Checks that a frame was stamped by CLOCK_MONOTONIC within the last second, and not before `last_ns`.
+    static void expect_recent(const SourceFrame &frame, std::int64_t last_ns) {
+        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+        EXPECT_EQ(frame.info.clock, ARHOST_CLOCK_MONOTONIC);
+        EXPECT_GE(frame.info.capture_ns, last_ns);
+        const std::int64_t age = monotonic_ns() - frame.info.capture_ns;
+        EXPECT_GE(age, 0);
+        EXPECT_LT(age, 1'000'000'000);
+    }
+    // Returns the number of frames that were skipped before the frames [first, end).
+    std::uint64_t skipped_in(std::uint64_t first, std::uint64_t end) {
+        std::uint64_t skipped = 0;
+        for (std::uint64_t n = first; n < end; ++n) {
+            last_ = source_.read(n);
+            EXPECT_EQ(last_.status, ARHOST_STATUS_OK) << source_.log();
+            skipped += last_.info.skipped;
+        }
+        return skipped;
     }
 
     SourceUnderTest source_{"source_v4l2"};
+    SourceFrame last_; // of skipped_in()
     int fd_ = -1;
 };
-
-std::int64_t monotonic_ns() {
-    timespec time{};
-    clock_gettime(CLOCK_MONOTONIC, &time);
-    return time.tv_sec * std::int64_t{1'000'000'000} + time.tv_nsec;
-}
-
-std::size_t open_files() {
-    return static_cast<std::size_t>(std::distance(fs::directory_iterator("/proc/self/fd"), {}));
-}
 
 std::size_t device_mappings() {
     std::ifstream maps("/proc/self/maps");
@@ -136,14 +148,6 @@ std::size_t device_mappings() {
     for (std::string line; std::getline(maps, line);)
         count += line.find("/dev/video") != std::string::npos;
     return count;
-}
-
-[[maybe_unused]] std::size_t resident_kib() {
-    std::ifstream status("/proc/self/status");
-    for (std::string line; std::getline(status, line);)
-        if (line.starts_with("VmRSS:"))
-            return std::stoul(line.substr(6));
-    return 0;
 }
 
 // vivid's eight colour bars over 320 px: white, yellow, cyan, green, magenta, red, blue and black.
@@ -229,12 +233,7 @@ TEST_F(Vivid, StampsFramesWithTheMonotonicClock) {
     std::int64_t last = 0;
     for (std::uint64_t n = 0; n < 15; ++n) {
         const SourceFrame frame = source_.read(n);
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
-        EXPECT_EQ(frame.info.clock, ARHOST_CLOCK_MONOTONIC);
-        EXPECT_GT(frame.info.capture_ns, last);
-        const std::int64_t age = monotonic_ns() - frame.info.capture_ns;
-        EXPECT_GE(age, 0);
-        EXPECT_LT(age, 1'000'000'000);
+        expect_recent(frame, last + 1);
         if (n > 0 && frame.info.skipped == 0) {
             EXPECT_NEAR(static_cast<double>(frame.info.capture_ns - last), 33.3e6, 20e6);
         }
@@ -267,18 +266,11 @@ TEST_F(Vivid, LockstepDeliversEveryFrameInOrder) {
 TEST_F(Vivid, CountsFramesDroppedByTheDriver) {
     set(percentage_of_dropped_buffers, 50);
     ASSERT_EQ(start(50), ARHOST_STATUS_OK) << source_.log();
-    std::uint64_t skipped = 0;
-    const std::int64_t first = source_.read(0).info.capture_ns;
-    std::int64_t last = first;
-    for (std::uint64_t n = 1; n < 30; ++n) {
-        const SourceFrame frame = source_.read(n);
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
-        skipped += frame.info.skipped;
-        last = frame.info.capture_ns;
-    }
+    const std::int64_t first_ns = source_.read(0).info.capture_ns;
+    const std::uint64_t skipped = skipped_in(1, 30);
     EXPECT_GT(skipped, 5u);
     // At 50 fps, a frame takes 20 ms. The delivered and the skipped frames together must match the elapsed time.
-    EXPECT_NEAR(static_cast<double>(last - first) / 20e6, static_cast<double>(29 + skipped), 3);
+    EXPECT_NEAR(static_cast<double>(last_.info.capture_ns - first_ns) / 20e6, static_cast<double>(29 + skipped), 3);
     EXPECT_GT(source_.plugin().counters().at("lost_by_driver"), 5u);
 }
 
@@ -286,13 +278,7 @@ TEST_F(Vivid, DropsFramesMarkedAsDamaged) {
     ASSERT_EQ(start(30), ARHOST_STATUS_OK) << source_.log();
     ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     set(inject_buffer_error, 1);
-    std::uint64_t skipped = 0;
-    for (std::uint64_t n = 1; n < 6; ++n) {
-        const SourceFrame frame = source_.read(n);
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
-        skipped += frame.info.skipped;
-    }
-    EXPECT_GE(skipped, 1u);
+    EXPECT_GE(skipped_in(1, 6), 1u);
     EXPECT_EQ(source_.plugin().counters().at("marked_damaged"), 1u);
 }
 
@@ -329,10 +315,7 @@ TEST_F(Vivid, UsesTheDriversSizeByDefault) {
 }
 
 TEST_F(Vivid, UsesTheSizeOfTheCalibration) {
-    arhost_intrinsics camera{};
-    camera.struct_size = sizeof camera;
-    camera.width = 640;
-    camera.height = 480;
+    const arhost_intrinsics camera = intrinsics_of_size(640, 480);
     arhost_source_setup setup{};
     setup.intrinsics = &camera;
     ASSERT_EQ(source_.start({{"device", device}}, setup), ARHOST_STATUS_OK) << source_.log();
@@ -345,15 +328,12 @@ TEST_F(Vivid, UsesTheSizeOfTheCalibration) {
 }
 
 TEST_F(Vivid, RejectsAnUnsupportedSizeAndNamesTheNearest) {
-    EXPECT_EQ(start(30, {{"width", "650"}, {"height", "470"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has no size 650×470 in YUYV"));
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("the nearest are 640×480"));
+    expect_rejection({{"width", "650"}, {"height", "470"}},
+                     {"has no size 650×470 in YUYV", "the nearest are 640×480"});
 }
 
 TEST_F(Vivid, RejectsAnUnsupportedFormatAndListsTheSupportedOnes) {
-    EXPECT_EQ(start(30, {{"format", "mjpeg"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("offers no mjpeg"));
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("YUYV (320×180 60 fps, 640×360 40 fps"));
+    expect_rejection({{"format", "mjpeg"}}, {"offers no mjpeg", "YUYV (320×180 60 fps, 640×360 40 fps"});
 }
 
 TEST_F(Vivid, WarnsAboutAnUnreachableRate) {
@@ -395,73 +375,41 @@ TEST_F(Vivid, SetsControlsWhileItCaptures) {
 }
 
 TEST_F(Vivid, RejectsControlsThatItDoesNotHave) {
-    EXPECT_EQ(start(30, {{"controls", "brightnes=3"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(
-        source_.log(ARHOST_SEVERITY_ERROR),
-        HasSubstr("controls: the camera '/dev/video0' (vivid) has no control 'brightnes'; it has: brightness, "
-                  "contrast, "));
-    EXPECT_EQ(start(30, {{"focus", "auto"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("focus: the camera"));
+    expect_rejection({{"controls", "brightnes=3"}},
+                     {"controls: the camera '/dev/video0' (vivid) has no control 'brightnes'; it has: brightness, "
+                      "contrast, "});
+    expect_rejection({{"focus", "auto"}}, {"focus: the camera"});
 }
 
 TEST_F(Vivid, RejectsValuesOutsideTheRangeOfAControl) {
-    EXPECT_EQ(start(30, {{"gain", "300"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("does not accept '300' for 'gain'; valid: 0 to 255"));
-    EXPECT_EQ(start(30, {{"controls", "menu=9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR),
-                HasSubstr("does not accept '9' for 'menu'; valid: 1 (menu_item_1), "));
-    EXPECT_EQ(start(30, {{"controls", "boolean=maybe"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("valid: true or false"));
-    EXPECT_EQ(start(30, {{"controls", "brightness"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("'brightness' is not of the form NAME=VALUE"));
-    EXPECT_EQ(start(30, {{"controls", "bitmask=4, brightness=7x"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
+    expect_rejection({{"gain", "300"}}, {"does not accept '300' for 'gain'; valid: 0 to 255"});
+    expect_rejection({{"controls", "menu=9"}}, {"does not accept '9' for 'menu'; valid: 1 (menu_item_1), "});
+    expect_rejection({{"controls", "boolean=maybe"}}, {"valid: true or false"});
+    expect_rejection({{"controls", "brightness"}}, {"'brightness' is not of the form NAME=VALUE"});
+    expect_rejection({{"controls", "bitmask=4, brightness=7x"}}, {});
 }
 
 TEST_F(Vivid, ReportsACameraInUse) {
     SourceUnderTest first("source_v4l2");
     ASSERT_EQ(first.start({{"device", device}}), ARHOST_STATUS_OK) << first.log();
-    EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("in use by another program"));
+    expect_rejection({}, {"in use by another program"}, ARHOST_STATUS_ERROR_IO);
     first.stop();
     EXPECT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
 }
 
 TEST_F(Vivid, ListsCamerasIfTheConfiguredOneIsMissing) {
-    EXPECT_EQ(start(30, {{"device", "/dev/video9"}}), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("/dev/video0 (vivid-000-vid-cap)"));
+    expect_rejection({{"device", "/dev/video9"}}, {"/dev/video0 (vivid-000-vid-cap)"});
 }
 
 // ---- arhost devices ----------------------------------------------------------------------------------
 
 namespace {
 
-// Returns the output of `arhost devices --json`, run by the user with this id.
-nlohmann::json listed_devices(uid_t user = 0) {
-    arhost::test::ArhostRun run;
-    run.start({"devices", "--json", "source_v4l2"}, [user] {
-        if (user != 0 && (setgroups(0, nullptr) != 0 || setgid(user) != 0 || setuid(user) != 0))
-            _exit(126);
-    });
-    EXPECT_EQ(run.wait(), 0) << run.output();
-    nlohmann::json json = nlohmann::json::parse(run.messages(), nullptr, false);
-    EXPECT_FALSE(json.is_discarded()) << run.messages();
-    return json.is_discarded() ? nlohmann::json::object() : json;
-}
-
 nlohmann::json listed_camera(const char *node, uid_t user = 0) {
-    const nlohmann::json list = listed_devices(user);
-    for (const nlohmann::json &camera : list.value("cameras", nlohmann::json::array()))
-        if (camera["path"] == node)
-            return camera;
-    ADD_FAILURE() << node << " is missing: " << list;
-    return {};
-}
-
-nlohmann::json named(const nlohmann::json &list, const char *key, const char *name) {
-    for (const nlohmann::json &entry : list)
-        if (entry[key] == name)
-            return entry;
-    return {};
+    const nlohmann::json list = listed_devices("source_v4l2", user);
+    const nlohmann::json camera = element_with(list.value("cameras", nlohmann::json::array()), "path", node);
+    EXPECT_TRUE(camera.is_object()) << node << " is missing: " << list;
+    return camera;
 }
 
 } // namespace
@@ -475,7 +423,7 @@ TEST_F(Vivid, IsListedWithFormatsSizesRatesAndControls) {
     EXPECT_EQ(camera["serial"], nullptr) << "it is no USB device";
     EXPECT_EQ(camera["problem"], nullptr);
     for (const char *format : {"yuyv", "uyvy", "nv12", "yuv420", "rgb24", "bgr24", "grey", "y10", "y12", "y16"}) {
-        const nlohmann::json sizes = named(camera["formats"], "pixel_format", format)["sizes"];
+        const nlohmann::json sizes = element_with(camera["formats"], "pixel_format", format)["sizes"];
         ASSERT_EQ(sizes.size(), 6u) << format;
         EXPECT_EQ(sizes[0]["width"], 320);
         EXPECT_EQ(sizes[0]["height"], 180);
@@ -485,31 +433,30 @@ TEST_F(Vivid, IsListedWithFormatsSizesRatesAndControls) {
         EXPECT_EQ(sizes[5]["rates"], nlohmann::json({2.0, 1.0}));
     }
     set(V4L2_CID_BRIGHTNESS, 200);
-    EXPECT_EQ(named(listed_camera(device)["controls"], "name", "brightness"), nlohmann::json({{"name", "brightness"},
-                                                                                              {"type", "integer"},
-                                                                                              {"minimum", 0},
-                                                                                              {"maximum", 255},
-                                                                                              {"step", 1},
-                                                                                              {"default", 128},
-                                                                                              {"value", 200}}));
-    EXPECT_EQ(named(camera["controls"], "name", "bitmask")["value"], 0x80000010u);
-    EXPECT_EQ(named(camera["controls"], "name", "horizontal_flip")["type"], "boolean");
-    EXPECT_EQ(named(camera["controls"], "name", "test_pattern")["value"], 1) << "as SetUp has set it";
-    EXPECT_EQ(named(camera["controls"], "name", "disconnect")["type"], "button");
-    EXPECT_EQ(named(camera["controls"], "name", "disconnect")["value"], nullptr);
+    const auto control = [](const nlohmann::json &listed, const char *name) {
+        return element_with(listed["controls"], "name", name);
+    };
+    EXPECT_EQ(control(listed_camera(device), "brightness"),
+              nlohmann::json::parse(R"({"name": "brightness", "type": "integer", "minimum": 0, "maximum": 255,
+                                        "step": 1, "default": 128, "value": 200})"));
+    EXPECT_EQ(control(camera, "bitmask")["value"], 0x80000010u);
+    EXPECT_EQ(control(camera, "horizontal_flip")["type"], "boolean");
+    EXPECT_EQ(control(camera, "test_pattern")["value"], 1) << "as SetUp has set it";
+    EXPECT_EQ(control(camera, "disconnect")["type"], "button");
+    EXPECT_EQ(control(camera, "disconnect")["value"], nullptr);
 }
 
 TEST_F(Vivid, IsListedRepeatedlyWithoutLeaks) {
-    arhost::test::ArhostRun run;
+    ArhostRun run;
     EXPECT_EQ(run.run({"conform", "source_v4l2", "--allow", "video", "--only", "abi.create,abi.devices"}), 0)
         << run.output();
     EXPECT_THAT(run.output(), testing::ContainsRegex("pass     abi.devices\\s+vivid"));
 }
 
 TEST_F(Vivid, IsDescribedAsTheSchemaDemands) {
-    if (!arhost::test::can_validate())
+    if (!can_validate())
         GTEST_SKIP() << "Debian's package python3-jsonschema is not installed";
-    EXPECT_EQ(arhost::test::schema_violation(listed_devices()), "");
+    EXPECT_EQ(schema_violation(listed_devices("source_v4l2")), "");
 }
 
 TEST_F(Vivid, ABusyCameraNamesTheProcessAndKeepsCapturing) {
@@ -554,9 +501,9 @@ TEST_F(Vivid, ABusyCameraOfAnotherUserSaysHowToFindTheProcess) {
 TEST_F(Vivid, IsFoundByALinkInTheSandbox) {
     fs::create_directories("/dev/v4l/by-id");
     fs::create_symlink("../../video0", "/dev/v4l/by-id/usb-vivid-index0");
-    arhost::test::ArhostRun run("version: 1\nsource: {plugin: source_v4l2, allow: [video], options: {device: "
-                                "/dev/v4l/by-id/usb-vivid-index0, width: 320, height: 180}}\n"
-                                "outputs: [{plugin: sink_null}]\n");
+    ArhostRun run("version: 1\nsource: {plugin: source_v4l2, allow: [video], options: {device: "
+                  "/dev/v4l/by-id/usb-vivid-index0, width: 320, height: 180}}\n"
+                  "outputs: [{plugin: sink_null}]\n");
     EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("320×180"));
     fs::remove_all("/dev/v4l");
@@ -582,25 +529,22 @@ protected:
         const std::string text = run.exists("out/poses.jsonl") ? run.read("out/poses.jsonl") : "";
         return std::count(text.begin(), text.end(), '\n');
     }
-    // Waits until the run has output this number of frames, for at most 30 s.
+    // Waits until the run has output this number of frames.
     bool wait_for(std::ptrdiff_t count) {
-        for (int i = 0; run.running() && frames() < count && i < 3000; ++i)
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
-        return frames() >= count;
+        return eventually([&] { return !run.running() || frames() >= count; }) && frames() >= count;
     }
     void end() {
-        arhost::test::send_signal(run.pid(), SIGINT);
+        send_signal(run.pid(), SIGINT);
         EXPECT_EQ(run.wait(), 130) << run.output();
     }
 
     const fs::path link = "/dev/v4l/by-id/usb-vivid-index0";
-    arhost::test::ArhostRun run{
-        "version: 1\nmode: live\n"
-        "source: {plugin: source_v4l2, allow: [video], fps: 30, options: {device: " +
-        link.string() +
-        ", width: 320, height: 180}}\ncamera: {width: 320, height: 180, fx: 300}\n"
-        "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
-        "outputs: [{plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n"};
+    ArhostRun run{"version: 1\nmode: live\n"
+                  "source: {plugin: source_v4l2, allow: [video], fps: 30, options: {device: " +
+                  link.string() +
+                  ", width: 320, height: 180}}\ncamera: {width: 320, height: 180, fx: 300}\n"
+                  "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
+                  "outputs: [{plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n"};
 };
 
 } // namespace
@@ -651,8 +595,7 @@ TEST_F(VividRun, WaitsUntilTheCameraIsPluggedInAgain) {
     EXPECT_THAT(run.output(), HasSubstr("its device is back"));
     fs::remove(link);
     set(disconnect, 1);
-    for (int i = 0; i < 2000 && run.output().rfind("waiting for") < run.output().rfind("is back"); ++i)
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_TRUE(eventually([&] { return run.output().rfind("waiting for") > run.output().rfind("is back"); }));
     end();
     // Each unplug counts once, however many processes look for the camera meanwhile.
     EXPECT_EQ(run.stats()["restarts"]["source"], 2) << run.output();
@@ -662,7 +605,7 @@ TEST_F(VividRun, SurvivesASuspend) {
     // The source waits for a frame when it is suspended and when it continues.
     set(percentage_of_dropped_buffers, 100);
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
-    ASSERT_TRUE(arhost::test::suspend_processes());
+    ASSERT_TRUE(suspend_processes());
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
     set(percentage_of_dropped_buffers, 0);
     EXPECT_TRUE(wait_for(frames() + 40)) << run.output();
@@ -675,14 +618,8 @@ TEST_F(VividRun, SurvivesASuspend) {
 TEST_F(Vivid, StopsWaitingWhenCancelled) {
     ASSERT_EQ(start(1), ARHOST_STATUS_OK) << source_.log(); // one frame per second
     ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
-    std::thread canceller([&] {
-        std::this_thread::sleep_for(std::chrono::milliseconds(100));
-        source_.plugin().cancel();
-    });
-    const std::int64_t before = monotonic_ns();
+    source_.plugin().cancel(1); // while it waits
     EXPECT_EQ(source_.read(1).status, ARHOST_STATUS_ERROR_CANCELLED);
-    EXPECT_LT(monotonic_ns() - before, 700'000'000);
-    canceller.join();
     EXPECT_EQ(source_.log(ARHOST_SEVERITY_ERROR), "");
 }
 
@@ -690,12 +627,7 @@ TEST_F(Vivid, ReportsAnUnplugAndReconnects) {
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
     ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     set(disconnect, 1);
-    std::uint64_t n = 1;
-    SourceFrame frame;
-    do
-        frame = source_.read(n);
-    while (frame.status == ARHOST_STATUS_OK && ++n < 10);
-    EXPECT_EQ(frame.status, ARHOST_STATUS_ERROR_DEVICE_LOST);
+    EXPECT_EQ(source_.read_all(1, 9).back().status, ARHOST_STATUS_ERROR_DEVICE_LOST);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has disappeared; was it unplugged?"));
     source_.stop();
     EXPECT_EQ(device_mappings(), 0u);
@@ -710,12 +642,7 @@ TEST_F(Vivid, ReportsAFatalDriverError) {
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
     ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
     set(inject_fatal_streaming_error, 1);
-    std::uint64_t n = 1;
-    SourceFrame frame;
-    do
-        frame = source_.read(n);
-    while (frame.status == ARHOST_STATUS_OK && ++n < 10);
-    EXPECT_EQ(frame.status, ARHOST_STATUS_ERROR_DEVICE_LOST);
+    EXPECT_EQ(source_.read_all(1, 9).back().status, ARHOST_STATUS_ERROR_DEVICE_LOST);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has stopped streaming"));
 }
 
@@ -741,11 +668,7 @@ TEST_F(Vivid, WrongTimeStampsAreReplacedByTheArrival) {
         std::int64_t last = 0;
         for (std::uint64_t n = 0; n < 20; ++n) {
             const SourceFrame frame = source_.read(n);
-            ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
-            EXPECT_GE(frame.info.capture_ns, last);
-            const std::int64_t age = monotonic_ns() - frame.info.capture_ns;
-            EXPECT_GE(age, 0);
-            EXPECT_LT(age, 1'000'000'000);
+            expect_recent(frame, last);
             last = frame.info.capture_ns;
         }
         EXPECT_THAT(source_.log(ARHOST_SEVERITY_WARNING), HasSubstr("arrival times are used instead"));
@@ -765,15 +688,12 @@ TEST_F(Vivid, TheTestsInjectEachFaultThatItsControlsOffer) {
 }
 
 TEST_F(Vivid, ReportsDriverErrorsAtStart) {
-    set(inject_reqbufs_error, 1);
-    EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("reported an error while reserving 4 buffers"));
-    set(inject_qbuf_error, 1);
-    EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("reported an error while queueing a buffer"));
-    set(inject_streamon_error, 1);
-    EXPECT_EQ(start(), ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("reported an error while starting the stream"));
+    for (const auto &[control, message] : {std::pair{inject_reqbufs_error, "while reserving 4 buffers"},
+                                           {inject_qbuf_error, "while queueing a buffer"},
+                                           {inject_streamon_error, "while starting the stream"}}) {
+        set(control, 1);
+        expect_rejection({}, {"reported an error", message}, ARHOST_STATUS_ERROR_IO);
+    }
     EXPECT_EQ(device_mappings(), 0u);
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
