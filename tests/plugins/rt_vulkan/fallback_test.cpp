@@ -4,6 +4,7 @@
 // of rt_vulkan is killed. The fallback ray tracer must take over.
 #include "arhost_run.hpp"
 #include "copy_drivers.hpp"
+#include "eventually.hpp"
 #include "two_tracers.hpp"
 
 #include <gmock/gmock.h>
@@ -48,8 +49,7 @@ protected:
         return std::ranges::count_if(lines, [](const CountedLine &line) { return line.kind != ARHOST_OVERLAY_NONE; });
     }
     void remove_drivers() {
-        while (run_.running() && overlaid() < 20)
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        eventually([&] { return !run_.running() || overlaid() >= 20; });
         fs::remove_all(drivers_);
         ASSERT_GT(run_.worker("rt_vulkan"), 0) << run_.output();
         ::kill(run_.worker("rt_vulkan"), SIGKILL); // the host restarts the worker, as it does after a device loss

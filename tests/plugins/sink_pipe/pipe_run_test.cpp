@@ -2,6 +2,7 @@
 //
 // Runs of arhost with sink_pipe, in the sandbox.
 #include "../../system/arhost_run.hpp"
+#include "eventually.hpp"
 #include "fifo.hpp"
 
 #include <gmock/gmock.h>
@@ -9,10 +10,7 @@
 #include <future>
 
 namespace fs = std::filesystem;
-using arhost::test::ArhostRun;
-using arhost::test::count_of;
-using arhost::test::FifoReader;
-using arhost::test::make_fifo;
+using namespace arhost::test;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -26,10 +24,17 @@ std::string yaml(const std::string &output, const std::string &source = "frames:
 }
 
 void wait_for_output(const ArhostRun &run, const std::string &text) {
-    for (int i = 0; run.running() && run.output().find(text) == std::string::npos && i < 6000; ++i)
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    eventually([&] { return !run.running() || run.output().find(text) != std::string::npos; });
     EXPECT_THAT(run.output(), HasSubstr(text));
 }
+
+// A run that writes to a FIFO, with a reader.
+struct FifoRun : ArhostRun {
+    explicit FifoRun(const std::string &output_options = "") : ArhostRun(yaml("path: out/fifo" + output_options)) {
+        make_fifo(fifo);
+    }
+    const fs::path fifo = path("out/fifo");
+};
 
 std::size_t frames_in(const std::string &stream) {
     return (stream.size() - stream.find('\n') - 1) / frame_bytes;
@@ -40,12 +45,11 @@ std::size_t frames_in(const std::string &stream) {
 TEST(PipeRun, FfmpegDecodesEachFrameOfAFifo) {
     if (std::system("ffmpeg -version >/dev/null 2>&1") != 0)
         GTEST_SKIP() << "needs ffmpeg";
-    ArhostRun run(yaml("path: out/fifo"));
-    make_fifo(run.path("out/fifo"));
+    FifoRun run;
     auto decoded = std::async(std::launch::async, [&] {
-        return std::system(("timeout 60 ffmpeg -loglevel error -i " + run.path("out/fifo").string() +
-                            " -f framemd5 " + run.path("md5").string())
-                               .c_str());
+        return std::system(
+            ("timeout 60 ffmpeg -loglevel error -i " + run.fifo.string() + " -f framemd5 " + run.path("md5").string())
+                .c_str());
     });
     EXPECT_EQ(run.run(), 0) << run.output();
     EXPECT_EQ(decoded.get(), 0);
@@ -106,34 +110,30 @@ TEST(PipeRun, AClosedReaderOfStandardOutputEndsTheRun) {
     EXPECT_THAT(run.output(), HasSubstr("the reader of standard output has closed it"));
 }
 
-TEST(PipeRun, OnlyASinkThatSupportsItMayWriteToStandardOutput) {
-    ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 1}}\noutputs: [{plugin: "
-                  "sink_poses, path: \"-\"}]\n");
-    EXPECT_EQ(run.run(), 2) << run.output();
-    EXPECT_THAT(run.output(),
-                HasSubstr("run.yaml:3:38: outputs[0].path: sink_poses cannot write to standard output; name a file"));
-}
-
-TEST(PipeRun, OnlyOneOutputMayUseStandardOutput) {
-    ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 1}}\n"
-                  "outputs: [{plugin: sink_pipe, path: \"-\"}, {plugin: sink_pipe, path: /dev/stdout}]\n");
-    EXPECT_EQ(run.run(), 2) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("another output already writes"));
+TEST(PipeRun, OnlyOneOutputMayUseStandardOutputIfItSupportsIt) {
+    for (const auto &[outputs, error] :
+         {std::pair{"{plugin: sink_poses, path: \"-\"}",
+                    "run.yaml:3:38: outputs[0].path: sink_poses cannot write to standard output; name a file"},
+          {"{plugin: sink_pipe, path: \"-\"}, {plugin: sink_pipe, path: /dev/stdout}",
+           "another output already writes"}}) {
+        ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 1}}\noutputs: [" +
+                      std::string(outputs) + "]\n");
+        EXPECT_EQ(run.run(), 2) << run.output();
+        EXPECT_THAT(run.output(), HasSubstr(error));
+    }
 }
 
 TEST(PipeRun, CheckOpensTheFifoWithoutAReader) {
-    ArhostRun run(yaml("path: out/fifo"));
-    make_fifo(run.path("out/fifo"));
+    FifoRun run;
     EXPECT_EQ(run.run({"check", "run.yaml"}), 0) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("output: sink_pipe: " + fs::canonical(run.path("out/fifo")).string()));
+    EXPECT_THAT(run.output(), HasSubstr("output: sink_pipe: " + fs::canonical(run.fifo).string()));
 }
 
 // The reader pauses longer than the deadline of a frame.
 TEST(PipeRun, APausedReaderDoesNotEndALockstepRun) {
-    ArhostRun run(yaml("path: out/fifo, deadline_ms: 500"));
-    make_fifo(run.path("out/fifo"));
+    FifoRun run(", deadline_ms: 500");
     run.start();
-    const FifoReader reader(run.path("out/fifo"));
+    const FifoReader reader(run.fifo);
     wait_for_output(run, "which has paused");
     const std::string video = reader.read_all();
     EXPECT_EQ(run.wait(), 0) << run.output();
@@ -152,8 +152,7 @@ TEST(PipeRun, APausedReaderOnlyDropsItsOwnFramesOfALiveRun) {
     const auto lines = [&] {
         return count_of(run.exists("out/poses.jsonl") ? run.read("out/poses.jsonl") : "", "\n");
     };
-    for (int i = 0; run.running() && lines() < 150 && i < 6000; ++i)
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    eventually([&] { return !run.running() || lines() >= 150; });
     EXPECT_GE(lines(), 150u) << "the paused reader holds up the run";
     const std::string video = reader.read_all();
     EXPECT_EQ(run.wait(), 0) << run.output();
@@ -163,22 +162,19 @@ TEST(PipeRun, APausedReaderOnlyDropsItsOwnFramesOfALiveRun) {
 }
 
 TEST(PipeRun, AnInterruptEndsARunThatWaitsForAReader) {
-    ArhostRun run(yaml("path: out/fifo"));
-    make_fifo(run.path("out/fifo"));
+    FifoRun run;
     run.start();
     wait_for_output(run, "waiting for a program to read");
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    arhost::test::send_signal(run.pid(), SIGINT);
+    send_signal(run.pid(), SIGINT);
     EXPECT_EQ(run.wait(), 130) << run.output();
 }
 
 TEST(PipeRun, AKilledWorkerCutsTheStreamAndEndsTheOutput) {
-    ArhostRun run(yaml("path: out/fifo"));
-    make_fifo(run.path("out/fifo"));
+    FifoRun run;
     run.start();
-    const FifoReader reader(run.path("out/fifo"));
+    const FifoReader reader(run.fifo);
     std::string video = reader.read(200 + 4 * frame_bytes);
-    arhost::test::send_signal(run.worker("sink_pipe"), SIGKILL);
+    send_signal(run.worker("sink_pipe"), SIGKILL);
     video += reader.read_all();
     EXPECT_EQ(run.wait(), 1) << run.output();
     EXPECT_EQ(count_of(video, "YUV4MPEG2"), 1u);
@@ -186,18 +182,17 @@ TEST(PipeRun, AKilledWorkerCutsTheStreamAndEndsTheOutput) {
 }
 
 TEST(PipeRun, AKilledWorkerBeginsAnotherStreamForTheNextReader) {
-    ArhostRun run(yaml("path: out/fifo, options: {reopen: true}"));
-    make_fifo(run.path("out/fifo"));
+    FifoRun run(", options: {reopen: true}");
     run.start();
     std::string first;
     {
-        const FifoReader reader(run.path("out/fifo"));
+        const FifoReader reader(run.fifo);
         first = reader.read(200 + 4 * frame_bytes);
-        arhost::test::send_signal(run.worker("sink_pipe"), SIGKILL);
+        send_signal(run.worker("sink_pipe"), SIGKILL);
         first += reader.read_all();
     }
     EXPECT_EQ(count_of(first, "YUV4MPEG2"), 1u);
-    const std::string second = FifoReader(run.path("out/fifo")).read_all();
+    const std::string second = FifoReader(run.fifo).read_all();
     EXPECT_EQ(run.wait(), 0) << run.output();
     EXPECT_THAT(second, StartsWith("YUV4MPEG2 "));
     EXPECT_GE(frames_in(first) + frames_in(second), 30u) << "a frame is missing";

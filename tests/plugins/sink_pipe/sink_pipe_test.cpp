@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "eventually.hpp"
 #include "fifo.hpp"
 #include "sink_under_test.hpp"
 
@@ -9,11 +10,7 @@
 #include <future>
 
 namespace fs = std::filesystem;
-using arhost::test::FifoReader;
-using arhost::test::make_fifo;
-using arhost::test::OverlayPicture;
-using arhost::test::Picture;
-using arhost::test::SinkUnderTest;
+using namespace arhost::test;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -22,21 +19,22 @@ namespace {
 struct SinkPipe : testing::Test {
     SinkPipe() { std::signal(SIGPIPE, SIG_IGN); } // as arhost-launcher does for each worker
 
-    arhost::test::ScratchFolder scratch;
+    ScratchFolder scratch;
     const fs::path fifo = make_fifo(scratch.path() / "fifo");
     const std::string path = fifo.string();
 
     static std::future<std::string> read_all(const fs::path &fifo) {
         return std::async(std::launch::async, [fifo] { return FifoReader(fifo).read_all(); });
     }
+    static void wait_for_log(const SinkUnderTest &sink, const std::string &text) {
+        EXPECT_TRUE(eventually([&] { return sink.log().find(text) != std::string::npos; })) << sink.log();
+    }
     // The bytes that a reader receives for `frames` frames.
     std::string stream(const std::string &format, int width, int height, std::uint64_t frames, double fps = 30,
                        const std::string &matrix = "auto") {
         std::future<std::string> received = read_all(fifo);
         SinkUnderTest sink("sink_pipe", {{"path", path}, {"format", format}, {"matrix", matrix}});
-        EXPECT_EQ(sink.start(width, height, 0, fps), ARHOST_STATUS_OK) << sink.log();
-        EXPECT_EQ(sink.write(0, frames), ARHOST_STATUS_OK) << sink.log();
-        EXPECT_EQ(sink.stop(), ARHOST_STATUS_OK) << sink.log();
+        sink.run(width, height, 0, frames, fps);
         return received.get();
     }
 };
@@ -98,7 +96,7 @@ TEST_F(SinkPipe, WritesTheOverlayAloneWithItsAlpha) {
         SinkUnderTest sink("sink_pipe", {{"path", path}, {"format", format}, {"content", "overlay"}});
         EXPECT_EQ(sink.capabilities(), ARHOST_CAPABILITY_STANDARD_OUTPUT | ARHOST_CAPABILITY_OVERLAY_INPUT);
         ASSERT_EQ(sink.start(13, 7), ARHOST_STATUS_OK) << sink.log();
-        EXPECT_EQ(sink.write(Picture(13, 7, 0), arhost::test::make_record(0), &overlay), ARHOST_STATUS_OK);
+        EXPECT_EQ(sink.write(Picture(13, 7, 0), make_record(0), &overlay), ARHOST_STATUS_OK);
         EXPECT_EQ(sink.stop(), ARHOST_STATUS_OK);
         EXPECT_TRUE(received.get() == expected) << format;
     }
@@ -148,8 +146,7 @@ TEST_F(SinkPipe, WaitsForAReader) {
     SinkUnderTest sink("sink_pipe", {{"path", path}, {"format", "bgr"}});
     ASSERT_EQ(sink.start(4, 4), ARHOST_STATUS_OK) << sink.log();
     auto written = std::async(std::launch::async, [&] { return sink.write(0, 2); });
-    while (sink.log().find("waiting for a program to read '" + path + "'") == std::string::npos)
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    wait_for_log(sink, "waiting for a program to read '" + path + "'");
     const FifoReader reader(fifo);
     EXPECT_EQ(reader.read(96).size(), 96u);
     EXPECT_EQ(written.get(), ARHOST_STATUS_OK) << sink.log();
@@ -190,8 +187,7 @@ TEST_F(SinkPipe, BeginsAnotherStreamForTheNextReader) {
     auto first = std::async(std::launch::async, [&] { return FifoReader(fifo).read(100); });
     auto written = std::async(std::launch::async, [&] { return sink.write(0, 1); });
     EXPECT_THAT(first.get(), StartsWith("YUV4MPEG2 "));
-    while (sink.log().find("has closed it") == std::string::npos)
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    wait_for_log(sink, "has closed it");
     auto second = read_all(fifo);
     EXPECT_EQ(written.get(), ARHOST_STATUS_OK) << sink.log();
     EXPECT_EQ(sink.stop(), ARHOST_STATUS_OK);
@@ -209,8 +205,7 @@ TEST_F(SinkPipe, WaitsForTheEndOfAnEarlierStream) {
     SinkUnderTest sink("sink_pipe", {{"path", path}, {"format", "bgr"}});
     ASSERT_EQ(sink.start(4, 4), ARHOST_STATUS_OK) << sink.log();
     auto written = std::async(std::launch::async, [&] { return sink.write(0); });
-    while (sink.log().find("has seen the end of an earlier stream") == std::string::npos)
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    wait_for_log(sink, "has seen the end of an earlier stream");
     char bytes[100];
     EXPECT_EQ(::read(reader.get(), bytes, sizeof bytes), 7);
     EXPECT_EQ(::read(reader.get(), bytes, sizeof bytes), 0) << "the sink has the FIFO open, which hides its end";

@@ -2,6 +2,7 @@
 //
 // Writes to the output node of vivid, the kernel's virtual video device, which loops the pictures to its capture
 // node. To be run in a virtual machine; see CMakeLists.txt for the parameters of the module.
+#include "../../support/eventually.hpp"
 #include "../../system/arhost_run.hpp"
 #include "sink_common/sink_under_test.hpp"
 #include "source_file/source_under_test.hpp"
@@ -18,11 +19,7 @@
 #include <atomic>
 #include <thread>
 
-using arhost::test::ArhostRun;
-using arhost::test::Picture;
-using arhost::test::SinkUnderTest;
-using arhost::test::SourceFrame;
-using arhost::test::SourceUnderTest;
+using namespace arhost::test;
 using testing::HasSubstr;
 
 namespace {
@@ -91,7 +88,7 @@ public:
     Writer(SinkUnderTest &sink, const Picture &picture)
         : thread_([this, &sink, &picture] {
               for (std::uint64_t n = 0; !stop_; ++n)
-                  if ((status = sink.write(picture, arhost::test::make_record(n))) != ARHOST_STATUS_OK)
+                  if ((status = sink.write(picture, make_record(n))) != ARHOST_STATUS_OK)
                       return;
           }) {}
     ~Writer() {
@@ -113,8 +110,7 @@ double difference(const arhost_frame_format &format, const SourceFrame &frame, c
     double greatest = 0;
     for (int y = 2 * Picture::square_px; y < height; y += 3)
         for (int x = 0; x < width; ++x) {
-            const auto rgb = arhost::test::colour_at(format, frame.bytes, static_cast<std::size_t>(x),
-                                                     static_cast<std::size_t>(y));
+            const auto rgb = colour_at(format, frame.bytes, static_cast<std::size_t>(x), static_cast<std::size_t>(y));
             for (int i = 0; i < 3; ++i)
                 greatest =
                     std::max(greatest, std::abs(rgb[static_cast<std::size_t>(i)] - picture.pixel(x, y)[2 - i]));
@@ -198,8 +194,7 @@ TEST_F(VividLoop, ARunContinuesWhenALostDeviceIsBack) {
                   "outputs: [{plugin: sink_v4l2, allow: [video], options: {device: " +
                   output_.path() + "}}, {plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n");
     run.start();
-    for (int i = 0; run.running() && !run.exists("out/poses.jsonl") && i < 3000; ++i)
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    eventually([&] { return !run.running() || run.exists("out/poses.jsonl"); });
     output_.set("Disconnect", 1);
     output_.release(); // vivid connects again when all programs have closed it
     capture_.release();

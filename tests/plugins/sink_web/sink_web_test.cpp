@@ -2,7 +2,9 @@
 //
 // Runs arhost with the page, in its sandbox, and sends requests to it.
 #include "arhost_run.hpp"
+#include "eventually.hpp"
 #include "http_client.hpp"
+#include "process_state.hpp"
 #include "sink_under_test.hpp"
 
 #include "base/unique_fd.hpp"
@@ -10,6 +12,8 @@
 #include <arhost/control.h>
 #include <gmock/gmock.h>
 #include <sys/resource.h>
+
+#include <regex>
 
 using namespace arhost::test;
 using testing::AllOf;
@@ -41,17 +45,17 @@ public:
     explicit WebRun(const Configuration &configuration) : ArhostRun(configuration.text) {
         write("scene.yaml", small_scene);
         start();
-        const std::string url = "http://127.0.0.1:";
-        std::size_t at = 0;
-        while ((at = output().find(url)) == std::string::npos ||
-               output().find('/', at + url.size()) == std::string::npos) {
-            if (!running())
-                throw std::runtime_error(output());
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
-        }
-        port_ = static_cast<std::uint16_t>(std::stoi(output().substr(at + url.size())));
-        while (get("/snapshot.jpg").status != 200 && running())
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
+        const std::regex url("http://127\\.0\\.0\\.1:([0-9]+)/");
+        std::string text;
+        std::smatch match;
+        wait_for([&] { return std::regex_search(text = output(), match, url); });
+        port_ = static_cast<std::uint16_t>(std::stoi(match[1]));
+        wait_for([&] { return get("/snapshot.jpg").status == 200; });
+    }
+    // Waits until the condition holds; throws if it does not, or if arhost has ended.
+    template <class Condition> void wait_for(Condition &&condition) const {
+        if (!eventually([&] { return !running() || condition(); }) || !running())
+            throw std::runtime_error(output());
     }
     std::uint16_t port() const { return port_; }
     HttpClient connect() const { return HttpClient(port_); }
@@ -74,9 +78,15 @@ public:
         client.send("GET /stream.mjpg HTTP/1.1\r\nHost: localhost\r\n\r\n");
         return client;
     }
-    int quit() {
+    // Like watch(), and receives the header.
+    HttpClient viewer() const {
+        HttpClient client = watch();
+        client.receive_to("\r\n\r\n");
+        return client;
+    }
+    void expect_quit() {
         EXPECT_EQ(post(R"({"command":"quit"})").status, 200) << output();
-        return wait();
+        EXPECT_EQ(wait(), 0) << output();
     }
 
 private:
@@ -104,12 +114,6 @@ private:
     arhost::base::UniqueFd fd_;
 };
 
-// A value of /proc/PID/status in bytes.
-std::size_t memory_of(pid_t pid, const std::string &name) {
-    const std::string text = read_file("/proc/" + std::to_string(pid) + "/status");
-    return 1024 * std::stoul(text.substr(text.find(name + ":") + name.size() + 1));
-}
-
 } // namespace
 
 TEST(SinkWeb, ServesThePageThePictureAndTheDescription) {
@@ -125,7 +129,7 @@ TEST(SinkWeb, ServesThePageThePictureAndTheDescription) {
     EXPECT_EQ(Json::parse(run.get("/openapi.json").body)["openapi"], "3.1.0");
     EXPECT_EQ(run.get("/nothing").status, 404);
     EXPECT_EQ(run.get("/../etc/passwd").status, 404);
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.expect_quit();
 }
 
 TEST(SinkWeb, TheCommandSetTurnsTheDebugViewOn) {
@@ -133,9 +137,8 @@ TEST(SinkWeb, TheCommandSetTurnsTheDebugViewOn) {
     const std::size_t plain = run.get("/snapshot.jpg").body.size(); // a frame of one colour
     const std::string set = R"({"command": "set", "component": "sink_web", "option": "debug_view", "value": "true"})";
     EXPECT_EQ(run.post(set).status, 200);
-    while (run.running() && run.get("/snapshot.jpg").body.size() < plain * 3 / 2)
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.wait_for([&] { return run.get("/snapshot.jpg").body.size() >= plain * 3 / 2; });
+    run.expect_quit();
 }
 
 TEST(SinkWeb, StreamsChangingFrames) {
@@ -148,19 +151,18 @@ TEST(SinkWeb, StreamsChangingFrames) {
     for (int i = 0; i < 100 && other == first; ++i)
         other = viewer.receive_frame();
     EXPECT_NE(other, first);
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.expect_quit();
 }
 
 TEST(SinkWeb, RepeatsTheLastFrameWhileTheVideoIsFrozen) {
     WebRun run;
     EXPECT_EQ(Json::parse(run.post(R"({"command":"freeze","on":true})").body)["frozen"], true);
-    HttpClient viewer = run.watch();
-    viewer.receive_to("\r\n\r\n");
+    HttpClient viewer = run.viewer();
     std::string last = viewer.receive_frame(), next = viewer.receive_frame();
     for (int i = 0; i < 10 && last != next; ++i) // frames in progress
         last = std::exchange(next, viewer.receive_frame());
     EXPECT_EQ(last, next);
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.expect_quit();
 }
 
 TEST(SinkWeb, GivesTheStatusAndTheGrantedCommands) {
@@ -181,7 +183,7 @@ TEST(SinkWeb, GivesTheStatusAndTheGrantedCommands) {
                       HasSubstr("arhost_stage_milliseconds{stage=\"latency\",quantile=\"0.5\"} "),
                       HasSubstr("arhost_latency_milliseconds{output=\"sink_web\",quantile=\"0.99\"} "),
                       HasSubstr("arhost_web_viewers 0\n")));
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.expect_quit();
 }
 
 TEST(SinkWeb, EncodesNothingWithoutViewers) {
@@ -191,10 +193,9 @@ TEST(SinkWeb, EncodesNothingWithoutViewers) {
         return std::stoul(text.substr(text.find("\n" + name + " ") + name.size() + 2));
     };
     const auto encoded = count("arhost_web_encoded_frames_total"), frames = count("arhost_web_frames_total");
-    while (count("arhost_web_frames_total") < frames + 10)
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    run.wait_for([&] { return count("arhost_web_frames_total") >= frames + 10; });
     EXPECT_EQ(count("arhost_web_encoded_frames_total"), encoded);
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.expect_quit();
 }
 
 TEST(SinkWeb, ExecutesOnlyGrantedCommands) {
@@ -207,7 +208,7 @@ TEST(SinkWeb, ExecutesOnlyGrantedCommands) {
     EXPECT_EQ(run.post("[]").status, 400);
     EXPECT_EQ(run.post("").status, 400);
     EXPECT_EQ(run.post(std::string("{\"command\":\"quit\"}\0x", 20)).status, 400);
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.expect_quit();
 }
 
 TEST(SinkWeb, RejectsOtherHostsOriginsAndTypes) {
@@ -229,7 +230,7 @@ TEST(SinkWeb, RejectsOtherHostsOriginsAndTypes) {
     EXPECT_EQ(run.get("/api/control").status, 405);
     EXPECT_EQ(run.request("OPTIONS /api/control HTTP/1.1\r\nHost: localhost\r\n\r\n").status, 405);
     EXPECT_EQ(run.request("PUT / HTTP/1.1\r\nHost: localhost\r\n\r\n").status, 405);
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.expect_quit();
 }
 
 TEST(SinkWeb, CommandsNeedTheToken) {
@@ -242,18 +243,14 @@ TEST(SinkWeb, CommandsNeedTheToken) {
     EXPECT_EQ(run.wait(), 0) << run.output();
 }
 
-TEST(SinkWeb, OtherMachinesNeedAToken) {
-    ArhostRun run(yaml("[quit]", "listen: \"0.0.0.0:0\""));
-    run.write("scene.yaml", small_scene);
-    EXPECT_NE(run.run(), 0);
-    EXPECT_THAT(run.output(), HasSubstr("the option 'token' must be set"));
-}
-
-TEST(SinkWeb, RejectsAShortToken) {
-    ArhostRun run(yaml("[quit]", "listen: \"127.0.0.1:0\", token: short"));
-    run.write("scene.yaml", small_scene);
-    EXPECT_NE(run.run(), 0);
-    EXPECT_THAT(run.output(), HasSubstr("at least 16 characters"));
+TEST(SinkWeb, OtherMachinesNeedATokenOf16Characters) {
+    for (const auto &[options, error] : {std::pair{"listen: \"0.0.0.0:0\"", "the option 'token' must be set"},
+                                         {"listen: \"127.0.0.1:0\", token: short", "at least 16 characters"}}) {
+        ArhostRun run(yaml("[quit]", options));
+        run.write("scene.yaml", small_scene);
+        EXPECT_NE(run.run(), 0);
+        EXPECT_THAT(run.output(), HasSubstr(error));
+    }
 }
 
 TEST(SinkWeb, NeedsASocket) {
@@ -279,7 +276,7 @@ TEST(SinkWeb, SurvivesMalformedRequests) {
     }
     EXPECT_EQ(run.post(std::string(100000, ' ')).status, 413);
     EXPECT_EQ(run.get("/").status, 200);
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.expect_quit();
     EXPECT_EQ(run.stats()["restarts"]["sink_web"], 0) << run.output();
 }
 
@@ -288,11 +285,10 @@ TEST(SinkWeb, AViewerThatDoesNotReadDelaysNobody) {
     std::vector<HttpClient> viewers;
     for (int i = 0; i < 10; ++i)
         viewers.push_back(run.watch(4096));
-    HttpClient viewer = run.watch();
-    viewer.receive_to("\r\n\r\n");
+    HttpClient viewer = run.viewer();
     for (int i = 0; i < 50; ++i)
         ASSERT_NE(viewer.receive_frame(), "") << run.output();
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.expect_quit();
 }
 
 TEST(SinkWeb, ClosesConnectionsThatSendTooSlowly) {
@@ -301,19 +297,17 @@ TEST(SinkWeb, ClosesConnectionsThatSendTooSlowly) {
     std::atomic<bool> is_closed = false;
     std::thread reader([&] { slow.receive_all(), is_closed = true; });
     slow.send("GET / HTTP/1.1\r\nHost: localhost\r\n");
-    for (int i = 0; i < 600 && !is_closed; ++i) {
+    EXPECT_TRUE(eventually([&] {
         slow.send("X");
-        std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    }
+        return is_closed.load();
+    })) << "the server accepts one byte at a time forever";
     reader.join();
-    EXPECT_TRUE(is_closed) << "the server accepts one byte at a time forever";
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.expect_quit();
 }
 
 TEST(SinkWeb, ManyConnectionsNeverStopTheVideo) {
     WebRun run;
-    HttpClient viewer = run.watch();
-    viewer.receive_to("\r\n\r\n");
+    HttpClient viewer = run.viewer();
     std::vector<HttpClient> idle;
     for (int i = 0; i < 300; ++i)
         idle.push_back(run.connect());
@@ -321,9 +315,8 @@ TEST(SinkWeb, ManyConnectionsNeverStopTheVideo) {
         ASSERT_NE(viewer.receive_frame(), "") << run.output();
     idle.clear();
     // The server accepts connections again once it has noticed that clients have left.
-    while (run.running() && run.get("/").status != 200)
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.wait_for([&] { return run.get("/").status == 200; });
+    run.expect_quit();
     EXPECT_EQ(run.stats()["restarts"]["sink_web"], 0) << run.output();
 }
 
@@ -331,10 +324,9 @@ TEST(SinkWeb, ARestartedWorkerServesAgain) {
     WebRun run;
     const pid_t worker = run.worker("sink_web");
     send_signal(worker, SIGKILL);
-    while (run.running() && run.get("/snapshot.jpg").status != 200)
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    run.wait_for([&] { return run.get("/snapshot.jpg").status == 200; });
     EXPECT_NE(run.worker("sink_web"), worker);
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.expect_quit();
 }
 
 // Slow readers, malformed requests, partial requests and idle connections, more than the server accepts.
@@ -351,10 +343,9 @@ TEST(SinkWeb, HostileClientsCostNoFrameAndLittleMemory) {
         "height: 120}}\noutputs: [{plugin: sink_web, allow: [listen], control: [quit, status], options: {listen: "
         "\"127.0.0.1:0\"}}]\nstats: stats.json\n"});
     const pid_t worker = run.worker("sink_web");
-    HttpClient viewer = run.watch();
-    viewer.receive_to("\r\n\r\n");
+    HttpClient viewer = run.viewer();
     ASSERT_NE(viewer.receive_frame(), "");
-    const std::size_t before = memory_of(worker, "VmRSS");
+    const std::size_t before = 1024 * memory_kib("VmRSS", worker);
 
     std::vector<AnyConnection> hostile;
     hostile.reserve(connections + 200);
@@ -366,14 +357,13 @@ TEST(SinkWeb, HostileClientsCostNoFrameAndLittleMemory) {
     };
     const std::string get = "GET / HTTP/1.1\r\nHost: localhost\r\n";
     attack(40, "GET /stream.mjpg HTTP/1.1\r\nHost: localhost\r\n\r\n", 2048);
-    while (run.running() && run.get("/metrics").body.find("arhost_web_viewers 41\n") == std::string::npos)
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    run.wait_for([&] { return run.get("/metrics").body.find("arhost_web_viewers 41\n") != std::string::npos; });
     attack(40, "GET \1\2\3 HTTP/7\r\n: \r\n\r\n" + std::string(20000, 'x'));
     attack(40, "POST /api/control HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: " +
                    std::to_string(ARHOST_MAX_COMMAND_SIZE) + "\r\n\r\n" + std::string(16000, ' '));
     attack(500, get + std::string(15000, 'x'));
     attack(connections - 500, "");
-    const std::size_t peak = memory_of(worker, "VmHWM");
+    const std::size_t peak = 1024 * memory_kib("VmHWM", worker);
     // The limits in the README: each connection has its headers and a command or a block of the stream, each viewer a
     // frame, which is smaller than its pixels. Then what the library and the allocator need.
     constexpr std::size_t allowed = 128 * ((16 + 64) << 10) + 48 * 3 * width * height + (6 << 20);
@@ -385,9 +375,8 @@ TEST(SinkWeb, HostileClientsCostNoFrameAndLittleMemory) {
     EXPECT_TRUE(peak < before + allowed || !is_exact) << peak << " bytes, from " << before << " bytes";
 
     hostile.clear();
-    while (run.running() && run.get("/").status != 200)
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    EXPECT_EQ(run.quit(), 0) << run.output();
+    run.wait_for([&] { return run.get("/").status == 200; });
+    run.expect_quit();
     const Json stats = run.stats();
     EXPECT_EQ(stats["restarts"]["sink_web"], 0) << run.output(); // no call exceeded its deadline
     EXPECT_EQ(stats["frames"]["dropped"].value("output", 0), 0) << stats["frames"];

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "eventually.hpp"
 #include "sink_under_test.hpp"
 #include "tracked_record.hpp"
 #include "x_server.hpp"
@@ -11,10 +12,8 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cstdio>
 #include <functional>
-#include <thread>
 
 using namespace arhost::test;
 using testing::AllOf;
@@ -110,16 +109,15 @@ protected:
         keep_libraries();
         return *sink_;
     }
-    // Calls the sink's idle() until `done` returns true; returns false after 20 seconds.
+    // Calls the sink's idle() until `done` returns true; returns whether it does.
     bool becomes(const std::function<bool()> &done) {
-        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-        while (std::chrono::steady_clock::now() < end) {
-            if (done())
-                return true;
-            sink_->idle();
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
-        }
-        return false;
+        return eventually([&] { return done() || (sink_->idle(), false); });
+    }
+    // Starts the sink and shows a frame of this size in it.
+    SinkUnderTest &show(const Picture &picture, const std::map<std::string, std::string> &options = {}) {
+        SinkUnderTest &sink = start(picture.width(), picture.height(), options);
+        EXPECT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK) << sink.log();
+        return sink;
     }
     // Waits until the window shows the frame in this rectangle, except for `covered` rows at the bottom; returns the
     // last worst_difference().
@@ -131,6 +129,10 @@ protected:
             return (worst = worst_difference(shot, picture, left, top, width, height)) <= 2;
         });
         return worst;
+    }
+    // Checks that the window shows exactly the frame.
+    void expect_shown(const Picture &picture) {
+        EXPECT_LE(difference(picture, 0, 0, picture.width(), picture.height()), 2);
     }
     // Returns the bounding box of the pixels that differ from a former screenshot, and their number.
     Area changed_area(const Screenshot &before) const {
@@ -167,7 +169,7 @@ TEST_F(SinkWindow, ShowsEachFramePixelForPixel) {
     for (const std::uint64_t i : {0, 300}) {
         const Picture picture(320, 200, i);
         ASSERT_EQ(sink.write(picture, make_record(i)), ARHOST_STATUS_OK) << sink.log();
-        EXPECT_LE(difference(picture, 0, 0, 320, 200), 2);
+        expect_shown(picture);
     }
     const Screenshot shot =
         observer_->screen(); // the frame must be visible on the screen, not only in the window's buffer
@@ -219,9 +221,8 @@ TEST_F(SinkWindow, IsBlackUntilTheFirstFrame) {
 }
 
 TEST_F(SinkWindow, KeepsTheAspectRatioWhenResized) {
-    SinkUnderTest &sink = start(160, 120);
     const Picture picture(160, 120, 0);
-    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
+    show(picture);
     observer_->resize(400, 240); // wider than the frame, which gives bars at the sides
     EXPECT_LE(difference(picture, 40, 0, 320, 240), 2);
     observer_->resize(160, 400); // higher than the frame, which gives bars above and below
@@ -229,9 +230,8 @@ TEST_F(SinkWindow, KeepsTheAspectRatioWhenResized) {
 }
 
 TEST_F(SinkWindow, StartsAtTheConfiguredScale) {
-    SinkUnderTest &sink = start(160, 120, {{"scale", "2.5"}});
     const Picture picture(160, 120, 0);
-    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
+    show(picture, {{"scale", "2.5"}});
     const XWindowAttributes window = observer_->attributes();
     EXPECT_EQ(window.width, 400);
     EXPECT_EQ(window.height, 300);
@@ -266,9 +266,8 @@ TEST_F(SinkWindow, ClosingTheWindowEndsTheRun) {
 }
 
 TEST_F(SinkWindow, FTogglesFullScreen) {
-    SinkUnderTest &sink = start(160, 120);
     const Picture picture(160, 120, 0);
-    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
+    show(picture);
     const auto has_size = [&](int width, int height) {
         return [this, width, height] {
             const XWindowAttributes window = observer_->attributes();
@@ -280,14 +279,13 @@ TEST_F(SinkWindow, FTogglesFullScreen) {
     EXPECT_LE(difference(picture, 0, 0, screen_width, screen_height), 2);
     observer_->press(XK_f);
     ASSERT_TRUE(becomes(has_size(160, 120)));
-    EXPECT_LE(difference(picture, 0, 0, 160, 120), 2);
+    expect_shown(picture);
 }
 
 TEST_F(SinkWindow, MMirrorsTheFrameExactly) {
-    SinkUnderTest &sink = start(320, 200);
     const Picture picture(320, 200, 5);
-    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
-    ASSERT_LE(difference(picture, 0, 0, 320, 200), 2);
+    show(picture);
+    expect_shown(picture);
     const Screenshot before = observer_->window();
     const auto is_mirrored = [&] {
         const Screenshot shot = observer_->window();
@@ -300,14 +298,13 @@ TEST_F(SinkWindow, MMirrorsTheFrameExactly) {
     observer_->press(XK_m);
     EXPECT_TRUE(becomes(is_mirrored));
     observer_->press(XK_m);
-    EXPECT_LE(difference(picture, 0, 0, 320, 200), 2);
+    expect_shown(picture);
 }
 
 TEST_F(SinkWindow, HShowsAHelpInTheMiddleOfTheWindow) {
-    SinkUnderTest &sink = start(640, 480);
     const Picture picture(640, 480, 5);
-    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
-    ASSERT_LE(difference(picture, 0, 0, 640, 480), 2);
+    show(picture);
+    expect_shown(picture);
     const Screenshot before = observer_->window();
     observer_->press(XK_h);
     ASSERT_TRUE(becomes([&] { return changed_area(before).count > 0; }));
@@ -318,22 +315,20 @@ TEST_F(SinkWindow, HShowsAHelpInTheMiddleOfTheWindow) {
     EXPECT_GT(help.bottom - help.top, 200);
     EXPECT_GT(count(white), 500) << "text";
     observer_->press(XK_h);
-    EXPECT_LE(difference(picture, 0, 0, 640, 480), 2);
+    expect_shown(picture);
 }
 
 TEST_F(SinkWindow, TheStatusLineIsAtTheBottom) {
-    SinkUnderTest &sink = start(640, 480, {{"status_line", "true"}});
     const Picture picture(640, 480, 5);
-    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
+    show(picture, {{"status_line", "true"}});
     EXPECT_LE(difference(picture, 0, 0, 640, 480, 40), 2);
     EXPECT_GT(count(white), 200);
 }
 
 TEST_F(SinkWindow, AHeldKeyCountsOnce) {
-    SinkUnderTest &sink = start(320, 200);
     const Picture picture(320, 200, 5);
-    ASSERT_EQ(sink.write(picture, make_record(0)), ARHOST_STATUS_OK);
-    ASSERT_LE(difference(picture, 0, 0, 320, 200), 2);
+    show(picture);
+    expect_shown(picture);
     const Screenshot before = observer_->window();
     observer_->press(XK_h, 4);
     EXPECT_TRUE(becomes([&] { return changed_area(before).count > 0; }));
@@ -368,7 +363,7 @@ TEST_F(SinkWindow, DShowsMarkersAndAxesOfTargetsWhereTheyAre) {
         record.add_observation(24, other_corners, false);
         ASSERT_EQ(sink.write(picture, record), ARHOST_STATUS_OK);
     } // the sink must not read the record later
-    ASSERT_LE(difference(picture, 0, 0, 640, 480), 2);
+    expect_shown(picture);
     EXPECT_EQ(count(yellow), 0);
     observer_->press(XK_d);
     ASSERT_TRUE(becomes([&] { return count(yellow) > 0; }));
@@ -398,7 +393,7 @@ TEST_F(SinkWindow, DShowsMarkersAndAxesOfTargetsWhereTheyAre) {
     }
     observer_->press(XK_m);
     observer_->press(XK_d);
-    EXPECT_LE(difference(picture, 0, 0, 640, 480), 2);
+    expect_shown(picture);
 }
 
 TEST_F(SinkWindow, AnOptionShowsTheDebugViewAtOnce) {
