@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "sink_under_test.hpp"
-#include "tracked_record.hpp"
+#include "log_sink_test.hpp"
 
 #include <directories.hpp>
 #include <gmock/gmock.h>
@@ -90,20 +89,6 @@ class SinkPoses : public testing::Test {
 protected:
     std::filesystem::path log() const { return folder_.path() / "log.jsonl"; }
     SinkUnderTest sink() const { return SinkUnderTest("sink_poses", {{"path", log().string()}}); }
-    // Returns the log that an uninterrupted run writes for the frames [0, end).
-    std::string uninterrupted(std::uint64_t end) const {
-        const auto path = folder_.path() / "whole.jsonl";
-        SinkUnderTest whole("sink_poses", {{"path", path.string()}});
-        EXPECT_EQ(whole.start(8, 8), ARHOST_STATUS_OK);
-        write(whole, 0, end);
-        EXPECT_EQ(whole.stop(), ARHOST_STATUS_OK);
-        return read_text(path);
-    }
-    static void write(SinkUnderTest &sink, std::uint64_t first, std::uint64_t end) {
-        const Picture picture(8, 8, 0);
-        for (; first < end; ++first)
-            ASSERT_EQ(sink.write(picture, full_record(first)), ARHOST_STATUS_OK) << sink.log();
-    }
     // Returns the line that the sink writes for one record.
     std::string line_of(const arhost_record &record) const {
         SinkUnderTest s = sink();
@@ -117,6 +102,9 @@ protected:
 
     ScratchFolder folder_;
 };
+
+INSTANTIATE_TEST_SUITE_P(SinkPoses, LogSink, testing::Values(LogSinkCase{"poses", "sink_poses", full_record}),
+                         [](const auto &info) { return info.param.name; });
 
 } // namespace
 
@@ -283,58 +271,6 @@ TEST_F(SinkPoses, ReadsTheElementsOfLongerArrays) {
     EXPECT_EQ(line_of(record), line_of(tracked));
 }
 
-TEST_F(SinkPoses, TheLogHasWholeLinesAfterEveryFrame) {
-    SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    for (std::uint64_t i = 0; i < 20; ++i) {
-        write(s, i, i + 1);
-        const std::string text = read_text(log());
-        EXPECT_EQ(text.back(), '\n');
-        const auto lines = lines_of(log());
-        ASSERT_EQ(lines.size(), i + 1);
-        EXPECT_EQ(Json::parse(lines.back())["frame"], i);
-    }
-}
-
-TEST_F(SinkPoses, AFreshRunReplacesAnOlderLogAtItsFirstFrame) {
-    std::ofstream(log()) << "something else\n";
-    SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    EXPECT_EQ(read_text(log()), "something else\n")
-        << "start must not change the file, because the run may still fail to start";
-    write(s, 0, 2);
-    EXPECT_EQ(s.stop(), ARHOST_STATUS_OK);
-    EXPECT_EQ(read_text(log()), uninterrupted(2));
-    EXPECT_EQ(s.log(), "");
-}
-
-TEST_F(SinkPoses, ARestartKeepsEarlierLinesAndReplacesTheRest) {
-    for (const std::uint64_t restart : {1, 5, 9, 10}) {
-        {
-            SinkUnderTest killed = sink();
-            ASSERT_EQ(killed.start(8, 8), ARHOST_STATUS_OK);
-            write(killed, 0, 10);
-        }
-        SinkUnderTest s = sink();
-        ASSERT_EQ(s.start(8, 8, restart), ARHOST_STATUS_OK);
-        write(s, restart, 12);
-        ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
-        EXPECT_EQ(read_text(log()), uninterrupted(12)) << "restarted at " << restart;
-        EXPECT_EQ(s.log(), "");
-    }
-}
-
-TEST_F(SinkPoses, APartialLineIsRemovedAfterAKill) {
-    const std::string whole = uninterrupted(3);
-    const std::size_t third = whole.find("{\"frame\": 2");
-    for (std::size_t size = third + 1; size < whole.size(); size += 7) {
-        std::ofstream(log(), std::ios::binary | std::ios::trunc) << whole.substr(0, size);
-        SinkUnderTest s = sink();
-        ASSERT_EQ(s.start(8, 8, 3), ARHOST_STATUS_OK); // although the host considers frame 2 written
-        EXPECT_EQ(read_text(log()), whole.substr(0, third)) << "cut at " << size;
-    }
-}
-
 TEST_F(SinkPoses, FramesDroppedInLiveModeStayDroppedAfterARestart) {
     const Picture picture(8, 8, 0);
     {
@@ -351,55 +287,6 @@ TEST_F(SinkPoses, FramesDroppedInLiveModeStayDroppedAfterARestart) {
     EXPECT_EQ(Json::parse(lines[0])["frame"], 3);
     EXPECT_EQ(Json::parse(lines[1])["frame"], 8);
     EXPECT_EQ(Json::parse(lines[2])["frame"], 15);
-}
-
-TEST_F(SinkPoses, SurvivesAKillAtAnyMoment) {
-    const std::map<std::string, std::string> options{{"path", log().string()}};
-    std::uint64_t next = 0;
-    for (const std::uint64_t frames : {1, 40, 3, 200})
-        next = write_until_killed("sink_poses", options, 8, 8, next, frames, full_record);
-    SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(8, 8, next), ARHOST_STATUS_OK);
-    write(s, next, next + 5);
-    ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
-    EXPECT_EQ(read_text(log()), uninterrupted(next + 5));
-}
-
-TEST_F(SinkPoses, ARestartWithoutTheOldLogGivesAWarning) {
-    SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(8, 8, 5), ARHOST_STATUS_OK);
-    EXPECT_THAT(s.log(), HasSubstr("4 '" + log().string() + "' has no frame before 5"));
-}
-
-TEST_F(SinkPoses, CreatesMissingFolders) {
-    SinkUnderTest s("sink_poses", {{"path", (folder_.path() / "a/b/log.jsonl").string()}});
-    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    EXPECT_FALSE(std::filesystem::exists(folder_.path() / "a/b/log.jsonl"))
-        << "the log must not be created before the first frame";
-    write(s, 0, 1);
-    EXPECT_TRUE(std::filesystem::exists(folder_.path() / "a/b/log.jsonl"));
-}
-
-TEST_F(SinkPoses, AFullDiskLeavesWholeLinesAndAMessage) {
-    SinkUnderTest s = sink();
-    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    write(s, 0, 2);
-    const std::string before = read_text(log());
-    {
-        const FileSizeLimit limit(before.size() + 100); // only a part of the next line fits
-        EXPECT_EQ(s.write(Picture(8, 8, 0), full_record(2)), ARHOST_STATUS_ERROR_IO);
-    }
-    EXPECT_EQ(read_text(log()), before);
-    EXPECT_THAT(s.log(), HasSubstr("5 cannot write '" + log().string() + "': File too large"));
-    write(s, 2, 4); // continues when the disk has free space again
-    EXPECT_EQ(read_text(log()), uninterrupted(4));
-}
-
-TEST_F(SinkPoses, AnUnwritableFolderIsAConfigurationErrorThatNamesThePath) {
-    const UnwritableFolder locked(folder_.path() / "locked");
-    SinkUnderTest s("sink_poses", {{"path", (folder_.path() / "locked/log.jsonl").string()}});
-    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(s.log(), HasSubstr("locked/log.jsonl"));
 }
 
 TEST_F(SinkPoses, AFolderAsPathIsRejected) {

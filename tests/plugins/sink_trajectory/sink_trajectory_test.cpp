@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera/trajectory.hpp"
-#include "sink_under_test.hpp"
+#include "log_sink_test.hpp"
 
 #include <gmock/gmock.h>
 
@@ -32,26 +32,20 @@ arhost_record camera_record(std::uint64_t sequence) {
     return record;
 }
 
+TrackedRecord record_with_camera(std::uint64_t sequence) {
+    return {camera_record(sequence), {}, {}};
+}
+
 class SinkTrajectory : public testing::Test {
 protected:
     std::filesystem::path file() const { return folder_.path() / "run.trajectory"; }
-    SinkUnderTest sink(const std::string &format) const { return sink(format, file()); }
-    SinkUnderTest sink(const std::string &format, const std::filesystem::path &path) const {
-        return SinkUnderTest("sink_trajectory", {{"path", path.string()}, {"format", format}});
+    SinkUnderTest sink(const std::string &format) const {
+        return SinkUnderTest("sink_trajectory", {{"path", file().string()}, {"format", format}});
     }
     static void write(SinkUnderTest &sink, std::uint64_t first, std::uint64_t end) {
         const Picture picture(8, 8, 0);
         for (; first < end; ++first)
             ASSERT_EQ(sink.write(picture, camera_record(first)), ARHOST_STATUS_OK) << sink.log();
-    }
-    // Returns the file that an uninterrupted run writes for the frames [0, end).
-    std::string uninterrupted(const std::string &format, std::uint64_t end) const {
-        const auto path = folder_.path() / "whole.trajectory";
-        SinkUnderTest whole = sink(format, path);
-        EXPECT_EQ(whole.start(8, 8), ARHOST_STATUS_OK);
-        write(whole, 0, end);
-        EXPECT_EQ(whole.stop(), ARHOST_STATUS_OK);
-        return read_text(path);
     }
     // Writes only these frames, as if the others had been dropped.
     void write_frames(const std::string &format, const std::vector<std::uint64_t> &frames) const {
@@ -100,8 +94,11 @@ TEST_F(SinkTrajectory, WritesAHeaderAndOneLinePerFrame) {
 
 TEST_F(SinkTrajectory, EveryNumberReadsBackAsTheSameDouble) {
     constexpr std::uint64_t frames = 200;
-    uninterrupted("arhost", frames);
-    const Trajectory trajectory = read_trajectory(folder_.path() / "whole.trajectory");
+    SinkUnderTest s = sink("arhost");
+    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
+    write(s, 0, frames);
+    const Trajectory trajectory = read_trajectory(file());
+    EXPECT_EQ(trajectory.warning, "");
     ASSERT_EQ(trajectory.frames.size(), frames);
     for (std::uint64_t i = 0; i < frames; ++i) {
         const arhost_record record = camera_record(i);
@@ -168,66 +165,6 @@ TEST_F(SinkTrajectory, ARunWithoutACameraIsRejected) {
     EXPECT_FALSE(std::filesystem::exists(file()));
 }
 
-TEST_P(SinkTrajectoryInEachFormat, HasWholeLinesAfterEveryFrame) {
-    SinkUnderTest s = sink(GetParam());
-    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    for (std::uint64_t i = 0; i < 10; ++i) {
-        write(s, i, i + 1);
-        EXPECT_EQ(read_trajectory(file()).end(), i + 1);
-        EXPECT_EQ(read_trajectory(file()).warning, "");
-    }
-}
-
-TEST_P(SinkTrajectoryInEachFormat, AFreshRunReplacesAnOlderFileAtItsFirstFrame) {
-    std::ofstream(file()) << "something else\n";
-    SinkUnderTest s = sink(GetParam());
-    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    EXPECT_EQ(read_text(file()), "something else\n")
-        << "start must not change the file, because the run may still fail to start";
-    write(s, 0, 2);
-    EXPECT_EQ(read_text(file()), uninterrupted(GetParam(), 2));
-}
-
-TEST_P(SinkTrajectoryInEachFormat, ARestartKeepsEarlierLinesAndReplacesTheRest) {
-    for (const std::uint64_t restart : {1, 4, 5, 10}) {
-        {
-            SinkUnderTest killed = sink(GetParam());
-            ASSERT_EQ(killed.start(8, 8), ARHOST_STATUS_OK);
-            write(killed, 0, 10);
-        }
-        SinkUnderTest s = sink(GetParam());
-        ASSERT_EQ(s.start(8, 8, restart), ARHOST_STATUS_OK);
-        write(s, restart, 12);
-        ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
-        EXPECT_EQ(read_text(file()), uninterrupted(GetParam(), 12)) << "restarted at " << restart;
-        EXPECT_EQ(s.log(), "");
-    }
-}
-
-TEST_P(SinkTrajectoryInEachFormat, APartialLineIsRemovedAfterAKill) {
-    const std::string whole = uninterrupted(GetParam(), 3), two = uninterrupted(GetParam(), 2);
-    for (std::size_t size = two.size(); size < whole.size(); size += 7) {
-        std::ofstream(file(), std::ios::binary | std::ios::trunc) << whole.substr(0, size);
-        SinkUnderTest s = sink(GetParam());
-        ASSERT_EQ(s.start(8, 8, 2), ARHOST_STATUS_OK);
-        EXPECT_EQ(read_text(file()), two) << "cut at " << size;
-        write(s, 2, 3);
-        EXPECT_EQ(read_text(file()), whole) << "cut at " << size;
-    }
-}
-
-TEST_P(SinkTrajectoryInEachFormat, SurvivesAKillAtAnyMoment) {
-    const std::map<std::string, std::string> options{{"path", file().string()}, {"format", GetParam()}};
-    std::uint64_t next = 0;
-    for (const std::uint64_t frames : {1, 40, 3, 200})
-        next = write_until_killed("sink_trajectory", options, 8, 8, next, frames, camera_record);
-    SinkUnderTest s = sink(GetParam());
-    ASSERT_EQ(s.start(8, 8, next), ARHOST_STATUS_OK);
-    write(s, next, next + 5);
-    ASSERT_EQ(s.stop(), ARHOST_STATUS_OK);
-    EXPECT_EQ(read_text(file()), uninterrupted(GetParam(), next + 5));
-}
-
 TEST_P(SinkTrajectoryInEachFormat, ARestartWithoutTheOldFileGivesAWarningAndAReadableFile) {
     SinkUnderTest s = sink(GetParam());
     ASSERT_EQ(s.start(8, 8, 5), ARHOST_STATUS_OK);
@@ -236,27 +173,10 @@ TEST_P(SinkTrajectoryInEachFormat, ARestartWithoutTheOldFileGivesAWarningAndARea
     EXPECT_THAT(numbers_of(read_trajectory(file())), testing::ElementsAre(5, 6));
 }
 
-TEST_P(SinkTrajectoryInEachFormat, AFullDiskLeavesWholeLinesAndAMessage) {
-    SinkUnderTest s = sink(GetParam());
-    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
-    write(s, 0, 2);
-    const std::string before = read_text(file());
-    {
-        const FileSizeLimit limit(before.size() + 20); // only a part of the next line fits
-        EXPECT_EQ(s.write(Picture(8, 8, 0), camera_record(2)), ARHOST_STATUS_ERROR_IO);
-    }
-    EXPECT_EQ(read_text(file()), before);
-    EXPECT_THAT(s.log(), HasSubstr("cannot write '" + file().string() + "': File too large"));
-    write(s, 2, 4); // continues when the disk has free space again
-    EXPECT_EQ(read_text(file()), uninterrupted(GetParam(), 4));
-}
-
 INSTANTIATE_TEST_SUITE_P(Formats, SinkTrajectoryInEachFormat, testing::Values("arhost", "dissertation"),
                          [](const auto &info) { return std::string(info.param); });
-
-TEST_F(SinkTrajectory, AnUnwritableFolderIsAConfigurationErrorThatNamesThePath) {
-    const UnwritableFolder locked(folder_.path() / "locked");
-    SinkUnderTest s = sink("arhost", folder_.path() / "locked/run.trajectory");
-    EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_CONFIGURATION);
-    EXPECT_THAT(s.log(), HasSubstr("locked/run.trajectory"));
-}
+INSTANTIATE_TEST_SUITE_P(
+    Formats, LogSink,
+    testing::Values(LogSinkCase{"arhost", "sink_trajectory", record_with_camera, {{"format", "arhost"}}},
+                    LogSinkCase{"dissertation", "sink_trajectory", record_with_camera, {{"format", "dissertation"}}}),
+    [](const auto &info) { return info.param.name; });
