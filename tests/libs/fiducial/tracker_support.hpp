@@ -127,6 +127,13 @@ public:
     explicit Tracker(const std::string &plugin, const Options &options = {}) : plugin_(plugin) {
         created_ = plugin_.create(options);
     }
+    // Starts the tracker; throws if that fails.
+    Tracker(const std::string &plugin, const Options &options, const arhost_intrinsics &camera,
+            const std::vector<Listed> &listed)
+        : Tracker(plugin, options) {
+        if (created_ != ARHOST_STATUS_OK || start(camera, listed) != ARHOST_STATUS_OK)
+            throw std::runtime_error(log());
+    }
     ~Tracker() { stop(); }
 
     arhost_status created() const { return created_; }

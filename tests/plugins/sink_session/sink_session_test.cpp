@@ -131,10 +131,10 @@ protected:
             EXPECT_EQ(all[i]["frame"], i);
         EXPECT_EQ(all[count - 1]["video_end"], std::filesystem::file_size(folder() / "video.mkv"));
     }
+    SourceUnderTest replay() const { return SourceUnderTest("source_file", {{"path", folder() / "video.mkv"}}); }
     // Expects that a replay reads the same pixels from the video.
     void expect_pixels(const Frames &frames, std::uint64_t count, const std::vector<std::size_t> &row) const {
-        SourceUnderTest source("source_file");
-        ASSERT_EQ(source.start({{"path", folder() / "video.mkv"}}), ARHOST_STATUS_OK) << source.log();
+        SourceUnderTest source = replay();
         EXPECT_EQ(source.format().pixel_format, frames.format().pixel_format);
         EXPECT_EQ(source.format().fps, 30);
         for (std::uint64_t i = 0; i < count; ++i)
@@ -164,17 +164,37 @@ TEST_F(Session, ConsistsOfDescriptionConfigurationLogAndVideo) {
     expect_frames(3);
 }
 
-TEST_F(Session, Ffv1KeepsBgr) {
-    const Frames frames(ARHOST_PIXEL_FORMAT_BGR8, 37, 23);
-    ASSERT_NO_FATAL_FAILURE(record(frames, 3));
-    expect_pixels(frames, 3, {37 * 3});
+TEST_F(Session, Ffv1KeepsPixels) {
+    const struct {
+        const char *name;
+        arhost_pixel_format pixels;
+        std::uint32_t width, height;
+        arhost_yuv_range range;
+        std::vector<std::size_t> row_bytes; // by plane
+    } cases[] = {
+        {"BGR", ARHOST_PIXEL_FORMAT_BGR8, 37, 23, ARHOST_YUV_RANGE_LIMITED, {37 * 3}},
+        {"grey", ARHOST_PIXEL_FORMAT_GREY8, 37, 23, ARHOST_YUV_RANGE_LIMITED, {37}},
+        {"YUYV of limited range", ARHOST_PIXEL_FORMAT_YUYV, 36, 23, ARHOST_YUV_RANGE_LIMITED, {72}},
+        {"YUYV of full range", ARHOST_PIXEL_FORMAT_YUYV, 36, 23, ARHOST_YUV_RANGE_FULL, {72}},
+        {"I420", ARHOST_PIXEL_FORMAT_I420, 36, 22, ARHOST_YUV_RANGE_FULL, {36, 18, 18}},
+    };
+    for (const auto &[name, pixels, width, height, range, row_bytes] : cases) {
+        SCOPED_TRACE(name);
+        const Frames frames(pixels, width, height, range);
+        ASSERT_NO_FATAL_FAILURE(record(frames, 3, {{"replace", "true"}}));
+        expect_pixels(frames, 3, row_bytes);
+        if (pixels == ARHOST_PIXEL_FORMAT_YUYV) {
+            const arhost_frame_format format = replay().format();
+            EXPECT_EQ(format.yuv_range, range);
+            EXPECT_EQ(format.yuv_matrix, ARHOST_YUV_MATRIX_BT601);
+        }
+    }
 }
 
 TEST_F(Session, Ffv1KeepsRgbAsBgr) {
     const Frames frames(ARHOST_PIXEL_FORMAT_RGB8, 32, 24);
     ASSERT_NO_FATAL_FAILURE(record(frames, 1));
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", folder() / "video.mkv"}}), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source = replay();
     const std::vector<std::uint8_t> rgb = frames.pixels(0, {32 * 3}), bgr = source.read(0).bytes;
     ASSERT_EQ(rgb.size(), bgr.size());
     for (std::size_t i = 0; i < rgb.size(); i += 3) {
@@ -184,45 +204,19 @@ TEST_F(Session, Ffv1KeepsRgbAsBgr) {
     }
 }
 
-TEST_F(Session, Ffv1KeepsGrey) {
-    const Frames frames(ARHOST_PIXEL_FORMAT_GREY8, 37, 23);
-    ASSERT_NO_FATAL_FAILURE(record(frames, 2));
-    expect_pixels(frames, 2, {37});
-}
-
 TEST_F(Session, Ffv1KeepsTheTransfer) {
     for (const arhost_transfer transfer : {ARHOST_TRANSFER_SRGB, ARHOST_TRANSFER_LINEAR}) {
         const Frames frames(ARHOST_PIXEL_FORMAT_BGR8, 36, 22, ARHOST_YUV_RANGE_FULL, transfer);
         ASSERT_NO_FATAL_FAILURE(record(frames, 2, {{"replace", "true"}}));
-        SourceUnderTest source("source_file");
-        ASSERT_EQ(source.start({{"path", folder() / "video.mkv"}}), ARHOST_STATUS_OK);
+        SourceUnderTest source = replay();
         EXPECT_EQ(source.format().transfer, transfer);
     }
-}
-
-TEST_F(Session, Ffv1KeepsYuyvOfBothRanges) {
-    for (const arhost_yuv_range range : {ARHOST_YUV_RANGE_LIMITED, ARHOST_YUV_RANGE_FULL}) {
-        const Frames frames(ARHOST_PIXEL_FORMAT_YUYV, 36, 23, range);
-        ASSERT_NO_FATAL_FAILURE(record(frames, 2, {{"replace", "true"}}));
-        expect_pixels(frames, 2, {72});
-        SourceUnderTest source("source_file");
-        ASSERT_EQ(source.start({{"path", folder() / "video.mkv"}}), ARHOST_STATUS_OK);
-        EXPECT_EQ(source.format().yuv_range, range);
-        EXPECT_EQ(source.format().yuv_matrix, ARHOST_YUV_MATRIX_BT601);
-    }
-}
-
-TEST_F(Session, Ffv1KeepsI420) {
-    const Frames frames(ARHOST_PIXEL_FORMAT_I420, 36, 22, ARHOST_YUV_RANGE_FULL);
-    ASSERT_NO_FATAL_FAILURE(record(frames, 2));
-    expect_pixels(frames, 2, {36, 18, 18});
 }
 
 TEST_F(Session, Ffv1KeepsTheSamplesOfNv12) {
     const Frames frames(ARHOST_PIXEL_FORMAT_NV12, 36, 22);
     ASSERT_NO_FATAL_FAILURE(record(frames, 1));
-    SourceUnderTest source("source_file");
-    ASSERT_EQ(source.start({{"path", folder() / "video.mkv"}}), ARHOST_STATUS_OK) << source.log();
+    SourceUnderTest source = replay();
     ASSERT_EQ(source.format().pixel_format, ARHOST_PIXEL_FORMAT_I420);
     const std::vector<std::uint8_t> nv12 = frames.pixels(0, {36, 36}), i420 = source.read(0).bytes;
     constexpr std::size_t luma = 36 * 22, chroma = 18 * 11;
@@ -240,8 +234,7 @@ TEST_F(Session, H264IsCloseToTheFrames) {
                                        {ARHOST_PIXEL_FORMAT_I420, {64, 32, 32}}}) {
         const Frames frames(pixels, 64, 48);
         ASSERT_NO_FATAL_FAILURE(record(frames, 3, {{"codec", "h264"}, {"crf", "1"}, {"replace", "true"}}));
-        SourceUnderTest source("source_file");
-        ASSERT_EQ(source.start({{"path", folder() / "video.mkv"}}), ARHOST_STATUS_OK) << source.log();
+        SourceUnderTest source = replay();
         EXPECT_EQ(source.format().pixel_format, pixels);
         const std::vector<std::uint8_t> before = frames.pixels(2, rows), after = source.read(2).bytes;
         ASSERT_EQ(before.size(), after.size());

@@ -46,8 +46,7 @@ TEST_P(AprilTagFamily, RefinesBlurredTagsByTheWholePrint) {
 }
 
 TEST_P(AprilTagFamily, FindsUnlistedTagsWithoutWrongBits) {
-    Tracker tracker("tracker_apriltag", {{"max_hamming", "2"}});
-    ASSERT_EQ(tracker.start(test_camera, {{0, 80, GetParam()}}), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker("tracker_apriltag", {{"max_hamming", "2"}}, test_camera, {{0, 80, GetParam()}});
     const Mt truth = pose_of(10, 5, 400, 10, -20, 160);
     for (const auto &[wrong_bits, count] : {std::pair{0, 1u}, {1, 0u}}) {
         const Print print = with_wrong_bits(april_tag(GetParam(), 20), wrong_bits).with_margin(1);
@@ -69,8 +68,7 @@ TEST(AprilTagTracker, FindsTagsOfAllFamiliesInOneRun) {
                           pose_of(150 * (i % 3 - 1), 120 * (i / 3 - 1), 500, 10, 5 * i - 20, 40 * i)});
         listed.push_back({20 + i, 45, type.name});
     }
-    Tracker tracker("tracker_apriltag");
-    ASSERT_EQ(tracker.start(test_camera, listed), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker("tracker_apriltag", {}, test_camera, listed);
     const auto seen = tracker.track(GreyFrame(picture_of(placed)));
     ASSERT_EQ(seen.size(), listed.size());
     for (std::size_t i = 0; i < seen.size(); ++i) {
@@ -163,8 +161,7 @@ TEST(AprilTagTracker, FindsATagWithAHiddenCornerInACloserLook) {
     cv::resize(picture, picture, size, 0, 0, cv::INTER_AREA);
     add_noise(picture, 1.5, 252);
     for (const auto &[closer_look, count] : {std::pair{"false", 0u}, {"true", 1u}}) {
-        Tracker tracker("tracker_apriltag", {{"closer_look", closer_look}});
-        ASSERT_EQ(tracker.start(camera, {{0}}), ARHOST_STATUS_OK) << tracker.log();
+        Tracker tracker("tracker_apriltag", {{"closer_look", closer_look}}, camera, {{0}});
         const auto seen = tracker.track(GreyFrame(picture));
         ASSERT_EQ(seen.size(), count) << closer_look;
         for (const arhost_observation &one : seen)
@@ -175,20 +172,16 @@ TEST(AprilTagTracker, FindsATagWithAHiddenCornerInACloserLook) {
 TEST(AprilTagTracker, IgnoresTagsBelowTheDecisionMargin) {
     const GreyFrame frame(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}));
     for (const auto &[margin, count] : {std::pair{"20", 1u}, std::pair{"200", 0u}}) {
-        Tracker tracker("tracker_apriltag", {{"min_decision_margin", margin}});
-        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+        Tracker tracker("tracker_apriltag", {{"min_decision_margin", margin}}, test_camera, {{3, 100}});
         EXPECT_EQ(tracker.track(frame).size(), count);
     }
 }
 
 TEST(AprilTagTracker, CorrectsTheConfiguredNumberOfWrongBits) {
-    Print damaged = april_tag("tag36h11", 3);
-    damaged.cells(4, 4) = 255 - damaged.cells(4, 4);
-    damaged.cells(5, 6) = 255 - damaged.cells(5, 6);
+    const Print damaged = with_wrong_bits(april_tag("tag36h11", 3), 2);
     const GreyFrame frame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}));
     for (const auto &[bits, count] : {std::pair{"1", 0u}, std::pair{"2", 1u}}) {
-        Tracker tracker("tracker_apriltag", {{"max_hamming", bits}});
-        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+        Tracker tracker("tracker_apriltag", {{"max_hamming", bits}}, test_camera, {{3, 100}});
         EXPECT_EQ(tracker.track(frame).size(), count) << bits;
     }
 }
@@ -197,8 +190,7 @@ TEST(AprilTagTracker, CorrectsByDefaultAsManyWrongBitsAsTheFamilyAllows) {
     for (const auto &[family, wrong_bits, count] :
          {std::tuple{"tag16h5", 1, 0u}, {"tag25h9", 1, 1u}, {"tag25h9", 2, 0u}, {"tag36h11", 2, 1u}}) {
         const Print damaged = with_wrong_bits(april_tag(family, 3), wrong_bits);
-        Tracker tracker("tracker_apriltag");
-        ASSERT_EQ(tracker.start(test_camera, {{3, 100, family}}), ARHOST_STATUS_OK);
+        Tracker tracker("tracker_apriltag", {}, test_camera, {{3, 100, family}});
         EXPECT_EQ(tracker.track(GreyFrame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}))).size(),
                   count)
             << family << ", " << wrong_bits;
@@ -206,11 +198,9 @@ TEST(AprilTagTracker, CorrectsByDefaultAsManyWrongBitsAsTheFamilyAllows) {
 }
 
 TEST(AprilTagTracker, AcceptsChangesOfOptionsWhileItTracks) {
-    Print damaged = april_tag("tag36h11", 3);
-    damaged.cells(4, 4) = 255 - damaged.cells(4, 4);
+    const Print damaged = with_wrong_bits(april_tag("tag36h11", 3), 1);
     const GreyFrame frame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}));
-    Tracker tracker("tracker_apriltag");
-    ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+    Tracker tracker("tracker_apriltag", {}, test_camera, {{3, 100}});
     const auto corners = [&] {
         const auto found = tracker.track(frame);
         return found.empty() ? std::vector<double>()
@@ -242,16 +232,15 @@ TEST(AprilTagTracker, AcceptsChangesOfOptionsWhileItTracks) {
 
 TEST(AprilTagTracker, KeepsItsDecimationIfTheNewOneIsInvalid) {
     const GreyFrame frame(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}));
-    Tracker tracker("tracker_apriltag");
-    ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+    Tracker tracker("tracker_apriltag", {}, test_camera, {{3, 100}});
     EXPECT_EQ(tracker.set("quad_decimate", "2.5"), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(tracker.log(), HasSubstr("quad_decimate: must be 1, 1.5 or an integer"));
     EXPECT_EQ(tracker.track(frame).size(), 1u);
 }
 
 TEST(AprilTagTracker, LibraryCornersUseTheSamePixelCentres) {
-    Tracker tracker("tracker_apriltag", {{"corner_refinement", "none"}, {"quad_decimate", "1"}});
-    ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+    Tracker tracker("tracker_apriltag", {{"corner_refinement", "none"}, {"quad_decimate", "1"}}, test_camera,
+                    {{3, 100}});
     cv::Point2d bias;
     for (int i = 0; i < 6; ++i) {
         const Mt truth = pose_of(7 * i, -5 * i, 450, 10 * i - 25, 20 - 8 * i, 60 * i);

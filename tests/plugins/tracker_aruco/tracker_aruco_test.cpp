@@ -39,9 +39,7 @@ INSTANTIATE_TEST_SUITE_P(Dictionaries, ArucoDictionary, testing::ValuesIn(dictio
 
 TEST_P(ArucoDictionary, FindsTheMarkerUpright) {
     const std::string dictionary = GetParam();
-    Tracker tracker("tracker_aruco");
-    ASSERT_EQ(tracker.start(test_camera, {{7, 80, dictionary}, {21, 80, dictionary}}), ARHOST_STATUS_OK)
-        << tracker.log();
+    Tracker tracker("tracker_aruco", {}, test_camera, {{7, 80, dictionary}, {21, 80, dictionary}});
     const Print print = print_of(dictionary, 21);
     for (const Mt &truth : {pose_of(10, 5, 400), pose_of(-20, 10, 450, 25, -20, 110)}) {
         const auto seen = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
@@ -60,8 +58,7 @@ TEST_P(ArucoDictionary, RefinesBlurredMarkersByTheWholePrint) {
 
 TEST_P(ArucoDictionary, FindsUnlistedMarkers) {
     const std::string dictionary = GetParam();
-    Tracker tracker("tracker_aruco");
-    ASSERT_EQ(tracker.start(test_camera, {{7, 80, dictionary}}), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker("tracker_aruco", {}, test_camera, {{7, 80, dictionary}});
     const Print print = print_of(dictionary, 21);
     const Mt truth = pose_of(10, 5, 400, 10, -20, 160);
     const auto seen = tracker.track(GreyFrame(picture_of({{print, 80, truth}})));
@@ -104,9 +101,7 @@ TEST_P(ArucoDictionary, IsReportedInTheSameWayWhereverAndHoweverItIsExpected) {
     const std::string dictionary = GetParam();
     const Mt truth = pose_of(10, 5, 400, 10, -20, 160);
     const GreyFrame frame(picture_of({{print_of(dictionary, 21), 80, truth}}));
-    Tracker tracker("tracker_aruco");
-    ASSERT_EQ(tracker.start(test_camera, {{21, 80, dictionary}, {7, 80, dictionary}}), ARHOST_STATUS_OK)
-        << tracker.log();
+    Tracker tracker("tracker_aruco", {}, test_camera, {{21, 80, dictionary}, {7, 80, dictionary}});
     const auto corners = corners_of(truth, test_camera, 80);
     const cv::Point2d cell_px = (corners[1] - corners[0]) / print_of(dictionary, 21).corner_cells;
     for (const std::uint32_t marker : {0U, 1U}) // 1: where it is, marker 7 is expected
@@ -128,8 +123,7 @@ TEST_P(ArucoDictionary, IsReportedInTheSameWayWhereverAndHoweverItIsExpected) {
 
 TEST(TrackerAruco, AnExpectedMarkerIsReadAlsoIfItIsNotDetected) {
     const Mt truth = pose_of(10, 5, 400);
-    Tracker tracker("tracker_aruco", {{"closer_look", "false"}});
-    ASSERT_EQ(tracker.start(test_camera, {{5}}), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker("tracker_aruco", {{"closer_look", "false"}}, test_camera, {{5}});
     cv::Mat dim;
     picture_of({{tag(5), 80, truth}}).convertTo(dim, -1, 0.04, 100); // below OpenCV's threshold of contrast
     const GreyFrame frame(dim);
@@ -143,8 +137,7 @@ TEST(TrackerAruco, AnExpectedMarkerIsReadAlsoIfItIsNotDetected) {
 
 TEST(TrackerAruco, AnExpectedMarkerWithAWrongCellIsNotReadButDetected) {
     const Mt truth = pose_of(10, 5, 400);
-    Tracker tracker("tracker_aruco");
-    ASSERT_EQ(tracker.start(test_camera, {{5}}), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker("tracker_aruco", {}, test_camera, {{5}});
     const auto expected = expected_at(0, corners_of(truth, test_camera, 80));
     const GreyFrame frame(picture_of({{with_wrong_bits(tag(5), 1), 80, truth}}));
     const auto seen = tracker.track(frame, {expected}, false);
@@ -213,8 +206,7 @@ INSTANTIATE_TEST_SUITE_P(Refinements, ArucoRefinement,
                          [](const auto &info) { return std::string(info.param.name); });
 
 TEST_P(ArucoRefinement, PlacesPixelCentresAtIntegers) {
-    Tracker tracker("tracker_aruco", {{"corner_refinement", GetParam().name}});
-    ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+    Tracker tracker("tracker_aruco", {{"corner_refinement", GetParam().name}}, test_camera, {{3, 100}});
     cv::Point2d bias;
     double error = 0;
     for (int i = 0; i < 6; ++i) {
@@ -240,10 +232,8 @@ TEST(ArucoTracker, ReadsADictionaryFile) {
     const std::string bits = "0100111010011101";
     for (int i = 0; i < 16; ++i)
         print.cells(1 + i / 4, 1 + i % 4) = bits[i] == '1' ? 255 : 0;
-    Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
-    ASSERT_EQ(tracker.created(), ARHOST_STATUS_OK) << tracker.log();
-    ASSERT_EQ(tracker.start(test_camera, {{0, 80, "mine"}, {1, 80, "mine"}, {3, 60}}), ARHOST_STATUS_OK)
-        << tracker.log();
+    Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}}, test_camera,
+                    {{0, 80, "mine"}, {1, 80, "mine"}, {3, 60}});
     const Mt truth = pose_of(10, 20, 400, 20, 20, 30), other = pose_of(-110, -60, 450);
     const auto seen = tracker.track(GreyFrame(picture_of({{print.with_margin(1), 80, truth}, {tag(3), 60, other}})));
     ASSERT_EQ(seen.size(), 2u);
@@ -268,8 +258,7 @@ TEST(ArucoTracker, TakesADictionaryFromTheFileOfItsName) {
         text += bit ? '1' : '0';
     std::ofstream(file) << "%YAML:1.0\nnmarkers: 1\nmarkersize: 5\nmaxCorrectionBits: 1\nmarker_0: \"" << text
                         << "\"\n";
-    Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
-    ASSERT_EQ(tracker.start(test_camera, {{0, 80, "DICT_4X4_50"}}), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}}, test_camera, {{0, 80, "DICT_4X4_50"}});
     const auto seen =
         tracker.track(GreyFrame(picture_of({{aruco_marker("DICT_5X5_50", 7), 80, pose_of(0, 0, 400)}})));
     ASSERT_EQ(seen.size(), 1u);
@@ -289,8 +278,7 @@ TEST(ArucoTracker, NamesTheTrackerThatKnowsMoreFamiliesOfAprilTag) {
 
 // Each begins with the markers of the smaller one, so a print may be a marker of both.
 TEST(ArucoTracker, HasExaminedAtLeastAsManyCandidatesAsItReports) {
-    Tracker tracker("tracker_aruco");
-    ASSERT_EQ(tracker.start(test_camera, {{3, 100, "DICT_6X6_50"}, {3, 100, "DICT_6X6_100"}}), ARHOST_STATUS_OK);
+    Tracker tracker("tracker_aruco", {}, test_camera, {{3, 100, "DICT_6X6_50"}, {3, 100, "DICT_6X6_100"}});
     const cv::Mat picture =
         render(test_camera, {{aruco_marker("DICT_6X6_50", 3).with_margin(2), 100, pose_of(0, 0, 400, 20, 10, 30)}});
     const auto seen = tracker.track(GreyFrame(picture));
@@ -313,8 +301,7 @@ TEST(ArucoTracker, CorrectsAtMostThreeWrongBitsOf36ByDefault) {
     const std::string bits = "101100111000110101001011100110010110";
     std::ofstream(file) << "%YAML:1.0\nnmarkers: 1\nmarkersize: 6\nmaxCorrectionBits: 12\nmarker_0: \"" << bits
                         << "\"\n";
-    Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
-    ASSERT_EQ(tracker.start(test_camera, {{0, 100, "mine"}}), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}}, test_camera, {{0, 100, "mine"}});
     for (const auto &[wrong_bits, count] : {std::pair{0, 1u}, {3, 1u}, {4, 0u}}) {
         Print print{cv::Mat_<uint8_t>(8, 8, uint8_t{0}), 8};
         for (int i = 0; i < 36; ++i)
@@ -327,23 +314,20 @@ TEST(ArucoTracker, CorrectsAtMostThreeWrongBitsOf36ByDefault) {
 
 TEST(ArucoTracker, RejectsAFileThatIsNotADictionary) {
     const ScratchFolder scratch;
-    const auto expect_rejected = [&](const std::string &text) {
-        const auto file = scratch.path() / "bad.yml";
+    const auto file = scratch.path() / "bad.yml";
+    const std::string header = "%YAML:1.0\n";
+    for (const std::string &text : {std::string(), std::string("not yaml at all {"), header + "nmarkers: 2\n",
+                                    header + "nmarkers: 0\nmarkersize: 4\n",
+                                    header + "nmarkers: 2\nmarkersize: 4\nmarker_0: \"1011010011100010\"\n",
+                                    header + "nmarkers: 1\nmarkersize: 4\nmarker_0: \"101\"\n",
+                                    header + "nmarkers: 1\nmarkersize: 4\nmarker_0: \"101101001110001x\"\n",
+                                    header + "nmarkers: -1\nmarkersize: -4\nmarker_0: \"1\"\n",
+                                    header + "nmarkers: 2000000000\nmarkersize: 1000\nmarker_0: \"1\"\n"}) {
         std::ofstream(file) << text;
         Tracker tracker("tracker_aruco", {{"dictionary_file", file.string()}});
         EXPECT_EQ(tracker.created(), ARHOST_STATUS_ERROR_CONFIGURATION) << text;
         EXPECT_THAT(tracker.log(), HasSubstr("dictionary_file: '" + file.string() + "' is not a dictionary")) << text;
-    };
-    expect_rejected("");
-    expect_rejected("not yaml at all {");
-    expect_rejected("%YAML:1.0\nnmarkers: 2\n");
-    expect_rejected("%YAML:1.0\nnmarkers: 0\nmarkersize: 4\n");
-    expect_rejected("%YAML:1.0\nnmarkers: 2\nmarkersize: 4\nmarker_0: \"1011010011100010\"\n");
-    expect_rejected("%YAML:1.0\nnmarkers: 1\nmarkersize: 4\nmarker_0: \"101\"\n");
-    expect_rejected("%YAML:1.0\nnmarkers: 1\nmarkersize: 4\nmarker_0: \"101101001110001x\"\n");
-    expect_rejected("%YAML:1.0\nnmarkers: -1\nmarkersize: -4\nmarker_0: \"1\"\n");
-    expect_rejected("%YAML:1.0\nnmarkers: 2000000000\nmarkersize: 1000\nmarker_0: \"1\"\n");
-
+    }
     Tracker absent("tracker_aruco", {{"dictionary_file", (scratch.path() / "absent.yml").string()}});
     EXPECT_EQ(absent.created(), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(absent.log(), HasSubstr("absent.yml' cannot be read"));
@@ -373,8 +357,7 @@ TEST(ArucoTracker, LooksCloserAtTinyFramesWithEachRefinement) {
 
 // By chance, clutter looks like a marker of a small family more often the closer the tracker looks.
 TEST(ArucoTracker, TakesNoCloserLookForASmallFamily) {
-    Tracker tracker("tracker_aruco");
-    ASSERT_EQ(tracker.start(test_camera, {{3, 100, "DICT_5X5_50"}}), ARHOST_STATUS_OK);
+    Tracker tracker("tracker_aruco", {}, test_camera, {{3, 100, "DICT_5X5_50"}});
     const Difficult dim{"dim", 60, 30, 0.6, 0.06};
     EXPECT_TRUE(tracker.track(GreyFrame(dim.picture(aruco_marker("DICT_5X5_50", 3)))).empty());
 }
@@ -389,8 +372,7 @@ TEST(ArucoTracker, FindsInvertedMarkersOnlyIfEnabled) {
     const GreyFrame frame(255 -
                           picture_of({{aruco_marker("DICT_5X5_50", 9).with_margin(2), 80, pose_of(0, 0, 400)}}));
     for (const auto &[inverted, count] : {std::pair{"false", 0u}, std::pair{"true", 1u}}) {
-        Tracker tracker("tracker_aruco", {{"inverted", inverted}});
-        ASSERT_EQ(tracker.start(test_camera, {{9, 80, "DICT_5X5_50"}}), ARHOST_STATUS_OK);
+        Tracker tracker("tracker_aruco", {{"inverted", inverted}}, test_camera, {{9, 80, "DICT_5X5_50"}});
         const auto seen = tracker.track(frame);
         ASSERT_EQ(seen.size(), count) << inverted;
         if (count) {
@@ -402,8 +384,7 @@ TEST(ArucoTracker, FindsInvertedMarkersOnlyIfEnabled) {
 }
 
 TEST(ArucoTracker, ReadsMarkersWithAWideBorder) {
-    Tracker tracker("tracker_aruco", {{"border_bits", "2"}});
-    ASSERT_EQ(tracker.start(test_camera, {{9, 80, "DICT_4X4_50"}}), ARHOST_STATUS_OK);
+    Tracker tracker("tracker_aruco", {{"border_bits", "2"}}, test_camera, {{9, 80, "DICT_4X4_50"}});
     const auto seen =
         tracker.track(GreyFrame(picture_of({{aruco_marker("DICT_4X4_50", 9, 2), 80, pose_of(0, 0, 400)}})));
     ASSERT_EQ(seen.size(), 1u);
@@ -412,13 +393,10 @@ TEST(ArucoTracker, ReadsMarkersWithAWideBorder) {
 }
 
 TEST(ArucoTracker, CorrectsWrongBitsOfAprilTags) {
-    Print damaged = april_tag("tag36h11", 3);
-    damaged.cells(4, 4) = 255 - damaged.cells(4, 4);
-    damaged.cells(5, 6) = 255 - damaged.cells(5, 6);
+    const Print damaged = with_wrong_bits(april_tag("tag36h11", 3), 2);
     const GreyFrame frame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}));
     for (const auto &[rate, count] : {std::pair{"0", 0u}, std::pair{"0.6", 1u}}) {
-        Tracker tracker("tracker_aruco", {{"error_correction_rate", rate}});
-        ASSERT_EQ(tracker.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
+        Tracker tracker("tracker_aruco", {{"error_correction_rate", rate}}, test_camera, {{3, 100}});
         EXPECT_EQ(tracker.track(frame).size(), count) << rate;
     }
 }
@@ -427,8 +405,7 @@ TEST(ArucoTracker, CorrectsByDefaultAsManyWrongBitsAsTheDictionaryAllows) {
     for (const auto &[family, wrong_bits, count] :
          {std::tuple{"16h5", 1, 0u}, {"25h9", 1, 1u}, {"25h9", 2, 0u}, {"36h11", 2, 1u}}) {
         const Print damaged = with_wrong_bits(april_tag("tag" + std::string(family), 3), wrong_bits);
-        Tracker tracker("tracker_aruco");
-        ASSERT_EQ(tracker.start(test_camera, {{3, 100, "tag" + std::string(family)}}), ARHOST_STATUS_OK);
+        Tracker tracker("tracker_aruco", {}, test_camera, {{3, 100, "tag" + std::string(family)}});
         EXPECT_EQ(tracker.track(GreyFrame(picture_of({{damaged.with_margin(1), 100, pose_of(0, 0, 400)}}))).size(),
                   count)
             << family << ", " << wrong_bits;
@@ -442,8 +419,7 @@ TEST(ArucoTracker, FindsTheMarkerOfTheUbiquityPhotoAndItsDistance) {
     const auto &k = golden["camera"]["K"];
     const std::vector<double> d = golden["camera"]["D"];
     const auto camera = intrinsics_of({1280, 960}, k[0], k[4], k[2], k[5], ARHOST_DISTORTION_BROWN, d);
-    Tracker tracker("tracker_aruco", {{"corner_refinement", "subpix"}});
-    ASSERT_EQ(tracker.start(camera, {{1, 145, "DICT_5X5_1000"}}), ARHOST_STATUS_OK);
+    Tracker tracker("tracker_aruco", {{"corner_refinement", "subpix"}}, camera, {{1, 145, "DICT_5X5_1000"}});
     const GreyFrame photo(read_grey(folder / "tag_01_d7_14cm.png"), ARHOST_TRANSFER_SRGB);
     const auto seen = tracker.track(photo);
     ASSERT_EQ(seen.size(), 1u);

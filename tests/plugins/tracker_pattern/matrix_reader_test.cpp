@@ -82,8 +82,7 @@ TEST(MatrixReader, TellsAllMarkersOfAFamilyApartAtTiltsOfUpTo60Degrees) {
 TEST(MatrixReader, CorrectsAsManyCellsAsTheCodeCan) {
     for (const MatrixFamily &family : matrix_families()) {
         const int id = 5, most = family.corrects;
-        Tracker tracker("tracker_pattern");
-        ASSERT_EQ(tracker.start(camera, {{id, side_mm, family.name}}), ARHOST_STATUS_OK) << tracker.log();
+        Tracker tracker("tracker_pattern", {}, camera, {{id, side_mm, family.name}});
         for (int wrong_cells = 0; wrong_cells <= most + 1; ++wrong_cells) {
             SCOPED_TRACE(std::string(family.name) + ", wrong cells: " + std::to_string(wrong_cells));
             const auto seen = tracker.track(GreyFrame(
@@ -98,8 +97,7 @@ TEST(MatrixReader, CorrectsAsManyCellsAsTheCodeCan) {
 
 TEST(MatrixReader, ReadsOnlyClearCellsInsideABlackBorder) {
     const MatrixFamily &family = *find_matrix_family("artoolkit-3x3");
-    Tracker tracker("tracker_pattern");
-    ASSERT_EQ(tracker.start(camera, listed(family)), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker("tracker_pattern", {}, camera, listed(family));
     const auto seen = [&](const Print &print) {
         return tracker.track(GreyFrame(picture_of({{print, side_mm, pose_of(0, 0, 1000, 20, 10, 100)}})));
     };
@@ -119,8 +117,7 @@ TEST(MatrixReader, ReadsOnlyClearCellsInsideABlackBorder) {
 TEST(MatrixReader, SurvivesDimCodesThatAreAlmostUniform) {
     for (const auto &[name, id] : {std::pair("artoolkit-3x3", 63), {"artoolkit-4x4", 8191}}) {
         const MatrixFamily &family = *find_matrix_family(name);
-        Tracker tracker("tracker_pattern");
-        ASSERT_EQ(tracker.start(camera, {{id, side_mm, name}}), ARHOST_STATUS_OK) << tracker.log();
+        Tracker tracker("tracker_pattern", {}, camera, {{id, side_mm, name}});
         cv::Mat picture = render(camera, {{print_of(family, id), side_mm, pose_of(0, 0, 1000, 20, 10, 100)}});
         cv::GaussianBlur(picture, picture, {}, 1.5);
         for (int percent = 5; percent <= 20; ++percent) {

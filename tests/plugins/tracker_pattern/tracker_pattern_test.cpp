@@ -17,8 +17,7 @@ using testing::IsEmpty;
 
 TEST(PatternTracker, TellsHiroFromKanjiAtTiltsOfUpTo60Degrees) {
     ARHOST_REQUIRE_SHARED_DATA("markers/artoolkit");
-    Tracker tracker("tracker_pattern");
-    ASSERT_EQ(tracker.start(camera, both()), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker("tracker_pattern", {}, camera, both());
     std::mt19937 random(1);
     double worst_px = 0;
     for (const double tilt : {0.0, 15.0, 30.0, 45.0, 60.0})
@@ -37,8 +36,7 @@ TEST(PatternTracker, TellsHiroFromKanjiAtTiltsOfUpTo60Degrees) {
 
 TEST(PatternTracker, SearchesOnlyWherePatternsAreExpected) {
     ARHOST_REQUIRE_SHARED_DATA("markers/artoolkit");
-    Tracker tracker("tracker_pattern");
-    ASSERT_EQ(tracker.start(camera, both()), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker("tracker_pattern", {}, camera, both());
     const Mt hiro = pose_of(-75, 0, 500, 20, 10, 5), kanji = pose_of(75, 0, 500);
     const GreyFrame frame(picture_of({{print_of("hiro"), 80, hiro}, {print_of("kanji"), 80, kanji}}));
     const auto corners = corners_of(hiro, camera, 80);
@@ -50,8 +48,7 @@ TEST(PatternTracker, SearchesOnlyWherePatternsAreExpected) {
 
 TEST(PatternTracker, FindsNothingElse) {
     ARHOST_REQUIRE_SHARED_DATA("markers/artoolkit");
-    Tracker tracker("tracker_pattern");
-    ASSERT_EQ(tracker.start(camera, {{0, 80, "pattern", file_of("hiro"), 0.5}}), ARHOST_STATUS_OK) << tracker.log();
+    Tracker tracker("tracker_pattern", {}, camera, {{0, 80, "pattern", file_of("hiro"), 0.5}});
     EXPECT_THAT(tracker.track(GreyFrame(picture_of({{print_of("kanji"), 80, pose_of(0, 0, 500, 20, 20, 30)}}))),
                 IsEmpty());
     for (const cv::Size size : {cv::Size(1, 1), cv::Size(3, 200), cv::Size(640, 480)}) {
