@@ -116,26 +116,6 @@ TEST(AlphaCutoff, HolesInACatcherReceiveNoShadow) {
     EXPECT_EQ(picture.alpha(110, 74), 0);
 }
 
-// ---- Combined features -----------------------------------------------------------------------------
-
-TEST(RichScene, IsIdenticalForAnyThreadCountAndRepeatedly) {
-    for (const char *mode : {"tree", "path"}) {
-        Tracer one(rich_scene(), {{"threads", "1"}, {"samples", "2"}, {"glass", mode}}),
-            three(rich_scene(), {{"threads", "3"}, {"samples", "2"}, {"glass", mode}});
-        const auto expected = one.render(from_the_side()).pixels();
-        EXPECT_TRUE(three.render(from_the_side()).pixels() == expected) << mode;
-        EXPECT_TRUE(three.render(from_the_side()).pixels() == expected) << mode;
-    }
-}
-
-TEST(RichScene, IsIdenticalForEveryInstructionSet) {
-    const auto trace = [](const std::string &instruction_set) {
-        return Tracer(rich_scene(), {{"instruction_set", instruction_set}}).render(from_the_side()).pixels();
-    };
-    for (const std::string &set : instruction_sets())
-        EXPECT_TRUE(trace(set) == trace("base")) << set;
-}
-
 // ---- Normal textures -------------------------------------------------------------------------------
 
 struct Tilt {

@@ -174,11 +174,4 @@ TEST(AreaLights, BehindAnObjectAreNotVisibleInMirrors) {
     }
 }
 
-TEST(AreaLights, AreIdenticalOnEachRunAndThreadCount) {
-    const auto pixels = [](const char *threads) {
-        return over_a_plane(bulb({0, -20, 200}, 30), {{"threads", threads}}).pixels();
-    };
-    EXPECT_EQ(pixels("1"), pixels("3"));
-}
-
 } // namespace arhost::test

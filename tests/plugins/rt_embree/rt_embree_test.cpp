@@ -12,7 +12,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include <cmath>
-#include <limits>
+#include <functional>
 
 namespace arhost::test {
 namespace {
@@ -106,19 +106,6 @@ TEST(Silhouette, SphereMatchesTheLensModel) {
         }
 }
 
-TEST(Silhouette, SphereOnTheAxisIsSymmetricAboutThePrincipalPoint) {
-    arhost_intrinsics in = pinhole(101, 81);
-    in.cx = 30; // pixel centres are integers, so the picture is symmetric about this column and row
-    in.cy = 50;
-    const Picture picture = Tracer(one_sphere({0, 0, 200, 20})).render(opencv_axes(in));
-    for (int dy = -30; dy <= 30; ++dy)
-        for (int dx = 0; dx <= 30; ++dx) {
-            ASSERT_EQ(picture.alpha(30 + dx, 50 + dy), picture.alpha(30 - dx, 50 + dy));
-            ASSERT_EQ(picture.alpha(30 + dx, 50 + dy), picture.alpha(30 + dx, 50 - dy));
-        }
-    EXPECT_EQ(picture.alpha(30, 50), 255);
-}
-
 TEST(Silhouette, SphereBehindAFisheyeCameraIsVisible) {
     const arhost_intrinsics in = with_lens(pinhole(300, 300, 60), ARHOST_DISTORTION_FISHEYE, {0, 0, 0, 0});
     const Picture picture = Tracer(one_sphere({100, 0, -40, 20})).render(opencv_axes(in));
@@ -170,14 +157,6 @@ SceneBuilder sphere_over_catcher(arhost_role floor_role = ARHOST_ROLE_CATCHER) {
     builder.add_ball("ball", {0, 0, 25, 12}, diffuse(0.9f, 0.1f, 0.1f));
     builder.add_light(light(60, -20, 200, 0.7f));
     return builder;
-}
-
-TEST(Alpha, IsZeroInLight153InShadowAnd255OnObjects) {
-    const auto counts = Tracer(sphere_over_catcher()).render(from_the_side()).alphas();
-    EXPECT_EQ(counts.size(), 3u);
-    EXPECT_GT(counts.at(0), 10000);
-    EXPECT_GT(counts.at(153), 100);
-    EXPECT_GT(counts.at(255), 300);
 }
 
 TEST(Alpha, ShadowIsWhereTheLightIsBlocked) {
@@ -676,36 +655,36 @@ SceneBuilder busy_scene(const glm::mat4 &moved = glm::mat4(1)) {
     return builder;
 }
 
-TEST(Equivalence, IsIdenticalForAnyThreadCount) {
-    for (const std::string samples : {"1", "4"}) {
-        const auto trace = [&](const std::string &threads) {
-            return Tracer(busy_scene(), {{"threads", threads}, {"samples", samples}})
-                .render(from_the_side())
-                .pixels();
-        };
-        const auto one = trace("1");
-        EXPECT_EQ(trace("2"), one);
-        EXPECT_EQ(trace("3"), one);
-    }
-}
+const std::vector<std::function<SceneBuilder()>> varied_scenes{[] { return busy_scene(); }, rich_scene};
 
-TEST(Equivalence, IsIdenticalForRepeatedFrames) {
-    for (const std::string samples : {"1", "4"}) {
-        Tracer tracer(busy_scene(), {{"threads", "2"}, {"samples", samples}});
-        const auto first = tracer.render(from_the_side()).pixels();
-        for (int i = 0; i < 20; ++i)
-            ASSERT_EQ(tracer.render_next(from_the_side()).pixels(), first) << samples << " samples";
-    }
+TEST(Equivalence, IsIdenticalForAnyThreadCountAndRepeatedFrames) {
+    for (const auto &scene : varied_scenes)
+        for (const Options &options :
+             {Options{{"samples", "1"}}, Options{{"samples", "4"}}, Options{{"samples", "2"}, {"glass", "path"}}}) {
+            const auto trace = [&](const std::string &threads) {
+                Options all = options;
+                all["threads"] = threads;
+                Tracer tracer(scene(), all);
+                const auto first = tracer.render(from_the_side()).pixels();
+                for (int i = 0; i < 5; ++i)
+                    EXPECT_EQ(tracer.render_next(from_the_side()).pixels(), first) << threads << " threads";
+                return first;
+            };
+            const auto one = trace("1");
+            EXPECT_EQ(trace("2"), one);
+            EXPECT_EQ(trace("3"), one);
+        }
 }
 
 TEST(Equivalence, IsIdenticalForEveryInstructionSet) {
-    const auto trace = [](const std::string &instruction_set) {
-        return Tracer(busy_scene(), {{"instruction_set", instruction_set}, {"samples", "3"}})
-            .render(from_the_side())
-            .pixels();
-    };
-    for (const std::string &set : instruction_sets())
-        EXPECT_EQ(trace(set), trace("base")) << set;
+    for (const auto &scene : varied_scenes) {
+        const auto trace = [&](const std::string &instruction_set) {
+            Tracer tracer(scene(), {{"instruction_set", instruction_set}, {"samples", "3"}});
+            return tracer.render(from_the_side()).pixels();
+        };
+        for (const std::string &set : instruction_sets())
+            EXPECT_EQ(trace(set), trace("base")) << set;
+    }
 }
 
 // Returns the fraction of pixels that differ by more than rounding. It is small but not 0 if silhouettes shift by a

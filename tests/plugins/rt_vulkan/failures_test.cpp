@@ -88,8 +88,11 @@ protected:
         ARHOST_REQUIRE_VULKAN(GetParam());
         enable_layer();
         std::ofstream(folder_.path() / "scene.yaml") << small_scene;
-        tracer_.emplace(scene::load_scene(folder_.path() / "scene.yaml"), Options{{"path", GetParam()}}, "rt_vulkan");
+        create();
     }
+    scene::ArenaBuilder scene() const { return scene::load_scene(folder_.path() / "scene.yaml"); }
+    // Creates the plugin again, with this path.
+    void create() { tracer_.emplace(scene(), Options{{"path", GetParam()}}, "rt_vulkan"); }
     arhost_status start() { return tracer_->start(small_); }
     arhost_status render() {
         picture_.emplace(small_);
@@ -124,7 +127,7 @@ TEST_P(FailingDevice, FallsBackIfAnAnnouncedPathFails) {
         GTEST_SKIP() << "no path precedes the path 'plain'";
     inject_failure(GetParam() == "query" ? "device-with:VK_KHR_ray_query" : "pipelines:1");
     ::setenv("ARHOST_TEST_VULKAN_IS_A_GPU", GetParam().c_str(), 1);
-    Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {}, "rt_vulkan");
+    Tracer tracer(scene(), {}, "rt_vulkan");
     ::unsetenv("ARHOST_TEST_VULKAN_IS_A_GPU");
     ASSERT_EQ(tracer.start(small_), ARHOST_STATUS_OK) << tracer.log();
     const std::string next = path_before(GetParam());
@@ -132,7 +135,7 @@ TEST_P(FailingDevice, FallsBackIfAnAnnouncedPathFails) {
                                     HasSubstr("path " + next + ", ")));
     EXPECT_GT(tracer.render(from_the_side(small_)).alphas().rbegin()->first, 0);
     // A path that is selected by name has no fallback.
-    tracer_.emplace(scene::load_scene(folder_.path() / "scene.yaml"), Options{{"path", GetParam()}}, "rt_vulkan");
+    create();
     EXPECT_THAT(log_of(ARHOST_STATUS_ERROR_UNSUPPORTED, [&] { return start(); }),
                 HasSubstr("that this is unsupported"));
 }
@@ -144,7 +147,7 @@ TEST_P(FailingDevice, FallsBackIfAPathDrawsWrongPictures) {
     const std::string next = path_before(GetParam());
     for (const char *failure : {"no-picture", ""}) {
         inject_failure(failure);
-        Tracer tracer(scene::load_scene(folder_.path() / "scene.yaml"), {}, "rt_vulkan");
+        Tracer tracer(scene(), {}, "rt_vulkan");
         ASSERT_EQ(tracer.start(small_), ARHOST_STATUS_OK) << tracer.log();
         if (*failure)
             EXPECT_THAT(tracer.log(),
@@ -162,7 +165,7 @@ TEST_P(FailingDevice, ReportsAMissingFunction) {
                                  : GetParam() == "query" ? "vkCmdBuildAccelerationStructuresKHR"
                                                          : "vkCmdTraceRaysKHR";
     inject_failure("lacks:" + function);
-    tracer_.emplace(scene::load_scene(folder_.path() / "scene.yaml"), Options{{"path", GetParam()}}, "rt_vulkan");
+    create();
     EXPECT_THAT(log_of(ARHOST_STATUS_ERROR_UNSUPPORTED, [&] { return start(); }),
                 HasSubstr("the Vulkan driver lacks " + function));
     expect_recovery();

@@ -68,8 +68,15 @@ public:
                         const char *run_description = description) {
         frames_ = &frames;
         const arhost_frame_format &format = frames.format();
-        const arhost_sink_setup setup{sizeof setup, format.width, format.height,  0, 30, first_sequence,
-                                      nullptr,      &format,      run_description};
+        const arhost_sink_setup setup{.struct_size = sizeof setup,
+                                      .width = format.width,
+                                      .height = format.height,
+                                      .reserved = 0,
+                                      .fps = 30,
+                                      .first_sequence = first_sequence,
+                                      .intrinsics = nullptr,
+                                      .video_format = &format,
+                                      .run_description = run_description};
         return functions().start(plugin_.instance(), &setup);
     }
     arhost_status write(std::uint64_t number) {
@@ -142,6 +149,14 @@ protected:
         EXPECT_EQ(source.read(count).status, ARHOST_STATUS_END) << source.log();
     }
 
+    // Starts the sink, records the frames [first, end), then simulates a kill.
+    void record_and_die(std::uint64_t first, std::uint64_t end) const {
+        Recorder sink(folder());
+        ASSERT_EQ(sink.start(frames, first), ARHOST_STATUS_OK) << sink.log();
+        sink.write(first, end);
+    }
+
+    const Frames frames{ARHOST_PIXEL_FORMAT_GREY8, 32, 24};
     ScratchFolder scratch_;
 };
 
@@ -246,26 +261,19 @@ TEST_F(Session, H264IsCloseToTheFrames) {
 }
 
 TEST_F(Session, ARestartedSinkContinuesTheSameFiles) {
-    const Frames frames(ARHOST_PIXEL_FORMAT_GREY8, 32, 24);
-    for (const std::uint64_t first : {0, 4, 5, 9}) { // frame 9 was written, but not confirmed
-        Recorder sink(folder());
-        ASSERT_EQ(sink.start(frames, first), ARHOST_STATUS_OK) << sink.log();
-        sink.write(first, first == 9 ? 12 : first == 5 ? 10 : first + 4);
-        if (first == 9) {
-            ASSERT_EQ(sink.stop(), ARHOST_STATUS_OK);
-        }
-    }
+    record_and_die(0, 4);
+    record_and_die(4, 8);
+    record_and_die(5, 10);
+    Recorder sink(folder());
+    ASSERT_EQ(sink.start(frames, 9), ARHOST_STATUS_OK) << sink.log(); // frame 9 was written, but not confirmed
+    sink.write(9, 12);
+    ASSERT_EQ(sink.stop(), ARHOST_STATUS_OK);
     expect_frames(12);
     expect_pixels(frames, 12, {32});
 }
 
 TEST_F(Session, ARestartedSinkRemovesAFrameThatIsIncomplete) {
-    const Frames frames(ARHOST_PIXEL_FORMAT_GREY8, 32, 24);
-    {
-        Recorder sink(folder());
-        ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK);
-        sink.write(0, 3);
-    }
+    record_and_die(0, 3);
     std::ofstream(folder() / "video.mkv", std::ios::app) << "a part of a cluster";
     std::ofstream(folder() / "frames.jsonl", std::ios::app) << "{\"frame\": 3, \"capt";
     Recorder sink(folder());
@@ -277,7 +285,6 @@ TEST_F(Session, ARestartedSinkRemovesAFrameThatIsIncomplete) {
 }
 
 TEST_F(Session, AnExistingFolderIsReplacedOnlyOnRequest) {
-    const Frames frames(ARHOST_PIXEL_FORMAT_GREY8, 32, 24);
     std::filesystem::create_directories(folder());
     std::ofstream(folder() / "notes.txt") << "mine";
     Recorder refused(folder());
@@ -286,21 +293,13 @@ TEST_F(Session, AnExistingFolderIsReplacedOnlyOnRequest) {
                                          "'replace: true'"));
     EXPECT_THAT(names_in(folder()), ElementsAre("notes.txt"));
     ASSERT_NO_FATAL_FAILURE(record(frames, 5, {{"replace", "true"}}));
-    Recorder again(folder(), {{"replace", "true"}});
-    ASSERT_EQ(again.start(frames), ARHOST_STATUS_OK) << again.log();
-    again.write(0, 2);
-    ASSERT_EQ(again.stop(), ARHOST_STATUS_OK);
+    ASSERT_NO_FATAL_FAILURE(record(frames, 2, {{"replace", "true"}}));
     expect_frames(2);
     EXPECT_EQ(read_text(folder() / "notes.txt"), "mine");
 }
 
 TEST_F(Session, ASinkKilledBeforeItsFirstAnswerStartsAgain) {
-    const Frames frames(ARHOST_PIXEL_FORMAT_GREY8, 32, 24);
-    {
-        Recorder sink(folder());
-        ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK);
-        sink.write(0, 1);
-    }
+    record_and_die(0, 1);
     Recorder other(folder());
     EXPECT_EQ(other.start(frames, 0, R"({"id": "another run"})"), ARHOST_STATUS_ERROR_CONFIGURATION);
     ASSERT_NO_FATAL_FAILURE(record(frames, 2));
@@ -326,14 +325,12 @@ TEST_F(Session, AFullDiskKeepsTheFramesBefore) {
 
 TEST_F(Session, AFileInPlaceOfTheFolderIsAnError) {
     std::ofstream(folder()) << "file";
-    const Frames frames(ARHOST_PIXEL_FORMAT_GREY8, 32, 24);
     Recorder sink(folder());
     EXPECT_EQ(sink.start(frames), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(sink.log(), HasSubstr("take' is not a folder; choose another path"));
 }
 
 TEST_F(Session, IsNotCreatedWithoutFrames) {
-    const Frames frames(ARHOST_PIXEL_FORMAT_GREY8, 32, 24);
     Recorder sink(folder());
     ASSERT_EQ(sink.start(frames), ARHOST_STATUS_OK);
     EXPECT_EQ(sink.stop(), ARHOST_STATUS_OK);
