@@ -103,6 +103,15 @@ public:
         return frame;
     }
 
+    // Reads a frame; throws if the source delivers none.
+    SourceFrame read_frame(std::uint64_t sequence) {
+        SourceFrame frame = read(sequence);
+        if (frame.status != ARHOST_STATUS_OK)
+            throw std::runtime_error("frame " + std::to_string(sequence) + ": status " +
+                                     std::to_string(frame.status) + "\n" + log());
+        return frame;
+    }
+
     // Reads frames up to and including the first whose status is not ARHOST_STATUS_OK, but at most `at_most`.
     std::vector<SourceFrame> read_all(std::uint64_t from = 0, std::size_t at_most = 1000) {
         std::vector<SourceFrame> frames;

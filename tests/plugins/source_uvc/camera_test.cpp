@@ -55,6 +55,12 @@ protected:
         options.try_emplace("usb", "1d6b:0104");
         return source_.start(options, source_setup(fps, live));
     }
+    // Starts the source and reads frame 0; throws if that fails.
+    void capture(const std::map<std::string, std::string> &options = {}, bool live = true) {
+        if (start(options, live) != ARHOST_STATUS_OK)
+            throw std::runtime_error(source_.log());
+        source_.read_frame(0);
+    }
     static std::string start_error(std::map<std::string, std::string> options,
                                    arhost_status expected = ARHOST_STATUS_ERROR_CONFIGURATION) {
         options.try_emplace("usb", "1d6b:0104");
@@ -117,8 +123,7 @@ TEST_P(UvcStream, DeliversUncompressedFramesUnchanged) {
         EXPECT_EQ(source_.format().yuv_matrix, ARHOST_YUV_MATRIX_BT709);
         std::uint32_t last = 0;
         for (std::uint64_t n = 0; n < 20; ++n) {
-            const SourceFrame frame = source_.read(n);
-            ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << source_.log();
+            const SourceFrame frame = source_.read_frame(n);
             const std::uint32_t number = number_of(frame.bytes);
             ASSERT_TRUE(frame.bytes == UsbCamera::picture(number, is_nv12)) << "frame " << number;
             if (n > 0) {
@@ -135,8 +140,7 @@ TEST_P(UvcStream, DecodesMotionJpeg) {
     ASSERT_EQ(start({{"format", "mjpeg"}}), ARHOST_STATUS_OK) << source_.log();
     ASSERT_EQ(source_.format().pixel_format, ARHOST_PIXEL_FORMAT_BGR8);
     for (std::uint64_t n = 0; n < 10; ++n) {
-        const SourceFrame frame = source_.read(n);
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << source_.log();
+        const SourceFrame frame = source_.read_frame(n);
         const int luma = frame.bytes[0], nearest = UsbCamera::luma_of(static_cast<std::uint32_t>((luma - 35) / 10));
         EXPECT_NEAR(luma, nearest, 2);
         EXPECT_TRUE(std::ranges::all_of(frame.bytes, [&](int value) { return std::abs(value - luma) <= 2; }));
@@ -153,8 +157,7 @@ TEST_F(UvcCamera, StampsFramesWithTheMonotonicClock) {
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
     std::int64_t last = 0;
     for (std::uint64_t n = 0; n < 30; ++n) {
-        const SourceFrame frame = source_.read(n);
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+        const SourceFrame frame = source_.read_frame(n);
         EXPECT_EQ(frame.info.clock, ARHOST_CLOCK_MONOTONIC);
         EXPECT_GE(frame.info.capture_ns, last); // equal where the camera's clock becomes known after late arrivals
         const std::int64_t age = monotonic_ns() - frame.info.capture_ns;
@@ -165,15 +168,13 @@ TEST_F(UvcCamera, StampsFramesWithTheMonotonicClock) {
 }
 
 TEST_F(UvcCamera, DropsDamagedFramesAndCountsThemByCause) {
-    ASSERT_EQ(start({}, false), ARHOST_STATUS_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture({}, false);
     std::uint64_t n = 1, skipped = 0;
     for (const auto fault : {UsbCamera::Fault::marked, UsbCamera::Fault::shortened, UsbCamera::Fault::malformed}) {
         camera_->inject(fault);
         const std::uint64_t end = n + 8;
         for (; n < end; ++n) {
-            const SourceFrame frame = source_.read(n);
-            ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+            const SourceFrame frame = source_.read_frame(n);
             EXPECT_TRUE(frame.bytes == UsbCamera::picture(number_of(frame.bytes), false));
             skipped += frame.info.skipped;
         }
@@ -221,8 +222,7 @@ TEST_F(UvcCamera, SetsControlsByName) {
 }
 
 TEST_F(UvcCamera, SetsControlsWhileItCaptures) {
-    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture();
     for (const auto &[key, text] : {std::pair{"exposure", "100"},
                                     {"gain", "7"},
                                     {"power_line_frequency", "60_hz"},
@@ -290,8 +290,7 @@ TEST_F(UvcCamera, ReportsACameraInUse) {
 }
 
 TEST_F(UvcCamera, ReturnsToTheKernelsDriver) {
-    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture();
     EXPECT_EQ(kernel_driven(), 0);
     source_.stop();
     EXPECT_EQ(kernel_driven(), 2);
@@ -302,8 +301,7 @@ TEST_F(UvcCamera, ReportsAnUnplugAndReconnects) {
     source_.stop();
     const std::size_t files = open_files();
     for (int round = 0; round < 3; ++round) {
-        ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
-        ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+        capture();
         camera_.reset();
         EXPECT_EQ(source_.read_all(1, 9).back().status, ARHOST_STATUS_ERROR_DEVICE_LOST);
         EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has disappeared; was it unplugged?"));
@@ -550,8 +548,7 @@ TEST_F(UvcCamera, IsListedWithTheReasonWhyItCannotBeOpened) {
 }
 
 TEST_F(UvcCamera, IsListedWhileItCaptures) {
-    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture();
     const nlohmann::json cameras = listed_cameras();
     ASSERT_EQ(cameras.size(), 1u) << cameras;
     EXPECT_THAT(cameras[0]["problem"], HasSubstr("in use by "));
@@ -573,8 +570,7 @@ TEST_F(UvcCamera, IsCapturedByTheV4l2SourceToo) {
                           {"controls", "gain=7, tilt_absolute=-3"}},
                          setup);
     for (std::uint64_t n = 0; n < 10; ++n) {
-        const SourceFrame frame = v4l2.read(n);
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << v4l2.log();
+        const SourceFrame frame = v4l2.read_frame(n);
         EXPECT_TRUE(frame.bytes == UsbCamera::picture(number_of(frame.bytes), false));
     }
     expect_controls({manual_exposure,
@@ -655,8 +651,7 @@ TEST_F(DepthBesideColour, EachFrameHasTheDepthThatWasCapturedNearest) {
         ASSERT_TRUE(v4l2_.format().has_depth);
         int without_depth = 0, far = 0;
         for (std::uint64_t n = 0; n < 40; ++n) {
-            const SourceFrame frame = v4l2_.read(n);
-            ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << v4l2_.log();
+            const SourceFrame frame = v4l2_.read_frame(n);
             const std::uint32_t colour = number_of(frame.bytes);
             if (std::ranges::count(frame.depth_mm, 0) == std::ssize(frame.depth_mm)) {
                 ++without_depth;
@@ -680,8 +675,7 @@ TEST_F(DepthBesideColour, DepthIsConvertedToMillimetres) {
     converting["depth_unit_mm"] = "0.125";
     ASSERT_EQ(v4l2_.start(converting), ARHOST_STATUS_OK) << v4l2_.log();
     for (std::uint64_t n = 0; n < 10; ++n) {
-        const SourceFrame frame = v4l2_.read(n);
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+        const SourceFrame frame = v4l2_.read_frame(n);
         if (frame.depth_mm.back() == 0)
             continue;
         // Frames 0 to 99 differ in their last value.
@@ -710,8 +704,7 @@ TEST_F(DepthBesideColour, ASilentDepthCameraLeavesTheVideoRunning) {
     ASSERT_TRUE(eventually([] { return kernel_driven() >= 4 && !node_of("0002").empty(); }));
     ASSERT_EQ(v4l2_.start(options()), ARHOST_STATUS_OK) << v4l2_.log();
     for (std::uint64_t n = 0; n < 20; ++n) {
-        const SourceFrame frame = v4l2_.read(n);
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << v4l2_.log();
+        const SourceFrame frame = v4l2_.read_frame(n);
         EXPECT_EQ(std::ranges::count(frame.depth_mm, 0), std::ssize(frame.depth_mm)) << "unknown";
     }
 }

@@ -110,6 +110,12 @@ protected:
         }
         return source_.start(options, source_setup(fps, live));
     }
+    // Starts the source and reads frame 0; throws if that fails.
+    void capture(double fps = 60, const std::map<std::string, std::string> &options = {}, bool live = true) {
+        if (start(fps, options, live) != ARHOST_STATUS_OK)
+            throw std::runtime_error(source_.log());
+        source_.read_frame(0);
+    }
     // Checks that a start with these options fails with messages that contain `words`.
     void expect_rejection(const std::map<std::string, std::string> &options, const std::vector<const char *> &words,
                           arhost_status status = ARHOST_STATUS_ERROR_CONFIGURATION) {
@@ -119,7 +125,6 @@ protected:
     }
     // Checks that a frame was stamped by CLOCK_MONOTONIC within the last second, and not before `last_ns`.
     static void expect_recent(const SourceFrame &frame, std::int64_t last_ns) {
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
         EXPECT_EQ(frame.info.clock, ARHOST_CLOCK_MONOTONIC);
         EXPECT_GE(frame.info.capture_ns, last_ns);
         const std::int64_t age = monotonic_ns() - frame.info.capture_ns;
@@ -130,8 +135,7 @@ protected:
     std::uint64_t skipped_in(std::uint64_t first, std::uint64_t end) {
         std::uint64_t skipped = 0;
         for (std::uint64_t n = first; n < end; ++n) {
-            last_ = source_.read(n);
-            EXPECT_EQ(last_.status, ARHOST_STATUS_OK) << source_.log();
+            last_ = source_.read_frame(n);
             skipped += last_.info.skipped;
         }
         return skipped;
@@ -184,8 +188,7 @@ TEST_F(Vivid, ColourBarsHaveTheCorrectColours) {
         ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
         EXPECT_EQ(source_.format().yuv_matrix, c.matrix);
         EXPECT_EQ(source_.format().yuv_range, c.range);
-        const SourceFrame frame = source_.read(0);
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+        const SourceFrame frame = source_.read_frame(0);
         for (const std::size_t y : {5u, 90u, 174u})
             for (std::size_t bar = 0; bar < 8; ++bar) {
                 const std::uint8_t *pair = &frame.bytes[y * 640 + 2 * (bar * 40 + 20)];
@@ -208,8 +211,7 @@ TEST_F(Vivid, DeliversEachFormatOfTheOption) {
         SCOPED_TRACE(name);
         ASSERT_EQ(start(60, {{"format", name}}), ARHOST_STATUS_OK) << source_.log();
         EXPECT_EQ(source_.format().pixel_format, delivered);
-        const SourceFrame frame = source_.read(0);
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+        const SourceFrame frame = source_.read_frame(0);
         const auto colour = [&](std::size_t bar, std::size_t y) {
             return colour_at(source_.format(), frame.bytes, bar * 40 + 20, y);
         };
@@ -232,7 +234,7 @@ TEST_F(Vivid, StampsFramesWithTheMonotonicClock) {
     ASSERT_EQ(start(30), ARHOST_STATUS_OK) << source_.log();
     std::int64_t last = 0;
     for (std::uint64_t n = 0; n < 15; ++n) {
-        const SourceFrame frame = source_.read(n);
+        const SourceFrame frame = source_.read_frame(n);
         expect_recent(frame, last + 1);
         if (n > 0 && frame.info.skipped == 0) {
             EXPECT_NEAR(static_cast<double>(frame.info.capture_ns - last), 33.3e6, 20e6);
@@ -242,20 +244,17 @@ TEST_F(Vivid, StampsFramesWithTheMonotonicClock) {
 }
 
 TEST_F(Vivid, LiveModeDeliversTheNewestFrameAndCountsTheOthers) {
-    ASSERT_EQ(start(50), ARHOST_STATUS_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture(50);
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
     const std::int64_t asked = monotonic_ns();
-    const SourceFrame frame = source_.read(1);
-    ASSERT_EQ(frame.status, ARHOST_STATUS_OK);
+    const SourceFrame frame = source_.read_frame(1);
     EXPECT_GE(frame.info.skipped, 2u) << "the driver filled its four buffers in the meantime";
     // The driver then had no free buffer. Reading frame 1 has queued the buffers again.
     EXPECT_GE(source_.read(2).info.capture_ns, asked - 100'000'000) << "an old frame was delivered";
 }
 
 TEST_F(Vivid, LockstepDeliversEveryFrameInOrder) {
-    ASSERT_EQ(start(50, {}, false), ARHOST_STATUS_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture(50, {}, false);
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
     const std::int64_t asked = monotonic_ns();
     for (std::uint64_t n = 1; n < 4; ++n)
@@ -275,16 +274,14 @@ TEST_F(Vivid, CountsFramesDroppedByTheDriver) {
 }
 
 TEST_F(Vivid, DropsFramesMarkedAsDamaged) {
-    ASSERT_EQ(start(30), ARHOST_STATUS_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture(30);
     set(inject_buffer_error, 1);
     EXPECT_GE(skipped_in(1, 6), 1u);
     EXPECT_EQ(source_.plugin().counters().at("marked_damaged"), 1u);
 }
 
 TEST_F(Vivid, DeliversThreeHundredFramesWithoutLeaks) {
-    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture();
     source_.stop();
     const std::size_t files = open_files();
     [[maybe_unused]] const std::size_t memory = resident_kib();
@@ -309,8 +306,7 @@ TEST_F(Vivid, UsesTheConfiguredNumberOfBuffers) {
 }
 
 TEST_F(Vivid, UsesTheDriversSizeByDefault) {
-    ASSERT_EQ(start(25, {{"width", "0"}, {"height", "0"}}), ARHOST_STATUS_OK) << source_.log();
-    EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture(25, {{"width", "0"}, {"height", "0"}});
     EXPECT_EQ(source_.format().width * 9, source_.format().height * 16);
 }
 
@@ -359,8 +355,7 @@ TEST_F(Vivid, SetsControlsByName) {
 }
 
 TEST_F(Vivid, SetsControlsWhileItCaptures) {
-    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture();
     EXPECT_EQ(source_.plugin().set_text("gain", "77"), ARHOST_STATUS_OK) << source_.log();
     EXPECT_EQ(get(V4L2_CID_AUTOGAIN), 0);
     EXPECT_EQ(get(V4L2_CID_GAIN), 77);
@@ -460,8 +455,7 @@ TEST_F(Vivid, IsDescribedAsTheSchemaDemands) {
 }
 
 TEST_F(Vivid, ABusyCameraNamesTheProcessAndKeepsCapturing) {
-    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture();
     const std::string self =
         std::string(program_invocation_short_name).substr(0, 15) + " (process " + std::to_string(getpid()) + ")";
     const nlohmann::json camera = listed_camera(device);
@@ -624,8 +618,7 @@ TEST_F(Vivid, StopsWaitingWhenCancelled) {
 }
 
 TEST_F(Vivid, ReportsAnUnplugAndReconnects) {
-    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture();
     set(disconnect, 1);
     EXPECT_EQ(source_.read_all(1, 9).back().status, ARHOST_STATUS_ERROR_DEVICE_LOST);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has disappeared; was it unplugged?"));
@@ -634,13 +627,11 @@ TEST_F(Vivid, ReportsAnUnplugAndReconnects) {
     // vivid reconnects when all programs have closed the device.
     close(fd_);
     fd_ = open(device, O_RDWR | O_CLOEXEC);
-    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
-    EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture();
 }
 
 TEST_F(Vivid, ReportsAFatalDriverError) {
-    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
-    ASSERT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture();
     set(inject_fatal_streaming_error, 1);
     EXPECT_EQ(source_.read_all(1, 9).back().status, ARHOST_STATUS_ERROR_DEVICE_LOST);
     EXPECT_THAT(source_.log(ARHOST_SEVERITY_ERROR), HasSubstr("has stopped streaming"));
@@ -651,8 +642,7 @@ TEST_F(Vivid, SequenceNumbersMayWrap) {
     ASSERT_EQ(start(60, {}, false), ARHOST_STATUS_OK) << source_.log();
     std::uint64_t skipped = 0;
     for (std::uint64_t n = 0; n < 200; ++n) {
-        const SourceFrame frame = source_.read(n);
-        ASSERT_EQ(frame.status, ARHOST_STATUS_OK) << source_.log();
+        const SourceFrame frame = source_.read_frame(n);
         ASSERT_LT(frame.info.skipped, 1000u);
         skipped += frame.info.skipped;
     }
@@ -667,7 +657,7 @@ TEST_F(Vivid, WrongTimeStampsAreReplacedByTheArrival) {
         ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
         std::int64_t last = 0;
         for (std::uint64_t n = 0; n < 20; ++n) {
-            const SourceFrame frame = source_.read(n);
+            const SourceFrame frame = source_.read_frame(n);
             expect_recent(frame, last);
             last = frame.info.capture_ns;
         }
@@ -695,6 +685,5 @@ TEST_F(Vivid, ReportsDriverErrorsAtStart) {
         expect_rejection({}, {"reported an error", message}, ARHOST_STATUS_ERROR_IO);
     }
     EXPECT_EQ(device_mappings(), 0u);
-    ASSERT_EQ(start(), ARHOST_STATUS_OK) << source_.log();
-    EXPECT_EQ(source_.read(0).status, ARHOST_STATUS_OK);
+    capture();
 }
