@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -35,6 +36,20 @@ inline std::filesystem::path shared_data(const std::string &relative) {
 #define ARHOST_REQUIRE_SHARED_DATA(relative)                                                                         \
     if (!std::filesystem::exists(::arhost::test::shared_data(relative)))                                             \
     GTEST_SKIP() << "needs " << ::arhost::test::shared_data(relative) << ", which is missing"
+
+// Skips the test if CMake has not found ffmpeg. Sources that use it must be compiled with ARHOST_FFMPEG.
+#define ARHOST_REQUIRE_FFMPEG()                                                                                      \
+    if (std::string(ARHOST_FFMPEG).empty())                                                                          \
+    GTEST_SKIP() << "needs the command ffmpeg (package ffmpeg), which was not found when the build was configured"
+
+// Runs a shell command; returns what it writes to standard output.
+inline std::string output_of(const std::string &command) {
+    const std::unique_ptr<FILE, int (*)(FILE *)> pipe(::popen(command.c_str(), "r"), ::pclose);
+    std::string text;
+    for (char part[4096]; const std::size_t size = std::fread(part, 1, sizeof part, pipe.get());)
+        text.append(part, size);
+    return text;
+}
 
 struct ScratchFolder : base::TemporaryFolder {
     ScratchFolder() : TemporaryFolder("arhost-test") {}
@@ -146,6 +161,8 @@ public:
     arhost_instance *instance() const { return instance_; }
     // Makes the host's function `cancelled` return true after `after` more calls.
     void cancel(int after = 0) { cancelled_after_ = cancel_checks_ + after; }
+    // The number of calls of `cancelled`.
+    int cancel_checks() const { return cancel_checks_; }
     void reset_cancel() { cancelled_after_ = std::numeric_limits<int>::max(); }
 
     // Returns all log messages so far, one per line, in the format "severity text".

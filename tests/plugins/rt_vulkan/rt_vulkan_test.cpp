@@ -3,6 +3,7 @@
 // Tests rt_vulkan on this machine's Vulkan device, and its error messages if the machine has no device.
 #include "drivers_leak.hpp"
 #include "environment_variable.hpp"
+#include "failure_of.hpp"
 #include "large_surfaces.hpp"
 #include "rejected_input.hpp"
 #include "renderer.hpp"
@@ -17,7 +18,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cstddef>
-#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 #include <list>
@@ -29,34 +29,15 @@ namespace {
 
 using testing::HasSubstr;
 
-struct LoggingHost {
-    std::string text;
-    int cancel_checks = 0;
-    arhost_host host{sizeof host,
-                     ARHOST_ABI_VERSION,
-                     "arhost-test",
-                     "0",
-                     this,
-                     [](const arhost_host *self, arhost_severity, const char *message) {
-                         static_cast<LoggingHost *>(self->context)->text += std::string(message) + "\n";
-                     },
-                     [](const arhost_host *, double, const char *) {},
-                     [](const arhost_host *self) {
-                         ++static_cast<LoggingHost *>(self->context)->cancel_checks;
-                         return 0;
-                     },
-                     [](const arhost_host *, const char *) -> const void * { return nullptr; }};
+// The host of this plugin is for the objects that the tests construct without the plugin.
+struct LoggingHost : PluginUnderTest {
+    LoggingHost() : PluginUnderTest("rt_vulkan") {}
 };
 
-template <class Call> std::string rejection(arhost_status status, Call call) {
-    try {
-        call();
-    } catch (const Failure &failure) {
-        EXPECT_EQ(failure.status(), status) << failure.what();
-        return failure.what();
-    }
-    ADD_FAILURE() << "expected a Failure, but none was thrown";
-    return "";
+template <class Call> std::string rejection(arhost_status expected, Call call) {
+    const auto [status, message] = failure_of(call);
+    EXPECT_EQ(status, expected) << message;
+    return message;
 }
 
 const arhost_intrinsics small = pinhole(96, 72, 96);
@@ -143,7 +124,7 @@ struct RendererParts {
         return {setup, settings, host, device, shaders};
     }
     LoggingHost logging;
-    const Host host{&logging.host};
+    const Host host{logging.host()};
     const rt_vulkan::Instance instance{host, false};
     const rt_vulkan::PhysicalDevice device;
     const rt_vulkan::Shaders shaders;
@@ -207,10 +188,10 @@ TEST_P(EachPath, TracesTheSamePictureInBandsAndAtOnce) {
             rt_vulkan::Rectangle drawn{};
             Picture picture(in);
             for (int image = 0; image < 3; ++image) {
-                const int checks = parts.logging.cancel_checks;
+                const int checks = parts.logging.cancel_checks();
                 drawn = renderer.render(from_the_side(in), picture.image());
                 const int expected = max_band_time.count() > 0 ? 1 : static_cast<int>((height + 7) / 8);
-                EXPECT_TRUE(image < 2 || parts.logging.cancel_checks - checks == expected)
+                EXPECT_TRUE(image < 2 || parts.logging.cancel_checks() - checks == expected)
                     << "expected one cancellation check per band";
             }
             EXPECT_TRUE(picture.only_pixels_written());
@@ -344,10 +325,10 @@ TEST(Loader, ReportsAMissingLibrary) {
     LoggingHost logging;
     EXPECT_THAT(
         rejection(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                  [&] { rt_vulkan::Instance(Host(&logging.host), false, "libvulkan-none.so.1"); }),
+                  [&] { rt_vulkan::Instance(Host(logging.host()), false, "libvulkan-none.so.1"); }),
         testing::AllOf(HasSubstr("no Vulkan loader"), HasSubstr("libvulkan-none.so.1"), HasSubstr("libvulkan1")));
     EXPECT_THAT(rejection(ARHOST_STATUS_ERROR_UNSUPPORTED,
-                          [&] { rt_vulkan::Instance(Host(&logging.host), false, "libm.so.6"); }),
+                          [&] { rt_vulkan::Instance(Host(logging.host()), false, "libm.so.6"); }),
                 HasSubstr("libm.so.6 is not a Vulkan loader"));
 }
 
@@ -442,13 +423,9 @@ TEST(Device, IsListedByTheHost) {
     GTEST_SKIP() << "the leak checker would report leaks of Vulkan drivers, and arhost would fail";
 #endif
     ARHOST_REQUIRE_VULKAN();
-    const std::unique_ptr<FILE, int (*)(FILE *)> pipe(
-        ::popen((arhost::test::build_directory() + "/bin/arhost devices rt_vulkan 2>&1").c_str(), "r"), ::pclose);
-    std::string text;
-    for (char part[4096]; const std::size_t size = std::fread(part, 1, sizeof part, pipe.get());)
-        text.append(part, size);
+    const std::string text = output_of(arhost::test::build_directory() + "/bin/arhost devices rt_vulkan 2>&1");
     LoggingHost logging;
-    for (const auto &device : rt_vulkan::Instance(Host(&logging.host), false).devices()) {
+    for (const auto &device : rt_vulkan::Instance(Host(logging.host()), false).devices()) {
         EXPECT_THAT(text, HasSubstr(device.name));
         EXPECT_THAT(text, HasSubstr(device.uuid));
         const std::string missing = rt_vulkan::missing_requirement(device);
@@ -459,7 +436,7 @@ TEST(Device, IsListedByTheHost) {
 TEST(Device, RejectsADeviceThatLacksARequirement) {
     ARHOST_REQUIRE_VULKAN();
     LoggingHost logging;
-    const Host host(&logging.host);
+    const Host host(logging.host());
     const rt_vulkan::Instance instance(host, false);
     const rt_vulkan::PhysicalDevice usable = instance.devices()[0];
     const auto shaders = rt_vulkan::shaders_of(rt_vulkan::Path::plain);
@@ -522,18 +499,18 @@ protected:
     void SetUp() override {
         ARHOST_REQUIRE_VULKAN();
         try {
-            rt_vulkan::Instance(Host(&logging.host), true);
+            rt_vulkan::Instance(Host(logging.host()), true);
         } catch (const Failure &failure) {
             GTEST_SKIP() << failure.what();
         }
     }
     // Writes zeros to a buffer with this usage, without barriers between the writes.
     void write_buffer(VkBufferUsageFlags usage, int times) {
-        const Host host(&logging.host);
+        const Host host(logging.host());
         const rt_vulkan::Instance instance(host, true);
         const auto devices = instance.devices();
         const rt_vulkan::Device device(devices[0]);
-        ASSERT_EQ(logging.text, "");
+        ASSERT_EQ(logging.log(), "");
         const rt_vulkan::Submission submission(device);
         const rt_vulkan::Buffer buffer(device, 64, usage, rt_vulkan::Buffer::Place::device);
         const VkCommandBuffer commands = submission.new_commands();
@@ -548,12 +525,12 @@ protected:
 
 TEST_F(Validation, ReportsAMissingUsageFlag) {
     write_buffer(VK_BUFFER_USAGE_STORAGE_BUFFER_BIT, 1); // invalid: the buffer lacks the usage TRANSFER_DST
-    EXPECT_THAT(logging.text, HasSubstr("Vulkan validation: "));
+    EXPECT_THAT(logging.log(), HasSubstr("Vulkan validation: "));
 }
 
 TEST_F(Validation, ReportsAWriteAfterWriteHazard) {
     write_buffer(VK_BUFFER_USAGE_TRANSFER_DST_BIT, 2);
-    EXPECT_THAT(logging.text, HasSubstr("HAZARD"));
+    EXPECT_THAT(logging.log(), HasSubstr("HAZARD"));
 }
 
 class ValidationOfPath : public Validation, public testing::WithParamInterface<std::string> {

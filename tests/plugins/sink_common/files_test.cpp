@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sink_common/files.hpp"
 
+#include "failure_of.hpp"
 #include "sink_under_test.hpp"
 
 #include <gmock/gmock.h>
@@ -11,6 +12,7 @@
 
 using namespace arhost;
 using namespace arhost::files;
+using arhost::test::failure_of;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -18,16 +20,6 @@ namespace {
 
 std::vector<std::uint8_t> bytes_of(const std::string &text) {
     return {text.begin(), text.end()};
-}
-
-// Returns the status and message of the Failure that `call` throws.
-template <class Call> std::pair<arhost_status, std::string> failure_of(Call &&call) {
-    try {
-        call();
-    } catch (const Failure &failure) {
-        return {failure.status(), failure.what()};
-    }
-    return {ARHOST_STATUS_OK, "no Failure was thrown"};
 }
 
 } // namespace

@@ -12,7 +12,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstdio>
 #include <functional>
 
 using namespace arhost::test;
@@ -442,11 +441,7 @@ TEST_F(SinkWindow, HasAScreenThatTheHostLists) {
 #if defined(__SANITIZE_ADDRESS__)
     GTEST_SKIP() << "the leak checker would report leaks of OpenGL drivers, and arhost would fail";
 #endif
-    const std::unique_ptr<FILE, int (*)(FILE *)> pipe(
-        ::popen((arhost::test::build_directory() + "/bin/arhost devices sink_window 2>&1").c_str(), "r"), ::pclose);
-    std::string text;
-    for (char part[4096]; const std::size_t size = std::fread(part, 1, sizeof part, pipe.get());)
-        text.append(part, size);
+    const std::string text = output_of(arhost::test::build_directory() + "/bin/arhost devices sink_window 2>&1");
     EXPECT_THAT(text, HasSubstr("display: screen, 640×480 [sink_window]\n"));
 }
 

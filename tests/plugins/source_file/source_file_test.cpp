@@ -20,10 +20,6 @@ using testing::HasSubstr;
 using Bytes = std::vector<std::uint8_t>;
 using Options = std::map<std::string, std::string>;
 
-#define ARHOST_REQUIRE_FFMPEG()                                                                                      \
-    if (std::string(ARHOST_FFMPEG).empty())                                                                          \
-    GTEST_SKIP() << "needs the command ffmpeg (package ffmpeg), which was not found when the build was configured"
-
 namespace {
 
 Bytes bytes_of(const fs::path &file) {

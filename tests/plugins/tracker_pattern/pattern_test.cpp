@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "failure_of.hpp"
 #include "plugin_under_test.hpp"
 
 #include <tracker_pattern/pattern.hpp>
-
-#include <arhost-cpp/plugin.hpp>
 
 #include <gmock/gmock.h>
 
@@ -32,13 +31,9 @@ protected:
         return path;
     }
     std::string error_in(const std::string &text) const {
-        try {
-            Pattern pattern(write(text));
-        } catch (const arhost::Failure &failure) {
-            EXPECT_EQ(failure.status(), ARHOST_STATUS_ERROR_CONFIGURATION);
-            return failure.what();
-        }
-        return "no error";
+        const auto [status, message] = arhost::test::failure_of([&] { Pattern pattern(write(text)); });
+        EXPECT_EQ(status, ARHOST_STATUS_ERROR_CONFIGURATION);
+        return message;
     }
     arhost::test::ScratchFolder folder_;
 };
