@@ -58,13 +58,13 @@ function(arhost_add_test_program name)
   endif()
 endfunction()
 
-# arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…] [STATISTICAL filter]
+# arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…] [SERIAL] [STATISTICAL filter]
 # [EXHAUSTIVE [filter]]): a GoogleTest program; each of its tests is a CTest test. For each label, the target `<label>-tests`
-# builds all programs that have it. STATISTICAL: these tests measure over many samples, check all values or repeat others;
+# builds all programs that have it. SERIAL: while one of these tests runs, CTest runs no other. STATISTICAL: these tests measure over many samples, check all values or repeat others;
 # sanitizers omit them, because other tests execute the same code. EXHAUSTIVE: these tests, or those of instantiations
 # named `Exhaustive`, have the label `exhaustive` and ten times the timeout, and sanitizers omit them, too.
 function(arhost_add_test name)
-  cmake_parse_arguments(ARG "" "TIMEOUT;STATISTICAL" "SOURCES;LIBRARIES;LABELS;DEPENDS;EXHAUSTIVE" ${ARGN})
+  cmake_parse_arguments(ARG "SERIAL" "TIMEOUT;STATISTICAL" "SOURCES;LIBRARIES;LABELS;DEPENDS;EXHAUSTIVE" ${ARGN})
   if("EXHAUSTIVE" IN_LIST ARG_KEYWORDS_MISSING_VALUES)
     set(ARG_EXHAUSTIVE "Exhaustive/*")
   endif()
@@ -93,7 +93,7 @@ function(arhost_add_test name)
   # LeakSanitizer may crash while scanning thread-locals of libraries loaded with dlopen, such as the image module's.
   set(lsan_options suppressions=${CMAKE_SOURCE_DIR}/tests/lsan.supp:print_suppressions=0:intercept_tls_get_addr=0)
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST ${per_push}
-                       PROPERTIES TIMEOUT ${ARG_TIMEOUT}
+                       PROPERTIES TIMEOUT ${ARG_TIMEOUT} RUN_SERIAL ${ARG_SERIAL}
                        ENVIRONMENT "LSAN_OPTIONS=${lsan_options}"
                        LABELS "${ARG_LABELS}")
   if(ARG_EXHAUSTIVE AND NOT ARHOST_SANITIZE)

@@ -24,6 +24,9 @@ public:
     }
     pid_t pid() const { return run_.pid(); }
     bool running() const { return run_.running(); }
+    template <class Condition> bool eventually(const Condition &condition) const {
+        return run_.eventually(condition);
+    }
     void write(const std::string &name, const std::string &text) const { run_.write(name, text); }
     bool exists(const std::string &name) const { return run_.exists(name); }
     std::string output() const { return run_.output(); }

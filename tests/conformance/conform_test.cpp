@@ -11,8 +11,8 @@
 #include <csignal>
 #include <cstdlib>
 #include <fcntl.h>
+#include <regex>
 #include <sys/resource.h>
-#include <thread>
 
 namespace arhost::test {
 namespace {
@@ -280,6 +280,14 @@ TEST(Conform, ReturnsTheExitStatusIfStandardErrorCannotBeWritten) {
     }
 }
 
+// Whether a process waits for two descriptors without a timeout, as base::write_all does.
+bool waits_until_it_can_write(pid_t pid) {
+    std::istringstream text(read_file("/proc/" + std::to_string(pid) + "/syscall"));
+    std::string number, descriptors, count, timeout; // of poll, or a null pointer of ppoll
+    return text >> number >> descriptors >> count >> timeout && count == "0x2" &&
+           (timeout == "0xffffffff" || timeout == "0x0");
+}
+
 // The output is a full pipe that nobody reads.
 TEST(Conform, EndsOnSignalsIfItsOutputIsNotRead) {
     for (const int stream : {STDOUT_FILENO, STDERR_FILENO}) {
@@ -297,9 +305,7 @@ TEST(Conform, EndsOnSignalsIfItsOutputIsNotRead) {
                       ::dup2(ends[1], stream);
                       std::signal(SIGTERM, SIG_DFL);
                   });
-        while (run.running() && std::filesystem::is_empty(run.path("tmp"))) // once a test runs, signals are handled
-            std::this_thread::sleep_for(std::chrono::milliseconds(1));
-        std::this_thread::sleep_for(std::chrono::milliseconds(500)); // until its output blocks
+        EXPECT_TRUE(run.eventually([&] { return waits_until_it_can_write(run.pid()); }));
         ::kill(run.pid(), SIGTERM);
         EXPECT_EQ(run.wait(), 128 + SIGTERM);
         EXPECT_TRUE(std::filesystem::is_empty(run.path("tmp")));
@@ -353,15 +359,12 @@ TEST(Conform, PassesNoDescriptorsToThePlugin) {
 
 // Returns the pid of the process that rt_hangs_with_child_process started.
 pid_t wait_for_process(const ConformRun &run) {
-    const std::string label = "process ";
-    for (int i = 0; i < 5000; ++i) {
-        const std::string output = run.output();
-        if (const std::size_t at = output.find(label);
-            at != std::string::npos && output.find('\n', at) < output.size())
-            return std::stoi(output.substr(at + label.size()));
-        std::this_thread::sleep_for(std::chrono::milliseconds(2));
-    }
-    throw std::runtime_error("it started no process: " + run.output());
+    std::smatch pid;
+    std::string output;
+    if (!run.eventually(
+            [&] { return std::regex_search(output = run.output(), pid, std::regex("process ([0-9]+)\n")); }))
+        throw std::runtime_error("it started no process: " + output);
+    return std::stoi(pid[1]);
 }
 
 TEST(Conform, KillsProcessesStartedByATest) {

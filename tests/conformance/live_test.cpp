@@ -256,8 +256,8 @@ TEST_P(LiveConformanceAfterARestart, ContinuesChecking) {
     };
     std::size_t shown = 0; // with an overlay
     const auto wait_for_more = [&](std::size_t frames) {
-        for (shown += frames; run.running() && augmented() < shown;)
-            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        shown += frames;
+        EXPECT_TRUE(run.eventually([&] { return augmented() >= shown; })) << run.output();
     };
     for (const char *plugin : {"source_synthetic", "tracker_aruco", "rt_embree"}) {
         wait_for_more(12);

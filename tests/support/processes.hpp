@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
+//
+// Other processes and threads, as /proc shows them.
 #pragma once
+
+#include "waiting.hpp"
 
 #include <gtest/gtest.h>
 
+#include <cstdint>
 #include <fstream>
 #include <string>
 #include <sys/types.h>
-#include <unistd.h>
 
 namespace arhost::test {
 
-// Returns a value in the status of a process or thread, as /proc shows it; "" if it does not exist.
+// Returns a value in the status of a process or thread; "" if it does not exist.
 inline std::string status_of(pid_t id, const std::string &key) {
     std::ifstream status("/proc/" + std::to_string(id) + "/status");
     for (std::string line; std::getline(status, line);)
@@ -26,16 +30,22 @@ inline bool is_alive(pid_t pid) {
     return !state.empty() && state[0] != 'Z' && state[0] != 'X';
 }
 
-// Polls a condition. Returns false if it does not become true within 20 s.
-template <class Condition> bool becomes_true(const Condition &condition) {
-    for (int i = 0; i < 10'000 && !condition(); ++i)
-        ::usleep(2000);
-    return condition();
-}
-
 // Waits until a process or thread sleeps.
 inline void wait_asleep(pid_t id) {
-    EXPECT_TRUE(becomes_true([id] { return status_of(id, "State").starts_with("S"); }));
+    EXPECT_TRUE(eventually([id] { return status_of(id, "State").starts_with("S"); }));
+}
+
+// Returns how often a process has waited for something, such as a frame, so far.
+inline std::uint64_t waits_of(pid_t pid) {
+    const std::string count = status_of(pid, "voluntary_ctxt_switches");
+    return count.empty() ? 0 : std::stoull(count);
+}
+
+// Returns whether a process waits in a function of the kernel, such as "pipe_write".
+inline bool is_waiting_in(pid_t pid, const std::string &function) {
+    std::ifstream file("/proc/" + std::to_string(pid) + "/wchan");
+    std::string name;
+    return file >> name && name.find(function) != std::string::npos;
 }
 
 } // namespace arhost::test

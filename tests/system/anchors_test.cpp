@@ -144,8 +144,7 @@ TEST(AnchorErrors, AKilledRayTracerKeepsObjectsOnTheirTargets) {
     ASSERT_EQ(clean.run(), 0) << clean.output();
     killed.start();
     for (const char *frame : {"0010.png", "0030.png"}) {
-        while (killed.running() && !killed.exists(frame))
-            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        ASSERT_TRUE(killed.eventually([&] { return killed.exists(frame); })) << killed.output();
         ::kill(killed.worker("rt_embree"), SIGKILL);
     }
     ASSERT_EQ(killed.wait(), 0) << killed.output();

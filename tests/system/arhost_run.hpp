@@ -8,16 +8,18 @@
 
 #include <directories.hpp>
 #include <nlohmann/json.hpp>
+#include <waiting.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <fcntl.h>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <set>
 #include <sstream>
 #include <sys/wait.h>
-#include <thread>
 #include <unistd.h>
 
 namespace arhost::test {
@@ -76,16 +78,11 @@ public:
     // Waits for arhost to exit. Returns its exit status, 128 + the number of the signal that killed it, or -1 if it
     // is still running after `limit`.
     int wait(std::chrono::seconds limit = std::chrono::seconds(100)) {
-        const auto end = std::chrono::steady_clock::now() + limit;
-        while (std::chrono::steady_clock::now() < end) {
-            int status = 0;
-            if (::waitpid(pid_, &status, WNOHANG) == pid_) {
-                pid_ = 0;
-                return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-            }
-            std::this_thread::sleep_for(std::chrono::milliseconds(2));
-        }
-        return -1;
+        int status = 0;
+        if (!arhost::test::eventually([&] { return ::waitpid(pid_, &status, WNOHANG) == pid_; }, limit))
+            return -1;
+        pid_ = 0;
+        return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
     }
     int run(std::vector<std::string> arguments = {"--config", "run.yaml"}) {
         start(std::move(arguments));
@@ -96,6 +93,30 @@ public:
         return pid_ > 0 && ::waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
                info.si_pid == 0;
     }
+    // Waits for a condition. Returns false if the run ends before.
+    template <class Condition> bool eventually(const Condition &condition) const {
+        bool is_met = false;
+        (void)arhost::test::eventually([&] { return (is_met = condition()) || !running(); });
+        return is_met || condition();
+    }
+    // Waits until a file has so many lines; sink_counter writes one for each frame. Returns false if the run ends
+    // before.
+    bool wait_for_lines(std::size_t count, const std::string &file = "counted.txt") const {
+        return eventually([&] { return lines(file) >= count; });
+    }
+    bool wait_for_output(const std::string &text) const {
+        return eventually([&] { return output().find(text) != std::string::npos; });
+    }
+    // Returns the pid of a plugin's worker once it has started, and 0 if the run ends before.
+    pid_t wait_for_worker(const std::string &plugin) const {
+        pid_t pid = 0;
+        (void)eventually([&] { return (pid = worker(plugin)) != 0; });
+        return pid;
+    }
+    std::size_t lines(const std::string &file = "counted.txt") const {
+        return static_cast<std::size_t>(std::ranges::count(read(file), '\n'));
+    }
+
     std::string output() const { return read("output.txt"); }
     // The output without lines about layers of the sandbox that this machine lacks.
     std::string messages() const {
@@ -155,23 +176,31 @@ inline void send_signal(pid_t pid, int signal) {
     ::kill(pid, signal);
 }
 
-// Timeout for a frame. It is so long that, even on a busy machine, only plugins that hang on purpose exceed it.
-inline constexpr std::chrono::milliseconds counting_deadline{3000};
-
-// Returns a configuration with the *_counter plugins. Arguments are their options. The run writes one line per frame
-// to counted.txt.
-inline std::string counting(const std::string &mode, const std::string &source, const std::string &tracker,
-                            const std::string &raytracer, const std::string &more = "",
-                            std::chrono::milliseconds deadline = counting_deadline) {
-    const std::string deadline_ms = "deadline_ms: " + std::to_string(deadline.count());
-    return "version: 1\nmode: " + mode + "\nsource: {plugin: source_counter, options: {" + source + "}}\n" +
-           "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}], options: {" +
-           tracker + "}, " + deadline_ms + "}\n" + "raytracer: {plugin: rt_counter, scene: scene.yaml, options: {" +
-           raytracer + "}, " + deadline_ms + "}\n" +
-           "outputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n" + more;
-}
 inline const char *const small_scene = "version: 1\naxes: z-up\nmaterials: {m: {model: diffuse, diffuse: 0.5}}\n"
                                        "objects: [{sphere: {centre: [0, 0, 10], radius: 10}, material: m}]\n";
+
+// The options of the plugins *_counter, and more lines of their configuration.
+struct Counting {
+    std::string mode = "lockstep";
+    std::string source{}, tracker{}, raytracer{}, more{};
+    // Only a plugin that hangs on purpose exceeds it, also on a busy machine.
+    std::chrono::milliseconds deadline = std::chrono::minutes(1);
+};
+// Returns a configuration with the plugins *_counter. The run writes one line per frame to counted.txt.
+inline std::string counting(const Counting &options) {
+    const std::string deadline_ms = "deadline_ms: " + std::to_string(options.deadline.count());
+    return "version: 1\nmode: " + options.mode + "\nsource: {plugin: source_counter, options: {" + options.source +
+           "}}\ntracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}], options: "
+           "{" +
+           options.tracker + "}, " + deadline_ms +
+           "}\nraytracer: {plugin: rt_counter, scene: scene.yaml, options: {" + options.raytracer + "}, " +
+           deadline_ms + "}\noutputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n" +
+           options.more;
+}
+class CountingRun : public ArhostRun {
+public:
+    explicit CountingRun(const Counting &options) : ArhostRun(counting(options)) { write("scene.yaml", small_scene); }
+};
 
 struct CountedLine {
     std::uint64_t sequence, video;
@@ -184,6 +213,29 @@ inline std::vector<CountedLine> counted(const ArhostRun &run, const std::string 
     for (CountedLine line; text >> line.sequence >> line.video >> line.overlay >> line.kind;)
         lines.push_back(line);
     return lines;
+}
+
+// Expects frames in order, and with each frame no overlay but its own. Returns the numbers of the frames without one.
+inline std::set<std::uint64_t> expect_own_overlays(const std::vector<CountedLine> &lines) {
+    std::set<std::uint64_t> plain;
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        const CountedLine &line = lines[i];
+        EXPECT_EQ(line.video, line.sequence);
+        EXPECT_TRUE(i == 0 || line.sequence > lines[i - 1].sequence) << line.sequence;
+        if (line.overlay == "none")
+            plain.insert(line.sequence);
+        else
+            EXPECT_EQ(line.overlay, std::to_string(line.sequence)) << "the overlay belongs to another frame";
+    }
+    return plain;
+}
+// Also expects that no frame is missing.
+inline std::set<std::uint64_t> expect_all_frames(const ArhostRun &run, std::uint64_t frames,
+                                                 const std::string &file = "counted.txt") {
+    const auto lines = counted(run, file);
+    EXPECT_EQ(lines.size(), frames) << run.output();
+    EXPECT_TRUE(lines.empty() || lines.back().sequence + 1 == lines.size()) << "a frame is missing";
+    return expect_own_overlays(lines);
 }
 
 // The column shown_s of a timeline: the times since the first frame arrived. Differences between them would depend on

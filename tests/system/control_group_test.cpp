@@ -59,8 +59,7 @@ protected:
     void TearDown() override {
         if (fs::exists(group_)) {
             write(group_ / "cgroup.kill", "1");
-            for (int i = 0; ::rmdir(group_.c_str()) != 0 && i < 100; ++i)
-                std::this_thread::sleep_for(std::chrono::milliseconds(20));
+            EXPECT_TRUE(eventually([this] { return ::rmdir(group_.c_str()) == 0; }));
         }
     }
     // Starts arhost in the group, as an ordinary user that owns it, or as root.
@@ -104,7 +103,7 @@ std::string attacked_by(const std::string &attack, const std::string &more = "",
 TEST_F(Delegated, GroupLimitsPageTables) {
     ArhostRun run(attacked_by("page_tables", ", memory_mb: 64", "restart: {quarantine_after: 1}\n"));
     start(run);
-    EXPECT_NE(run.wait(std::chrono::seconds(120)), 0);
+    EXPECT_NE(run.wait(), 0);
     EXPECT_THAT(run.output(), HasSubstr("it used more memory than its control group allows"));
     EXPECT_THAT(run.output(), Not(HasSubstr("page tables: ")));
     expect_restored();
@@ -124,9 +123,7 @@ TEST_F(Delegated, GroupPrefersTheHostAndHoldsTheWorkers) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 0, delay_ms: 10}}\n"
                   "outputs: [{plugin: sink_null}]\n");
     start(run);
-    pid_t worker = 0;
-    while (run.running() && (worker = run.worker("sink_null")) == 0)
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    const pid_t worker = run.wait_for_worker("sink_null");
     ASSERT_NE(worker, 0) << run.output();
     EXPECT_THAT(processes_of(group_ / "arhost-host"), UnorderedElementsAre(run.pid(), run.launcher()));
     EXPECT_EQ(first_line(group_ / "arhost-host/cpu.weight"), "1000");
@@ -154,13 +151,11 @@ TEST_F(Delegated, GroupIsUsedByTheNextLauncher) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 0, delay_ms: 10}}\n"
                   "outputs: [{plugin: sink_null}]\n");
     start(run);
-    while (run.running() && run.worker("sink_null") == 0)
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    ASSERT_NE(run.wait_for_worker("sink_null"), 0) << run.output();
     const pid_t killed = run.launcher();
     send_signal(killed, SIGKILL);
-    pid_t worker = 0;
-    while (run.running() && (run.launcher() == killed || (worker = run.worker("sink_null")) == 0))
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    EXPECT_TRUE(run.eventually([&] { return run.launcher() != killed; }));
+    const pid_t worker = run.wait_for_worker("sink_null");
     EXPECT_THAT(first_line("/proc/" + std::to_string(worker) + "/cgroup"), HasSubstr("/arhost-test/arhost-worker-"));
     send_signal(run.pid(), SIGINT);
     run.wait();

@@ -61,11 +61,8 @@ public:
         return false;
     }
     void connect() {
-        while (!try_connect()) {
-            if (!running())
-                throw std::runtime_error("cannot connect to sink_control: " + output());
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
-        }
+        if (!eventually([this] { return try_connect(); }))
+            throw std::runtime_error("cannot connect to sink_control: " + output());
     }
     void send(const std::string &text) const {
         if (::send(socket_, text.data(), text.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(text.size()))
@@ -110,8 +107,7 @@ public:
     std::uint64_t composited() { return status()["frames"]["composited"]; }
     void wait_for_frames(std::uint64_t more) {
         const std::uint64_t goal = composited() + more;
-        while (composited() < goal)
-            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        EXPECT_TRUE(eventually([&] { return composited() >= goal; })) << output();
     }
     int quit() {
         succeed({{"command", "quit"}});
@@ -126,7 +122,7 @@ private:
 // A run without end; every frame of its plugins is numbered, so counted.txt shows which overlay each frame got.
 std::string controlled(const std::string &mode, const std::string &more = "",
                        const std::string &granted = all_commands) {
-    std::string yaml = counting(mode, "frames: 1000000, delay_ms: 5", "", "", more);
+    std::string yaml = counting({.mode = mode, .source = "frames: 1000000, delay_ms: 5", .more = more});
     const std::string counter = "outputs: [{plugin: sink_counter, path: counted.txt}";
     return yaml.replace(yaml.find(counter), counter.size(),
                         counter + ", {plugin: sink_control, allow: [listen], control: " + granted + "}") +
@@ -181,14 +177,16 @@ TEST(Control, FreezeStopsALockstepRunWithoutLosingFrames) {
     ControlledRun run(controlled("lockstep"));
     run.start_and_connect();
     EXPECT_EQ(run.succeed({{"command", "freeze"}})["frozen"], true);
-    std::uint64_t frozen_at = run.composited();
-    // The frames in progress are finished.
-    for (std::uint64_t before = ~0ull; before != frozen_at; frozen_at = run.composited()) {
-        before = frozen_at;
-        std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
+    // The frames in progress are finished, and no other follows.
+    const auto in_progress = [&] {
+        const Json frames = run.status()["frames"];
+        return frames["in"].get<std::uint64_t>() - frames["composited"].get<std::uint64_t>();
+    };
+    EXPECT_TRUE(run.eventually([&] { return in_progress() == 0; })) << run.output();
+    const std::uint64_t frozen_at = run.composited();
+    for (int answers = 0; answers < 100; ++answers)
+        ASSERT_EQ(run.status()["frames"]["in"], frozen_at);
     EXPECT_EQ(run.status()["frozen"], true);
-    EXPECT_EQ(run.composited(), frozen_at);
     EXPECT_EQ(run.succeed({{"command", "freeze"}, {"on", false}})["frozen"], false);
     run.wait_for_frames(10);
     EXPECT_EQ(run.quit(), 0) << run.output();
@@ -199,8 +197,7 @@ TEST(Control, FreezeDiscardsCameraFramesInModeLive) {
     ControlledRun run(controlled("live"));
     run.start_and_connect();
     run.succeed({{"command", "freeze"}, {"on", true}});
-    while (run.status()["frames"]["dropped"].value("freeze", 0) < 20)
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_TRUE(run.eventually([&] { return run.status()["frames"]["dropped"].value("freeze", 0) >= 20; }));
     run.succeed({{"command", "freeze"}});
     run.wait_for_frames(3);
     EXPECT_EQ(run.quit(), 0) << run.output();
@@ -218,8 +215,7 @@ TEST(Control, ReplacesTrackerAndRayTracerWithoutLosingAFrame) {
                 EXPECT_EQ(run.status_of(component)["choice"], plugin);
                 run.wait_for_frames(1);
             }
-    while (run.workers().size() > 5) // until the replaced workers have ended
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_TRUE(run.eventually([&] { return run.workers().size() == 5; })) << "the replaced workers must end";
     EXPECT_EQ(run.quit(), 0) << run.output();
     expect_all_frames_with_their_overlays(run);
     const Json stats = run.stats();
@@ -399,8 +395,10 @@ TEST(Control, ChangesAnOptionAlsoForARestartedPlugin) {
     EXPECT_THAT(run.error_of(wrong), HasSubstr("no running component 'nobody'"));
     const pid_t killed = run.worker("rt_embree");
     send_signal(killed, SIGKILL);
-    while (run.status_of("raytracer")["restarts"] == 0 || run.status_of("raytracer")["state"] != "running")
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_TRUE(run.eventually([&] {
+        const Json raytracer = run.status_of("raytracer");
+        return raytracer["restarts"] == 1 && raytracer["state"] == "running";
+    }));
     EXPECT_EQ(samples(), 4);
     EXPECT_EQ(run.quit(), 0) << run.output();
 }
@@ -408,11 +406,10 @@ TEST(Control, ChangesAnOptionAlsoForARestartedPlugin) {
 // The camera is unplugged at the third frame and does not come back.
 TEST(Control, TheStatusSaysWhichCameraIsMissing) {
     ControlledRun run("version: 1\nmode: live\nrestart: {first_delay_ms: 1}\nsource: {plugin: source_waiting_live, "
-                      "options: {wait_ms: 10, unplugged_at: 3, back_at: -1}}\n"
+                      "options: {wait_ms: 10, unplugged_at: 3}}\n"
                       "outputs: [{plugin: sink_control, allow: [listen], control: [quit, status]}]\n");
     run.start_and_connect();
-    while (run.status_of("source")["missing_device"].is_null())
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_TRUE(run.eventually([&] { return !run.status_of("source")["missing_device"].is_null(); }));
     EXPECT_EQ(run.quit(), 0) << run.output();
 }
 
@@ -472,12 +469,7 @@ TEST(Control, DisconnectsAClientThatSendsAnEndlessLine) {
     ControlledRun run(controlled("lockstep"));
     run.start_and_connect();
     const std::string part(4096, 'x');
-    EXPECT_THROW(
-        for (;;) {
-            run.send(part);
-            std::this_thread::sleep_for(std::chrono::milliseconds(1));
-        },
-        std::runtime_error);
+    EXPECT_THROW(for (;;) run.send(part), std::runtime_error);
     run.connect();
     EXPECT_EQ(run.quit(), 0) << run.output();
 }
@@ -516,8 +508,7 @@ TEST(Control, ReplacesTheSocketFileOfAKilledRun) {
     send_signal(run.pid(), SIGKILL);
     run.wait();
     EXPECT_TRUE(std::filesystem::exists(run.socket_path()));
-    while (run.try_connect()) // until the launcher has ended the worker
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_TRUE(eventually([&] { return !run.try_connect(); })) << "the launcher ends the worker";
     run.start_and_connect();
     EXPECT_EQ(run.quit(), 0) << run.output();
 }

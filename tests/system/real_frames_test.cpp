@@ -80,8 +80,7 @@ TEST(RealFrames, KillingEveryWorkerDoesNotChangeTheResult) {
     for (const char *plugin : {"source_file", "tracker_aruco", "rt_embree", "sink_poses", "sink_images"}) {
         char name[32];
         std::snprintf(name, sizeof name, "frames/%04d.png", frame += 4);
-        while (killed.running() && !killed.exists(name))
-            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        ASSERT_TRUE(killed.eventually([&] { return killed.exists(name); })) << killed.output();
         const pid_t worker = killed.worker(plugin);
         ASSERT_NE(worker, 0) << plugin << "\n" << killed.output();
         ::kill(worker, SIGKILL);
@@ -103,8 +102,7 @@ TEST(RealFrames, KillingTheTrackerDoesNotChangeFilteredPoses) {
         // The second kill comes later than the frames that are in the pipeline at the first one (8 slots before and 8
         // after the composition): a frame that two workers die with is given up.
         for (const char *frame : {"frames/0001.png", "frames/0020.png"}) {
-            while (killed.running() && !killed.exists(frame))
-                std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            ASSERT_TRUE(killed.eventually([&] { return killed.exists(frame); })) << killed.output();
             const pid_t worker = killed.worker(tracker);
             ASSERT_NE(worker, 0) << killed.output();
             ::kill(worker, SIGKILL);

@@ -56,7 +56,7 @@ std::vector<nlohmann::json> lines_of(const ArhostRun &run, const std::string &fi
 // Records `frames` frames of the *_counter plugins.
 void record_counted(ArhostRun &run, int frames, const std::string &tracker = "",
                     const std::string &format = "arhost") {
-    run.write("run.yaml", counting("lockstep", "frames: " + std::to_string(frames), tracker, "") +
+    run.write("run.yaml", counting({.source = "frames: " + std::to_string(frames), .tracker = tracker}) +
                               "camera: {width: 64, height: 48, fx: 64}\n");
     run.write("scene.yaml", small_scene);
     ASSERT_EQ(run.run({"--config", "run.yaml", "--set",
@@ -237,9 +237,8 @@ TEST(Replay, RecordsTheSameTrajectoryIfTheSinkIsKilled) {
     run.start({"--config", "run.yaml", "--set", "outputs=[{plugin: sink_trajectory, path: killed.txt}]", "--set",
                "raytracer.options.delay_ms=2"});
     for (int kills = 0; kills < 3; ++kills) {
-        const std::string before = run.exists("killed.txt") ? run.read("killed.txt") : "";
-        while (run.running() && (!run.exists("killed.txt") || run.read("killed.txt").size() < before.size() + 3000))
-            std::this_thread::sleep_for(std::chrono::milliseconds(2));
+        const std::size_t goal = run.read("killed.txt").size() + 3000;
+        EXPECT_TRUE(run.eventually([&] { return run.read("killed.txt").size() >= goal; })) << run.output();
         if (const pid_t worker = run.worker("sink_trajectory"))
             ::kill(worker, SIGKILL);
     }
@@ -279,11 +278,7 @@ TEST(Replay, FinishesItsFilesOnCtrlCAndExitsWith130) {
         if (with_output)
             arguments.insert(arguments.end(), {"--output", "x.txt", "--set", "outputs[0].plugin=sink_counter"});
         run.start(arguments);
-        if (with_output)
-            while (run.running() && counted(run, "x.txt").size() < 20)
-                std::this_thread::sleep_for(std::chrono::milliseconds(5));
-        else
-            std::this_thread::sleep_for(std::chrono::seconds(3));
+        ASSERT_TRUE(with_output ? run.wait_for_lines(20, "x.txt") : run.wait_for_output("frame ")) << run.output();
         ::kill(run.pid(), SIGINT);
         ASSERT_EQ(run.wait(), 130) << run.output();
         const std::uint64_t frames = run.stats()["frames"]["composited"];

@@ -74,11 +74,8 @@ std::vector<Json> lines_of(const ArhostRun &run, const std::string &file) {
     return lines;
 }
 
-void wait_for_lines(const ArhostRun &run, std::size_t count, const std::string &file = "take/frames.jsonl") {
-    while (!run.exists(file) || lines_of(run, file).size() < count) {
-        ASSERT_TRUE(run.running()) << run.output();
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
+void wait_for_frames(const ArhostRun &run, std::size_t count, const std::string &take = "take") {
+    ASSERT_TRUE(run.wait_for_lines(count, take + "/frames.jsonl")) << run.output();
 }
 
 std::size_t count(const std::vector<Json> &lines, const std::string &overlay) {
@@ -121,19 +118,23 @@ TEST(Sessions, AReplayRepeatsTheDecisionsOfALiveRun) {
     GTEST_SKIP() << "takes minutes under a sanitizer";
 #endif
     ArhostRun run(
-        recording("live", "90", "samples: 64", "", "restart: {proven_after_frames: 1000000, first_delay_ms: 300}\n"));
+        recording("live", "0", "samples: 64", "", "restart: {proven_after_frames: 1000000, first_delay_ms: 300}\n"));
     run.start();
-    wait_for_lines(run, 2);
-    send_signal(run.worker("tracker_aruco"), SIGKILL);
-    std::this_thread::sleep_for(std::chrono::milliseconds(600));
+    wait_for_frames(run, 2);
+    const pid_t killed = run.worker("tracker_aruco");
+    send_signal(killed, SIGKILL);
+    EXPECT_TRUE(run.eventually([&] { return run.worker("tracker_aruco") != killed && run.worker("tracker_aruco"); }));
     send_signal(run.worker("rt_embree"), SIGKILL);
-    ASSERT_EQ(run.wait(), 0) << run.output();
-    const auto lines = lines_of(run, "take/frames.jsonl");
-    EXPECT_LT(lines.size(), 90u) << "frames must be dropped";
-    EXPECT_GT(count(lines, "rendered"), 0u);
-    EXPECT_TRUE(std::ranges::any_of(lines, [](const Json &line) { // the ray tracer was down
-        return line["overlay"] == "none" && !line["camera"].is_null();
-    }));
+    const auto recorded = [&] { return lines_of(run, "take/frames.jsonl"); };
+    EXPECT_TRUE(run.eventually([&] {
+        return std::ranges::any_of(recorded(), [](const Json &line) { // the ray tracer was down
+            return line["overlay"] == "none" && !line["camera"].is_null();
+        });
+    })) << run.output();
+    EXPECT_TRUE(run.eventually([&] { return recorded().back()["overlay"] == "rendered"; })) << run.output();
+    send_signal(run.pid(), SIGTERM);
+    ASSERT_EQ(run.wait(), 130) << run.output();
+    EXPECT_LT(recorded().size(), recorded().back()["frame"].get<std::size_t>() + 1) << "frames must be dropped";
     ASSERT_EQ(run.run(replaying()), 0) << run.output();
     expect_same(run);
 }
@@ -147,13 +148,10 @@ TEST(Sessions, AReplayRepeatsTheReducedQualityOfALiveRun) {
     const auto is_reduced = [](const Json &line) {
         return line.value("overlay_samples", 32) < 32 && line["overlay"] != "none";
     };
-    std::size_t reduced = 0;
-    while (reduced < 5) {
-        ASSERT_TRUE(run.running()) << run.output();
-        std::this_thread::sleep_for(std::chrono::milliseconds(100));
-        if (run.exists("take/frames.jsonl"))
-            reduced = static_cast<std::size_t>(std::ranges::count_if(lines_of(run, "take/frames.jsonl"), is_reduced));
-    }
+    EXPECT_TRUE(run.eventually([&] {
+        return run.exists("take/frames.jsonl") &&
+               std::ranges::count_if(lines_of(run, "take/frames.jsonl"), is_reduced) >= 5;
+    })) << run.output();
     send_signal(run.pid(), SIGTERM);
     ASSERT_EQ(run.wait(), 130) << run.output();
     ASSERT_EQ(run.run(replaying()), 0) << run.output();
@@ -207,12 +205,12 @@ TEST(Sessions, H264RecordsAllFramesAndPosesClosely) {
 TEST(Sessions, AKilledHostLosesNoFrameThatWasLogged) {
     ArhostRun run(recording("live", "0"));
     run.start();
-    wait_for_lines(run, 30);
+    wait_for_frames(run, 30);
     const std::size_t logged = lines_of(run, "take/frames.jsonl").size();
+    const std::vector<pid_t> workers = run.workers();
     send_signal(run.pid(), SIGKILL);
     EXPECT_EQ(run.wait(), 128 + SIGKILL);
-    while (!run.workers().empty())
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    EXPECT_TRUE(eventually([&] { return std::ranges::none_of(workers, is_alive); }));
     ASSERT_EQ(run.run(replaying()), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("take: the recording was interrupted; it ends after frame "));
     const auto replayed = lines_of(run, "replayed/poses.jsonl");
@@ -224,7 +222,7 @@ TEST(Sessions, AKilledSinkContinuesTheSession) {
     ArhostRun run(recording("live", "200"));
     run.start();
     for (const std::size_t lines : {10, 25}) {
-        wait_for_lines(run, lines);
+        wait_for_frames(run, lines);
         send_signal(run.worker("sink_session"), SIGKILL);
     }
     ASSERT_EQ(run.wait(), 0) << run.output();
@@ -313,16 +311,13 @@ TEST(Sessions, TheCommandRecordStartsAndStopsThem) {
                                  run.path("ctl.txt").string() + "' 2>&1";
         return std::system(line.c_str());
     };
-    while (command("record on") != 0) { // until the run has started
-        ASSERT_TRUE(run.running()) << run.output();
-        std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    }
-    wait_for_lines(run, 10, "out/take-01/frames.jsonl");
+    ASSERT_TRUE(run.eventually([&] { return command("record on") == 0; })) << run.output();
+    wait_for_frames(run, 10, "out/take-01");
     EXPECT_EQ(command("record off"), 0) << run.read("ctl.txt");
     EXPECT_EQ(command("swap raytracer fine"), 0) << run.read("ctl.txt");
     EXPECT_EQ(command("set raytracer samples 3"), 0) << run.read("ctl.txt");
     EXPECT_EQ(command("record on"), 0) << run.read("ctl.txt");
-    wait_for_lines(run, 10, "out/take-02/frames.jsonl");
+    wait_for_frames(run, 10, "out/take-02");
     EXPECT_EQ(command("quit"), 0) << run.read("ctl.txt");
     ASSERT_EQ(run.wait(), 0) << run.output();
     const auto recorded = files_in(run, "recorded");

@@ -40,8 +40,7 @@ public:
     }
     void start_watching() {
         start({"run.yaml", "--watch"});
-        while (!exists("out/000002.png") && running())
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        EXPECT_TRUE(eventually([this] { return exists("out/000002.png"); })) << output();
     }
     // Waits until the log contains `text` for the `count`th time.
     void wait_for(const std::string &text, int count = 1) {
@@ -52,12 +51,8 @@ public:
                 ++times;
             return times >= count;
         };
-        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(60);
-        while (!found()) {
-            if (!running() || std::chrono::steady_clock::now() > end)
-                throw std::runtime_error("the log lacks '" + text + "': " + output());
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
-        }
+        if (!eventually(found))
+            throw std::runtime_error("the log lacks '" + text + "': " + output());
     }
     // Replaces a file as most editors do.
     void replace(const std::string &name, const std::string &text) const {
@@ -66,8 +61,8 @@ public:
     }
     // Interrupts the run after some more frames.
     int interrupt() {
-        for (const int goal = std::stoi(last_picture()) + 4; std::stoi(last_picture()) < goal && running();)
-            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        const int goal = std::stoi(last_picture()) + 4;
+        EXPECT_TRUE(eventually([&] { return std::stoi(last_picture()) >= goal; })) << output();
         send_signal(pid(), SIGINT);
         return wait();
     }
@@ -344,8 +339,7 @@ TEST(Watch, NamesTheKeysWhoseEditsNeedANewRun) {
 TEST(Watch, EditsWithoutTheOptionHaveNoEffect) {
     WatchedRun run;
     run.start({"run.yaml", "--frames", "100"});
-    while (!run.exists("out/000002.png") && run.running())
-        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    ASSERT_TRUE(run.eventually([&] { return run.exists("out/000002.png"); })) << run.output();
     run.write("scene.yaml", large_sphere);
     EXPECT_EQ(run.wait(), 0) << run.output();
     EXPECT_THAT(run.output(), Not(HasSubstr(" is now ")));

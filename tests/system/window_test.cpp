@@ -30,7 +30,7 @@ protected:
 
     // `granted`: the value of `control`. Frames of source_counter have one colour, which changes from frame to frame.
     void start(const std::string &granted) {
-        std::string yaml = counting("live", "frames: 1000000, width: 640, height: 480", "", "");
+        std::string yaml = counting({.mode = "live", .source = "frames: 1000000, width: 640, height: 480"});
         const std::string counter = "outputs: [{plugin: sink_counter, path: counted.txt}]";
         yaml.replace(yaml.find(counter), counter.size(),
                      "outputs: [{plugin: sink_window, allow: [display], control: " + granted +
@@ -41,23 +41,13 @@ protected:
         run_.write("other.yaml", small_scene);
         run_.start({"--config", "run.yaml"}, environment());
         observer_.emplace(server_->name());
-        ASSERT_TRUE(becomes([this] { return has_frame(screen()); })) << run_.output();
+        ASSERT_TRUE(eventually([this] { return has_frame(screen()); })) << run_.output();
     }
     std::function<void()> environment() const {
         return [this] {
             setenv("DISPLAY", server_->name().c_str(), 1);
             setenv("LIBGL_ALWAYS_SOFTWARE", "1", 1);
         };
-    }
-    // Returns false after 30 seconds.
-    static bool becomes(const std::function<bool()> &done) {
-        const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
-        while (!done()) {
-            if (std::chrono::steady_clock::now() > end)
-                return false;
-            std::this_thread::sleep_for(std::chrono::milliseconds(10));
-        }
-        return true;
     }
     Screenshot screen() const { return observer_->screen(); }
     static bool has_frame(const Screenshot &shot) { return shot.pixel(0, 240)[2] > 0; }
@@ -71,15 +61,17 @@ protected:
         return count;
     }
     bool logs(const std::string &text) const { return run_.output().find(text) != std::string::npos; }
-    // Whether the video changes within the time in which it shows several frames.
+    // Whether the video changes while the source delivers several frames. It waits at least once before each frame.
     bool moves() const {
         const Screenshot before = screen();
-        for (int i = 0; i < 20; ++i) {
-            std::this_thread::sleep_for(std::chrono::milliseconds(20));
-            if (!std::ranges::equal(std::span(screen().pixel(0, 240), 3), std::span(before.pixel(0, 240), 3)))
-                return true;
-        }
-        return false;
+        const pid_t source = run_.worker("source_counter");
+        const std::uint64_t goal = waits_of(source) + 40;
+        bool changed = false;
+        EXPECT_TRUE(eventually([&] {
+            changed = !std::ranges::equal(std::span(screen().pixel(0, 240), 3), std::span(before.pixel(0, 240), 3));
+            return changed || waits_of(source) >= goal;
+        })) << run_.output();
+        return changed;
     }
 
     std::optional<XServer> server_;
@@ -93,12 +85,12 @@ constexpr const char *all_commands = "[quit, freeze, snapshot, record, load_scen
 
 TEST_F(WindowRun, SpaceFreezesTheVideoAndContinuesIt) {
     start(all_commands);
-    ASSERT_TRUE(becomes([this] { return moves(); }));
+    ASSERT_TRUE(eventually([this] { return moves(); }));
     observer_->press(XK_space);
-    ASSERT_TRUE(becomes([this] { return count(blue) > 0; })) << "FROZEN is blue: " << run_.output();
-    EXPECT_TRUE(becomes([this] { return !moves(); }));
+    ASSERT_TRUE(eventually([this] { return count(blue) > 0; })) << "FROZEN is blue: " << run_.output();
+    EXPECT_TRUE(eventually([this] { return !moves(); }));
     observer_->press(XK_space);
-    EXPECT_TRUE(becomes([this] { return moves() && count(blue) == 0; })) << run_.output();
+    EXPECT_TRUE(eventually([this] { return moves() && count(blue) == 0; })) << run_.output();
     observer_->press(XK_q);
     EXPECT_EQ(run_.wait(), 0) << run_.output();
 }
@@ -106,7 +98,7 @@ TEST_F(WindowRun, SpaceFreezesTheVideoAndContinuesIt) {
 TEST_F(WindowRun, SWritesASnapshot) {
     start(all_commands);
     observer_->press(XK_s);
-    EXPECT_TRUE(becomes([this] { return run_.exists("out/snapshot-01.png"); })) << run_.output();
+    EXPECT_TRUE(eventually([this] { return run_.exists("out/snapshot-01.png"); })) << run_.output();
     EXPECT_EQ(count(red), 0);
     observer_->press(XK_q);
     EXPECT_EQ(run_.wait(), 0) << run_.output();
@@ -115,9 +107,9 @@ TEST_F(WindowRun, SWritesASnapshot) {
 TEST_F(WindowRun, RRecordsUntilItIsPressedAgain) {
     start(all_commands);
     observer_->press(XK_r);
-    ASSERT_TRUE(becomes([this] { return count(red) > 0; })) << "REC is red: " << run_.output();
+    ASSERT_TRUE(eventually([this] { return count(red) > 0; })) << "REC is red: " << run_.output();
     observer_->press(XK_r);
-    EXPECT_TRUE(becomes([this] { return count(red) == 0; })) << run_.output();
+    EXPECT_TRUE(eventually([this] { return count(red) == 0; })) << run_.output();
     EXPECT_TRUE(run_.exists("out/take-01.jsonl"));
     observer_->press(XK_q);
     EXPECT_EQ(run_.wait(), 0) << run_.output();
@@ -125,11 +117,11 @@ TEST_F(WindowRun, RRecordsUntilItIsPressedAgain) {
 
 TEST_F(WindowRun, ADigitLoadsTheSceneWithThisNumber) {
     start(all_commands);
-    ASSERT_TRUE(becomes([this] {
+    ASSERT_TRUE(eventually([this] {
         observer_->press(XK_2); // reports an error until the first status has arrived
         return logs(R"("scene":"other")");
     })) << run_.output();
-    EXPECT_TRUE(becomes([this] { return logs("raytracer is now rt_counter"); })) << run_.output();
+    EXPECT_TRUE(eventually([this] { return logs("raytracer is now rt_counter"); })) << run_.output();
     observer_->press(XK_q);
     EXPECT_EQ(run_.wait(), 0) << run_.output();
 }
@@ -138,17 +130,17 @@ TEST_F(WindowRun, ACommandThatIsNotGrantedShowsTheReason) {
     start("[quit]");
     EXPECT_EQ(count(red), 0) << "the window shows no error about the status";
     observer_->press(XK_space);
-    EXPECT_TRUE(becomes([this] { return count(red) > 100; })) << run_.output();
+    EXPECT_TRUE(eventually([this] { return count(red) > 100; })) << run_.output();
     EXPECT_TRUE(moves());
-    EXPECT_TRUE(becomes([this] { return count(red) == 0; })) << "the message disappears";
+    EXPECT_TRUE(eventually([this] { return count(red) == 0; })) << "the message disappears";
     observer_->press(XK_2);
-    EXPECT_TRUE(becomes([this] { return count(red) > 100; })) << "the names of scenes are unknown";
+    EXPECT_TRUE(eventually([this] { return count(red) > 100; })) << "the names of scenes are unknown";
     observer_->press(XK_q);
     EXPECT_EQ(run_.wait(), 0) << run_.output();
 }
 
 TEST_F(WindowRun, ShowsAFilmAtItsOwnRateInLockstep) {
-    std::string yaml = counting("lockstep", "frames: 10", "", "", "timeline: times.csv\n");
+    std::string yaml = counting({.source = "frames: 10", .more = "timeline: times.csv\n"});
     const std::string counter = "{plugin: sink_counter, path: counted.txt}";
     run_.write("run.yaml",
                yaml.replace(yaml.find(counter), counter.size(), "{plugin: sink_window, allow: [display]}"));

@@ -31,8 +31,7 @@ int run_in_process(const ArhostRun &run) {
 } // namespace
 
 TEST(InProcess, WritesTheSameBytesAsSeparateProcesses) {
-    ArhostRun run(counting("lockstep", "frames: 30", "lost_from: 5, lost_to: 9", "error_at: 20"));
-    run.write("scene.yaml", small_scene);
+    CountingRun run({.source = "frames: 30", .tracker = "lost_from: 5, lost_to: 9", .raytracer = "error_at: 20"});
     ASSERT_EQ(run.run(), 1) << run.output(); // frame 20 has no overlay
     const std::string of_processes = run.read("counted.txt");
     std::filesystem::remove(run.path("counted.txt"));
@@ -42,15 +41,14 @@ TEST(InProcess, WritesTheSameBytesAsSeparateProcesses) {
 }
 
 TEST(InProcess, IgnoresDeadlines) {
-    ArhostRun run(counting("lockstep", "frames: 2", "", "delay_ms: 300", "", std::chrono::milliseconds(100)));
-    run.write("scene.yaml", small_scene);
+    CountingRun run(
+        {.source = "frames: 2", .raytracer = "delay_ms: 300", .deadline = std::chrono::milliseconds(100)});
     EXPECT_EQ(run_in_process(run), 0) << run.read("output.txt");
     EXPECT_EQ(run.stats()["frames"]["augmented"], 2);
 }
 
 TEST(InProcess, ReportsAPluginThatRejectsItsOptions) {
-    ArhostRun run(counting("lockstep", "frames: 2", "", "reject: true"));
-    run.write("scene.yaml", small_scene);
+    CountingRun run({.source = "frames: 2", .raytracer = "reject: true"});
     EXPECT_EQ(run_in_process(run), 2);
     EXPECT_THAT(run.read("output.txt"), HasSubstr("run.yaml:5:"));
     EXPECT_THAT(run.read("output.txt"), HasSubstr("rejected, as the option 'reject' requests"));
@@ -71,8 +69,7 @@ TEST(InProcess, ReportsErrorsLikeArhost) {
 // A worker thread cannot be killed, but it ends by itself if the host closes the channel while it waits for a
 // command.
 TEST(InProcess, RestartsAPluginWhoseDeviceIsLost) {
-    ArhostRun run(counting("lockstep", "frames: 30", "", "error_at: 20, error: -6"));
-    run.write("scene.yaml", small_scene);
+    CountingRun run({.source = "frames: 30", .raytracer = "error_at: 20, error: -6"});
     ASSERT_EQ(run_in_process(run), 1) << run.read("output.txt");
     EXPECT_EQ(counted(run).size(), 30u);
     EXPECT_EQ(run.stats()["frames"]["augmented"], 29) << "the frame is retried once";

@@ -25,7 +25,7 @@ protected:
 // Returns a configuration of the counting plugins for six frames, in which the line that starts with `prefix` is
 // replaced with `replacement`.
 std::string chain(const std::string &prefix, const std::string &replacement) {
-    std::istringstream lines(counting("lockstep", "frames: 6", "", ""));
+    std::istringstream lines(counting({.source = "frames: 6"}));
     std::string result;
     for (std::string line; std::getline(lines, line);)
         result += line.starts_with(prefix) ? replacement + "\n" : line + "\n";

@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// One test for each deadline and delay in real time. CTest runs them one at a time; ARHOST_TEST_TIME_SCALE scales
+// their deadlines. All others test deadlines in virtual time (core/supervise/component_test.cpp,
+// core/host/frame_flow_test.cpp).
+#include "arhost_run.hpp"
+
+#include <gmock/gmock.h>
+
+using namespace arhost::test;
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+using testing::Not;
+
+namespace {
+
+const std::chrono::milliseconds call_deadline = scaled(1s);
+
+std::string text_of(std::chrono::milliseconds time) {
+    return std::to_string(time.count());
+}
+
+bool is_plain(const CountedLine &line) {
+    return line.overlay == "none";
+}
+
+} // namespace
+
+TEST(Deadlines, APluginThatHangsInACallIsEnded) {
+    CountingRun run({.source = "frames: 40", .raytracer = "hang_at: 20", .deadline = call_deadline});
+    ASSERT_EQ(run.run(), 1) << run.output();
+    EXPECT_EQ(expect_all_frames(run, 40), std::set<std::uint64_t>{20});
+    EXPECT_THAT(run.output(), HasSubstr("hung: no answer within " + text_of(call_deadline) + " ms"));
+    EXPECT_THAT(run.output(), HasSubstr("error: arhost: 1 frame has no overlay because the raytracer failed"));
+}
+
+TEST(Deadlines, AHungPluginThatIgnoresSigabrtIsKilled) {
+    CountingRun run({.source = "frames: 30", .tracker = "hang_at: 20, ignore_abort: true", .deadline = call_deadline});
+    ASSERT_EQ(run.run(), 1) << run.output();
+    EXPECT_EQ(expect_all_frames(run, 30), std::set<std::uint64_t>{20});
+    const std::string how = run.stats()["crashes"][0]["how"];
+    EXPECT_THAT(how, HasSubstr("hung"));
+    EXPECT_THAT(how, HasSubstr("signal 9"));
+}
+
+// The time of a stopped host does not count. At frame 20, as at Ctrl-Z, the workers continue, and the host reads their
+// responses later. At frame 60, as in a frozen container, the workers are stopped, too, and resumed after the host.
+TEST(Deadlines, NothingHangsIfTheHostIsStopped) {
+    CountingRun run({.source = "frames: 120", .raytracer = "delay_ms: 5", .deadline = call_deadline});
+    run.start();
+    for (const std::size_t frame : {20, 60}) {
+        ASSERT_TRUE(run.wait_for_lines(frame)) << run.output();
+        const std::vector<pid_t> stopped = frame == 60 ? run.workers() : std::vector<pid_t>();
+        for (const pid_t worker : stopped)
+            send_signal(worker, SIGSTOP);
+        send_signal(run.pid(), SIGSTOP);
+        std::this_thread::sleep_for(call_deadline + 500ms);
+        const std::uint64_t waits = waits_of(run.pid());
+        send_signal(run.pid(), SIGCONT);
+        EXPECT_TRUE(frame == 20 || run.eventually([&] { return waits_of(run.pid()) > waits; }));
+        for (const pid_t worker : stopped)
+            send_signal(worker, SIGCONT);
+    }
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    EXPECT_TRUE(expect_all_frames(run, 120).empty());
+    EXPECT_THAT(run.output(), Not(HasSubstr("hung")));
+}
+
+TEST(Deadlines, AStartMustReportProgress) {
+    CountingRun slow({.source = "frames: 5", .tracker = "start_steps: 25, start_step_ms: 100"});
+    const std::string deadline = "tracker.start_deadline_ms=" + text_of(scaled(2s));
+    EXPECT_EQ(slow.run({"run.yaml", "--set", deadline}), 0) << slow.output();
+    EXPECT_EQ(slow.stats()["restarts"]["tracker"], 0);
+    EXPECT_TRUE(expect_all_frames(slow, 5).empty());
+
+    CountingRun hung({.source = "frames: 5",
+                      .tracker = "start_steps: 1, start_step_ms: 60000",
+                      .more = "restart: {quarantine_after: 2, first_delay_ms: 1}\n"});
+    EXPECT_EQ(hung.run({"run.yaml", "--set", deadline}), 1);
+    EXPECT_THAT(hung.output(), HasSubstr("did not start within " + text_of(scaled(2s)) + " ms"));
+    EXPECT_THAT(hung.output(), HasSubstr("it failed 2 times in a row"));
+    EXPECT_FALSE(hung.exists("counted.txt"));
+}
+
+TEST(Deadlines, AnOutputThatHangsInStopIsEndedAndOthersFinish) {
+    const std::string deadline_ms = text_of(scaled(300ms));
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 20}}\n"
+                  "outputs:\n- {plugin: sink_counter, path: second.txt, options: {hang_in_stop: true}, "
+                  "stop_deadline_ms: " +
+                  deadline_ms + "}\n- {plugin: sink_counter, path: counted.txt}\n");
+    EXPECT_EQ(run.run(), 1);
+    EXPECT_THAT(run.output(), HasSubstr("did not stop within " + deadline_ms + " ms"));
+    EXPECT_TRUE(run.exists("counted.txt.done"));
+    EXPECT_FALSE(run.exists("second.txt.done"));
+    expect_all_frames(run, 20);
+}
+
+// After the signal, the source may no longer extend deadline_ms, so the outputs are completed.
+TEST(Deadlines, OneSignalEndsARunWhoseLiveSourceWaitsForever) {
+    ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_waiting_live, deadline_ms: " +
+                  text_of(scaled(400ms)) +
+                  ", options: {wait_ms: -1}}\noutputs: [{plugin: sink_counter, path: out/counted.txt}]\n");
+    run.start();
+    ASSERT_TRUE(run.wait_for_output("waits for a frame")) << run.output();
+    send_signal(run.pid(), SIGTERM);
+    EXPECT_EQ(run.wait(), 130) << run.output();
+    EXPECT_TRUE(run.exists("out/counted.txt.done"));
+}
+
+// A stop that reports progress forever must not outlast a signal to the host by more than stop_deadline_ms.
+TEST(Deadlines, OneSignalEndsARunWhosePluginStopsForever) {
+    const std::string deadline_ms = text_of(scaled(400ms));
+    ArhostRun run("version: 1\nsource: {plugin: hostile_source, stop_deadline_ms: " + deadline_ms +
+                  ", options: {frames: 20, attack: endless_stop}}\n"
+                  "outputs: [{plugin: sink_poses, path: poses.jsonl, stop_deadline_ms: " +
+                  deadline_ms + "}]\n");
+    run.start();
+    ASSERT_TRUE(run.wait_for_lines(20, "poses.jsonl")) << run.output();
+    send_signal(run.pid(), SIGTERM);
+    EXPECT_EQ(run.wait(), 1) << run.output();
+    EXPECT_THAT(run.output(),
+                HasSubstr("not stopped within " + deadline_ms + " ms after the signal (stop_deadline_ms): source; "));
+    EXPECT_EQ(run.lines("poses.jsonl"), 20u);
+}
+
+TEST(Deadlines, TheVideoContinuesDuringTheBackOff) {
+    CountingRun run({.mode = "live",
+                     .source = "frames: 100000",
+                     .more = "live: {max_latency_ms: 60000}\n"
+                             "restart: {proven_after_frames: 100000, first_delay_ms: " +
+                             text_of(scaled(3s)) + "}\n"});
+    run.start();
+    ASSERT_TRUE(run.wait_for_lines(15)) << run.output();
+    send_signal(run.worker("tracker_counter"), SIGKILL);
+    EXPECT_TRUE(run.eventually([&] { return std::ranges::count_if(counted(run), is_plain) >= 8; })) << run.output();
+    EXPECT_TRUE(run.eventually([&] { return !is_plain(counted(run).back()); })) << run.output();
+    send_signal(run.pid(), SIGINT);
+    ASSERT_EQ(run.wait(), 130) << run.output();
+    expect_own_overlays(counted(run));
+}
+
+// The ray tracer hangs at the first frame from `hang_at` on that it receives. When its deadline ends, the source has
+// passed `hang_until`, so the restarted ray tracer does not hang again.
+TEST(Deadlines, FramesDoNotWaitForAHungRayTracerLongerThanMaxLatency) {
+    CountingRun run({.mode = "live",
+                     .source = "frames: 100000",
+                     .raytracer = "hang_at: 20, hang_until: 30",
+                     .more = "live: {max_latency_ms: 150}\n",
+                     .deadline = call_deadline});
+    run.start();
+    EXPECT_TRUE(run.eventually([&] {
+        const auto lines = counted(run);
+        return std::ranges::any_of(lines, [](const auto &line) { return line.sequence > 30 && !is_plain(line); });
+    })) << "overlays must be shown again after the restart: "
+        << run.output();
+    send_signal(run.pid(), SIGINT);
+    ASSERT_EQ(run.wait(), 130) << run.output();
+    const auto lines = counted(run);
+    expect_own_overlays(lines);
+    EXPECT_GE(std::ranges::count_if(lines, is_plain), 5) << "plain video must continue until the deadline";
+    EXPECT_GE(run.stats()["restarts"]["raytracer"], 1);
+}
