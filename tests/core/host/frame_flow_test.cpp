@@ -88,11 +88,11 @@ struct Bench {
     }
 
     // The oldest frame that was read arrives, with this capture time.
-    void arrive(std::int64_t capture_ns = 0) {
+    void arrive(std::int64_t capture_ns = 0, arhost_clock timestamps = ARHOST_CLOCK_MEDIA) {
         auto frame = std::make_unique<Frame>(pending.front());
         pending.erase(pending.begin());
         frame->pixels = flow.take_read();
-        frame->record.clock = ARHOST_CLOCK_MEDIA;
+        frame->record.clock = timestamps;
         frame->record.capture_ns = capture_ns;
         frame->captured = clock.now();
         frame->recorded = flow.recorded(frame->record.sequence);
@@ -307,6 +307,54 @@ TEST(FrameFlow, ReadsNothingWhileTheVideoIsFrozen) {
     EXPECT_THAT(bench.go(), ElementsAre("read 0", "read 1"));
 }
 
+TEST(FrameFlow, FinishesTheFramesInProgressWhileTheVideoIsFrozen) {
+    Bench bench(lockstep());
+    arrive(bench, 1);
+    EXPECT_THAT(bench.go(), ElementsAre("read 2", "track 0"));
+    bench.flow.set_frozen(true);
+    bench.tracked();
+    EXPECT_THAT(bench.go(), ElementsAre("render 0"));
+    bench.rendered();
+    EXPECT_THAT(bench.go(), ElementsAre("show 0+"));
+    EXPECT_TRUE(bench.flow.is_empty());
+}
+
+TEST(FrameFlow, MeasuresTheLatencyOfEachShownFrame) {
+    FrameFlow::Settings settings = lockstep();
+    settings.has_timeline = true;
+    Bench bench(settings);
+    for (const auto latency : {20ms, 70ms}) {
+        arrive(bench, 1, 100ms);
+        bench.go();
+        bench.clock.advance(latency);
+        bench.tracked(false);
+        bench.go();
+    }
+    ASSERT_EQ(bench.statistics.timeline.size(), 2u);
+    EXPECT_EQ(bench.statistics.timeline[0].latency, 20ms);
+    EXPECT_EQ(bench.statistics.timeline[1].latency, 70ms);
+    EXPECT_EQ(bench.statistics.timeline[1].frame, 1u);
+    EXPECT_EQ(bench.statistics.timeline[1].shown, bench.clock.now());
+    EXPECT_EQ(bench.statistics.last_frame, bench.clock.now());
+}
+
+// The held camera has the axes of the previous scene, in which its frame is being rendered.
+TEST(FrameFlow, ShowsAFrameWithAHeldCameraWithoutAnOverlayInAReplacedScene) {
+    Bench bench(lockstep());
+    bench.raytracer_limit = 1;
+    for (const bool sees_target : {true, false}) {
+        arrive(bench, 1);
+        bench.go();
+        bench.tracked(sees_target);
+        bench.go();
+    }
+    EXPECT_THAT(bench.in_raytracer, ElementsAre(0u));
+    bench.cameras.set_coordinates({1, 2, {{90, {1, 0, 0}}}});
+    bench.flow.on_coordinates_changed();
+    bench.rendered();
+    EXPECT_THAT(bench.go(), ElementsAre("show 0+", "show 1"));
+}
+
 TEST(FrameFlow, GivesAFrameInAReplacedSceneTheCameraOfTheNewAxes) {
     Bench bench(lockstep());
     bench.raytracer = Readiness::busy;
@@ -418,6 +466,40 @@ TEST(FrameFlow, ShowsAFilmAtItsOwnRate) {
     EXPECT_THAT(bench.go(), ElementsAre("show 1"));
 }
 
+// Its frames have the time stamps of a camera.
+TEST(FrameFlow, ShowsARecordingAtItsOwnRate) {
+    arhost::run_config::Recording recording;
+    recording.repeats_decisions = false;
+    for (const std::int64_t capture_ns : {0, 40'000'000})
+        recording.frames.push_back({.number = recording.frames.size(),
+                                    .capture_ns = capture_ns,
+                                    .clock = ARHOST_CLOCK_MONOTONIC,
+                                    .overlay = ARHOST_OVERLAY_NONE,
+                                    .scale = 1,
+                                    .samples = 0,
+                                    .targets = {},
+                                    .observations = {},
+                                    .view = {},
+                                    .truth = {}});
+    for (const bool is_recording : {true, false}) {
+        FrameFlow::Settings settings;
+        settings.max_frames = 2;
+        settings.recording = is_recording ? &recording : nullptr;
+        Bench bench(settings);
+        bench.flow.set_paced(true);
+        bench.go();
+        bench.arrive(0, ARHOST_CLOCK_MONOTONIC);
+        bench.arrive(40'000'000, ARHOST_CLOCK_MONOTONIC);
+        if (!is_recording) {
+            EXPECT_THAT(bench.go(), ElementsAre("show 0", "show 1")) << "a camera sets the rate itself";
+            continue;
+        }
+        EXPECT_THAT(bench.go(), ElementsAre("show 0"));
+        bench.clock.advance(40ms);
+        EXPECT_THAT(bench.go(), ElementsAre("show 1"));
+    }
+}
+
 TEST(FrameFlow, DoesNotCatchUpMoreThanAMomentOfAFilm) {
     Bench bench{FrameFlow::Settings()};
     bench.flow.set_paced(true);
@@ -492,6 +574,37 @@ TEST(FrameFlow, ForgetsThePaceOfAReplacedTracker) {
     bench.flow.on_tracker_replaced();
     arrive(bench, 3);
     EXPECT_TRUE(bench.statistics.dropped.empty());
+}
+
+TEST(FrameFlow, ForgetsThePaceOfAReplacedRayTracer) {
+    for (const bool is_replaced : {false, true}) {
+        Bench bench(live());
+        bench.raytracer_limit = 1;
+        bench.flow.set_rate(30);
+        for (int frame = 0; frame < 4; ++frame) {
+            arrive(bench, 1);
+            bench.go();
+            bench.tracked();
+            bench.go();
+            if (frame > 0)
+                continue; // the others wait
+            bench.rendered(40ms);
+            if (is_replaced)
+                bench.flow.on_raytracer_replaced();
+        }
+        EXPECT_EQ(bench.statistics.dropped["raytracer"], is_replaced ? 0u : 1u);
+    }
+}
+
+TEST(FrameFlow, DiscardsOnlyTheArrivalsAfterAnInterruptedCameraHasEnded) {
+    for (const bool is_live : {false, true}) {
+        Bench bench(is_live ? live() : lockstep());
+        EXPECT_FALSE(bench.flow.discards_arrivals());
+        bench.flow.on_input_ended();
+        EXPECT_FALSE(bench.flow.discards_arrivals()) << "a source without an interruption has ended";
+        bench.flow.on_interrupted();
+        EXPECT_EQ(bench.flow.discards_arrivals(), is_live);
+    }
 }
 
 TEST(FrameFlow, PassesFramesWhileAWorkerRestarts) {
@@ -598,6 +711,29 @@ private:
     std::map<std::uint64_t, std::string> before_;
 };
 
+// Ends the run: all frames are answered and shown.
+void expect_that_all_slots_become_free(Bench &bench) {
+    bench.flow.on_input_ended();
+    bench.tracker = bench.raytracer = Readiness::ready;
+    while (!bench.pending.empty())
+        bench.arrive();
+    for (int i = 0; i < 100 && !bench.flow.is_empty(); ++i) {
+        bench.go();
+        if (!bench.in_tracker.empty())
+            bench.tracked();
+        if (!bench.in_raytracer.empty())
+            bench.rendered();
+    }
+    EXPECT_TRUE(bench.flow.is_empty());
+    for (const auto &[slots, count] :
+         {std::pair{bench.source_slots, 8}, {bench.stage_slots, 4}, {bench.overlay_slots, 4}}) {
+        std::vector<Lease> free;
+        while (auto slot = slots->acquire())
+            free.push_back(std::move(*slot));
+        EXPECT_EQ(free.size(), static_cast<std::size_t>(count));
+    }
+}
+
 // Lets random events happen.
 void run_at_random(const FrameFlow::Settings &settings, unsigned seed, Transitions &transitions) {
     Bench bench(settings);
@@ -643,6 +779,7 @@ void run_at_random(const FrameFlow::Settings &settings, unsigned seed, Transitio
         }
     }
     transitions.forget_frames();
+    expect_that_all_slots_become_free(bench);
 }
 
 } // namespace
