@@ -113,10 +113,10 @@ TEST(AnchorErrors, ATargetThatDoesNotExistIsAnErrorAtTheKeyOfTheObject) {
                             "  - {sphere: {radius: 8}, material: grey, on: cup}\n");
     for (const std::vector<std::string> &arguments :
          {std::vector<std::string>{"run.yaml"}, {"check", "run.yaml"}, {"check", "--no-open", "run.yaml"}}) {
-        EXPECT_EQ(run.run(arguments), 2) << run.output();
-        EXPECT_THAT(run.output(), HasSubstr("scene.yaml:6:47: objects[1].on: there is no target 'cup'; the tracker "
-                                            "looks for 'visor' (body 'head'), 'glove' (body 'hand'); correct the "
-                                            "name, or add the target"));
+        run.expect(arguments, 2,
+                   {"scene.yaml:6:47: objects[1].on: there is no target 'cup'; the tracker "
+                    "looks for 'visor' (body 'head'), 'glove' (body 'hand'); correct the "
+                    "name, or add the target"});
     }
     run.write("scene.yaml", scene);
     EXPECT_EQ(run.run({"check", "--no-open", "run.yaml"}), 0) << run.output();
@@ -132,9 +132,9 @@ TEST(AnchorErrors, AnObjectOnATargetNeedsATracker) {
               R"({"frame": 0, "capture_ns": 0, "eye": null, "look_at": null, "up": null})"
               "\n");
     run.write("scene.yaml", scene);
-    EXPECT_EQ(run.run({"check", "--no-open", "run.yaml"}), 2) << run.output();
-    EXPECT_THAT(run.output(), HasSubstr("scene.yaml:9:68: objects[1].on: no tracker runs that could find the target "
-                                        "'glove'; remove this key, or run a tracker with this target"));
+    run.expect({"check", "--no-open", "run.yaml"}, 2,
+               {"scene.yaml:9:68: objects[1].on: no tracker runs that could find the target "
+                "'glove'; remove this key, or run a tracker with this target"});
 }
 
 TEST(AnchorErrors, AKilledRayTracerKeepsObjectsOnTheirTargets) {

@@ -7,6 +7,7 @@
 #include "processes.hpp"
 
 #include <directories.hpp>
+#include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 #include <waiting.hpp>
 
@@ -18,6 +19,7 @@
 #include <fstream>
 #include <functional>
 #include <set>
+#include <source_location>
 #include <sstream>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -87,6 +89,18 @@ public:
     int run(std::vector<std::string> arguments = {"--config", "run.yaml"}) {
         start(std::move(arguments));
         return wait();
+    }
+    // Runs `arhost ARGUMENTS` and expects its exit status, and that its output contains all texts.
+    void expect(const std::vector<std::string> &arguments, int status, const std::vector<std::string> &texts,
+                const std::source_location &caller = std::source_location::current()) {
+        const testing::ScopedTrace trace(caller.file_name(), static_cast<int>(caller.line()), "called from here");
+        EXPECT_EQ(run(arguments), status) << output();
+        for (const std::string &text : texts)
+            EXPECT_THAT(output(), testing::HasSubstr(text));
+    }
+    void expect(int status, const std::vector<std::string> &texts,
+                const std::source_location &caller = std::source_location::current()) {
+        expect({"--config", "run.yaml"}, status, texts, caller);
     }
     bool running() const {
         siginfo_t info{};

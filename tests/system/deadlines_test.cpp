@@ -35,7 +35,8 @@ TEST(Deadlines, APluginThatHangsInACallIsEnded) {
 }
 
 TEST(Deadlines, AHungPluginThatIgnoresSigabrtIsKilled) {
-    CountingRun run({.source = "frames: 30", .tracker = "hang_at: 20, ignore_abort: true", .deadline = call_deadline});
+    CountingRun run(
+        {.source = "frames: 30", .tracker = "hang_at: 20, ignore_abort: true", .deadline = call_deadline});
     ASSERT_EQ(run.run(), 1) << run.output();
     EXPECT_EQ(expect_all_frames(run, 30), std::set<std::uint64_t>{20});
     const std::string how = run.stats()["crashes"][0]["how"];
@@ -43,8 +44,9 @@ TEST(Deadlines, AHungPluginThatIgnoresSigabrtIsKilled) {
     EXPECT_THAT(how, HasSubstr("signal 9"));
 }
 
-// The time of a stopped host does not count. At frame 20, as at Ctrl-Z, the workers continue, and the host reads their
-// responses later. At frame 60, as in a frozen container, the workers are stopped, too, and resumed after the host.
+// The time of a stopped host does not count. At frame 20, as at Ctrl-Z, the workers continue, and the host reads
+// their responses later. At frame 60, as in a frozen container, the workers are stopped, too, and resumed after the
+// host.
 TEST(Deadlines, NothingHangsIfTheHostIsStopped) {
     CountingRun run({.source = "frames: 120", .raytracer = "delay_ms: 5", .deadline = call_deadline});
     run.start();
@@ -76,9 +78,8 @@ TEST(Deadlines, AStartMustReportProgress) {
     CountingRun hung({.source = "frames: 5",
                       .tracker = "start_steps: 1, start_step_ms: 60000",
                       .more = "restart: {quarantine_after: 2, first_delay_ms: 1}\n"});
-    EXPECT_EQ(hung.run({"run.yaml", "--set", deadline}), 1);
-    EXPECT_THAT(hung.output(), HasSubstr("did not start within " + text_of(scaled(2s)) + " ms"));
-    EXPECT_THAT(hung.output(), HasSubstr("it failed 2 times in a row"));
+    hung.expect({"run.yaml", "--set", deadline}, 1,
+                {"did not start within " + text_of(scaled(2s)) + " ms", "it failed 2 times in a row"});
     EXPECT_FALSE(hung.exists("counted.txt"));
 }
 
@@ -88,8 +89,7 @@ TEST(Deadlines, AnOutputThatHangsInStopIsEndedAndOthersFinish) {
                   "outputs:\n- {plugin: sink_counter, path: second.txt, options: {hang_in_stop: true}, "
                   "stop_deadline_ms: " +
                   deadline_ms + "}\n- {plugin: sink_counter, path: counted.txt}\n");
-    EXPECT_EQ(run.run(), 1);
-    EXPECT_THAT(run.output(), HasSubstr("did not stop within " + deadline_ms + " ms"));
+    run.expect(1, {"did not stop within " + deadline_ms + " ms"});
     EXPECT_TRUE(run.exists("counted.txt.done"));
     EXPECT_FALSE(run.exists("second.txt.done"));
     expect_all_frames(run, 20);
@@ -97,9 +97,9 @@ TEST(Deadlines, AnOutputThatHangsInStopIsEndedAndOthersFinish) {
 
 // After the signal, the source may no longer extend deadline_ms, so the outputs are completed.
 TEST(Deadlines, OneSignalEndsARunWhoseLiveSourceWaitsForever) {
-    ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_waiting_live, deadline_ms: " +
-                  text_of(scaled(400ms)) +
-                  ", options: {wait_ms: -1}}\noutputs: [{plugin: sink_counter, path: out/counted.txt}]\n");
+    ArhostRun run(
+        "version: 1\nmode: live\nsource: {plugin: source_waiting_live, deadline_ms: " + text_of(scaled(400ms)) +
+        ", options: {wait_ms: -1}}\noutputs: [{plugin: sink_counter, path: out/counted.txt}]\n");
     run.start();
     ASSERT_TRUE(run.wait_for_output("waits for a frame")) << run.output();
     send_signal(run.pid(), SIGTERM);

@@ -126,11 +126,9 @@ TEST(VideoFile, ATruncatedInputSetsTheExitStatus) {
     run.write("video.mkv", video.substr(0, video.size() * 6 / 10));
     run.write("again.yaml", "version: 1\nsource: {plugin: source_file, path: video.mkv}\n"
                             "outputs: [{plugin: sink_poses, path: poses.jsonl}]\nstats: stats.json\n");
-    EXPECT_EQ(run.run({"--config", "again.yaml"}), 1);
-    EXPECT_THAT(run.output(), HasSubstr("video.mkv' is truncated: it ends after frame "));
-    EXPECT_THAT(
-        run.output(),
-        HasSubstr("again.yaml:2:9: source: the input is truncated; the frames before the truncation are kept"));
+    run.expect({"--config", "again.yaml"}, 1,
+               {"video.mkv' is truncated: it ends after frame ",
+                "again.yaml:2:9: source: the input is truncated; the frames before the truncation are kept"});
     const std::string poses = run.read("poses.jsonl");
     const auto kept = std::count(poses.begin(), poses.end(), '\n');
     EXPECT_GT(kept, 10);

@@ -170,8 +170,7 @@ TEST(Devices, AMissingDisplayHasAReason) {
 
 TEST(Devices, OfAnUnknownPluginAreAnInvalidCommandLine) {
     ArhostRun run;
-    EXPECT_EQ(run.run({"devices", "source_v5l2"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("there is no plugin 'source_v5l2'; did you mean 'source_v4l2'?"));
+    run.expect({"devices", "source_v5l2"}, 2, {"there is no plugin 'source_v5l2'; did you mean 'source_v4l2'?"});
 }
 
 // The scratch folder is not the configuration's folder.

@@ -628,8 +628,7 @@ TEST(Sandbox, ReportsATooSmallMemoryLimit) {
         "version: 1\nsource: {plugin: source_synthetic}\n"
         "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}], memory_mb: 1}\n"
         "outputs: [{plugin: sink_null}]\n");
-    EXPECT_EQ(run.run(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("'memory_mb' may be too small"));
+    run.expect(2, {"'memory_mb' may be too small"});
 }
 
 TEST(Sandbox, RejectsAMemoryLimitWithAGpu) {
@@ -637,9 +636,8 @@ TEST(Sandbox, RejectsAMemoryLimitWithAGpu) {
                   "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}], "
                   "memory_mb: 100, allow: [gpu]}\n"
                   "outputs: [{plugin: sink_null}]\n");
-    EXPECT_EQ(run.run({"check", "run.yaml"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("run.yaml:3:"));
-    EXPECT_THAT(run.output(), HasSubstr("memory_mb: cannot be enforced together with 'allow: [gpu]'"));
+    run.expect({"check", "run.yaml"}, 2,
+               {"run.yaml:3:", "memory_mb: cannot be enforced together with 'allow: [gpu]'"});
 }
 
 // The plugin changes data between the host's check and use. This may result in a wrong pose, which cannot be
@@ -728,10 +726,8 @@ TEST(Sandbox, RefusesAnImplausibleLens) {
                   "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"
                   "raytracer: {plugin: rt_counter, scene: scene.yaml}\noutputs: [{plugin: sink_null}]\n");
     run.write("scene.yaml", small_scene);
-    EXPECT_EQ(run.run(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("run.yaml:2:"));
-    EXPECT_THAT(run.output(), HasSubstr("the lens distortion is implausible: near the principal point it scales "
-                                        "distances by "));
+    run.expect(2, {"run.yaml:2:", "the lens distortion is implausible: near the principal point it scales "
+                                  "distances by "});
 }
 
 TEST(Sandbox, ASecondHelloEndsTheWorker) {
@@ -786,14 +782,10 @@ TEST(Sandbox, NeedsMustBeAllowed) {
     const std::string yaml = "version: 1\nsource: {plugin: source_v4l2, options: {device: /dev/none}}\n"
                              "camera: {width: 640, height: 480, fx: 600}\noutputs: [{plugin: sink_null}]\n";
     ArhostRun run(yaml);
-    EXPECT_EQ(run.run(), 2);
-    EXPECT_THAT(run.output(), HasSubstr("run.yaml:2"));
-    EXPECT_THAT(run.output(), HasSubstr("'source_v4l2' needs 'video', which the sandbox blocks: add 'allow: "
-                                        "[video]' to source"));
-    EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "source.allow=[video]"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("/dev/none"));
-    EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "sandbox=none"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("/dev/none"));
+    run.expect(2, {"run.yaml:2", "'source_v4l2' needs 'video', which the sandbox blocks: add 'allow: "
+                                 "[video]' to source"});
+    run.expect({"--config", "run.yaml", "--set", "source.allow=[video]"}, 2, {"/dev/none"});
+    run.expect({"--config", "run.yaml", "--set", "sandbox=none"}, 2, {"/dev/none"});
 }
 
 TEST(Sandbox, WarnsIfAnOutputMayWriteToTheWorkingDirectory) {
@@ -814,8 +806,7 @@ TEST(Sandbox, ReadsGrantsALibraryInAnotherFolder) {
                                             "'--reads FOLDER' to plugins and conform"));
     run.run({"plugins", "linked_elsewhere", "--reads", arhost::test::build_directory() + "/tests/elsewhere"});
     EXPECT_THAT(run.output(), ContainsRegex("linked_elsewhere +cannot be used: .*exports no symbol 'arhost_entry'"));
-    EXPECT_EQ(run.run({"plugins", "--reads", "/"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("the sandbox cannot grant '/'"));
+    run.expect({"plugins", "--reads", "/"}, 2, {"the sandbox cannot grant '/'"});
 }
 
 TEST(Sandbox, RejectsUnknownPermissions) {

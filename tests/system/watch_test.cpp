@@ -306,8 +306,7 @@ TEST(WatchConfiguration, RejectsAPluginThatCouldReplaceALinkToTheConfiguration) 
     std::filesystem::create_directory(run.path("out"));
     std::filesystem::create_symlink("../own/run.yaml", run.path("out/run.yaml"));
     std::filesystem::create_symlink("../own/scene.yaml", run.path("out/scene.yaml"));
-    EXPECT_EQ(run.run({"out/run.yaml", "--watch"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("outputs[0]: may write to the folder of '"));
+    run.expect({"out/run.yaml", "--watch"}, 2, {"outputs[0]: may write to the folder of '"});
 }
 
 TEST(WatchConfiguration, RejectsAPluginThatCouldReplaceALinkInThePath) {
@@ -349,8 +348,7 @@ TEST(WatchConfiguration, RejectsAPluginThatCouldEditTheConfiguration) {
     ArhostRun run(std::string("version: 1\n") + source + tracker + raytracer +
                   "outputs:\n  - {plugin: sink_video, path: take.mkv}\n");
     run.write("scene.yaml", small_sphere);
-    EXPECT_EQ(run.run({"run.yaml", "--watch"}), 2);
-    EXPECT_THAT(run.output(), HasSubstr("run.yaml:6:5: outputs[0]: may write to the folder of '"));
+    run.expect({"run.yaml", "--watch"}, 2, {"run.yaml:6:5: outputs[0]: may write to the folder of '"});
     EXPECT_EQ(run.run({"run.yaml", "--frames", "3"}), 0) << run.output();
 }
 
