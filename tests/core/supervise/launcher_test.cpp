@@ -137,7 +137,7 @@ TEST(Launcher, StartsAWorkerAsPid2WhosePid1EndsWithIt) {
     ASSERT_GT(init, 0);
     ::kill(worker.pid, SIGKILL);
     launcher.wait_exit(worker.pid);
-    EXPECT_TRUE(becomes_true([&] { return !is_alive(init); }));
+    EXPECT_TRUE(eventually([&] { return !is_alive(init); }));
 }
 
 TEST(Launcher, ReportsThatItCanNotStartAProcess) {
@@ -269,7 +269,7 @@ TEST(Launcher, ExitsWithItsHostEvenIfStopped) {
     ASSERT_EQ(::read(ends[0], pids, sizeof pids), static_cast<ssize_t>(sizeof pids));
     ::waitpid(host, nullptr, 0);
     for (const pid_t pid : pids) {
-        EXPECT_TRUE(becomes_true([&] { return !is_alive(pid); }));
+        EXPECT_TRUE(eventually([&] { return !is_alive(pid); }));
         ::kill(pid, SIGKILL);
     }
     ::close(ends[0]);

@@ -4,8 +4,8 @@
 // of rt_vulkan is killed. The fallback ray tracer must take over.
 #include "arhost_run.hpp"
 #include "copy_drivers.hpp"
-#include "eventually.hpp"
 #include "two_tracers.hpp"
+#include "waiting.hpp"
 
 #include <gmock/gmock.h>
 

@@ -2,8 +2,8 @@
 //
 // Runs of arhost with sink_pipe, in the sandbox.
 #include "../../system/arhost_run.hpp"
-#include "eventually.hpp"
 #include "fifo.hpp"
+#include "waiting.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "eventually.hpp"
 #include "fifo.hpp"
 #include "sink_under_test.hpp"
+#include "waiting.hpp"
 
 #include <gmock/gmock.h>
 

@@ -2,7 +2,7 @@
 //
 // Writes to the output node of vivid, the kernel's virtual video device, which loops the pictures to its capture
 // node. To be run in a virtual machine; see CMakeLists.txt for the parameters of the module.
-#include "../../support/eventually.hpp"
+#include "../../support/waiting.hpp"
 #include "../../system/arhost_run.hpp"
 #include "sink_common/sink_under_test.hpp"
 #include "source_file/source_under_test.hpp"

@@ -2,10 +2,10 @@
 //
 // Runs arhost with the page, in its sandbox, and sends requests to it.
 #include "arhost_run.hpp"
-#include "eventually.hpp"
 #include "http_client.hpp"
 #include "process_state.hpp"
 #include "sink_under_test.hpp"
+#include "waiting.hpp"
 
 #include "base/unique_fd.hpp"
 

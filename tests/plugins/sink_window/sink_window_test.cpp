@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "eventually.hpp"
 #include "sink_under_test.hpp"
 #include "tracked_record.hpp"
+#include "waiting.hpp"
 #include "x_server.hpp"
 
 #include <directories.hpp>

@@ -3,7 +3,7 @@
 // Runs arhost with network cameras, inside the sandbox.
 #include "arhost_run.hpp"
 #include "camera_server.hpp"
-#include "eventually.hpp"
+#include "waiting.hpp"
 
 #include <gmock/gmock.h>
 

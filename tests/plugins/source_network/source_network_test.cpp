@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "camera_server.hpp"
-#include "eventually.hpp"
 #include "process_state.hpp"
 #include "source_under_test.hpp"
+#include "waiting.hpp"
 
 #include <gmock/gmock.h>
 

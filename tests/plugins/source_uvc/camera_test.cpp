@@ -2,9 +2,9 @@
 //
 // Captures from a USB camera in user space, through the kernel's USB stack. To be run in a virtual machine:
 //   tools/vm/run-in-vm -m vhci_hcd -m uvcvideo …/source_uvc-camera-test
-#include "../../support/eventually.hpp"
 #include "../../support/process_state.hpp"
 #include "../../support/usb_camera.hpp"
+#include "../../support/waiting.hpp"
 #include "../../system/arhost_run.hpp"
 #include "../../system/listed_devices.hpp"
 #include "../../system/suspend.hpp"

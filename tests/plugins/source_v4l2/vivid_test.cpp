@@ -2,8 +2,8 @@
 //
 // Captures from vivid, the kernel's virtual camera, and makes vivid inject faults. To be run in a virtual machine:
 //   tools/vm/run-in-vm -m "vivid n_devs=1 node_types=0x1" …/source_v4l2-vivid-test
-#include "../../support/eventually.hpp"
 #include "../../support/process_state.hpp"
+#include "../../support/waiting.hpp"
 #include "../../system/arhost_run.hpp"
 #include "../../system/device_schema.hpp"
 #include "../../system/listed_devices.hpp"
