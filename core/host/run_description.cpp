@@ -1,12 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/run_description.hpp"
 
-#include "run_config/recorded_session.hpp"
+#include "base/unique_fd.hpp"
 
 #include <arhost-cpp/url.hpp>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+#include <cstdio>
 #include <ctime>
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 namespace arhost::host {
 
@@ -70,7 +75,7 @@ Json scene_files(const LoadedScene &scene) {
     Json files = Json::array();
     std::uint64_t left = max_hashed_bytes;
     for (const std::filesystem::path &file : read)
-        if (const auto fingerprint = run_config::fingerprint_of(file, left)) {
+        if (const auto fingerprint = fingerprint_of(file, left)) {
             left -= fingerprint->hash.empty() ? 0 : fingerprint->bytes;
             files.push_back({{"file", file.string()}, {"bytes", fingerprint->bytes}});
             if (!fingerprint->hash.empty())
@@ -89,7 +94,7 @@ std::string run_description(const RunParts &parts, const Assembly &assembly, con
         overridden[path] = folder.string();
     const Video &video = parts.video;
     Json description = {{"format", "arhost-session"},
-                        {"version", run_config::session_version},
+                        {"version", session_version},
                         {"id", id},
                         {"recorded", utc_now()},
                         {"arhost", ARHOST_VERSION},
@@ -126,6 +131,31 @@ std::string run_description(const RunParts &parts, const Assembly &assembly, con
                                  std::to_string(messages::max_run_description >> 10) +
                                  " KiB with the list of scene files");
     return text;
+}
+
+std::optional<Fingerprint> fingerprint_of(const std::filesystem::path &file, std::uint64_t max_hashed_bytes) {
+    const base::UniqueFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+    struct stat status {};
+    if (fd.get() < 0 || ::fstat(fd.get(), &status) != 0 || !S_ISREG(status.st_mode))
+        return std::nullopt;
+    Fingerprint fingerprint{static_cast<std::uint64_t>(status.st_size), ""};
+    if (fingerprint.bytes > max_hashed_bytes)
+        return fingerprint;
+    std::uint64_t hash = 0xcbf29ce484222325; // FNV-1a: offset basis and prime for 64 bits
+    std::vector<unsigned char> buffer(1 << 16);
+    std::uint64_t left = fingerprint.bytes;
+    while (left > 0) {
+        const ssize_t got = ::read(fd.get(), buffer.data(), std::min<std::uint64_t>(left, buffer.size()));
+        if (got <= 0)
+            return std::nullopt;
+        left -= static_cast<std::uint64_t>(got);
+        for (ssize_t i = 0; i < got; ++i)
+            hash = (hash ^ buffer[static_cast<std::size_t>(i)]) * 0x100000001b3;
+    }
+    char digits[17];
+    std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash));
+    fingerprint.hash = digits;
+    return fingerprint;
 }
 
 } // namespace arhost::host

@@ -3,7 +3,7 @@
 // arhost-inprocess: runs a configuration like `arhost --config FILE`, but in one process and without deadlines and
 // sandbox, for debuggers, valgrind and sanitizers. If a plugin crashes, the whole program crashes.
 #include "base/program.hpp"
-#include "host/commands.hpp"
+#include "cli/commands.hpp"
 #include "inprocess/thread_starter.hpp"
 #include "worker/session.hpp"
 
@@ -17,13 +17,13 @@ int main(int argc, char **argv) {
         "arhost-inprocess runs a configuration like arhost, but with all plugins in one process and without\n"
         "deadlines or sandbox. Intended for debuggers, valgrind and sanitizers.");
     app.version("arhost-inprocess " ARHOST_VERSION);
-    host::Arguments arguments;
+    cli::Arguments arguments;
     arguments.in_process = true;
     add_run_options(app, arguments).required();
     return base::exit_status_of([&] {
         if (const auto status = app.parse(argc, argv))
             return *status;
         inprocess::ThreadStarter starter;
-        return host::run(arguments, starter);
+        return cli::run(arguments, starter);
     });
 }

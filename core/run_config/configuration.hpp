@@ -9,7 +9,7 @@
 #include "model/plugin_description.hpp"
 #include "run_config/files_in_use.hpp"
 #include "run_config/plugin_path.hpp"
-#include "run_config/recorded_session.hpp"
+#include "run_config/recording.hpp"
 #include "run_config/targets.hpp"
 #include "sandbox/sandbox.hpp"
 #include "yaml/yaml.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/console.hpp"
+#include "cli/console.hpp"
 
 #include <gmock/gmock.h>
 
@@ -7,7 +7,7 @@
 #include <thread>
 #include <unistd.h>
 
-using namespace arhost::host;
+using namespace arhost::cli;
 using testing::HasSubstr;
 
 namespace {

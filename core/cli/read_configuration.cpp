@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/read_configuration.hpp"
+#include "cli/read_configuration.hpp"
 
 #include "base/file_identity.hpp"
 #include "base/program.hpp"
 #include "camera/coordinates.hpp"
 
-namespace arhost::host {
+namespace arhost::cli {
 namespace {
 
 namespace fs = std::filesystem;
@@ -122,4 +122,4 @@ run_config::Configuration read_configuration(const Arguments &arguments) {
     return parse_configuration(root, arguments);
 }
 
-} // namespace arhost::host
+} // namespace arhost::cli

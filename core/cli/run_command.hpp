@@ -3,12 +3,12 @@
 // Runs a configuration.
 #pragma once
 
-#include "host/commands.hpp"
-#include "host/console.hpp"
+#include "cli/commands.hpp"
+#include "cli/console.hpp"
 #include "run_config/configuration.hpp"
 #include "supervise/process.hpp"
 
-namespace arhost::host {
+namespace arhost::cli {
 
 supervise::Context make_context(ipc::Reactor &reactor, supervise::Starter &launcher, Console &console);
 void show_warnings(const run_config::Configuration &configuration, Console &console);
@@ -16,4 +16,4 @@ void show_warnings(const run_config::Configuration &configuration, Console &cons
 // Returns the exit status.
 int run(const run_config::Configuration &configuration, const Arguments &arguments, supervise::Starter &launcher);
 
-} // namespace arhost::host
+} // namespace arhost::cli

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/console.hpp"
+#include "cli/console.hpp"
 
 #include "base/text.hpp"
 #include "host/run.hpp"
@@ -11,7 +11,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
-namespace arhost::host {
+namespace arhost::cli {
 namespace {
 
 constexpr std::size_t max_queued_lines = 1024;
@@ -62,7 +62,7 @@ void Console::log(arhost_severity severity, const std::string &component, const 
     log_->log(level, "{}: {}{}", component, blame, base::printable(text));
 }
 
-void Console::show(const Progress &progress, const Statistics &statistics) {
+void Console::show(const host::Progress &progress, const host::Statistics &statistics) {
     const auto now = std::chrono::steady_clock::now();
     const auto interval = terminal_ ? std::chrono::milliseconds(200) : std::chrono::milliseconds(5000);
     if (last_shown_ == std::chrono::steady_clock::time_point{})
@@ -77,8 +77,9 @@ void Console::show(const Progress &progress, const Statistics &statistics) {
         line += fmt::format("  {:.1f} fps  finishing the outputs", statistics.fps());
     else
         line += fmt::format("  {:.1f} fps", fps);
-    line += "  " + (progress.finishing ? percentiles_text(statistics.stages.all(), statistics.latencies.all())
-                                       : percentiles_text(statistics.stages.recent(), statistics.latencies.recent()));
+    line += "  " + (progress.finishing
+                        ? host::percentiles_text(statistics.stages.all(), statistics.latencies.all())
+                        : host::percentiles_text(statistics.stages.recent(), statistics.latencies.recent()));
     if (terminal_) {
         winsize size{};
         if (::ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 1 && line.size() >= size.ws_col)
@@ -92,4 +93,4 @@ void Console::show(const Progress &progress, const Statistics &statistics) {
     last_frame_ = progress.frame;
 }
 
-} // namespace arhost::host
+} // namespace arhost::cli

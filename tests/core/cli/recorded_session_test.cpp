@@ -1,16 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run_config/recorded_session.hpp"
+#include "cli/recorded_session.hpp"
 
 #include "errors.hpp"
+#include "host/run_description.hpp"
 #include "plugin_under_test.hpp"
 
 #include <gmock/gmock.h>
 
 #include <fstream>
 
-namespace arhost::run_config {
+namespace arhost::cli {
 namespace {
 
+using host::fingerprint_of;
+using run_config::RecordedFrame;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -211,4 +214,4 @@ TEST(Fingerprint, IsThatOfRegularFilesOnly) {
 }
 
 } // namespace
-} // namespace arhost::run_config
+} // namespace arhost::cli

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/commands.hpp"
-#include "host/read_configuration.hpp"
-#include "host/run_command.hpp"
-#include "run_config/recorded_session.hpp"
+#include "cli/commands.hpp"
+#include "cli/read_configuration.hpp"
+#include "cli/recorded_session.hpp"
+#include "cli/run_command.hpp"
 
 #include <algorithm>
 
-namespace arhost::host {
+namespace arhost::cli {
 namespace {
 
 namespace fs = std::filesystem;
@@ -121,7 +121,7 @@ bool is_option_of_stage(std::string_view path) {
 }
 
 // Lets the configuration of the recorded run, if `is_recorded`, or another one play the video of the session.
-void play_video(yaml::Node &root, const run_config::Session &session, bool is_recorded) {
+void play_video(yaml::Node &root, const Session &session, bool is_recorded) {
     for (const char *key : {"record", "snapshot", "stats", "timeline", "frames"})
         root.remove(key);
     root.override_value("mode", "lockstep", "arhost replay");
@@ -140,7 +140,7 @@ void play_video(yaml::Node &root, const run_config::Session &session, bool is_re
     }
 }
 
-std::vector<std::string> warnings_of(const run_config::Session &session) {
+std::vector<std::string> warnings_of(const Session &session) {
     std::vector<std::string> warnings;
     if (const yaml::Node version = session.description.require("arhost"); version.text() != ARHOST_VERSION)
         warnings.push_back(version.where() + ": the session was recorded with arhost " + version.text() +
@@ -155,7 +155,7 @@ std::vector<std::string> warnings_of(const run_config::Session &session) {
 run_config::Configuration session_configuration(const Arguments &arguments, const ReplayArguments &replay) {
     if (replay.with_pipeline || replay.width || replay.height)
         throw yaml::Error("--with-pipeline, --width and --height are for trajectories; remove them");
-    run_config::Session session = run_config::read_session(replay.session);
+    Session session = read_session(replay.session);
     const bool is_recorded = arguments.file.empty();
     yaml::Node root = is_recorded ? session.configuration : yaml::Node::load(arguments.file);
     if (is_recorded)
@@ -253,4 +253,4 @@ int replay(const Arguments &arguments, const ReplayArguments &replay, supervise:
                arguments, launcher);
 }
 
-} // namespace arhost::host
+} // namespace arhost::cli

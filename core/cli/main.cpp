@@ -2,7 +2,7 @@
 //
 // Command line of arhost.
 #include "base/program.hpp"
-#include "host/commands.hpp"
+#include "cli/commands.hpp"
 
 #include <cerrno>
 #include <cstdio>
@@ -11,7 +11,7 @@
 
 namespace {
 
-using namespace arhost::host;
+using namespace arhost::cli;
 using arhost::base::CommandLine;
 namespace base = arhost::base;
 

@@ -3,12 +3,12 @@
 // Reads a configuration and applies the command line's options to it.
 #pragma once
 
-#include "host/commands.hpp"
+#include "cli/commands.hpp"
 #include "run_config/configuration.hpp"
 
 #include <algorithm>
 
-namespace arhost::host {
+namespace arhost::cli {
 
 run_config::Configuration read_configuration(const Arguments &arguments);
 
@@ -31,4 +31,4 @@ void for_each_component(auto &configuration, const auto &function) {
     std::ranges::for_each(configuration.outputs, function);
 }
 
-} // namespace arhost::host
+} // namespace arhost::cli

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/run_command.hpp"
+#include "cli/run_command.hpp"
 
 #include "base/atomic_file.hpp"
 #include "base/program.hpp"
 #include "base/write_all.hpp"
+#include "cli/read_configuration.hpp"
 #include "host/outcome.hpp"
-#include "host/read_configuration.hpp"
 #include "host/run.hpp"
 
 #include <nlohmann/json.hpp>
@@ -16,7 +16,10 @@
 #include <sys/resource.h>
 #include <sys/signalfd.h>
 
-namespace arhost::host {
+namespace arhost::cli {
+
+using namespace host;
+
 namespace {
 
 double cpu_seconds_of_host() {
@@ -228,4 +231,4 @@ int run(const Arguments &arguments, supervise::Starter &launcher) {
     return run(read_configuration(arguments), arguments, launcher);
 }
 
-} // namespace arhost::host
+} // namespace arhost::cli

@@ -1,23 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "run_config/recorded_session.hpp"
+#include "cli/recorded_session.hpp"
 
 #include "base/text.hpp"
-#include "base/unique_fd.hpp"
+#include "host/run_description.hpp"
 
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <fcntl.h>
 #include <fstream>
 #include <limits>
-#include <sys/stat.h>
-#include <unistd.h>
 
-namespace arhost::run_config {
+namespace arhost::cli {
 namespace {
 
+using run_config::RecordedFrame;
 namespace fs = std::filesystem;
 
 constexpr const char *description_file = "session.json", *configuration_file = "configuration.yaml";
@@ -208,8 +206,8 @@ Session read_session(const fs::path &path) {
         expect_file(file, advice);
     yaml::Node root = yaml::Node::load(description);
     root.require("format").choice({"arhost-session"});
-    if (const yaml::Node version = root.require("version"); version.integer() != session_version)
-        version.fail("must be " + std::to_string(session_version) +
+    if (const yaml::Node version = root.require("version"); version.integer() != host::session_version)
+        version.fail("must be " + std::to_string(host::session_version) +
                      ", the only version that this arhost can replay; record the session again, or replay it with "
                      "the arhost that has recorded it");
     yaml::Node::Origin origin{root.require("folder").text(), {}};
@@ -230,9 +228,9 @@ std::vector<std::string> Session::changed_scene_files() const {
     for (const yaml::Node &entry : files.items()) {
         const fs::path file = entry.require("file").text();
         const auto hash = entry.find("fnv1a");
-        const auto found = fingerprint_of(file, hash ? std::numeric_limits<std::uint64_t>::max() : 0);
-        const Fingerprint recorded{static_cast<std::uint64_t>(entry.require("bytes").integer(0)),
-                                   hash ? hash->text() : ""};
+        const auto found = host::fingerprint_of(file, hash ? std::numeric_limits<std::uint64_t>::max() : 0);
+        const host::Fingerprint recorded{static_cast<std::uint64_t>(entry.require("bytes").integer(0)),
+                                         hash ? hash->text() : ""};
         if (found != recorded)
             changes.push_back("the scene file '" + file.string() + "' " +
                               (found ? "has changed since the recording" : "of the recording cannot be read") +
@@ -241,29 +239,4 @@ std::vector<std::string> Session::changed_scene_files() const {
     return changes;
 }
 
-std::optional<Fingerprint> fingerprint_of(const fs::path &file, std::uint64_t max_hashed_bytes) {
-    const base::UniqueFd fd(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
-    struct stat status {};
-    if (fd.get() < 0 || ::fstat(fd.get(), &status) != 0 || !S_ISREG(status.st_mode))
-        return std::nullopt;
-    Fingerprint fingerprint{static_cast<std::uint64_t>(status.st_size), ""};
-    if (fingerprint.bytes > max_hashed_bytes)
-        return fingerprint;
-    std::uint64_t hash = 0xcbf29ce484222325; // FNV-1a: offset basis and prime for 64 bits
-    std::vector<unsigned char> buffer(1 << 16);
-    std::uint64_t left = fingerprint.bytes;
-    while (left > 0) {
-        const ssize_t got = ::read(fd.get(), buffer.data(), std::min<std::uint64_t>(left, buffer.size()));
-        if (got <= 0)
-            return std::nullopt;
-        left -= static_cast<std::uint64_t>(got);
-        for (ssize_t i = 0; i < got; ++i)
-            hash = (hash ^ buffer[static_cast<std::size_t>(i)]) * 0x100000001b3;
-    }
-    char digits[17];
-    std::snprintf(digits, sizeof digits, "%016llx", static_cast<unsigned long long>(hash));
-    fingerprint.hash = digits;
-    return fingerprint;
-}
-
-} // namespace arhost::run_config
+} // namespace arhost::cli

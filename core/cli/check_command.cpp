@@ -3,11 +3,11 @@
 #include "base/program.hpp"
 #include "base/temporary_folder.hpp"
 #include "base/text.hpp"
-#include "host/commands.hpp"
+#include "cli/commands.hpp"
+#include "cli/read_configuration.hpp"
+#include "cli/run_command.hpp"
 #include "host/outcome.hpp"
-#include "host/read_configuration.hpp"
 #include "host/run.hpp"
-#include "host/run_command.hpp"
 #include "run_config/access.hpp"
 #include "scene/capabilities.hpp"
 #include "supervise/probe.hpp"
@@ -16,7 +16,10 @@
 #include <cstdio>
 #include <sys/stat.h>
 
-namespace arhost::host {
+namespace arhost::cli {
+
+using namespace host;
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -168,4 +171,4 @@ int check(const Arguments &arguments, bool open, supervise::Starter &launcher) {
     return base::success;
 }
 
-} // namespace arhost::host
+} // namespace arhost::cli

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-namespace arhost::host {
+namespace arhost::cli {
 
 // Command-line options of the subcommands that read a configuration.
 struct Arguments {
@@ -47,4 +47,4 @@ int replay(const Arguments &arguments, const ReplayArguments &replay, supervise:
 // `arguments.frames` frames, if given, and prints what it found; outputs then write to a temporary folder.
 int check(const Arguments &arguments, bool open, supervise::Starter &launcher);
 
-} // namespace arhost::host
+} // namespace arhost::cli

@@ -15,9 +15,11 @@
 #include <string>
 
 namespace arhost::host {
-
 struct Progress;
 struct Statistics;
+} // namespace arhost::host
+
+namespace arhost::cli {
 
 class Console {
 public:
@@ -25,7 +27,7 @@ public:
     ~Console(); // clears the progress line and waits until all queued lines are written
 
     void log(arhost_severity severity, const std::string &component, const std::string &text);
-    void show(const Progress &progress, const Statistics &statistics);
+    void show(const host::Progress &progress, const host::Statistics &statistics);
 
 private:
     void clear_line();
@@ -38,4 +40,4 @@ private:
     std::uint64_t last_frame_ = 0;
 };
 
-} // namespace arhost::host
+} // namespace arhost::cli

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/commands.hpp"
+#include "cli/commands.hpp"
 
-namespace arhost::host {
+namespace arhost::cli {
 
 void add_configuration_options(base::CommandLine &command, Arguments &arguments) {
     command.option("--set", arguments.settings, "Override a value: key.path=value (repeatable)")
@@ -25,4 +25,4 @@ base::Option add_run_options(base::CommandLine &command, Arguments &arguments) {
     return config;
 }
 
-} // namespace arhost::host
+} // namespace arhost::cli

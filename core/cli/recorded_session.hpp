@@ -6,22 +6,17 @@
 #include "run_config/recording.hpp"
 #include "yaml/yaml.hpp"
 
-#include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
-namespace arhost::run_config {
-
-// The member `version` of session.json. Logs of version 1 have markers instead of targets.
-constexpr int session_version = 2;
+namespace arhost::cli {
 
 struct Session {
     std::filesystem::path folder;
     yaml::Node description;   // session.json
     yaml::Node configuration; // configuration.yaml, with the paths of the recorded run
-    Recording recording;
+    run_config::Recording recording;
     std::string warning; // what is missing at the end, as a message for the user; ""
 
     std::filesystem::path video() const { return folder / "video.mkv"; }
@@ -33,13 +28,4 @@ struct Session {
 // Throws yaml::Error, whose message names file and line, for anything else that is missing or damaged.
 Session read_session(const std::filesystem::path &folder);
 
-// Size and hash (64-bit FNV-1a, hexadecimal) of a regular file. The hash of larger files is "". Returns
-// nullopt if the file cannot be read.
-struct Fingerprint {
-    std::uint64_t bytes;
-    std::string hash;
-    bool operator==(const Fingerprint &) const = default;
-};
-std::optional<Fingerprint> fingerprint_of(const std::filesystem::path &file, std::uint64_t max_hashed_bytes);
-
-} // namespace arhost::run_config
+} // namespace arhost::cli

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/commands.hpp"
-#include "host/read_configuration.hpp"
-#include "host/run_command.hpp"
+#include "cli/commands.hpp"
+#include "cli/read_configuration.hpp"
+#include "cli/run_command.hpp"
 #include "host/time_codes.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
-namespace arhost::host {
+namespace arhost::cli {
 namespace {
 
 // Returns the configuration without tracker and ray tracer, with a tracker of time codes.
@@ -16,7 +16,7 @@ run_config::Configuration latency_configuration(const Arguments &arguments) {
     root.override_value("tracker",
                         fmt::format("{{plugin: tracker_apriltag, targets: [{{ids: 0-{}, family: tag36h11, side_mm: "
                                     "100}}]}}",
-                                    TimeCodes::count - 1),
+                                    host::TimeCodes::count - 1),
                         "arhost latency");
     run_config::Configuration configuration = parse_configuration(root, arguments);
     if (!configuration.source || configuration.outputs.empty())
@@ -40,4 +40,4 @@ int latency(Arguments arguments, supervise::Starter &launcher) {
     return run(latency_configuration(arguments), arguments, launcher);
 }
 
-} // namespace arhost::host
+} // namespace arhost::cli
