@@ -2,7 +2,7 @@
 #include "cli/commands.hpp"
 #include "cli/read_configuration.hpp"
 #include "cli/run_command.hpp"
-#include "host/time_codes.hpp"
+#include "latency/time_codes.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
@@ -16,7 +16,7 @@ run_config::Configuration latency_configuration(const Arguments &arguments) {
     root.override_value("tracker",
                         fmt::format("{{plugin: tracker_apriltag, targets: [{{ids: 0-{}, family: tag36h11, side_mm: "
                                     "100}}]}}",
-                                    host::TimeCodes::count - 1),
+                                    latency::TimeCodes::count - 1),
                         "arhost latency");
     run_config::Configuration configuration = parse_configuration(root, arguments);
     if (!configuration.source || configuration.outputs.empty())

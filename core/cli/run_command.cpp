@@ -115,7 +115,7 @@ private:
     std::optional<std::chrono::steady_clock::time_point> first_;
 };
 
-void log_contract_checks(const ContractChecks &checks, Console &console) {
+void log_contract_checks(const contracts::ContractChecks &checks, Console &console) {
     std::size_t passed = 0;
     for (const auto &[name, check] : checks.all()) {
         passed += check.violations == 0;

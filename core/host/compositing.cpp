@@ -92,8 +92,8 @@ void Compositing::check_buffers_unmodified(const Frame &frame) {
     const auto check = [&](const char *name, const std::optional<std::size_t> &sample, const Lease &buffer,
                            const char *problem) {
         if (sample && buffer)
-            statistics_.contract_checks.add(name, sequence,
-                                            sample_hash(buffer.bytes(), sequence) == *sample ? "" : problem);
+            statistics_.contract_checks.add(
+                name, sequence, contracts::sample_hash(buffer.bytes(), sequence) == *sample ? "" : problem);
     };
     check("source.frame-stays", frame.pixels_sample, frame.pixels, "the frame changed after hand-over");
     check("raytracer.image-stays", frame.overlay_sample, frame.overlay, "the image changed after hand-over");

@@ -6,7 +6,7 @@
 
 #include "compositor/compositor.hpp"
 #include "host/frame.hpp"
-#include "host/time_codes.hpp"
+#include "latency/time_codes.hpp"
 #include "supervise/launcher.hpp"
 
 #include <optional>
@@ -35,7 +35,7 @@ private:
     const supervise::LogFunction &log_;
     Statistics &statistics_;
     const bool draws_time_codes_;
-    std::optional<TimeCodes> time_codes_;
+    std::optional<latency::TimeCodes> time_codes_;
     std::vector<std::uint8_t> enlarged_; // the overlay of a frame that was rendered smaller
 };
 

@@ -138,7 +138,7 @@ void Raytracer::on_result(const Command &command, const Result &result) {
         const arhost_frame_format &format = parts_.video.format;
         checks->check(statistics.contract_checks, command.sequence, command.camera,
                       region_of(frame->render, format.width, format.height), overlay_of(*frame, format));
-        frame->overlay_sample = sample_hash(frame->overlay.bytes(), command.sequence);
+        frame->overlay_sample = contracts::sample_hash(frame->overlay.bytes(), command.sequence);
     }
 }
 

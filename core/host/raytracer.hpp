@@ -4,7 +4,7 @@
 #pragma once
 
 #include "compositor/compositor.hpp"
-#include "host/contract_checks.hpp"
+#include "contracts/contract_checks.hpp"
 #include "host/scene_loading.hpp"
 #include "host/stage.hpp"
 
@@ -15,8 +15,8 @@ struct LoadedScene {
     std::set<std::filesystem::path> files; // as in SceneLoading::Callbacks
     ipc::SharedMemory arena;
     std::vector<Anchor> anchors;
-    camera::Coordinates coordinates;             // from the configuration or from the scene's axes
-    std::optional<OverlayChecks> overlay_checks; // only for `conform: true`
+    camera::Coordinates coordinates;                        // from the configuration or from the scene's axes
+    std::optional<contracts::OverlayChecks> overlay_checks; // only for `conform: true`
 };
 
 // Returns the width and the height in px of an overlay for frames of this format.

@@ -56,10 +56,11 @@ Run::Run(const run_config::Configuration &configuration, const supervise::Contex
                 [this] { end_input(); }},
                options_.check_scratch),
       commands_(parts_, assembly_, outputs_, [this] { end_input(); }) {
-    statistics_.contract_checks = ContractChecks([this](const std::string &name, const std::string &violation) {
-        context_.log(ARHOST_SEVERITY_WARNING, name.substr(0, name.find('.')),
-                     "violates the contract: " + name + ": " + violation);
-    });
+    statistics_.contract_checks =
+        contracts::ContractChecks([this](const std::string &name, const std::string &violation) {
+            context_.log(ARHOST_SEVERITY_WARNING, name.substr(0, name.find('.')),
+                         "violates the contract: " + name + ": " + violation);
+        });
     flow_.set_paced(configuration.paced.value_or(false));
     if (options_.read_configuration)
         edits_.emplace(parts_, assembly_, options_.read_configuration);

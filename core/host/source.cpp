@@ -80,7 +80,8 @@ SlotLayout Source::on_ready(const messages::Ready &ready) {
     const run_config::SourceConfiguration &source = *parts_.configuration.source;
     const bool is_live = (component_->description().capabilities & ARHOST_CAPABILITY_LIVE) != 0;
     if (source.conform && !checks_)
-        checks_.emplace(SourceChecks::Rate{is_live ? 0 : format.fps, source.fps > 0, parts_.live()}, parts_.now_ns());
+        checks_.emplace(contracts::SourceChecks::Rate{is_live ? 0 : format.fps, source.fps > 0, parts_.live()},
+                        parts_.now_ns());
     set_intrinsics(ready);
     return {format.byte_size, source_slot_count};
 }
@@ -161,7 +162,7 @@ void Source::on_frame(Lease pixels, const Command &command, const Result &result
     frame->pixels = std::move(pixels);
     if (checks_) {
         checks_->check(statistics.contract_checks, frame->record, result.frame.skipped, arrival_ns);
-        frame->pixels_sample = sample_hash(frame->pixels.bytes(), frame->record.sequence);
+        frame->pixels_sample = contracts::sample_hash(frame->pixels.bytes(), frame->record.sequence);
     }
     // The record of a replayed frame has the time at which it was recorded.
     statistics.latency_from_capture = result.frame.clock == ARHOST_CLOCK_MONOTONIC;

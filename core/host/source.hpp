@@ -3,7 +3,7 @@
 // The source of a run: passes its frames to the flow. Without a source, the frames of a trajectory are black.
 #pragma once
 
-#include "host/contract_checks.hpp"
+#include "contracts/contract_checks.hpp"
 #include "host/run_parts.hpp"
 
 namespace arhost::host {
@@ -34,8 +34,8 @@ private:
     std::shared_ptr<SlotPool> slots_; // of the current worker; null unless it is running
     std::uint64_t skipped_ = 0;       // frames that the source has skipped
     std::int64_t last_capture_ns_ = INT64_MIN;
-    std::size_t candidate_ = 0;          // plugin of the current worker
-    std::optional<SourceChecks> checks_; // for the current plugin; survives restarts
+    std::size_t candidate_ = 0;                     // plugin of the current worker
+    std::optional<contracts::SourceChecks> checks_; // for the current plugin; survives restarts
 };
 
 } // namespace arhost::host

@@ -3,7 +3,7 @@
 // Counters and timings of a run, and their JSON and CSV reports.
 #pragma once
 
-#include "host/contract_checks.hpp"
+#include "contracts/contract_checks.hpp"
 #include "host/quality.hpp"
 
 #include <nlohmann/json_fwd.hpp>
@@ -103,8 +103,8 @@ struct Statistics {
     std::optional<Quality> quality;    // requested from the ray tracer; only with `live.target_fps`
     std::uint64_t quality_changes = 0; // how often it was changed
     std::chrono::steady_clock::time_point first_frame{}, last_frame{};
-    ContractChecks contract_checks;   // checks of the components with `conform: true`
-    std::vector<FrameTimes> timeline; // only if the configuration requests it
+    contracts::ContractChecks contract_checks; // checks of the components with `conform: true`
+    std::vector<FrameTimes> timeline;          // only if the configuration requests it
 
     double fps() const;
 };

@@ -107,7 +107,8 @@ void Tracker::on_result(const Command &command, const Result &result) {
     state_ = std::move(frame->result);
     state_is_of_solver_only_ = false;
     if (configuration_->conform)
-        check_tracking(parts_.statistics.contract_checks, command.sequence, frame->targets, frame->observations);
+        contracts::check_tracking(parts_.statistics.contract_checks, command.sequence, frame->targets,
+                                  frame->observations);
     frame->times.tracker = std::chrono::nanoseconds(result.busy_ns);
     sightings_.add(*frame);
     parts_.flow.on_tracked(*frame, frame->times.tracker);

@@ -2,7 +2,7 @@
 //
 // The contract checks that `conform: true` enables (docs/conformance.md). They inspect a sample of the run's frames
 // and report violations of the ABI; they do not change the run. Values that could harm the host are always rejected,
-// with or without these checks (frame_validation.hpp).
+// with or without these checks (host/frame_validation.hpp).
 #pragma once
 
 #include "compositor/compositor.hpp"
@@ -22,7 +22,7 @@
 #include <span>
 #include <string>
 
-namespace arhost::host {
+namespace arhost::contracts {
 
 struct ContractCheck {
     std::uint64_t checked = 0, violations = 0; // numbers of frames
@@ -99,4 +99,4 @@ private:
     std::optional<scene::Box> virtual_box_; // world coordinates, mm; nullopt if the scene has no virtual object
 };
 
-} // namespace arhost::host
+} // namespace arhost::contracts

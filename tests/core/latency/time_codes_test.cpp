@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/time_codes.hpp"
+#include "latency/time_codes.hpp"
 
 #include "fiducial/tracker_support.hpp"
 
@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 using namespace arhost;
-using arhost::host::TimeCodes;
+using arhost::latency::TimeCodes;
 using namespace std::chrono_literals;
 
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/contract_checks.hpp"
+#include "contracts/contract_checks.hpp"
 
 #include "camera/lens_model.hpp"
 #include "scene/arena_builder.hpp"
@@ -10,7 +10,7 @@
 #include <vector>
 
 using namespace arhost;
-using namespace arhost::host;
+using namespace arhost::contracts;
 using testing::HasSubstr;
 
 namespace {

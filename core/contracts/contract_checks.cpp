@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/contract_checks.hpp"
+#include "contracts/contract_checks.hpp"
 
 #include "camera/lens_model.hpp"
 #include "scene/motion.hpp"
@@ -12,7 +12,7 @@
 #include <string_view>
 #include <tuple>
 
-namespace arhost::host {
+namespace arhost::contracts {
 namespace {
 
 constexpr std::uint32_t sample_step = 16; // checks every 16th row or block of bytes of a frame
@@ -253,4 +253,4 @@ void OverlayChecks::check(ContractChecks &checks, std::uint64_t frame, const arh
         checks.add("raytracer.place", frame, misplaced);
 }
 
-} // namespace arhost::host
+} // namespace arhost::contracts

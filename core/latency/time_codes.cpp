@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/time_codes.hpp"
+#include "latency/time_codes.hpp"
 
 #include <algorithm>
 #include <cstring>
 #include <utility>
 
-namespace arhost::host {
+namespace arhost::latency {
 namespace {
 
 constexpr std::uint32_t data_cells = 6;
@@ -75,4 +75,4 @@ bool TimeCodes::is_overdue(std::chrono::nanoseconds limit, Clock::time_point now
     return true;
 }
 
-} // namespace arhost::host
+} // namespace arhost::latency

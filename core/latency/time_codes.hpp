@@ -16,7 +16,7 @@
 #include <optional>
 #include <span>
 
-namespace arhost::host {
+namespace arhost::latency {
 
 class TimeCodes {
 public:
@@ -43,4 +43,4 @@ private:
     Clock::time_point last_seen_; // or the time of the last reminder
 };
 
-} // namespace arhost::host
+} // namespace arhost::latency
