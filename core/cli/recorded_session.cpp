@@ -2,7 +2,7 @@
 #include "cli/recorded_session.hpp"
 
 #include "base/text.hpp"
-#include "host/run_description.hpp"
+#include "host/documents.hpp"
 
 #include <nlohmann/json.hpp>
 

@@ -13,7 +13,7 @@ namespace arhost::host {
 using namespace ipc;
 using supervise::Component;
 
-Assembly::Assembly(const RunParts &parts, Sightings &sightings, WatchFiles watch_files)
+Assembly::Assembly(RunParts &parts, Sightings &sightings, WatchFiles watch_files)
     : parts_(parts), sightings_(sightings), watch_files_(std::move(watch_files)),
       latest_(std::shared_ptr<void>(), &parts.configuration), source_(parts) {}
 
@@ -37,19 +37,17 @@ bool Assembly::advance() {
     if (!has_started_stages_) {
         if (!source_.has_started() || scene_loading_ || (parts_.configuration.raytracer && !scene_))
             return false;
-        if (parts_.configuration.tracker) {
-            tracker_ = make_tracker(shared(*parts_.configuration.tracker));
-            tracker_->take_over(nullptr);
-            tracker_->start();
-        }
-        if (parts_.configuration.raytracer) {
-            raytracer_ = make_raytracer(shared(*parts_.configuration.raytracer), scene_);
-            raytracer_->take_over(nullptr);
-            raytracer_->start();
-        }
+        if (parts_.configuration.tracker)
+            swap_tracker(shared(*parts_.configuration.tracker), nullptr);
+        if (parts_.configuration.raytracer)
+            start_next_raytracer(shared(*parts_.configuration.raytracer), scene_, nullptr);
         has_started_stages_ = true;
     }
-    return (!tracker_ || tracker_->running()) && (!raytracer_ || raytracer_->running());
+    if ((next_tracker_ && !next_tracker_->running()) || (next_raytracer_ && !next_raytracer_->running()))
+        return false;
+    finish_swap(tracker_, next_tracker_);
+    finish_swap(raytracer_, next_raytracer_);
+    return true;
 }
 
 FrameFlow::Intakes Assembly::intakes() const {
@@ -61,6 +59,12 @@ FrameFlow::Intakes Assembly::intakes() const {
         return intake;
     };
     return {source_.intake(), intake_of(tracker_, next_tracker_), intake_of(raytracer_, next_raytracer_)};
+}
+
+void Assembly::end_input() {
+    parts_.flow.on_input_ended();
+    if (source_.component())
+        source_.component()->cancel_call();
 }
 
 void Assembly::cancel_calls() {
@@ -135,21 +139,10 @@ std::unique_ptr<SceneLoading> Assembly::load(const run_config::Scene &scene,
 
 // ---- swaps ----------------------------------------------------------------------------------------------
 
-std::unique_ptr<Tracker> Assembly::make_tracker(Tracker::Configuration configuration) {
-    return std::make_unique<Tracker>(
+void Assembly::swap_tracker(Tracker::Configuration configuration, const control::Done &done) {
+    next_tracker_ = std::make_unique<Tracker>(
         parts_, sightings_, std::move(configuration),
         [this](const Stage &stage, const std::string &reason) { return abandon_swap(stage, reason); });
-}
-
-std::unique_ptr<Raytracer> Assembly::make_raytracer(Raytracer::Configuration configuration,
-                                                    std::shared_ptr<LoadedScene> scene) {
-    return std::make_unique<Raytracer>(
-        parts_, std::move(configuration), std::move(scene),
-        [this](const Stage &stage, const std::string &reason) { return abandon_swap(stage, reason); });
-}
-
-void Assembly::swap_tracker(Tracker::Configuration configuration, const control::Done &done) {
-    next_tracker_ = make_tracker(std::move(configuration));
     next_tracker_->swapped = done;
     next_tracker_->start();
 }
@@ -175,18 +168,21 @@ void Assembly::swap_scene(const run_config::Scene &scene, const Raytracer::Confi
 
 void Assembly::start_next_raytracer(Raytracer::Configuration configuration, std::shared_ptr<LoadedScene> scene,
                                     const control::Done &done) {
-    next_raytracer_ = make_raytracer(std::move(configuration), std::move(scene));
+    next_raytracer_ = std::make_unique<Raytracer>(
+        parts_, std::move(configuration), std::move(scene),
+        [this](const Stage &stage, const std::string &reason) { return abandon_swap(stage, reason); });
     next_raytracer_->swapped = done;
-    if (next_raytracer_->configuration() == raytracer_->configuration()) // keeps what the command `set` has changed
+    // Keeps what the command `set` has changed.
+    if (raytracer_ && next_raytracer_->configuration() == raytracer_->configuration())
         parts_.options.copy(raytracer_->component(), next_raytracer_->component());
     next_raytracer_->start();
 }
 
 bool Assembly::abandon_swap(const Stage &stage, const std::string &reason) {
     std::unique_ptr<Stage> next;
-    if (&stage == next_tracker_.get())
+    if (tracker_ && &stage == next_tracker_.get())
         next = std::move(next_tracker_);
-    else if (&stage == next_raytracer_.get())
+    else if (raytracer_ && &stage == next_raytracer_.get())
         next = std::move(next_raytracer_);
     else
         return false;
@@ -196,12 +192,15 @@ bool Assembly::abandon_swap(const Stage &stage, const std::string &reason) {
     return true;
 }
 
-// Exchanges a stage for its successor, once the successor runs and no frame is in the old stage.
+// Exchanges a stage, which may be null, for its successor, once the successor runs and no frame is in the old stage.
 template <class Kind> bool Assembly::finish_swap(std::unique_ptr<Kind> &current, std::unique_ptr<Kind> &next) {
-    if (!next || !next->running() || current->component().in_flight() > 0)
+    if (!next || !next->running() || (current && current->component().in_flight() > 0))
         return false;
     next->take_over(current.get());
-    retire(std::exchange(current, std::exchange(next, nullptr)));
+    std::unique_ptr<Kind> previous = std::exchange(current, std::move(next));
+    if (!previous) // the first stage of the run
+        return true;
+    retire(std::move(previous));
     const std::string &name = current->configuration()->name;
     std::string text = current->component().name() + " is now " + name;
     nlohmann::ordered_json members = {{"plugin", name}};

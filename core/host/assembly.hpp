@@ -15,7 +15,7 @@ public:
     // `watch_files` is called with files that are read: those of scenes. They may be names from the scene loader,
     // which is not trusted.
     using WatchFiles = std::function<void(const std::set<std::filesystem::path> &)>;
-    Assembly(const RunParts &parts, Sightings &sightings, WatchFiles watch_files);
+    Assembly(RunParts &parts, Sightings &sightings, WatchFiles watch_files);
     Assembly(const Assembly &) = delete;
     Assembly &operator=(const Assembly &) = delete;
 
@@ -24,14 +24,14 @@ public:
     void start();
     bool advance();
     FrameFlow::Intakes intakes() const;
+    void end_input();    // has the same effect as the end of the source
     void cancel_calls(); // of the tracker and the ray tracer, whose frames will not be shown
     void stop_loading();
 
     const Source &source() const { return source_; }
     Source &source() { return source_; }
-    Tracker *tracker() const {
-        return tracker_.get();
-    } // null before the source has started, or without one; likewise:
+    // Null before both run, or if the configuration has none.
+    Tracker *tracker() const { return tracker_.get(); }
     Raytracer *raytracer() const { return raytracer_.get(); }
     std::vector<supervise::Component *> components() const; // including those that start or end
 
@@ -63,9 +63,6 @@ private:
                                        const std::function<void(std::shared_ptr<LoadedScene>)> &on_loaded,
                                        const std::function<void(const std::string &reason)> &on_failed);
     const run_config::TrackerConfiguration *tracker_of_anchors() const;
-    std::unique_ptr<Tracker> make_tracker(Tracker::Configuration configuration);
-    std::unique_ptr<Raytracer> make_raytracer(Raytracer::Configuration configuration,
-                                              std::shared_ptr<LoadedScene> scene);
     void start_next_raytracer(Raytracer::Configuration configuration, std::shared_ptr<LoadedScene> scene,
                               const control::Done &done);
     bool abandon_swap(const Stage &stage, const std::string &reason);
@@ -73,7 +70,7 @@ private:
     void retire(std::unique_ptr<Stage> stage);
     void warn_of_hidden_objects() const;
 
-    const RunParts parts_;
+    RunParts &parts_;
     Sightings &sightings_;
     const WatchFiles watch_files_;
     std::shared_ptr<const run_config::Configuration> latest_;

@@ -36,8 +36,8 @@ void copy_inputs(const Frame &frame, const arhost_frame_format &format, const Im
 
 } // namespace
 
-void Compositing::write(Frame &frame, const arhost_frame_format &format, std::uint32_t inputs,
-                        std::span<std::byte> slot) {
+void Compositing::write(Frame &frame, std::uint32_t inputs, std::span<std::byte> slot) {
+    const arhost_frame_format &format = parts_.video.format;
     check_buffers_unmodified(frame);
     const Clock::time_point begin = Clock::now();
     const auto *pixels = reinterpret_cast<const std::uint8_t *>(frame.pixels.bytes().data());
@@ -47,17 +47,17 @@ void Compositing::write(Frame &frame, const arhost_frame_format &format, std::ui
     ImageView overlay;
     Region region;
     if (frame.has_overlay())
-        std::tie(overlay, region) = full_size_overlay(frame, format);
+        std::tie(overlay, region) = full_size_overlay(frame);
     write_record(frame, slot);
     const OutputView out{reinterpret_cast<std::uint8_t *>(slot.data()) + OutputSlot::image_offset,
                          OutputSlot::stride(format.width)};
-    if (draws_time_codes_)
-        exchange_time_code(frame.observations, format, out);
+    if (parts_.configuration.time_codes)
+        exchange_time_code(frame.observations, out);
     else
         composite(format, planes, overlay, region, out);
     copy_inputs(frame, format, overlay, region, inputs, slot);
     frame.times.composite = Clock::now() - begin;
-    statistics_.stages.add("composite", frame.times.composite);
+    parts_.statistics.stages.add("composite", frame.times.composite);
 }
 
 void Compositing::write_record(Frame &frame, std::span<std::byte> slot) const {
@@ -74,7 +74,8 @@ void Compositing::write_record(Frame &frame, std::span<std::byte> slot) const {
 }
 
 // Returns the overlay in the size of the frame, and its region. It is valid until the next call.
-std::pair<ImageView, Region> Compositing::full_size_overlay(const Frame &frame, const arhost_frame_format &format) {
+std::pair<ImageView, Region> Compositing::full_size_overlay(const Frame &frame) {
+    const arhost_frame_format &format = parts_.video.format;
     const auto [width, height] = overlay_size(format, frame.quality);
     const Region region = region_of(frame.render, width, height);
     const ImageView overlay = overlay_of(frame, format);
@@ -92,7 +93,7 @@ void Compositing::check_buffers_unmodified(const Frame &frame) {
     const auto check = [&](const char *name, const std::optional<std::size_t> &sample, const Lease &buffer,
                            const char *problem) {
         if (sample && buffer)
-            statistics_.contract_checks.add(
+            parts_.statistics.contract_checks.add(
                 name, sequence, contracts::sample_hash(buffer.bytes(), sequence) == *sample ? "" : problem);
     };
     check("source.frame-stays", frame.pixels_sample, frame.pixels, "the frame changed after hand-over");
@@ -100,19 +101,18 @@ void Compositing::check_buffers_unmodified(const Frame &frame) {
 }
 
 // Measures the age of the picture that the frame shows, and draws the next one.
-void Compositing::exchange_time_code(std::span<const arhost_observation> observations,
-                                     const arhost_frame_format &format, const OutputView &out) {
+void Compositing::exchange_time_code(std::span<const arhost_observation> observations, const OutputView &out) {
     const Clock::time_point now = Clock::now();
     if (!time_codes_)
         time_codes_.emplace(now);
     if (const auto age = time_codes_->see(observations, now))
-        statistics_.stages.add("glass_to_glass", *age);
+        parts_.statistics.stages.add("glass_to_glass", *age);
     if (time_codes_->is_overdue(std::chrono::seconds(5), now))
-        log_(
+        parts_.context.log(
             ARHOST_SEVERITY_WARNING, "latency",
             "the camera has not shown a time code for 5 s: point it at the output's picture, so that the whole black "
             "square with its white border is in view, sharp, without reflections and not mirrored");
-    time_codes_->draw(out, format.width, format.height, now);
+    time_codes_->draw(out, parts_.video.format.width, parts_.video.format.height, now);
 }
 
 } // namespace arhost::host

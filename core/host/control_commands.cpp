@@ -2,7 +2,7 @@
 #include "host/control_commands.hpp"
 
 #include "base/text.hpp"
-#include "host/status.hpp"
+#include "host/documents.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -53,7 +53,7 @@ void Commands::execute(SinkQueue &sink, const messages::Request &request) {
 }
 
 void Commands::execute(const control::Quit &, const control::Done &done) {
-    end_run_();
+    assembly_.end_input();
     done("", {});
 }
 
@@ -92,9 +92,7 @@ void Commands::execute(const control::Record &record, const control::Done &done)
 }
 
 Component &Commands::running_component(const std::string &name) const {
-    std::vector<Component *> all = assembly_.components();
-    for (const auto &sink : outputs_.sinks())
-        all.push_back(sink->component.get());
+    const std::vector<Component *> all = components_of(assembly_, outputs_);
     const auto found =
         std::ranges::find_if(all, [&](const Component *each) { return each->name() == name && each->running(); });
     if (found == all.end())

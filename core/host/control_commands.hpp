@@ -11,9 +11,8 @@ namespace arhost::host {
 
 class Commands {
 public:
-    // `end_run`: as if the source had ended.
-    Commands(const RunParts &parts, Assembly &assembly, Outputs &outputs, std::function<void()> end_run)
-        : parts_(parts), assembly_(assembly), outputs_(outputs), end_run_(std::move(end_run)) {}
+    Commands(RunParts &parts, Assembly &assembly, Outputs &outputs)
+        : parts_(parts), assembly_(assembly), outputs_(outputs) {}
 
     // Executes the command of a sink, and answers it now or later.
     void execute(SinkQueue &sink, const ipc::messages::Request &request);
@@ -29,10 +28,9 @@ private:
     void execute(const control::Status &command, const control::Done &done);
     supervise::Component &running_component(const std::string &name) const;
 
-    const RunParts parts_;
+    RunParts &parts_;
     Assembly &assembly_;
     Outputs &outputs_;
-    const std::function<void()> end_run_;
 };
 
 } // namespace arhost::host

@@ -71,7 +71,7 @@ bool has_edited_print(const run_config::TrackerConfiguration &tracker, const Fil
 
 } // namespace
 
-Edits::Edits(const RunParts &parts, Assembly &assembly, std::function<run_config::Configuration()> read)
+Edits::Edits(RunParts &parts, Assembly &assembly, std::function<run_config::Configuration()> read)
     : parts_(parts), assembly_(assembly), read_(std::move(read)),
       file_watch_(parts.context.reactor,
                   [this](const FileWatch::Files &files) { edited_.insert(files.begin(), files.end()); }) {

@@ -12,7 +12,7 @@ namespace arhost::host {
 class Edits {
 public:
     // `read` parses the configuration again and throws yaml::Error.
-    Edits(const RunParts &parts, Assembly &assembly, std::function<run_config::Configuration()> read);
+    Edits(RunParts &parts, Assembly &assembly, std::function<run_config::Configuration()> read);
 
     // `files` may be names from the scene loader, which is not trusted: only their folders are opened.
     void watch(const FileWatch::Files &files);
@@ -26,7 +26,7 @@ private:
     void apply(const run_config::Configuration &edited, const run_config::Configuration &previous, bool scene_changed,
                bool print_changed);
 
-    const RunParts parts_;
+    RunParts &parts_;
     Assembly &assembly_;
     const std::function<run_config::Configuration()> read_;
     FileWatch file_watch_;

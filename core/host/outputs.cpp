@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/outputs.hpp"
 
+#include "host/documents.hpp"
 #include "run_config/access.hpp"
 
 #include <arhost-cpp/numbered_name.hpp>
@@ -25,9 +26,10 @@ std::string random_id() {
 
 } // namespace
 
-Outputs::Outputs(const RunParts &parts, Callbacks callbacks, std::optional<std::filesystem::path> check_scratch)
-    : parts_(parts), callbacks_(std::move(callbacks)), check_scratch_(std::move(check_scratch)),
-      compositing_(parts.context.log, parts.statistics, parts.configuration.time_codes) {}
+Outputs::Outputs(RunParts &parts, Assembly &assembly, OnRequest on_request,
+                 std::optional<std::filesystem::path> check_scratch)
+    : parts_(parts), assembly_(assembly), on_request_(std::move(on_request)),
+      check_scratch_(std::move(check_scratch)), compositing_(parts) {}
 
 std::filesystem::path Outputs::check_folder(const std::filesystem::path &scratch, std::size_t output) {
     return scratch / std::to_string(output);
@@ -46,7 +48,9 @@ void Outputs::start() {
         std::string name = outputs[i].plugins.front().stem().string();
         if (std::ranges::any_of(sinks_, [&](const auto &sink) { return sink->component->name() == name; }))
             name += "#" + std::to_string(i);
-        make_sink(outputs[i], name);
+        SinkQueue &sink = make_sink(outputs[i], name);
+        if (check_scratch_)
+            sink.folder = check_folder(*check_scratch_, i);
     }
 }
 
@@ -89,7 +93,7 @@ SinkQueue &Outputs::make_sink(const run_config::ComponentConfiguration &output, 
     };
     callbacks.lost = [sink](const std::vector<Command> &) { sink->on_lost(); };
     callbacks.end_requested = [this, sink] { end_sink(*sink); };
-    callbacks.request = [this, sink](const messages::Request &request) { callbacks_.request(*sink, request); };
+    callbacks.request = [this, sink](const messages::Request &request) { on_request_(*sink, request); };
     callbacks.stopped = [sink, report = callbacks.stopped](arhost_status status, const std::string &text) {
         report(status, text);
         sink->answer(sink->awaits_its_frame()     ? "the run ended before the next frame"
@@ -121,14 +125,13 @@ Component::Create Outputs::on_hello(SinkQueue &sink, const PluginDescription &pl
     if (video.intrinsics.width > 0)
         setup.intrinsics = video.intrinsics;
     if (plugin.capabilities & ARHOST_CAPABILITY_RUN_DESCRIPTION)
-        setup.run_description = callbacks_.run_description(sink.id);
+        setup.run_description = run_description(parts_, assembly_, sink.id);
     std::vector<OptionValue> options = parts_.options.choose(*sink.component, ARHOST_KIND_SINK, output, candidate);
     expect_distinct_files(output, plugin);
     for (OptionValue &option : options)
-        if (check_scratch_ && option.type == ARHOST_OPTION_OUTPUT_PATH && !option.text.empty() && option.text != "-")
-            option.text =
-                check_folder(*check_scratch_, static_cast<std::size_t>(&output - configuration.outputs.data())) /
-                std::filesystem::path(option.text).filename();
+        if (!sink.folder.empty() && option.type == ARHOST_OPTION_OUTPUT_PATH && !option.text.empty() &&
+            option.text != "-")
+            option.text = sink.folder / std::filesystem::path(option.text).filename();
         else if (option.key == "path" && !sink.path.empty())
             option.text = sink.path;
     if (std::ranges::count(plugin.needs, "display") > 0)
@@ -201,7 +204,7 @@ Frame::Clock::time_point Outputs::show(Frame &frame) {
         return parts_.context.reactor.now();
     auto output =
         std::make_shared<OutputFrame>(OutputFrame{frame.record.sequence, *slots_->acquire(), frame.captured, inputs});
-    compositing_.write(frame, parts_.video.format, inputs, output->slot.bytes());
+    compositing_.write(frame, inputs, output->slot.bytes());
     const auto composited = parts_.context.reactor.now(); // before an output can have written the frame
     if (parts_.configuration.snapshot)
         last_frame_ = output;
@@ -253,7 +256,7 @@ void Outputs::end_sink(SinkQueue &sink) {
     if (sink.configuration->control.contains("quit")) {
         sink.has_quit = true;
         parts_.context.log(ARHOST_SEVERITY_INFO, name, "ends the run");
-        return callbacks_.end_run();
+        return assembly_.end_input();
     }
     close_sink(sink);
     parts_.context.log(ARHOST_SEVERITY_INFO, name,
@@ -273,7 +276,7 @@ void Outputs::close_sink(SinkQueue &sink) {
 void Outputs::end_without_sinks() {
     if (!sinks_.empty() &&
         std::ranges::all_of(sinks_, [](const auto &sink) { return sink->closed || sink->on_demand; }))
-        callbacks_.end_run();
+        assembly_.end_input();
 }
 
 void Outputs::stop() {
@@ -348,6 +351,13 @@ std::filesystem::path Outputs::free_path(const std::filesystem::path &pattern) c
             std::ranges::none_of(sinks_, [&](const auto &sink) { return sink->path == path; }))
             return path;
     }
+}
+
+std::vector<Component *> components_of(const Assembly &assembly, const Outputs &outputs) {
+    std::vector<Component *> all = assembly.components();
+    for (const auto &sink : outputs.sinks())
+        all.push_back(sink->component.get());
+    return all;
 }
 
 } // namespace arhost::host

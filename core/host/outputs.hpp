@@ -4,8 +4,8 @@
 #pragma once
 
 #include "base/listening_socket.hpp"
+#include "host/assembly.hpp"
 #include "host/compositing.hpp"
-#include "host/run_parts.hpp"
 #include "host/sink_queue.hpp"
 
 #include <map>
@@ -14,13 +14,10 @@ namespace arhost::host {
 
 class Outputs {
 public:
-    struct Callbacks {
-        std::function<std::string(const std::string &id)> run_description; // for the sink with this id
-        std::function<void(SinkQueue &, const ipc::messages::Request &)> request;
-        std::function<void()> end_run; // as if the source had ended
-    };
+    using OnRequest = std::function<void(SinkQueue &, const ipc::messages::Request &)>;
     // `check_scratch`: sinks write to check_folder(*check_scratch, …) instead of their own folders.
-    Outputs(const RunParts &parts, Callbacks callbacks, std::optional<std::filesystem::path> check_scratch);
+    Outputs(RunParts &parts, Assembly &assembly, OnRequest on_request,
+            std::optional<std::filesystem::path> check_scratch);
     static std::filesystem::path check_folder(const std::filesystem::path &scratch, std::size_t output);
 
     void start(); // the configured outputs
@@ -62,8 +59,9 @@ private:
     void close_sink(SinkQueue &sink);
     void end_without_sinks(); // ends the run if all outputs are closed
 
-    const RunParts parts_;
-    const Callbacks callbacks_;
+    RunParts &parts_;
+    Assembly &assembly_;
+    const OnRequest on_request_;
     const std::optional<std::filesystem::path> check_scratch_;
     std::vector<std::unique_ptr<SinkQueue>> sinks_;
     std::shared_ptr<SlotPool> slots_;
@@ -73,5 +71,8 @@ private:
     std::map<std::pair<const run_config::ComponentConfiguration *, std::string>, base::ListeningSocket>
         sockets_; // by output and option
 };
+
+// Returns all components of a run, including those that start or end.
+std::vector<supervise::Component *> components_of(const Assembly &assembly, const Outputs &outputs);
 
 } // namespace arhost::host

@@ -29,7 +29,7 @@ ImageView overlay_of(const Frame &frame, const arhost_frame_format &format) {
             overlay_stride(overlay_size(format, frame.quality).first)};
 }
 
-Raytracer::Raytracer(const RunParts &parts, Configuration configuration, std::shared_ptr<LoadedScene> scene,
+Raytracer::Raytracer(RunParts &parts, Configuration configuration, std::shared_ptr<LoadedScene> scene,
                      Abandon abandon)
     : Stage(parts, "raytracer", *configuration, Frame::Stage::to_render, parts.live() ? 1 : 2, std::move(abandon)),
       configuration_(std::move(configuration)), scene_(std::move(scene)) {

@@ -28,8 +28,7 @@ class Raytracer final : public Stage {
 public:
     using Configuration = std::shared_ptr<const run_config::RaytracerConfiguration>;
 
-    Raytracer(const RunParts &parts, Configuration configuration, std::shared_ptr<LoadedScene> scene,
-              Abandon abandon);
+    Raytracer(RunParts &parts, Configuration configuration, std::shared_ptr<LoadedScene> scene, Abandon abandon);
 
     FrameFlow::Intake intake() const override;
     void render(Frame &frame);

@@ -39,9 +39,9 @@ public:
     // the reactor.
     void interrupt();
 
-    const Failures &failures() const { return failures_; }
-    const Statistics &statistics() const { return statistics_; }
-    ComponentTotals component_totals() const { return totals_.plus(components()); }
+    const Failures &failures() const { return parts_.failures; }
+    const Statistics &statistics() const { return parts_.statistics; }
+    ComponentTotals component_totals() const { return parts_.totals.plus(components()); }
     std::vector<model::Target> targets() const; // that the tracker looks for now
     // Describes the started components and what they have found, one per line, for the user.
     std::vector<std::string> findings() const;
@@ -51,7 +51,7 @@ private:
 
     void log(const supervise::LogFunction &log, arhost_severity severity, const std::string &component,
              const std::string &text);
-    std::vector<supervise::Component *> components() const;
+    std::vector<supervise::Component *> components() const { return components_of(assembly_, outputs_); }
     void pump();
     void start_next();
     void run_frames();
@@ -59,23 +59,12 @@ private:
     void execute(FrameFlow::Track &action) { assembly_.tracker()->track(action.frame); }
     void execute(FrameFlow::Render &action) { assembly_.raytracer()->render(action.frame); }
     void execute(FrameFlow::Show &action);
-    void end_input(); // has the same effect as the end of the source
     void stop_components();
     void kill_components();
     void report_frame_errors();
-    std::chrono::milliseconds longest_stop_deadline() const;
 
-    const run_config::Configuration &configuration_;
-    supervise::Context context_;
     const Options options_;
-    Statistics statistics_;
-    Failures failures_;
-    ComponentOptions component_options_;
-    ComponentTotals totals_;
-    Cameras cameras_;
-    FrameFlow flow_;
-    Video video_;
-    const RunParts parts_;
+    RunParts parts_;
     Sightings sightings_;
     Assembly assembly_;
     Outputs outputs_;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/run_description.hpp"
+#include "host/documents.hpp"
 
 #include "base/unique_fd.hpp"
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The parts of a run that its components use. `Run` owns them.
+// The parts of a run that its components share.
 #pragma once
 
 #include "host/cameras.hpp"
 #include "host/component_options.hpp"
-#include "host/component_totals.hpp"
 #include "host/failures.hpp"
 #include "host/frame_flow.hpp"
 
@@ -20,24 +19,28 @@ struct Video {
 };
 
 struct RunParts {
+    RunParts(const run_config::Configuration &configuration, supervise::Context context);
+    RunParts(const RunParts &) = delete;
+    RunParts &operator=(const RunParts &) = delete;
+
     const run_config::Configuration &configuration; // with which the run has begun
-    supervise::Context &context;
-    Statistics &statistics;
-    Failures &failures;
-    ComponentOptions &options;
-    ComponentTotals &totals; // of the components that have ended before the run
-    Cameras &cameras;
-    FrameFlow &flow;
-    Video &video;
+    supervise::Context context;
+    Statistics statistics;
+    Failures failures;
+    ComponentOptions options;
+    ComponentTotals totals; // of the components that have ended before the run
+    Cameras cameras;
+    FrameFlow flow;
+    Video video;
 
     bool live() const { return configuration.mode == run_config::Mode::live; }
     std::int64_t now_ns() const { return base::to_ns(context.reactor.now()); }
     // If the component has stopped, or will not be restarted, keeps its totals and returns true.
-    bool take_if_ended(const supervise::Component &component) const;
+    bool take_if_ended(const supervise::Component &component);
     void log(arhost_severity severity, const std::string &text) const { context.log(severity, "arhost", text); }
 
     // Returns callbacks that report failures of the component `name`; the others do nothing.
-    supervise::Component::Callbacks callbacks(const std::string &name, const yaml::Node &node) const;
+    supervise::Component::Callbacks callbacks(const std::string &name, const yaml::Node &node);
 };
 
 // The memory that a component's worker writes; null if there is none.

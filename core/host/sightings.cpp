@@ -30,15 +30,14 @@ void Sightings::set_tracker(std::shared_ptr<const run_config::TrackerConfigurati
     for (const model::Target &target : tracker_->targets)
         for (const model::TargetMarker &marker : target.markers)
             listed_.try_emplace({marker.family, marker.id}, marker_name(marker));
-    statistics_.hints.clear();
 }
 
 void Sightings::add(Frame &frame) {
     for (std::size_t i = 0; i < families_.size(); ++i)
         families_[i].copy(frame.record.families[i], ARHOST_MAX_FAMILY - 1);
-    ++statistics_.tracker_results;
+    ++parts_.statistics.tracker_results;
     count_other_markers(frame);
-    count_targets(frame, statistics_);
+    count_targets(frame, parts_.statistics);
     warn_of_missing_targets();
 }
 
@@ -64,33 +63,34 @@ void Sightings::count_other_markers(Frame &frame) {
             if (frames.contains(name) || frames.size() < Statistics::max_marker_names)
                 ++frames[name];
     };
-    count(unlisted, statistics_.unlisted);
-    count(unconfirmed, statistics_.unconfirmed);
+    count(unlisted, parts_.statistics.unlisted);
+    count(unconfirmed, parts_.statistics.unconfirmed);
 }
 
 void Sightings::warn_of_missing_targets() {
-    if (has_warned_ || configuration_.mode != run_config::Mode::live || configuration_.time_codes ||
-        clock_.now() - statistics_.first_frame <= max_time_without_target)
+    if (has_warned_ || !parts_.live() || parts_.configuration.time_codes ||
+        parts_.context.reactor.now() - parts_.statistics.first_frame <= max_time_without_target)
         return;
     has_warned_ = true;
     const std::vector<model::Target> &targets = tracker_->targets;
-    if (statistics_.targets.empty())
-        log_(ARHOST_SEVERITY_WARNING, "tracker",
-             "has seen no target yet; it looks for " + describe_targets(targets) +
-                 seen_instead(statistics_, targets) + how_to_compare(targets));
-    else if (const std::string unseen = unseen_targets(configuration_, statistics_, targets); !unseen.empty())
-        log_(ARHOST_SEVERITY_WARNING, "tracker", unseen);
+    if (parts_.statistics.targets.empty())
+        parts_.context.log(ARHOST_SEVERITY_WARNING, "tracker",
+                           "has seen no target yet; it looks for " + describe_targets(targets) +
+                               seen_instead(parts_.statistics, targets) + how_to_compare(targets));
+    else if (const std::string unseen = unseen_targets(parts_.configuration, parts_.statistics, targets);
+             !unseen.empty())
+        parts_.context.log(ARHOST_SEVERITY_WARNING, "tracker", unseen);
 }
 
 void Sightings::add_hint(std::string text) {
     constexpr std::size_t max_bytes = 500;
-    std::vector<std::string> &hints = statistics_.hints;
+    std::vector<std::string> &hints = parts_.statistics.hints;
     text.resize(std::min(text.size(), max_bytes));
     if (hints.size() == Statistics::max_hints || std::ranges::find(hints, text) != hints.end())
         return;
     hints.push_back(text);
-    const bool is_late = has_warned_ && statistics_.targets.empty();
-    log_(is_late ? ARHOST_SEVERITY_INFO : ARHOST_SEVERITY_DEBUG, "tracker", text);
+    const bool is_late = has_warned_ && parts_.statistics.targets.empty();
+    parts_.context.log(is_late ? ARHOST_SEVERITY_INFO : ARHOST_SEVERITY_DEBUG, "tracker", text);
 }
 
 } // namespace arhost::host

@@ -3,10 +3,7 @@
 // Counts which markers and targets the tracker sees, and tells the user if targets are not seen for a while.
 #pragma once
 
-#include "base/clock.hpp"
-#include "host/frame.hpp"
-#include "run_config/configuration.hpp"
-#include "supervise/launcher.hpp"
+#include "host/run_parts.hpp"
 
 #include <map>
 #include <memory>
@@ -21,9 +18,7 @@ void count_targets(const Frame &frame, Statistics &statistics);
 
 class Sightings {
 public:
-    Sightings(const run_config::Configuration &configuration, const base::Clock &clock,
-              const supervise::LogFunction &log, Statistics &statistics)
-        : configuration_(configuration), clock_(clock), log_(log), statistics_(statistics) {}
+    explicit Sightings(RunParts &parts) : parts_(parts) {}
 
     // `tracker` is the one in use from now on.
     void set_tracker(std::shared_ptr<const run_config::TrackerConfiguration> tracker);
@@ -36,10 +31,7 @@ private:
     void count_other_markers(Frame &frame);
     void warn_of_missing_targets();
 
-    const run_config::Configuration &configuration_;
-    const base::Clock &clock_;
-    const supervise::LogFunction &log_;
-    Statistics &statistics_;
+    RunParts &parts_;
     std::shared_ptr<const run_config::TrackerConfiguration> tracker_;
     std::vector<std::string> families_;                                  // of the targets' markers
     std::map<std::pair<std::string, std::int32_t>, std::string> listed_; // the targets' markers, by family and id

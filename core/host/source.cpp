@@ -15,7 +15,7 @@ using namespace ipc;
 using namespace model;
 using supervise::Component;
 
-Source::Source(const RunParts &parts) : parts_(parts) {
+Source::Source(RunParts &parts) : parts_(parts) {
     if (!parts.configuration.source) {
         make_black_frames();
         return;

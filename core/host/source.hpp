@@ -10,7 +10,7 @@ namespace arhost::host {
 
 class Source {
 public:
-    explicit Source(const RunParts &parts);
+    explicit Source(RunParts &parts);
 
     void start();
     bool has_started() const { return !component_ || component_->running(); }
@@ -29,7 +29,7 @@ private:
     void repeat_record(Frame &frame) const;
     void on_lost(const std::vector<ipc::Command> &unanswered);
 
-    const RunParts parts_;
+    RunParts &parts_;
     std::unique_ptr<supervise::Component> component_;
     std::shared_ptr<SlotPool> slots_; // of the current worker; null unless it is running
     std::uint64_t skipped_ = 0;       // frames that the source has skipped

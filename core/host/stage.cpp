@@ -7,7 +7,7 @@ using namespace ipc;
 using namespace model;
 using supervise::Component;
 
-Stage::Stage(const RunParts &parts, const char *name, const run_config::ComponentConfiguration &configuration,
+Stage::Stage(RunParts &parts, const char *name, const run_config::ComponentConfiguration &configuration,
              Frame::Stage waiting, std::size_t max_in_flight, Abandon abandon)
     : parts_(parts), max_in_flight_(max_in_flight) {
     Component::Callbacks callbacks = parts.callbacks(name, configuration.node);

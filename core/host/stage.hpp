@@ -26,7 +26,7 @@ public:
 
 protected:
     // `waiting`: stage of a frame that waits for this one. `max_in_flight`: frames that the worker gets at a time.
-    Stage(const RunParts &parts, const char *name, const run_config::ComponentConfiguration &configuration,
+    Stage(RunParts &parts, const char *name, const run_config::ComponentConfiguration &configuration,
           Frame::Stage waiting, std::size_t max_in_flight, Abandon abandon);
 
     // As in supervise::Component::Callbacks.
@@ -40,7 +40,7 @@ protected:
     // this stage.
     Frame *accept(const ipc::Command &command, const ipc::Result &result);
 
-    const RunParts parts_;
+    RunParts &parts_;
     std::shared_ptr<SlotPool> slots_; // of the current worker; null unless it is running
 
 private:

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/statistics.hpp"
 
-#include "host/component_totals.hpp"
-
 #include <nlohmann/json.hpp>
 
 #include <algorithm>
@@ -114,6 +112,28 @@ double StageTimings::recent_rate(const std::string &name, Clock::time_point now)
 double Statistics::fps() const {
     const double seconds = std::chrono::duration<double>(last_frame - first_frame).count();
     return composited > 1 && seconds > 0 ? static_cast<double>(composited - 1) / seconds : 0;
+}
+
+void ComponentTotals::add(const supervise::Component &component) {
+    cpu_seconds[component.name()] += component.cpu_seconds();
+    restarts[component.name()] += component.restarts();
+    for (const auto &[name, value] : component.counters())
+        if (auto &counted = counters[component.name()];
+            counted.contains(name) || counted.size() < ARHOST_MAX_COUNTERS) // the names are the plugin's
+            counted[name] += value;
+    for (const supervise::Crash &crash : component.crashes())
+        crashes.push_back({component.name(), crash});
+    const auto is_of_component = [&](const Crash &crash) { return crash.component == component.name(); };
+    auto count = std::ranges::count_if(crashes, is_of_component);
+    for (; std::cmp_greater(count, supervise::Crash::max_kept); --count)
+        crashes.erase(std::ranges::find_if(crashes, is_of_component));
+}
+
+ComponentTotals ComponentTotals::plus(const std::vector<supervise::Component *> &components) const {
+    ComponentTotals totals = *this;
+    for (const supervise::Component *component : components)
+        totals.add(*component);
+    return totals;
 }
 
 std::string percentiles_text(const StageTimings::ByName &stages, const StageTimings::ByName &latencies) {

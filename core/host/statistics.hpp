@@ -5,11 +5,13 @@
 
 #include "contracts/contract_checks.hpp"
 #include "host/quality.hpp"
+#include "supervise/component.hpp"
 
 #include <nlohmann/json_fwd.hpp>
 
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <span>
@@ -18,8 +20,6 @@
 #include <vector>
 
 namespace arhost::host {
-
-struct ComponentTotals;
 
 // Histogram of a stage's durations. Each bucket is 1 % wider than the previous one, so memory use is bounded for runs
 // of any length.
@@ -107,6 +107,20 @@ struct Statistics {
     std::vector<FrameTimes> timeline;          // only if the configuration requests it
 
     double fps() const;
+};
+
+// Totals of the components of a run, by name: processor time, restarts, counters and crashes.
+struct ComponentTotals {
+    struct Crash {
+        std::string component;
+        supervise::Crash crash;
+    };
+    std::map<std::string, double> cpu_seconds;
+    std::map<std::string, std::uint32_t> restarts;
+    std::map<std::string, model::Counters> counters;
+    std::deque<Crash> crashes; // the last supervise::Crash::max_kept of each component
+    void add(const supervise::Component &component);
+    ComponentTotals plus(const std::vector<supervise::Component *> &components) const;
 };
 
 // Returns the percentiles as one line: of the latencies, then of the stages.

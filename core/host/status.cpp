@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "host/status.hpp"
+#include "host/documents.hpp"
+#include "host/outputs.hpp"
 
 #include <nlohmann/json.hpp>
 

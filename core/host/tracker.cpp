@@ -45,7 +45,7 @@ std::optional<yaml::Node> quoted_target(const std::string &message, const run_co
 } // namespace
 
 // A tracker processes one frame at a time, because a frame needs the state after the previous one.
-Tracker::Tracker(const RunParts &parts, Sightings &sightings, Configuration configuration, Abandon abandon)
+Tracker::Tracker(RunParts &parts, Sightings &sightings, Configuration configuration, Abandon abandon)
     : Stage(parts, "tracker", *configuration, Frame::Stage::to_track, 1, std::move(abandon)), sightings_(sightings),
       configuration_(std::move(configuration)), targets_(to_memory(configuration_->targets)),
       family_count_(families_of(configuration_->targets).size()) {}
@@ -124,8 +124,10 @@ void Tracker::take_over(Tracker *previous) {
     parts_.cameras.set_targets(
         {configuration_->targets.front().name, configuration_->world_grace_frames, configuration_->hold_frames},
         has_same_targets);
-    if (previous)
-        parts_.flow.on_tracker_replaced();
+    if (!previous)
+        return;
+    parts_.statistics.hints.clear();
+    parts_.flow.on_tracker_replaced();
 }
 
 } // namespace arhost::host

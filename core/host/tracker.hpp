@@ -13,7 +13,7 @@ class Tracker final : public Stage {
 public:
     using Configuration = std::shared_ptr<const run_config::TrackerConfiguration>;
 
-    Tracker(const RunParts &parts, Sightings &sightings, Configuration configuration, Abandon abandon);
+    Tracker(RunParts &parts, Sightings &sightings, Configuration configuration, Abandon abandon);
 
     void track(Frame &frame);
     const Configuration &configuration() const { return configuration_; }

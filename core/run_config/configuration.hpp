@@ -16,6 +16,7 @@
 
 #include <arhost/camera.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <set>
@@ -97,6 +98,22 @@ struct Configuration {
 
     std::vector<OutputFile> report_files() const; // the files that the host writes: `stats` and `timeline`
 };
+
+// Calls `function` for each component that a run can start, among them those that commands start.
+void for_each_component(auto &configuration, const auto &function) {
+    for (auto *one : {&configuration.snapshot, &configuration.record})
+        if (*one)
+            function(**one);
+    if (configuration.source)
+        function(*configuration.source);
+    if (configuration.tracker)
+        function(*configuration.tracker);
+    if (configuration.raytracer)
+        function(*configuration.raytracer);
+    std::ranges::for_each(configuration.trackers, function);
+    std::ranges::for_each(configuration.raytracers, function);
+    std::ranges::for_each(configuration.outputs, function);
+}
 
 // Returns the option values for creating a component's plugin. `candidate` is 0 for the plugin itself and 1 for the
 // fallback, for which the configured options are ignored and all options have their defaults. Throws yaml::Error if

@@ -2,7 +2,7 @@
 #include "cli/recorded_session.hpp"
 
 #include "errors.hpp"
-#include "host/run_description.hpp"
+#include "host/documents.hpp"
 #include "plugin_under_test.hpp"
 
 #include <gmock/gmock.h>

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The description of a run for the sinks that record it (docs/sessions.md).
+// The JSON documents that describe a run.
 #pragma once
 
 #include "host/assembly.hpp"
+
+#include <nlohmann/json_fwd.hpp>
 
 #include <cstdint>
 #include <filesystem>
@@ -12,10 +14,16 @@
 
 namespace arhost::host {
 
+class Outputs;
+
+// Returns the status document (docs/control.md).
+nlohmann::ordered_json status_json(const RunParts &parts, const Assembly &assembly, const Outputs &outputs);
+
 // The member `version` of session.json. Logs of version 1 have markers instead of targets.
 constexpr int session_version = 2;
 
-// Returns session.json. `id`: of the sink. Throws std::runtime_error if the description is too long.
+// Returns session.json, for the sinks that record the run (docs/sessions.md). `id`: of the sink. Throws
+// std::runtime_error if the description is too long.
 std::string run_description(const RunParts &parts, const Assembly &assembly, const std::string &id);
 
 // Size and hash (64-bit FNV-1a, hexadecimal) of a regular file. The hash of larger files is "". Returns
