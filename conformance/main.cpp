@@ -2,11 +2,11 @@
 //
 // arhost-conform: tests whether a plugin meets the requirements of the ABI (docs/conformance.md).
 #include "base/atomic_file.hpp"
-#include "base/command_line.hpp"
 #include "base/file_identity.hpp"
 #include "base/listening_socket.hpp"
 #include "base/text.hpp"
 #include "base/write_all.hpp"
+#include "command_line/command_line.hpp"
 #include "conformance/report.hpp"
 #include "run_config/plugin_path.hpp"
 
@@ -38,7 +38,7 @@ template <class Number> bool parse_number(std::string_view text, Number &number)
     return error == std::errc() && end == text.data() + text.size();
 }
 
-// Validators for base::Option::check: return an error message, or "".
+// Validators for arhost::command_line::Option::check: return an error message, or "".
 std::string invalid_name(const std::string &text) {
     return text.empty() ? "the name is empty" : "";
 }
@@ -96,7 +96,7 @@ struct PolicyOptions {
     std::vector<std::string> allow, reads, environment;
     std::string sandbox{sandbox::modes.front()};
 
-    void add_to(base::CommandLine &app) {
+    void add_to(arhost::command_line::CommandLine &app) {
         const auto add = [&](const char *name, std::vector<std::string> &values, const char *help) {
             return app.option(name, values, help).one_value_each();
         };
@@ -383,7 +383,7 @@ int main(int argc, char **argv) {
     std::signal(SIGPIPE, SIG_IGN); // as in arhost-worker: a closed pipe or a full disk is an error, not a signal
     std::signal(SIGXFSZ, SIG_IGN);
     std::signal(SIGCHLD, SIG_DFL); // if the parent process ignores it, waitpid fails
-    base::CommandLine app(
+    arhost::command_line::CommandLine app(
         "Tests whether a plugin meets the requirements of arhost's ABI (docs/conformance.md).\n"
         "Exit status: 0 success; 1 a test failed, crashed or timed out; 2 the suite itself failed;\n"
         "128 plus a signal's number: interrupted.",

@@ -3,12 +3,12 @@
 // arhost-calibrate calibrates cameras (docs/calibration.md). `arhost calibrate` runs it, because the host itself
 // links no OpenCV.
 #include "base/atomic_file.hpp"
-#include "base/command_line.hpp"
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
 #include "base/write_all.hpp"
 #include "calibrate/input.hpp"
 #include "calibrate/picture.hpp"
+#include "command_line/command_line.hpp"
 
 #include <fmt/format.h>
 #include <opencv2/core/utils/logger.hpp>
@@ -217,10 +217,10 @@ int main(int argc, char **argv) {
     std::signal(SIGPIPE, SIG_IGN); // a closed pipe or a full disk is an error, not a signal
     std::signal(SIGXFSZ, SIG_IGN);
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-    base::CommandLine app("Calibrates a camera with a board, and writes YAML for camera.file. See "
-                          "docs/calibration.md.\n"
-                          "Exit status: 0 success; 2 failure, without a calibration.",
-                          "arhost calibrate");
+    arhost::command_line::CommandLine app("Calibrates a camera with a board, and writes YAML for camera.file. See "
+                                          "docs/calibration.md.\n"
+                                          "Exit status: 0 success; 2 failure, without a calibration.",
+                                          "arhost calibrate");
     Arguments arguments;
     app.option("--images", arguments.images, "Images of the board, 10 or more").type_name("FILE");
     app.option("--video", arguments.video, "Video of the board; the best views are chosen").type_name("FILE");

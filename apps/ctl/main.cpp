@@ -2,11 +2,11 @@
 //
 // arhost-ctl sends a command to a running arhost whose configuration has the output sink_control. `arhost ctl` runs
 // it.
-#include "base/command_line.hpp"
 #include "base/listening_socket.hpp"
 #include "base/program.hpp"
 #include "base/text.hpp"
 #include "base/write_all.hpp"
+#include "command_line/command_line.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -111,7 +111,7 @@ int send(const Arguments &arguments) {
 
 int main(int argc, char **argv) {
     base::prepare_process();
-    base::CommandLine app("Send a command to a running arhost (docs/control.md)", "arhost ctl");
+    arhost::command_line::CommandLine app("Send a command to a running arhost (docs/control.md)", "arhost ctl");
     Arguments arguments;
     std::vector<std::string> names(commands.size());
     std::ranges::transform(commands, names.begin(), [](const auto &command) { return command.first; });

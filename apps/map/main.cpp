@@ -3,11 +3,11 @@
 // arhost-map learns maps of markers from images (docs/maps.md). `arhost map` runs it, because the host itself links
 // neither OpenCV nor Ceres.
 #include "base/atomic_file.hpp"
-#include "base/command_line.hpp"
 #include "base/text.hpp"
 #include "base/unique_fd.hpp"
 #include "base/write_all.hpp"
 #include "camera/calibration.hpp"
+#include "command_line/command_line.hpp"
 #include "detector.hpp"
 #include "map_file.hpp"
 
@@ -308,10 +308,11 @@ void run(const Arguments &arguments, int signals) {
 int main(int argc, char **argv) {
     std::signal(SIGPIPE, SIG_IGN); // a closed pipe or a full disk is an error, not a signal
     std::signal(SIGXFSZ, SIG_IGN);
-    base::CommandLine app("Learns where markers are relative to each other, from images of a calibrated camera, and "
-                          "writes a map. See docs/maps.md.\n"
-                          "Exit status: 0 success; 2 failure, without any output file.",
-                          "arhost map");
+    arhost::command_line::CommandLine app(
+        "Learns where markers are relative to each other, from images of a calibrated camera, and "
+        "writes a map. See docs/maps.md.\n"
+        "Exit status: 0 success; 2 failure, without any output file.",
+        "arhost map");
     Arguments arguments;
     app.option("--images", arguments.images, "Images from different directions; each shows two markers or more")
         .type_name("FILE");

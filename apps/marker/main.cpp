@@ -3,10 +3,10 @@
 // arhost-marker prints markers in their true size (docs/markers.md). `arhost marker` runs it, because the host itself
 // links no OpenCV and draws nothing.
 #include "base/atomic_file.hpp"
-#include "base/command_line.hpp"
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
 #include "base/write_all.hpp"
+#include "command_line/command_line.hpp"
 #include "drawing.hpp"
 
 #include <fmt/format.h>
@@ -207,11 +207,12 @@ void write(const std::vector<File> &files) {
 int main(int argc, char **argv) {
     std::signal(SIGPIPE, SIG_IGN); // a closed pipe or a full disk is an error, not a signal
     std::signal(SIGXFSZ, SIG_IGN);
-    base::CommandLine app(fmt::format("Prints markers and boards in their true size. See docs/markers.md.\n"
-                                      "Families and dictionaries: {}.\n"
-                                      "Exit status: 0 success; 2 failure, without any output file.",
-                                      fmt::join(family_names(), ", ")),
-                          "arhost marker");
+    arhost::command_line::CommandLine app(
+        fmt::format("Prints markers and boards in their true size. See docs/markers.md.\n"
+                    "Families and dictionaries: {}.\n"
+                    "Exit status: 0 success; 2 failure, without any output file.",
+                    fmt::join(family_names(), ", ")),
+        "arhost marker");
     Arguments arguments;
     app.option(
            "MARKERS", arguments.markers,

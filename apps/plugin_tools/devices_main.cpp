@@ -62,7 +62,8 @@ int list(const plugin_tools::Selection &selection, bool as_json) {
 
 int main(int argc, char **argv) {
     base::prepare_process();
-    base::CommandLine app("List cameras, GPUs and displays; for unusable ones, print the reason", "arhost devices");
+    arhost::command_line::CommandLine app("List cameras, GPUs and displays; for unusable ones, print the reason",
+                                          "arhost devices");
     plugin_tools::Selection selection;
     bool as_json = false;
     selection.add_names(app, "List only the devices of these plugins");

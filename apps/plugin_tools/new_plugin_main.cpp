@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // arhost-new-plugin creates a skeleton plugin. `arhost new-plugin` runs it.
-#include "base/command_line.hpp"
 #include "base/program.hpp"
+#include "command_line/command_line.hpp"
 #include "plugin_tools/new_plugin.hpp"
 
 int main(int argc, char **argv) {
     using namespace arhost;
     base::prepare_process();
-    base::CommandLine app("Create a working skeleton plugin (docs/backend-guide.md)", "arhost new-plugin");
+    arhost::command_line::CommandLine app("Create a working skeleton plugin (docs/backend-guide.md)",
+                                          "arhost new-plugin");
     plugin_tools::NewPlugin plugin;
     app.option("KIND", plugin.kind, "Kind of plugin").required().one_of(plugin_tools::plugin_kinds);
     app.option("NAME", plugin.name, "Name of the plugin and its folder").required();

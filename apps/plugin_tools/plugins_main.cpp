@@ -58,7 +58,7 @@ int list_plugins(const plugin_tools::Selection &selection, bool with_options) {
 
 int main(int argc, char **argv) {
     base::prepare_process();
-    base::CommandLine app("List the plugins; for unusable ones, print the reason", "arhost plugins");
+    arhost::command_line::CommandLine app("List the plugins; for unusable ones, print the reason", "arhost plugins");
     plugin_tools::Selection selection;
     bool with_options = false;
     selection.add_names(app, "List only these plugins");

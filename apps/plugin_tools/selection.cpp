@@ -28,11 +28,11 @@ std::filesystem::path built_in_plugins() {
     return base::own_prefix() / "lib/arhost/plugins";
 }
 
-void Selection::add_names(base::CommandLine &app, const std::string &help) {
+void Selection::add_names(arhost::command_line::CommandLine &app, const std::string &help) {
     app.option("PLUGIN", names_, help);
 }
 
-void Selection::add_reads(base::CommandLine &app) {
+void Selection::add_reads(arhost::command_line::CommandLine &app) {
     app.option("--reads", reads_, "A folder with libraries that the plugins need (repeatable)")
         .existing_path()
         .check(sandbox::obstacle_to_grant)

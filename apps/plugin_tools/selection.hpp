@@ -3,7 +3,7 @@
 // The plugins that a command asks, each in a worker of its own.
 #pragma once
 
-#include "base/command_line.hpp"
+#include "command_line/command_line.hpp"
 #include "ipc/reactor.hpp"
 #include "sandbox/sandbox.hpp"
 #include "supervise/launcher.hpp"
@@ -19,8 +19,8 @@ std::filesystem::path built_in_plugins(); // folder
 
 class Selection {
 public:
-    void add_names(base::CommandLine &app, const std::string &help); // PLUGIN
-    void add_reads(base::CommandLine &app);                          // --reads
+    void add_names(arhost::command_line::CommandLine &app, const std::string &help); // PLUGIN
+    void add_reads(arhost::command_line::CommandLine &app);                          // --reads
 
     // Returns the files of the plugins; of all plugins if none is named. Throws base::InvalidInput.
     std::vector<std::filesystem::path> files() const;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // arhost-schema prints the JSON Schema of configurations. `arhost schema` runs it.
-#include "base/command_line.hpp"
 #include "base/program.hpp"
+#include "command_line/command_line.hpp"
 #include "schema/schema_text.hpp"
 
 #include <cstdio>
@@ -10,7 +10,7 @@
 int main(int argc, char **argv) {
     using namespace arhost;
     base::prepare_process();
-    base::CommandLine app("Print the JSON Schema of configurations, for editors", "arhost schema");
+    arhost::command_line::CommandLine app("Print the JSON Schema of configurations, for editors", "arhost schema");
     bool markdown = false;
     app.flag("--markdown", markdown, "Print the Markdown table of docs/config.md instead");
     return base::exit_status_of([&] {

@@ -7,7 +7,7 @@
 #include "bare_detectors.hpp"
 #include "cramer_rao.hpp"
 
-#include "base/command_line.hpp"
+#include "command_line/command_line.hpp"
 
 #include <fiducial/prints.hpp>
 #include <fiducial/rendered_marker.hpp>
@@ -289,7 +289,7 @@ std::vector<std::string> missed_targets(const Result &tracker, const std::array<
 int main(int argc, char **argv) try {
     bool is_quick = false;
     std::string only, csv_file;
-    arhost::base::CommandLine line("Measures the errors of poses in synthetic pictures.");
+    arhost::command_line::CommandLine line("Measures the errors of poses in synthetic pictures.");
     line.flag("--quick", is_quick, "Measure with fewer frames; the figures are less precise");
     line.option("--only", only, "Name of a dimension (default: all)");
     line.option("CSV", csv_file, "File to write");

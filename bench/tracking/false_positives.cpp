@@ -5,7 +5,7 @@
 // the worker reports.
 #include "solving_tracker.hpp"
 
-#include "base/command_line.hpp"
+#include "command_line/command_line.hpp"
 
 #include <fiducial/artoolkit.hpp>
 #include <fiducial/aruco.hpp>
@@ -246,7 +246,8 @@ template <class Show> CountsByFamily in_parallel(int count, int unit, const Show
 int main(int argc, char **argv) try {
     bool is_quick = false;
     std::string only = ".*";
-    arhost::base::CommandLine line("Counts sightings and poses in pictures without markers; takes over an hour.");
+    arhost::command_line::CommandLine line(
+        "Counts sightings and poses in pictures without markers; takes over an hour.");
     line.flag("--quick", is_quick, "Measure with fewer frames; the figures are less precise");
     line.option("--only", only, "Regular expression for the names of families (default: all)");
     if (const auto status = line.parse(argc, argv))

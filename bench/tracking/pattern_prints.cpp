@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Which patterns tracker_pattern reports for rendered prints of hiro and kanji, and the errors of their corners.
-#include "base/command_line.hpp"
+#include "command_line/command_line.hpp"
 
 #include <tracker_pattern/printed_patterns.hpp>
 
@@ -17,7 +17,7 @@
 int main(int argc, char **argv) try {
     using namespace arhost::test;
     bool is_quick = false;
-    arhost::base::CommandLine line("Counts confusions of patterns.");
+    arhost::command_line::CommandLine line("Counts confusions of patterns.");
     line.flag("--quick", is_quick, "Measure with fewer frames; the figures are less precise");
     if (const auto status = line.parse(argc, argv))
         return *status;

@@ -2,7 +2,7 @@
 //
 // Speed and accuracy of tracker_image on generated video of 640×480, in which half of the picture is covered, next to
 // OpenCV's features (ORB, ratio test, findHomography with RANSAC) in every frame.
-#include "base/command_line.hpp"
+#include "command_line/command_line.hpp"
 
 #include <tracker_image/poster_video.hpp>
 
@@ -101,7 +101,7 @@ std::optional<Quad> quad_of(const std::vector<arhost_observation> &seen) {
 
 int main(int argc, char **argv) try {
     bool is_quick = false;
-    arhost::base::CommandLine line("Measures the speed of tracker_image.");
+    arhost::command_line::CommandLine line("Measures the speed of tracker_image.");
     line.flag("--quick", is_quick, "Measure with fewer frames; the figures are less precise");
     if (const auto status = line.parse(argc, argv))
         return *status;

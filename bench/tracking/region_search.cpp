@@ -5,7 +5,7 @@
 #include "bare_detectors.hpp"
 #include "solving_tracker.hpp"
 
-#include "base/command_line.hpp"
+#include "command_line/command_line.hpp"
 
 #include <fiducial/clutter.hpp>
 #include <fiducial/prints.hpp>
@@ -161,7 +161,7 @@ Detector plugin(const std::string &name, std::uint32_t full_search_every, int li
 
 int main(int argc, char **argv) try {
     bool is_quick = false;
-    arhost::base::CommandLine line("Measures the speed of the search for markers in video.");
+    arhost::command_line::CommandLine line("Measures the speed of the search for markers in video.");
     line.flag("--quick", is_quick, "Measure with fewer frames; the figures are less precise");
     if (const auto status = line.parse(argc, argv))
         return *status;

@@ -5,7 +5,7 @@
 #include "bare_detectors.hpp"
 #include "solving_tracker.hpp"
 
-#include "base/command_line.hpp"
+#include "command_line/command_line.hpp"
 
 #include <fiducial/prints.hpp>
 #include <fiducial/rendered_marker.hpp>
@@ -75,7 +75,7 @@ double with_plugin(const std::deque<GreyFrame> &frames, const std::string &plugi
 
 int main(int argc, char **argv) try {
     bool is_quick = false;
-    arhost::base::CommandLine line("Measures the jitter of a resting marker.");
+    arhost::command_line::CommandLine line("Measures the jitter of a resting marker.");
     line.flag("--quick", is_quick, "Measure with fewer frames; the figures are less precise");
     if (const auto status = line.parse(argc, argv))
         return *status;

@@ -3,15 +3,15 @@
 
 namespace arhost::cli {
 
-void add_configuration_options(base::CommandLine &command, Arguments &arguments) {
+void add_configuration_options(command_line::CommandLine &command, Arguments &arguments) {
     command.option("--set", arguments.settings, "Override a value: key.path=value (repeatable)")
         .type_name("KEY=VALUE")
         .one_value_each();
     command.flag("-v,--verbose", arguments.verbose, "Log debug messages of components");
 }
 
-base::Option add_run_options(base::CommandLine &command, Arguments &arguments) {
-    const base::Option config =
+command_line::Option add_run_options(command_line::CommandLine &command, Arguments &arguments) {
+    const command_line::Option config =
         command.option("--config,FILE", arguments.file, "The configuration to run (docs/config.md)")
             .type_name("FILE");
     add_configuration_options(command, arguments);

@@ -3,7 +3,7 @@
 // The commands of `arhost` that run a configuration. Each returns the exit status (docs/config.md).
 #pragma once
 
-#include "base/command_line.hpp"
+#include "command_line/command_line.hpp"
 #include "supervise/launcher.hpp"
 
 #include <cstdint>
@@ -35,9 +35,9 @@ struct ReplayArguments {
     bool with_pipeline = false;
 };
 
-void add_configuration_options(base::CommandLine &command, Arguments &arguments); // --set, --verbose
+void add_configuration_options(command_line::CommandLine &command, Arguments &arguments); // --set, --verbose
 // Adds all options of a run and returns the option --config.
-base::Option add_run_options(base::CommandLine &command, Arguments &arguments);
+command_line::Option add_run_options(command_line::CommandLine &command, Arguments &arguments);
 
 int run(const Arguments &arguments, supervise::Starter &launcher);
 // Measures the time from the camera's lens to the display of the configuration's outputs.

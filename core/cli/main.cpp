@@ -12,7 +12,7 @@
 namespace {
 
 using namespace arhost::cli;
-using arhost::base::CommandLine;
+using arhost::command_line::CommandLine;
 namespace base = arhost::base;
 
 void add_coordinates(CommandLine &app, Arguments &arguments) {

@@ -13,7 +13,7 @@ int main(int argc, char **argv) {
     using namespace arhost;
     std::signal(SIGPIPE, SIG_IGN);
     worker::retain_freed_memory();
-    base::CommandLine app(
+    command_line::CommandLine app(
         "arhost-inprocess runs a configuration like arhost, but with all plugins in one process and without\n"
         "deadlines or sandbox. Intended for debuggers, valgrind and sanitizers.");
     app.version("arhost-inprocess " ARHOST_VERSION);

@@ -272,35 +272,25 @@ void Node::override_text(const std::string &path, const std::string &text, const
 void Node::replace(const std::string &path, const YAML::Node &value, const std::string &option) {
     YAML::Node at = node_;
     std::string canonical; // the key path in the format of Node::path()
-    const std::vector<std::string> parts = split_path(path);
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-        const bool last = i + 1 == parts.size();
+    for (const std::string &part : split_path(path)) {
         const auto reject = [&](const std::string &why) { throw Error(option + " " + path + ": " + why); };
-        if (parts[i].empty())
+        if (part.empty())
             reject("a key is empty; write it as in tracker.options.border_bits=2");
-        canonical = at.IsSequence() ? canonical + "[" + parts[i] + "]" : child_path(canonical, parts[i]);
-        YAML::Node next;
+        canonical = at.IsSequence() ? canonical + "[" + part + "]" : child_path(canonical, part);
         if (at.IsSequence()) {
             std::size_t index = 0;
-            const auto [end, error] = std::from_chars(parts[i].data(), parts[i].data() + parts[i].size(), index);
+            const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), index);
             if (error != std::errc() || *end != '\0' || index >= at.size())
-                reject("'" + parts[i] + "' is not a valid index; the number of elements in the list is " +
+                reject("'" + part + "' is not a valid index; the number of elements in the list is " +
                        std::to_string(at.size()));
-            if (last)
-                at[index] = value;
-            else
-                next.reset(at[index]);
+            at.reset(YAML::Node(at[index]));
         } else if (at.IsMap() || at.IsNull() || !at.IsDefined()) {
-            if (last)
-                at[parts[i]] = value;
-            else
-                next.reset(at[parts[i]]);
+            at.reset(YAML::Node(at[part]));
         } else {
-            reject("the parent of '" + parts[i] + "' is a scalar, which cannot have keys");
+            reject("the parent of '" + part + "' is a scalar, which cannot have keys");
         }
-        if (!last)
-            at.reset(next);
     }
+    at = value;
     document_->overrides[canonical] = option;
 }
 

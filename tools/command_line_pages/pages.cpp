@@ -5,7 +5,7 @@
 // Generates a program's man page or shell completion from the definitions of its command line, which the program
 // prints with `--describe`. Placeholders determine which values are completed: FILE and PLUGIN as files, FOLDER and
 // DIR as folders, choices as they are.
-#include "base/command_line_description.hpp"
+#include "command_line/description.hpp"
 
 #include <algorithm>
 #include <cstdio>
@@ -14,8 +14,8 @@
 
 namespace {
 
-using arhost::base::CommandDescription;
-using arhost::base::OptionDescription;
+using arhost::command_line::CommandDescription;
+using arhost::command_line::OptionDescription;
 
 std::string joined(const std::vector<std::string> &words, std::string_view separator) {
     std::string text;

@@ -3,10 +3,10 @@
 // render-scene renders a scene file with any ray tracer plugin. The user chooses the viewpoint; the program needs no
 // video, tracker or marker.
 #include "base/atomic_file.hpp"
-#include "base/command_line.hpp"
 #include "base/file_identity.hpp"
 #include "base/text.hpp"
 #include "base/write_all.hpp"
+#include "command_line/command_line.hpp"
 #include "ray_tracer.hpp"
 #include "scene/scene_loader.hpp"
 
@@ -110,7 +110,7 @@ arhost::yaml::Node options_of(const std::optional<int> &samples, const std::opti
 int main(int argc, char **argv) {
     std::signal(SIGPIPE, SIG_IGN); // writing to a closed pipe then fails with an error instead of a signal
     std::signal(SIGXFSZ, SIG_IGN);
-    base::CommandLine app(
+    arhost::command_line::CommandLine app(
         "Renders a scene file over a checkerboard into a PNG, JPEG or PPM file. Lengths are in mm.");
     std::string scene, output, label, ray_tracer = "rt_embree";
     View view;

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace arhost::base {
+namespace arhost::command_line {
 
 struct OptionDescription {
     std::vector<std::string> names; // "-v", "--verbose"; empty if the option is only positional
@@ -31,4 +31,4 @@ struct CommandDescription {
 };
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(CommandDescription, name, description, is_program, options, commands)
 
-} // namespace arhost::base
+} // namespace arhost::command_line

@@ -14,7 +14,7 @@ class App;
 class Option;
 } // namespace CLI
 
-namespace arhost::base {
+namespace arhost::command_line {
 
 class Option {
 public:
@@ -69,4 +69,4 @@ private:
     std::shared_ptr<CLI::App> app_;
 };
 
-} // namespace arhost::base
+} // namespace arhost::command_line

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "base/command_line.hpp"
+#include "command_line/command_line.hpp"
 
-#include "base/command_line_description.hpp"
 #include "base/text.hpp"
+#include "command_line/description.hpp"
 
 #include <CLI/CLI.hpp>
 
@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <cstdio>
 
-namespace arhost::base {
+namespace arhost::command_line {
 namespace {
 
 // Returns the choices of CLI::IsMember, whose description is "{a,b,c}".
@@ -126,7 +126,7 @@ CommandLine::CommandLine(const std::string &description, const std::string &name
     app_->get_formatter()->column_width(34);
     // The message quotes arguments, which might contain control characters for the terminal.
     app_->failure_message([](const CLI::App *, const CLI::Error &error) {
-        return printable(error.what()) + "\nRun with --help for more information.\n";
+        return base::printable(error.what()) + "\nRun with --help for more information.\n";
     });
 }
 
@@ -215,4 +215,4 @@ std::string CommandLine::help(const std::string &subcommand) const {
     return app_->get_formatter()->make_help(app, name, CLI::AppFormatMode::Normal);
 }
 
-} // namespace arhost::base
+} // namespace arhost::command_line
