@@ -19,7 +19,7 @@ struct Limits {
     std::chrono::milliseconds start{10'000}; // restarts with each progress report
     std::chrono::milliseconds frame{5'000};  // for each command
     std::chrono::milliseconds stop{30'000};  // restarts with each progress report
-    // Limits of start and stop despite progress reports.
+    // Limits of the whole start and the whole stop. Progress reports do not restart them.
     static constexpr int total_factor = 30; // configurations set this multiple of `start` and `stop`
     std::chrono::milliseconds start_total{total_factor * start}, stop_total{total_factor * stop};
     RestartLimits restart;

@@ -36,7 +36,7 @@ void override_outputs(yaml::Node &root, const ReplayArguments &replay) {
     root.override_text("outputs[0].path", replay.output, "--output");
 }
 
-// Sets the plugin of `component` and discards the settings of the recorded one that other plugins do not have.
+// Sets the plugin of `component`, and removes the settings that only apply to the previous plugin.
 void override_plugin(yaml::Node &root, const char *component, const std::string &plugin, const std::string &option) {
     if (plugin.empty())
         return;
@@ -120,7 +120,8 @@ bool is_option_of_stage(std::string_view path) {
     return skip(".options.") && path.find_first_of(".[") == std::string_view::npos;
 }
 
-// Lets the configuration of the recorded run, if `is_recorded`, or another one play the video of the session.
+// Changes a configuration so that it plays the video of the session. `is_recorded`: the
+// configuration is that of the recorded run.
 void play_video(yaml::Node &root, const Session &session, bool is_recorded) {
     for (const char *key : {"record", "snapshot", "stats", "timeline", "frames"})
         root.remove(key);

@@ -175,8 +175,9 @@ void Source::on_frame(Lease pixels, const Command &command, const Result &result
     flow.on_arrived(std::move(frame));
 }
 
-// Sets what the video of a session does not contain. If the recorded decisions are repeated, that includes the
-// results of the tracker, which may depend on frames that the recorded run has dropped.
+// Copies recorded data that the video of a session does not contain, such as the capture time. If the run repeats the
+// recorded decisions, also copies the results of the tracker: they may depend on frames that the recorded run
+// dropped.
 void Source::repeat_record(Frame &frame) const {
     const run_config::RecordedFrame &recorded = *frame.recorded;
     frame.record.clock = recorded.clock;

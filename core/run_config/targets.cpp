@@ -78,7 +78,7 @@ std::string parse_family(const yaml::Node &map) {
     return name;
 }
 
-// The name under which two names of a family are the same: AprilTag's families are also dictionaries of OpenCV, and
+// Returns the same name for families that share markers: AprilTag's families are also dictionaries of OpenCV, and
 // DICT_6X6_50 has the first markers of DICT_6X6_250.
 std::string canonical(const std::string &family) {
     constexpr std::string_view april_tag = "DICT_APRILTAG_";
@@ -421,8 +421,8 @@ std::vector<TargetMarker> parse_bundle(const yaml::Node &bundles, const std::str
                         "{id: 0, size: 0.08, x: 0, y: 0, z: 0, qw: 1, qx: 0, qy: 0, qz: 0}", warnings);
 }
 
-// Checks that the print of a target exists, and adds it to the files that the tracker may read. `owner` reports
-// errors.
+// Checks that `file`, the pattern or picture of a target, exists. Adds it to `files`, which the tracker may read.
+// Reports errors through `owner`.
 template <class Owner>
 std::string found_print(const fs::path &file, const Owner &owner, std::vector<fs::path> &files) {
     std::error_code ignored;

@@ -93,8 +93,8 @@ Linearized linearize(std::span<Pixel> pixels, const Model &model) {
     return sum;
 }
 
-// Removes the columns whose residuals are greater than those of most columns, and than `min_error`. Returns whether
-// there were any.
+// Removes outliers: columns whose RMS residual is greater than `min_error` and much greater than that of the median
+// column. Returns whether there were any.
 bool remove_outliers(std::vector<Pixel> &pixels, double min_error) {
     constexpr double max_ratio = 6; // of the mean squared residuals of a column and the median column
     struct Column {
@@ -116,15 +116,16 @@ bool remove_outliers(std::vector<Pixel> &pixels, double min_error) {
     return std::erase_if(pixels, [&](const Pixel &pixel) { return columns[pixel.column].mean_square() > bound; }) > 0;
 }
 
-// The contributions of the columns to the derivative of the cost by the offset.
+// Statistics of the derivative of the cost with respect to the offset. Each column contributes one term to it.
 struct Contributions {
     double squares = 0, independent = 0; // sum of their squares, and its expectation if the errors were independent
     double correlation = 0;              // of neighbouring columns
     double columns = 0;                  // their number
 
-    // By how much the variance of the offset is greater than if the errors of pixels were independent: the
-    // contributions are greater, because the errors within a column are similar, and those of columns resemble an
-    // autoregressive process of the first order. 1 if the correlation may be due to chance.
+    // Returns the variance of the offset, relative to that for independent errors of pixels. It is greater for two
+    // reasons. The errors within a column are similar, which makes the contributions greater. The contributions
+    // of successive columns resemble an autoregressive process of the first order. Returns 1 if the correlation may
+    // be chance.
     double variance_ratio() const {
         // Errors with a higher correlation vary so slowly along the edge that the fit mostly follows them.
         constexpr double min_deviations = 2, max_correlation = 0.7;
@@ -141,7 +142,7 @@ Contributions contributions(std::span<const Pixel> pixels) {
     int column = -2;
     for (auto first = pixels.begin(); first != pixels.end(); ++all.columns) {
         double sum = 0;
-        if (first->column != column + 1) // what hides the edge is between them
+        if (first->column != column + 1) // the columns between them are missing
             last = 0;
         for (column = first->column; first != pixels.end() && first->column == column; ++first) {
             sum += first->by_offset * first->residual;
@@ -210,8 +211,9 @@ LightLine light_line(std::span<const Pixel> pixels, const Model &model, double s
 // Lines of the areas before and after the edge.
 using LightLines = std::array<LightLine, 2>;
 
-// Changes the light of the pixels so that both areas have that of the model, and what is between them remains between
-// them. The light may be multiplied, by uneven illumination, or added to, by glare.
+// Removes the changes along the edge from the light of the pixels. Both areas then have the light of the model, and
+// values between the two areas stay between them. Works for factors (uneven illumination) and for added light
+// (glare).
 void remove(const LightLines &lines, const Model &model, std::span<Pixel> pixels) {
     for (Pixel &pixel : pixels) {
         const double before = lines[0].at(pixel.along_px), after = lines[1].at(pixel.along_px);
@@ -220,10 +222,10 @@ void remove(const LightLines &lines, const Model &model, std::span<Pixel> pixels
     }
 }
 
-// Minimizes the squared residuals by the method of Levenberg and Marquardt: edges that are sharper than pixels have
-// hardly any slope, so undamped steps may lead far away. `sum` is that of `model` and the pixels; afterwards, its
-// derivatives and the residuals of the pixels may be those beside the last, small step. Returns whether the fit has
-// converged near the line.
+// Minimizes the squared residuals by the method of Levenberg and Marquardt. Its damping is necessary for edges that
+// are sharper than pixels: they have hardly any slope, so undamped steps may lead far away. `sum` must be the result
+// of linearize() for `model`. Afterwards, its derivatives and the residuals of the pixels may belong to a model that
+// differs from `model` by a small step. Returns whether the fit has converged near the line.
 bool minimize(std::span<Pixel> pixels, double half_length_px, double max_blur_px, Model &model, Linearized &sum) {
     constexpr double first_damping = 1e-4, max_damping = 1e3; // relative
     constexpr double max_offset_px = 1, converged_px = 0.02, converged_light = 0.01;
@@ -283,13 +285,14 @@ struct Fit {
     LightLines lines;   // that remain
 };
 
-// Fits the model as fit_blurred_edge() describes it. `are_lines_removed`: from the light of the pixels, as a fit
-// before has told them.
+// Fits the model that fit_blurred_edge() describes. `are_lines_removed`: remove() has been called for the pixels,
+// with the lines that an earlier fit found.
 std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, double blur_px,
                              bool are_lines_removed) {
     constexpr double max_blur_ratio = 2,
                      min_variance = 1e-20; // not 0; of the light, relative to the squared contrast
-    // Of the contrast, before the fit and afterwards: a lens does not blur an edge exactly as the model does.
+    // A column can be an outlier only if its error, relative to the contrast, exceeds `min_first_error` before the
+    // fit or `min_error` after it. Smaller errors are normal, because a lens does not blur exactly as the model does.
     constexpr double min_first_error = 0.4, min_error = 0.06;
     constexpr int max_rounds = 10;
     const std::size_t min_pixels = std::max<std::size_t>(pixels.size() / 2, 4 * unknowns);
@@ -309,12 +312,12 @@ std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, d
         }
         const double variance = std::max(sum.cost / static_cast<double>(pixels.size() - unknowns),
                                          min_variance * model.contrast * model.contrast);
-        if (model.blur_px <= min_blur_px || model.blur_px >= max_blur_px) // it was no unknown
+        if (model.blur_px <= min_blur_px || model.blur_px >= max_blur_px) // the limit fixed the blur
             for (int i = 0; i < unknowns; ++i)
                 sum.normal(i, 2) = sum.normal(2, i) = i == 2 ? 1 : 0;
         const Normal inverse = sum.normal.inv(cv::DECOMP_CHOLESKY);
         Contributions columns = contributions(pixels);
-        if (columns.variance_ratio() > 1) { // the last step may be the reason
+        if (columns.variance_ratio() > 1) { // the residuals may be those of another model, see minimize()
             linearize(pixels, model);
             columns = contributions(pixels);
         }
@@ -322,7 +325,7 @@ std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, d
                 columns.variance_ratio() * variance * inverse,
                 columns.correlation,
                 {light_line(pixels, model, -1), light_line(pixels, model, 1)}};
-        if (are_lines_removed) { // an error of their slopes moves the edge
+        if (are_lines_removed) { // the removed slopes have errors, which move the edge
             const Vector gradient = linearize(pixels, model).gradient;
             for (const std::size_t side : {0U, 1U}) {
                 LightLines error;

@@ -43,7 +43,7 @@ struct Edge {
     std::vector<cv::Point2d> at_px, outward;
 };
 
-// All in steps along the normal, whose length depends on the size of the marker and on the blur.
+// In steps along the normal. The length of a step depends on the size of the marker and on the blur.
 constexpr int search = 9, half_baseline = 3, reach = search + half_baseline;
 
 // Returns how much the light rises over the baseline, outwards, times `sign`: one row for each position, one
@@ -67,7 +67,8 @@ cv::Mat_<float> rises(const Picture &picture, const Edge &edge, double step_px, 
     return result;
 }
 
-// Returns the sum of how much the light rises from so far inside to so far outside.
+// Returns how much the light rises from `distance_px` inside the edge to `distance_px` outside it, summed over the
+// positions.
 double rise_across(const Picture &picture, const Edge &edge, double distance_px) {
     double sum = 0;
     for (std::size_t i = 0; i < edge.at_px.size(); ++i) {
@@ -85,21 +86,25 @@ cv::Mat_<float> mean_of_rows(const cv::Mat_<float> &rises) {
     return mean;
 }
 
-// Neighbouring positions on an edge share pixels, and rows of rises that were averaged. This is the distance in px at
-// which positions get independent, if pixels are: the integral of the autocorrelation of bilinear samples.
+// The distance in px from which positions on an edge count as independent, if the noise of pixels is independent.
+// Closer positions share pixels. The value is the integral of the autocorrelation of bilinear samples.
 constexpr double correlation_px = 1.5;
 
-// The rises near an edge. `peak` and `at_rim` are the greatest mean rises at any offset and at the greatest offsets,
-// `on_line` is the mean at offset 0 with steps of the smallest size; `width_px` is the width of a slope of constant
-// rise that is as high, `noise` the standard deviation of a rise before averaging, relative to the peak, and
-// `averaged` the number of rows that each was averaged from.
+// The rises near an edge. The mean rise at an offset is the mean over all positions.
+// - `peak`: the greatest mean rise.
+// - `at_rim`: the greatest mean rise at the outermost offsets.
+// - `on_line`: the mean rise at offset 0, with steps of the smallest size.
+// - `width_px`: the width of a slope whose rise is `peak` everywhere and that has the same sum.
+// - `noise`: the standard deviation of a rise before reduce_noise(), relative to `peak`.
+// - `averaged`: the number of rows that reduce_noise() has averaged for each row.
 struct Slope {
     cv::Mat_<float> rises;
     double step_px, peak = 0, at_rim = 0, on_line = 0, width_px = 0, noise = 0;
     int averaged = 1;
 
-    // Standard deviation of the blur, including that by the averages over pixels. The baseline (a uniform
-    // distribution) and the interpolation (a triangular one) widen the slope, too.
+    // Returns the standard deviation of the blur. It includes the blur from pixels, which average light over squares.
+    // It excludes what else widens the slope: the baseline (a uniform distribution) and the interpolation (a
+    // triangular one).
     double blur_px() const {
         constexpr double min_blur_px = 0.3, interpolation_variance = 1.0 / 6;
         const double baseline_px = 2 * half_baseline * step_px;
@@ -111,7 +116,7 @@ struct Slope {
 
 constexpr std::size_t few_positions = 8, min_positions = 16, max_positions = 100; // on an edge
 
-constexpr double contained = 0.35; // greatest rise at the rim relative to the peak, if the slope ends before the rim
+constexpr double contained = 0.35; // if `at_rim` is below this part of `peak`, the slope ends before the rim
 
 // Doubles the steps, up to `max_step_px`, until they contain the whole slope, which blur widens.
 Slope find_slope(const Picture &picture, const Edge &edge, double min_step_px, double max_step_px, double sign) {
@@ -208,8 +213,9 @@ std::vector<cv::Point2f> most_collinear(const std::vector<cv::Point2f> &points, 
     return best;
 }
 
-// Fits a line without outliers. `sampled` is the number of positions at which an edge was searched. Returns
-// std::nullopt if fewer than half of them remain, or if half of these are further than `max_median_px` from the line.
+// Fits a line and leaves out outliers. `sampled` is the number of positions at which an edge was searched. Returns
+// std::nullopt if the points that remain are fewer than half of `sampled`, or if their median distance from the line
+// is `max_median_px` or more.
 std::optional<FittedEdge> fit_line_robustly(std::vector<cv::Point2f> points, std::size_t sampled,
                                             double max_median_px, double dependent) {
     constexpr double min_inlier_px = 0.3;
@@ -234,9 +240,9 @@ std::optional<FittedEdge> fit_line_robustly(std::vector<cv::Point2f> points, std
     }
 }
 
-// Returns `count` positions on the line between two corners in undistorted pixels, which are in clockwise order.
-// Keeps `margin_px` away from the corners, where the search would hit the adjacent edges. Returns std::nullopt if the
-// lens does not see the edge.
+// Returns `count` positions on the edge between two corners. The corners are in undistorted pixels and in clockwise
+// order. Keeps `margin_px` away from the corners, where the search would hit the adjacent edges. Returns std::nullopt
+// if the lens does not see the edge.
 std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &lens, double margin_px,
                                  std::size_t count) {
     const double length = cv::norm(to - from);
@@ -413,8 +419,8 @@ struct Square {
     }
     const cv::Point2d &next(std::size_t i) const { return corners[(i + 1) % 4]; }
 
-    // Moves the corners to the crossings of lines. Returns how far, or std::nullopt if one is now far from the rough
-    // one.
+    // Moves each corner to the crossing of its two lines. Returns the longest movement in px, or std::nullopt if a
+    // corner is now far from its rough position.
     std::optional<double> move_to(const std::array<FittedEdge, 4> &edges) {
         double moved_px = 0;
         for (std::size_t i = 0; i < 4; ++i) {
@@ -428,8 +434,9 @@ struct Square {
     }
 };
 
-// As refine_edges(). Searches the edges at no more than so many positions on each, and then fits them to the pixels.
-// Where that fails, the line of the search at max_positions remains, and imprecise corners are doubtful.
+// Implements refine_edges(). Searches each edge at up to `max_count` positions, then fits it to the pixels. If the
+// fit of an edge fails, returns std::nullopt for a `max_count` below max_positions; otherwise keeps the line that the
+// search found, and marks imprecise corners as doubtful.
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
                                        bool is_subpixel, std::size_t max_count) {
     constexpr int max_passes = 8, max_fits = 3;

@@ -40,7 +40,7 @@ struct Print {
 // 4 · Σ C(bits, k) / 2^bits, summed over k = 0 to `hamming`.
 double false_positive_rate(int bits, std::uint32_t hamming);
 
-// How well a marker was read: as arhost_observation has it.
+// How well a marker was read. The members have the same meaning as in arhost_observation.
 struct Decoding {
     std::uint32_t hamming = 0;
     double decision_margin = 0, false_positive_rate = 0;
@@ -59,7 +59,7 @@ cv::Mat_<std::uint8_t> unwarped(const cv::Mat &grey, const Corners &corners_px, 
 // AprilTag's name of a family: "tag36h11" for "DICT_APRILTAG_36h11". Other names remain as they are.
 std::string april_tag_name(std::string_view name);
 
-// A family in use. A setup that calls it by several names has it once.
+// A family in use. If a setup lists it under several names, there is still only one Family.
 struct Family {
     std::string name;                    // as april_tag_name() returns it
     std::uint32_t index;                 // of its first name in arhost_tracker_setup.families

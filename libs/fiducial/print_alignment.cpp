@@ -52,7 +52,8 @@ Homography px_from_cells(const cv::Vec<double, 8> &corners_px, const Print &prin
     return Homography(1, 0, origin.x, 0, 1, origin.y, 0, 0, 1) * relative;
 }
 
-// The smallest code of a pixel that may be brighter than its code tells; video compression turns some 255 into 254.
+// A pixel with this code or a higher one may be brighter than its code tells. Not 255, because video compression
+// turns some 255 into 254.
 constexpr std::uint8_t saturated = 254;
 
 // A pixel whose light the print determines.
@@ -60,7 +61,8 @@ struct Pixel {
     cv::Vec2d place; // undistorted
     double light;
     bool is_saturated;
-    // Of the model that was linearized last: the light of the pixel less its own, and how this changes with a motion.
+    // From the last call of linearize(): the light of the pixel minus that of the model, and how much the model's
+    // light changes if the print moves by 1 px.
     double residual = 0, change_per_px = 0;
 };
 
@@ -75,7 +77,7 @@ std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_co
     const int margin_px = 1 + static_cast<int>(std::max(part.width, part.height) * reach / 2);
     part = cv::Rect(part.x - margin_px, part.y - margin_px, part.width + 2 * margin_px, part.height + 2 * margin_px) &
            cv::Rect({}, grey.size());
-    // The print fills at least so much of its bounding box, or fewer pixels have to do.
+    // The part of its bounding box that the print is assumed to fill. If it fills less, fewer of its pixels are used.
     constexpr double min_filled = 0.1;
     const double area_px = std::max(cv::contourArea(points), part.area() * min_filled);
     const double stride = std::max(std::sqrt(area_px / max_pixels), 1.0);
@@ -164,8 +166,8 @@ public:
     }
 
 private:
-    // By differences of the fourth order (the mixed one is of the second): those of the second are up to 40 % too
-    // small for a blur of less than a sample, which large cells have, and the steps of the fit then too long.
+    // Uses differences of the fourth order, except for the mixed derivative. If the blur is less than a sample, as in
+    // large cells, differences of the second order are up to 40 % too small. The steps of the fit would be too long.
     void differentiate() {
         const auto first = static_cast<float>(per_cell_) / 12, second = first * static_cast<float>(per_cell_);
         for (int y = 0; y < white_.rows; ++y) {
@@ -228,11 +230,12 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
         }
         const cv::Vec2d cell(h[0] / h[2], h[1] / h[2]);
         Whiteness white = blurred.at(cell);
-        // A blur spreads as heat does: the whiteness changes with the variance of the blur by half of its Laplacian
-        // with respect to px. The table has the Laplacian of a linear map with the ellipse of the centre. Corrected
-        // to the first order of the perspective: the ellipse at this cell is another one (half of the difference
-        // times the second derivatives), the map is not linear (a shift of the whiteness), and the ellipse changes
-        // within the blur (a shift of its spread).
+        // A blur obeys the heat equation: the derivative of the whiteness with respect to the variance of the blur is
+        // half of its Laplacian in px. The table is for a linear map, with the blur's ellipse at the centre of the
+        // print. Three terms correct this to the first order of the perspective:
+        // - The ellipse at this cell differs: half of the difference times the second derivatives.
+        // - The map is not linear: a shift of the whiteness.
+        // - The ellipse changes within the blur: a shift of the spread.
         const double variance_px2 = model.blur_px * model.blur_px;
         const cv::Matx22d cells_per_px_here = derivative(to_cells, h),
                           ellipse_here = cells_per_px_here * cells_per_px_here.t();
@@ -303,8 +306,8 @@ double sum_of_squared_differences_from_mean(std::span<const Pixel> pixels) {
     return squares - sum * sum / static_cast<double>(pixels.size());
 }
 
-// Returns which pixels show the print: not those where something hides it or a highlight is, and not those that blur
-// mixes with them. `max_error`: of a pixel, relative to the contrast of the print.
+// Returns which pixels show the print. Others show a highlight or something that hides the print, or are so close to
+// these that blur mixes them. `max_error`: the maximum error of a pixel, relative to the contrast of the print.
 std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &light_of_code, const Model &model,
                           double max_error) {
     constexpr double max_deviations = 4, reach = 4; // standard deviations of the noise, of the blur
@@ -369,10 +372,10 @@ CornerMotions corner_motions(const cv::Vec<double, 8> &corners_px, const cv::Vec
     return motions;
 }
 
-// Returns the variance of independent noise of the coordinates for which the 95 % ellipsoid of the pose contains
-// noise with this covariance as often. Of the noise, only the part that `motions` span changes the pose: a sum of
-// squares with unequal variances, and so by Satterthwaite's approximation a scaled chi-squared with fewer degrees of
-// freedom.
+// Returns a variance that can replace `covariance` where the noise of the coordinates is taken as independent. The
+// 95 % ellipsoid of the pose that follows from it contains the true pose in 95 % of the cases. Only the part of the
+// noise that `motions` span changes the pose. The square of this part is a sum of squares with unequal variances.
+// Satterthwaite's approximation of its distribution is a scaled chi-squared one with fewer degrees of freedom.
 double equivalent_variance(const cv::Matx<double, 8, 8> &covariance, const CornerMotions &motions) {
     const auto projected = (motions.t() * motions).inv() * (motions.t() * covariance * motions);
     const double sum = cv::trace(projected), sum_of_squares = cv::trace(projected * projected);
@@ -537,7 +540,7 @@ private:
     Fit fit_;
 };
 
-// Whether the white at most of the edges is too bright for the camera, which shifts the edges into the black.
+// Returns whether white is saturated at most places beside the edges. This shifts the edges into the black.
 bool is_overexposed(const cv::Mat &grey, const Corners &corners_px, int cells) {
     const cv::Point2d centre = (corners_px[0] + corners_px[1] + corners_px[2] + corners_px[3]) / 4;
     const cv::Rect2d inside(0, 0, grey.cols - 1, grey.rows - 1);
@@ -622,7 +625,8 @@ std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transf
     const Print known = print();
     if (const auto found = align_print(grey, transfer, edges ? edges->corners_px : rough_px, lens, known))
         return is_better(*found) ? *found : *edges;
-    // A detector takes the end of what hides a corner for the corner. The others nearly tell where it is.
+    // If an object hides a corner, a detector takes the end of the object for the corner. The other three corners
+    // nearly tell where the hidden one is.
     const cv::Point2d skew_px = rough_px[0] - rough_px[1] + rough_px[2] - rough_px[3];
     const double diagonal_px = std::min(cv::norm(rough_px[2] - rough_px[0]), cv::norm(rough_px[3] - rough_px[1]));
     if ((is_unreliable || edges->is_doubtful) && cv::norm(skew_px) * cells > max_skew_cells * diagonal_px)

@@ -44,8 +44,8 @@ Point centre_of(const Canvas &canvas, const arhost_observation &marker) {
     return canvas.at({sum.x / 4, sum.y / 4});
 }
 
-// Draws the outline and a stroke that cuts the first corner and reaches further along the edge to the second one.
-// Returns the lowest corner.
+// Draws the outline, and a stroke that cuts off the first corner. The stroke ends on the two sides that meet there;
+// the end on the side to the second corner is farther from the first corner. Returns the lowest corner.
 Point draw_quad(const Canvas &canvas, const Corners &corners_px, Colour colour) {
     Point corners[4];
     for (int i = 0; i < 4; ++i)

@@ -75,7 +75,7 @@ private:
     std::unique_ptr<libusb_device_handle, CloseHandle> handle_;
 };
 
-// A camera that is connected, and what is known of it if it cannot be opened.
+// A connected camera. If it cannot be opened, `device` is absent, and the other members contain what is known.
 struct UsbDevice::Connected {
     std::string node, id; // "/dev/bus/usb/001/004", "046d:0825"
     std::string product, serial;
