@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The AprilTag library: its families and its detector.
+// Accesses the AprilTag library: its tag families and its detector.
 #pragma once
 
 #include "observations.hpp"
@@ -30,9 +30,9 @@ struct FamilyType {
     const char *name;
     apriltag_family_t *(*create)();
     void (*destroy)(apriltag_family_t *);
-    // The largest number of bit errors, at most 2, with which fewer than 2 in 10,000 squares of random bits match one
-    // of the family's tags: 4 · tags · Σ C(bits, k) / 2^bits, summed over k = 0 to the number of errors. For tag16h5,
-    // even without errors it is 2 in 1,000.
+    // The largest number of bit errors, at most 2, with which fewer than 2 in 10,000 squares of random bits match any
+    // tag of the family. The expected share of such squares is 4 · tags · Σ C(bits, k) / 2^bits, summed over k = 0 to
+    // the number of errors. For tag16h5, it is 2 in 1,000 even without errors, so its value is 0.
     int default_max_hamming = 2;
 };
 
@@ -48,7 +48,7 @@ inline constexpr std::array family_types{
     FamilyType{"tagStandard52h13", tagStandard52h13_create, tagStandard52h13_destroy},
 };
 
-// `index`: of the tag in the family's table.
+// `index`: the index of the tag in the family's table.
 inline fiducial::Print print_of(apriltag_family_t &family, int index) {
     image_u8_t *drawn = apriltag_to_image(&family, static_cast<std::uint32_t>(index));
     fiducial::Print print{{}, (family.total_width - family.width_at_border) / 2};
@@ -58,7 +58,7 @@ inline fiducial::Print print_of(apriltag_family_t &family, int index) {
     return print;
 }
 
-// A copy of a family that has only some of its tags.
+// A copy of a family that contains only some of the family's tags.
 class PartOfFamily {
 public:
     PartOfFamily(const FamilyType &type, const std::function<bool(int id)> &contains)
@@ -80,7 +80,7 @@ public:
 
     const FamilyType &type() const { return type_; }
     apriltag_family_t *tags() const { return tags_; }
-    int id(int index) const { return ids_[index]; } // of the tag that the library numbers so
+    int id(int index) const { return ids_[index]; } // `index`: the index that the library reports
 
 private:
     const FamilyType &type_;
@@ -92,7 +92,8 @@ private:
 
 using Detector = std::unique_ptr<apriltag_detector_t, decltype(&apriltag_detector_destroy)>;
 
-// The library reads out of bounds in images smaller than one of its 4×4 px tiles, so these have no tags.
+// In images smaller than one of its 4×4 px tiles, the library reads out of bounds. Smaller images are therefore not
+// searched.
 inline int min_image_side_px(const apriltag_detector_t &detector) {
     return static_cast<int>(8 * detector.quad_decimate);
 }
@@ -103,7 +104,7 @@ inline bool detect(apriltag_detector_t &detector, const cv::Mat &grey,
     if (std::min(grey.cols, grey.rows) < min_image_side_px(detector))
         return false;
     cv::Mat pixels = grey;
-    if (detector.quad_sigma != 0 && detector.quad_decimate == 1) // the library would blur `grey` in place
+    if (detector.quad_sigma != 0 && detector.quad_decimate == 1) // otherwise the library would blur `grey` in place
         pixels = grey.clone();
     image_u8_t image{pixels.cols, pixels.rows, static_cast<int>(pixels.step), pixels.data};
     const std::unique_ptr<zarray_t, decltype(&apriltag_detections_destroy)> tags(
@@ -116,8 +117,8 @@ inline bool detect(apriltag_detector_t &detector, const cv::Mat &grey,
     return tags != nullptr; // null if no thread could be started
 }
 
-// AprilTag's corners begin at the bottom left and are counter-clockwise; pixel centres are at +0.5. `scale`: of the
-// picture that was searched, relative to the one whose pixels are returned.
+// AprilTag's corners begin at the bottom left and are counter-clockwise; its pixel centres are at +0.5. `scale`: the
+// size of the searched picture divided by the size of the frame, in whose pixels the corners are returned.
 inline fiducial::Corners corners_of(const apriltag_detection_t &tag, double scale = 1) {
     fiducial::Corners corners_px;
     for (int i = 0; i < 4; ++i)

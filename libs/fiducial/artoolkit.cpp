@@ -17,7 +17,7 @@ std::uint32_t plain(std::uint32_t id) {
     return id;
 }
 
-// The highest bit makes the number of ones even.
+// Prepends a parity bit, which makes the number of ones even.
 std::uint32_t parity65(std::uint32_t id) {
     return id | (static_cast<std::uint32_t>(std::popcount(id)) & 1) << 5;
 }
@@ -26,7 +26,8 @@ std::uint32_t hamming63(std::uint32_t id) {
     return (id & 1 ? 0b000111U : 0) ^ (id & 2 ? 0b011001U : 0) ^ (id & 4 ? 0b101010U : 0);
 }
 
-// Shortened BCH codes: the id, and then the remainder of its division by the generator polynomial.
+// Shortened BCH codes: the word is the id, followed by the remainder of the id's division by the generator
+// polynomial.
 template <std::uint32_t generator> std::uint32_t bch(std::uint32_t id) {
     constexpr int degree = std::bit_width(generator) - 1;
     const std::uint32_t dividend = id << degree;
@@ -50,7 +51,7 @@ constexpr std::array families{
 };
 
 enum class Cell { black, white, bit };
-constexpr int fixed_cells = 3; // in the corners
+constexpr int fixed_cells = 3; // the three cells in the corners that show the orientation
 
 Cell cell_at(int row, int column, int side) {
     if (column == 0 && (row == 0 || row == side - 1))
@@ -100,7 +101,8 @@ std::vector<int> numbers_in(const std::string &file) {
 std::optional<std::int32_t> matrix_id(const MatrixFamily &family, std::uint32_t word) {
     const auto is_of = [&](std::uint32_t id) { return family.word(id) == word; };
     const auto count = static_cast<std::uint32_t>(family.id_count);
-    if (word < count && is_of(word)) // all words of a family without check bits, which may have millions
+    // Handles all words of families without check bits, which may have millions of words.
+    if (word < count && is_of(word))
         return static_cast<std::int32_t>(word);
     for (std::uint32_t id = 0; id < count; ++id)
         if (is_of(id))
@@ -158,7 +160,7 @@ cv::Mat_<float> read_pattern(const std::string &file) {
                "is not a pattern of ARToolKit: it has " + std::to_string(numbers.size()) +
                    " numbers; a pattern of 16 x 16 has 3072: four orientations of three colours; if the file is cut "
                    "short, copy it again");
-    // The first orientation is the upright one. The others are the same picture, rotated.
+    // The file has the upright picture first. The other three orientations are rotated copies of it.
     cv::Mat_<float> upright(side, side, 0.0F);
     constexpr float weights[planes] = {0.114F, 0.587F, 0.299F}; // luma of BT.601, as in frames
     const int size = side * side;

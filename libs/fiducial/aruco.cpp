@@ -11,7 +11,8 @@ namespace {
 using fiducial::Corners;
 using fiducial::unwarped;
 
-// Whether the cells of a marker are uniform around their centres: on the side of the threshold that `white` tells.
+// Returns whether the middle of each cell is uniform: whether it lies on the side of the threshold that `white`
+// states.
 bool is_uniform(const cv::Mat &grey, const Corners &corners_px, const cv::Mat_<std::uint8_t> &white,
                 double threshold) {
     const cv::Mat_<std::uint8_t> samples = unwarped(grey, corners_px, 4 * white.rows);
@@ -32,7 +33,8 @@ double default_correction_rate(const cv::aruco::Dictionary &dictionary) {
     if (size > 6 || dictionary.maxCorrectionBits <= 0)
         return rate;
     const int errors = size <= 4 ? 0 : size == 5 ? 1 : 3;
-    return std::min(rate, (errors + 0.5) / dictionary.maxCorrectionBits); // OpenCV rounds the product down
+    // Adds 0.5, because OpenCV rounds the product down.
+    return std::min(rate, (errors + 0.5) / dictionary.maxCorrectionBits);
 }
 
 Reading read(const cv::Mat &grey, const Corners &corners_px, const cv::aruco::Dictionary &dictionary, int id,
@@ -52,7 +54,7 @@ Reading read(const cv::Mat &grey, const Corners &corners_px, const cv::aruco::Di
                     cv::countNonZero(unlike_border) == cv::countNonZero(unlike_border(code)),
                     (white_level - black_level) / 2, 0};
     reading.false_positive_rate = fiducial::false_positive_rate(bits, reading.wrong_bits);
-    // Squares in clutter often read as a code of 4×4 bits, but most of their cells are not uniform.
+    // Squares in clutter often match a code of 4×4 bits, but most cells of such squares are not uniform.
     if (bits <= 16) {
         cv::Mat_<std::uint8_t> expected(cells, cells, is_inverted ? 1 : 0); // the border
         white(code).copyTo(expected(code));

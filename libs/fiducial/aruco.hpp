@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// OpenCV's ArUco markers: a common interface to its detector, which is in a contrib module up to OpenCV 4.6 and in
-// objdetect from 4.7, the predefined dictionaries, and a reader of the bits of a marker.
+// OpenCV's ArUco markers. Provides a common interface to the detector, which is in a contrib module up to OpenCV 4.6
+// and in objdetect from 4.7. Also provides the predefined dictionaries and a reader of a marker's bits.
 #pragma once
 
 #include "observations.hpp"
@@ -30,7 +30,7 @@ using PredefinedDictionary = cv::aruco::PREDEFINED_DICTIONARY_NAME;
 struct DetectedMarkers {
     std::vector<int> ids;
     std::vector<std::vector<cv::Point2f>> corners;
-    std::vector<std::vector<cv::Point2f>> rejected; // quadrilaterals that are none of the dictionary's markers
+    std::vector<std::vector<cv::Point2f>> rejected; // quadrilaterals that match no marker of the dictionary
 };
 
 inline cv::aruco::Dictionary predefined(PredefinedDictionary name) {
@@ -76,15 +76,16 @@ struct DictionaryType {
     const char *option;
     PredefinedDictionary name;
     const char *family; // reported name: AprilTag's name for its families, otherwise the name in the option
-    // Number of bit errors that an AprilTag family can correct, which OpenCV's tables lack; 0: not an AprilTag
-    // family.
+    // Number of bit errors that an AprilTag family can correct, because OpenCV's tables lack it. 0 if the dictionary
+    // is not an AprilTag family.
     int april_tag_bits = 0;
 
     // OpenCV's AprilTag dictionaries are rotated by 180° relative to AprilTag's own library.
     constexpr bool is_april_tag() const { return april_tag_bits > 0; }
 
-    // Whether it is this dictionary or one of the same size of markers, of which the larger begins with the smaller:
-    // "DICT_4X4_1000" and "DICT_4X4_50".
+    // Returns whether `other` is this dictionary or another one of the same series, such as "DICT_4X4_1000" and
+    // "DICT_4X4_50". The dictionaries of a series have markers of the same size, and a larger dictionary begins with
+    // the markers of a smaller one.
     constexpr bool is_of_series(std::string_view other) const {
         constexpr std::size_t length = std::string_view("DICT_4X4_").size();
         const std::string_view own = family;
@@ -111,20 +112,22 @@ inline constexpr std::array dictionary_types {
 #undef ARHOST_DICTIONARY
 };
 
-// Returns DetectorParameters::errorCorrectionRate. The more errors are corrected, the more squares of random bits are
-// taken for markers: with 50 markers of 4×4 bits, 3 of 1,000 without any error and 5 of 100 with one; with 50 of 5×5
-// bits, 2 of 10,000 with one error; with 50 of 6×6 bits, 2 of 100,000 with three.
+// Returns DetectorParameters::errorCorrectionRate. The more bit errors are corrected, the more squares of random bits
+// are mistaken for markers. For a dictionary of 50 markers, these shares are:
+// - 4×4 bits: 3 in 1,000 without errors, 5 in 100 with one error
+// - 5×5 bits: 2 in 10,000 with one error
+// - 6×6 bits: 2 in 100,000 with three errors
 double default_correction_rate(const cv::aruco::Dictionary &dictionary);
 
 struct Reading {
     std::uint32_t wrong_bits;
-    bool has_whole_border;      // each of its cells is black, or white if the marker is inverted
-    double contrast;            // half of the difference between the mean grey levels of white and of black cells
-    double false_positive_rate; // as arhost_observation has it
+    bool has_whole_border;      // whether each cell of the border is black, or white if the marker is inverted
+    double contrast;            // half of the difference between the mean grey levels of white and black cells
+    double false_positive_rate; // see arhost_observation
 };
 
-// Reads the bits once more, because OpenCV does not tell how many of them it has corrected.
-// `is_oriented`: the corners begin at the top left of the drawn marker; otherwise at any of its corners.
+// Reads the bits again, because OpenCV does not report how many bits it has corrected. `is_oriented`: whether the
+// first corner is the top left one of the upright marker; otherwise it may be any corner.
 Reading read(const cv::Mat &grey, const fiducial::Corners &corners_px, const cv::aruco::Dictionary &dictionary,
              int id, int border_bits, bool is_oriented);
 

@@ -17,9 +17,9 @@ struct Step {
     double value, slope;
 };
 
-// The distribution function of the standard normal distribution and its derivative: a blurred step from 0 to 1.
-// Interpolated by cubic polynomials, which takes a fifth of the time of std::erf and std::exp; the errors are below
-// 1e-7 and 1e-5.
+// The distribution function of the standard normal distribution, and its derivative. The function is the profile of a
+// blurred step from 0 to 1. Both are interpolated by cubic polynomials, which takes a fifth of the time of std::erf
+// and std::exp. The errors are below 1e-7 and 1e-5, respectively.
 class BlurredStep {
 public:
     BlurredStep() {
@@ -43,19 +43,20 @@ public:
 
 private:
     static constexpr int per_unit = 16, limit = 6;
-    static constexpr int count = 2 * limit * per_unit + 2; // one more, because a sum may be rounded to 2 * limit
-    std::array<Step, count> nodes_;                        // slopes: per interval
+    // One node more than necessary, because rounding may yield 2 * limit.
+    static constexpr int count = 2 * limit * per_unit + 2;
+    std::array<Step, count> nodes_; // slopes are per interval
 };
 
 struct Pixel : EdgePixel {
-    double residual = 0, by_offset = 0; // of the light, and its derivative
+    double residual = 0, by_offset = 0; // of the light, and the light's derivative with respect to the offset
 };
 
 struct Model {
     double offset_px = 0, turn = 0, blur_px = 0; // the edge is at offset_px + turn * along_px
     double before = 0, contrast = 0;
 };
-constexpr int unknowns = 5; // in this order
+constexpr int unknowns = 5; // in the order of the members of Model
 constexpr double min_blur_px = 0.25;
 using Normal = cv::Matx<double, unknowns, unknowns>;
 using Vector = cv::Vec<double, unknowns>;
@@ -93,10 +94,10 @@ Linearized linearize(std::span<Pixel> pixels, const Model &model) {
     return sum;
 }
 
-// Removes outliers: columns whose RMS residual is greater than `min_error` and much greater than that of the median
-// column. Returns whether there were any.
+// Removes outliers. A column is an outlier if its RMS residual is greater than `min_error` and much greater than the
+// RMS residual of the median column. Returns whether there were any outliers.
 bool remove_outliers(std::vector<Pixel> &pixels, double min_error) {
-    constexpr double max_ratio = 6; // of the mean squared residuals of a column and the median column
+    constexpr double max_ratio = 6; // mean squared residual of a column divided by that of the median column
     struct Column {
         double squares = 0;
         int pixels = 0;
@@ -118,16 +119,17 @@ bool remove_outliers(std::vector<Pixel> &pixels, double min_error) {
 
 // Statistics of the derivative of the cost with respect to the offset. Each column contributes one term to it.
 struct Contributions {
-    double squares = 0, independent = 0; // sum of their squares, and its expectation if the errors were independent
-    double correlation = 0;              // of neighbouring columns
-    double columns = 0;                  // their number
+    double squares = 0, independent = 0; // sum of the squared terms, and its expected value for independent errors
+    double correlation = 0;              // between the terms of neighbouring columns
+    double columns = 0;                  // number of columns
 
-    // Returns the variance of the offset, relative to that for independent errors of pixels. It is greater for two
-    // reasons. The errors within a column are similar, which makes the contributions greater. The contributions
-    // of successive columns resemble an autoregressive process of the first order. Returns 1 if the correlation may
-    // be chance.
+    // Returns the variance of the offset, divided by the variance that independent pixel errors would cause. The
+    // ratio exceeds 1 for two reasons. The errors within a column are similar, which makes the terms larger. The
+    // terms of successive columns resemble a first-order autoregressive process. Returns 1 if the correlation may be
+    // due to chance.
     double variance_ratio() const {
-        // Errors with a higher correlation vary so slowly along the edge that the fit mostly follows them.
+        // Limits the correlation, because errors with a higher one vary so slowly along the edge that the fit mostly
+        // follows them.
         constexpr double min_deviations = 2, max_correlation = 0.7;
         if (!(correlation * std::sqrt(columns) > min_deviations))
             return 1;
@@ -142,7 +144,7 @@ Contributions contributions(std::span<const Pixel> pixels) {
     int column = -2;
     for (auto first = pixels.begin(); first != pixels.end(); ++all.columns) {
         double sum = 0;
-        if (first->column != column + 1) // the columns between them are missing
+        if (first->column != column + 1) // columns were skipped
             last = 0;
         for (column = first->column; first != pixels.end() && first->column == column; ++first) {
             sum += first->by_offset * first->residual;
@@ -158,7 +160,7 @@ Contributions contributions(std::span<const Pixel> pixels) {
     return all;
 }
 
-// Where to start: most pixels beside the slope show the light of the two areas.
+// Returns the initial model. Most pixels are away from the slope, so they show the light of one of the two areas.
 Model first_model(std::span<const Pixel> pixels, double blur_px) {
     const auto median_light = [&](double sign) {
         std::vector<double> light;
@@ -171,25 +173,26 @@ Model first_model(std::span<const Pixel> pixels, double blur_px) {
     return {0, 0, blur_px, before, after - before};
 }
 
-// How the light of an area differs from that of the model: by offset + slope_per_px * along_px.
+// Deviation of an area's light from the model: offset + slope_per_px * along_px.
 struct LightLine {
     double offset = 0, slope_per_px = 0, slope_variance = 0;
 
-    // `light`: of the bright area.
+    // `light`: the light of the bright area.
     bool is_clear(double half_length_px, double light) const {
-        constexpr double min_change = 0.002;   // of the light, from the middle to an end
-        constexpr double min_deviations = 3.5; // standard deviations; fewer would often be chance
+        constexpr double min_change = 0.002;   // relative to `light`, from the middle to an end of the edge
+        constexpr double min_deviations = 3.5; // standard deviations; smaller deviations would often be due to chance
         return std::abs(slope_per_px) * half_length_px > min_change * light &&
                slope_per_px * slope_per_px > min_deviations * min_deviations * slope_variance;
     }
     double at(double along_px) const { return offset + slope_per_px * along_px; }
 };
 
-// Fits a line to the residuals of the area before the edge (`side` is -1) or after it (+1), so far from the edge that
-// they do not depend on its direction. Returns a line of 0 if there are few pixels.
+// Fits a line to the residuals of the area before the edge (`side` is -1) or after it (+1). Uses only pixels that are
+// so far from the edge that their residuals do not depend on the edge's direction. Returns a line of 0 if there are
+// few such pixels.
 LightLine light_line(std::span<const Pixel> pixels, const Model &model, double side) {
     constexpr double min_pixels = 10;
-    // A pixel and its interpolated neighbours, of a renderer or of a Bayer pattern, reach 1.2 px.
+    // Interpolation by a renderer or of a Bayer pattern affects pixels up to 1.2 px from the edge.
     const double min_distance_px = std::max(2 * model.blur_px, 1.2);
     double count = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
     for (const Pixel &pixel : pixels)
@@ -208,12 +211,12 @@ LightLine light_line(std::span<const Pixel> pixels, const Model &model, double s
     return {(y - slope * x) / count, slope, std::max(yy - slope * xy, 0.0) / (count - 2) / xx};
 }
 
-// Lines of the areas before and after the edge.
+// The lines of the areas before and after the edge.
 using LightLines = std::array<LightLine, 2>;
 
-// Removes the changes along the edge from the light of the pixels. Both areas then have the light of the model, and
-// values between the two areas stay between them. Works for factors (uneven illumination) and for added light
-// (glare).
+// Removes the changes along the edge from the light of the pixels, so that both areas have the light of the model.
+// Values between the lights of the two areas stay between them. Works for factors (uneven illumination) and for added
+// light (glare).
 void remove(const LightLines &lines, const Model &model, std::span<Pixel> pixels) {
     for (Pixel &pixel : pixels) {
         const double before = lines[0].at(pixel.along_px), after = lines[1].at(pixel.along_px);
@@ -222,10 +225,10 @@ void remove(const LightLines &lines, const Model &model, std::span<Pixel> pixels
     }
 }
 
-// Minimizes the squared residuals by the method of Levenberg and Marquardt. Its damping is necessary for edges that
-// are sharper than pixels: they have hardly any slope, so undamped steps may lead far away. `sum` must be the result
-// of linearize() for `model`. Afterwards, its derivatives and the residuals of the pixels may belong to a model that
-// differs from `model` by a small step. Returns whether the fit has converged near the line.
+// Minimizes the squared residuals by the method of Levenberg and Marquardt. Damping is necessary for edges that are
+// sharper than a pixel: almost no pixel lies on their slope, so undamped steps may be far too long. `sum` must be the
+// result of linearize() for `model`. After the call, the derivatives in `sum` and the residuals of the pixels may
+// belong to a model that differs from `model` by a small step. Returns whether the fit has converged near the line.
 bool minimize(std::span<Pixel> pixels, double half_length_px, double max_blur_px, Model &model, Linearized &sum) {
     constexpr double first_damping = 1e-4, max_damping = 1e3; // relative
     constexpr double max_offset_px = 1, converged_px = 0.02, converged_light = 0.01;
@@ -255,14 +258,15 @@ bool minimize(std::span<Pixel> pixels, double half_length_px, double max_blur_px
             damping *= 10;
             continue;
         }
-        // Strong damping would make any step small.
+        // Requires weak damping, because strong damping makes every step small.
         const bool is_converged =
             damping <= 1 &&
             std::abs(change[0]) + half_length_px * std::abs(change[1]) + std::abs(change[2]) < converged_px &&
             std::abs(change[3]) + std::abs(change[4]) < converged_light * std::abs(model.contrast);
         if (is_converged && damping <= first_damping) { // hardly damped
             model = next;
-            sum.cost += change.dot(sum.normal * change) - 2 * change.dot(sum.gradient); // as the derivatives tell
+            // The cost that the derivatives predict.
+            sum.cost += change.dot(sum.normal * change) - 2 * change.dot(sum.gradient);
             return true;
         }
         const Linearized candidate = linearize(pixels, next);
@@ -281,16 +285,16 @@ bool minimize(std::span<Pixel> pixels, double half_length_px, double max_blur_px
 struct Fit {
     Model model;
     Normal covariance;
-    double correlation; // as BlurredEdge has it
-    LightLines lines;   // that remain
+    double correlation; // see BlurredEdge
+    LightLines lines;   // changes along the edge that are still in the light
 };
 
-// Fits the model that fit_blurred_edge() describes. `are_lines_removed`: remove() has been called for the pixels,
-// with the lines that an earlier fit found.
+// Fits the model that fit_blurred_edge() describes. `are_lines_removed`: whether remove() has been called for the
+// pixels, with the lines of an earlier fit.
 std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, double blur_px,
                              bool are_lines_removed) {
     constexpr double max_blur_ratio = 2,
-                     min_variance = 1e-20; // not 0; of the light, relative to the squared contrast
+                     min_variance = 1e-20; // greater than 0; variance of the light, relative to the squared contrast
     // A column can be an outlier only if its error, relative to the contrast, exceeds `min_first_error` before the
     // fit or `min_error` after it. Smaller errors are normal, because a lens does not blur exactly as the model does.
     constexpr double min_first_error = 0.4, min_error = 0.06;
@@ -317,7 +321,8 @@ std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, d
                 sum.normal(i, 2) = sum.normal(2, i) = i == 2 ? 1 : 0;
         const Normal inverse = sum.normal.inv(cv::DECOMP_CHOLESKY);
         Contributions columns = contributions(pixels);
-        if (columns.variance_ratio() > 1) { // the residuals may be those of another model, see minimize()
+        // The residuals in `pixels` may be those of a slightly different model, see minimize().
+        if (columns.variance_ratio() > 1) {
             linearize(pixels, model);
             columns = contributions(pixels);
         }
@@ -325,7 +330,7 @@ std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, d
                 columns.variance_ratio() * variance * inverse,
                 columns.correlation,
                 {light_line(pixels, model, -1), light_line(pixels, model, 1)}};
-        if (are_lines_removed) { // the removed slopes have errors, which move the edge
+        if (are_lines_removed) { // the errors of the removed slopes move the edge
             const Vector gradient = linearize(pixels, model).gradient;
             for (const std::size_t side : {0U, 1U}) {
                 LightLines error;
@@ -345,7 +350,7 @@ std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, d
 
 std::optional<BlurredEdge> fit_blurred_edge(std::span<const EdgePixel> edge_pixels, double blur_px) {
     constexpr int max_fits = 5;
-    constexpr double max_change = 0.6; // of the contrast, from the middle to an end
+    constexpr double max_change = 0.6; // relative to the contrast, from the middle to an end of the edge
     std::vector<Pixel> pixels;
     pixels.reserve(edge_pixels.size());
     double half_length_px = 0;
@@ -369,7 +374,7 @@ std::optional<BlurredEdge> fit_blurred_edge(std::span<const EdgePixel> edge_pixe
                                covariance(1, 1), model.blur_px,
                                fit->correlation};
         }
-        const double change = fit->lines[1].slope_per_px - fit->lines[0].slope_per_px; // of the contrast
+        const double change = fit->lines[1].slope_per_px - fit->lines[0].slope_per_px; // relative to the contrast
         if (!(std::abs(change) * half_length_px < max_change * std::abs(model.contrast)))
             return std::nullopt;
         is_uneven = true;

@@ -24,7 +24,7 @@ struct Picture {
     const cv::Mat &grey;
     const LightOfCode &light;
 
-    // Whether light_at() can interpolate there; false for NaN.
+    // Returns whether light_at() can interpolate at this point; false for NaN.
     bool contains(cv::Point2d at) const {
         return at.x >= 0 && at.y >= 0 && at.x < grey.cols - 1 && at.y < grey.rows - 1;
     }
@@ -43,7 +43,8 @@ struct Edge {
     std::vector<cv::Point2d> at_px, outward;
 };
 
-// In steps along the normal. The length of a step depends on the size of the marker and on the blur.
+// The constants are in steps along the normal. The length of a step depends on the size of the marker and on the
+// blur.
 constexpr int search = 9, half_baseline = 3, reach = search + half_baseline;
 
 // Returns how much the light rises over the baseline, outwards, times `sign`: one row for each position, one
@@ -93,17 +94,17 @@ constexpr double correlation_px = 1.5;
 // The rises near an edge. The mean rise at an offset is the mean over all positions.
 // - `peak`: the greatest mean rise.
 // - `at_rim`: the greatest mean rise at the outermost offsets.
-// - `on_line`: the mean rise at offset 0, with steps of the smallest size.
-// - `width_px`: the width of a slope whose rise is `peak` everywhere and that has the same sum.
+// - `on_line`: the mean rise at offset 0 with the smallest step.
+// - `width_px`: the width of a slope with the same sum whose rise is `peak` everywhere.
 // - `noise`: the standard deviation of a rise before reduce_noise(), relative to `peak`.
-// - `averaged`: the number of rows that reduce_noise() has averaged for each row.
+// - `averaged`: the number of rows that reduce_noise() averages to obtain one row.
 struct Slope {
     cv::Mat_<float> rises;
     double step_px, peak = 0, at_rim = 0, on_line = 0, width_px = 0, noise = 0;
     int averaged = 1;
 
-    // Returns the standard deviation of the blur. It includes the blur from pixels, which average light over squares.
-    // It excludes what else widens the slope: the baseline (a uniform distribution) and the interpolation (a
+    // Returns the standard deviation of the blur. It includes the averaging of light over square pixels. It excludes
+    // two other causes that widen the slope: the baseline (a uniform distribution) and the interpolation (a
     // triangular one).
     double blur_px() const {
         constexpr double min_blur_px = 0.3, interpolation_variance = 1.0 / 6;
@@ -114,11 +115,11 @@ struct Slope {
     }
 };
 
-constexpr std::size_t few_positions = 8, min_positions = 16, max_positions = 100; // on an edge
+constexpr std::size_t few_positions = 8, min_positions = 16, max_positions = 100; // per edge
 
-constexpr double contained = 0.35; // if `at_rim` is below this part of `peak`, the slope ends before the rim
+constexpr double contained = 0.35; // if `at_rim` divided by `peak` is below this value, the slope ends before the rim
 
-// Doubles the steps, up to `max_step_px`, until they contain the whole slope, which blur widens.
+// Doubles the step, up to `max_step_px`, until the search range contains the whole slope, which blur widens.
 Slope find_slope(const Picture &picture, const Edge &edge, double min_step_px, double max_step_px, double sign) {
     constexpr int rim = 3; // columns
     Slope slope{{}, min_step_px};
@@ -139,11 +140,12 @@ Slope find_slope(const Picture &picture, const Edge &edge, double min_step_px, d
 // Averages the rises of neighbouring positions until their noise is small relative to the slope. Sets `noise`.
 void reduce_noise(Slope &slope) {
     constexpr double max_noise = 0.08; // relative to the peak
-    std::vector<float> steps; // differences between neighbours contain little of the picture, but all the noise
+    // Differences between neighbouring rises contain all the noise, but little of the picture.
+    std::vector<float> steps;
     for (int row = 1; row < slope.rises.rows; ++row)
         for (int column = 0; column < slope.rises.cols; column += half_baseline)
             steps.push_back(std::abs(slope.rises(row, column) - slope.rises(row - 1, column)));
-    const double noise = 1.05 * median(steps); // standard deviation of a rise, if it is normally distributed
+    const double noise = 1.05 * median(steps); // standard deviation of a rise, if rises are normally distributed
     const double ratio = noise / (max_noise * slope.peak);
     const int averaged = static_cast<int>(std::min(ratio * ratio, slope.rises.rows / 4.0));
     if (averaged > 2) {
@@ -153,8 +155,8 @@ void reduce_noise(Slope &slope) {
     slope.noise = noise / slope.peak;
 }
 
-// Returns the offset of the edge in px: the mean offset weighted by the square of the rise above `min_rise`. Returns
-// std::nullopt if no rise is above it.
+// Returns the offset of the edge in px: the mean of the offsets, weighted by the square of how much the rise exceeds
+// `min_rise`. Returns std::nullopt if no rise exceeds it.
 std::optional<double> edge_offset_px(const Slope &slope, int row, double min_rise) {
     double weighted = 0, weights = 0;
     for (int i = -search; i <= search; ++i)
@@ -166,18 +168,18 @@ std::optional<double> edge_offset_px(const Slope &slope, int row, double min_ris
 }
 
 struct FittedEdge {
-    Line line; // `point`: where the errors of the offset and of the direction are independent
+    Line line;                             // the errors of offset and direction are independent at `point`
     double offset_variance, turn_variance; // px², rad²
-    double blur_px, correlation;           // as BlurredEdge has them
+    double blur_px, correlation;           // see BlurredEdge
 
-    // Variance of the distance between the line and the true one, beside `at`.
+    // Returns the variance of the distance between the fitted line and the true line beside `at`.
     double variance_at(cv::Point2d at) const {
         const double along_px = line.direction.dot(at - line.point);
         return offset_variance + along_px * along_px * turn_variance;
     }
 };
 
-// `dependent`: the number of neighbouring points whose errors are the same.
+// `dependent`: the number of neighbouring points that have the same error.
 FittedEdge fit_line(const std::vector<cv::Point2f> &points, double dependent) {
     cv::Vec4f fitted;
     cv::fitLine(points, fitted, cv::DIST_L2, 0, 0, 0);
@@ -195,9 +197,10 @@ FittedEdge fit_line(const std::vector<cv::Point2f> &points, double dependent) {
     return edge;
 }
 
-// Returns the points that are closer than `tolerance_px` to the line through two of the points that has most of them.
+// Tries lines through two points, and returns the points closer than `tolerance_px` to the line with most such
+// points.
 std::vector<cv::Point2f> most_collinear(const std::vector<cv::Point2f> &points, double tolerance_px) {
-    constexpr std::size_t ends = 16; // the number of points that are tried as ends of the line
+    constexpr std::size_t ends = 16; // number of points that are tried as an end of the line
     const std::size_t stride = std::max<std::size_t>(points.size() / ends, 1);
     std::vector<cv::Point2f> best, near;
     for (std::size_t i = 0; i < points.size(); i += stride)
@@ -213,8 +216,8 @@ std::vector<cv::Point2f> most_collinear(const std::vector<cv::Point2f> &points, 
     return best;
 }
 
-// Fits a line and leaves out outliers. `sampled` is the number of positions at which an edge was searched. Returns
-// std::nullopt if the points that remain are fewer than half of `sampled`, or if their median distance from the line
+// Fits a line without outliers. `sampled` is the number of positions at which the edge was searched. Returns
+// std::nullopt if fewer than half of `sampled` points remain, or if the median distance of the points from the line
 // is `max_median_px` or more.
 std::optional<FittedEdge> fit_line_robustly(std::vector<cv::Point2f> points, std::size_t sampled,
                                             double max_median_px, double dependent) {
@@ -240,9 +243,9 @@ std::optional<FittedEdge> fit_line_robustly(std::vector<cv::Point2f> points, std
     }
 }
 
-// Returns `count` positions on the edge between two corners. The corners are in undistorted pixels and in clockwise
-// order. Keeps `margin_px` away from the corners, where the search would hit the adjacent edges. Returns std::nullopt
-// if the lens does not see the edge.
+// Returns `count` positions on the edge between two corners, which are in undistorted pixels and in clockwise order.
+// Keeps `margin_px` away from the corners, because the search would hit the adjacent edges there. Returns
+// std::nullopt if the edge is outside the field of view of the lens.
 std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &lens, double margin_px,
                                  std::size_t count) {
     const double length = cv::norm(to - from);
@@ -261,13 +264,13 @@ std::optional<Edge> edge_between(cv::Point2d from, cv::Point2d to, const Lens &l
     return edge;
 }
 
-// Returns a number of positions between two points.
+// Returns the number of positions to sample between two points.
 std::size_t count_of(cv::Point2d from, cv::Point2d to, double per_px) {
-    // Clamped first: corners may be so far apart that no integer holds their distance.
+    // Clamps before the conversion: corners may be so far apart that their distance exceeds any integer.
     return static_cast<std::size_t>(std::clamp<double>(per_px * cv::norm(to - from), min_positions, max_positions));
 }
 
-// Returns the light of a step from one code to the next, at the mean code along an edge.
+// Returns how much the light changes per code, at the mean code along an edge.
 double code_step(const Picture &picture, const Edge &edge) {
     double sum = 0;
     for (const cv::Point2d &at : edge.at_px)
@@ -278,15 +281,15 @@ double code_step(const Picture &picture, const Edge &edge) {
     return picture.light[code + 1] - picture.light[code];
 }
 
-// Fits a line in undistorted pixels to the slope of an edge. `from` is a corner near it.
+// Fits a line in undistorted pixels to the slope of an edge. `from`: a corner near the edge.
 std::optional<FittedEdge> fit_edge(const Picture &picture, const Edge &edge, Slope &slope, double cell_px,
                                    cv::Point2d from, const Lens &lens) {
     constexpr double max_median_steps = 4;
     if (!(slope.peak >= code_step(picture, edge)))
         return std::nullopt;
     reduce_noise(slope);
-    // Relative to the peak. The wider the slope is relative to the cell, the more its flanks depend on what is beside
-    // the border and the margin, and the less of them is used.
+    // Relative to the peak. A slope that is wide relative to the cell has flanks that depend on the cells beside the
+    // border and the margin. The wider it is, the less of its flanks is used.
     const double min_rise = std::clamp(slope.width_px / cell_px - 0.2, 0.1, 0.6);
     std::vector<cv::Point2d> found;
     for (std::size_t i = 0; i < edge.at_px.size(); ++i)
@@ -316,7 +319,7 @@ std::optional<FittedEdge> fit_edge(const Picture &picture, const Edge &edge, Slo
 // A rectangle around an edge, in undistorted pixels relative to a line beside it.
 struct Surroundings {
     double first_px, last_px; // along the line
-    double reach_px;          // to both sides
+    double reach_px;          // on both sides of the line
 };
 
 // Returns the pixels in the surroundings of an edge, ordered by columns, or by rows if the edge is steep.
@@ -326,13 +329,13 @@ std::vector<EdgePixel> pixels_beside(const Picture &picture, const Edge &edge, c
     const bool is_steep = std::abs(along.y) > std::abs(along.x);
     const cv::Point step = is_steep ? cv::Point(1, 0) : cv::Point(0, 1);
     const int stride = std::max(static_cast<int>(blur_px / 2), 1); // resolves the blur
-    std::vector<cv::Point2d> places; // three of each column: the first pixel, the middle one and the last one
+    std::vector<cv::Point2d> places; // three per column: the first pixel, the middle pixel and the last pixel
     int last = std::numeric_limits<int>::min();
     for (std::size_t i = 0; i < edge.at_px.size(); ++i) {
         if (!picture.contains(edge.at_px[i]))
             continue;
         const cv::Point middle(cvRound(edge.at_px[i].x), cvRound(edge.at_px[i].y));
-        // One px more, because the middle is rounded and the line is not exactly at the position.
+        // Adds one px, because the middle is rounded and the line is not exactly at the position.
         const int half = static_cast<int>(part.reach_px / std::max(std::abs(edge.outward[i].dot(step)), 0.5) + 1.5);
         const int column = is_steep ? middle.y : middle.x;
         const cv::Rect inside({}, picture.grey.size());
@@ -349,7 +352,7 @@ std::vector<EdgePixel> pixels_beside(const Picture &picture, const Edge &edge, c
     for (std::size_t i = 0; i < places.size(); i += 3) {
         const cv::Point middle(places[i + 1]);
         const int half = cvRound((places[i + 2] - places[i + 1]).dot(step));
-        // Over so few px, the distortion is a quadratic function.
+        // Over this short distance, a quadratic function approximates the distortion.
         const cv::Point2d constant = (*straight)[i + 1], linear = ((*straight)[i + 2] - (*straight)[i]) / (2 * half),
                           square = ((*straight)[i + 2] + (*straight)[i] - 2 * constant) / (2 * half * half);
         for (int k = -half; k <= half; k += stride) {
@@ -367,10 +370,11 @@ std::vector<EdgePixel> pixels_beside(const Picture &picture, const Edge &edge, c
 // Fits an edge to the pixels beside it. `line` is close to it, and `from` and `to` are the corners.
 std::optional<FittedEdge> fit_pixels(const Picture &picture, Line line, cv::Point2d from, cv::Point2d to,
                                      double cell_px, double blur_px, const Lens &lens) {
-    // Farther pixels tell little more. Within `pure_px`, what is beside the border and the margin contributes little.
+    // Pixels beyond `useful_px` add little information. Within `pure_px`, cells beside the border and the margin
+    // contribute little light.
     const double useful_px = 3.5 * blur_px, pure_px = cell_px - 2.5 * blur_px, needed_px = 1.6;
     const double reach_px = std::min(std::max(std::min(useful_px, pure_px), needed_px), 0.9 * cell_px);
-    // The adjacent edges show up to there, and a little farther if the camera sharpens.
+    // The adjacent edges affect pixels up to this distance, and slightly farther if the camera sharpens.
     const double margin_px = std::min(3 * blur_px + 1, cv::norm(to - from) / 4);
     const auto edge = edge_between(from, to, lens, margin_px, count_of(from, to, 1));
     if (!edge)
@@ -392,13 +396,13 @@ std::optional<FittedEdge> fit_pixels(const Picture &picture, Line line, cv::Poin
                       fitted->correlation};
 }
 
-// Where the line crosses the next one.
+// Returns the intersection of the line with the next line.
 cv::Point2d crossing(const Line &line, const Line &next) {
     return line.point +
            (next.point - line.point).cross(next.direction) / line.direction.cross(next.direction) * line.direction;
 }
 
-// The square in undistorted pixels.
+// The black square in undistorted pixels.
 struct Square {
     std::array<cv::Point2d, 4> rough, corners;
     double shortest_px;
@@ -419,8 +423,8 @@ struct Square {
     }
     const cv::Point2d &next(std::size_t i) const { return corners[(i + 1) % 4]; }
 
-    // Moves each corner to the crossing of its two lines. Returns the longest movement in px, or std::nullopt if a
-    // corner is now far from its rough position.
+    // Moves each corner to the intersection of its two lines. Returns the longest movement in px, or std::nullopt if
+    // a corner is now far from its rough position.
     std::optional<double> move_to(const std::array<FittedEdge, 4> &edges) {
         double moved_px = 0;
         for (std::size_t i = 0; i < 4; ++i) {
@@ -434,17 +438,17 @@ struct Square {
     }
 };
 
-// Implements refine_edges(). Searches each edge at up to `max_count` positions, then fits it to the pixels. If the
-// fit of an edge fails, returns std::nullopt for a `max_count` below max_positions; otherwise keeps the line that the
-// search found, and marks imprecise corners as doubtful.
+// Implements refine_edges(). Searches each edge at up to `max_count` positions, then fits a line to the pixels. If
+// the fit of an edge fails and `max_count` is below max_positions, returns std::nullopt. Otherwise keeps the line
+// that the search found, and marks imprecise corners as doubtful.
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
                                        bool is_subpixel, std::size_t max_count) {
     constexpr int max_passes = 8, max_fits = 3;
-    constexpr double max_sigma_px = 0.05, max_correlation = 0.5; // unless noise is the reason
-    constexpr double max_moved_px = 0.2;   // by the last fit; its pixels are those near the line of the one before
+    constexpr double max_sigma_px = 0.05, max_correlation = 0.5; // noise alone does not make corners doubtful
+    constexpr double max_moved_px = 0.2;   // by the last fit, which uses the pixels near the previous line
     constexpr double sharp_step_px = 0.25; // suffices for a sharp edge
-    constexpr double min_strength = 0.9;   // of the refined edges, relative to the rough ones
-    constexpr double max_noise = 0.12;     // relative to the peak, for tags too small to average it out
+    constexpr double min_strength = 0.9;   // strength of the refined edges relative to the rough edges
+    constexpr double max_noise = 0.12;     // relative to the peak; applies to tags too small to average out noise
     constexpr double max_blur = 0.7; // relative to the cell; a wider slope depends on the cells beside the border
     const auto rough = lens.undistort({rough_px.begin(), rough_px.end()});
     if (!rough)
@@ -518,10 +522,10 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     }
     if (is_misfit && max_count < max_positions)
         return std::nullopt;
-    double variance = 0, blur_cells = 0; // of a coordinate; at the most blurred edge
+    double variance = 0, blur_cells = 0; // `variance`: of a coordinate; `blur_cells`: at the most blurred edge
     for (std::size_t i = 0; i < 4; ++i) {
         const FittedEdge &before = fitted[(i + 3) % 4], &after = fitted[i];
-        // An error of a line moves the crossing along the other line.
+        // An error of one line moves the intersection along the other line.
         const double sine = before.line.direction.cross(after.line.direction);
         variance +=
             (before.variance_at(square.corners[i]) + after.variance_at(square.corners[i])) / (sine * sine) / (2 * 4);
@@ -544,7 +548,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
 std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
                                             const Lens &lens, int cells, bool is_subpixel) {
     const Picture picture{grey, light_of_code(transfer)};
-    // Few positions suffice to find where to fit the pixels, unless noise has to be averaged.
+    // A few positions suffice to locate the pixels for the fit, unless noise must be averaged out.
     const auto result = refined(picture, rough_px, lens, cells, is_subpixel, few_positions);
     return result ? result : refined(picture, rough_px, lens, cells, is_subpixel, max_positions);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Shared by the trackers of square markers: options that may change, and the steps of a search.
+// Code shared by the trackers of square markers: options that may change during a run, and the steps of a search.
 #pragma once
 
 #include "other_markers.hpp"
@@ -12,7 +12,7 @@
 
 namespace arhost::fiducial {
 
-// Sets `value` to that of an option, if `changed` contains it.
+// Sets `value` to the value of the option `key`, if `changed` contains this option.
 template <class Value> void take(const Options &changed, const char *key, Value &value) {
     if (!changed.contains(key))
         return;
@@ -31,7 +31,7 @@ public:
                  std::function<OtherMarkers::Markers(const cv::Mat &grey)> find_others)
         : lens_(*setup.intrinsics), regions_(setup, traits_of), others_(host, setup, std::move(find_others)) {}
 
-    // Searches a frame (SearchRegions::search), and reports what was seen and which other markers there are.
+    // Searches a frame (SearchRegions::search), and reports the observations and hints about other markers.
     void track(const arhost_track_request &request, Observations &observations, const RegionLimits &limits,
                std::span<const Pass> passes, const Verified &verified = {}) {
         Seen seen = regions_.search(request, limits, passes, verified);

@@ -15,8 +15,8 @@ cv::Point2d corner(const arhost_observation &seen, int i) {
     return {seen.corners_px[i % 4][0], seen.corners_px[i % 4][1]};
 }
 
-// Returns whether the corners are clockwise in the image (y down), like those of a marker's front face, and no angle
-// is near 0° or 180°. False for NaN.
+// Returns whether the corners are clockwise in the image (y down), as they are for the front face of a marker, and no
+// angle is near 0° or 180°. Returns false for NaN.
 bool is_convex_front(const arhost_observation &seen) {
     constexpr double min_sine = 1e-3;
     for (int i = 0; i < 4; ++i) {
@@ -108,7 +108,7 @@ void reject_prints_without_ids(std::string_view family, std::string_view tracker
 std::vector<Family> families_of(const arhost_tracker_setup &setup,
                                 const std::function<int(const std::string &)> &id_count) {
     std::vector<Family> families;
-    std::vector<std::size_t> positions; // in `families`, of each name
+    std::vector<std::size_t> positions; // index in `families` of each name
     for (std::uint32_t i = 0; i < setup.family_count; ++i) {
         const std::string name = april_tag_name(setup.families[i]);
         const auto known = std::ranges::find(families, name, &Family::name);

@@ -25,22 +25,23 @@ struct MeasuredCorners {
     Corners corners_px;
     double sigma_px = 0;      // standard deviation of each coordinate, RMS over the corners; 0: unknown
     double blur_cells = 0;    // standard deviation of the blur at the most blurred edge, in cells; 0: unknown
-    bool is_doubtful = false; // they are imprecise, but not because of noise: something may hide an edge
+    bool is_doubtful = false; // imprecise for another reason than noise, for example because an object hides an edge
 };
 
-// The cells of a print from the top left: 1 is white, 0 is black. `margin` cells around the square are known.
+// The cells of a printed marker, called "print" below, from the top left: 1 is white, 0 is black. It includes
+// `margin` known cells around the square.
 struct Print {
     cv::Mat_<float> cells;
     int margin = 0;
 
-    int side() const { return cells.rows - 2 * margin; } // of the square
+    int side() const { return cells.rows - 2 * margin; } // side of the square in cells
 };
 
-// arhost_observation.false_positive_rate of a code with so many bits, in any of four orientations:
+// Returns arhost_observation.false_positive_rate of a code with `bits` bits that is read in any of four orientations:
 // 4 · Σ C(bits, k) / 2^bits, summed over k = 0 to `hamming`.
 double false_positive_rate(int bits, std::uint32_t hamming);
 
-// How well a marker was read. The members have the same meaning as in arhost_observation.
+// The result of decoding a marker. The members have the same meaning as in arhost_observation.
 struct Decoding {
     std::uint32_t hamming = 0;
     double decision_margin = 0, false_positive_rate = 0;
@@ -52,17 +53,17 @@ arhost_observation observation_of(std::int32_t id, std::uint32_t family, const M
 // Returns the grey plane of a frame, without copying it.
 cv::Mat grey_of(const arhost_frame &frame);
 
-// Returns `side`² samples of a square, at the centres of equal parts. The square of the corners is larger: it reaches
-// `margin` samples further to each side.
+// Divides a square into `side` × `side` equal parts and returns a sample at the centre of each. The square with the
+// corners `corners_px` extends beyond this one by `margin` samples on each side.
 cv::Mat_<std::uint8_t> unwarped(const cv::Mat &grey, const Corners &corners_px, int side, double margin = 0);
 
-// AprilTag's name of a family: "tag36h11" for "DICT_APRILTAG_36h11". Other names remain as they are.
+// Returns AprilTag's name of a family: "tag36h11" for "DICT_APRILTAG_36h11". Returns other names unchanged.
 std::string april_tag_name(std::string_view name);
 
 // A family in use. If a setup lists it under several names, there is still only one Family.
 struct Family {
     std::string name;                    // as april_tag_name() returns it
-    std::uint32_t index;                 // of its first name in arhost_tracker_setup.families
+    std::uint32_t index;                 // index of the family's first name in arhost_tracker_setup.families
     int id_count;                        // its ids are 0 … id_count − 1
     std::map<int, std::uint32_t> listed; // listed ids and the names they are listed under, as indices in
                                          // arhost_tracker_setup.families
@@ -75,8 +76,8 @@ struct Family {
     arhost_observation observation(int id, const MeasuredCorners &corners, const Decoding &decoding = {}) const;
 };
 
-// Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION), which names the tracker to use, if the family is that of
-// patterns or of pictures. `tracker`: the one that has no such family.
+// Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION), which names the right tracker, if `family` is the family of
+// patterns or of pictures. `tracker`: the tracker that does not support these families.
 void reject_prints_without_ids(std::string_view family, std::string_view tracker);
 
 // Returns the families of the setup. `id_count` returns the number of markers of a family, and throws if it is
@@ -87,10 +88,10 @@ std::vector<Family> families_of(const arhost_tracker_setup &setup,
 // Returns whether two observations are of the same marker and overlap.
 bool are_of_one_print(const arhost_observation &a, const arhost_observation &b);
 
-// Reports what was seen, by family, id and place, so the order does not depend on the detector's threads. Leaves out
-// corners that are not those of a convex quadrilateral seen from the front. Of detections that are of one print,
-// reports only the one with the fewest wrong bits, then one with refined corners (a detector may also find the inside
-// of the border), then the one with the highest decision margin.
+// Reports the observations, sorted by family, id and place, so that the order does not depend on the detector's
+// threads. Omits observations whose corners do not form a convex quadrilateral seen from the front. If several
+// observations are of one printed marker, reports only one. Prefers the fewest wrong bits, then refined corners (a
+// detector may also find the inside of the border), then the highest decision margin.
 void report(std::vector<arhost_observation> seen, Observations &observations);
 
 } // namespace arhost::fiducial

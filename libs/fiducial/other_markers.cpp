@@ -39,7 +39,7 @@ using aruco::dictionary_types;
 using aruco::DictionaryType;
 
 void add_april_tags(const cv::Mat &grey, std::span<const Family> used, OtherMarkers::Markers &markers) {
-    constexpr float min_contrast = 20; // grey levels; clutter of less contrast may read as a tag of a small family
+    constexpr float min_contrast = 20; // grey levels; low-contrast clutter may match a tag of a small family
     using TagFamily = std::unique_ptr<apriltag_family_t, void (*)(apriltag_family_t *)>;
     std::vector<TagFamily> families; // outlive the detector
     const apriltag::Detector detector(apriltag_detector_create(), apriltag_detector_destroy);
@@ -55,7 +55,7 @@ void add_april_tags(const cv::Mat &grey, std::span<const Family> used, OtherMark
     });
 }
 
-// Each dictionary of "DICT_4X4_50", "DICT_4X4_100" and so on begins with the markers of the smaller ones.
+// The dictionaries of a series, such as "DICT_4X4_50" and "DICT_4X4_100", begin with the markers of the smaller ones.
 void add_aruco_markers(const cv::Mat &grey, std::span<const Family> used, OtherMarkers::Markers &markers) {
     cv::aruco::DetectorParameters parameters;
     parameters.errorCorrectionRate = 0;
@@ -165,7 +165,7 @@ void OtherMarkers::tell(const Markers &markers) {
 }
 
 OtherMarkers::Markers markers_of_other_families(const cv::Mat &grey, std::span<const Family> used) {
-    constexpr int max_side_px = 1280; // so that it takes less than a second
+    constexpr int max_side_px = 1280; // limits the search to less than a second
     cv::Mat reduced = grey;
     if (const double scale = static_cast<double>(max_side_px) / std::max(grey.cols, grey.rows); scale < 1)
         cv::resize(grey, reduced, {std::max(1, cvRound(scale * grey.cols)), std::max(1, cvRound(scale * grey.rows))},

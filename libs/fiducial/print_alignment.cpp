@@ -23,27 +23,28 @@ cv::Vec2d transform(const Homography &h, const cv::Vec2d &at) {
     return {v[0] / v[2], v[1] / v[2]};
 }
 
-// How the result of transform() changes with `at`. `v`: h * (at, 1).
+// Returns the derivative of transform() with respect to `at`. `v`: h * (at, 1).
 cv::Matx22d derivative(const Homography &h, const cv::Vec3d &v) {
     const double x = v[0] / v[2], y = v[1] / v[2];
     return cv::Matx22d(h(0, 0) - x * h(2, 0), h(0, 1) - x * h(2, 1), h(1, 0) - y * h(2, 0), h(1, 1) - y * h(2, 1)) *
            (1 / v[2]);
 }
 
-// The unknowns of the fit.
+// The unknowns of the fit. The print is the printed marker (fiducial::Print).
 struct Model {
     cv::Vec<double, 8> corners_px; // undistorted
     double blur_px;                // standard deviation
-    double black, contrast;        // light of black, and how much more white has; negative if the print is inverted
-    cv::Vec2d slope;               // of the illumination: relative change across the print along its columns and rows
+    // Light of black, and light of white minus light of black; negative if the print is inverted.
+    double black, contrast;
+    cv::Vec2d slope; // relative change of the illumination across the print along its columns and rows
 };
-constexpr int unknowns = 13; // in this order
+constexpr int unknowns = 13; // in the order of the members of Model
 
 // Maps cells to undistorted px.
 Homography px_from_cells(const cv::Vec<double, 8> &corners_px, const Print &print) {
     const auto first = static_cast<float>(print.margin), last = first + static_cast<float>(print.side());
     const cv::Point2f square[] = {{first, first}, {last, first}, {last, last}, {first, last}};
-    // Relative to the first corner, so the precision of float suffices.
+    // Positions are relative to the first corner, so the precision of float suffices.
     const cv::Point2d origin(corners_px[0], corners_px[1]);
     cv::Point2f corners[4];
     for (int i = 0; i < 4; ++i)
@@ -52,32 +53,34 @@ Homography px_from_cells(const cv::Vec<double, 8> &corners_px, const Print &prin
     return Homography(1, 0, origin.x, 0, 1, origin.y, 0, 0, 1) * relative;
 }
 
-// A pixel with this code or a higher one may be brighter than its code tells. Not 255, because video compression
-// turns some 255 into 254.
+// Light at this code and above may be clipped, so the pixel may be brighter than its code indicates. The limit is
+// below 255, because video compression turns some 255 into 254.
 constexpr std::uint8_t saturated = 254;
 
-// A pixel whose light the print determines.
+// A pixel whose light depends only on the print.
 struct Pixel {
     cv::Vec2d place; // undistorted
     double light;
     bool is_saturated;
-    // From the last call of linearize(): the light of the pixel minus that of the model, and how much the model's
-    // light changes if the print moves by 1 px.
+    // Results of the last call of linearize(): the light of the pixel minus the light of the model, and the change of
+    // the model's light if the print moves by 1 px.
     double residual = 0, change_per_px = 0;
 };
 
-// Returns the pixels of the print, of large prints only some of them. Returns none if the lens does not see all of
-// its surroundings.
+// Returns the pixels of the print; for large prints, only a subset. Returns none if a part of the print's
+// surroundings is outside the field of view of the lens.
 std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_code, const Corners &corners_px,
                              const Lens &lens, const Homography &cells_from_px, const Print &print) {
-    constexpr double reach = 0.25; // into the margin, in cells; blur mixes the rest with what is around it
+    // Into the margin, in cells; farther out, blur mixes the margin with its surroundings.
+    constexpr double reach = 0.25;
     constexpr double max_pixels = 1'000;
     const std::vector<cv::Point2f> points(corners_px.begin(), corners_px.end());
     cv::Rect part = cv::boundingRect(points);
     const int margin_px = 1 + static_cast<int>(std::max(part.width, part.height) * reach / 2);
     part = cv::Rect(part.x - margin_px, part.y - margin_px, part.width + 2 * margin_px, part.height + 2 * margin_px) &
            cv::Rect({}, grey.size());
-    // The part of its bounding box that the print is assumed to fill. If it fills less, fewer of its pixels are used.
+    // The minimum share of its bounding box that the print is assumed to fill. If the actual share is smaller, fewer
+    // pixels are used.
     constexpr double min_filled = 0.1;
     const double area_px = std::max(cv::contourArea(points), part.area() * min_filled);
     const double stride = std::max(std::sqrt(area_px / max_pixels), 1.0);
@@ -102,13 +105,13 @@ std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_co
     return pixels;
 }
 
-// Whiteness and its derivatives with respect to u and v, the column and the row in cells.
+// Whiteness, and its derivatives with respect to the column u and the row v, in cells.
 struct Whiteness {
     float value, u, v, uu, uv, vv;
 };
 using Sample = cv::Vec<float, 6>; // a Whiteness
 
-// Samples per cell that resolve a blur of this covariance, within limits.
+// Returns the number of samples per cell that resolves a blur of this covariance, within limits.
 int samples_per_cell(const Print &print, const cv::Matx22d &covariance_cells2) {
     constexpr double min_sigma = 1.2, max_per_cell = 12, max_size = 240; // samples
     const double half_trace = cv::trace(covariance_cells2) / 2;
@@ -118,8 +121,8 @@ int samples_per_cell(const Print &print, const cv::Matx22d &covariance_cells2) {
                                        std::clamp(max_size / print.cells.rows, 3.0, max_per_cell)));
 }
 
-// A table of the blurred print. Its number of samples stays the same from step to step of a fit, because the errors
-// of the interpolation depend on it.
+// A table of the blurred print. The number of samples stays constant during the steps of a fit, because the
+// interpolation errors depend on it.
 class BlurredPrint {
 public:
     BlurredPrint(const Print &print, int per_cell) : per_cell_(per_cell) {
@@ -127,7 +130,7 @@ public:
         values_.create(sharp_.size());
     }
 
-    // `covariance_cells2`: of the blur.
+    // `covariance_cells2`: the covariance of the blur.
     void blur(const cv::Matx22d &covariance_cells2) {
         constexpr double cutoff = 3, max_radius = 40; // standard deviations; samples
         const cv::Matx22d covariance =
@@ -148,8 +151,8 @@ public:
         differentiate();
     }
 
-    // Interpolates bilinearly. The slopes correct the value, so its error is of the third order instead of the
-    // second.
+    // Interpolates bilinearly, and corrects the value by means of the slopes. This reduces the error from second to
+    // third order.
     Whiteness at(const cv::Vec2d &cell) const {
         const double x = std::clamp(cell[0] * per_cell_ - 0.5, 0.0, values_.cols - 1.001);
         const double y = std::clamp(cell[1] * per_cell_ - 0.5, 0.0, values_.rows - 1.001);
@@ -166,8 +169,9 @@ public:
     }
 
 private:
-    // Uses differences of the fourth order, except for the mixed derivative. If the blur is less than a sample, as in
-    // large cells, differences of the second order are up to 40 % too small. The steps of the fit would be too long.
+    // Uses differences of the fourth order, except for the mixed derivative. Differences of the second order would be
+    // up to 40 % too small where the blur is narrower than a sample, as in large cells. The steps of the fit would
+    // then be too long.
     void differentiate() {
         const auto first = static_cast<float>(per_cell_) / 12, second = first * static_cast<float>(per_cell_);
         for (int y = 0; y < white_.rows; ++y) {
@@ -196,12 +200,12 @@ private:
 struct Fit {
     cv::Matx<double, unknowns, unknowns> normal; // JᵀJ, where J are the derivatives of the light
     cv::Vec<double, unknowns> gradient;          // Jᵀ·residuals
-    int pixels = 0;                              // without saturated ones that tell nothing
+    int pixels = 0;  // number of pixels, without saturated pixels that give no information
     double cost = 0; // sum of the squared residuals; infinite if the corners are not those
                      // of a square seen from the front
 };
 
-// How px change with cells, at the centre of the print.
+// Returns the derivative of px with respect to cells at the centre of the print.
 cv::Matx22d px_per_cell_at_centre(const Homography &to_px, const Print &print) {
     const double middle = print.cells.rows / 2.0;
     return derivative(to_px, to_px * cv::Vec3d(middle, middle, 1));
@@ -218,7 +222,7 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
     const cv::Matx22d cells_per_px = px_per_cell.inv(), ellipse = cells_per_px * cells_per_px.t();
     blurred.blur(model.blur_px * model.blur_px * ellipse);
 
-    // First with respect to the nine elements of the homography and the other unknowns.
+    // First computes the derivatives with respect to the nine elements of the homography and the other unknowns.
     constexpr int count = 14;
     std::array<double, count * count> normal{};
     std::array<double, count> gradient{};
@@ -231,11 +235,12 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
         const cv::Vec2d cell(h[0] / h[2], h[1] / h[2]);
         Whiteness white = blurred.at(cell);
         // A blur obeys the heat equation: the derivative of the whiteness with respect to the variance of the blur is
-        // half of its Laplacian in px. The table is for a linear map, with the blur's ellipse at the centre of the
+        // half of its Laplacian in px. The table assumes a linear map, and an elliptical blur as at the centre of the
         // print. Three terms correct this to the first order of the perspective:
-        // - The ellipse at this cell differs: half of the difference times the second derivatives.
-        // - The map is not linear: a shift of the whiteness.
-        // - The ellipse changes within the blur: a shift of the spread.
+        // - The ellipse at this cell differs from that at the centre. The term is half of the difference times the
+        //   second derivatives.
+        // - The map is not linear. The term shifts the whiteness.
+        // - The ellipse changes within the blur. The term shifts the spread.
         const double variance_px2 = model.blur_px * model.blur_px;
         const cv::Matx22d cells_per_px_here = derivative(to_cells, h),
                           ellipse_here = cells_per_px_here * cells_per_px_here.t();
@@ -257,7 +262,7 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
         // The derivative of the light with respect to a motion of the print in undistorted px.
         const cv::Vec2d by_px = -contrast * (cells_per_px_here.t() * cv::Vec2d(white.u, white.v));
         pixel.change_per_px = cv::norm(by_px);
-        if (pixel.is_saturated && residual < 0) // the pixel does not tell how much brighter it would be
+        if (pixel.is_saturated && residual < 0) // the true light of the pixel is unknown, but at least this high
             continue;
         const double x = by_px[0], y = by_px[1];
         // The homography maps `h` to (pixel.place, 1).
@@ -280,7 +285,7 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
         for (int b = 0; b < a; ++b)
             normal[a * count + b] = normal[b * count + a];
 
-    // Then with respect to the corners, on which the homography depends.
+    // Then converts them to derivatives with respect to the corners, which determine the homography.
     cv::Matx<double, count, unknowns> by_unknown = cv::Matx<double, count, unknowns>::zeros();
     for (int i = 0; i < 8; ++i) {
         constexpr double step_px = 0.1;
@@ -306,8 +311,9 @@ double sum_of_squared_differences_from_mean(std::span<const Pixel> pixels) {
     return squares - sum * sum / static_cast<double>(pixels.size());
 }
 
-// Returns which pixels show the print. Others show a highlight or something that hides the print, or are so close to
-// these that blur mixes them. `max_error`: the maximum error of a pixel, relative to the contrast of the print.
+// Returns which pixels show the print. The other pixels show a highlight, show an object that hides the print, or are
+// so close to such pixels that blur mixes them. `max_error`: the maximum error of a pixel, relative to the contrast
+// of the print.
 std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &light_of_code, const Model &model,
                           double max_error) {
     constexpr double max_deviations = 4, reach = 4; // standard deviations of the noise, of the blur
@@ -321,7 +327,7 @@ std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &ligh
     if (outliers.empty())
         return std::vector<bool>(pixels.size(), true);
 
-    // Noise depends less on the brightness in codes than in light.
+    // Compares noise in codes, because in light it depends more on the brightness.
     const auto code_of = [&](double light) {
         const double within = std::clamp<double>(light, light_of_code.front(), light_of_code.back());
         const auto above =
@@ -336,7 +342,7 @@ std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &ligh
     for (const Pixel &pixel : pixels)
         if (tells_its_light(pixel) && pixel.light > light_of_code.front()) // black may be clipped, too
             errors.push_back(code_error(pixel));
-    const double deviation = 1.4826 * median(errors); // of a normal distribution
+    const double deviation = 1.4826 * median(errors); // standard deviation, if the errors are normally distributed
     std::erase_if(outliers, [&](const Pixel *one) { return code_error(*one) <= max_deviations * deviation; });
     std::vector<bool> result;
     result.reserve(pixels.size());
@@ -349,8 +355,9 @@ std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &ligh
 
 using CornerMotions = cv::Matx<double, 8, 6>;
 
-// Returns how the corners of a square, in undistorted px, change with its pose: with shifts along three axes, and
-// with turns about its centre. Takes the homography as the pose, although noise makes its axes slightly oblique.
+// Returns the derivatives of a square's corners, in undistorted px, with respect to its pose: shifts along three
+// axes, and rotations about its centre. Derives the axes from the homography, although noise makes them slightly
+// oblique.
 CornerMotions corner_motions(const cv::Vec<double, 8> &corners_px, const cv::Vec2d &focal_px) {
     const cv::Point2f square[] = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
     cv::Point2f corners[4];
@@ -372,10 +379,10 @@ CornerMotions corner_motions(const cv::Vec<double, 8> &corners_px, const cv::Vec
     return motions;
 }
 
-// Returns a variance that can replace `covariance` where the noise of the coordinates is taken as independent. The
-// 95 % ellipsoid of the pose that follows from it contains the true pose in 95 % of the cases. Only the part of the
-// noise that `motions` span changes the pose. The square of this part is a sum of squares with unequal variances.
-// Satterthwaite's approximation of its distribution is a scaled chi-squared one with fewer degrees of freedom.
+// Returns the variance of independent noise that is equivalent to `covariance`: the 95 % ellipsoid of the pose that
+// it yields contains the true pose in 95 % of cases. Only the part of the noise that `motions` span changes the pose.
+// The square of this part is a sum of squares with unequal variances. Satterthwaite's approximation of its
+// distribution is a scaled chi-squared distribution with fewer degrees of freedom.
 double equivalent_variance(const cv::Matx<double, 8, 8> &covariance, const CornerMotions &motions) {
     const auto projected = (motions.t() * motions).inv() * (motions.t() * covariance * motions);
     const double sum = cv::trace(projected), sum_of_squares = cv::trace(projected * projected);
@@ -385,10 +392,11 @@ double equivalent_variance(const cv::Matx<double, 8, 8> &covariance, const Corne
     return sum_of_squares / sum * quantile(freedom) / quantile(6);
 }
 
-// The fit of a print to pixels.
+// Fits a print to pixels.
 class PrintFit {
 public:
-    // `pixels`: with outliers. `cells_per_px`: at the centre. `shortest_px`: side of the square.
+    // `pixels`: includes outliers. `cells_per_px`: at the centre of the print. `shortest_px`: the shortest side of
+    // the square.
     PrintFit(const Print &print, const LightOfCode &light_of_code, std::vector<Pixel> pixels,
              const cv::Vec<double, 8> &corners_px, const cv::Matx22d &cells_per_px, double shortest_px)
         : print_(print), light_of_code_(light_of_code), all_(std::move(pixels)), pixels_(all_),
@@ -397,19 +405,19 @@ public:
         linearize_model();
     }
 
-    // Returns whether the fit has converged to a picture that resembles the pixels. Call it once.
+    // Returns whether the fit has converged to a picture that resembles the pixels. Call only once.
     bool run() {
-        constexpr double max_hidden = 0.25, max_left_out = 0.5; // of the pixels, at the end and before
+        constexpr double max_hidden = 0.25, max_left_out = 0.5; // shares of the pixels, at the end and during the fit
         constexpr double least_max_error = 0.05;
         constexpr int max_rounds = 8;
         if (!std::isfinite(fit_.cost))
             return false;
-        // First the light, on which the other derivatives depend: it is linear.
+        // First fits the light, which is a linear problem, because the other derivatives depend on it.
         const auto light = fit_.normal.get_minor<2, 2>(9, 9).inv() * cv::Vec2d(fit_.gradient[9], fit_.gradient[10]);
         model_.black += light[0];
         model_.contrast += light[1];
         linearize_model();
-        // A hidden part shifts the first fits, so only the largest errors are outliers at first.
+        // A hidden part displaces the first fits, so at first only the largest errors count as outliers.
         double max_error = 0.4;
         std::vector<bool> kept(all_.size(), true);
         for (int round = 0;; ++round) {
@@ -436,7 +444,7 @@ public:
         }
     }
 
-    // The light of white where the illumination is brightest.
+    // Returns the light of white where the illumination is brightest.
     double white() const {
         return (model_.black + std::max(model_.contrast, 0.0)) *
                (1 + (std::abs(model_.slope[0]) + std::abs(model_.slope[1])) / 2);
@@ -462,7 +470,8 @@ private:
         constexpr double converged_px = 0.01;
         constexpr int max_steps = 20;
         double damping = 1e-3;
-        bool is_converged = false, is_limited = false; // an undamped step would leave the square
+        // `is_limited`: an undamped step would leave the permitted area.
+        bool is_converged = false, is_limited = false;
         for (int step = 0; step < max_steps && steps_left_ > 0 && !is_converged; ++step, --steps_left_) {
             const std::optional<Model> next = step_from_model(damping);
             if (!next)
@@ -478,7 +487,7 @@ private:
             const Fit candidate = linearize(pixels_, print_, blurred_, *next);
             is_limited |= !std::isfinite(candidate.cost);
             const bool is_better = candidate.cost < fit_.cost;
-            // At the minimum, the resolution of the table decides whether a small step is better.
+            // Near the minimum, the table's resolution determines whether a small step reduces the cost.
             is_converged = moved_px < converged_px && (is_better || damping <= 1) && !is_limited;
             damping *= is_better ? 0.1 : 10;
             if (is_better) {
@@ -515,10 +524,10 @@ private:
         return std::isfinite(cv::norm(change, cv::NORM_L2)) ? std::optional(next) : std::nullopt;
     }
 
-    // A table that is too fine for the blur would need a large kernel, a coarse one would not resolve it. Returns
-    // whether another one was necessary.
+    // Replaces the table if its resolution no longer suits the blur. Too fine a table would need a large kernel; too
+    // coarse a table would not resolve the blur. Returns whether the table was replaced.
     bool renew_table() {
-        constexpr double max_ratio = 1.8; // of the blur and the one that the table was made for
+        constexpr double max_ratio = 1.8; // ratio of the current blur to the blur for which the table was made
         if (std::max(model_.blur_px, table_blur_px_) <= max_ratio * std::min(model_.blur_px, table_blur_px_))
             return false;
         table_blur_px_ = model_.blur_px;
@@ -533,14 +542,14 @@ private:
     cv::Matx22d cells_per_px_;        // at the centre
     cv::Vec<double, 8> first_px_;
     double shortest_px_;
-    int steps_left_ = 60; // fits that succeed need fewer
+    int steps_left_ = 60; // successful fits need fewer steps
     double table_blur_px_ = first_blur_px;
     BlurredPrint blurred_ = table();
     Model model_;
     Fit fit_;
 };
 
-// Returns whether white is saturated at most places beside the edges. This shifts the edges into the black.
+// Returns whether white is saturated at most positions beside the edges. Saturation shifts the edges into the black.
 bool is_overexposed(const cv::Mat &grey, const Corners &corners_px, int cells) {
     const cv::Point2d centre = (corners_px[0] + corners_px[1] + corners_px[2] + corners_px[3]) / 4;
     const cv::Rect2d inside(0, 0, grey.cols - 1, grey.rows - 1);
@@ -579,7 +588,8 @@ std::optional<AlignedPrint> align_print(const cv::Mat &grey, arhost_transfer tra
         return std::nullopt;
     const Homography px_from_cell = px_from_cells(first_px, print);
     const cv::Matx22d px_per_cell = px_per_cell_at_centre(px_from_cell, print);
-    if (!(cv::determinant(px_per_cell) > 0)) // no square seen from the front; also for NaN
+    // False for NaN, and if the corners are not those of a square seen from the front.
+    if (!(cv::determinant(px_per_cell) > 0))
         return std::nullopt;
     const LightOfCode &light = light_of_code(transfer);
     std::vector<Pixel> pixels = pixels_of(grey, light, corners_px, lens, px_from_cell.inv(), print);
@@ -610,9 +620,10 @@ std::optional<AlignedPrint> align_print(const cv::Mat &grey, arhost_transfer tra
 std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
                                               const Lens &lens, int cells, const std::function<Print()> &print,
                                               bool is_subpixel) {
-    constexpr double max_blur_cells = 0.2, max_sigma_ratio = 0.1; // of the print and doubtful edges
-    constexpr double max_light = 255, max_clipped = 0.05;         // of the light of white
-    constexpr double max_skew_cells = 0.25;                       // of a square that is seen in perspective
+    // `max_sigma_ratio`: sigma of the print divided by sigma of doubtful edges.
+    constexpr double max_blur_cells = 0.2, max_sigma_ratio = 0.1;
+    constexpr double max_light = 255, max_clipped = 0.05; // `max_clipped`: share of the light of white
+    constexpr double max_skew_cells = 0.25;               // maximum for a square in perspective
     const auto edges = refine_edges(grey, transfer, rough_px, lens, cells, is_subpixel);
     const bool is_unreliable = !edges || edges->sigma_px == 0 || edges->blur_cells > max_blur_cells;
     const bool has_bright_edges = !is_unreliable && is_overexposed(grey, edges->corners_px, cells);
@@ -625,8 +636,8 @@ std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transf
     const Print known = print();
     if (const auto found = align_print(grey, transfer, edges ? edges->corners_px : rough_px, lens, known))
         return is_better(*found) ? *found : *edges;
-    // If an object hides a corner, a detector takes the end of the object for the corner. The other three corners
-    // nearly tell where the hidden one is.
+    // If an object hides a corner, a detector mistakes the end of the object for the corner. The position of the
+    // hidden corner is estimated from the other three corners.
     const cv::Point2d skew_px = rough_px[0] - rough_px[1] + rough_px[2] - rough_px[3];
     const double diagonal_px = std::min(cv::norm(rough_px[2] - rough_px[0]), cv::norm(rough_px[3] - rough_px[1]));
     if ((is_unreliable || edges->is_doubtful) && cv::norm(skew_px) * cells > max_skew_cells * diagonal_px)

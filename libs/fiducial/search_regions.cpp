@@ -9,20 +9,21 @@
 namespace arhost::fiducial {
 namespace {
 
-// Beyond this part of the frame, its regions take about as long to search as the whole frame.
+// If the regions cover a larger part of the frame than this, searching them takes about as long as searching the
+// whole frame.
 constexpr double max_share = 0.6;
 
 struct Interval {
     int begin, end;
 };
 
-// Returns the multiples of the grid around an interval, within 0 … `size`.
+// Returns the smallest interval around the given one whose ends are multiples of the grid, within 0 … `size`.
 Interval on_grid(double first, double last, int size, const RegionLimits &limits) {
     const auto within = [&](double value) { return static_cast<int>(std::clamp<double>(value, 0, size)); };
     const double shortage = std::max(0.0, limits.min_side_px - (last - first));
     Interval interval{within(std::floor((first - shortage / 2) / limits.grid_px) * limits.grid_px),
                       within(std::ceil((last + shortage / 2) / limits.grid_px) * limits.grid_px)};
-    if (interval.end - interval.begin < limits.min_side_px) { // cut off by the border of the frame
+    if (interval.end - interval.begin < limits.min_side_px) { // the border of the frame has cut off a part
         if (interval.begin > 0)
             interval.begin = std::max(0, interval.end - limits.min_side_px) / limits.grid_px * limits.grid_px;
         else
@@ -35,8 +36,8 @@ cv::Rect whole_of(const arhost_track_request &request) {
     return {0, 0, static_cast<int>(request.frame->format->width), static_cast<int>(request.frame->format->height)};
 }
 
-// Returns the region in which the marker is detected if it is where it is expected; empty if that is outside of the
-// frame.
+// Returns the region in which the detector finds the marker if the marker is at its expected place. The region is
+// empty if that place is outside the frame.
 cv::Rect region_of(const arhost_expected_marker &expected, double margin, cv::Size frame,
                    const RegionLimits &limits) {
     cv::Point2d first(expected.corners_px[0][0], expected.corners_px[0][1]), last = first;
@@ -58,7 +59,7 @@ cv::Rect region_of(const arhost_expected_marker &expected, double margin, cv::Si
     return {x.begin, y.begin, x.end - x.begin, y.end - y.begin};
 }
 
-// Adds a region. Regions that overlap become the smallest one that contains both.
+// Adds a region. Replaces regions that overlap by the smallest region that contains them.
 void add(std::vector<cv::Rect> &regions, cv::Rect region) {
     const auto overlaps = [&](const cv::Rect &other) { return !(other & region).empty(); };
     for (auto other = std::ranges::find_if(regions, overlaps); other != regions.end();
@@ -99,7 +100,7 @@ Verified SearchRegions::verified(const arhost_track_request &request, const Veri
     };
     if (request.expected_count == 0)
         return {};
-    // If no thread can be started, the caller of get() verifies them.
+    // If no thread can be started, the caller of get() verifies the markers.
     const std::launch by_any_thread = std::launch::async | std::launch::deferred;
     return std::async(request.search_everywhere ? by_any_thread : std::launch::deferred, verify_all).share();
 }
@@ -120,7 +121,7 @@ Seen SearchRegions::search(const arhost_track_request &request, const RegionLimi
     seen.add(look_closer(passes, missed_markers(seen.markers), [&](const CloserLook &look, const Indices &wanted) {
         std::vector<cv::Rect> regions = around_expected(
             request, limits, [&](const arhost_expected_marker &one) { return wanted.contains(one.marker); });
-        int area = tile_width_px * tile_height_px; // that remains for a slow look
+        int area = tile_width_px * tile_height_px; // remaining area for a slow look
         if (look.is_slow)
             std::erase_if(regions, [&](const cv::Rect &region) {
                 const bool fits = region.area() <= area;
@@ -144,7 +145,8 @@ Seen SearchRegions::search(const arhost_track_request &request, const RegionLimi
         seen.add(look_closer(passes, missed_markers(seen.markers), [&](const CloserLook &look, const Indices &) {
             return std::vector{look.is_slow ? tile_of(whole.size(), request.frame->sequence) : whole};
         }));
-    seen.candidates = std::max(seen.candidates, seen.markers.size()); // one may be a marker of several families
+    // One candidate may be a marker of several families.
+    seen.candidates = std::max(seen.candidates, seen.markers.size());
     return seen;
 }
 
@@ -182,7 +184,7 @@ SearchRegions::Indices SearchRegions::missed_markers(std::span<const arhost_obse
 }
 
 cv::Rect SearchRegions::tile_of(cv::Size frame, std::uint64_t sequence) {
-    constexpr int overlap_px = 96; // a marker of this size is whole in one of the tiles
+    constexpr int overlap_px = 96; // a marker of up to this size is completely in at least one tile
     const cv::Size tile(std::min(frame.width, tile_width_px), std::min(frame.height, tile_height_px));
     const auto count = [](int length, int tile_length) {
         return length == tile_length
@@ -193,7 +195,7 @@ cv::Rect SearchRegions::tile_of(cv::Size frame, std::uint64_t sequence) {
         return tiles == 1 ? 0 : static_cast<int>(index * static_cast<unsigned>(length - tile_length) / (tiles - 1));
     };
     const unsigned columns = count(frame.width, tile.width), rows = count(frame.height, tile.height);
-    // SplitMix64: a fixed order could miss tiles if only every nth frame is searched.
+    // SplitMix64. With a fixed order, some tiles might never be searched if only every nth frame is searched.
     std::uint64_t hash = (sequence + 1) * 0x9E3779B97F4A7C15;
     hash = (hash ^ (hash >> 30)) * 0xBF58476D1CE4E5B9;
     hash = (hash ^ (hash >> 27)) * 0x94D049BB133111EB;
@@ -235,7 +237,7 @@ bool SearchRegions::miss_a_target(const arhost_track_request &request,
                                   std::span<const arhost_observation> seen) const {
     if (request.search_everywhere)
         return false;
-    std::map<std::uint32_t, bool> is_seen; // targets
+    std::map<std::uint32_t, bool> is_seen; // keys: target indices
     for (const arhost_expected_marker &expected : elements(request.expected, request.expected_count)) {
         const Marker &marker = markers_.at(expected.marker);
         is_seen[marker.target] |= marker.is_in(seen);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Converts between pixels of a camera and undistorted pixels: those of a camera with the same focal lengths, the
-// principal point (0, 0) and no distortion. Pixel centres are at integers.
+// Converts between pixels of a camera and undistorted pixels. Undistorted pixels are those of a camera with the same
+// focal lengths, the principal point (0, 0) and no distortion. Pixel centres are at integers.
 #pragma once
 
 #include <arhost/shading/lens.hpp>
@@ -18,7 +18,7 @@ public:
     // Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION) if the model or coefficient count is unsupported.
     explicit Lens(const arhost_intrinsics &intrinsics);
 
-    // Both return std::nullopt if the distortion model is not one-to-one at one of the points.
+    // Both functions return std::nullopt if the distortion model is not one-to-one at one of the points.
     std::optional<std::vector<cv::Point2d>> undistort(const std::vector<cv::Point2d> &pixels) const;
     std::optional<std::vector<cv::Point2d>> distort(const std::vector<cv::Point2d> &undistorted_px) const;
 
@@ -29,7 +29,8 @@ private:
     shading::Lens lens_;
 };
 
-// Returns by how much the distortion enlarges the noise of a square's corners: as much as it enlarges the square.
+// Returns the factor by which the distortion enlarges the noise of a square's corners. It equals the factor by which
+// the square is enlarged.
 double noise_scale(const std::vector<cv::Point2d> &undistorted_px, const std::vector<cv::Point2d> &distorted_px);
 
 } // namespace arhost::fiducial
