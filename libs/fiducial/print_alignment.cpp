@@ -71,7 +71,7 @@ struct Pixel {
 // surroundings is outside the field of view of the lens.
 std::vector<Pixel> pixels_of(const cv::Mat &grey, const LightOfCode &light_of_code, const Corners &corners_px,
                              const Lens &lens, const Homography &cells_from_px, const Print &print) {
-    // Into the margin, in cells; farther out, blur mixes the margin with its surroundings.
+    // The part of the margin that is used, in cells. Farther out, blur mixes the margin with its surroundings.
     constexpr double reach = 0.25;
     constexpr double max_pixels = 1'000;
     const std::vector<cv::Point2f> points(corners_px.begin(), corners_px.end());

@@ -36,9 +36,8 @@ protected:
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "width, height: set both or neither");
     }
 
-    // Calls `open`. After a restart, the options have worked before, so whatever fails is temporary: the camera is
-    // not connected, not ready, or not accessible until udev has set its permissions. The host then waits for the
-    // camera.
+    // Calls `open`. After a restart, the options are known to work, so every failure is temporary: the camera is not
+    // connected, not ready, or not accessible until udev has set its permissions. The host then waits for the camera.
     template <class Open> static void start_camera(const arhost_source_setup &setup, const Open &open) {
         try {
             open();
@@ -49,12 +48,12 @@ protected:
         }
     }
 
-    // Whether the option `format` permits the format of this name.
+    // Returns whether the option `format` permits the format `name`.
     bool permits(std::string_view name) const { return format_option_ == "auto" || format_option_ == name; }
     std::string permitted_text() const { return format_option_ == "auto" ? "supported format" : format_option_; }
 
-    // Returns the first of `modes` in which the camera reaches the configured rate `fps` (0: not set), else the
-    // fastest. `max_fps(mode)`: 0 if unknown.
+    // Returns the first of `modes` in which the camera reaches the configured rate `fps` (0: not set). If there is
+    // none, returns the fastest mode. `max_fps(mode)`: the maximum rate of a mode; 0 if unknown.
     template <class Mode, class MaxFps>
     static const Mode &choose_by_rate(const std::vector<Mode> &modes, double fps, const MaxFps &max_fps) {
         const double wanted = 0.95 * (fps > 0 ? fps : 25);
@@ -72,8 +71,9 @@ protected:
         return *best;
     }
 
-    // Calls `take`, which waits no longer than `poll_slice`, until it returns a frame. Returns std::nullopt if
-    // cancelled. Throws Failure when `silence` exceeds its limit. `camera`: its name, for messages.
+    // Calls `take`, which waits no longer than `poll_slice`, until it returns a frame. Returns std::nullopt if the
+    // host cancels the call. Throws Failure when `silence` exceeds its limit. `camera`: the name of the camera, for
+    // messages.
     template <class Take> auto wait_for_frame(Silence &silence, const std::string &camera, const Take &take) {
         for (;;) {
             if (host_.cancelled())
@@ -89,9 +89,9 @@ protected:
         }
     }
 
-    // Waits for a JPEG picture and sets `format` to its format. The chroma subsampling is known only from a picture.
-    // `use_next(silence, use)` waits for a frame, calls `use` with its bytes, and returns false if cancelled.
-    // `mode`: what the camera was set to, for messages.
+    // Waits for a JPEG picture and sets `format` to the picture's format. Only a picture shows its chroma
+    // subsampling. `use_next(silence, use)` waits for a frame and calls `use` with the frame's bytes; it returns
+    // false if the host cancels the call. `mode`: the mode to which the camera was set, for messages.
     template <class UseNext>
     void describe_first_picture(arhost_frame_format &format, const FrameSize &size, const std::string &camera,
                                 const std::string &mode, const UseNext &use_next) {
@@ -111,10 +111,10 @@ protected:
     Host host_;
     FrameSize configured_size_; // 0×0: use the size of the calibration or the camera's default
     std::string format_option_;
-    std::vector<std::pair<std::string, std::string>> control_values_; // of the options that set controls
+    std::vector<std::pair<std::string, std::string>> control_values_; // values of the options that set controls
     bool newest_only_ = false;
     JpegDecoder jpeg_;
-    std::string fault_; // what was wrong with the last damaged picture
+    std::string fault_; // fault of the last damaged picture
 };
 
 } // namespace arhost

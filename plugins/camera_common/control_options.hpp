@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The options of a source that set the controls of its camera, at the start and while it runs. `Controls` below is
-// the plugin's class for the controls of its API. It has these functions; those that fail throw Failure:
-//   all()                         the controls; each has a `name`
-//   find(handle)                  the control with this handle or with this name, or nullptr
-//   values_of(control)            the ControlValues that it accepts
-//   set(control, text, key)       sets it; returns a warning if the camera sets another value, else ""
+// The options of a source that set the controls of its camera, at the start and during the run. `Controls` below is
+// the plugin's class for the controls of its API. It must have these functions, which throw Failure if they fail:
+//   all()                         returns the controls; each has a `name`
+//   find(handle)                  returns the control with this handle or with this name, or nullptr
+//   values_of(control)            returns the ControlValues that the control accepts
+//   set(control, text, key)       sets the control; returns a warning if the camera sets another value, else ""
 //   fail(key, what)               throws "KEY: the camera … WHAT"
 #pragma once
 
@@ -25,8 +25,8 @@ namespace arhost {
 
 // A control that has an automatic mode. `Handle`: how the API identifies a control.
 template <class Handle> struct AutomaticControl {
-    std::string_view key; // of the option
-    Handle value, mode;   // mode: the control that switches the automatic mode on or off
+    std::string_view key; // the option that sets this control
+    Handle value, mode;   // mode: the control that enables or disables the automatic mode
 };
 
 inline constexpr arhost_option_descriptor exposure_option =
@@ -44,7 +44,7 @@ inline constexpr arhost_option_descriptor controls_option =
     option(ARHOST_OPTION_TEXT, "controls", "",
            "Further controls by the names that arhost devices lists: 'sharpness=3, backlight_compensation=1'.");
 
-// Throws Failure: the camera has no control `name`. `key`: the option that names it.
+// Throws a Failure which states that the camera has no control `name`. `key`: the option that names the control.
 template <class Controls>
 [[noreturn]] void fail_missing(const Controls &controls, std::string_view name, const std::string &key) {
     std::string names;
@@ -65,13 +65,13 @@ std::int64_t accepted_value(const Controls &controls, const Control &control, st
     return *value;
 }
 
-// Sets a control to a number, which disables its automatic mode, or to "auto". Checks the value before it
-// sets anything. Returns warnings.
+// Sets a control to a number, which disables its automatic mode, or to "auto". Checks the value before setting
+// anything. Returns warnings.
 template <class Controls, class Handle>
 std::vector<std::string> set_automatic_control(const Controls &controls, const AutomaticControl<Handle> &control,
                                                const std::string &text) {
-    // Values of the mode, in the order of preference. Those of exposure are V4L2's: 0 automatic, 1 manual, 2 priority
-    // of the shutter, 3 priority of the aperture.
+    // The values of the mode, in order of preference. For exposure, the values are those of V4L2: 0 automatic, 1
+    // manual, 2 shutter priority, 3 aperture priority.
     static constexpr std::array<std::int64_t, 2> exposure_automatic = {0, 3}, exposure_manual = {1, 2};
     static constexpr std::array<std::int64_t, 1> on = {1}, off = {0};
     const std::string key(control.key);
@@ -89,7 +89,7 @@ std::vector<std::string> set_automatic_control(const Controls &controls, const A
             : is_exposure ? std::span<const std::int64_t>(exposure_manual)
                           : off;
         const ControlValues accepted = controls.values_of(*mode);
-        // The last value is an error of set() if the camera has none of them.
+        // If the camera has none of the values, the last one is used, so that set() reports the error.
         const auto value = std::find_if(values.begin(), values.end() - 1, [&](std::int64_t candidate) {
             return accepted.items.empty() || accepted.items.contains(candidate);
         });
@@ -102,8 +102,8 @@ std::vector<std::string> set_automatic_control(const Controls &controls, const A
     return warnings;
 }
 
-// Sets controls as listed by a user: "gain=20, auto_exposure=manual_mode", in this order. Checks all values before it
-// sets one. Returns warnings.
+// Sets controls from a user's list such as "gain=20, auto_exposure=manual_mode", in this order. Checks all values
+// before setting any control. Returns warnings.
 template <class Controls>
 std::vector<std::string> set_listed_controls(const Controls &controls, std::string_view list,
                                              const std::string &key) {
@@ -129,8 +129,8 @@ inline void show_warnings(const Host &host, const std::vector<std::string> &warn
             host.warn(warning);
 }
 
-// Sets the controls of the options with these keys and values, and shows warnings. `lamps`: the control of
-// power_line_frequency.
+// Sets the controls of the options with these keys and values, and logs warnings. `lamps`: the control that the
+// option power_line_frequency sets.
 template <class Controls, class Handle, std::size_t count>
 void set_option_controls(const Host &host, const Controls &controls,
                          const AutomaticControl<Handle> (&automatic)[count], const Handle &lamps,
@@ -150,8 +150,8 @@ void set_option_controls(const Host &host, const Controls &controls,
         show_warnings(host, set(key, text));
 }
 
-// Returns the key and the value of each option that `options` contains with a value other than "". `keys`: the
-// options to look for; ends with nullptr.
+// Returns the key and value of each option in `options` whose value is not "". `keys`: the options to look for,
+// terminated by nullptr.
 inline std::vector<std::pair<std::string, std::string>> given_options(const Options &options,
                                                                       const char *const *keys) {
     std::vector<std::pair<std::string, std::string>> given;

@@ -20,10 +20,11 @@ struct ControlValues {
     ControlKind kind = ControlKind::integer;
     std::int64_t minimum = 0, maximum = 0, default_value = 0;
     std::uint64_t step = 1;
-    std::map<std::int64_t, std::string> items; // of a menu
+    std::map<std::int64_t, std::string> items; // number and name of each item of a menu
 };
 
-// "0 to 255", "0 to 10 in steps of 5", "true or false" or "1 (manual_mode), 3 (aperture_priority_mode)".
+// Returns, for example, "0 to 255", "0 to 10 in steps of 5", "true or false" or "1 (manual_mode), 3
+// (aperture_priority_mode)".
 std::string describe_values(const ControlValues &values);
 
 // Parses a number, "true" or "false", or the number or name of a menu item. Returns std::nullopt if the control does

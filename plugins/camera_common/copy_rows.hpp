@@ -7,7 +7,8 @@
 
 namespace arhost {
 
-// Copies the rows of a plane; all at once if both planes have the same stride, with what is between the rows.
+// Copies the rows of a plane. If both planes have the same stride, copies all rows and the bytes between them at
+// once.
 inline void copy_rows(const std::uint8_t *from, std::size_t from_stride, std::uint8_t *to, std::size_t to_stride,
                       std::size_t row_bytes, std::size_t rows) {
     if (from_stride == to_stride) {

@@ -6,7 +6,7 @@
 
 namespace arhost {
 
-// The characters of a V4L2 pixel format, such as "YUYV".
+// Returns the characters of a V4L2 pixel format, such as "YUYV".
 inline std::string fourcc_text(std::uint32_t fourcc) {
     std::string text;
     for (int i = 0; i < 4; ++i)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The frame size that a camera must have, according to the options `width` and `height` and to the calibration.
+// Determines the frame size that a camera must have, from the options `width` and `height` and from the calibration.
 #pragma once
 
 #include <arhost/camera.h>
@@ -21,7 +21,8 @@ struct DemandedSize {
     std::string advice; // what the user can change if the camera does not have this size
 };
 
-// `configured`: the options; 0×0 if they are not set. `calibration`: may be NULL. Throws Failure if they differ.
+// `configured`: the size in the options; 0×0 if it is not set. `calibration`: may be NULL. Throws Failure if both
+// sizes are known and differ.
 DemandedSize demanded_size(const FrameSize &configured, const arhost_intrinsics *calibration);
 
 } // namespace arhost

@@ -16,8 +16,9 @@ public:
 
     explicit Silence(Clock::time_point now = Clock::now()) : last_check_(now) {}
 
-    // Call this several times per second. A longer interval between two calls counts as one second only: the process
-    // was suspended (a suspended computer, a frozen container, Ctrl-Z), and the camera possibly too.
+    // Call this several times per second. A longer interval between two calls counts as only one second, because it
+    // means that the process, and possibly the camera, was suspended (for example by suspend-to-RAM, a frozen
+    // container or Ctrl-Z).
     bool exceeds_limit(Clock::time_point now = Clock::now()) {
         constexpr Clock::duration longest_interval = std::chrono::seconds(1);
         duration_ += std::min(now - std::exchange(last_check_, now), longest_interval);

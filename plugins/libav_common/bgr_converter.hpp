@@ -12,7 +12,7 @@ namespace arhost::libav {
 
 enum class Matrix { bt601, bt709 };
 
-// YUV has limited range, and the chroma samples of YUV 4:2:0 and 4:2:2 are at the left, as in MPEG-2.
+// Converts to YUV with limited range. In YUV 4:2:0 and 4:2:2, the chroma samples are at the left, as in MPEG-2.
 class BgrConverter {
 public:
     // `width` and `height` are the size of the frames in px. Throws Failure (ARHOST_STATUS_ERROR_UNSUPPORTED).
@@ -22,7 +22,8 @@ public:
     int padded_width() const { return converted_->width; }
     int padded_height() const { return converted_->height; }
 
-    // The converted frame is valid until the next call. If others refer to it, the next call replaces it.
+    // The returned frame is valid until the next call. If an encoder still refers to it, the next call returns a new
+    // frame.
     AVFrame &convert(const std::uint8_t *bgr, std::size_t stride);
 
 private:

@@ -20,7 +20,7 @@ struct Colour {
 inline constexpr Colour white{255, 255, 255}, grey{170, 170, 170}, red{255, 96, 80}, green{90, 230, 110},
     blue{90, 160, 255}, yellow{255, 210, 60}, pink{255, 120, 220}, cyan{70, 225, 255}, violet{205, 130, 255};
 
-// A line of text. Boxes align the texts of their rows, after the longest label.
+// A line of text. A box aligns the texts of its rows, to the right of the longest label.
 struct Row {
     std::string label, text;
     Colour colour = white; // of `text`
@@ -28,7 +28,7 @@ struct Row {
 
 class Canvas {
 public:
-    // `scale`: px of the canvas per px of the font; lines are as wide. At least 1.
+    // `scale`: canvas px per font px, at least 1. Lines are `scale` px wide.
     Canvas(double width, double height, double scale);
     virtual ~Canvas() = default;
     Canvas(const Canvas &) = delete;
@@ -41,9 +41,10 @@ public:
     // Draws a line that is visible on every background.
     void line(Point from, Point to, Colour colour) const;
     void dashed_line(Point from, Point to, Colour colour) const; // thinner
-    // Draws text in a dark box. `x`, `y`: where in the free space, from 0 (left, top) to 1 (right, bottom). `top`,
-    // `bottom`: height of the space at the edges that is not free, px. Uses smaller text if the box would not fit
-    // on the canvas. Returns the height of the box and its margin in px.
+    // Draws text in a dark box. Returns the height of the box plus its margin, in px. Uses smaller text if the box
+    // would not fit on the canvas.
+    // - `x`, `y`: position in the free area, from 0 (left, top) to 1 (right, bottom).
+    // - `top`, `bottom`: heights of the occupied areas at the top and bottom edges, px.
     double box(const std::vector<Row> &rows, double x, double y, double top = 0, double bottom = 0) const;
     // Draws text in a dark box around a point.
     void label(Point centre, const std::string &text, Colour colour) const;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Shows the measurements of the tracker in the picture (docs/tracking.md).
+// Draws the measurements of the tracker into the picture (docs/tracking.md).
 #pragma once
 
 #include "sink_common/canvas.hpp"
@@ -31,13 +31,13 @@ public:
     explicit DebugView(const Options &options) : is_on(options.boolean(key)) {}
     void start(const arhost_sink_setup &setup);
 
-    // Draws the outlines of the markers, their expected places and residuals, and the names, states and, if the
-    // lens is known, axes of the targets (x red, y green, z blue), and the numbers and the times of the stages in a
-    // box at the top. Returns the height of the box in px.
+    // Draws the measurements, and a box with numbers and stage times at the top. Returns the height of the box in px.
+    // Draws the outlines of the markers, their expected positions and their residuals. Draws the names and states of
+    // the targets and, if the lens is known, their axes (x red, y green, z blue).
     double draw(const Canvas &canvas, const arhost_record &record, const Timings &timings = {}) const;
 
-    // Returns the output with the view in its picture if it is on, otherwise the same output. Valid until the next
-    // call.
+    // If the view is on, returns the output with the view drawn into its picture; otherwise returns `output`. The
+    // result is valid until the next call.
     const arhost_output &applied_to(const arhost_output &output);
 
     bool is_on;
@@ -51,7 +51,7 @@ private:
     std::optional<shading::Lens> lens_;
     double focal_length_px_ = 0;
     std::vector<std::uint8_t> bgr_;
-    arhost_output output_{}; // with the picture `bgr_`
+    arhost_output output_{}; // a copy of the output with the picture `bgr_`
 };
 
 } // namespace arhost::drawing

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// File operations of the sinks. If they fail, they throw arhost::Failure with a message that names the file, the
-// reason that the system gives, and what to change. The status is ARHOST_STATUS_ERROR_CONFIGURATION if retrying
-// cannot help, for example without permission, otherwise ARHOST_STATUS_ERROR_IO.
+// File operations of the sinks. On failure, they throw arhost::Failure with a message that names the file, the
+// system's reason, and the required change. The status is ARHOST_STATUS_ERROR_CONFIGURATION if retrying cannot help,
+// for example if permission is missing; otherwise it is ARHOST_STATUS_ERROR_IO.
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
@@ -16,7 +16,7 @@
 
 namespace arhost::files {
 
-// Makes an error such as "cannot write 'out/video.mp4': No space left on device (free some space, or choose another
+// Returns an error such as "cannot write 'out/video.mp4': No space left on device (free some space, or choose another
 // path)".
 Failure io_failure(const std::string &what, const std::filesystem::path &file, int error_number);
 

@@ -16,12 +16,12 @@ class LineFile {
 public:
     LineFile(const Host &host, std::filesystem::path path) : host_(host), path_(std::move(path)) {}
 
-    // For `first_sequence` see arhost_sink_setup. If it is 0, a run starts: an older file remains until the first
-    // line is appended, because the run may still fail. Otherwise the sink was restarted: truncates the file before
-    // the first line for which `keep` returns false.
+    // Opens the file. For `first_sequence`, see arhost_sink_setup. If it is 0, a run starts. An older file then
+    // remains until the first line is appended, because the run may still fail. If it is not 0, the sink was
+    // restarted; the file is truncated before the first line for which `keep` returns false.
     void start(std::uint64_t first_sequence, const std::function<bool(std::string_view line)> &keep);
 
-    bool empty() const { return end_ == 0; } // true: there are no lines yet
+    bool empty() const { return end_ == 0; } // whether the file has no lines yet
     // `lines` must be whole lines with line ends. Writes all of them or, if the disk is full, none.
     void append(std::string_view lines);
 

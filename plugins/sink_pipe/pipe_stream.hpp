@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A FIFO or standard output. No call blocks in the kernel: while the program at the other end is missing or does not
-// read, the functions report progress to the host, and throw Failure (ARHOST_STATUS_ERROR_CANCELLED) once the host
-// cancels the call.
+// A FIFO or standard output. No call blocks in the kernel. While the reading program is missing or does not read, the
+// functions report progress to the host. Once the host cancels the call, they throw Failure
+// (ARHOST_STATUS_ERROR_CANCELLED).
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
@@ -15,7 +15,7 @@ namespace arhost::pipe {
 
 class PipeStream {
 public:
-    // `path`: of an existing FIFO, or "-" for standard output.
+    // `path`: the path of an existing FIFO, or "-" for standard output.
     PipeStream(const Host &host, std::string path) : host_(host), path_(std::move(path)) {}
     ~PipeStream() { close(); }
     PipeStream(const PipeStream &) = delete;
@@ -29,10 +29,10 @@ public:
     void check() const;
 
     bool is_open() const { return fd_ >= 0; }
-    // Waits for a reader. If an earlier stream may still be in the FIFO (`after_another`, or unread bytes), first
-    // waits until its reader has seen the end of it.
+    // Waits for a reader. If an earlier stream may still be in the FIFO (`after_another` is set, or bytes are
+    // unread), first waits until the reader of that stream has seen its end.
     void open(bool after_another);
-    // Waits until everything is written. Returns false if the reader has closed the stream.
+    // Waits until all bytes are written. Returns false if the reader has closed the stream.
     bool write(std::span<const std::uint8_t> bytes);
     void close();
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The video of a session: a Matroska file of unknown length with one cluster per frame. Each frame is written
-// immediately, and a file that ends after any cluster is valid, so a killed process loses no frame. A restarted one
-// appends clusters to the same file.
+// immediately, and a file that ends after any cluster is valid. A killed process therefore loses no frame, and a
+// restarted process appends clusters to the same file.
 #pragma once
 
 #include "libav_common/libav_pointers.hpp"
@@ -39,9 +39,9 @@ public:
     bool is_open() const { return file_.has_value(); }
     std::uint64_t end() const { return end_; } // size of the file
 
-    // Appends a frame: completely or, if an error is thrown, not at all. `time_ms` must ascend.
+    // Appends a frame. If it throws, the file does not contain any part of the frame. `time_ms` must increase.
     void append(const std::uint8_t *const (&planes)[ARHOST_MAX_PLANES], std::int64_t time_ms);
-    void truncate(std::uint64_t bytes); // takes back the last frames
+    void truncate(std::uint64_t bytes); // removes the last frames
 
 private:
     struct FreeMuxer {

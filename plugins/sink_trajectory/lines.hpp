@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Functions that append the lines of both formats (docs/trajectories.md), including line ends.
+// Functions that append lines in both formats (docs/trajectories.md), including line ends.
 #pragma once
 
 #include <arhost/arhost.h>

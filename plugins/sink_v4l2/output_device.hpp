@@ -38,15 +38,15 @@ public:
     std::vector<std::uint32_t> formats() const; // pixel formats that the device accepts
     bool supports(Transfer transfer) const;
 
-    // Requests a format; returns the one that the driver has chosen.
+    // Requests a format. Returns the format that the driver has chosen.
     OutputFormat set_format(const OutputFormat &wanted);
     double set_fps(double fps); // returns the resulting rate; 0: unknown
 
     // Allocates memory for images. Afterwards the format cannot change, and with Transfer::mmap other programs cannot
     // use the device.
     void reserve(Transfer transfer);
-    // Waits until the device takes another image, and returns the memory to write it to, of OutputFormat::image_size
-    // bytes. Empty: the host has cancelled the call.
+    // Waits until the device accepts another image. Returns the memory for the image, which has
+    // OutputFormat::image_size bytes. Returns an empty span if the host has cancelled the call.
     std::span<std::uint8_t> begin_image(const Host &host);
     void end_image(const Host &host); // hands over the image; the first one starts the stream
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A video is written in segments, which are joined at the end. Each start of the sink begins a new segment. A segment
-// is a Matroska file with one cluster per frame, because all complete clusters of a truncated file can be read. (The
-// same is true for fragmented MP4, but there libav loses the gaps between frames.) The time stamps of a segment are
-// capture times in ms; each frame's number accompanies it as a BlockAdditional.
+// is a Matroska file with one cluster per frame. This format is used because all complete clusters of a truncated
+// file can be read. (Fragmented MP4 has the same property, but libav loses the gaps between its frames.) The time
+// stamps in a segment are capture times in ms. A BlockAdditional stores the number of each frame.
 #pragma once
 
 #include "libav.hpp"
@@ -38,9 +38,9 @@ private:
 };
 
 // Copies the packets of all segments to `video`. `format` is libav's name of the file format ("mp4"). If two segments
-// have the same frame, takes it from the later segment. The video begins at time 0. Capture times within 1 ms of a
-// multiple of 1/fps become this multiple, so that a constant frame rate remains constant. Returns the number of
-// frames; if it is 0, `video` is unusable. Calls `progress` regularly with a fraction from 0 to 1, and `warn` with
+// contain the same frame, takes it from the later segment. The video begins at time 0. Capture times within 1 ms of a
+// multiple of 1/fps are rounded to this multiple, so that a constant frame rate remains constant. Returns the number
+// of frames; if it is 0, `video` is unusable. Calls `progress` regularly with a fraction from 0 to 1, and `warn` with
 // messages for the user.
 std::int64_t join(const std::vector<Segment> &segments, const std::filesystem::path &video, const char *format,
                   AVRational fps, const std::function<void(double)> &progress,

@@ -19,15 +19,15 @@ struct EncoderSettings {
     int threads;
 };
 
-// Encodes BGR8 frames as YUV 4:2:0, BT.709, limited range. It uses no look-ahead, so each call returns the packet of
-// its own frame, which can be written immediately.
+// Encodes BGR8 frames as YUV 4:2:0, BT.709, limited range. The encoder uses no look-ahead. Each call therefore
+// returns the packet of its own frame, which can be written immediately.
 class Encoder {
 public:
     explicit Encoder(const EncoderSettings &settings); // throws Failure (ARHOST_STATUS_ERROR_UNSUPPORTED)
 
     const AVCodecContext &context() const { return *context_; }
 
-    // The time stamps of the packet are `number`. It is valid until the next call.
+    // Encodes a frame. `number` becomes the packet's time stamps. The packet is valid until the next call.
     AVPacket &encode(const std::uint8_t *bgr, std::size_t stride, std::int64_t number);
 
 private:

@@ -7,7 +7,7 @@
 
 namespace arhost::web {
 
-std::string_view page_html(); // with placeholders: {{name}}
+std::string_view page_html(); // has placeholders: {{name}}
 std::string_view openapi_json();
 
 } // namespace arhost::web

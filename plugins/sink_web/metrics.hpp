@@ -12,8 +12,8 @@ struct OwnCounts {
     std::size_t viewers, connections;
 };
 
-// Returns the metrics in Prometheus' text format. `answer`: the host's answer to the command "status"; without a
-// status, the result contains only the counts of this output.
+// Returns the metrics in Prometheus' text format. `answer`: the host's answer to the command "status". If it contains
+// no status, the result contains only the counts of this output.
 std::string metrics(const std::string &answer, const OwnCounts &own);
 
 } // namespace arhost::web

@@ -9,12 +9,12 @@
 namespace arhost::web {
 
 struct Jpeg {
-    std::uint64_t number = 0;            // of the frame
-    std::chrono::nanoseconds received{}; // by the plugin, CLOCK_MONOTONIC
+    std::uint64_t number = 0;            // number of the frame
+    std::chrono::nanoseconds received{}; // when the plugin received the frame, CLOCK_MONOTONIC
     std::vector<std::uint8_t> bytes;
 };
 
-// The newest frame. It is encoded only if somebody asks for it, and only once.
+// The newest frame. It is encoded on the first request for it, and only once.
 class NewestFrame {
 public:
     explicit NewestFrame(int quality);
@@ -23,7 +23,7 @@ public:
     void put(const arhost_output &output);
     void set_quality(int quality) { quality_ = quality; }
 
-    // Counts the frames; 0: there is none.
+    // Returns the number of frames so far; 0 if there is no frame.
     std::uint64_t number() const { return number_.load(); }
     std::uint64_t encoded() const { return encoded_.load(); }
 

@@ -15,7 +15,7 @@ struct MHD_Response;
 namespace arhost::web {
 
 struct Settings {
-    int socket;                          // listening
+    int socket;                          // a listening socket
     std::string token;                   // "": none
     std::string hosts;                   // see is_own_host
     std::uint32_t width = 0, height = 0; // of the frames
@@ -24,14 +24,14 @@ struct Settings {
 // Serves the page, the live picture and the commands, in a thread of libmicrohttpd.
 class Server {
 public:
-    // `control` may be without functions; there are then no status and no commands.
+    // `control` may lack its functions; in that case the server offers no status and no commands.
     Server(Settings settings, NewestFrame &frame, HostControl &control);
     ~Server();
     Server(const Server &) = delete;
     Server &operator=(const Server &) = delete;
 
-    // Called by the plugin's thread after each frame, and 30 times per second without frames: sends new frames and
-    // closes the connections of clients that exceed their time.
+    // Call on the plugin's thread after each frame, and 30 times per second while there are no frames. Sends new
+    // frames and closes the connections of clients that exceed their time limit.
     void tick();
 
 private:
@@ -74,7 +74,7 @@ private:
     std::map<MHD_Connection *, Connection> connections_;
     std::set<Viewer *> viewers_;
     std::set<SharedRequest> suspended_, waiting_for_status_;
-    std::size_t unsent_answers_ = 0; // to requests that were suspended
+    std::size_t unsent_answers_ = 0; // answers to requests that were suspended
     std::condition_variable all_sent_;
 };
 

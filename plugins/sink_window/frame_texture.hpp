@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The frame in the window: a texture, and where the window shows it.
+// The frame in the window: a texture, and the area in which the window shows it.
 #pragma once
 
 #include "sink_common/canvas.hpp"
@@ -13,7 +13,7 @@
 
 namespace sink_window {
 
-// Where and how the window shows a frame.
+// The position and size of a frame in the window.
 struct View {
     Rectangle area;    // px of the window
     int width, height; // of the frame, px
@@ -28,8 +28,9 @@ struct View {
 
 class FrameTexture {
 public:
-    // Creates a black picture in the current OpenGL context, with which the texture is deleted. `shows_overlay`: the
-    // overlay alone, over black, instead of the frame. Throws arhost::Failure if OpenGL does not support the size.
+    // Creates a black picture in the current OpenGL context, which also owns the texture. `shows_overlay`: whether to
+    // show only the overlay, over black, instead of the frame. Throws arhost::Failure if OpenGL does not support the
+    // size.
     FrameTexture(int width, int height, bool shows_overlay);
 
     void upload(const arhost_output &output);

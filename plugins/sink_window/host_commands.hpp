@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Sends to the host the commands that the user gives with keys, and stores the host's answers (docs/control.md).
+// Sends the user's commands, which keys trigger, to the host, and stores the host's answers (docs/control.md).
 #pragma once
 
 #include <arhost-cpp/plugin.hpp>
@@ -22,11 +22,11 @@ public:
     // Receives a message to the user.
     using Show = std::function<void(const std::string &text, bool is_error)>;
 
-    // From the host's status document.
+    // Values from the host's status document.
     struct Numbers {
         double fps = 0;
-        // Percentiles p50/p95/p99 of the latency from the capture of a frame until it is composited ("": not known),
-        // and of each stage and output, with its name.
+        // Percentiles p50/p95/p99 of the latency from capture to compositing of a frame ("": unknown), and the
+        // percentiles of each stage and output, with its name.
         std::string latency;
         std::vector<std::pair<std::string, std::string>> timings;
         int targets = 0, restarts = 0;
@@ -43,8 +43,8 @@ public:
 
     bool frozen() const { return frozen_; }
     bool recording() const { return recording_; }
-    const std::vector<std::string> &scenes() const { return scenes_; } // empty: not known
-    const std::string &scene() const { return scene_; }                // the one in use
+    const std::vector<std::string> &scenes() const { return scenes_; } // empty: unknown
+    const std::string &scene() const { return scene_; }                // the current scene
     const std::optional<Numbers> &numbers() const { return numbers_; }
     // Returns whether an answer has changed the state since the last call.
     bool take_changed() { return std::exchange(changed_, false); }
@@ -61,7 +61,7 @@ private:
     std::vector<std::string> scenes_;
     std::string scene_;
     std::optional<Numbers> numbers_;
-    bool status_granted_ = true, status_pending_ = false; // granted until the host has refused it
+    bool status_granted_ = true, status_pending_ = false; // granted until the host refuses it
     Clock::time_point next_poll_{};
 };
 

@@ -23,7 +23,7 @@ struct Rectangle {
 // Returns the largest centred rectangle within `width`×`height` that has the aspect ratio of the image.
 Rectangle fit(int image_width, int image_height, int width, int height);
 
-// Lists the monitors, or one display with the reason why no window can be opened.
+// Lists the monitors. If no window can be opened, returns one display that states the reason.
 std::vector<arhost::Device> list_displays();
 
 class Glfw {
@@ -51,7 +51,7 @@ public:
 
     void process_events();
     void close();
-    bool closed() const; // by the user or by close()
+    bool closed() const; // whether the user or close() has closed the window
     void toggle_full_screen();
     Rectangle size() const; // of the framebuffer in px; x and y are 0
     void present();
@@ -64,9 +64,9 @@ private:
     Glfw glfw_;
     OnCharacter on_character_;
     WindowPointer window_;
-    Rectangle windowed_{}; // where the window was before full screen
+    Rectangle windowed_{}; // position and size of the window before full screen
     bool stale_ = false;
-    bool key_repeats_ = false; // whether the user holds the key whose character follows
+    bool key_repeats_ = false; // whether the next character comes from a key that the user holds down
 };
 
 } // namespace sink_window

@@ -14,9 +14,9 @@
 namespace arhost {
 
 struct StreamSettings {
-    std::string url;                   // accepted by check_url
-    std::string transport;             // of RTSP: "tcp" or "udp"
-    std::chrono::milliseconds timeout; // without an intact picture
+    std::string url;                   // a URL that check_url accepts
+    std::string transport;             // transport of RTSP: "tcp" or "udp"
+    std::chrono::milliseconds timeout; // maximum time without an intact picture
     bool verifies_tls;
 };
 
@@ -26,7 +26,7 @@ std::int64_t monotonic_ns();
 // One connection to a network camera. Decodes the first video track.
 class NetworkStream {
 public:
-    // Connects. Throws Failure, as next does, also if `stop` is requested.
+    // Connects. The constructor and next() throw Failure on errors, and if `stop` is requested.
     NetworkStream(const StreamSettings &settings, LibavLog &log, std::stop_token stop);
     NetworkStream(const NetworkStream &) = delete; // libav stores its address
     NetworkStream &operator=(const NetworkStream &) = delete;
@@ -36,15 +36,16 @@ public:
     bool next();
 
     const AVFrame &picture() const { return *picture_; }
-    std::int64_t arrival_ns() const { return arrival_ns_; } // of the last data of the picture, CLOCK_MONOTONIC
+    std::int64_t arrival_ns() const { return arrival_ns_; } // arrival of the picture's last data, CLOCK_MONOTONIC
     // The picture's time stamp, with an arbitrary epoch; nullopt if it has none.
     std::optional<std::int64_t> sender_ns() const;
-    // The picture's time by the sender's wall clock (UTC), from RTCP sender reports; nullopt if there were none.
+    // The picture's time by the sender's wall clock (UTC), computed from RTCP sender reports; nullopt if no report
+    // has arrived.
     std::optional<std::int64_t> sender_utc_ns() const;
-    // The number of damaged pictures before this picture since the previous one.
+    // The number of damaged pictures between the previous picture and this one.
     std::uint32_t damaged() const { return damaged_; }
-    // Whether data arrives faster than in real time (recordings, and HLS, whose segments contain seconds), so that
-    // pictures have to wait until they are due.
+    // Returns whether data arrives faster than in real time, as in recordings and in HLS, whose segments contain
+    // seconds of video. Pictures must then wait until they are due.
     bool is_ahead_of_time() const { return ahead_of_time_; }
     double fps() const; // 0: unknown
 
@@ -59,7 +60,7 @@ private:
     bool verifies_tls_;
     LibavLog &log_;
     std::stop_token stop_;
-    std::chrono::steady_clock::time_point deadline_; // of the next picture
+    std::chrono::steady_clock::time_point deadline_; // for the next picture
     decltype(AVFormatContext::io_open) open_io_ = nullptr;
 
     libav::InputPointer input_;
@@ -69,7 +70,7 @@ private:
     libav::FramePointer picture_;
     bool timed_ = false, ahead_of_time_ = false, ends_ = false;
     std::int64_t arrival_ns_ = 0;
-    std::optional<std::int64_t> utc_offset_ns_; // UTC − time stamp
+    std::optional<std::int64_t> utc_offset_ns_; // UTC minus time stamp
     std::uint32_t damaged_ = 0;
 };
 

@@ -15,8 +15,8 @@ namespace arhost {
 
 struct ReceiverSettings {
     StreamSettings stream;
-    bool uses_sender_clock; // the sender's wall clock is synchronised with that of this machine
-    std::size_t capacity;   // number of pictures to keep; if more arrive, the oldest are dropped
+    bool uses_sender_clock; // whether the sender's wall clock is synchronised with this machine's clock
+    std::size_t capacity;   // maximum number of stored pictures; if more arrive, the oldest are dropped
     bool retries_at_once;   // false: the first connection must succeed
 };
 
@@ -26,20 +26,20 @@ struct Received {
     std::uint32_t skipped = 0;   // damaged or dropped pictures since the previous one
 };
 
-// Receives a stream on a thread of its own, so that no data waits in the network while nobody takes pictures. If the
-// connection is lost, it reconnects until it is destroyed.
+// Receives a stream on its own thread, so that no data waits in the network while the source takes no pictures. If
+// the connection is lost, it reconnects until it is destroyed.
 class Receiver {
 public:
     Receiver(const Host &host, ReceiverSettings settings);
 
-    // Returns the oldest kept picture; waits for one up to `limit`, then returns std::nullopt. Throws the error of
-    // the first connection.
+    // Returns the oldest stored picture. Waits up to `limit` for a picture, then returns std::nullopt. If the first
+    // connection failed, throws its error.
     std::optional<Received> take(std::chrono::milliseconds limit);
-    // Whether the stream was a recording, and has ended. All of its pictures have then been taken.
+    // Returns whether the stream was a recording that has ended and all its pictures have been taken.
     bool ended();
     double fps(); // 0: unknown
 
-    // Numbers of pictures that were not delivered, by cause, and of lost connections.
+    // Numbers of undelivered pictures by cause, and the number of lost connections.
     struct Losses {
         std::uint64_t damaged = 0, superseded = 0, connections = 0;
     };
@@ -59,16 +59,17 @@ private:
     Host host_;
     ReceiverSettings settings_;
     LibavLog log_;
-    // Used only by the thread:
+    // Only the thread uses the following members:
     SenderClock clock_;
     bool has_received_ = false, is_lost_ = false, clock_reported_ = false;
-    std::chrono::milliseconds delay_ = first_delay; // before the next attempt
+    std::chrono::milliseconds delay_ = first_delay; // delay before the next attempt
     std::optional<std::int64_t> epoch_ns_; // CLOCK_MONOTONIC at time stamp 0, for streams that are ahead of time
 
     mutable std::mutex mutex_;
     std::condition_variable_any changed_;
     std::deque<Received> kept_;
-    std::uint32_t skipped_ = 0; // pictures since the newest kept one, or since the last taken one
+    // Pictures skipped since the newest stored picture, or since the last taken picture if none is stored.
+    std::uint32_t skipped_ = 0;
     Losses losses_;
     double fps_ = 0;
     bool ended_ = false;

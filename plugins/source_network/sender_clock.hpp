@@ -6,18 +6,17 @@
 
 namespace arhost {
 
-// Maps a sender's time stamps to CLOCK_MONOTONIC. The results ascend and are never after the arrival.
-//
-// A picture arrives after a delay that varies. The picture with the shortest delay shows best how far the clocks are
-// apart, so the offset is the minimum of arrival − time stamp. It may rise by 500 ppm, more than the drift of quartz
-// clocks, so that it also follows a sender whose clock is slow. The shortest delay itself is unknown, and remains in
-// the result: the capture time of the fastest picture is its arrival.
+// Maps a sender's time stamps to CLOCK_MONOTONIC. The results increase and are never later than the arrival.
+// Each picture arrives after a variable delay. The picture with the shortest delay indicates the offset between the
+// clocks best, so the offset is the minimum of arrival − time stamp. To follow a sender whose clock is slow, the
+// offset may rise by 500 ppm, which exceeds the drift of quartz clocks. The shortest delay itself is unknown and
+// remains in the result: the capture time of the fastest picture equals its arrival.
 class SenderClock {
 public:
-    // `sender_ns`: the time stamp on any clock; nullopt: the sender has none, so the result is the arrival.
+    // `sender_ns`: the time stamp by any clock; if it is nullopt, the result is the arrival.
     std::int64_t capture_ns(std::optional<std::int64_t> sender_ns, std::int64_t arrival_ns);
 
-    // For a new connection, whose time stamps have another epoch.
+    // Call for a new connection, because its time stamps have another epoch.
     void restart() { offset_ns_.reset(); }
 
 private:

@@ -9,12 +9,12 @@ namespace arhost::synthetic {
 
 enum class PathKind { orbit, still, approach };
 
-// Marker-to-camera as arhost_target.mt: column-major, GL eye space.
+// The transform from marker to camera in the format of arhost_target.mt: column-major, GL eye space.
 using Mt = std::array<double, 16>;
 
-// Returns the pose at a point of the path. `phase` is the elapsed fraction of the period, 0 to 1. `distance_scale` is
-// the camera distance relative to that for the default lens. `unit_mm` is the scale of the whole scene: 1 for a
-// marker of 80 mm.
+// Returns the pose at a point of the path. `phase`: elapsed fraction of the period, 0 to 1. `distance_scale`: camera
+// distance divided by the distance for the default lens. `unit_mm`: scale of the whole scene; 1 for a marker of 80
+// mm.
 Mt pose_on_path(PathKind kind, double phase, double distance_scale, double unit_mm);
 
 } // namespace arhost::synthetic

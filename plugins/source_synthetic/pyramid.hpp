@@ -13,17 +13,17 @@
 
 namespace arhost::synthetic {
 
-// A texel has red, green and blue as sRGB codes, whose largest value stands for `full_scale`, and a fourth channel.
-// Codes are filtered, not linear light. With linear light, the edges of a black square on white would appear inside
-// their true position, because half the light is far more than half the code (docs/adr/0007).
+// A texel has three sRGB codes (red, green, blue) and a fourth channel. The largest code represents `full_scale`.
+// Filtering works on the codes instead of linear light. With linear light, the edges of a black square on white would
+// appear inside their true position, because half the light has far more than half the code (docs/adr/0007).
 using Texel = cv::Vec4b;
 using Texel16 = std::array<uint16_t, 4>; // code · 256
 inline constexpr float texel16_unit = 255 * 256;
 inline constexpr float full_scale = 1.6f; // white in full light is 1
 
-// Sample positions of a span: sixteen pixels of a row. A pixel is sampled at the two points (u, v) ± step, each of
-// which stands for one half of the longer side of its footprint. `step` and `lod` have two values, one at the first
-// pixel of this span and one at the first pixel of the next span, and are interpolated between them.
+// Sample positions of a span: sixteen pixels of a row. Each pixel is sampled at the two points (u, v) ± step, which
+// represent the two halves of its footprint's longer side. `step` and `lod` are interpolated between two values, one
+// for the first pixel of this span and one for the first pixel of the next span.
 inline constexpr int span_px = 16;
 struct Footprints {
     alignas(64) float u[span_px], v[span_px];
@@ -32,9 +32,9 @@ struct Footprints {
 
 class Pyramid {
 public:
-    // `clips` are RGBA images of equal size, which is a power of two; the top row is first. A texel of the first clip
-    // has the side `texel`, and a texel of each following clip is twice as large as in the clip before. The area that
-    // a finer clip covers is ignored in coarser clips.
+    // `clips` are RGBA images of equal size, which is a power of two; the top row is first. `texel` is the side of a
+    // texel in the first clip. Each further clip has texels of twice the size of the previous clip. The area that a
+    // finer clip covers is ignored in coarser clips.
     Pyramid(std::span<const cv::Mat> clips, float texel);
 
     // Samples with trilinear filtering and two samples per pixel.

@@ -63,14 +63,14 @@ private:
     DeskTextures textures_;
     int width_, height_, threads_;
     int padded_; // width + 1, rounded up to whole spans
-    // Ray directions at every lens_px-th pixel; they are interpolated linearly. (0, 0, 0) where no light arrives.
+    // Ray directions at every lens_px-th pixel, which are interpolated linearly. (0, 0, 0) where no light arrives.
     static constexpr int lens_px = 4;
     int lens_columns_;
     std::vector<float> ray_[3];
     int grid_width_, grid_height_;
     double focal_px_;
-    // Blur weights: first of the centre, then of each pair of neighbours. Each entry has one weight per channel,
-    // repeated for two pixels.
+    // Blur weights: first that of the centre, then one for each pair of neighbours. Each entry has one weight per
+    // channel, repeated for two pixels.
     std::vector<std::array<uint16_t, 8>> kernel_;
     // The following tables use light in units of full_scale.
     std::vector<uint8_t> srgb_;                 // sRGB codes, indexed by the square root of light

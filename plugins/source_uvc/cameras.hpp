@@ -9,8 +9,9 @@
 
 namespace arhost::uvc {
 
-// Only with formats that this plugin can capture, by the names of the option `format`, and with controls only if no
-// driver uses the camera: a listing does not take it from the kernel's driver or from a program that captures.
+// Lists the cameras with the formats that this plugin can capture, named as in the option `format`. Lists the
+// controls only if no driver uses the camera, because the listing must not take the camera from the kernel's driver
+// or from a program that captures.
 std::vector<Device> list_cameras();
 
 } // namespace arhost::uvc

@@ -12,13 +12,13 @@
 
 namespace arhost::uvc {
 
-// A control as the class defines it ("USB Device Class Definition for Video Devices" 1.5, section 4.2.2).
+// A control as defined by the UVC class ("USB Device Class Definition for Video Devices" 1.5, section 4.2.2).
 struct ControlDefinition {
     std::string_view name;
     UnitKind unit;
-    std::uint8_t bit, selector; // in bmControls
-    std::uint8_t size;          // of the data of the selector, in bytes
-    std::uint8_t offset, width; // of the value in the data
+    std::uint8_t bit, selector; // bit: position in bmControls
+    std::uint8_t size;          // size of the selector's data, bytes
+    std::uint8_t offset, width; // position and size of the value in the data, bytes
     bool is_signed;
     ControlKind kind;
 };
@@ -27,7 +27,7 @@ class Controls {
 public:
     Controls(const UsbDevice &device, const VideoFunction &function);
 
-    // The control of this name, if the camera has it.
+    // Returns the control with this name, or nullptr if the camera lacks it.
     const ControlDefinition *find(std::string_view name) const;
     std::vector<ControlDefinition> all() const;
     ControlValues values_of(const ControlDefinition &control) const;
@@ -38,8 +38,8 @@ public:
     // sets another value, else an empty string.
     std::string set(const ControlDefinition &control, std::string_view text, const std::string &key) const;
 
-    // Sets controls of extension units as listed by a user: "UNIT:SELECTOR=BYTES", with the unit's ID or GUID and
-    // hexadecimal bytes: "4:9=01ff, 28f03370-…:2=00". Returns the warnings.
+    // Sets controls of extension units from a user's list of "UNIT:SELECTOR=BYTES", for example "4:9=01ff,
+    // 28f03370-…:2=00". UNIT is the ID or GUID of the unit, and BYTES are hexadecimal. Returns the warnings.
     std::vector<std::string> set_extensions(std::string_view list, const std::string &key) const;
 
     [[noreturn]] void fail(const std::string &key, const std::string &what) const {

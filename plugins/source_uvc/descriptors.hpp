@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Parser of the configuration descriptor of a USB video camera: USB 2.0 and 3.2 chapter 9.6, and "USB Device Class
-// Definition for Video Devices" 1.0 to 1.5, chapter 3. The bytes come from the device and are not trusted: the parser
-// accepts any bytes, leaves out what it cannot use and describes each mistake in Configuration::defects.
+// Parses the configuration descriptor of a USB video camera: USB 2.0 and 3.2 chapter 9.6, and "USB Device Class
+// Definition for Video Devices" 1.0 to 1.5, chapter 3. The bytes come from the device and are not trusted. The parser
+// accepts any bytes, ignores unusable parts and describes each mistake in Configuration::defects.
 #pragma once
 
 #include <array>
@@ -16,7 +16,7 @@ namespace arhost::uvc {
 using Bytes = std::span<const std::uint8_t>;
 using Guid = std::array<std::uint8_t, 16>;
 
-// Limits of what is kept of one device. Real cameras have less than a quarter of these numbers.
+// Limits of the data that is stored per device. Real cameras have less than a quarter of these numbers.
 constexpr std::size_t max_functions = 16, max_units = 64, max_streams = 16, max_formats = 64, max_frames = 128,
                       max_intervals = 64, max_alternates = 64, max_defects = 32;
 
@@ -32,16 +32,17 @@ constexpr NamedEncoding encodings[] = { // in the order of preference
     {Encoding::nv12, "nv12"},
     {Encoding::mjpeg, "mjpeg"}};
 
-// A frame size. The intervals are either a list or, if that is empty, a range. A maximum of 0: the camera lists none.
+// A frame size. `intervals` lists the frame intervals. If it is empty, the intervals are a range; if the range's
+// maximum is 0, the camera states no intervals.
 struct FrameSize {
     std::uint8_t index = 0; // bFrameIndex
     std::uint32_t width = 0, height = 0;
-    std::uint32_t max_bytes = 0; // of one frame, as the camera states it; 0: not stated
+    std::uint32_t max_bytes = 0; // maximum size of a frame that the camera states; 0: not stated
     std::uint32_t default_interval = 0;
     std::vector<std::uint32_t> intervals; // ascending, none is 0
     std::uint32_t shortest_interval = 0, longest_interval = 0, interval_step = 0;
 
-    // The permitted interval that is nearest to `wanted`; the default interval if the camera lists none.
+    // Returns the permitted interval nearest to `wanted`, or the default interval if the camera lists none.
     std::uint32_t nearest_interval(std::uint32_t wanted) const;
     double max_fps() const; // 0: unknown
 };
@@ -55,12 +56,12 @@ struct Format {
     std::vector<FrameSize> frames;
 };
 
-// One setting of a streaming interface that has an endpoint for video.
+// A setting of a streaming interface with an endpoint for video.
 struct AlternateSetting {
     std::uint8_t number = 0;
     std::uint8_t endpoint = 0; // address; always an IN endpoint
     bool is_bulk = false;
-    std::uint32_t packet_bytes = 0;  // of one packet on the bus
+    std::uint32_t packet_bytes = 0;  // size of a packet on the bus
     std::uint32_t payload_bytes = 0; // isochronous: maximum per (micro)frame, at most 48 KiB; bulk: like packet_bytes
 };
 
@@ -77,7 +78,7 @@ struct Unit {
     UnitKind kind = UnitKind::camera_terminal;
     std::uint8_t id = 0;
     std::uint64_t controls = 0; // bmControls
-    Guid guid{};                // of an extension unit
+    Guid guid{};                // GUID of an extension unit
 };
 
 // A camera. A device may contain several.

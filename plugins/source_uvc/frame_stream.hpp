@@ -21,7 +21,7 @@ namespace arhost::uvc {
 struct CapturedFrame {
     std::vector<std::uint8_t> bytes;
     std::int64_t capture_ns = 0;
-    std::uint32_t lost_before = 0; // frames that were damaged or discarded since the frame before
+    std::uint32_t lost_before = 0; // frames that were damaged or discarded since the previous frame
 };
 
 class FrameStream {
@@ -29,23 +29,25 @@ public:
     struct Setup {
         std::uint8_t interface = 0;
         AlternateSetting alternate;
-        std::uint32_t payload_bytes = 0; // maximum, as negotiated
+        std::uint32_t payload_bytes = 0; // negotiated maximum
         std::size_t max_frame_bytes = 0, exact_frame_bytes = 0;
         std::uint32_t clock_hz = 0;
-        std::size_t queue_length = 4; // frames that wait to be read
+        std::size_t queue_length = 4; // maximum number of frames that wait to be read
         bool keeps_newest = false;    // if the queue is full, discards the oldest frame instead of the new one
     };
 
-    // Selects the alternate setting and starts. The device must outlive the stream, and the interface be claimed.
+    // Selects the alternate setting and starts the stream. The device must outlive the stream, and its interface must
+    // be claimed.
     FrameStream(const UsbDevice &device, const Setup &setup);
     ~FrameStream();
     FrameStream(const FrameStream &) = delete;
     FrameStream &operator=(const FrameStream &) = delete;
 
-    // Returns the oldest frame; waits for one. Returns std::nullopt on timeout. Throws Failure if the camera is lost.
+    // Returns the oldest frame. Waits for a frame; returns std::nullopt on timeout. Throws Failure if the camera is
+    // lost.
     std::optional<CapturedFrame> next(std::chrono::milliseconds timeout);
-    bool has_more() const;               // whether a further frame waits
-    void recycle(CapturedFrame &&frame); // takes back the memory
+    bool has_more() const;               // whether another frame can be read
+    void recycle(CapturedFrame &&frame); // reuses the memory of the frame
 
     Losses losses() const;
 
@@ -73,19 +75,19 @@ private:
     std::atomic<bool> stopping_{false};
     std::thread thread_;
 
-    // used by the thread only
+    // Only the thread uses these members.
     FrameAssembler assembler_;
     CaptureTimes times_;
-    std::size_t bulk_payload_bytes_ = 0; // of the current payload
+    std::size_t bulk_payload_bytes_ = 0; // size of the current payload so far
     int failed_in_a_row_ = 0;
 
     mutable std::mutex mutex_;
     std::condition_variable changed_;
     std::deque<CapturedFrame> frames_;
-    std::vector<std::vector<std::uint8_t>> unused_; // memory of frames
+    std::vector<std::vector<std::uint8_t>> unused_; // buffers for frames
     Losses losses_;
-    std::uint32_t lost_ = 0; // since the last frame in the queue
-    int error_ = 0;          // of libusb, which has ended the stream
+    std::uint32_t lost_ = 0; // frames lost since the last frame in the queue
+    int error_ = 0;          // libusb's error that has ended the stream
 };
 
 } // namespace arhost::uvc

@@ -31,9 +31,9 @@ enum class Damage { none, marked, lost_packet, malformed, truncated, oversized }
 
 // Numbers of frames that were not delivered, by cause.
 struct Losses {
-    std::uint64_t marked = 0;      // by the camera
-    std::uint64_t lost_packet = 0; // on the bus
-    std::uint64_t malformed = 0;   // payloads without a valid header
+    std::uint64_t marked = 0;      // marked as damaged by the camera
+    std::uint64_t lost_packet = 0; // a packet was lost on the bus
+    std::uint64_t malformed = 0;   // a payload had no valid header
     std::uint64_t truncated = 0, oversized = 0;
     std::uint64_t superseded = 0; // replaced by a newer one, or not read in time
 
@@ -43,26 +43,27 @@ struct Losses {
 
 struct AssembledFrame {
     std::vector<std::uint8_t> bytes;
-    std::int64_t arrival_ns = 0; // of its first payload
+    std::int64_t arrival_ns = 0; // arrival of the frame's first payload
     std::optional<std::uint32_t> presentation_ticks;
     std::optional<std::uint32_t> clock_ticks; // of the first payload that has it, which arrived at clock_arrival_ns
     std::int64_t clock_arrival_ns = 0;
-    Damage damage = Damage::none; // the first cause
+    Damage damage = Damage::none; // the first cause of damage
 };
 
-// Assembles frames from payloads. Hands over each frame that has any data, also damaged ones.
+// Assembles frames from payloads. Passes each frame with any data, even if damaged, to `take`.
 class FrameAssembler {
 public:
     using Take = std::function<void(AssembledFrame &frame)>; // may move the bytes out of the frame
 
-    // `max_bytes`: of a frame. `exact_bytes`: of an intact frame; 0: any number.
+    // `max_bytes`: maximum size of a frame. `exact_bytes`: size of an intact frame; 0: any size.
     FrameAssembler(std::size_t max_bytes, std::size_t exact_bytes, Take take);
 
-    // Adds an entire payload.
+    // Adds a whole payload.
     void add_payload(Bytes payload, std::int64_t arrival_ns);
-    // Adds bytes of a bulk endpoint, where a payload may need several transfers. `ends_payload`: with these bytes.
+    // Adds bytes from a bulk endpoint, where a payload may span several transfers. `ends_payload`: whether these
+    // bytes end the payload.
     void add_bulk(Bytes bytes, bool ends_payload, std::int64_t arrival_ns);
-    // A packet was lost on the bus.
+    // Records that a packet was lost on the bus.
     void lose_packet();
 
 private:
@@ -77,7 +78,7 @@ private:
     AssembledFrame frame_;
     bool in_frame_ = false;
     bool frame_id_ = false;
-    bool in_payload_ = false, ends_frame_ = false, skips_payload_ = false; // of the current payload
+    bool in_payload_ = false, ends_frame_ = false, skips_payload_ = false; // state of the current payload
 };
 
 } // namespace arhost::uvc

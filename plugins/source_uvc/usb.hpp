@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A USB camera, opened through libusb without a scan for devices: only the nodes in /dev/bus/usb that may be opened
-// are used, so that it works in a sandbox that has only one. Functions that fail throw Failure with a message for the
-// user.
+// A USB camera, opened through libusb without device discovery. Only those nodes in /dev/bus/usb are used that may be
+// opened. The plugin therefore works in a sandbox that contains only one node. Functions that fail throw Failure with
+// a message for the user.
 #pragma once
 
 #include "descriptors.hpp"
@@ -18,7 +18,7 @@
 
 namespace arhost::uvc {
 
-// "VENDOR:PRODUCT" or "VENDOR:PRODUCT:SERIAL", with the IDs in hexadecimal digits, as lsusb prints them.
+// The text is "VENDOR:PRODUCT" or "VENDOR:PRODUCT:SERIAL", with the IDs in hexadecimal digits as lsusb prints them.
 struct UsbIdentity {
     std::uint16_t vendor = 0, product = 0;
     std::string serial; // empty: any
@@ -27,12 +27,12 @@ std::optional<UsbIdentity> parse_identity(const std::string &text);
 
 class UsbDevice {
 public:
-    // Opens the camera with this identity; without one, the first camera that can be opened.
+    // Opens the camera with this identity, or, if there is no identity, the first camera that can be opened.
     static UsbDevice open(const std::optional<UsbIdentity> &identity);
     struct Connected;
     static std::vector<Connected> list();
 
-    const std::string &name() const { return name_; } // "the camera 046d:0825 (/dev/bus/usb/001/004)"
+    const std::string &name() const { return name_; } // such as "the camera 046d:0825 (/dev/bus/usb/001/004)"
     const Configuration &configuration() const { return configuration_; }
     libusb_context *context() const { return context_.get(); }
     libusb_device_handle *handle() const { return handle_.get(); }
@@ -40,17 +40,17 @@ public:
     enum class Driver { none, kernel, user_space };
     Driver driver_of(std::uint8_t interface) const;
 
-    // Takes an interface from the kernel's driver until release(), after which the driver has it again.
+    // Takes an interface from the kernel's driver. release() returns the interface to the driver.
     void claim(std::uint8_t interface);
     void release(std::uint8_t interface);
     void set_alternate(std::uint8_t interface, std::uint8_t alternate) const;
 
-    // A request of the video class to an entity (a unit's ID and an interface). Returns the number of bytes received,
-    // or a negative error of libusb; LIBUSB_ERROR_PIPE: the camera rejects it.
+    // Sends a request of the video class to an entity (a unit's ID and an interface). Returns the number of bytes
+    // received, or a negative libusb error. LIBUSB_ERROR_PIPE means that the camera rejects the request.
     int get(std::uint8_t request, std::uint8_t selector, std::uint16_t entity, std::span<std::uint8_t> data) const;
     int set(std::uint8_t selector, std::uint16_t entity, Bytes data) const;
 
-    // Throws Failure for an error of libusb, which occurred while `what` ("setting the format").
+    // Throws Failure for a libusb error. `what`: the operation that failed ("setting the format").
     [[noreturn]] void fail(const std::string &what, int error) const;
     [[noreturn]] void fail_configuration(const std::string &key, const std::string &what) const;
 
@@ -70,18 +70,19 @@ private:
 
     std::string name_;
     Configuration configuration_;
-    FileDescriptor fd_; // closed after the handle, which does not own it
+    FileDescriptor fd_; // closed after the handle, which does not own the descriptor
     std::unique_ptr<libusb_context, ExitContext> context_;
     std::unique_ptr<libusb_device_handle, CloseHandle> handle_;
 };
 
-// A connected camera. If it cannot be opened, `device` is absent, and the other members contain what is known.
+// A connected camera. If it cannot be opened, `device` is absent, and the other members contain the available
+// information.
 struct UsbDevice::Connected {
     std::string node, id; // "/dev/bus/usb/001/004", "046d:0825"
     std::string product, serial;
     Configuration configuration;
     std::optional<UsbDevice> device;
-    std::string problem; // why there is no `device`
+    std::string problem; // the reason why there is no `device`
 };
 
 // bRequest

@@ -9,8 +9,8 @@
 
 namespace arhost {
 
-// Only with formats that this plugin can capture, by the names of the option `format`. Nodes that deliver no pictures
-// are left out, unless they cannot be opened.
+// Lists the cameras with the formats that this plugin can capture, named as in the option `format`. Omits nodes that
+// deliver no pictures, unless they cannot be opened.
 std::vector<Device> list_cameras();
 
 } // namespace arhost

@@ -21,7 +21,7 @@ namespace arhost {
 struct CaptureSize {
     std::uint32_t width = 0, height = 0;
     std::vector<double> rates; // frames per second, highest first; empty: unknown
-    bool any_rate = false;     // `rates` has the two ends of a range
+    bool any_rate = false;     // whether `rates` contains the two ends of a range
     double max_fps() const { return rates.empty() ? 0 : rates.front(); }
 };
 
@@ -32,7 +32,7 @@ struct CaptureFormat {
     bool any_size = false; // any size in the range is available
 };
 
-// The format that a camera is set to.
+// The current format of a camera.
 struct PictureFormat {
     std::uint32_t fourcc = 0, width = 0, height = 0;
     std::uint32_t colour_space = 0, ycbcr_encoding = 0, quantization = 0, transfer = 0; // V4L2's constants
@@ -43,10 +43,10 @@ struct PictureFormat {
 struct Capture {
     std::uint32_t index = 0, flags = 0, sequence = 0;
     timeval time{};
-    std::vector<std::span<const std::uint8_t>> planes; // of memory; as many bytes as the driver reported
+    std::vector<std::span<const std::uint8_t>> planes; // planes of memory, with the size that the driver reported
 };
 
-// The nodes /dev/video*, in the order of their numbers, and what the kernel calls them ("" if unknown).
+// Returns the nodes /dev/video*, in the order of their numbers, with the kernel's names for them ("" if unknown).
 std::vector<std::string> video_nodes();
 std::string card_of(const std::string &node);
 
@@ -62,7 +62,7 @@ struct NotACamera : Failure {
 
 class CaptureDevice {
 public:
-    // Opens the device and checks that it captures video; throws CannotOpen or NotACamera. `option`: the option that
+    // Opens the device and checks that it captures video. Throws CannotOpen or NotACamera. `option`: the option that
     // names the device, for messages.
     explicit CaptureDevice(const std::string &path, const std::string &option = "device");
 
@@ -72,7 +72,7 @@ public:
     const CaptureFormat *find(std::uint32_t fourcc) const;
     double max_fps(std::uint32_t fourcc, std::uint32_t width, std::uint32_t height) const; // 0: unknown
     bool is_busy() const;                 // whether another program captures
-    std::string describe_formats() const; // such as "YUYV (640×480 30 fps, …), MJPG (…)"
+    std::string describe_formats() const; // for example "YUYV (640×480 30 fps, …), MJPG (…)"
     std::string describe_sizes_near(const CaptureFormat &format, std::uint32_t width, std::uint32_t height) const;
 
     PictureFormat current_format() const;
@@ -81,7 +81,8 @@ public:
 
     // Calls ioctl and repeats it on EINTR. Returns 0 or an errno value.
     int control(unsigned long request, void *argument) const;
-    // Throws, or returns, a Failure for the errno value `error`, which occurred while `what` ("querying its format").
+    // Throws or returns a Failure for the errno value `error`. `what`: the operation that failed ("querying its
+    // format").
     Failure failure_of(const std::string &what, int error) const;
     [[noreturn]] void fail(const std::string &what, int error) const;
     int fd() const { return fd_.get(); }
@@ -121,7 +122,7 @@ private:
     [[noreturn]] void fail_stopped() const;
 
     const CaptureDevice &device_;
-    std::vector<std::vector<Mapping>> mappings_; // of each buffer, of each plane
+    std::vector<std::vector<Mapping>> mappings_; // one entry per buffer and plane
 };
 
 } // namespace arhost

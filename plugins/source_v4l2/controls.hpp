@@ -15,10 +15,10 @@ namespace arhost {
 
 struct Control : ControlValues {
     std::uint32_t id = 0, type = 0, flags = 0; // type: V4L2's
-    std::string name;                          // as v4l2-ctl prints it: "white_balance_temperature"
+    std::string name;                          // in the form that v4l2-ctl prints: "white_balance_temperature"
 };
 
-// "White Balance, Automatic" becomes "white_balance_automatic".
+// Returns, for example, "white_balance_automatic" for "White Balance, Automatic".
 std::string control_name(std::string_view label);
 
 class Controls {

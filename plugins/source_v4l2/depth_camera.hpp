@@ -22,9 +22,9 @@ public:
     // Starts capturing in the size of the colour frames. `fps`: rate of the colour camera; 0: unknown.
     DepthCamera(const Host &host, const std::string &path, const FrameSize &size, double fps, double unit_mm);
 
-    // Writes the depth plane of `buffer`: the frame that was captured nearest to the time `colour_ns` of
-    // CLOCK_MONOTONIC. Waits for it if necessary. If there is none within about half a frame time, all depths are
-    // unknown (0), and the result is false. Throws Failure if the camera has delivered no frame for 5 s.
+    // Writes the depth frame that was captured nearest to `colour_ns` (CLOCK_MONOTONIC) to the depth plane of
+    // `buffer`. Waits for that frame if necessary. If no frame was captured within about half a frame time, sets all
+    // depths to unknown (0) and returns false. Throws Failure if the camera has delivered no frame for 5 s.
     bool read(std::int64_t colour_ns, const arhost_frame_buffer &buffer);
 
 private:
@@ -41,10 +41,10 @@ private:
     CaptureDevice device_;
     DriverClock clock_;
     double unit_mm_;
-    std::uint32_t stride_ = 0;     // bytes per row of the camera
-    std::int64_t interval_ns_ = 0; // from frame to frame
+    std::uint32_t stride_ = 0;     // bytes per row of the camera's frames
+    std::int64_t interval_ns_ = 0; // time from frame to frame
     std::optional<CaptureStream> stream_;
-    std::deque<Held> held_;        // in the order of capture; at most two after `read`
+    std::deque<Held> held_;        // in capture order; at most two after `read`
     std::int64_t last_arrival_ns_; // CLOCK_MONOTONIC
     Silence silence_;
 };

@@ -15,8 +15,8 @@ class DriverClock {
 public:
     explicit DriverClock(const Host &host) : host_(host) {}
 
-    // Returns the capture time in ns of CLOCK_MONOTONIC, at most the current time. Reports once if the driver uses
-    // another clock.
+    // Returns the capture time in ns of CLOCK_MONOTONIC, which is at most the current time. If the driver uses
+    // another clock, logs this once.
     std::int64_t monotonic_ns(const Capture &captured);
     // Returns the time since the capture; nullopt if the driver uses another clock.
     static std::optional<std::int64_t> age_ns(const Capture &captured);

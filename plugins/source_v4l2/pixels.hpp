@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// V4L2's uncompressed pixel formats, and their conversion to those of arhost. The formats are described in the
-// kernel's documentation, "Image Formats" of the V4L2 API.
+// V4L2's uncompressed pixel formats, and their conversion to arhost's formats. The section "Image Formats" of the
+// kernel's V4L2 documentation describes them.
 #pragma once
 
 #include "capture_device.hpp"
@@ -20,8 +20,8 @@ struct RawFormat {
     bool is_grey;
 };
 
-// In the order of preference: formats that need no conversion come first. Grey formats with more than 8 bits lose
-// their lower bits.
+// The formats in order of preference. Formats that need no conversion come first. Grey formats with more than 8 bits
+// lose their lower bits.
 inline constexpr std::array<RawFormat, 13> raw_formats = {{
     {V4L2_PIX_FMT_YUYV, "yuyv", ARHOST_PIXEL_FORMAT_YUYV, false},
     {V4L2_PIX_FMT_NV12, "nv12", ARHOST_PIXEL_FORMAT_NV12, false},
@@ -43,14 +43,15 @@ const RawFormat *find_raw_format(std::uint32_t fourcc);
 // Sets pixel format, size and, for Y'CbCr, matrix and range. Returns false for compressed and unknown formats.
 bool describe(const PictureFormat &camera, arhost_frame_format &format);
 
-// Whether describe() sets the driver's matrix; otherwise it sets that of BT.601.
+// Returns whether describe() sets the driver's matrix. Otherwise describe() sets the BT.601 matrix.
 bool has_known_matrix(const PictureFormat &camera);
 
-// Returns what is wrong with the rows that the driver reports ("rows of 100 bytes for 640 px"), or an empty string.
+// Returns a description of a defect in the row sizes that the driver reports ("rows of 100 bytes for 640 px"), or an
+// empty string.
 std::string defect_of(const PictureFormat &camera);
 
-// Copies a picture, whose format describe() has set. Returns false if its planes are too small; `fault` then has the
-// reason.
+// Copies a picture whose format describe() has set. Returns false if its planes are too small; `fault` then states
+// the reason.
 bool copy_picture(const PictureFormat &camera, const std::vector<std::span<const std::uint8_t>> &planes,
                   const arhost_frame_buffer &buffer, std::string &fault);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A plane picture, such as a poster or the cover of a book: finds it in a frame by its features, and aligns it with a
-// frame in which its place is roughly known.
+// A planar picture, such as a poster or a book cover. This class finds the picture in a frame by its features, and
+// aligns it with a frame in which its approximate position is known.
 #pragma once
 
 #include <fiducial/undistortion.hpp>
@@ -15,24 +15,24 @@
 
 namespace tracker_image {
 
-// The camera of the frames. In undistorted pixels (fiducial::Lens), a plane picture is related to a frame by a
-// homography.
+// The camera of the frames. A homography relates a planar picture to the undistorted pixels of a frame
+// (fiducial::Lens).
 class Camera {
 public:
     explicit Camera(const arhost_intrinsics &intrinsics);
 
-    // Both return std::nullopt where the distortion model is not one-to-one.
+    // Both functions return std::nullopt where the distortion model is not one-to-one.
     std::optional<cv::Point2d> undistort(cv::Point2d pixel) const;
     std::optional<cv::Point2d> distort(cv::Point2d undistorted_px) const;
-    // For each pixel of a region of the frame, the undistorted pixel (CV_32FC2); NaN where there is none.
+    // Returns the undistorted pixel of each pixel in a region of the frame (CV_32FC2); NaN where there is none.
     cv::Mat undistorted(const cv::Rect &region) const { return undistorted_(region); }
 
 private:
     arhost::fiducial::Lens lens_;
-    cv::Mat undistorted_; // of all pixels of a frame
+    cv::Mat undistorted_; // undistorted pixels of all pixels of a frame
 };
 
-// The features of a frame, which all pictures share.
+// The features of a frame, which are used for all pictures.
 struct Features {
     std::vector<cv::KeyPoint> points;
     cv::Mat descriptors;
@@ -47,26 +47,26 @@ public:
     // Height divided by width.
     double aspect() const { return aspect_; }
 
-    // Where the picture is in a frame, and how well it fits.
+    // The position of the picture in a frame, and the quality of the fit.
     struct Place {
-        std::vector<cv::Point2d> corners_px; // from the top left one clockwise
-        std::size_t inliers;                 // points of the picture that were found there
-        double inlier_share;                 // of the points that should be visible
+        std::vector<cv::Point2d> corners_px; // clockwise from the top left one
+        std::size_t inliers;                 // points of the picture that were found at this place
+        double inlier_share;                 // inliers divided by the number of points that should be visible
     };
-    // The features must be those of `frame`.
+    // `features`: must be the features of `frame`.
     std::optional<Place> find(const cv::Mat &frame, const Camera &camera, const Features &features) const;
-    // `corners_px`: where the corners are expected, from the top left one clockwise.
+    // `corners_px`: expected positions of the corners, clockwise from the top left one.
     std::optional<Place> align(const cv::Mat &frame, const Camera &camera,
                                const std::vector<cv::Point2d> &corners_px) const;
 
 private:
-    // The picture at one of several sizes, each 1/sqrt(2) of the one before.
+    // The picture at one of several sizes. The sides of each level are 1/sqrt(2) of those of the previous level.
     struct Level {
         cv::Mat grey;
-        std::vector<cv::Point2f> points; // with texture in both directions, for the alignment
+        std::vector<cv::Point2f> points; // points with texture in both directions, for the alignment
     };
 
-    // `undistorted_from_picture`: to undistorted pixels from pixels of the largest level.
+    // `undistorted_from_picture`: maps pixels of the largest level to undistorted pixels.
     std::optional<Place> align(const cv::Mat &frame, const Camera &camera,
                                cv::Matx33d undistorted_from_picture) const;
     std::vector<cv::Point2f> own_corners() const;
@@ -74,7 +74,7 @@ private:
 
     double aspect_;
     std::vector<Level> levels_;
-    Features features_; // of the largest level
+    Features features_; // features of the largest level
 };
 
 } // namespace tracker_image

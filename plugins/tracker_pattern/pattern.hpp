@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Patterns of ARToolKit: small pictures inside the black border of a square.
+// ARToolKit's patterns: small pictures inside the black border of a square.
 #pragma once
 
 #include <opencv2/core.hpp>
@@ -15,13 +15,13 @@ using Samples = cv::Mat_<float>;
 
 class Pattern {
 public:
-    // Reads a .patt file. Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION), with the place of the error.
+    // Reads a .patt file. Throws Failure(ARHOST_STATUS_ERROR_CONFIGURATION), which names the position of the error.
     explicit Pattern(const std::string &file);
 
     int side() const { return rotated_[0].rows; } // samples
 
-    // Returns the correlation of samples of this size with the picture, −1 to 1, and the number of quarter turns
-    // (clockwise, as seen) by which the print is rotated. `normalized`: from `normalized()`.
+    // Returns the correlation of samples of this size with the picture, −1 to 1, and the clockwise rotation of the
+    // marker in the image, in quarter turns. `normalized`: a result of `normalized()`.
     struct Match {
         double correlation;
         int quarter_turns;
