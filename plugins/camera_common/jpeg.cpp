@@ -10,8 +10,8 @@ namespace arhost {
 
 namespace {
 
-// Returns whether a warning of libjpeg is harmless. Many cameras insert padding before the end marker (0xd9), about
-// which libjpeg warns as if the picture were damaged.
+// Returns whether a warning of libjpeg is harmless. Many cameras insert padding before the end marker (0xd9). libjpeg
+// warns about this padding as if the picture were damaged.
 bool is_harmless(const std::string &warning) {
     return warning.find("extraneous bytes before marker 0xd9") != std::string::npos;
 }

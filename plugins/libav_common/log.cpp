@@ -41,7 +41,7 @@ void LibavLog::on_message(void *context, int level, const char *format, va_list 
     if (!active.log)
         return;
     LibavLog &log = *active.log;
-    std::array<char, 8192> line{}; // a cut URL would no longer show where its password ends
+    std::array<char, 8192> line{}; // a truncated URL would hide where its password ends
     av_log_format_line2(context, level, format, arguments, line.data(), line.size(), &log.print_prefix_);
     std::string text = line.data();
     while (!text.empty() && (text.back() == '\n' || text.back() == '\r'))

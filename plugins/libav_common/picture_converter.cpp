@@ -49,7 +49,7 @@ struct Plane {
     std::ptrdiff_t step_x, step_y;
 };
 
-// `width` and `height` are those before the rotation.
+// `width`, `height`: the size before the rotation.
 Plane turned(const std::uint8_t *data, std::ptrdiff_t stride, std::ptrdiff_t width, std::ptrdiff_t height,
              std::ptrdiff_t bytes, int quarter_turns_clockwise) {
     switch (quarter_turns_clockwise) {

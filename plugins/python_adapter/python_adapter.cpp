@@ -238,7 +238,7 @@ public:
                 static_cast<std::uint32_t>(PyLong_AsUnsignedLongMask(call("capabilities", "").value.get()));
 #endif
         } catch (...) {
-            adapter_ = Object(); // needs the GIL
+            adapter_ = Object(); // destruction requires the GIL
             throw;
         }
     }
@@ -432,13 +432,13 @@ private:
             throw Failure(ARHOST_STATUS_ERROR_INTERNAL, "Python: " + take_error());
     }
 
-    // The newest instance whose class has a method `devices`. Static, because the extension has no instance argument.
-    // Only the worker's main thread uses it.
+    // The newest instance whose class has a method `devices`. It is static, because the extension has no instance
+    // argument. Only the worker's main thread uses it.
     static inline PythonAdapter *lister_ = nullptr;
 
     Host host_;
     std::string path_;
-    std::uint64_t state_size_ = 0; // of a tracker
+    std::uint64_t state_size_ = 0; // size of a tracker's state
     Object adapter_;
 #if defined(KIND_RAYTRACER)
     std::uint32_t capabilities_ = 0;

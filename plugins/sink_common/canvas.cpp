@@ -11,7 +11,7 @@
 namespace arhost::drawing {
 namespace {
 
-// Sizes in px of the font.
+// Sizes in font px.
 constexpr int line_height = 12, padding = 5, margin = 4, label_gap = 8;
 constexpr int baseline_offset = 2; // centres letters, which are up to 9 px high, in their line
 
@@ -62,7 +62,7 @@ void Canvas::line(Point from, Point to, Colour colour) const {
 
 void Canvas::dashed_line(Point from, Point to, Colour colour) const {
     const double length = std::hypot(to.x - from.x, to.y - from.y), dash = 4 * scale_;
-    // An odd number of equal parts, so that the line begins and ends with a dash.
+    // Uses an odd number of equal parts, so that the line begins and ends with a dash.
     const int parts = 2 * static_cast<int>(std::clamp(length / dash / 2, 0.0, 1e4)) + 1;
     const auto part = [&](double i) {
         return Point{from.x + i / parts * (to.x - from.x), from.y + i / parts * (to.y - from.y)};
@@ -172,7 +172,7 @@ void PictureCanvas::fill(std::span<const Point> corners, Colour colour, std::uin
         }
         const int end_y = static_cast<int>(std::clamp(std::ceil(bottom + 0.5), 0.0, double(height_)));
         for (int y = static_cast<int>(std::clamp(std::floor(top - 0.5), 0.0, double(height_))); y < end_y; ++y) {
-            // The pixels of the row whose centres are at most half a pixel outside of all edges.
+            // Finds the pixels of the row whose centres are at most half a pixel outside of any edge.
             double begin = 0, end = width_;
             for (const Edge &edge : edges) {
                 const double rest = edge.b * (y + 0.5) + edge.c + 0.5;
@@ -183,7 +183,7 @@ void PictureCanvas::fill(std::span<const Point> corners, Colour colour, std::uin
             }
             if (end <= 0)
                 continue;
-            // An edge that is almost horizontal may put `begin` far outside of the picture.
+            // An almost horizontal edge may place `begin` far outside the picture.
             for (int x = static_cast<int>(std::min(begin, end)); x < end; ++x) {
                 const auto covers = [&](const Edge &edge) { return edge.covers(x + 0.5, y + 0.5); };
                 const double opacity = alpha / 255.0 * std::max(0.0, covers(edges[0]) + covers(edges[2]) - 1) *

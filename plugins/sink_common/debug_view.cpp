@@ -11,7 +11,7 @@
 namespace arhost::drawing {
 namespace {
 
-constexpr std::size_t max_listed_targets = 16; // in the box
+constexpr std::size_t max_listed_targets = 16; // maximum number of targets in the box
 constexpr double residual_scale = 50;
 
 std::string name_of(const arhost_target &target) {
@@ -44,8 +44,9 @@ Point centre_of(const Canvas &canvas, const arhost_observation &marker) {
     return canvas.at({sum.x / 4, sum.y / 4});
 }
 
-// Draws the outline, and a stroke that cuts off the first corner. The stroke ends on the two sides that meet there;
-// the end on the side to the second corner is farther from the first corner. Returns the lowest corner.
+// Draws the outline, and a stroke that cuts off the first corner to mark it. The stroke connects the two sides that
+// meet at this corner. Its end on the side to the second corner is farther from the first corner. Returns the lowest
+// corner.
 Point draw_quad(const Canvas &canvas, const Corners &corners_px, Colour colour) {
     Point corners[4];
     for (int i = 0; i < 4; ++i)
@@ -65,7 +66,8 @@ bool has_projection(const arhost_observation &marker) {
                                [](const auto &corner) { return corner[0] != 0 || corner[1] != 0; });
 }
 
-// Draws magnified lines from the corners to where the pose projects them, at most as long as the marker.
+// Draws magnified lines from the measured corners to the corners that the pose predicts. The lines are at most as
+// long as the marker.
 void draw_residuals(const Canvas &canvas, const arhost_observation &marker) {
     const double longest_px = longest_side_px(marker.corners_px);
     for (int i = 0; i < 4; ++i) {
@@ -76,7 +78,7 @@ void draw_residuals(const Canvas &canvas, const arhost_observation &marker) {
     }
 }
 
-// Writes below a point, so that the text does not cover what is there.
+// Draws text below a point, so that the text does not cover the picture there.
 void write_below(const Canvas &canvas, Point point, const std::string &text, Colour colour) {
     canvas.label({point.x, point.y + canvas.text_height()}, text, colour);
 }
@@ -113,7 +115,8 @@ void DebugView::start(const arhost_sink_setup &setup) {
     }
 }
 
-// Draws axes of this length, for a target in the middle of the picture. Returns the origin.
+// Draws the axes of a target in the middle of the picture. `length_px`: length of an axis at that position. Returns
+// the origin.
 std::optional<Point> DebugView::draw_axes(const Canvas &canvas, const arhost_target &target, double length_px) const {
     const double length = length_px * distance_of(target) / focal_length_px_;
     // Returns the pixel of a point on an axis; columns 0 to 2 of `mt` are the axes. Eye space has y up and z

@@ -43,7 +43,7 @@ void require_regular_file(int fd, const std::filesystem::path &path) {
     }
 }
 
-// Whether only a change of the configuration or of permissions helps, so the host must not retry.
+// Returns whether only a change of the configuration or of permissions helps. The host must then not retry.
 bool is_permanent(int error_number) {
     switch (error_number) {
     case EACCES:

@@ -17,8 +17,8 @@ namespace {
 using json_text::append;
 using json_text::append_number;
 
-// Appends a JSON string and replaces all bytes that are not printable ASCII with '?'. The host's names are ASCII;
-// other bytes can only come from a defective one.
+// Appends a JSON string. Replaces all bytes that are not printable ASCII with '?'. The host's names are ASCII, so
+// other bytes come from a defective host.
 template <std::size_t size> void append_text(std::string &text, const char (&value)[size]) {
     text += '"';
     for (const char c : std::string_view(value, ::strnlen(value, size))) {
@@ -51,7 +51,7 @@ const char *name_of_overlay(arhost_overlay overlay) {
     }
 }
 
-// Appends an array unless all its elements are 0, which means that it is unknown.
+// Appends an array unless all its elements are 0, which means "unknown".
 void append_if_known(std::string &text, const char *key, std::span<const double> numbers) {
     if (std::ranges::all_of(numbers, [](double x) { return x == 0; }))
         return;

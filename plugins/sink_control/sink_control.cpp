@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// sink_control: passes commands of `arhost ctl` and other programs of the same user to the host. Each line that a
-// client sends is a command, each line that it receives is the answer to one. The plugin serves its clients between
+// sink_control: transfers commands from `arhost ctl` and other programs of the same user to the host. Each line from
+// a client is a command; each line to a client is the answer to one command. The plugin serves its clients between
 // frames, so it needs no thread.
 #include <arhost-cpp/plugin.hpp>
 
@@ -22,8 +22,8 @@ public:
     Client(const Client &) = delete;
     Client &operator=(const Client &) = delete;
 
-    // Receives commands and sends answers, as far as possible without waiting. Returns false if the client has left
-    // or is too slow.
+    // Receives commands and sends answers without waiting. Returns false if the client has disconnected or is too
+    // slow.
     bool serve(arhost::HostControl &control, const std::shared_ptr<Client> &self) {
         char buffer[4096];
         const ssize_t size = ::recv(fd_, buffer, sizeof buffer, MSG_DONTWAIT);
@@ -46,7 +46,7 @@ public:
     }
 
 private:
-    static constexpr int max_pending = 2; // commands of this client without an answer
+    static constexpr int max_pending = 2; // maximum number of unanswered commands of this client
 
     void send_command(arhost::HostControl &control, const std::string &command, const std::shared_ptr<Client> &self) {
         ++pending_;
@@ -71,7 +71,7 @@ private:
     }
 
     int fd_;
-    bool has_left_ = false; // has sent its last command
+    bool has_left_ = false; // whether the client has sent its last command
     int pending_ = 0;
     std::string received_, unsent_;
 };
@@ -107,7 +107,7 @@ public:
     }
 
 private:
-    // Whether the client is a process of the same user or of root.
+    // Returns whether the client is a process of the same user or of root.
     bool is_own(int client) const {
         ucred peer{};
         socklen_t size = sizeof peer;

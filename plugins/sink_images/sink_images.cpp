@@ -83,7 +83,7 @@ public:
         debug_view_.start(setup);
         depth_stride_ = setup.video_format->depth_stride;
         files::make_parent_folders(path_);
-        files::check_can_write(scratch_); // reports an error now, not only at the first frame
+        files::check_can_write(scratch_); // reports an error now instead of at the first frame
         if (pattern_) {
             if (setup.first_sequence == 0)
                 warn_of_older_images();
@@ -102,8 +102,8 @@ public:
     arhost_status write(const arhost_output &output) {
         const Image image = image_of(output);
         const std::uint64_t sequence = output.record->sequence;
-        // Delete an older image when the first frame arrives, not in start(), because the run may still fail before.
-        // From then on, also after a restart, the file exists only if this run wrote it.
+        // Deletes an older image when the first frame arrives instead of in start(), because the run may fail before.
+        // From then on, even after a restart, an existing file comes from this run.
         if (may_be_older_)
             files::remove_file(path_);
         may_be_older_ = false;

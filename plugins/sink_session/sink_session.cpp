@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// sink_session: records a session, which `arhost replay` plays again (docs/sessions.md). Writes the frames of the
-// source to a video, and the record of each frame to a log. A frame is in the video before it is in the log, and each
-// line of the log says where the frame's data in the video ends. So whatever ends the process, the lines of the log
-// tell which frames are complete.
+// sink_session: records a session, which `arhost replay` plays back (docs/sessions.md). Writes the frames of the
+// source to a video, and the record of each frame to a log. Each frame is written to the video before it is written
+// to the log. Each line of the log states where the frame's data in the video ends. The log therefore shows which
+// frames are complete, no matter how the process ended.
 #include "sink_common/line_file.hpp"
 #include "sink_common/record_line.hpp"
 #include "video_file.hpp"
@@ -88,12 +88,12 @@ public:
         if (!video_->is_open())
             return host_.warn("'" + folder_.string() + "' was not written, because there were no frames");
         if (is_complete_)
-            log_.append("{\"end\": true}\n"); // without this line, the recording was interrupted
+            log_.append("{\"end\": true}\n"); // a log without this line was interrupted
     }
 
 private:
-    // Throws if the folder has contents that must not be overwritten. A restarted sink may overwrite what it has
-    // written before the host has got its first answer.
+    // Throws if the folder has contents that must not be overwritten. A restarted sink may overwrite the files that
+    // it wrote before the host received its first answer.
     void expect_free() const {
         std::error_code error;
         const fs::file_status status = fs::status(folder_, error);
@@ -168,7 +168,7 @@ private:
     Host host_;
     fs::path folder_;
     bool replaces_, has_restarted_ = false;
-    bool is_complete_ = true; // the last frame was written
+    bool is_complete_ = true; // whether the last frame was written
     files::LineFile log_;
     session::VideoSettings settings_;
     std::optional<session::VideoFile> video_;

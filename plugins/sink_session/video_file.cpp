@@ -19,7 +19,7 @@ bool is_rgb(arhost_pixel_format format) {
     return format == ARHOST_PIXEL_FORMAT_BGR8 || format == ARHOST_PIXEL_FORMAT_RGB8;
 }
 
-// Returns the planar or padded format that holds the frames' pixels without loss.
+// Returns the planar or padded format that stores the frames' pixels without loss.
 AVPixelFormat encoded_format(arhost_pixel_format format, bool is_ffv1) {
     switch (format) {
     case ARHOST_PIXEL_FORMAT_GREY8:
@@ -146,7 +146,7 @@ void VideoFile::open_encoder() {
     if (is_ffv1) {
         encoder_->gop_size = 1; // each frame can be decoded alone
         encoder_->level = 3;
-        av_opt_set_int(encoder_->priv_data, "slicecrc", 1, 0); // damage is detected
+        av_opt_set_int(encoder_->priv_data, "slicecrc", 1, 0); // makes damage detectable
         encoder_->slices = 4;                                  // fixed, so that the file does not depend on `threads`
     } else {
         encoder_->gop_size = 30;

@@ -24,7 +24,7 @@ const char *name_of(arhost_distortion distortion) {
     }
 }
 
-// Returns whether the record has a camera with finite numbers. A defective host could send others.
+// Returns whether the record has a camera with finite numbers. A defective host could send non-finite numbers.
 bool has_camera(const arhost_record &record) {
     const auto finite = [](const double(&values)[3]) {
         return std::ranges::all_of(values, [](double value) { return std::isfinite(value); });

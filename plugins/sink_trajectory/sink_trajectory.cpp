@@ -39,7 +39,7 @@ public:
         const arhost_record &record = *output.record;
         text_.clear();
         if (dissertation_) {
-            // The lines have no frame numbers, so frames that live mode dropped need a line, too.
+            // The lines have no frame numbers, so each frame that live mode dropped also needs a line.
             if (record.sequence > next_line_)
                 text_.assign(record.sequence - next_line_, '\n');
             arhost::trajectory::append_dissertation_frame(text_, record);

@@ -179,7 +179,7 @@ void OutputDevice::map_buffers() {
 
 bool OutputDevice::wait_until_writable(const Host &host) const {
     using Clock = std::chrono::steady_clock;
-    constexpr auto limit = std::chrono::seconds(3); // less than the default of deadline_ms
+    constexpr auto limit = std::chrono::seconds(3); // shorter than the default of deadline_ms
     constexpr int timeout_ms = 50;
     for (const auto give_up = Clock::now() + limit; Clock::now() < give_up;) {
         if (host.cancelled())

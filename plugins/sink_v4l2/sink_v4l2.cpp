@@ -17,7 +17,7 @@ struct PixelFormat {
     std::string_view name; // value of the option `format`
     std::uint32_t fourcc;
     AVPixelFormat pixels;
-    int bytes_per_pixel; // of the first plane
+    int bytes_per_pixel; // for the first plane
     bool is_yuv;
 };
 constexpr PixelFormat pixel_formats[] = {{"yuyv", V4L2_PIX_FMT_YUYV, AV_PIX_FMT_YUYV422, 2, true},
@@ -93,7 +93,7 @@ public:
     void stop() { device_.reset(); }
 
 private:
-    // Sets the first permitted pixel format in which the device takes frames of this size.
+    // Sets the first permitted pixel format in which the device accepts frames of this size.
     void set_format() {
         const std::vector<std::uint32_t> offered = device_->formats();
         std::string rejected, offers;
@@ -103,7 +103,8 @@ private:
             if (std::ranges::count(offered, candidate.fourcc) == 0 ||
                 (format_option_ != "auto" && format_option_ != candidate.name))
                 continue;
-            // Programs that read the device may not see the colour space, and then assume this one from the height.
+            // Programs that read the device may not receive the colour space. They then derive it from the height, as
+            // follows.
             constexpr std::uint32_t standard_definition = 576;
             const std::uint32_t colour_space = !candidate.is_yuv                ? V4L2_COLORSPACE_SRGB
                                                : height_ <= standard_definition ? V4L2_COLORSPACE_SMPTE170M
@@ -125,7 +126,7 @@ private:
                                                              "; set the source or the device to another size");
     }
 
-    // Subsampled formats have even sizes.
+    // Subsampled formats require even sizes.
     bool fits() const {
         const auto is_same_or_even = [](std::uint32_t size, std::uint32_t frame) {
             return size == frame || size == (frame + 1) / 2 * 2;

@@ -127,7 +127,7 @@ private:
                               "' was encoded with different options than the previous segment");
     }
 
-    // Returns the time of the next frame in the film, in the time base of the stream.
+    // Returns the time of the next frame in the joined video, in the time base of the stream.
     std::int64_t time_of(std::int64_t capture_ms) {
         const std::int64_t since_first_ms = capture_ms - first_ms_;
         const std::int64_t periods = av_rescale_q(since_first_ms, ms, av_inv_q(fps_)); // rounded to the nearest

@@ -83,9 +83,9 @@ public:
         if (static_cast<int>(output.width) != settings_.width || static_cast<int>(output.height) != settings_.height)
             throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the size of a frame differs from that in the setup");
         if (failed_)
-            return ARHOST_STATUS_ERROR_IO; // the error was already reported
+            return ARHOST_STATUS_ERROR_IO; // the error has already been reported
         if (!writer_) {
-            failed_ = true; // reset below after success
+            failed_ = true; // set to false after success
             begin();
             failed_ = false;
         }
@@ -113,8 +113,8 @@ public:
     }
 
 private:
-    // Begins a segment. Called for the first frame, not in start(), so a run that fails to start does not delete the
-    // segments of an earlier run.
+    // Begins a segment. It is called for the first frame instead of in start(), so that a run that fails to start
+    // does not delete the segments of an earlier run.
     void begin() {
         bool has_beginning = false;
         for (const Segment &segment : find_segments(path_))
@@ -123,8 +123,8 @@ private:
             else
                 has_beginning |= segment.first == 0;
         files::remove_file(partial_);
-        // When the video is complete, stop() deletes segment 0 first. A restarted sink therefore knows from the
-        // missing segment 0 that the video is complete.
+        // When the video is complete, stop() deletes segment 0 first. A missing segment 0 therefore tells a restarted
+        // sink that the video is complete.
         std::error_code ignored;
         finished_ = first_ > 0 && !has_beginning && fs::exists(path_, ignored);
         if (first_ > 0 && !has_beginning && !finished_)
@@ -159,7 +159,7 @@ private:
     std::optional<SegmentWriter> writer_;
     std::int64_t first_ = 0; // number of the first frame
     bool failed_ = false;    // the segment could not be opened
-    bool finished_ = false;  // a previous process completed the video, but was killed before it acknowledged this
+    bool finished_ = false;  // a previous process completed the video, but was killed before it reported this
 };
 
 constexpr const char *codecs[] = {"h264", "mpeg4", nullptr};

@@ -45,7 +45,7 @@ std::shared_ptr<const Jpeg> NewestFrame::newest() {
     if (tjCompress2(compressor_.get(), encoding_.bgr.data(), width, 0, height, TJPF_BGR, &bytes, &size, TJSAMP_420,
                     quality_, TJFLAG_NOREALLOC | TJFLAG_FASTDCT) != 0)
         throw std::runtime_error(std::string("cannot encode the picture: ") + tjGetErrorStr2(compressor_.get()));
-    jpeg->bytes.assign(bytes, bytes + size); // viewers keep it, so without the unused part of the buffer
+    jpeg->bytes.assign(bytes, bytes + size); // omits the unused part of the buffer, because viewers keep the JPEG
     jpeg_ = std::move(jpeg);
     ++encoded_;
     return jpeg_;

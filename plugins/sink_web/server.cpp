@@ -19,9 +19,11 @@ constexpr std::size_t max_viewers = 48;
 constexpr std::size_t connection_memory = 16384, stream_block = 65536; // bytes
 constexpr unsigned inactivity_s = 30;
 constexpr auto request_time = std::chrono::seconds(10), response_time = std::chrono::seconds(60),
-               frame_time = std::chrono::seconds(30);      // a viewer that needs longer for a frame is disconnected
-constexpr auto last_answer_time = std::chrono::seconds(1); // for sending the last answers when the run ends
-// After this time without a new frame, viewers receive the last one again, which shows whether they are still there.
+               frame_time = std::chrono::seconds(30); // a viewer that needs longer for a frame is disconnected
+// Time limit for sending the last answers at the end of the run.
+constexpr auto last_answer_time = std::chrono::seconds(1);
+// After this time without a new frame, viewers receive the last frame again. Sending it shows whether they are still
+// connected.
 constexpr auto repeat_time = std::chrono::seconds(1);
 constexpr std::string_view boundary = "arhostframe";
 
@@ -50,7 +52,7 @@ struct Server::Request {
     std::string body{};
     bool has_begun = false, is_too_large = false;
     bool was_suspended = false; // guarded by mutex_
-    std::string answer{};       // of the host, guarded by mutex_
+    std::string answer{};       // answer of the host, guarded by mutex_
 };
 
 struct Server::Viewer {
@@ -60,12 +62,12 @@ struct Server::Viewer {
     std::uint64_t number = 0;
     Clock::time_point sent_at{};
     std::shared_ptr<const Jpeg> jpeg{};
-    std::string head{};       // before the JPEG
-    std::size_t position = 0; // in head, JPEG and end
+    std::string head{};       // precedes the JPEG
+    std::size_t position = 0; // position in the concatenation of head, JPEG and end
 };
 
 struct Server::Callbacks {
-    // Exceptions must not cross libmicrohttpd: they close the connection.
+    // Exceptions must not leave the callbacks of libmicrohttpd. An exception closes the connection.
     template <class Call> static MHD_Result guarded(Call &&call) noexcept {
         try {
             return call() ? MHD_YES : MHD_NO;
@@ -101,7 +103,7 @@ struct Server::Callbacks {
                          MHD_RequestTerminationCode) noexcept {
         auto &server = *static_cast<Server *>(self);
         const std::unique_ptr<SharedRequest> request(static_cast<SharedRequest *>(std::exchange(*context, nullptr)));
-        server.limit_time(connection, request_time); // for the next request
+        server.limit_time(connection, request_time); // time limit for the next request
         const std::lock_guard lock(server.mutex_);
         if (request && (*request)->was_suspended && --server.unsent_answers_ == 0)
             server.all_sent_.notify_all();
@@ -160,7 +162,7 @@ Server::~Server() {
             const SharedRequest request = *suspended_.begin();
             resume(request);
         }
-        // The answer to `quit` may have arrived just now.
+        // The answer to `quit` may have arrived only now.
         all_sent_.wait_for(lock, last_answer_time, [this] { return unsent_answers_ == 0; });
     }
     MHD_stop_daemon(daemon_);
@@ -202,7 +204,7 @@ bool Server::check(const Request &request) {
         return true;
     if (!settings_.token.empty() && !has_token(header(request.connection, "Authorization"), settings_.token))
         return refuse(request, MHD_HTTP_UNAUTHORIZED, "commands need the token: 'Authorization: Bearer TOKEN'");
-    // Pages of other servers cannot send this type without asking first.
+    // Pages of other servers cannot send this content type without a CORS preflight request.
     if (!header(request.connection, "Content-Type").starts_with("application/json"))
         return refuse(request, MHD_HTTP_UNSUPPORTED_MEDIA_TYPE, "the type must be application/json");
     return true;
@@ -247,8 +249,8 @@ bool Server::send_command(const SharedRequest &request) {
     return suspend_until_answer(request);
 }
 
-// All requests that arrive while the host answers get the same answer, so any number of clients costs the host one
-// command at a time.
+// All requests that arrive while the host answers receive the same answer. The host thus handles one command at a
+// time, for any number of clients.
 bool Server::ask_status(const SharedRequest &request) {
     bool sends = false;
     {
@@ -322,7 +324,7 @@ bool Server::respond_with_page(const Request &request) {
     const std::string nonce = make_nonce();
     std::string status;
     for (const char c : request.answer)
-        status += c == '<' ? "\\u003c" : std::string(1, c); // in JSON, it is always part of a string
+        status += c == '<' ? "\\u003c" : std::string(1, c); // in JSON, '<' occurs only in strings
     const std::map<std::string_view, std::string> values = {{"nonce", nonce},
                                                             {"status", status},
                                                             {"width", std::to_string(settings_.width)},
@@ -373,8 +375,8 @@ bool Server::respond_with_stream(const Request &request) {
     return queue(request, MHD_HTTP_OK, response);
 }
 
-// Copies the next bytes of the stream. Browsers show a frame once they have the boundary after it, so this boundary
-// is sent with the frame.
+// Copies the next bytes of the stream. Browsers show a frame only when they receive the boundary after it, so the
+// boundary is sent with the frame.
 std::ptrdiff_t Server::read_stream(Viewer &viewer, std::span<char> to) {
     static const std::string end = "\r\n--" + std::string(boundary) + "\r\n";
     const auto size_of = [&](const Viewer &v) {
@@ -406,7 +408,7 @@ std::ptrdiff_t Server::read_stream(Viewer &viewer, std::span<char> to) {
                       "\r\nContent-Length: " + std::to_string(viewer.jpeg->bytes.size()) + "\r\n\r\n";
         viewer.position = 0;
     }
-    std::size_t copied = 0, begin = 0; // of the part within the whole
+    std::size_t copied = 0, begin = 0; // position of the current part within the whole
     const std::string_view jpeg(reinterpret_cast<const char *>(viewer.jpeg->bytes.data()), viewer.jpeg->bytes.size());
     for (const std::string_view part : {std::string_view(viewer.head), jpeg, std::string_view(end)}) {
         if (viewer.number == 0 && begin > 0)

@@ -234,7 +234,7 @@ private:
     HostCommands commands_;
     std::optional<Window> window_;
     std::optional<FrameTexture> picture_;
-    std::optional<arhost_record> record_; // of the frame in the window
+    std::optional<arhost_record> record_; // record of the frame in the window
     std::vector<arhost_target> targets_;  // of the record
     std::vector<arhost_observation> observations_;
     std::vector<arhost_expected_marker> expected_;

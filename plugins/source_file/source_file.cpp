@@ -136,7 +136,7 @@ private:
             frame += info.skipped;
             if (const arhost_status status = go_to(frame); status != ARHOST_STATUS_OK)
                 return status;
-            // If the decoder is too slow even so, play slower instead of skipping more and more frames.
+            // If the decoder is still too slow, plays slower instead of skipping more and more frames.
             if (now_ns() - epoch_ns_ - time_ns(frame) >= period_ns)
                 epoch_ns_ = now_ns() - time_ns(frame);
         }

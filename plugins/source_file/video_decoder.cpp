@@ -17,7 +17,8 @@ namespace arhost {
 
 namespace {
 
-// Throws std::bad_alloc if libav ran out of memory: the only error that the file does not cause. Returns other codes.
+// Returns an error code. Throws std::bad_alloc if libav ran out of memory, which is the only error that the file does
+// not cause.
 int checked(int code) {
     if (code == AVERROR(ENOMEM))
         throw std::bad_alloc();
@@ -25,8 +26,8 @@ int checked(int code) {
 }
 
 // Returns whether `file` is shorter than its AVI header declares, or std::nullopt if it is not an AVI file. The frame
-// count in the header cannot be used, because it counts time slots, some of which may be empty (Microsoft, AVI RIFF
-// File Reference).
+// count in the header is not suitable for this check: it counts time slots, some of which may be empty (Microsoft,
+// AVI RIFF File Reference).
 std::optional<bool> is_short_avi(const std::filesystem::path &file) {
     std::ifstream stream(file, std::ios::binary);
     unsigned char head[12] = {};
@@ -132,7 +133,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     codec_ = libav::allocated<libav::CodecPointer>(avcodec_alloc_context3(decoder));
     checked(avcodec_parameters_to_context(codec_.get(), stream_->codecpar));
     codec_->pkt_timebase = stream_->time_base;
-    // Let threads share the slices of one picture, but not decode several pictures at once. Otherwise, damaged data
+    // Threads share the slices of one picture, but do not decode several pictures at once. Otherwise, damaged data
     // might decode to different pictures each time.
     codec_->thread_type = FF_THREAD_SLICE;
     codec_->thread_count = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U));
@@ -194,7 +195,7 @@ arhost_status Decoder::feed() {
     }
     if (packet_->stream_index != stream_->index)
         return ARHOST_STATUS_OK;
-    // Drop a truncated packet. Its picture would be partly grey, but not marked as damaged.
+    // Drops a truncated packet. Its picture would be partly grey, but not marked as damaged.
     if (packet_->flags & AV_PKT_FLAG_CORRUPT) {
         lost_data_ = true;
         return ARHOST_STATUS_OK;
@@ -289,7 +290,7 @@ std::uint64_t Video::frame_count() const {
 }
 
 arhost_status Video::go_to(std::uint64_t index) {
-    // To seek back, reopen the file: then every picture is decoded from the same data in the same order, which
+    // To seek back, reopens the file. Every picture is then decoded from the same data in the same order, which
     // seeking to a keyframe does not guarantee. After the end, the decoder has no current picture.
     if (index < (decoder_->ended() ? decoder_->count() : decoder_->index()))
         open();

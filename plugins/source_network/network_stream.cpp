@@ -14,21 +14,21 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr AVRational nanoseconds = {1, 1'000'000'000};
 
-// Throws std::bad_alloc if libav ran out of memory. Returns other codes.
+// Returns an error code. Throws std::bad_alloc if libav ran out of memory.
 int checked(int code) {
     if (code == AVERROR(ENOMEM))
         throw std::bad_alloc();
     return code;
 }
 
-// The protocols that libav may use, for this URL and all that the server names (redirects, playlists): neither local
-// files nor other protocols.
+// Returns the protocols that libav may use for this URL and for all URLs that the server names (redirects,
+// playlists). They exclude local files and other protocols.
 const char *protocols_for(const std::string &url) {
     return url.starts_with("rtsp:") ? "rtsp,rtp,udp,tcp" : "http,https,tls,tcp";
 }
 
-// The containers that cameras and streaming servers send. Others, such as lists of files, would let the server choose
-// what libav opens.
+// The containers that cameras and streaming servers send. Other containers, such as lists of files, would let the
+// server choose which files libav opens.
 constexpr const char *containers = "rtsp,mpjpeg,hls,mpegts,mov,flv,matroska";
 
 class Dictionary {
@@ -81,14 +81,14 @@ void NetworkStream::open(const StreamSettings &settings) {
     Dictionary options;
     options.set("protocol_whitelist", protocols_for(settings.url));
     options.set("format_whitelist", containers);
-    // Bounds the data that is read to recognise the container and its tracks.
+    // Limits the amount of data that libav reads to recognise the container and its tracks.
     options.set("probesize", "100000");
     options.set("analyzeduration", "500000"); // µs
     if (settings.url.starts_with("rtsp:")) {
         options.set("rtsp_transport", settings.transport);
         options.set("allowed_media_types", "video"); // requests no other tracks
     } else {
-        options.set("live_start_index", "-1"); // the newest segment of a playlist
+        options.set("live_start_index", "-1"); // start with the newest segment of a playlist
     }
     // avformat_open_input frees the context if it fails.
     const int opened = checked(avformat_open_input(&context, settings.url.c_str(), nullptr, options.get()));
@@ -153,7 +153,7 @@ bool NetworkStream::next() {
         } else if (!feed()) {
             if (!ends_)
                 throw failure(AVERROR_EOF);
-            checked(avcodec_send_packet(codec_.get(), nullptr)); // then returns the remaining pictures
+            checked(avcodec_send_packet(codec_.get(), nullptr)); // the decoder then returns the remaining pictures
         }
     }
 }

@@ -34,7 +34,7 @@ std::optional<Received> Receiver::take(milliseconds limit) {
 
 bool Receiver::ended() {
     const std::lock_guard lock(mutex_);
-    return ended_ && kept_.empty() && !error_; // take throws the error
+    return ended_ && kept_.empty() && !error_; // if error_ is set, take throws it
 }
 
 double Receiver::fps() {
@@ -69,7 +69,7 @@ void Receiver::run(const std::stop_token &stop) {
     }
 }
 
-// Receives one connection until the end of a recording. Throws Failure if it is lost.
+// Receives one connection until the end of a recording. Throws Failure if the connection is lost.
 void Receiver::receive(const std::stop_token &stop) {
     NetworkStream stream(settings_.stream, log_, stop);
     const Clock::time_point begin = Clock::now();
@@ -100,14 +100,14 @@ bool Receiver::wait_until_due(const NetworkStream &stream, const std::stop_token
         return true;
     const std::int64_t now_ns = monotonic_ns();
     const std::int64_t early_ns = epoch_ns_ ? *epoch_ns_ + *sender_ns - now_ns : 0;
-    // A picture that is too late or too early follows an interruption or a jump of the time stamps.
+    // A picture that is far too late or far too early indicates an interruption or a jump of the time stamps.
     if (!epoch_ns_ || early_ns < -latest_ns || early_ns > earliest_ns)
         epoch_ns_ = now_ns - *sender_ns;
     return wait(stop, Clock::time_point(std::chrono::nanoseconds(*epoch_ns_ + *sender_ns)));
 }
 
 std::int64_t Receiver::capture_ns(const NetworkStream &stream) {
-    // A picture that arrives ahead of time waits until it is due; then that time counts as its arrival.
+    // A picture that arrives ahead of time waits until it is due. The due time then counts as its arrival.
     const std::int64_t now_ns = monotonic_ns(), arrival_ns = stream.is_ahead_of_time() ? now_ns : stream.arrival_ns();
     const auto utc_ns = stream.sender_utc_ns();
     if (!settings_.uses_sender_clock || !utc_ns)

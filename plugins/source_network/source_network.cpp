@@ -92,7 +92,7 @@ private:
     // Waits for next_. Returns false if the stream has ended or the host cancels the call.
     bool wait_for_picture(const char *what) {
         while (!next_ && !receiver_->ended() && !host_.cancelled()) {
-            host_.progress(-1, what); // prevents the deadline while the camera is lost
+            host_.progress(-1, what); // prevents a deadline violation while the connection is lost
             next_ = receiver_->take(poll_interval);
         }
         return next_.has_value();

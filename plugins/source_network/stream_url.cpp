@@ -12,7 +12,7 @@
 namespace arhost {
 
 void check_url(const std::string &url) {
-    constexpr std::size_t max_length = 2000; // far below the length of a line in LibavLog
+    constexpr std::size_t max_length = 2000; // far below the maximum line length of LibavLog
     const auto rejection = [](const std::string &why) {
         return Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "url: " + why);
     };

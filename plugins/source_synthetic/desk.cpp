@@ -11,8 +11,8 @@
 #include <vector>
 
 // The texture atlas of the desk: four square images, one below the other. They have the same centre on the desk, and
-// each covers twice the width of the image above it, so its own middle is not needed. The middle holds other data
-// instead: in the second image the colour of the card, in the third image the coverage of the card.
+// each covers twice the width of the image above it. The middle of each lower image is therefore not needed and may
+// hold other data: the second image holds the colour of the card, and the third image holds the coverage of the card.
 asm(".section .rodata\n"
     "desk_jpeg: .incbin \"" DESK_JPEG "\"\n"
     "desk_jpeg_end:\n"
@@ -24,7 +24,7 @@ namespace {
 
 constexpr float atlas_texel = 0.25f; // texel size of the first image
 constexpr float card_texel = 0.5f;
-constexpr int ink_permille = 175; // of the paper, in sRGB codes
+constexpr int ink_permille = 175; // sRGB code of the ink relative to the paper
 
 cv::Mat load_atlas() {
     const std::unique_ptr<void, int (*)(void *)> decoder(tjInitDecompress(), tjDestroy);
@@ -43,7 +43,7 @@ cv::Mat centre(const cv::Mat &image, int side) {
     return image(cv::Rect((image.cols - side) / 2, (image.rows - side) / 2, side, side));
 }
 
-// Computes the fourth channel, the gloss of the varnish, from the colour: only varnished wood is that red.
+// Computes the fourth channel, the gloss of the varnish, from the colour: only varnished wood is red enough.
 void add_gloss(cv::Mat &image) {
     std::vector<cv::Mat> rgba;
     cv::split(image, rgba);
@@ -74,7 +74,7 @@ void print_marker(const cv::Mat &cells, cv::Mat &image, float texel) {
     cv::Mat white, paper = centre(image, side);
     cv::resize(cells, white, {}, cell_px, cell_px, cv::INTER_NEAREST);
     cv::resize(white, white, {side, side}, 0, 0, cv::INTER_AREA);
-    // In integers: OpenCV rounds products of floats differently on different instruction sets.
+    // Uses integers, because OpenCV rounds products of floats differently on different instruction sets.
     for (int y = 0; y < side; ++y)
         for (int x = 0; x < side; ++x) {
             const int factor = ink_permille * 255 + (1000 - ink_permille) * white.at<std::uint8_t>(y, x);
@@ -108,7 +108,7 @@ DeskTextures make_desk(const MarkerSheet &sheet) {
     for (auto clip = clips.begin() + 1; clip != clips.end(); ++clip)
         add_gloss(*clip);
     print_caption(sheet, clips[1]);
-    // An additional, finer level that covers only the marker and its surroundings.
+    // Adds a finer level that covers only the marker and its surroundings.
     cv::resize(centre(clips[1], side / 2), clips[0], {side, side}, 0, 0, cv::INTER_CUBIC);
     print_marker(sheet.cells, clips[0], atlas_texel / 2);
     return {Pyramid(clips, atlas_texel / 2), Pyramid(std::span(&card_image, 1), card_texel)};

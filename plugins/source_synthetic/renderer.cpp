@@ -17,7 +17,7 @@ namespace {
 constexpr int cell_px = span_px; // cell size of the coarse grid
 constexpr int srgb_table_size = 4096;
 constexpr int grain_side = 256;
-constexpr float grain_unit = 4096; // value of one sigma
+constexpr float grain_unit = 4096; // value of one standard deviation
 constexpr float min_slope = 0.02f; // flatter rays are clamped to this slope, so they hit the desk
 constexpr float sharpness = 0.8f; // texel size relative to the footprint; below 1, because the pyramid itself smooths
 constexpr float aperture = 3.2f; // diameter of the circle of confusion in px = aperture·focal_px·|1/depth − 1/focus|
@@ -89,7 +89,7 @@ Renderer::Renderer(DeskTextures textures, const arhost_intrinsics &camera, const
                 }
     });
 
-    // Most lenses are a little softer in red and blue than in green.
+    // Most lenses blur red and blue slightly more than green.
     const double softness[4] = {1.15, 1.0, 1.22, 1.0};
     const int radius = sensor.blur_px > 0 ? static_cast<int>(std::ceil(2.6 * sensor.blur_px)) : 0;
     kernel_.resize(radius + 1);

@@ -70,7 +70,7 @@ public:
         sheet_.id = static_cast<int>(options.integer("id"));
         sheet_.cells = marker_cells(sheet_.family, options.integer("id"));
         target_ = options.text("target");
-        if (target_.empty()) // as the host names a target without a name
+        if (target_.empty()) // the host uses this name for a target without a name
             target_ = sheet_.family + "-" + std::to_string(sheet_.id);
         if (target_.size() >= ARHOST_MAX_NAME)
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "target: has " + std::to_string(target_.size()) +
@@ -154,8 +154,8 @@ private:
         return pose_on_path(path_, periods - std::floor(periods), distance_scale_, unit_mm);
     }
 
-    // Returns the pose of the card, if it is visible. It covers the marker from frame occlude_from until before frame
-    // occlude_to, slides in before that and slides out after that.
+    // Returns the pose of the card if it is visible. The card covers the marker from frame occlude_from to the frame
+    // before occlude_to. It slides in before these frames and slides out after them.
     std::optional<Card> card_at(std::uint64_t sequence) const {
         if (occlude_from_ < 0)
             return {};

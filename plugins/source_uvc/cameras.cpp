@@ -46,7 +46,7 @@ std::vector<DeviceControl> controls_of(const UsbDevice &device, const VideoFunct
         const arhost_device_control_type type = control.kind == ControlKind::boolean ? ARHOST_DEVICE_CONTROL_BOOLEAN
                                                 : control.kind == ControlKind::menu  ? ARHOST_DEVICE_CONTROL_MENU
                                                                                      : ARHOST_DEVICE_CONTROL_INTEGER;
-        if (values.minimum <= values.maximum) // some cameras report nonsense
+        if (values.minimum <= values.maximum) // some cameras report an invalid range
             listed.push_back({std::string(control.name), type, values.minimum, values.maximum,
                               static_cast<std::int64_t>(values.step), values.default_value,
                               controls.value_of(control)});
@@ -69,7 +69,7 @@ void describe(UsbDevice::Connected &camera, const VideoFunction &function, Devic
         device.problem = "it offers no supported format";
     }
     if (driver != UsbDevice::Driver::none)
-        return; // the interface must be taken from the driver for requests about controls
+        return; // requests about controls require the interface, which a driver holds
     camera.device->claim(function.control_interface);
     device.controls = controls_of(*camera.device, function);
     camera.device->release(function.control_interface);

@@ -11,10 +11,10 @@ namespace {
 
 constexpr std::size_t max_samples = 256, min_samples = 8;
 constexpr std::int64_t second_ns = 1'000'000'000;
-// Over less time, the delays of the samples hide the error of the rate.
+// For a shorter time, the variation of the delays hides the error of the rate.
 constexpr std::int64_t min_span_ns = 2 * second_ns;
-constexpr double max_rate_error = 5e-4;         // of a quartz, with a margin
-constexpr double implausible_rate_error = 0.02; // the stated frequency is wrong
+constexpr double max_rate_error = 5e-4;         // maximum error of a quartz clock, with a margin
+constexpr double implausible_rate_error = 0.02; // a larger error means that the stated frequency is wrong
 
 } // namespace
 
@@ -31,7 +31,7 @@ void DeviceClock::add(std::uint32_t ticks, std::int64_t arrival_ns) {
     if (!samples_.empty()) {
         const std::int64_t elapsed_ns = arrival_ns - samples_.back().arrival_ns;
         if (elapsed_ns >= 0 && step == 0)
-            return;                                                                 // the same sample again
+            return;                                                                 // the sample was repeated
         if (elapsed_ns < 0 || std::abs(device_ns(step) - elapsed_ns) > second_ns) { // the camera's clock was reset
             samples_.clear();
             is_known_ = false;
@@ -55,7 +55,7 @@ void DeviceClock::fit() {
     struct Point {
         double x, y;
     };
-    std::vector<Point> hull; // the lower one
+    std::vector<Point> hull; // the lower hull
     double mean = 0;
     for (const Sample &sample : samples_) {
         const Point point{static_cast<double>(sample.device_ns - origin_.device_ns),

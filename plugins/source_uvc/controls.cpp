@@ -44,10 +44,10 @@ constexpr std::array<ControlDefinition, 26> definitions = {{
     {"contrast_automatic", processing, 18, 0x13, 1, 0, 1, false, boolean},
 }};
 
-// The items of the kernel's menu auto_exposure, and the values that the class uses instead.
+// The items of the kernel's menu auto_exposure, and the corresponding values of the UVC class.
 struct ExposureMode {
     std::int64_t item;
-    std::uint8_t value; // also its bit in the set of supported modes
+    std::uint8_t value; // also the item's bit in the set of supported modes
     const char *name;
 };
 constexpr std::array<ExposureMode, 4> exposure_modes = {
@@ -91,7 +91,7 @@ template <class T> std::optional<T> number(std::string_view text, int base) {
                                                                                      : std::nullopt;
 }
 
-// Returns an empty vector for anything but pairs of hexadecimal digits.
+// Returns an empty vector if the text does not consist of pairs of hexadecimal digits.
 std::vector<std::uint8_t> parse_hex(std::string_view text) {
     std::vector<std::uint8_t> bytes;
     for (std::size_t i = 0; i < text.size(); i += 2) {
@@ -182,14 +182,14 @@ std::string Controls::set(const ControlDefinition &control, std::string_view tex
         for (const ExposureMode &mode : exposure_modes)
             if (mode.item == value)
                 encoded = mode.value;
-    // The data may have other values, which stay as they are.
+    // The data may contain other values, which must not change.
     std::vector<std::uint8_t> data = read(get_current, control);
     data.resize(control.size);
     for (std::size_t i = 0; i < control.width; ++i)
         data[control.offset + i] = static_cast<std::uint8_t>(encoded >> (8 * i));
     const int sent = device_.set(control.selector, entity_of(*unit_of(control)), data);
     if (sent == LIBUSB_ERROR_PIPE) {
-        constexpr unsigned can_set = 2, disabled = 4; // of GET_INFO
+        constexpr unsigned can_set = 2, disabled = 4; // flags of the answer to GET_INFO
         std::array<std::uint8_t, 1> info{};
         const bool is_known =
             device_.get(get_info, control.selector, entity_of(*unit_of(control)), info) == 1 && info[0] != 0;
@@ -246,7 +246,8 @@ std::string Controls::set_extension(const ControlSetting &setting, const std::st
     if (const int sent = device_.set(selector, entity_of(*unit), data); sent < 0)
         device_.fail("setting " + what, sent);
     std::vector<std::uint8_t> found(data.size());
-    const int got = device_.get(get_current, selector, entity_of(*unit), found); // not all can be read back
+    // Some extension units cannot be read back.
+    const int got = device_.get(get_current, selector, entity_of(*unit), found);
     if (got != static_cast<int>(data.size()) || found == data)
         return "";
     return "the camera has set " + what + " to " + hex_text(found) + " instead of " + hex_text(data);

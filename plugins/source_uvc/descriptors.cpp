@@ -22,10 +22,10 @@ constexpr std::uint8_t input_header = 1, output_header = 2, still_image_frame = 
                        format_h264_simulcast = 0x15, format_vp8 = 0x16, frame_vp8 = 0x17, format_vp8_simulcast = 0x18;
 constexpr std::uint16_t camera_terminal_type = 0x0201;
 
-// The end of the GUIDs that are a FourCC followed by this: "YUY2", "NV12", "H264", …
+// The last 12 bytes of GUIDs that begin with a FourCC: "YUY2", "NV12", "H264", …
 constexpr std::array<std::uint8_t, 12> fourcc_guid_end = {0, 0, 0x10, 0, 0x80, 0, 0, 0xaa, 0, 0x38, 0x9b, 0x71};
 
-// One descriptor. Bytes beyond its end read as 0, because cameras with an older version of the class omit fields.
+// A descriptor. Bytes beyond its end read as 0, because cameras that use an older version of the class omit fields.
 class Descriptor {
 public:
     explicit Descriptor(Bytes bytes) : bytes_(bytes) {}
@@ -35,7 +35,7 @@ public:
     std::uint8_t byte(std::size_t at) const { return at < bytes_.size() ? bytes_[at] : std::uint8_t{0}; }
     std::uint16_t word(std::size_t at) const { return static_cast<std::uint16_t>(byte(at) | byte(at + 1) << 8); }
     std::uint32_t number(std::size_t at) const { return word(at) | std::uint32_t{word(at + 2)} << 16; }
-    // A bit field of `count` bytes, of which the first 8 are kept.
+    // Returns a bit field of `count` bytes, or its first 8 bytes if it is longer.
     std::uint64_t bits(std::size_t at, std::size_t count) const {
         std::uint64_t value = 0;
         for (std::size_t i = 0; i < std::min<std::size_t>(count, 8); ++i)
@@ -66,7 +66,7 @@ Encoding encoding_of(const std::string &name) {
     return name == "YUY2" ? Encoding::yuy2 : name == "NV12" ? Encoding::nv12 : Encoding::unsupported;
 }
 
-// The name of a format that carries no GUID, or an empty string.
+// Returns the name of a format without a GUID, or an empty string.
 std::string name_of_format(std::uint8_t subtype) {
     switch (subtype) {
     case format_mjpeg:
@@ -119,11 +119,11 @@ public:
 private:
     enum class Place { elsewhere, control, streaming };
 
-    // A streaming interface, the formats that its header announces, and the function that lists it.
+    // A streaming interface, the formats that its header announces, and the function to which it belongs.
     struct Stream {
         StreamingInterface interface;
         std::optional<unsigned> announced_formats;
-        std::size_t function = 0; // index of the last function before it
+        std::size_t function = 0; // index of the last function before the interface
     };
 
     void defect(std::size_t at, const std::string &what) {
@@ -166,7 +166,7 @@ private:
                 add_streaming(at, descriptor);
             return;
         default:
-            return; // of other classes, or without use here, such as interface associations
+            return; // descriptors of other classes, or without use here, such as interface associations
         }
     }
 
@@ -210,7 +210,7 @@ private:
         std::vector<AlternateSetting> &alternates = streams_[stream_].interface.alternates;
         if (!(address & is_input) || (kind != isochronous && kind != bulk) ||
             std::ranges::count(alternates, alternate_, &AlternateSetting::number))
-            return; // of still images
+            return; // endpoints of still images
         // Bits 11 and 12: additional transactions of a high-bandwidth endpoint per microframe.
         const std::uint32_t size = descriptor.word(4), packet = size & 0x7ff, transactions = 1 + (size >> 11 & 3);
         if (packet == 0)
@@ -261,7 +261,7 @@ private:
             break;
         }
         default:
-            return; // other terminals and units have no controls of use here
+            return; // other terminals and units have no controls that the plugin uses
         }
         if (unit.id == 0 || std::ranges::count(function.units, unit.id, &Unit::id))
             return defect(at, "is ignored: its unit ID " + std::to_string(unit.id) + " is 0 or not unique");
@@ -312,14 +312,14 @@ private:
             if (in_format_)
                 formats.back().matrix = descriptor.byte(5);
             return;
-        case frame_h264: // their sizes are at other places, and no format uses them
+        case frame_h264: // their sizes have other offsets, and no supported format uses them
         case frame_vp8:
         case still_image_frame:
         case output_header:
         default:
             return;
         }
-        in_format_ = false; // if this one is ignored, so are its frames
+        in_format_ = false; // if this format is ignored, its frames are ignored too
         if (format.index == 0 || std::ranges::count(formats, format.index, &Format::index))
             return defect(at, "is ignored: its format index " + std::to_string(format.index) + " is 0 or not unique");
         in_format_ = append(formats, max_formats, at, std::move(format)) != nullptr;
@@ -357,8 +357,8 @@ private:
         append(format.frames, max_frames, at, std::move(frame));
     }
 
-    // Assigns the streaming interfaces to their functions: to the one whose header lists it, otherwise to the last
-    // one before it.
+    // Assigns each streaming interface to the function whose header lists it. If no header lists it, assigns it to
+    // the last function before it.
     void finish() {
         for (Stream &stream : streams_) {
             StreamingInterface &interface = stream.interface;
@@ -379,10 +379,10 @@ private:
     std::vector<std::vector<std::uint8_t>> listed_; // baInterfaceNr of each function
     std::vector<Stream> streams_;
     Place place_ = Place::elsewhere;
-    std::size_t stream_ = 0; // in streams_
-    bool in_format_ = false; // frames belong to the last format
+    std::size_t stream_ = 0; // index in streams_
+    bool in_format_ = false; // whether frames belong to the last format
     std::uint8_t alternate_ = 0;
-    AlternateSetting *last_endpoint_ = nullptr; // that a companion descriptor may follow
+    AlternateSetting *last_endpoint_ = nullptr; // the endpoint to which a companion descriptor belongs
 };
 
 } // namespace
@@ -415,7 +415,7 @@ Configuration parse_configuration(Bytes bytes) {
     return Parser().parse(bytes);
 }
 
-// The first three groups are little-endian in the descriptor.
+// In the descriptor, the first three groups of a GUID are little-endian.
 std::string to_text(const Guid &guid) {
     constexpr std::array<int, 16> order = {3, 2, 1, 0, 5, 4, 7, 6, 8, 9, 10, 11, 12, 13, 14, 15};
     std::string text;

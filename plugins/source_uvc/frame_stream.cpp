@@ -9,7 +9,8 @@ namespace {
 
 constexpr std::size_t transfer_count = 5;
 constexpr std::size_t max_bulk_transfer = std::size_t{256} << 10;
-// The packets of an isochronous transfer arrive together, so few of them keep the latency low: 4 ms at high speed.
+// The packets of an isochronous transfer are delivered together, so a small number keeps the latency low: 4 ms at
+// high speed.
 constexpr int max_packets = 32;
 constexpr int max_failed_in_a_row = 200;
 
@@ -88,21 +89,21 @@ void FrameStream::stop() {
         thread_.join();
     else
         run();
-    // Both fail if the camera is lost.
+    // Both calls fail if the camera is lost.
     if (!setup_.alternate.is_bulk)
         libusb_set_interface_alt_setting(device_.handle(), setup_.interface, 0);
     else
         libusb_clear_halt(device_.handle(), setup_.alternate.endpoint);
 }
 
-// Handles events until the stream is stopped and no transfer is in flight: the kernel must not write to its memory
-// later.
+// Handles events until the stream is stopped and no transfer is in flight, because the kernel must not write to the
+// buffers after they are freed.
 void FrameStream::run() noexcept {
     bool is_cancelled = false;
     while (!stopping_ || in_flight_ > 0) {
         if (stopping_ && !is_cancelled) {
             for (const Transfer &transfer : transfers_)
-                libusb_cancel_transfer(transfer.transfer.get()); // fails for those that are not in flight
+                libusb_cancel_transfer(transfer.transfer.get()); // fails for transfers that are not in flight
             is_cancelled = true;
         }
         timeval timeout{0, 50'000};
@@ -159,7 +160,7 @@ void FrameStream::add_isochronous(libusb_transfer *transfer, std::int64_t arriva
     }
 }
 
-// A payload ends with a transfer that is not full, or at its maximum size.
+// Adds bytes of a payload. A payload ends with a transfer that is not full, or when it reaches its maximum size.
 void FrameStream::add_bulk(libusb_transfer *transfer, std::int64_t arrival_ns) {
     const auto size = static_cast<std::size_t>(std::clamp(transfer->actual_length, 0, transfer->length));
     bulk_payload_bytes_ += size;

@@ -35,7 +35,7 @@ std::optional<ProbeControl> decode_probe(Bytes bytes) {
     if (bytes.size() >= 30)
         probe.clock_hz = number(26);
     if ((probe.max_payload_bytes & 0xffff0000) == 0xffff0000)
-        probe.max_payload_bytes &= 0xffff; // some cameras extend the sign of a 16-bit number
+        probe.max_payload_bytes &= 0xffff; // some cameras sign-extend a 16-bit number
     return probe;
 }
 

@@ -25,7 +25,7 @@ std::optional<PayloadHeader> parse_payload_header(Bytes payload) {
         return bytes[0] | std::uint32_t{bytes[1]} << 8 | std::uint32_t{bytes[2]} << 16 |
                std::uint32_t{bytes[3]} << 24;
     };
-    // Some cameras set the bits of fields that their header is too short for.
+    // Some cameras set bits of fields that their header is too short to contain.
     if (info & has_presentation && header.size >= at + 4) {
         header.presentation_ticks = ticks();
         at += 4;

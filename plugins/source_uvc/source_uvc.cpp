@@ -41,8 +41,8 @@ std::string rate_text(double fps) {
     return text;
 }
 
-// The option `extension` is not changeable: an output that may change options could otherwise replace the firmware of
-// some cameras.
+// The option `extension` is not changeable during a run. Otherwise, an output with the right to change options could
+// replace the firmware of some cameras.
 class UvcSource : arhost::CameraSource {
 public:
     using CameraSource::changeable;
@@ -105,7 +105,8 @@ public:
 
     void stop() {
         stream_.reset();
-        // The kernel's driver takes all interfaces when it gets the control interface, so that must be free last.
+        // Releases the control interface last, because the kernel's driver takes all interfaces when it takes the
+        // control interface.
         for (; device_ && !claimed_.empty(); claimed_.pop_back())
             device_->release(claimed_.back());
         device_.reset();
@@ -119,7 +120,7 @@ private:
         const Mode mode = choose_mode(function, setup);
         claim(function.control_interface);
         claim(mode.stream->number);
-        // Before the stream starts, so that the first frame has them.
+        // Sets the controls before the stream starts, so that they apply to the first frame.
         set_controls(function, control_values_);
         arhost::show_warnings(host_,
                               uvc::Controls(*device_, function).set_extensions(extension_option_, "extension"));
@@ -191,7 +192,7 @@ private:
         return text.empty() ? "no format" : text;
     }
 
-    // Returns the modes that the camera offers and the option `format` permits, in the order of preference.
+    // Returns the modes that the camera offers and the option `format` permits, in order of preference.
     std::vector<Mode> permitted_modes(const uvc::VideoFunction &function) const {
         std::vector<Mode> modes;
         for (const auto &[encoding, name] : uvc::encodings)
@@ -228,7 +229,8 @@ private:
                                     std::string_view("power_line_frequency"), values);
     }
 
-    // Agrees with the camera on the mode and the nearest possible rate; fps 0: the camera's default.
+    // Negotiates the mode and the nearest possible rate with the camera. If `fps` is 0, uses the camera's default
+    // rate.
     uvc::ProbeControl negotiate(const uvc::VideoFunction &function, const Mode &mode, double fps) const {
         constexpr std::uint8_t probe = 1, commit = 2; // selectors
         const std::uint16_t entity = mode.stream->number;
@@ -273,7 +275,7 @@ private:
         stream_.emplace(*device_, setup);
     }
 
-    // Waits for a frame and returns it: in live mode the newest one, otherwise the oldest one.
+    // Waits for a frame. Returns the newest frame in live mode, otherwise the oldest frame.
     std::optional<uvc::CapturedFrame> next(arhost::Silence &silence) {
         return wait_for_frame(silence, device_->name(), [&] {
             auto found = stream_->next(poll_slice);
@@ -291,7 +293,7 @@ private:
         const arhost_frame_format &format = *buffer.format;
         if (encoding_ == uvc::Encoding::mjpeg)
             return jpeg_.decode(bytes, format, buffer.plane, fault_);
-        const std::uint8_t *from = bytes.data(); // an intact frame has all rows, without padding
+        const std::uint8_t *from = bytes.data(); // an intact frame contains all rows without padding
         const auto copy_plane = [&](std::uint32_t plane, std::size_t row_bytes, std::size_t rows) {
             arhost::copy_rows(from, row_bytes, buffer.plane[plane], format.stride[plane], row_bytes, rows);
             from += rows * row_bytes;
@@ -311,11 +313,11 @@ private:
     std::optional<uvc::UsbIdentity> identity_;
 
     std::optional<uvc::UsbDevice> device_;
-    std::vector<std::uint8_t> claimed_; // interfaces
+    std::vector<std::uint8_t> claimed_; // numbers of the claimed interfaces
     std::optional<uvc::FrameStream> stream_;
     uvc::Encoding encoding_ = uvc::Encoding::yuy2;
     bool has_delivered_ = false;
-    std::uint32_t lost_ = 0; // since the last delivered frame
+    std::uint32_t lost_ = 0; // frames lost since the last delivered frame
     std::uint64_t undecodable_ = 0, superseded_ = 0;
 };
 

@@ -31,7 +31,7 @@ std::string id_text(std::uint16_t vendor, std::uint16_t product) {
     return text;
 }
 
-// The device descriptor and the configuration descriptors, as the kernel has read them.
+// Returns the device descriptor and the configuration descriptors that the kernel has read from the device.
 std::vector<std::uint8_t> read_descriptors(int fd) {
     std::vector<std::uint8_t> bytes(std::size_t{1} << 18);
     std::size_t size = 0;
@@ -41,7 +41,8 @@ std::vector<std::uint8_t> read_descriptors(int fd) {
     return bytes;
 }
 
-// The configuration that is active, or the first one if `value` is 0. The kernel stores each with its stated length.
+// Returns the active configuration, whose bConfigurationValue is `value`, or the first configuration if `value` is 0.
+// The kernel stores each configuration with the length that the configuration states.
 Configuration find_configuration(Bytes bytes, int value) {
     Configuration first;
     for (bool is_first = true; bytes.size() >= 9; is_first = false) {
@@ -81,7 +82,7 @@ std::optional<UsbIdentity> parse_identity(const std::string &text) {
 // A node in /dev/bus/usb.
 struct UsbDevice::Node {
     std::string path;
-    FileDescriptor fd; // for reading and writing; -1: only readable, and `error` has the reason
+    FileDescriptor fd; // opened for reading and writing; -1: only readable, and `error` states the reason
     int error = 0;
     std::vector<std::uint8_t> descriptors;
     std::uint16_t word(std::size_t at) const {
@@ -126,7 +127,7 @@ std::vector<UsbDevice::Node> UsbDevice::list_nodes() {
 std::optional<UsbDevice> UsbDevice::open_node(Node &node, const std::string &serial) {
     UsbDevice device;
     device.name_ = "the camera " + node.text();
-    libusb_set_option(nullptr, LIBUSB_OPTION_NO_DEVICE_DISCOVERY); // of all later contexts
+    libusb_set_option(nullptr, LIBUSB_OPTION_NO_DEVICE_DISCOVERY); // applies to all later contexts
     libusb_context *context = nullptr;
     if (const int error = libusb_init(&context))
         device.fail("starting libusb", error);
@@ -167,7 +168,7 @@ UsbDevice UsbDevice::open(const std::optional<UsbIdentity> &identity) {
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "no USB camera is connected, or the configuration does not permit it: name it with the key "
                       "'usb: {vendor: …, product: …}' of the source ('lsusb' lists both)");
-    // The camera may have been unplugged and may come back.
+    // The camera may have been unplugged and may be reconnected.
     throw Failure(ARHOST_STATUS_ERROR_DEVICE_LOST,
                   "usb: there is no camera " + id_text(identity->vendor, identity->product) +
                       (identity->serial.empty() ? "" : " with the serial number '" + identity->serial + "'") +

@@ -69,7 +69,7 @@ std::vector<DeviceControl> controls_of(const CaptureDevice &camera) {
     std::vector<DeviceControl> listed;
     const Controls controls(camera);
     for (const Control &c : controls.all())
-        if (!c.name.empty() && c.minimum <= c.maximum) // some cameras report nonsense
+        if (!c.name.empty() && c.minimum <= c.maximum) // some cameras report an invalid range
             listed.push_back({c.name, type_of(c), c.minimum, c.maximum, static_cast<std::int64_t>(c.step),
                               c.default_value, controls.value_of(c)});
     return listed;

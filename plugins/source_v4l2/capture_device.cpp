@@ -240,7 +240,7 @@ double CaptureDevice::max_fps(std::uint32_t fourcc, std::uint32_t width, std::ui
 }
 
 bool CaptureDevice::is_busy() const {
-    // Freeing this descriptor's buffers, of which there are none, fails only if another descriptor has some.
+    // Frees the buffers of this descriptor, which has none. This fails only if another descriptor has buffers.
     v4l2_requestbuffers none{};
     none.type = buffer_type_;
     none.memory = V4L2_MEMORY_MMAP;
@@ -356,7 +356,7 @@ CaptureStream::CaptureStream(const CaptureDevice &device, std::uint32_t buffer_c
 }
 
 CaptureStream::~CaptureStream() {
-    // Both calls may fail after the camera was unplugged. In that case, closing the device frees the buffers.
+    // Both calls may fail if the camera has been unplugged. In that case, closing the device frees the buffers.
     int type = device_.buffer_type();
     device_.control(VIDIOC_STREAMOFF, &type);
     mappings_.clear(); // must happen before freeing the buffers

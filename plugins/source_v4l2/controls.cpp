@@ -25,7 +25,7 @@ ControlKind kind_of(std::uint32_t type) {
     }
 }
 
-// Whether the control has a value that fits into 64 bits.
+// Returns whether the control has a value that fits into 64 bits.
 bool is_scalar(const v4l2_query_ext_ctrl &query) {
     switch (query.type) {
     case V4L2_CTRL_TYPE_INTEGER:

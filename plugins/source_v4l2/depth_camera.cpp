@@ -10,7 +10,7 @@
 namespace arhost {
 namespace {
 
-constexpr std::uint32_t buffer_count = 6; // two may be held
+constexpr std::uint32_t buffer_count = 6; // up to two of them are held
 constexpr std::int64_t default_interval_ns = 33'333'333;
 
 std::int64_t now_ns() {
@@ -46,7 +46,7 @@ DepthCamera::DepthCamera(const Host &host, const std::string &path, const FrameS
 }
 
 bool DepthCamera::read(std::int64_t colour_ns, const arhost_frame_buffer &buffer) {
-    // Frame times jitter, so the nearest frame may be a little more than half a frame time away.
+    // Frame times jitter, so the nearest frame may be slightly more than half a frame time away.
     const std::int64_t max_difference_ns = interval_ns_ * 6 / 10;
     dequeue_up_to(colour_ns);
     wait_for_frame_near(colour_ns);
@@ -58,8 +58,8 @@ bool DepthCamera::read(std::int64_t colour_ns, const arhost_frame_buffer &buffer
     return found;
 }
 
-// Waits until no later frame can be nearer to `colour_ns`. Frames arrive at most two frame times after their capture;
-// a camera that has stopped is not waited for.
+// Waits until no later frame can be nearer to `colour_ns`. Frames arrive at most two frame times after their capture.
+// Does not wait for a camera that has stopped.
 void DepthCamera::wait_for_frame_near(std::int64_t colour_ns) {
     while (!host_.cancelled() && (held_.empty() || held_.back().ns < colour_ns - interval_ns_ / 2)) {
         const std::int64_t now = now_ns();
@@ -74,8 +74,8 @@ void DepthCamera::wait_for_frame_near(std::int64_t colour_ns) {
     }
 }
 
-// Takes frames from the driver up to the first that was captured after `colour_ns`; later ones may belong to the next
-// colour frames. Keeps the nearest and those after it.
+// Takes frames from the driver up to the first frame that was captured after `colour_ns`, because later frames may
+// belong to the next colour frames. Keeps the nearest frame and all frames after it.
 void DepthCamera::dequeue_up_to(std::int64_t colour_ns) {
     while (held_.empty() || held_.back().ns < colour_ns) {
         std::optional<Capture> captured = stream_->dequeue();

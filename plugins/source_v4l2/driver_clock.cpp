@@ -36,7 +36,7 @@ std::int64_t DriverClock::monotonic_ns(const Capture &captured) {
     const std::int64_t now_ns = clock_ns(CLOCK_MONOTONIC);
     if (const auto age = age_ns(captured))
         return now_ns - *age;
-    // Old drivers use the wall clock or do not say which clock they use.
+    // Old drivers use the wall clock or do not state which clock they use.
     const std::int64_t age_ns = clock_ns(CLOCK_REALTIME) - stamp_ns_of(captured);
     if (!reported_)
         host_.warn("the camera driver does not use CLOCK_MONOTONIC; " +

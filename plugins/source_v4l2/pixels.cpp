@@ -8,10 +8,10 @@
 namespace arhost {
 namespace {
 
-// One colour plane of a picture. Several may share a plane of memory.
+// A colour plane of a picture. Several colour planes may share a plane of memory.
 struct ColourPlane {
     std::size_t memory; // index of the plane of memory
-    std::size_t offset; // of its first row, in bytes
+    std::size_t offset; // offset of the first row, bytes
     std::size_t stride; // bytes from row to row
     std::size_t row_bytes, rows;
 };
@@ -52,7 +52,7 @@ bool is_converted(std::uint32_t fourcc) {
 }
 
 void convert_row(std::uint32_t fourcc, const std::uint8_t *from, std::size_t bytes, std::uint8_t *to) {
-    // `shift`: right shift of a sample, of which `low` is the less significant byte, to 8 bits.
+    // Reduces samples to 8 bits by a right shift. `low`: the index of a sample's less significant byte.
     const auto reduce = [&](int low, int shift) {
         for (std::size_t i = 0; i < bytes; i += 2)
             to[i / 2] = static_cast<std::uint8_t>(std::min((from[i + low] | from[i + 1 - low] << 8) >> shift, 255));

@@ -47,7 +47,7 @@ constexpr arhost::AutomaticControl<std::uint32_t> automatic_controls[] = {
     {"white_balance", V4L2_CID_WHITE_BALANCE_TEMPERATURE, V4L2_CID_AUTO_WHITE_BALANCE},
 };
 
-// Frames that were not delivered, by cause.
+// Numbers of frames that were not delivered, by cause.
 struct Losses {
     std::uint64_t driver = 0;     // missing in the driver's sequence numbers
     std::uint64_t marked = 0;     // marked as damaged by the driver
@@ -186,7 +186,7 @@ private:
                                         std::uint32_t{V4L2_CID_POWER_LINE_FREQUENCY}, values);
     }
 
-    // Returns the formats that the camera offers and the option `format` permits, in the order of preference.
+    // Returns the formats that the camera offers and the option `format` permits, in order of preference.
     std::vector<const CaptureFormat *> permitted_formats() const {
         std::vector<const CaptureFormat *> permitted;
         const auto add = [&](std::uint32_t fourcc, std::string_view name) {
@@ -206,7 +206,7 @@ private:
         return permitted;
     }
 
-    // Chooses a permitted format; only formats with this size if there are any.
+    // Chooses a permitted format. If any format has this size, considers only formats with this size.
     const CaptureFormat &choose_format(const Size &size, double fps) const {
         std::vector<const CaptureFormat *> formats = permitted_formats();
         if (formats.empty())
@@ -228,8 +228,8 @@ private:
                               [&] { return stream_->wait(poll_slice.count()) ? dequeue_intact() : std::nullopt; });
     }
 
-    // Returns a frame from the driver's queue that the driver does not mark as damaged: in live mode the newest one,
-    // otherwise the oldest one.
+    // Returns a frame from the driver's queue that the driver does not mark as damaged: the newest frame in live
+    // mode, otherwise the oldest frame.
     std::optional<Capture> dequeue_intact() {
         std::optional<Capture> found;
         while (auto captured = stream_->dequeue()) {
@@ -251,7 +251,7 @@ private:
         return found;
     }
 
-    // Whether the camera cannot have captured another picture since this one.
+    // Returns whether the camera cannot have captured another picture since this one.
     bool is_fresh(const Capture &captured) const {
         const auto age_ns = arhost::DriverClock::age_ns(captured);
         return age_ns && *age_ns < frame_ns_ / 2;
@@ -264,7 +264,7 @@ private:
     }
 
     // Returns the number of frames lost since the last delivered frame. The gap in the driver's sequence numbers
-    // includes the frames that were dropped here, unless the driver does not count frames.
+    // includes the frames that this plugin dropped, unless the driver does not count frames.
     std::uint32_t skipped_before(std::uint32_t sequence) {
         std::uint32_t skipped = dropped_;
         if (last_sequence_) {

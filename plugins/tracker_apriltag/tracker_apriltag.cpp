@@ -79,15 +79,15 @@ constexpr arhost_descriptor descriptor = {
     .needs = nullptr,
 };
 
-// The listed tags of a family, or its others. The others are detected only if all of their bits are right: the
-// decoding table has an entry for each tag and each combination of corrected bits, which would be gigabytes for the
-// larger families.
+// Either the listed tags of a family or its other tags. The other tags are detected only if all their bits are
+// correct: the decoding table has an entry for each tag and each combination of corrected bits, so for larger
+// families it would need gigabytes.
 struct Detectable {
     const Family &family;
     bool is_listed;
     std::unique_ptr<apriltag::PartOfFamily> part; // not empty
 
-    // `configured`: −1 for the family's default.
+    // `configured`: the configured value; −1: the family's default.
     int max_hamming(int configured) const {
         return !is_listed ? 0 : configured < 0 ? part->type().default_max_hamming : configured;
     }
@@ -115,18 +115,19 @@ WholeFamily whole_family(const std::string &name) {
 
 fiducial::FamilyTraits traits_of(const std::string &name) {
     const WholeFamily family = whole_family(name);
-    // The margin has the bits outside of the border, or is white.
+    // The margin of the tag contains the bits outside the border, or is white.
     return {(family->total_width - family->width_at_border) / 2.0 / family->width_at_border,
             static_cast<int>(family->nbits)};
 }
 
-// How to search a region: the normal look, or a closer one.
+// The parameters of a search: the normal look or a closer look.
 struct Look {
     int scale = 1;
-    double min_sharpening = 0; // of the bits; the decision margin increases with it
-    int max_maxima = 10;       // qtp.max_nmaxima: of an outline, so many places are tried as corners of a square
+    double min_sharpening = 0; // sharpening of the bits; the decision margin increases with it
+    int max_maxima = 10; // qtp.max_nmaxima: number of places on an outline that are tried as corners of a square
 };
-// The ends of what hides a corner look like corners, too.
+// If an object hides a corner, the places where its outline crosses the square look like corners, too. `sharpened`
+// therefore tries more places.
 constexpr Look enlarged{2}, sharpened{1, 2, 20};
 
 class AprilTagTracker {
@@ -139,11 +140,12 @@ public:
     static constexpr const char *changeable[] = {"corner_refinement",   "quad_decimate",     "quad_sigma",
                                                  "refine_edges",        "decode_sharpening", "max_hamming",
                                                  "min_decision_margin", "closer_look",       nullptr};
-    // Takes the options that `changed` contains.
+    // Sets the options that `changed` contains.
     void set(const arhost::Options &changed) {
         double decimate = decimate_;
         take(changed, "quad_decimate", decimate);
-        // For other factors, the library would decimate by the integer part but scale the corners by the full factor.
+        // For other factors, the library would decimate by the integer part, but scale the corners by the full
+        // factor.
         if (decimate != 1.5 && decimate != std::floor(decimate))
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION, "quad_decimate: must be 1, 1.5 or an integer");
         decimate_ = decimate;
@@ -246,8 +248,8 @@ private:
             seen.candidates += detector_->nquads;
     }
 
-    // The library's threshold is that of 4×4 px tiles of the decimated image. Regions on this grid have the tiles of
-    // the whole frame.
+    // The library computes its threshold per 4×4 px tile of the decimated image. In regions on this grid, the tiles
+    // are the same as in the whole frame.
     int grid_px() const { return decimate_ == 1.5 ? 6 : 4 * static_cast<int>(decimate_); }
 
     arhost::Host host_;
@@ -257,7 +259,7 @@ private:
     bool refine_edges_ = true;
     double sharpening_ = 0.25;
     bool looks_closer_ = true;
-    int max_hamming_ = -1; // −1: that of each family
+    int max_hamming_ = -1; // −1: the default of each family
     double min_margin_ = 0;
 
     std::optional<fiducial::MarkerSearch> search_;

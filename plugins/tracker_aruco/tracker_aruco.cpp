@@ -89,8 +89,8 @@ constexpr arhost_descriptor descriptor = {
     .needs = nullptr,
 };
 
-// Returns whether `root` is a valid dictionary. OpenCV does not check this and reads past the end of strings that are
-// too short.
+// Returns whether `root` is a valid dictionary. OpenCV does not check this, and reads past the end of strings that
+// are too short.
 bool is_dictionary(const cv::FileNode &root) {
     const cv::FileNode count = root["nmarkers"], size = root["markersize"];
     if (!count.isInt() || !size.isInt() || static_cast<int>(count) < 1 || static_cast<int>(size) < 1 ||
@@ -134,23 +134,23 @@ struct Dictionary {
     bool rotated_180 = false; // relative to AprilTag's own library
 };
 
-// The markers of a family, and how to detect them.
+// The markers of a family, and the parameters of their detection.
 struct Detectable {
     Family family;
     Dictionary dictionary;
     cv::aruco::DetectorParameters parameters;
 };
 
-// How to search a region: the normal look, or a closer one. OpenCV's thresholds of contrast suit bright pictures
+// The parameters of a search: the normal look or a closer look. OpenCV's contrast thresholds suit bright pictures
 // without noise.
 struct Look {
     int scale = 1;
-    double sigma_px = 0;                      // of a Gaussian blur
+    double sigma_px = 0;                      // standard deviation of a Gaussian blur
     std::optional<double> threshold = {};     // adaptiveThreshConstant, in grey levels
     std::optional<double> min_deviation = {}; // minOtsuStdDev: standard deviation of the grey levels of a marker
 
     cv::Mat prepared(const cv::Mat &grey) const {
-        cv::Mat scaled = grey, blurred; // does not write to `grey`, which is read-only
+        cv::Mat scaled = grey, blurred; // copies, because `grey` is read-only
         if (scale > 1)
             cv::resize(grey, scaled, {}, scale, scale, cv::INTER_CUBIC);
         if (sigma_px == 0)
@@ -190,7 +190,7 @@ public:
                                                  "border_bits",
                                                  "inverted",
                                                  nullptr};
-    // Takes the options that `changed` contains.
+    // Sets the options that `changed` contains.
     void set(const arhost::Options &changed) {
         cv::aruco::DetectorParameters parameters = parameters_;
         take(changed, "subpix_window_px", parameters.cornerRefinementWinSize);
@@ -266,7 +266,7 @@ private:
         cv::aruco::DetectorParameters parameters = detectable.parameters;
         parameters.adaptiveThreshConstant = look.threshold.value_or(parameters.adaptiveThreshConstant);
         parameters.minOtsuStdDev = look.min_deviation.value_or(parameters.minOtsuStdDev);
-        // OpenCV takes the perimeter relative to the longer side of the image that it gets.
+        // OpenCV divides the perimeter by the longer side of the image that it receives.
         parameters.minMarkerPerimeterRate *=
             static_cast<double>(std::max(grey.cols, grey.rows)) / std::max(region.width, region.height);
         const cv::Mat pixels = look.prepared(grey(region));
@@ -297,7 +297,8 @@ private:
             for (int corner = 0; corner < 4; ++corner)
                 in_pixels[corner] = (corners.corners_px[corner] - origin) * look.scale - half;
             const Reading reading = aruco::read(pixels, in_pixels, table, id, parameters.markerBorderBits, false);
-            if (is_listed || (reading.wrong_bits == 0 && reading.false_positive_rate < 1)) // else it may be anything
+            // An unlisted marker with wrong bits or with a high false-positive rate may be clutter.
+            if (is_listed || (reading.wrong_bits == 0 && reading.false_positive_rate < 1))
                 observations[i] = detectable.family.observation(id, corners, decoding_of(reading));
         };
         cv::parallel_for_({0, static_cast<int>(found.ids.size())}, [&](const cv::Range &range) {
@@ -309,7 +310,7 @@ private:
                 seen.markers.push_back(*one);
     }
 
-    // Returns an expected marker if it can be read where it is expected, without detection.
+    // Reads an expected marker at its expected place, without detection. Returns std::nullopt if this fails.
     std::optional<arhost_observation> verify_one(const cv::Mat &grey, arhost_transfer transfer,
                                                  const arhost_expected_marker &expected, std::int32_t id,
                                                  std::uint32_t family) const {
@@ -320,7 +321,7 @@ private:
         Corners corners;
         for (int i = 0; i < 4; ++i)
             corners[i] = {expected.corners_px[i][0], expected.corners_px[i][1]};
-        // Proves that the corners are correct to less than half a cell, too.
+        // A correct reading also proves that the errors of the corners are below half a cell.
         const auto is_there = [](const Reading &reading) {
             return reading.wrong_bits == 0 && reading.has_whole_border && reading.false_positive_rate < 1;
         };
@@ -336,7 +337,7 @@ private:
                                  : std::nullopt;
     }
 
-    // `corners_px`: as reported.
+    // `corners_px`: the corners in the order in which the tracker reports them.
     Reading read_upright(const cv::Mat &grey, Corners corners_px, const Dictionary &dictionary, int id) const {
         if (dictionary.rotated_180)
             std::rotate(corners_px.begin(), corners_px.begin() + 2, corners_px.end());
@@ -361,7 +362,7 @@ private:
         return print;
     }
 
-    // The side of a marker's square in cells.
+    // Returns the side of a marker's square in cells.
     int cells_of(const cv::aruco::Dictionary &table) const {
         return table.markerSize + 2 * parameters_.markerBorderBits;
     }
@@ -409,11 +410,11 @@ private:
 
     arhost::Host host_;
     cv::aruco::Dictionary file_table_;
-    std::string file_name_; // the name of file_table_; empty: there is none
+    std::string file_name_; // the name of the file from which file_table_ was read; empty: none
     bool refine_edges_ = false, looks_closer_ = true;
     cv::aruco::DetectorParameters parameters_;
     double correction_rate_ = -1;
-    double centre_shift_px_ = 0; // for CORNER_REFINE_APRILTAG, whose pixel centres are at +0.5
+    double centre_shift_px_ = 0; // needed for CORNER_REFINE_APRILTAG, whose pixel centres are at +0.5
 
     std::optional<fiducial::MarkerSearch> search_;
     std::vector<Detectable> detectables_;

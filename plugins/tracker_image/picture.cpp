@@ -16,12 +16,13 @@
 namespace tracker_image {
 namespace {
 
-constexpr int stored_side_px = 640; // of the longer side; larger pictures are reduced
+constexpr int stored_side_px = 640; // length of the longer side; larger pictures are scaled down
 constexpr int max_features = 1500;
 constexpr std::size_t max_points = 200, min_points = 24;
 constexpr std::size_t min_inliers = 12;
-constexpr double min_inlier_share = 0.25; // of the points of an aligned picture; covered ones are no inliers
-constexpr double match_ratio = 0.8;       // Lowe: distance of the best match to that of the second best
+constexpr double min_inlier_share = 0.25; // minimum share of an aligned picture's points; hidden points are outliers
+// Lowe's ratio: distance of the best match divided by the distance of the second-best match.
+constexpr double match_ratio = 0.8;
 constexpr double find_tolerance_px = 4, align_tolerance_px = 1.5;
 
 cv::Ptr<cv::ORB> detector() {
@@ -33,7 +34,7 @@ cv::Point2d transformed(const cv::Matx33d &m, cv::Point2d p) {
     return {h[0] / h[2], h[1] / h[2]};
 }
 
-// Whether the transform shows the front of the picture, without a horizon through it.
+// Returns whether the transform shows the front of the picture, with no horizon across it.
 bool is_plausible(const cv::Matx33d &m, const std::vector<cv::Point2f> &corners) {
     std::vector<cv::Point2d> at;
     for (const cv::Point2f &corner : corners) {
@@ -50,8 +51,9 @@ bool is_plausible(const cv::Matx33d &m, const std::vector<cv::Point2f> &corners)
     return true;
 }
 
-// Returns the picture with the local mean removed and the local contrast made equal, so that a homogeneous change of
-// the light, a gradient of it, or something that covers a part of the picture changes little elsewhere.
+// Returns the picture without its local mean and with equal local contrast. As a result, a homogeneous change of the
+// light or a gradient of the light changes the picture only slightly. An object that hides a part of the picture
+// changes the rest only slightly.
 cv::Mat normalized(const cv::Mat &grey) {
     constexpr int window_px = 21;
     constexpr float min_deviation = 6, mean = 128, deviation = 50; // grey levels; noise is not amplified to texture
@@ -66,7 +68,7 @@ cv::Mat normalized(const cv::Mat &grey) {
     return result;
 }
 
-// Root mean square distance from the mean.
+// Returns the root mean square distance of the points from their mean.
 double spread(const std::vector<cv::Point2f> &points) {
     cv::Scalar mean, deviation;
     cv::meanStdDev(points, mean, deviation);
@@ -78,7 +80,7 @@ struct Fit {
     std::size_t inliers;
 };
 
-// Fits a homography to undistorted pixels. `tolerance_px`: of inliers, in pixels of the frame.
+// Fits a homography to undistorted pixels. `tolerance_px`: the tolerance of inliers, in pixels of the frame.
 std::optional<Fit> fit(const Camera &camera, const std::vector<cv::Point2f> &on_picture,
                        const std::vector<cv::Point2f> &in_frame, double tolerance_px) {
     std::vector<cv::Point2f> from, pixels, to;
@@ -91,7 +93,7 @@ std::optional<Fit> fit(const Camera &camera, const std::vector<cv::Point2f> &on_
     if (from.size() < min_inliers)
         return std::nullopt;
     cv::Mat is_inlier;
-    const double scale = spread(to) / std::max(spread(pixels), 1.0); // large at the rim of a wide lens
+    const double scale = spread(to) / std::max(spread(pixels), 1.0); // large near the rim of a wide-angle lens
     const cv::Mat homography = cv::findHomography(from, to, cv::RANSAC, scale * tolerance_px, is_inlier);
     if (homography.empty())
         return std::nullopt;
@@ -102,8 +104,8 @@ std::optional<Fit> fit(const Camera &camera, const std::vector<cv::Point2f> &on_
 } // namespace
 
 Camera::Camera(const arhost_intrinsics &intrinsics) : lens_(intrinsics) {
-    // Computes every eighth pixel and interpolates the others: the distortion is smooth. A power of 2 gives exact
-    // weights in OpenCV.
+    // Computes every eighth pixel and interpolates the others, because the distortion is smooth. The step is a power
+    // of 2, so that the interpolation weights in OpenCV are exact.
     constexpr int step_px = 8;
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
     const cv::Size size(static_cast<int>(intrinsics.width), static_cast<int>(intrinsics.height));
@@ -130,7 +132,7 @@ std::optional<cv::Point2d> Camera::distort(cv::Point2d undistorted_px) const {
 }
 
 Features features_of(const cv::Mat &grey) {
-    constexpr int min_side_px = 64; // ORB's pyramid and margins need as much
+    constexpr int min_side_px = 64; // minimum for ORB's pyramid and margins
     Features features;
     if (std::min(grey.cols, grey.rows) < min_side_px)
         return features;
@@ -209,14 +211,14 @@ std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const Camera 
     return align(frame, camera, cv::Matx33d(cv::getPerspectiveTransform(own_corners(), corners)));
 }
 
-// Draws the picture as it should look in the frame, and measures with the method of Lucas and Kanade where its points
-// really are.
+// Renders the picture as it should look in the frame. Measures the actual positions of its points by the method of
+// Lucas and Kanade.
 std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const Camera &camera,
                                              cv::Matx33d undistorted_from_picture) const {
     constexpr int repetitions = 2, window_px = 15, levels = 2, margin_px = 24;
     Place place{};
     const std::vector<cv::Point2f> corners = own_corners();
-    // Returns where the lens shows points of the picture. Leaves out those that it does not show.
+    // Returns the pixels at which the lens shows points of the picture. Omits points outside the field of view.
     const auto shown = [&](const std::vector<cv::Point2f> &points) {
         std::vector<cv::Point2d> pixels;
         for (const cv::Point2f &point : points)
@@ -224,7 +226,7 @@ std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const Camera 
                 pixels.push_back(*pixel);
         return pixels;
     };
-    std::vector<cv::Point2f> outline; // with points between the corners, as a lens bends edges
+    std::vector<cv::Point2f> outline; // has points between the corners, because a lens bends edges
     for (std::size_t i = 0; i < 4; ++i)
         for (const float along : {0.0F, 0.25F, 0.5F, 0.75F})
             outline.push_back(corners[i] + along * (corners[(i + 1) % 4] - corners[i]));

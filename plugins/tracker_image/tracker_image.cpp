@@ -57,7 +57,7 @@ public:
 
     double aspect(std::uint32_t marker) const { return shown_.at(marker).picture.aspect(); }
 
-    // Pictures that are expected somewhere are aligned there. The features of the frame are needed only for others.
+    // Aligns expected pictures at their expected places. Only other pictures need the features of the frame.
     void track(const arhost_track_request &request, arhost::Observations &observations) const {
         const cv::Mat grey = fiducial::grey_of(*request.frame);
         std::vector<bool> is_found(shown_.size()), is_missed(shown_.size());
@@ -90,7 +90,7 @@ public:
     }
 
 private:
-    // A picture that a target has.
+    // A picture of a target.
     struct Shown {
         std::int32_t id;
         std::uint32_t family;
@@ -104,7 +104,7 @@ private:
     }
 
     std::optional<Camera> camera_;
-    std::vector<Shown> shown_; // as the markers of the setup
+    std::vector<Shown> shown_; // in the order of the markers in the setup
 };
 
 } // namespace

@@ -15,7 +15,7 @@ using arhost::fiducial::MatrixFamily;
 
 namespace {
 
-constexpr double min_correlation = 0.8; // of the samples with the code's picture
+constexpr double min_correlation = 0.8; // correlation of the samples with the code's picture
 
 } // namespace
 
@@ -30,7 +30,7 @@ void MatrixReader::add(const MatrixFamily &type, std::int32_t id, std::uint32_t 
     codes_.push_back(code);
 }
 
-// Returns the samples of an ideal print.
+// Returns the samples that an ideal image of the marker would have.
 Samples MatrixReader::picture_of(const MatrixFamily &type, std::int32_t id) const {
     Samples cells(cells_ + 2, cells_ + 2, 0.0F);
     const std::vector<bool> black = arhost::fiducial::matrix_cells(type, id);
@@ -41,10 +41,10 @@ Samples MatrixReader::picture_of(const MatrixFamily &type, std::int32_t id) cons
     return normalized(picture);
 }
 
-// Returns nullopt if the cells are not clearly black or white, or if the border is not black.
+// Returns std::nullopt if some cells are neither clearly black nor clearly white, or if the border is not black.
 std::optional<std::vector<bool>> MatrixReader::black_cells(const Samples &samples) const {
     constexpr float min_contrast = 20;    // grey levels
-    constexpr float min_distance = 0.15F; // from the threshold, relative to the contrast
+    constexpr float min_distance = 0.15F; // distance from the threshold, relative to the contrast
     Samples centres(cells_ + 2, cells_ + 2);
     for (int row = 0; row < centres.rows; ++row)
         for (int column = 0; column < centres.cols; ++column)
@@ -76,7 +76,7 @@ std::optional<MatrixReader::Reading> MatrixReader::read(const Samples &samples) 
         const auto black = black_cells(upright);
         if (!black)
             return std::nullopt;
-        if (const auto word = arhost::fiducial::matrix_word(*black, cells_)) { // no other side can be up
+        if (const auto word = arhost::fiducial::matrix_word(*black, cells_)) { // fits one orientation only
             const Samples picture = normalized(upright);
             return picture.empty() ? std::nullopt : std::optional(Reading{*word, turns, picture});
         }

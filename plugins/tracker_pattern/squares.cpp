@@ -11,10 +11,12 @@ namespace {
 
 using arhost::fiducial::Corners;
 
-// Windows of the adaptive threshold, px: small ones separate near squares, large ones keep wide borders closed.
+// Windows of the adaptive threshold, px. Small windows separate neighbouring squares; large windows keep wide borders
+// closed.
 constexpr int windows_px[] = {7, 21, 51};
-constexpr double threshold_levels = 7; // darker than the mean of the window
-// Greatest distance of a contour from the quadrilateral, relative to the perimeter.
+// A pixel is dark if it is darker than the mean of its window by this number of levels.
+constexpr double threshold_levels = 7;
+// Maximum distance of a contour from the quadrilateral, relative to the perimeter.
 constexpr double max_deviation = 0.03;
 
 double shortest_side(const std::vector<cv::Point> &corners) {
@@ -36,7 +38,7 @@ std::vector<Corners> find_squares(const cv::Mat &grey, double min_side_px) {
                               threshold_levels);
         cv::findContours(dark, contours, cv::RETR_LIST, cv::CHAIN_APPROX_NONE);
         for (const std::vector<cv::Point> &contour : contours) {
-            // The contour goes through the centres of the outermost pixels, in steps of at most √2 px.
+            // The contour passes through the centres of the outermost pixels, in steps of at most √2 px.
             const double min_perimeter_px = 4 * (min_side_px - 1);
             if (static_cast<double>(contour.size()) * std::numbers::sqrt2 < min_perimeter_px)
                 continue;
@@ -46,7 +48,8 @@ std::vector<Corners> find_squares(const cv::Mat &grey, double min_side_px) {
             cv::approxPolyDP(contour, polygon, max_deviation * perimeter_px, true);
             if (polygon.size() != 4 || !cv::isContourConvex(polygon) || shortest_side(polygon) < min_side_px - 1)
                 continue;
-            // The outer contour of a dark region runs counter-clockwise in the image, that of a hole clockwise.
+            // The outer contour of a dark region is counter-clockwise in the image; the contour of a hole is
+            // clockwise.
             if (cv::contourArea(polygon, true) >= 0)
                 continue;
             Corners corners;

@@ -108,10 +108,10 @@ private:
         std::uint32_t family;
         Pattern pattern;
     };
-    // The samples of a square that patterns of the same size have in common.
+    // The sampling of a square's interior that all patterns of the same size share.
     struct Sampling {
-        double ratio; // of the side of the samples to that of the square
-        int side;     // samples
+        double ratio; // side of the sampled area relative to the side of the square
+        int side;     // number of samples
         bool operator<(const Sampling &other) const {
             return std::tie(ratio, side) < std::tie(other.ratio, other.side);
         }
@@ -130,13 +130,13 @@ private:
                           names + "; tracker_apriltag and tracker_aruco have other families");
     }
 
-    // The marker that a square resembles most.
+    // The marker that is most similar to a square.
     struct Best {
         std::int32_t id = 0;
         std::uint32_t family = 0, wrong_cells = 0;
         double correlation = 0, ratio = 0;
         int quarter_turns = 0;
-        double false_positive_rate = 0; // of a pattern: negligible
+        double false_positive_rate = 0; // negligible for a pattern
     };
     Best recognised(const cv::Mat &grey, const Corners &corners_px) const {
         Best best;
@@ -175,7 +175,7 @@ private:
             const int cells = static_cast<int>(std::ceil(2 / (1 - best.ratio)));
             auto corners = fiducial::refine_edges(grey, frame.format->transfer, corners_px, search_->lens(), cells)
                                .value_or(fiducial::MeasuredCorners{corners_px});
-            // A print that is rotated clockwise begins with a later corner.
+            // If the marker is rotated clockwise in the image, its first corner comes later in the list.
             std::rotate(corners.corners_px.begin(), corners.corners_px.begin() + best.quarter_turns,
                         corners.corners_px.end());
             seen.markers.push_back(fiducial::observation_of(
@@ -183,7 +183,7 @@ private:
         }
     }
 
-    // Squares of other markers may also read as matrix codes, which have few check bits or none.
+    // Squares of other markers may match matrix codes, because these have few or no check bits.
     fiducial::OtherMarkers::Markers other_markers(const cv::Mat &grey) const {
         auto markers = fiducial::markers_of_other_families(grey, {});
         if (!markers.empty() || matrix_readers_.empty())
@@ -195,8 +195,8 @@ private:
         return markers;
     }
 
-    // The code that a square resembles most, of any family. If families share it: of a listed one, otherwise of the
-    // one with the fewest codes.
+    // Returns the code of any family that is most similar to a square. If several families have this code, prefers a
+    // listed code, then the family with the fewest codes.
     std::optional<MatrixReader::AnyCode> any_code(const cv::Mat &grey, const Corners &corners_px) const {
         const auto rank = [&](const MatrixReader::AnyCode &code) {
             return std::tuple(code.correlation, listed_families_.contains(code.type->name), -code.type->id_count);
@@ -211,7 +211,7 @@ private:
         return best;
     }
 
-    // The mean grey levels of the picture within a square.
+    // Returns the mean grey levels of the picture inside a square.
     static Samples interior(const cv::Mat &grey, const Corners &corners_px, double ratio, int side) {
         constexpr int oversampling = 4;
         const int size = side * oversampling;
@@ -227,7 +227,7 @@ private:
     std::optional<fiducial::MarkerSearch> search_;
     std::map<Sampling, std::vector<Marked>> patterns_;
     std::vector<MatrixReader> matrix_readers_;
-    std::set<std::string> listed_families_; // of matrix codes
+    std::set<std::string> listed_families_; // listed families of matrix codes
 };
 
 } // namespace
