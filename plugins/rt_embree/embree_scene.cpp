@@ -95,8 +95,8 @@ bool is_instance(const arhost_object &object) {
     return object.deforms || object.moves || !is_identity(object.world_from_object);
 }
 
-// Whether catchers get an additional BVH of their own. It spares the rays that search for catchers the traversal of
-// all other triangles. It is not worth building if catchers, such as a scanned room, make up most of the scene.
+// Returns whether catchers get an additional BVH. In this BVH, rays that search for catchers do not traverse other
+// triangles. It is not worth building if catchers, such as a scanned room, make up most of the scene.
 bool needs_catcher_bvh(const arhost_scene &arena) {
     const auto geometries = elements<arhost_geometry>(arena, arena.geometries);
     std::uint64_t catcher_triangles = 0, all_triangles = 0;
@@ -237,8 +237,8 @@ void EmbreeScene::move(const arhost_motion &motion) {
 }
 
 void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
-    // If the BVH has degraded more than this, tracing a few frames through a refitted BVH costs more than rebuilding
-    // it (measured with rt-embree-refit).
+    // Threshold of degradation above which tracing a few frames through a refitted BVH costs more than rebuilding it
+    // (measured with rt-embree-refit).
     constexpr double max_degradation = 1.3;
     Object &object = objects_[deformed.object];
     object.positions = deformed.positions;
@@ -320,8 +320,8 @@ RTCScene EmbreeScene::deforming_scene(std::uint32_t number) {
     const arhost_geometry &from = elements<arhost_geometry>(arena_, arena_.geometries)[object.geometry];
     Deforming &state = deforming_[number];
     state.scene = new_scene(RTC_SCENE_FLAG_DYNAMIC);
-    // At low build quality, Embree gives each geometry its own BVH, which can be refitted; at higher quality it does
-    // not.
+    // At low build quality, Embree gives each geometry its own BVH, which can be refitted. At higher quality, BVHs
+    // cannot be refitted.
     rtcSetSceneBuildQuality(state.scene.get(), RTC_BUILD_QUALITY_LOW);
     state.geometry = new_geometry(number);
     rtcSetGeometryMask(state.geometry.get(), all_masks);

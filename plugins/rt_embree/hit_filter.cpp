@@ -22,8 +22,8 @@ float alpha_of_texel(const Texture &texture, std::int32_t x, std::int32_t y) {
                : static_cast<float>(static_cast<const std::uint8_t *>(texture.texels)[at]) / 255;
 }
 
-// Converts a texture coordinate to texels. First reduces it to an equivalent one near 0, so that the texel index fits
-// an int.
+// Converts a texture coordinate to texels. First reduces it to an equivalent coordinate near 0, so that the texel
+// index fits an int.
 float in_texels(float t, std::int32_t size, arhost_wrap wrap) {
     const float reduced = wrap == ARHOST_WRAP_CLAMP ? std::clamp(t, -1.0f, 2.0f) : t - 2 * std::floor(t / 2);
     return reduced * static_cast<float>(size) - 0.5f;

@@ -61,8 +61,9 @@ enum SumRow : int {
     coverage_row = 3, // number of samples that hit a virtual object; the remaining rows are unused without catchers
     caught_row,       // number of samples that hit a catcher
     irradiance_row,   // irradiance of the catcher without shadows
-    // Three rows: the parts of that irradiance that virtual objects hide. With coloured shadows, one part for each
-    // colour channel; otherwise, the part that opaque objects hide, the part that translucent objects hide, and 0.
+    // Three rows: the parts of irradiance_row that virtual objects hide. With coloured shadows, there is one part per
+    // colour channel. Otherwise, the rows are the part that opaque objects hide, the part that translucent objects
+    // hide, and 0.
     hidden_row,
     sum_rows = hidden_row + 3
 };
@@ -92,10 +93,11 @@ struct Scene {
     const float *linear_of_srgb8; // linear value of each of the 256 sRGB codes
 };
 
-// Ray directions in camera axes (x right, y down, z forward), stored tile by tile, and within a tile in blocks of 4×4
-// pixels. A block has an array of 16 x values, one of 16 y values and, with `dimensions` 3, one of 16 z values; with
-// `dimensions` 2, z is 1. If `has_derivatives`, two more sets of such arrays follow: the derivatives along image
-// rows, then along image columns, per px. x is NaN for pixels to which the lens maps no direction.
+// Ray directions in camera axes (x right, y down, z forward). They are stored tile by tile, and within a tile in
+// blocks of 4×4 pixels. A block has an array of 16 x values, an array of 16 y values and, if `dimensions` is 3, an
+// array of 16 z values; if `dimensions` is 2, z is 1. If `has_derivatives`, two more sets of such arrays follow: the
+// derivatives along image rows, then those along image columns, per px. x is NaN for pixels to which the lens maps no
+// direction.
 struct Rays {
     const float *blocks;
     std::int32_t dimensions; // 2 or 3
@@ -115,7 +117,8 @@ struct Frame {
     const arhost::raytracer_common::Sample *samples;
     std::int32_t sample_count;
     std::uint32_t first_sample; // number of samples accumulated before this frame; offset into the random sequences
-    float *history[sum_rows];   // sums of accumulated samples, as Scratch::sum but for all tiles; NULL: off
+    // Sums of accumulated samples, like Scratch::sum but for all tiles; NULL: no accumulation.
+    float *history[sum_rows];
     std::int32_t light_samples; // samples per shaded point of each area light, the environment and the background
     bool single_path;           // glass spawns one random ray instead of two
     std::uint8_t *rgba;
@@ -133,12 +136,13 @@ struct Tile {
 
 inline constexpr std::int32_t tile_side = 32, tile_pixels = tile_side * tile_side; // px
 
-// Secondary rays that wait to be traced, all of the same depth. `values` consists of `rows` arrays, each with room
-// for `capacity` rays.
+// Secondary rays of the same depth that wait to be traced. `values` consists of `rows` arrays, each with space for
+// `capacity` rays.
 struct RayQueue {
-    // Origin, direction, throughput (three floats each), inverse density, pixel index (an int's bits). Inverse
-    // density: reciprocal of the density per steradian of the path's last random direction; 0 if there is none,
-    // negative if the path has since been reflected or refracted by mirrors or glass.
+    // The rows are: origin, direction and throughput (three floats each), inverse density, and pixel index (an int's
+    // bits). The inverse density is the reciprocal of the density per steradian of the path's last random direction.
+    // It is 0 if there is no such direction, and negative if mirrors or glass have reflected or refracted the path
+    // since.
     static constexpr int rows = 11;
     float *values;
     std::int32_t count, capacity;
@@ -147,7 +151,7 @@ struct RayQueue {
 // A thread's working memory for one tile. The arrays have one value per pixel, in the order of Rays::blocks.
 struct Scratch {
     float *radiance[3];   // linear radiance of the current sample
-    float *sum[sum_rows]; // over all samples
+    float *sum[sum_rows]; // sums over all samples
     RayQueue *queues;     // one queue per depth, from 0 to Scene::max_depth
 };
 

@@ -86,9 +86,9 @@ Kernel choose_kernel(const std::string &instruction_set) {
 }
 
 ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
-    // The first queue holds up to two rays per pixel, as glass reflects and refracts; all others hold fewer than
-    // three packets (trace_queued_rays() in scatter.inl). Whole packets are read even from partly filled queues, so
-    // each row needs space for one more packet.
+    // The first queue holds up to two rays per pixel, because glass reflects and refracts. All other queues hold
+    // fewer than three packets (trace_queued_rays() in scatter.inl). Whole packets are read even from partly filled
+    // queues, so each row needs space for one more packet.
     constexpr std::int32_t packet = 16, first_capacity = 2 * tile_pixels + packet, capacity = 4 * packet;
     constexpr int pixel_rows = 3 + sum_rows;
     storage_.resize(std::size_t{pixel_rows} * tile_pixels +
@@ -132,7 +132,7 @@ void Renderer::set_light_samples(std::int32_t samples) {
     history_camera_.reset();
 }
 
-// Prepares for images of the size that the camera has, unless it is larger than that of the setup.
+// Adapts the renderer to the image size of the camera. Does nothing if this size exceeds that of the setup.
 void Renderer::set_size(const arhost_camera &camera) {
     const std::uint32_t width = camera.intrinsics.width, height = camera.intrinsics.height;
     if ((width == intrinsics_.width && height == intrinsics_.height) || width < 1 || height < 1 ||

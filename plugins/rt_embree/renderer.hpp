@@ -45,7 +45,7 @@ public:
     // is NULL if nothing has moved since the last call.
     Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr);
     const EmbreeScene &scene() const { return scene_; }
-    // Both change the images of later calls as if the renderer had been created with this setting.
+    // Both functions change the images of later calls as if the renderer had been created with the new setting.
     void set_samples(std::uint32_t samples);
     void set_light_samples(std::int32_t samples);
 
@@ -56,8 +56,8 @@ private:
     void set_size(const arhost_camera &camera);
 
     arhost::Host host_;
-    const arhost_intrinsics full_intrinsics_; // those passed to start
-    arhost_intrinsics intrinsics_;            // of the ray table
+    const arhost_intrinsics full_intrinsics_; // the intrinsics passed to start
+    arhost_intrinsics intrinsics_;            // the intrinsics of the ray table
     Kernel kernel_;
     ThreadPool threads_;
     RayTable ray_table_;
@@ -69,9 +69,9 @@ private:
     bool single_path_;
 
     // State of the option `accumulate`.
-    std::vector<float> history_;                  // sums of the samples so far; empty unless accumulating
+    std::vector<float> history_;                  // sums of the samples so far; empty if the option is off
     std::uint32_t history_samples_ = 0;           // number of samples in the sums
-    std::optional<arhost_camera> history_camera_; // the camera of the sums; empty: they are invalid
+    std::optional<arhost_camera> history_camera_; // the camera of the sums; empty: the sums are invalid
 };
 
 // Returns the kernel for `instruction_set`; "auto" selects the one with the widest registers that this processor

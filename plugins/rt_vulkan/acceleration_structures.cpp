@@ -280,8 +280,9 @@ void AccelerationStructures::build_moving() {
     record_moving(refit_, true);
 }
 
-// Records commands that refit (`refits`) or build the structures of deforming meshes, and rebuild the top-level
-// structure. The latter is never refitted: it is small, and refitting would degrade it as objects move apart.
+// Records commands that refit (`refits`) or build the structures of deforming meshes, and commands that rebuild the
+// top-level structure. The top-level structure is never refitted: it is small, and refitting would degrade it as
+// objects move apart.
 void AccelerationStructures::record_moving(VkCommandBuffer commands, bool refits) const {
     const VolkDeviceTable &vk = device_.functions();
     const VkDeviceAddress scratch = aligned(scratch_.address(), device_.physical().tracing.scratch_alignment);

@@ -19,7 +19,7 @@ inline constexpr VkBufferUsageFlags build_input_usage =
 
 class AccelerationStructures {
 public:
-    // `objects`: the objects of `arena`, in the same order; their first_index refers to `indices`. `readers`: the
+    // `objects`: the objects of `arena`, in the same order. Their first_index refers to `indices`. `readers`: the
     // pipeline stages that trace rays. `device`, `submission` and `arena` must outlive this object.
     AccelerationStructures(const Device &device, const Submission &submission, const arhost_scene &arena,
                            std::span<const Object> objects, const Buffer &indices, VkPipelineStageFlags readers,
@@ -27,8 +27,8 @@ public:
 
     VkAccelerationStructureKHR top_level() const { return top_level_.handle.get(); }
 
-    // Writes the new transforms, masks and vertices to host memory; `objects` has already been updated. Returns a
-    // command buffer that updates the structures; it must run before the next image is traced.
+    // Writes the new transforms, masks and vertices to host memory. The caller must already have updated `objects`.
+    // Returns a command buffer that updates the structures. It must run before the next image is traced.
     VkCommandBuffer update(const arhost_motion &motion, std::span<const Object> objects);
 
 private:

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Splits slow images into bands of rows, which are submitted one after another. This is necessary because a driver's
-// watchdog mistakes GPU work that takes seconds for a hang, and because submitted work cannot be cancelled. The
-// height of a band depends on the duration of the previous one.
+// Splits slow images into bands of rows, which are submitted one after another. There are two reasons for this: a
+// driver's watchdog mistakes GPU work that takes seconds for a hang, and submitted work cannot be cancelled. The
+// duration of a band determines the height of the next one.
 #pragma once
 
 #include <chrono>

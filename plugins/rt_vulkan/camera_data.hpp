@@ -15,8 +15,8 @@ namespace rt_vulkan {
 void set_camera(const arhost_camera &camera, Frame &frame);
 
 // The ray direction of each pixel in camera axes (x right, y down, z forward), row by row. If `dimensions` is 2, only
-// x and y are stored, and z is 1. With `has_slopes`, each direction is followed by its derivatives along image rows
-// and image columns, per px. x is 1e30 for pixels outside the field of view of the lens.
+// x and y are stored, and z is 1. With `has_slopes`, the derivatives along image rows and image columns, per px,
+// follow each direction. x is 1e30 for pixels outside the field of view of the lens.
 struct RayTable {
     std::uint32_t dimensions; // 2 or 3
     std::vector<float> values;

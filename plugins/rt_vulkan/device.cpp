@@ -25,8 +25,8 @@ Memory allocated(const Device &device, VkDeviceSize size, std::span<const std::u
     return {device, memory};
 }
 
-// Returns a function that `path` needs and the driver lacks, although the driver announces its extension; nullptr:
-// none.
+// Returns the name of a function that `path` needs but the driver lacks, although it announces the function's
+// extension; nullptr if there is none.
 const char *missing_function(const VolkDeviceTable &functions, Path path, bool imports_host_memory) {
     const struct {
         const char *name;

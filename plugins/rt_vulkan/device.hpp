@@ -93,8 +93,8 @@ public:
     };
     Buffer() = default;
     Buffer(const Device &device, VkDeviceSize size, VkBufferUsageFlags usage, Place place);
-    // Returns a buffer in the given host memory, for use as a copy destination. The buffer is empty if the device
-    // cannot import that memory.
+    // Returns a buffer in the given host memory, for use as a copy destination. If the device cannot import that
+    // memory, returns an empty buffer.
     static Buffer imported(const Device &device, void *memory, VkDeviceSize size);
 
     VkBuffer get() const { return buffer_.get(); }
@@ -130,7 +130,7 @@ private:
     Fence fence_;
 };
 
-// Inserts a barrier: accesses `used` in stage `to` see the writes `written` of stage `from`.
+// Inserts a barrier: accesses `used` in stage `to` see the writes `written` in stage `from`.
 void barrier(const VolkDeviceTable &vk, VkCommandBuffer commands, VkPipelineStageFlags from, VkAccessFlags written,
              VkPipelineStageFlags to, VkAccessFlags used);
 

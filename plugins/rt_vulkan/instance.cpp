@@ -95,7 +95,7 @@ std::set<std::string> loaded_libraries() {
     return paths;
 }
 
-// Keeps all libraries that were loaded after `before` was listed in memory until the process ends.
+// Keeps newly loaded libraries in memory until the process ends. `before`: the libraries that were already loaded.
 void keep_new_libraries(const std::set<std::string> &before) {
     for (const std::string &path : loaded_libraries())
         if (!before.contains(path))

@@ -13,7 +13,7 @@
 
 namespace rt_vulkan {
 
-// How intersections of rays with the scene are found.
+// The methods of intersecting rays with the scene.
 enum class Path {
     plain,   // software BVH traversal in a compute shader
     query,   // hardware acceleration structures, ray queries in a compute shader (VK_KHR_ray_query)
@@ -68,8 +68,8 @@ private:
     PFN_vkDestroyDebugUtilsMessengerEXT destroy_messenger_ = nullptr;
 };
 
-// Returns the device selected by `wanted`: its index in `devices`, its UUID or a part of its name; "auto" selects the
-// fastest kind of usable device.
+// Returns the device that `wanted` selects: its index in `devices`, its UUID or a part of its name. "auto" selects a
+// usable device of the fastest kind.
 const PhysicalDevice &choose_device(const std::vector<PhysicalDevice> &devices, const std::string &wanted);
 
 // Returns the path called `wanted`. For "auto", returns all paths worth trying, best first, because some drivers

@@ -88,7 +88,7 @@ inline constexpr std::uint32_t max_samples = 256; // per pixel and frame
 struct Frame {
     float eye[3];
     std::uint32_t object_count;
-    float world_from_camera[3][4]; // columns
+    float world_from_camera[3][4]; // three columns
     std::uint32_t width, height, sample_count, first_sample;
     std::uint32_t light_samples, light_count, max_depth, single_path;
     float ambient[3];

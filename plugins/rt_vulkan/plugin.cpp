@@ -116,8 +116,8 @@ public:
     }
 
 private:
-    // Tries to start with the first of `paths_`. Returns false if it failed but another path remains to be tried;
-    // throws if none remains or another path would not help.
+    // Tries to start with the first of `paths_`. If that fails and trying another path makes sense, returns false;
+    // otherwise throws.
     bool try_start(const arhost_raytracer_setup &setup) {
         try {
             if (paths_.size() > 1) // another path can be used instead

@@ -63,9 +63,9 @@ PhysicalDevice checked(const PhysicalDevice &device) {
     return device;
 }
 
-// Returns the maximum duration of a band. On a GPU, it is far below the shortest watchdog timeout (0.5 s, of Linux's
-// v3d and panfrost drivers) and far above the overhead of a submission (about 0.1 ms). CPU devices have no watchdog;
-// longer bands are better there, because lavapipe's threads wait for each other at the end of each band.
+// Returns the maximum duration of a band. On a GPU, it is far below the shortest watchdog timeout (0.5 s in Linux's
+// v3d and panfrost drivers) and far above the overhead of a submission (about 0.1 ms). CPU devices have no watchdog.
+// For them, longer bands are better, because lavapipe's threads wait for each other at the end of each band.
 std::chrono::milliseconds max_band_time(const PhysicalDevice &device) {
     return std::chrono::milliseconds(device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? 250 : 100);
 }
@@ -287,7 +287,7 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
     submission_.free(commands);
 }
 
-// Returns the target for an image's memory. After a failed import, no further import is tried, and all images share
+// Returns the target for an image's memory. After a failed import, tries no further imports; all images then share
 // one buffer.
 Renderer::Target &Renderer::target_for(const arhost_image &image) {
     for (Target &target : targets_)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Renders images. Usually renders an image with one submission, whose commands are recorded once per target; images
-// that take long are split into bands (bands.hpp).
+// Renders images. An image usually needs one submission, whose commands are recorded once per target. Images that
+// take long are split into bands (bands.hpp).
 #pragma once
 
 #include "acceleration_structures.hpp"
@@ -37,7 +37,7 @@ public:
     // NULL if nothing has moved since the last call.
     Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr);
 
-    // Both change the images of later calls as if the renderer had been created with this setting.
+    // Both functions change the images of later calls as if the renderer had been created with the new setting.
     void set_samples(std::uint32_t samples);
     void set_light_samples(std::uint32_t samples);
 
@@ -56,8 +56,8 @@ public:
     const Submission &submission() const { return submission_; }
 
 private:
-    // Where the device writes an image: either the caller's memory, imported into Vulkan, or a buffer from which the
-    // host copies the image (`rgba` is NULL).
+    // The memory to which the device writes an image: either the caller's memory, imported into Vulkan, or a buffer
+    // from which the host copies the image (`rgba` is NULL).
     struct Target {
         std::uint8_t *rgba = nullptr;
         std::uint32_t stride = 0;

@@ -23,8 +23,8 @@ using arhost::raytracer_common::object_extent;
 using arhost::raytracer_common::quantized_alpha;
 using arhost::raytracer_common::transform_box;
 
-// A BVH is rebuilt if its SAH cost exceeds this times the cost after the last build: above that, a rebuild saves more
-// tracing time than it costs.
+// A BVH is rebuilt if its SAH cost divided by its cost after the last build exceeds this value. Above it, a rebuild
+// saves more tracing time than it costs.
 constexpr double max_degradation = 1.3;
 constexpr std::uint32_t max_leaf_size = 4;
 

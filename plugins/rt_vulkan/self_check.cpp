@@ -16,7 +16,7 @@ using arhost::raytracer_common::elements;
 using arhost::raytracer_common::transform_box;
 
 constexpr std::uint32_t width = 64, height = 48;
-constexpr int max_code_difference = 16; // rounding differs between the paths, but by less
+constexpr int max_code_difference = 16; // differences in rounding between the paths are smaller
 
 using Pixels = std::vector<std::uint8_t>;
 

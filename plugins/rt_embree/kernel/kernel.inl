@@ -83,15 +83,15 @@ ARHOST_INLINE Int rgba8(Int r, Int g, Int b, Int a) {
     return r | (g << Int(8)) | (b << Int(16)) | (a << Int(24));
 }
 
-// Adds the radiance of the current sample to the pixels' sums. It is averaged in linear light and encoded only once:
-// sRGB codes are not linear and limited to 1, so that their mean would darken noise and highlights.
+// Adds the radiance of the current sample to the pixels' sums. Radiance is averaged in linear light and encoded only
+// once. sRGB codes are not linear and limited to 1, so averaging them would darken noise and highlights.
 ARHOST_INLINE void accumulate(Scratch &scratch, int first_pixel) {
     for (int i = 0; i < 3; ++i)
         add_to_sum(scratch, light_row + i, first_pixel, bounded_radiance(load(scratch.radiance[i] + first_pixel)));
 }
 
-// Adds the sums of previous frames to the sums of this frame, and stores the totals for the next frame. A frame has
-// no samples once accumulation is complete; its totals are those of the previous frame.
+// Adds the sums of previous frames to the sums of this frame, and stores the totals for the next frame. Once
+// accumulation is complete, a frame has no samples of its own; its totals are those of the previous frame.
 ARHOST_INLINE void add_history(const Frame &frame, Scratch &scratch, std::size_t first_of_tile, int first_pixel) {
     for (int i = 0; i < frame.scene.sum_row_count(); ++i) {
         float *kept = frame.history[i] + first_of_tile + first_pixel, *sum = scratch.sum[i] + first_pixel;
@@ -115,8 +115,8 @@ ARHOST_INLINE CatcherShadow catcher_shadow(const Scene &scene, const Scratch &sc
     const Float opaque = scene.shadow_alpha_opaque, translucent = scene.shadow_alpha_translucent;
     if (!scene.coloured_shadows)
         return {shadow_alpha(fraction[0], fraction[1], opaque, translucent), black()};
-    // Each colour channel has its own alpha, but the image has one alpha for all: the largest. The shadow's colour
-    // compensates for channels that this alpha would darken too much.
+    // Each colour channel has its own alpha, but the image has one alpha for all channels: the largest. This alpha
+    // would darken the other channels too much, so the shadow's colour compensates for the difference.
     Vec3 of_channel;
     of_channel.x = shadow_alpha(fraction[0], Float(0.0f), opaque, translucent);
     of_channel.y = shadow_alpha(fraction[1], Float(0.0f), opaque, translucent);
@@ -127,9 +127,9 @@ ARHOST_INLINE CatcherShadow catcher_shadow(const Scene &scene, const Scratch &sc
              shadow_colour_encoded(of_channel.z, alpha)}};
 }
 
-// Returns a block's RGBA pixels, the means of `count` samples. Virtual objects and catchers are averaged apart and
-// then blended by their shares of the pixel in sRGB, as the compositor blends them with the video: edges thus have no
-// halo on any background.
+// Returns a block's RGBA pixels, the means of `count` samples. Virtual objects and catchers are averaged separately.
+// They are then blended in sRGB, weighted by their shares of the pixel, as the compositor blends them with the video.
+// Edges thus have no halo on any background.
 ARHOST_INLINE Int mean(const Frame &frame, const Scratch &scratch, int first_pixel, std::uint32_t count) {
     const Scene &scene = frame.scene;
     const Float samples(static_cast<float>(count)), covered = load(scratch.sum[coverage_row] + first_pixel);

@@ -11,13 +11,14 @@ enum Purpose : int { environment_purpose = 1, glass_purpose, rough_purpose, firs
 struct LightSample {
     Vec3 to_light;    // vector from the surface to the sampled point; of unit length if the light is infinitely far
     float t_far;      // end of the shadow ray in lengths of `to_light`: 1, or infinity
-    Vec3 direction;   // of `to_light`, unit length
+    Vec3 direction;   // unit vector in the direction of `to_light`
     Float cosine;     // cosine of the angle of incidence; 0 if the light is behind the surface
     Vec3 intensity;   // linear colour
     Float irradiance; // at perpendicular incidence, per unit of intensity
-    // Number of samples of the light source times their density per steradian; 0 if reflected rays cannot hit it.
+    // Number of samples of the light source times the density of one sample per steradian; 0 if reflected rays cannot
+    // hit the light source.
     Float sampling_density;
-    bool is_background; // seen in reflections only
+    bool is_background; // visible in reflections only
 };
 
 ARHOST_INLINE LightSample make_light_sample(const Surface &s, Vec3 to_light, float t_far, Vec3 intensity) {
@@ -41,7 +42,7 @@ ARHOST_INLINE Float falloff_of(const arhost_light &light, Vec3 to_light) {
     return point_light_falloff(bool_of(light.falloff == ARHOST_FALLOFF_INVERSE_SQUARE), dot(to_light, to_light));
 }
 
-// The irradiance of a LightSample, and the density of one sample per steradian.
+// The irradiance of a LightSample, and the density per steradian of one sample.
 struct Arriving {
     Float irradiance, density;
 };
@@ -59,7 +60,7 @@ ARHOST_INLINE Arriving arriving_from_point(const arhost_light &light, Vec3 to_ce
     return {falloff * cosine, density_over_area(distance_squared, Float(area), cosine)};
 }
 
-// `uv` selects the sampled point of an area light, of which `count` are sampled.
+// `uv` selects the sampled point of an area light. `count`: number of samples of the area light.
 ARHOST_INLINE LightSample sample_light(const arhost_light &light, const Surface &s, Pair uv, int count) {
     if (light.type == ARHOST_LIGHT_DIRECTIONAL)
         return make_light_sample(s, -splat(light.direction), far_away, splat(light.intensity));
@@ -84,10 +85,10 @@ ARHOST_INLINE LightSample sample_light(const arhost_light &light, const Surface 
     return sample;
 }
 
-// Returns the light of area lights that arrives along secondary rays before `t_far`, where the rays hit a
-// surface. Lamps do not hide each other or anything else. `inverse_density`: see RayQueue. After a rough surface,
-// mirrors and glass on the way count as if the lamp were seen directly: a few random rays that find a small lamp by
-// such a path would be bright spots.
+// Returns the light that secondary rays receive from area lights before `t_far`, where the rays hit a surface. Lamps
+// do not hide each other or anything else. `inverse_density`: see RayQueue. After a reflection off a rough surface,
+// mirrors and glass on the path are ignored in the weight, as if the lamp were seen directly. Otherwise, the few
+// random rays that find a small lamp along such a path would cause bright spots.
 ARHOST_INLINE Vec3 arriving_from_area_lights(const Frame &frame, Vec3 origin, Vec3 direction, Float t_far,
                                              Float inverse_density) {
     Vec3 sum = black();
@@ -168,8 +169,8 @@ ARHOST_INLINE Visibility visibility_of(const Scene &scene, const LightSample &sa
     return visibility;
 }
 
-// For each lane, returns the index (from 0, relative to `first`) of the first cumulative sum above `value`, found by
-// binary search.
+// For each lane, finds the first cumulative sum above `value` by binary search. Returns its index relative to
+// `first`.
 ARHOST_INLINE Int search(const float *sums, Int first, std::int32_t count, Float value) {
     Int low(0), high(count - 1);
     for (std::int32_t remaining = count; remaining > 1; remaining = (remaining + 1) / 2) {
@@ -189,13 +190,14 @@ ARHOST_INLINE Pair step_of_sums(const float *sums, Int first, Int i) {
     return {before, gather(sums, first + i) - before};
 }
 
-// Density per steradian of sample_environment() in a texel, from the steps of the cumulative sums.
+// Returns the density per steradian of sample_environment() in a texel, computed from the steps of the cumulative
+// sums.
 ARHOST_INLINE Float environment_density(const Texture &image, Float row_step, Float column_step, Float v) {
     const Float texels = Float(static_cast<float>(image.width) * static_cast<float>(image.height));
     return equirectangular_density(row_step * column_step * texels, v);
 }
 
-// Returns the light that arrives along secondary rays that hit no surface, from the environment or the background.
+// Returns the light that secondary rays receive from the environment or the background if they hit no surface.
 // `inverse_density`: see RayQueue.
 ARHOST_INLINE Vec3 arriving_from_environment(const Frame &frame, Vec3 direction, Float inverse_density) {
     inverse_density = max(inverse_density, Float(0.0f)); // samples of the environment do not follow mirrors
@@ -285,9 +287,9 @@ ARHOST_INLINE void for_each_light(const Frame &frame, const Surface &s, const Ra
     }
 }
 
-// Returns the share of the light of a sample that a rough surface reflects to the eye, without the Fresnel term. A
-// ray that is reflected at random can also arrive at the light source; balance_weight() divides the light between
-// them. Light of the environment that passes through glass counts only for such rays, not for samples.
+// Returns the share of a sample's light that a rough surface reflects to the eye, without the Fresnel term. A
+// randomly reflected ray can reach the same light source; balance_weight() divides the light between the sample and
+// that ray. Environment light that passes through glass is counted only along reflected rays, not for samples.
 ARHOST_INLINE Float rough_lobe(const Surface &s, Vec3 to_eye, Vec3 half_vector, const LightSample &sample,
                                const Visibility &visibility, bool rays_follow) {
     const Float cosine_eye = dot(s.normal, to_eye), cosine_half = dot(s.normal, half_vector);
@@ -339,8 +341,8 @@ struct CatcherLight {
     Vec3 hidden;      // see hidden_row
 };
 
-// Computes the parts of a catcher's irradiance that virtual objects hide. Objects of glass do not hide a light, but
-// tint it.
+// Computes the parts of a catcher's irradiance that virtual objects hide. Glass objects do not hide light, but tint
+// it.
 ARHOST_INLINE CatcherLight catcher_light(const Frame &frame, const RTCRayHit16 &rays, Bool active,
                                          const Random &random) {
     const Scene &scene = frame.scene;

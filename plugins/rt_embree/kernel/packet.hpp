@@ -49,8 +49,8 @@ template <class Op, class To, class... From> ARHOST_INLINE void apply(Op op, To 
     }
 }
 
-// The body of a function of the packets `a` (and `b`) that returns a `Type`. Evaluates `expression` for each register
-// of `a` (and `b`), which it calls `a_` (and `b_`).
+// The body of a function of the packets `a` (and `b`) that returns a `Type`. Evaluates `expression` for each
+// register; `expression` refers to the registers of `a` and `b` as `a_` and `b_`.
 #define ARHOST_UNARY(Type, expression)                                                                               \
     Type to;                                                                                                         \
     apply(                                                                                                           \

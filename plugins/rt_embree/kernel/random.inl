@@ -21,9 +21,9 @@ struct Pair {
     Float u, v; // [0, 1)
 };
 
-// Returns pair `index` of the `count` pairs that a sample needs for `purpose`. These pairs are evenly spread over the
-// unit square, as are the pairs of all samples of a pixel (R2 sequence: M. Roberts, The Unreasonable Effectiveness of
-// Quasirandom Sequences, 2018).
+// Returns pair `index` of the `count` pairs that a sample needs for `purpose`. These pairs are evenly distributed
+// over the unit square. The pairs of all samples of a pixel are evenly distributed, too (R2 sequence: M. Roberts, The
+// Unreasonable Effectiveness of Quasirandom Sequences, 2018).
 ARHOST_INLINE Pair pair(const Random &random, int purpose, int index, int count) {
     const Int base = hash(random.pixel ^ random.seed);
     const Int start = hash(base + Int(purpose * 2)), start_2 = hash(base + Int(purpose * 2 + 1));

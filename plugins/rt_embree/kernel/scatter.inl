@@ -54,7 +54,7 @@ ARHOST_INLINE void add_radiance(Work &work, const Paths &paths, Vec3 radiance, B
     }
 }
 
-// Adds a secondary ray for each active lane to the queue of the depth of `from`. `inverse_density`: see RayQueue.
+// Adds a secondary ray for each active lane to the queue of the depth `from.depth`. `inverse_density`: see RayQueue.
 ARHOST_INLINE void enqueue(Work &work, const Paths &from, Vec3 origin, Vec3 direction, Vec3 throughput, Bool active,
                            Float inverse_density) {
     alignas(64) float by_lane[RayQueue::rows][lanes];
@@ -74,7 +74,7 @@ ARHOST_INLINE void enqueue(Work &work, const Paths &from, Vec3 origin, Vec3 dire
     queue.count += __builtin_popcount(mask_of(active.lane));
 }
 
-// Adds rays off mirrors and glass.
+// Adds rays that mirrors and glass reflect or refract.
 ARHOST_INLINE void enqueue(Work &work, const Paths &from, Vec3 origin, Vec3 direction, Vec3 throughput, Bool active) {
     enqueue(work, from, origin, direction, throughput, active, -abs(from.inverse_density));
 }
@@ -94,9 +94,10 @@ ARHOST_INLINE void reflect(Work &work, const Paths &paths, const Surface &s, Vec
         enqueue(work, paths, s.position + s.geometric_normal * s.offset, reflected(s, direction), throughput, active);
 }
 
-// Refraction of rays at a surface with this normal. `cosine`: of the angle of incidence.
+// The refraction of rays at a surface. `cosine`: cosine of the angle of incidence.
 struct Refraction {
-    Float cosine, cosine_squared; // the latter of the angle of refraction; negative for total internal reflection
+    // Cosine_squared: of the angle of refraction; negative for total internal reflection.
+    Float cosine, cosine_squared;
     Vec3 direction;
 };
 ARHOST_INLINE Refraction refraction_at(Vec3 direction, Vec3 normal, Float ratio) {
@@ -105,8 +106,8 @@ ARHOST_INLINE Refraction refraction_at(Vec3 direction, Vec3 normal, Float ratio)
     return {cosine, squared, refracted_direction(direction, normal, ratio, cosine, sqrt(max(squared, Float(0.0f))))};
 }
 
-// Queues the reflected and the refracted ray, or only one of them, chosen at random, if `single_path` is set. A ray
-// that exceeds the depth limit or falls below the importance cutoff is not traced: it contributes the material's
+// Queues the reflected and the refracted ray, or, with `single_path`, only one of them, chosen at random. A ray is
+// not traced if it exceeds the depth limit or falls below the importance cutoff. It then contributes the material's
 // cutoff colour.
 ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surface &s, Vec3 direction,
                                     const arhost_material &glass, Bool active) {
@@ -237,8 +238,8 @@ ARHOST_INLINE void trace_queued_packet(Work &work, std::uint32_t depth) {
         shade(work, rays, hit, paths);
 }
 
-// Traces packets until all queues are empty. Picks the deepest queue that holds a full packet, which keeps every
-// queue but the first below three packets. If no queue holds a full packet, picks the shallowest non-empty one,
+// Traces packets until all queues are empty. Picks the deepest queue that holds a full packet. This keeps every queue
+// except the first below three packets. If no queue holds a full packet, picks the shallowest non-empty queue,
 // because its secondary rays may fill the deeper queues.
 ARHOST_INLINE void trace_queued_rays(Work &work) {
     RayQueue *queues = work.scratch.queues;

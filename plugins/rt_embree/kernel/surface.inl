@@ -11,7 +11,7 @@ struct Surface {
     Vec3 geometric_normal, normal;
     Bool back_face; // the ray hit the back face; `geometric_normal` has been flipped
     Float offset;   // mm: distance of a secondary ray's origin from the surface
-    Vec3 lift;      // mm: from the hit to the curved surface where shadow rays start (lift_to_corner)
+    Vec3 lift;      // mm: vector from the hit to the curved surface where shadow rays start (lift_to_corner)
     Float distance; // mm, from the ray origin
     Vec3 ambient, diffuse, specular, emission;
     Float exponent; // Phong exponent
@@ -19,7 +19,7 @@ struct Surface {
     Bool is_lit;    // shaded by direct light: neither a mirror nor glass
     Bool is_rough;  // has a metallic-roughness material; `specular` is then the reflectance at normal incidence
     Bool is_real;   // a catcher or occluder
-    // Whether any lane has the property. A scattering surface spawns secondary rays.
+    // Whether any lane has the property. A surface with any_scattering spawns secondary rays.
     bool any_specular, any_rough, any_scattering;
 };
 
@@ -83,8 +83,8 @@ ARHOST_INLINE Vec3 mapped_normal(const Scene &scene, const Object &object, Vec3 
     return perturbed_normal(normal, facet, along_u, along_v, texel);
 }
 
-// Returns the vector from the hits to the curved surface that the vertex normals describe (lift_to_corner), in object
-// space. `side`: −1 in lanes whose rays come from the side opposite to the vertex normals, else 1.
+// Returns the vectors, in object space, from the hits to the curved surface that the vertex normals describe
+// (lift_to_corner). `side`: −1 in lanes whose rays come from the side opposite to the vertex normals, else 1.
 ARHOST_INLINE Vec3 lift_of(const Object &object, const Corners &corners, const Vec3 (&normals)[3], Float side) {
     Vec3 positions[3], hit = black(), lift = black();
     for (int i = 0; i < 3; ++i) {

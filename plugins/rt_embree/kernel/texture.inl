@@ -8,7 +8,7 @@ struct Texel {
     Float alpha;
 };
 
-// Returns the texel index inside the texture that `i`, which may be outside, maps to.
+// Maps the texel index `i`, which may be outside the texture, to an index inside it.
 ARHOST_INLINE Int wrapped(Int i, std::int32_t size, arhost_wrap wrap) {
     const Int last(size - 1), zero(0);
     if (wrap == ARHOST_WRAP_CLAMP)

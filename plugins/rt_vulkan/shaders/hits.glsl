@@ -2,7 +2,7 @@
 //
 // Rays and their intersections with triangles and spheres. Each path implements
 //     Hit trace(Ray ray, bool any_hit, bool cull_back_faces)
-// which returns the nearest hit. With `any_hit`, it may return any hit, in which only `object` is valid.
+// which returns the nearest hit. With `any_hit`, it may return any hit, of which only `object` is valid.
 
 struct Ray {
     vec3 origin, direction;
@@ -79,8 +79,8 @@ bool is_hole(uint object, uint primitive, vec2 uv) {
     return sample_texture(materials[material].colour_texture, texcoord).a < materials[material].alpha_cutoff;
 }
 
-// Intersects a ray with a triangle by the Möller-Trumbore algorithm, with the same operations as Embree. Returns true
-// and updates `hit` if the hit is not farther away than hit.t.
+// Intersects a ray with a triangle by the Möller-Trumbore algorithm, with the same operations as Embree. If the hit is
+// not farther away than hit.t, updates `hit` and returns true.
 bool hits_triangle(uint primitive, vec3 origin, vec3 direction, inout Hit hit) {
     vec3 edge_1 = primitives[primitive].edge_1, edge_2 = primitives[primitive].edge_2;
     vec3 to_corner = primitives[primitive].corner - origin;
@@ -155,8 +155,8 @@ void refine(Ray ray, inout Hit hit) {
     }
 }
 
-// Recomputes a hit reported by the device with the plain path's formulas, so that all paths agree to the last bit. At
-// edges, these formulas may find no hit; the function then keeps the device's values.
+// Recomputes a hit reported by the device with the formulas of the path `plain`, so that all paths agree to the last
+// bit. At edges, these formulas may find no hit; the function then keeps the device's values.
 Hit recomputed_hit(Ray ray, uint object, uint primitive, float t, vec2 uv) {
     vec3 origin, direction;
     to_object_space(object, ray, origin, direction);

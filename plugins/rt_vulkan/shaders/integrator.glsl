@@ -61,8 +61,8 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
         ray = Ray(path.origin, path.direction, INFINITY, ALL_MASKS);
         stage = PATH_STAGE;
     }
-    // Radiance is averaged in linear light and encoded only once: sRGB codes are not linear and limited to 1, so that
-    // their mean would darken noise and highlights.
+    // Radiance is averaged in linear light and encoded only once. sRGB codes are not linear and limited to 1, so
+    // averaging them would darken noise and highlights.
     sums.light += vec3(bounded_radiance(light.x), bounded_radiance(light.y), bounded_radiance(light.z));
 }
 
@@ -88,7 +88,7 @@ bool direction_of(uint pixel, vec2 within, out vec3 direction) {
 }
 
 uint srgb8(float linear) {
-    // Table lookup of arhost/shading/srgb8.hpp. The result equals the exact formula, rounded.
+    // Looks up the code in the table of arhost/shading/srgb8.hpp. The result equals that of the exact formula, rounded.
     int bits = floatBitsToInt(clamp(linear, 1.0 / 8192.0, 1.0));
     uint number = min(uint((bits - (114 << 23)) >> 16), FIRST_LIGHT_OF_CODE - 1u); // stays inside the table even for NaN
     int cell = int(tables[FIRST_SRGB_CELL + number]);
@@ -103,9 +103,9 @@ uint code_of(float value) {
     return uint(code_8bit(value));
 }
 
-// Returns a pixel's RGBA code, the mean of all samples so far. Virtual objects and catchers are averaged apart and then
-// blended by their shares of the pixel in sRGB, as the compositor blends them with the video: edges thus have no halo on
-// any background.
+// Returns a pixel's RGBA code, the mean of all samples so far. Virtual objects and catchers are averaged separately.
+// They are then blended in sRGB, weighted by their shares of the pixel, as the compositor blends them with the video.
+// Edges thus have no halo on any background.
 uint shade_pixel(uvec2 position) {
     uint pixel = position.y * frame.width + position.x;
     Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, 0.0, 0.0, 0.0, 0.0);

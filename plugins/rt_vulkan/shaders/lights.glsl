@@ -6,13 +6,14 @@
 struct LightSample {
     vec3 to_light;    // vector from the surface to the sampled point; of unit length if the light is infinitely far
     float t_max;      // end of the shadow ray in lengths of `to_light`: 1, or infinity
-    vec3 direction;   // of `to_light`, unit length
+    vec3 direction;   // unit vector in the direction of `to_light`
     float cosine;     // cosine of the angle of incidence; 0 if the light is behind the surface
     float irradiance; // at perpendicular incidence, per unit of intensity
     vec3 intensity;
-    // Number of samples of the light source times their density per steradian; 0 if reflected rays cannot hit it.
+    // Number of samples of the light source times the density of one sample per steradian; 0 if reflected rays cannot
+    // hit the light source.
     float sampling_density;
-    bool is_background; // seen in reflections only
+    bool is_background; // visible in reflections only
 };
 
 LightSample make_light_sample(Surface s, vec3 to_light, float t_max, float irradiance, vec3 intensity) {
@@ -24,8 +25,8 @@ bool is_area_light(uint lamp) {
     return lights[lamp].type == RECTANGLE_LIGHT || lights[lamp].type == SPHERE_LIGHT;
 }
 
-// The irradiance that arrives from a point of an area light per unit of intensity (x), and the density of one sample (y).
-// `to_centre`, `to_point`: vectors to the light's centre and to the point.
+// Returns, for a point of an area light, the irradiance per unit of intensity (x) and the density per steradian of one
+// sample (y). `to_centre`, `to_point`: vectors to the light's centre and to the point.
 vec2 arriving_from_point(uint lamp, vec3 to_centre, vec3 to_point) {
     vec3 direction = normalize(to_point);
     float distance_squared = dot(to_point, to_point);
@@ -40,7 +41,7 @@ vec2 arriving_from_point(uint lamp, vec3 to_centre, vec3 to_point) {
     return vec2(falloff * cosine, density_over_area(distance_squared, area, cosine));
 }
 
-// `sample_uv` selects the sampled point of an area light, of which `count` are sampled.
+// `sample_uv` selects the sampled point of an area light. `count`: number of samples of the area light.
 LightSample sample_light(uint lamp, Surface s, vec2 sample_uv, uint count) {
     uint type = lights[lamp].type;
     vec3 intensity = lights[lamp].intensity, axis = lights[lamp].direction;
@@ -66,10 +67,10 @@ LightSample sample_light(uint lamp, Surface s, vec2 sample_uv, uint count) {
     return arriving;
 }
 
-// Returns the light of area lights that arrives along a secondary ray before `t_max`, where the ray hits a
-// surface. Lamps do not hide each other or anything else. `inverse_density`: see Path. After a rough surface, mirrors and
-// glass on the way count as if the lamp were seen directly: a few random rays that find a small lamp by such a path would
-// be bright spots.
+// Returns the light that a secondary ray receives from area lights before `t_max`, where the ray hits a surface. Lamps
+// do not hide each other or anything else. `inverse_density`: see Path. After a reflection off a rough surface, mirrors
+// and glass on the path are ignored in the weight, as if the lamp were seen directly. Otherwise, the few random rays
+// that find a small lamp along such a path would cause bright spots.
 vec3 arriving_from_area_lights(vec3 origin, vec3 direction, float t_max, float inverse_density) {
     vec3 sum = vec3(0.0);
     for (uint lamp = 0u; lamp < frame.light_count; ++lamp) {
@@ -136,7 +137,7 @@ Visibility visibility(LightSample arriving, Surface s) {
     return result;
 }
 
-// Returns the index (from 0, relative to `first`) of the first cumulative sum above `value`, found by binary search.
+// Finds the first cumulative sum above `value` by binary search. Returns its index relative to `first`.
 int search_sums(uint first, int count, float value) {
     int low = 0, high = count - 1;
     while (low < high) {
@@ -155,16 +156,16 @@ vec2 step_of_sums(uint first, int i) {
     return vec2(before, uintBitsToFloat(tables[first + uint(i)]) - before);
 }
 
-// Density per steradian of sample_environment() in a texel, from the steps of the cumulative sums.
+// Returns the density per steradian of sample_environment() in a texel, computed from the steps of the cumulative sums.
 float environment_density(float row_step, float column_step, float v) {
     float texels = float(textures[frame.environment_texture].width) * float(textures[frame.environment_texture].height);
     return equirectangular_density(row_step * column_step * texels, v);
 }
 
-// Returns the light that arrives along a secondary ray that hits no surface, from the environment or the background.
+// Returns the light that a secondary ray receives from the environment or the background if it hits no surface.
 // `inverse_density`: see Path.
 vec3 arriving_from_environment(vec3 direction, float inverse_density) {
-    inverse_density = max(inverse_density, 0.0); // negative after a mirror, which shadow rays do not follow
+    inverse_density = max(inverse_density, 0.0); // negative after a mirror; shadow rays do not follow mirrors
     vec3 light = frame.background;
     float density = hemisphere_density();
     if (frame.environment_texture != NONE) {
@@ -182,7 +183,7 @@ vec3 arriving_from_environment(vec3 direction, float inverse_density) {
     return light * balance_weight_of_ray(density * float(frame.light_samples), inverse_density);
 }
 
-// Samples a direction of the hemisphere uniformly, for rough reflections of a scene without environment.
+// Samples a direction of the hemisphere uniformly, for rough reflections in a scene without an environment.
 LightSample sample_background(Surface s, vec2 sample_uv) {
     vec3 direction = hemisphere_direction(s.normal, sample_uv.x, sample_uv.y);
     LightSample arriving =
@@ -211,8 +212,9 @@ LightSample sample_environment(Surface s, vec2 sample_uv) {
     return arriving;
 }
 
-// The effect of direct light at a surface point. For shadow catchers: the total irradiance, and the parts of it that
-// virtual objects hide (Sums.hidden). For other surfaces: `light`, the radiance towards the ray origin.
+// The effect of direct light at a surface point. For shadow catchers, it is the total irradiance, and the parts of the
+// irradiance that virtual objects hide (Sums.hidden). For other surfaces, it is `light`, the radiance towards the ray
+// origin.
 struct DirectLight {
     vec3 light, hidden;
     float irradiance;
@@ -229,9 +231,9 @@ void add_shadow(inout DirectLight sum, LightSample arriving, Visibility visible,
         sum.hidden += vec3(hidden, tinted, 0.0);
 }
 
-// Returns the share of the arriving light that a rough surface reflects to the eye, without the Fresnel term. A ray that
-// is reflected at random can also arrive at the light source; balance_weight() divides the light between them. Light of
-// the environment that passes through glass counts only for such rays, not for samples.
+// Returns the share of the arriving light that a rough surface reflects to the eye, without the Fresnel term. A
+// randomly reflected ray can reach the same light source; balance_weight() divides the light between the sample and
+// that ray. Environment light that passes through glass is counted only along reflected rays, not for samples.
 float rough_lobe(Surface s, vec3 to_eye, vec3 half_vector, LightSample arriving, Visibility visible, bool rays_follow) {
     float cosine_eye = dot(s.normal, to_eye), cosine_half = dot(s.normal, half_vector);
     float lobe = ggx_lobe(arriving.cosine, cosine_eye, cosine_half, s.alpha);
@@ -290,14 +292,14 @@ DirectLight direct_light(Surface s, vec3 to_eye, bool catches, bool rays_follow,
     return sum;
 }
 
-// Returns the overlay's sRGB-encoded colour and alpha at a shadow catcher, from the fractions of light that are hidden
-// (Sums.hidden).
+// Returns the overlay's sRGB-encoded colour and alpha at a shadow catcher. `fractions`: the fractions of light that are
+// hidden (Sums.hidden).
 vec4 catcher_shadow(vec3 fractions) {
     float opaque = frame.shadow_alpha_opaque, translucent = frame.shadow_alpha_translucent;
     if (frame.coloured_shadows == 0u)
         return vec4(vec3(0.0), shadow_alpha(fractions.x, fractions.y, opaque, translucent));
-    // Each colour channel has its own alpha, but the image has one alpha for all: the largest. The shadow's colour
-    // compensates for channels that this alpha would darken too much.
+    // Each colour channel has its own alpha, but the image has one alpha for all channels: the largest. This alpha
+    // would darken the other channels too much, so the shadow's colour compensates for the difference.
     vec3 alphas = vec3(shadow_alpha(fractions.x, 0.0, opaque, translucent),
                        shadow_alpha(fractions.y, 0.0, opaque, translucent),
                        shadow_alpha(fractions.z, 0.0, opaque, translucent));

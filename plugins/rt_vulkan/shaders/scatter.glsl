@@ -5,8 +5,8 @@
 // A ray, and the throughput of the path from the pixel to this ray.
 struct Path {
     vec3 origin, direction, throughput;
-    // Reciprocal of the density per steradian of the last random direction; 0 if there is none, negative if the path has
-    // since been reflected or refracted by mirrors or glass.
+    // Reciprocal of the density per steradian of the last random direction. It is 0 if there is no such direction, and
+    // negative if mirrors or glass have reflected or refracted the path since.
     float inverse_density;
     uint depth; // number of bounces so far
 };
@@ -33,9 +33,9 @@ void push_reflected(Path path, Surface s, vec3 direction, vec3 reflectance) {
              -abs(path.inverse_density));
 }
 
-// Refraction of a ray at a surface with this normal. `cosine`: of the angle of incidence.
+// The refraction of a ray at a surface. `cosine`: cosine of the angle of incidence.
 struct Refraction {
-    float cosine, cosine_squared; // the latter of the angle of refraction; negative for total internal reflection
+    float cosine, cosine_squared; // cosine_squared: of the angle of refraction; negative for total internal reflection
     vec3 direction;
 };
 Refraction refraction_at(vec3 direction, vec3 normal, float ratio) {
@@ -44,9 +44,9 @@ Refraction refraction_at(vec3 direction, vec3 normal, float ratio) {
                       refracted_direction(direction, normal, ratio, cosine, sqrt(max(squared, 0.0))));
 }
 
-// Pushes the reflected and the refracted ray, or only one of them, chosen at random, if frame.single_path is set. A ray
-// that exceeds the depth limit or falls below the importance cutoff is not traced: the function returns the cutoff
-// colour that it contributes instead.
+// Pushes the reflected and the refracted ray, or, with frame.single_path, only one of them, chosen at random. A ray is
+// not traced if it exceeds the depth limit or falls below the importance cutoff. The function then returns the cutoff
+// colour, which the ray contributes instead.
 vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Random random) {
     vec3 throughput = path.throughput;
     if (s.back_face)
@@ -104,7 +104,7 @@ void scatter_rough(Path path, Surface s, vec3 to_eye, Random random) {
         push(path, above(s), direction, throughput, 1.0 / max(density, 1e-30));
 }
 
-// Pushes the secondary rays of a surface. Returns the light that replaces rays that are cut off.
+// Pushes the secondary rays of a surface. For rays that are cut off, returns the light that replaces them.
 vec3 scatter(Path path, Surface s, vec3 direction, uint material, Random random) {
     uint model = materials[material].model;
     if (path.depth >= frame.max_depth)

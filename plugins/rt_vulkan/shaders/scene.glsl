@@ -160,15 +160,15 @@ layout(std430, set = 0, binding = 11) readonly buffer Rays {
 struct Sums {
     vec3 light;       // linear radiance of the virtual objects
     float coverage;   // number of samples that hit a virtual object
-    // The parts of `irradiance` that virtual objects hide. With coloured shadows, one part for each colour channel;
-    // otherwise, the part that opaque objects hide, the part that translucent objects hide, and 0.
+    // The parts of `irradiance` that virtual objects hide. With coloured shadows, there is one part per colour channel.
+    // Otherwise, the values are the part that opaque objects hide, the part that translucent objects hide, and 0.
     vec3 hidden;
     float irradiance; // of the catcher, without shadows
     float caught;     // number of samples that hit a catcher
     float unused, unused_2, unused_3;
 };
 layout(std430, set = 0, binding = 12) buffer History {
-    Sums history[]; // of all earlier samples
+    Sums history[]; // sums of all earlier samples
 };
 layout(std430, set = 0, binding = 13) writeonly buffer Image {
     uint image_pixels[];

@@ -10,7 +10,7 @@ struct Surface {
     bool back_face; // the ray hit the back face; `geometric_normal` has been flipped
     float offset;      // mm: distance of a secondary ray's origin from the surface
     float distance;    // mm, from the ray origin
-    vec3 lift;         // mm: from the hit to the curved surface where shadow rays start (lift_to_corner)
+    vec3 lift;         // mm: vector from the hit to the curved surface where shadow rays start (lift_to_corner)
     bool is_real;      // a catcher or occluder
     // add_material() sets the following members. They are 0 for mirrors and glass.
     vec3 ambient, diffuse, specular, emission;
@@ -29,12 +29,12 @@ vec3 normal_at(uint object, uint number, vec2 uv) {
     return sum;
 }
 
-// Returns the vector from the hit to the curved surface that the vertex normals describe (lift_to_corner), in object
-// space. `side`: −1 if the ray comes from the side opposite to the vertex normals, else 1.
+// Returns the vector, in object space, from the hit to the curved surface that the vertex normals describe
+// (lift_to_corner). `side`: −1 if the ray comes from the side opposite to the vertex normals, else 1.
 vec3 lift_of(Hit hit, float side) {
     uint first = objects[hit.object].first_index + 3u * primitives[hit.primitive].number;
     vec3 weights = vec3(1.0 - hit.uv.x - hit.uv.y, hit.uv.x, hit.uv.y), lift = vec3(0.0);
-    // The corners relative to the first one, and the hit.
+    // The corners and the hit, relative to the first corner.
     vec3 corners[3] = vec3[](vec3(0.0), -primitives[hit.primitive].edge_1, primitives[hit.primitive].edge_2);
     vec3 position = corners[1] * weights.y + corners[2] * weights.z;
     for (int i = 0; i < 3; ++i) {

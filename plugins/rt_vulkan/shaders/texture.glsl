@@ -3,7 +3,7 @@
 // Textures, which are stored in a buffer. The shader computes bilinear filtering, because hardware samplers differ in
 // rounding.
 
-// Returns the texel index inside the texture that `i`, which may be outside, maps to.
+// Maps the texel index `i`, which may be outside the texture, to an index inside it.
 int wrapped(int i, int size, uint wrap) {
     if (wrap == WRAP_CLAMP)
         return clamp(i, 0, size - 1);

@@ -10,7 +10,7 @@ layout(location = 0) rayPayloadEXT Payload payload;
 Hit trace(Ray ray, bool any_hit, bool cull_back_faces) {
     if (!can_hit(ray))
         return no_hit(ray);
-    payload.object = 0u; // if the closest-hit shader is skipped, this stays: any value but MISS reports a hit
+    payload.object = 0u; // value if the closest-hit shader is skipped; any value but MISS reports a hit
     traceRayEXT(top_level,
                 (any_hit ? gl_RayFlagsTerminateOnFirstHitEXT | gl_RayFlagsSkipClosestHitShaderEXT : gl_RayFlagsNoneEXT) |
                     (cull_back_faces ? gl_RayFlagsNoOpaqueEXT : gl_RayFlagsNoneEXT),

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Implements trace() with VK_KHR_ray_query. The device traverses its acceleration structures and leaves some
-// candidates to this shader: spheres, and triangles that may have holes or be back faces.
+// Implements trace() with VK_KHR_ray_query. The device traverses its acceleration structures. This shader tests the
+// candidates that the device cannot decide: spheres, and triangles that may have holes or be back faces.
 
 layout(set = 0, binding = 15) uniform accelerationStructureEXT top_level;
 

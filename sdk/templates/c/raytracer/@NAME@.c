@@ -56,8 +56,9 @@ static double linear_light(double srgb) {
     return srgb <= 0.04045 ? srgb / 12.92 : pow((srgb + 0.055) / 1.055, 2.4);
 }
 
-/* Alpha of a shadow. The host composites in sRGB, but a shadow hides a share of the linear light: alpha is exact for
- * mid-grey video, the sRGB value 0.5. `opaque`, `translucent`: the shares of the light that such objects hide. */
+/* Returns the alpha of a shadow. The host composites in sRGB, but a shadow hides a share of the linear light. Alpha is
+ * therefore exact only for mid-grey video (sRGB value 0.5). `opaque`, `translucent`: the shares of the light that
+ * opaque and translucent objects hide. */
 static double shadow_alpha(const arhost_instance *self, double opaque, double translucent) {
     const double grey = linear_light(0.5);
     const double hidden = opaque * (grey - linear_light(0.5 * (1 - self->shadow_alpha_opaque))) +
@@ -65,8 +66,8 @@ static double shadow_alpha(const arhost_instance *self, double opaque, double tr
     return 1 - 2 * srgb(grey - hidden);
 }
 
-/* Averages a grid of rays in linear light. Objects and shadows are averaged apart and then blended by their shares of
- * the alpha. Alpha is straight: the colour is not multiplied by it. */
+/* Averages a grid of rays in linear light. Objects and shadows are averaged separately and then blended by their shares
+ * of the alpha. Alpha is straight: the colour is not multiplied by alpha. */
 static void write_pixel(uint8_t *pixel, const arhost_instance *self, const view *v, double column, double row) {
     const int side = self->side;
     vec colour = {0, 0, 0};

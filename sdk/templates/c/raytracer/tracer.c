@@ -1,5 +1,5 @@
-/* Brute force: tests each ray against every object whose bounding sphere it hits, and there against every sphere or
- * triangle. All positions are in world coordinates, mm. */
+/* Brute force: for each object whose bounding sphere a ray hits, tests the ray against every sphere or triangle of the
+ * object. All positions are in world coordinates, mm. */
 #include "tracer.h"
 
 #include <stdlib.h>
@@ -200,7 +200,7 @@ typedef struct hit {
     vec lift;                /* from the hit to the origin of shadow rays */
 } hit;
 
-/* Distances at which the ray's line enters and leaves a sphere; returns 0 if it misses. */
+/* Computes the distances at which the line of a ray enters and leaves a sphere. Returns 0 if it misses the sphere. */
 static int sphere_interval(sphere s, ray r, double *enter, double *leave) {
     const vec to_centre = subtract(s.centre, r.origin);
     const double middle = dot(to_centre, r.direction);
@@ -225,9 +225,9 @@ static void intersect_sphere(const object *o, const sphere *s, ray r, int front_
     }
 }
 
-/* From a point of a triangle to the curved surface that its normals describe. Shadow rays start there, so that the
- * facets of a smooth mesh do not shadow themselves (J. Hanika, Hacking the Shadow Terminator, Ray Tracing Gems II, 2021).
- */
+/* Returns the vector from a point of a triangle to the curved surface that the triangle's shading normals describe.
+ * Shadow rays start at this surface, so that the facets of a smooth mesh do not shadow themselves (J. Hanika, Hacking
+ * the Shadow Terminator, Ray Tracing Gems II, 2021). */
 static vec lift_at(const triangle *t, double u, double v) {
     const vec from_corner = add(scale(u, t->edge_1), scale(v, t->edge_2));
     const vec to_corners[3] = {scale(-1, from_corner), subtract(t->edge_1, from_corner),
@@ -292,7 +292,7 @@ static surface surface_at(ray r, const hit *h) {
     const vec face_normal = dot(h->face_normal, r.direction) > 0 ? scale(-1, h->face_normal) : h->face_normal;
     const vec normal = dot(h->normal, face_normal) < 0 ? scale(-1, h->normal) : h->normal;
     const vec gap = scale(1e-9 * (length(at) + h->distance), face_normal), above = add(at, gap);
-    const vec lifted = dot(h->normal, face_normal) < 0 ? above : add(above, h->lift); /* not from inside */
+    const vec lifted = dot(h->normal, face_normal) < 0 ? above : add(above, h->lift); /* no lift inside an object */
     return (surface){above, subtract(at, gap), lifted, normal, (h->object->kind & (CATCHER | OCCLUDER)) != 0};
 }
 
@@ -328,8 +328,8 @@ static incident_light incident_from(const arhost_light *light, const surface *s)
     return in;
 }
 
-/* Returns SOLID if an opaque object blocks the light, GLASS if only glass does, otherwise 0. Proxies for real objects
- * cast no shadows on each other: the video already contains those. */
+/* Returns SOLID if an opaque object blocks the light, GLASS if only glass blocks it, otherwise 0. Proxies for real
+ * objects cast no shadows on each other, because the video already shows these shadows. */
 static unsigned blocked_by(const tracer *self, const incident_light *light, const surface *s) {
     ray shadow_ray = {s->lifted, light->direction, light->distance};
     if (isfinite(light->distance)) {
@@ -343,7 +343,7 @@ static unsigned blocked_by(const tracer *self, const incident_light *light, cons
     return nearest_hit(self, shadow_ray, GLASS, 0).object ? GLASS : 0;
 }
 
-/* Lambert and Phong. */
+/* Shades with the models of Lambert and Phong. */
 static vec direct_light(const tracer *self, const surface *s, const arhost_material *material, vec to_eye) {
     const int has_highlight = material->model == ARHOST_MATERIAL_SPECULAR || material->model == ARHOST_MATERIAL_METAL;
     vec sum = add(multiply(vec_of(self->scene->ambient), vec_of(material->ambient)), vec_of(material->emission));

@@ -43,11 +43,11 @@ typedef struct ray {
     double end;            /* maximum distance of a hit, mm */
 } ray;
 
-/* The result of a ray: a virtual object, or a shadow catcher. All 0 where only the video is visible. */
+/* The result of a ray that hits a virtual object or a shadow catcher. All members are 0 if only the video is visible. */
 typedef struct sample {
     int is_virtual;
     vec colour;                 /* of the virtual object, linear light */
-    double opaque, translucent; /* shares of the catcher's light that such objects hide */
+    double opaque, translucent; /* shares of the catcher's light that opaque and translucent objects hide */
 } sample;
 
 typedef struct tracer tracer;

@@ -58,8 +58,8 @@ public:
     }
 
 private:
-    // Averages a grid of rays in linear light. Objects and shadows are averaged apart and then blended by their shares
-    // of the alpha. Alpha is straight: the colour is not multiplied by it.
+    // Averages a grid of rays in linear light. Objects and shadows are averaged separately and then blended by their
+    // shares of the alpha. Alpha is straight: the colour is not multiplied by alpha.
     void write(std::uint8_t *pixel, const Camera &camera, double column, double row) const {
         Vec colour;
         double hits = 0, opaque = 0, translucent = 0;

@@ -111,7 +111,7 @@ void Tracer::update_geometry(std::uint32_t number, const float *world_from_objec
 
 namespace {
 
-// Distances at which the ray's line enters and leaves a sphere; enter > leave if it misses.
+// The distances at which the line of a ray enters and leaves a sphere; enter > leave if it misses the sphere.
 struct Interval {
     double enter = infinity, leave = -infinity;
 };
@@ -136,8 +136,9 @@ void Tracer::intersect_sphere(const Object &object, const Sphere &sphere, const 
     nearest = {distance, &object, normal, normal, {}};
 }
 
-// From a point of a triangle to the curved surface that its normals describe. Shadow rays start there, so that the
-// facets of a smooth mesh do not shadow themselves (J. Hanika, Hacking the Shadow Terminator, Ray Tracing Gems II, 2021).
+// Returns the vector from a point of a triangle to the curved surface that the triangle's shading normals describe.
+// Shadow rays start at this surface, so that the facets of a smooth mesh do not shadow themselves (J. Hanika, Hacking
+// the Shadow Terminator, Ray Tracing Gems II, 2021).
 Vec Tracer::lift(const Triangle &t, double u, double v) {
     const Vec from_corner = u * t.edge_1 + v * t.edge_2;
     const auto to_corner = [&](Vec corner, Vec normal, double weight) {
@@ -202,7 +203,7 @@ Tracer::Surface Tracer::surface_at(const Ray &ray, const Hit &hit) {
     const Vec face_normal = dot(hit.face_normal, ray.direction) > 0 ? -1 * hit.face_normal : hit.face_normal;
     const Vec normal = dot(hit.normal, face_normal) < 0 ? -1 * hit.normal : hit.normal;
     const Vec gap = 1e-9 * (length(at) + hit.distance) * face_normal;
-    const Vec lift = dot(hit.normal, face_normal) < 0 ? Vec{} : hit.lift; // not from inside
+    const Vec lift = dot(hit.normal, face_normal) < 0 ? Vec{} : hit.lift; // no lift inside an object
     return {at + gap, at - gap, at + gap + lift, normal, bool(hit.object->kind & (catcher | occluder))};
 }
 
@@ -237,7 +238,7 @@ Tracer::IncidentLight Tracer::incident(const arhost_light &light, const Surface 
     return in;
 }
 
-// Proxies for real objects cast no shadows on each other: the video already contains those.
+// Proxies for real objects cast no shadows on each other, because the video already shows these shadows.
 Tracer::Visibility Tracer::visibility(const IncidentLight &light, const Surface &surface) const {
     Ray ray = {surface.lifted, light.direction, light.distance};
     if (light.distance < infinity) {
@@ -250,7 +251,7 @@ Tracer::Visibility Tracer::visibility(const IncidentLight &light, const Surface 
     return nearest(ray, glass).object ? Visibility::through_glass : Visibility::clear;
 }
 
-// Lambert and Phong.
+// Shades with the models of Lambert and Phong.
 Vec Tracer::direct_light(const Surface &surface, const arhost_material &material, Vec to_eye) const {
     const bool has_highlight = material.model == ARHOST_MATERIAL_SPECULAR || material.model == ARHOST_MATERIAL_METAL;
     const auto *lights = elements<arhost_light>(scene_.lights);

@@ -46,15 +46,15 @@ struct Ray {
     double end = infinity; // maximum distance of a hit, mm
 };
 
-// The result of a ray: a virtual object, or a shadow catcher. All 0 where only the video is visible.
+// The result of a ray that hits a virtual object or a shadow catcher. All members are 0 if only the video is visible.
 struct Sample {
     bool is_virtual = false;
     Vec colour;                         // of the virtual object, linear light
-    double opaque = 0, translucent = 0; // shares of the catcher's light that such objects hide
+    double opaque = 0, translucent = 0; // shares of the catcher's light that opaque and translucent objects hide
 };
 
-// Brute force: tests each ray against every object whose bounding sphere it hits, and there against every sphere or
-// triangle. All positions are in world coordinates, mm.
+// Brute force: for each object whose bounding sphere a ray hits, tests the ray against every sphere or triangle of the
+// object. All positions are in world coordinates, mm.
 class Tracer {
 public:
     explicit Tracer(const arhost_scene &scene); // the scene must outlive it

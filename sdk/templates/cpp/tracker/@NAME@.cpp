@@ -1,5 +1,5 @@
 // @NAME@: a tracker for arhost. Treats the bright pixels as one white square that faces the camera: their centroid is
-// its centre, their number its area. arhost computes the pose from the corners.
+// the centre of the square, and their number is its area. arhost computes the pose from the corners.
 #include <arhost-cpp/plugin.hpp>
 
 #include <cmath>
