@@ -11,8 +11,8 @@ namespace {
 using fiducial::Corners;
 using fiducial::unwarped;
 
-// Returns whether the middle of each cell is uniform: whether it lies on the side of the threshold that `white`
-// states.
+// Returns whether the middle of each cell is uniform, which means that all its samples lie on the side of the
+// threshold that `white` states.
 bool is_uniform(const cv::Mat &grey, const Corners &corners_px, const cv::Mat_<std::uint8_t> &white,
                 double threshold) {
     const cv::Mat_<std::uint8_t> samples = unwarped(grey, corners_px, 4 * white.rows);

@@ -288,8 +288,8 @@ std::optional<FittedEdge> fit_edge(const Picture &picture, const Edge &edge, Slo
     if (!(slope.peak >= code_step(picture, edge)))
         return std::nullopt;
     reduce_noise(slope);
-    // Relative to the peak. A slope that is wide relative to the cell has flanks that depend on the cells beside the
-    // border and the margin. The wider it is, the less of its flanks is used.
+    // `min_rise` is relative to the peak. The wider a slope is relative to the cell, the more its flanks depend on
+    // the cells beside the border and the margin. A wide slope is therefore used only above a larger rise.
     const double min_rise = std::clamp(slope.width_px / cell_px - 0.2, 0.1, 0.6);
     std::vector<cv::Point2d> found;
     for (std::size_t i = 0; i < edge.at_px.size(); ++i)

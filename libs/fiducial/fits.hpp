@@ -35,7 +35,7 @@ inline const LightOfCode &light_of_code(arhost_transfer transfer) {
     return transfer == ARHOST_TRANSFER_LINEAR ? linear : srgb;
 }
 
-// The upper median. Reorders the values.
+// Returns the upper median. Reorders the values.
 template <class T> T median(std::vector<T> &values) {
     const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
     std::ranges::nth_element(values, middle);

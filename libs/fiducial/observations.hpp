@@ -53,8 +53,8 @@ arhost_observation observation_of(std::int32_t id, std::uint32_t family, const M
 // Returns the grey plane of a frame, without copying it.
 cv::Mat grey_of(const arhost_frame &frame);
 
-// Divides a square into `side` × `side` equal parts and returns a sample at the centre of each. The square with the
-// corners `corners_px` extends beyond this one by `margin` samples on each side.
+// Divides a square into `side` × `side` equal parts and returns a sample at the centre of each part. `corners_px` are
+// the corners of a larger square, which extends beyond the sampled square by `margin` samples on each side.
 cv::Mat_<std::uint8_t> unwarped(const cv::Mat &grey, const Corners &corners_px, int side, double margin = 0);
 
 // Returns AprilTag's name of a family: "tag36h11" for "DICT_APRILTAG_36h11". Returns other names unchanged.
@@ -69,7 +69,7 @@ struct Family {
                                          // arhost_tracker_setup.families
 
     bool lists(int id) const { return listed.contains(id); }
-    bool lists(int id, std::uint32_t name) const { // under this name
+    bool lists(int id, std::uint32_t name) const { // whether the setup lists `id` under this name
         const auto found = listed.find(id);
         return found != listed.end() && found->second == name;
     }

@@ -53,8 +53,8 @@ Homography px_from_cells(const cv::Vec<double, 8> &corners_px, const Print &prin
     return Homography(1, 0, origin.x, 0, 1, origin.y, 0, 0, 1) * relative;
 }
 
-// Light at this code and above may be clipped, so the pixel may be brighter than its code indicates. The limit is
-// below 255, because video compression turns some 255 into 254.
+// Pixels with this code or a higher one may be clipped, so their light may be brighter than the code indicates. The
+// value is below 255, because video compression turns some codes 255 into 254.
 constexpr std::uint8_t saturated = 254;
 
 // A pixel whose light depends only on the print.
@@ -132,7 +132,7 @@ public:
 
     // `covariance_cells2`: the covariance of the blur.
     void blur(const cv::Matx22d &covariance_cells2) {
-        constexpr double cutoff = 3, max_radius = 40; // standard deviations; samples
+        constexpr double cutoff = 3, max_radius = 40; // `cutoff`: standard deviations; `max_radius`: samples
         const cv::Matx22d covariance =
             double(per_cell_ * per_cell_) * covariance_cells2 + 1e-3 * cv::Matx22d::eye(); // in samples; invertible
         const cv::Matx22d inverse = covariance.inv();
@@ -285,7 +285,7 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
         for (int b = 0; b < a; ++b)
             normal[a * count + b] = normal[b * count + a];
 
-    // Then converts them to derivatives with respect to the corners, which determine the homography.
+    // Then converts these to derivatives with respect to the corners, which determine the homography.
     cv::Matx<double, count, unknowns> by_unknown = cv::Matx<double, count, unknowns>::zeros();
     for (int i = 0; i < 8; ++i) {
         constexpr double step_px = 0.1;
@@ -316,7 +316,7 @@ double sum_of_squared_differences_from_mean(std::span<const Pixel> pixels) {
 // of the print.
 std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &light_of_code, const Model &model,
                           double max_error) {
-    constexpr double max_deviations = 4, reach = 4; // standard deviations of the noise, of the blur
+    constexpr double max_deviations = 4, reach = 4; // standard deviations of the noise and of the blur, respectively
     constexpr double max_edge_px = 0.1; // displacement; a lens does not blur an edge exactly as the model does
     const auto tells_its_light = [](const Pixel &pixel) { return !pixel.is_saturated || pixel.residual > 0; };
     std::vector<const Pixel *> outliers;
@@ -327,7 +327,7 @@ std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &ligh
     if (outliers.empty())
         return std::vector<bool>(pixels.size(), true);
 
-    // Compares noise in codes, because in light it depends more on the brightness.
+    // Compares errors in codes, because noise depends less on the brightness in codes than in light.
     const auto code_of = [&](double light) {
         const double within = std::clamp<double>(light, light_of_code.front(), light_of_code.back());
         const auto above =
