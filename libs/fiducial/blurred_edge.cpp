@@ -30,7 +30,7 @@ public:
         }
     }
     Step at(double z) const {
-        if (!(std::abs(z) < limit)) // also for NaN
+        if (!(std::abs(z) < limit)) // also true for NaN
             return {z > 0 ? 1.0 : 0.0, 0};
         const double place = (z + limit) * per_unit;
         const int i = static_cast<int>(place);
@@ -49,7 +49,8 @@ private:
 };
 
 struct Pixel : EdgePixel {
-    double residual = 0, by_offset = 0; // of the light, and the light's derivative with respect to the offset
+    // Residual of the light, and the light's derivative with respect to the offset.
+    double residual = 0, by_offset = 0;
 };
 
 struct Model {
@@ -254,7 +255,7 @@ bool minimize(std::span<Pixel> pixels, double half_length_px, double max_blur_px
         }
         const Model next{model.offset_px + change[0], model.turn + change[1], model.blur_px + change[2],
                          model.before + change[3], model.contrast + change[4]};
-        if (!(std::abs(next.offset_px) + half_length_px * std::abs(next.turn) < max_offset_px)) { // also for NaN
+        if (!(std::abs(next.offset_px) + half_length_px * std::abs(next.turn) < max_offset_px)) { // also true for NaN
             damping *= 10;
             continue;
         }

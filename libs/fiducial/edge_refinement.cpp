@@ -445,7 +445,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
                                        bool is_subpixel, std::size_t max_count) {
     constexpr int max_passes = 8, max_fits = 3;
     constexpr double max_sigma_px = 0.05, max_correlation = 0.5; // noise alone does not make corners doubtful
-    constexpr double max_moved_px = 0.2;   // by the last fit, which uses the pixels near the previous line
+    constexpr double max_moved_px = 0.2;   // movement by the last fit, which uses the pixels near the previous line
     constexpr double sharp_step_px = 0.25; // suffices for a sharp edge
     constexpr double min_strength = 0.9;   // strength of the refined edges relative to the rough edges
     constexpr double max_noise = 0.12;     // relative to the peak; applies to tags too small to average out noise

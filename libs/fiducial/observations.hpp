@@ -18,7 +18,7 @@
 namespace arhost::fiducial {
 
 // Corners in px (pixel centres at integers), in the order top-left, top-right, bottom-right, bottom-left of the
-// upright print.
+// upright marker.
 using Corners = std::array<cv::Point2d, 4>;
 
 struct MeasuredCorners {
@@ -62,7 +62,7 @@ std::string april_tag_name(std::string_view name);
 
 // A family in use. If a setup lists it under several names, there is still only one Family.
 struct Family {
-    std::string name;                    // as april_tag_name() returns it
+    std::string name;                    // the name that april_tag_name() returns
     std::uint32_t index;                 // index of the family's first name in arhost_tracker_setup.families
     int id_count;                        // its ids are 0 … id_count − 1
     std::map<int, std::uint32_t> listed; // listed ids and the names they are listed under, as indices in

@@ -215,7 +215,7 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
     const Homography to_px = px_from_cells(model.corners_px, print), to_cells = to_px.inv();
     Fit fit;
     const cv::Matx22d px_per_cell = px_per_cell_at_centre(to_px, print);
-    if (!(cv::determinant(px_per_cell) > 0)) { // also for NaN
+    if (!(cv::determinant(px_per_cell) > 0)) { // also true for NaN
         fit.cost = std::numeric_limits<double>::infinity();
         return fit;
     }
@@ -331,7 +331,8 @@ std::vector<bool> inliers(std::span<const Pixel> pixels, const LightOfCode &ligh
     const auto code_of = [&](double light) {
         const double within = std::clamp<double>(light, light_of_code.front(), light_of_code.back());
         const auto above =
-            std::min(std::ranges::upper_bound(light_of_code, within), light_of_code.end() - 1); // not the first
+            // Never the first element.
+            std::min(std::ranges::upper_bound(light_of_code, within), light_of_code.end() - 1);
         const double below = *(above - 1);
         return static_cast<double>(above - light_of_code.begin() - 1) + (within - below) / (*above - below);
     };
@@ -538,8 +539,8 @@ private:
 
     const Print &print_;
     const LightOfCode &light_of_code_;
-    std::vector<Pixel> all_, pixels_; // with outliers and without
-    cv::Matx22d cells_per_px_;        // at the centre
+    std::vector<Pixel> all_, pixels_; // `all_`: with outliers; `pixels_`: without outliers
+    cv::Matx22d cells_per_px_;        // at the centre of the print
     cv::Vec<double, 8> first_px_;
     double shortest_px_;
     int steps_left_ = 60; // successful fits need fewer steps
@@ -588,7 +589,7 @@ std::optional<AlignedPrint> align_print(const cv::Mat &grey, arhost_transfer tra
         return std::nullopt;
     const Homography px_from_cell = px_from_cells(first_px, print);
     const cv::Matx22d px_per_cell = px_per_cell_at_centre(px_from_cell, print);
-    // False for NaN, and if the corners are not those of a square seen from the front.
+    // True for NaN, and if the corners are not those of a square seen from the front.
     if (!(cv::determinant(px_per_cell) > 0))
         return std::nullopt;
     const LightOfCode &light = light_of_code(transfer);

@@ -54,7 +54,7 @@ constexpr double max_rate_of_closer_look = 1e-7;
 
 struct FamilyTraits {
     double margin; // width of the surroundings that a square needs for detection, relative to its side
-    int bits;      // of the code
+    int bits;      // number of bits of the code
 };
 
 // Returns an observation if the marker `id` of `family` is at its expected place. Takes less time than detection.
@@ -121,8 +121,8 @@ private:
     // look has to search for the missed markers of its pass.
     template <class RegionsOf>
     Seen look_closer(std::span<const Pass> passes, const Indices &missed, const RegionsOf &regions_of) const;
-    // Returns the markers of the targets without any seen marker. Excludes families with so few bits that a closer
-    // look would often cause false positives.
+    // Returns the markers of those targets of which no marker has been seen. Excludes families with so few bits that
+    // a closer look would often cause false positives.
     Indices missed_markers(std::span<const arhost_observation> seen) const;
     // Returns rectangles that do not overlap and contain the expected markers for which `accepts` returns true.
     // Returns the whole frame if the rectangles would cover most of it. Ignores request.search_everywhere.

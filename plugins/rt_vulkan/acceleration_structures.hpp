@@ -35,7 +35,7 @@ private:
     struct Structure {
         VkAccelerationStructureTypeKHR type;
         VkBuildAccelerationStructureFlagsKHR flags;
-        VkAccelerationStructureGeometryKHR geometry; // of the top-level structure: the instances
+        VkAccelerationStructureGeometryKHR geometry; // for the top-level structure: the instances
         std::uint32_t count;                         // number of triangles, spheres or instances
         AccelerationStructure handle;
         VkDeviceSize scratch_size = 0, scratch_offset = 0;

@@ -334,8 +334,9 @@ void Instance::create(bool validate) {
                       "the Vulkan loader supports version 1.0 only; install one for 1.1 or later");
     const VkApplicationInfo application{.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
                                         .pApplicationName = "arhost",
-                                        .apiVersion = VK_API_VERSION_1_2};      // the highest version used
-    const VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(host_); // for messages of vkCreateInstance
+                                        .apiVersion = VK_API_VERSION_1_2}; // the highest version used
+    // Receives messages of vkCreateInstance.
+    const VkDebugUtilsMessengerCreateInfoEXT messenger = messenger_info(host_);
     const VkValidationFeatureEnableEXT feature = VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT;
     const VkValidationFeaturesEXT features{.sType = VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT,
                                            .pNext = &messenger,

@@ -23,7 +23,7 @@ inline constexpr Colour white{255, 255, 255}, grey{170, 170, 170}, red{255, 96, 
 // A line of text. A box aligns the texts of its rows, to the right of the longest label.
 struct Row {
     std::string label, text;
-    Colour colour = white; // of `text`
+    Colour colour = white; // colour of `text`
 };
 
 class Canvas {
@@ -37,7 +37,7 @@ public:
     // Converts pixel coordinates of the frame, whose pixel centres are at integers, to coordinates of the canvas.
     virtual Point at(Point pixel) const = 0;
 
-    double text_height() const; // of one line, px
+    double text_height() const; // height of one line, px
     // Draws a line that is visible on every background.
     void line(Point from, Point to, Colour colour) const;
     void dashed_line(Point from, Point to, Colour colour) const; // thinner

@@ -47,7 +47,7 @@ private:
     std::optional<Point> draw_axes(const Canvas &canvas, const arhost_target &target, double length_px) const;
     void draw_expected(const Canvas &canvas, const arhost_expected_marker &expected, bool is_missed) const;
 
-    double width_ = 0, height_ = 0; // of the frame, px
+    double width_ = 0, height_ = 0; // size of the frame, px
     std::optional<shading::Lens> lens_;
     double focal_length_px_ = 0;
     std::vector<std::uint8_t> bgr_;

@@ -170,8 +170,8 @@ private:
     fs::path scratch_, kept_path_; // temporary files next to `path_`
     std::optional<NumberedName> pattern_;
     std::unique_ptr<images::Encoder> encoder_;
-    std::int64_t frame_;  // for a single image: the frame to write, or -1 for the last
-    std::uint64_t every_; // for numbered images
+    std::int64_t frame_;  // number of the frame to write as a single image, or -1 for the last frame
+    std::uint64_t every_; // interval of numbered images, in frames
     PixelFormat format_;
     drawing::DebugView debug_view_;
     std::uint32_t depth_stride_ = 0;

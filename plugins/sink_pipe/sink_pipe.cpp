@@ -154,9 +154,9 @@ private:
     std::string matrix_;
     bool writes_overlay_, reopen_;
     int width_ = 0, height_ = 0;
-    std::string header_;                    // of the stream
+    std::string header_;                    // header of the stream
     std::optional<BgrConverter> converter_; // only for Y4M
-    std::vector<std::uint8_t> frame_;       // as it is written
+    std::vector<std::uint8_t> frame_;       // the frame's bytes in the output format
     bool was_interrupted_ = false;
 };
 

@@ -23,7 +23,7 @@ struct VideoSettings {
     arhost_frame_format format;
     double fps;        // 0: unknown
     std::string codec; // "ffv1" or "h264"
-    int crf;           // for h264
+    int crf;           // rate factor of h264
     int threads;
 };
 

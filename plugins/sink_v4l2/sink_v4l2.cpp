@@ -158,7 +158,7 @@ private:
 
     Host host_;
     std::string path_, format_option_, io_option_;
-    std::uint32_t width_ = 0, height_ = 0; // of the frames
+    std::uint32_t width_ = 0, height_ = 0; // size of the frames
     std::optional<OutputDevice> device_;
     OutputFormat format_;
     const PixelFormat *pixels_ = nullptr;

@@ -35,7 +35,7 @@ private:
         std::uint64_t number = 0;
         std::chrono::nanoseconds received{};
         std::uint32_t width = 0, height = 0;
-        std::vector<std::uint8_t> bgr; // without padding
+        std::vector<std::uint8_t> bgr; // rows have no padding
     };
     struct Free {
         void operator()(void *compressor) const;

@@ -18,7 +18,7 @@ struct Settings {
     int socket;                          // a listening socket
     std::string token;                   // "": none
     std::string hosts;                   // see is_own_host
-    std::uint32_t width = 0, height = 0; // of the frames
+    std::uint32_t width = 0, height = 0; // size of the frames
 };
 
 // Serves the page, the live picture and the commands, in a thread of libmicrohttpd.
@@ -36,7 +36,7 @@ public:
 
 private:
     using Clock = std::chrono::steady_clock;
-    struct Callbacks; // of libmicrohttpd
+    struct Callbacks; // callbacks of libmicrohttpd
     struct Request;
     struct Viewer;
     using SharedRequest = std::shared_ptr<Request>;

@@ -16,7 +16,7 @@ namespace sink_window {
 // The position and size of a frame in the window.
 struct View {
     Rectangle area;    // px of the window
-    int width, height; // of the frame, px
+    int width, height; // size of the frame, px
     bool mirrored;
 
     // Converts pixel coordinates of the frame, whose pixel centres are at integers, to coordinates of the window.

@@ -235,11 +235,11 @@ private:
     std::optional<Window> window_;
     std::optional<FrameTexture> picture_;
     std::optional<arhost_record> record_; // record of the frame in the window
-    std::vector<arhost_target> targets_;  // of the record
+    std::vector<arhost_target> targets_;  // targets of the record
     std::vector<arhost_observation> observations_;
     std::vector<arhost_expected_marker> expected_;
     Rate rate_;
-    std::optional<double> latency_ms_; // from the capture of a frame to its arrival here
+    std::optional<double> latency_ms_; // time from the capture of a frame to its arrival in this plugin
     bool help_ = false, mirrored_ = false, stale_ = false;
     std::optional<Message> message_;
 };

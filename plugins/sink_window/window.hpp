@@ -53,7 +53,7 @@ public:
     void close();
     bool closed() const; // whether the user or close() has closed the window
     void toggle_full_screen();
-    Rectangle size() const; // of the framebuffer in px; x and y are 0
+    Rectangle size() const; // size of the framebuffer in px; x and y are 0
     void present();
     bool stale() const { return stale_; } // whether the content must be drawn again
 

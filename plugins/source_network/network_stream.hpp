@@ -55,7 +55,7 @@ private:
     bool feed(); // returns false at the end of the data
     Failure failure(int code);
 
-    std::string name_; // without credentials
+    std::string name_; // name for messages, without credentials
     std::chrono::milliseconds timeout_;
     bool verifies_tls_;
     LibavLog &log_;

@@ -102,7 +102,7 @@ private:
     std::string url_, transport_;
     milliseconds timeout_;
     bool uses_sender_clock_, verifies_tls_;
-    std::string name_; // without credentials
+    std::string name_; // name for messages, without credentials
 
     std::optional<arhost::Receiver> receiver_;
     std::optional<Received> next_;

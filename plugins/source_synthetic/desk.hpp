@@ -17,7 +17,7 @@ namespace arhost::synthetic {
 inline constexpr float marker_side = 80;
 
 struct MarkerSheet {
-    cv::Mat_<uint8_t> cells; // from marker_cells()
+    cv::Mat_<uint8_t> cells; // result of marker_cells()
     std::string family;
     int id;
     double side_mm; // printed in the caption

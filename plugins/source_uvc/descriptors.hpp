@@ -32,8 +32,8 @@ constexpr NamedEncoding encodings[] = { // in the order of preference
     {Encoding::nv12, "nv12"},
     {Encoding::mjpeg, "mjpeg"}};
 
-// A frame size. `intervals` lists the frame intervals. If it is empty, the intervals are a range; if the range's
-// maximum is 0, the camera states no intervals.
+// A frame size. `intervals` lists the permitted frame intervals. If it is empty, the permitted intervals form a
+// range; if longest_interval is 0, the camera states no intervals.
 struct FrameSize {
     std::uint8_t index = 0; // bFrameIndex
     std::uint32_t width = 0, height = 0;

@@ -45,7 +45,8 @@ struct AssembledFrame {
     std::vector<std::uint8_t> bytes;
     std::int64_t arrival_ns = 0; // arrival of the frame's first payload
     std::optional<std::uint32_t> presentation_ticks;
-    std::optional<std::uint32_t> clock_ticks; // of the first payload that has it, which arrived at clock_arrival_ns
+    // From the first payload that contains it; that payload arrived at clock_arrival_ns.
+    std::optional<std::uint32_t> clock_ticks;
     std::int64_t clock_arrival_ns = 0;
     Damage damage = Damage::none; // the first cause of damage
 };

@@ -116,7 +116,7 @@ private:
         newest_only_ = setup.paced != 0;
         device_.emplace(path_);
         camera_ = set_format(setup);
-        set_controls(control_values_); // before the stream starts, so that the first frame has them
+        set_controls(control_values_); // precedes the stream, so that the controls apply to the first frame
         const double fps = device_->set_fps(setup.fps);
         const Size size{camera_.width, camera_.height};
         const std::string mode = arhost::fourcc_text(camera_.fourcc) + " " + size.text();

@@ -14,7 +14,7 @@ struct LightSample {
     Vec3 direction;   // unit vector in the direction of `to_light`
     Float cosine;     // cosine of the angle of incidence; 0 if the light is behind the surface
     Vec3 intensity;   // linear colour
-    Float irradiance; // at perpendicular incidence, per unit of intensity
+    Float irradiance; // irradiance at perpendicular incidence, per unit of intensity
     // Number of samples of the light source times the density of one sample per steradian; 0 if reflected rays cannot
     // hit the light source.
     Float sampling_density;
@@ -337,7 +337,7 @@ ARHOST_INLINE Vec3 direct_light(const Frame &frame, const Surface &s, Vec3 to_ey
 
 // The light at a shadow catcher.
 struct CatcherLight {
-    Float irradiance; // without shadows
+    Float irradiance; // irradiance without shadows
     Vec3 hidden;      // see hidden_row
 };
 

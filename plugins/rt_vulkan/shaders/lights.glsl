@@ -8,7 +8,7 @@ struct LightSample {
     float t_max;      // end of the shadow ray in lengths of `to_light`: 1, or infinity
     vec3 direction;   // unit vector in the direction of `to_light`
     float cosine;     // cosine of the angle of incidence; 0 if the light is behind the surface
-    float irradiance; // at perpendicular incidence, per unit of intensity
+    float irradiance; // irradiance at perpendicular incidence, per unit of intensity
     vec3 intensity;
     // Number of samples of the light source times the density of one sample per steradian; 0 if reflected rays cannot
     // hit the light source.

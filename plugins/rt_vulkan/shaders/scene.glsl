@@ -163,7 +163,7 @@ struct Sums {
     // The parts of `irradiance` that virtual objects hide. With coloured shadows, there is one part per colour channel.
     // Otherwise, the values are the part that opaque objects hide, the part that translucent objects hide, and 0.
     vec3 hidden;
-    float irradiance; // of the catcher, without shadows
+    float irradiance; // irradiance of the catcher without shadows
     float caught;     // number of samples that hit a catcher
     float unused, unused_2, unused_3;
 };
