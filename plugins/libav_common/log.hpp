@@ -22,7 +22,7 @@ namespace arhost {
 // instead of stderr.
 class LibavLog {
 public:
-    // `hides` replaces what must not be shown, such as passwords, in each message.
+    // `hides` replaces secrets, such as passwords, in each message.
     explicit LibavLog(const Host &host, std::string (*hides)(const std::string &text) = nullptr);
     ~LibavLog();
     LibavLog(const LibavLog &) = delete;

@@ -256,7 +256,7 @@ public:
         call("stop", "");
     }
 
-    // The extension of arhost/devices.h exists while there is an instance whose class has a method `devices`.
+    // Returns the extension of arhost/devices.h while there is an instance whose class has a method `devices`.
     static const void *get_extension(const char *id) {
         static constexpr arhost_devices functions = {sizeof functions, list_devices};
         return lister_ && std::string_view(id) == ARHOST_DEVICES_EXTENSION ? &functions : nullptr;

@@ -73,7 +73,7 @@ void PipeStream::open_standard_output() {
 // The reader sees the end of a stream when it reads while the FIFO is empty and no program has it open for writing.
 void PipeStream::wait_for_end_of_earlier_stream() {
     constexpr auto time_to_read = std::chrono::seconds(1);
-    const int fd = ::open(path_.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC); // a reader does not delay the end
+    const int fd = ::open(path_.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC); // reading does not delay the end
     if (fd < 0)
         throw io_failure("cannot open " + name());
     const struct Close {

@@ -61,8 +61,8 @@ public:
     void start(const arhost_sink_setup &setup) {
         width_ = static_cast<int>(setup.width);
         height_ = static_cast<int>(setup.height);
-        // The matrix that programs assume, because Y4M does not state it: that of standard-definition television
-        // (BT.601) up to its size.
+        // Y4M does not state the matrix. Programs assume that of standard-definition television (BT.601) up to this
+        // height.
         constexpr int standard_definition = 576;
         const bool is_bt601 = matrix_ == "auto" ? height_ <= standard_definition : matrix_ == "bt601";
         if (format_.y4m)
@@ -130,7 +130,7 @@ private:
         }
     }
 
-    // Without swscale, which converts BGR to RGBA through YUV, with a loss.
+    // Does not use swscale, because it converts BGR to RGBA through YUV, which loses information.
     void pack_pixels(const arhost_output &output) {
         const std::size_t channels = format_.name.size(), input_channels = writes_overlay_ ? 4 : 3;
         const std::string_view input_names = writes_overlay_ ? "rgba" : "bgr";

@@ -201,7 +201,7 @@ void VideoFile::resume(std::uint64_t bytes) {
     file_.emplace(path_, O_RDWR | O_APPEND);
     truncate(bytes);
     begin_stream();
-    pending_.clear(); // the file has the same header
+    pending_.clear(); // the file already has this header
 }
 
 void VideoFile::truncate(std::uint64_t bytes) {

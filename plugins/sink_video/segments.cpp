@@ -51,7 +51,7 @@ AVStream &add_stream(AVFormatContext &output, AVRational fps) {
 }
 
 constexpr AVRational ms = {1, 1000}, ns = {1, 1'000'000'000};
-constexpr std::uint64_t block_additional_id = 1; // the only one that libavformat writes
+constexpr std::uint64_t block_additional_id = 1; // the only id that libavformat writes
 
 // Attaches the frame's number to its packet.
 void set_number(AVPacket &packet, std::int64_t number) {
@@ -86,7 +86,7 @@ public:
 
     std::int64_t frames() const { return frames_; }
 
-    // Appends the frames of a segment whose number is below `end`.
+    // Appends those frames of a segment whose numbers are below `end`.
     void append(AVFormatContext &segment, const fs::path &segment_path, std::int64_t end,
                 const std::function<void(double)> &progress) {
         check_fits(*segment.streams[0]->codecpar, segment_path);

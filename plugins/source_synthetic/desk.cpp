@@ -24,7 +24,7 @@ namespace {
 
 constexpr float atlas_texel = 0.25f; // texel size of the first image
 constexpr float card_texel = 0.5f;
-constexpr int ink_permille = 175; // sRGB code of the ink relative to the paper
+constexpr int ink_permille = 175; // sRGB code of the ink relative to that of the paper
 
 cv::Mat load_atlas() {
     const std::unique_ptr<void, int (*)(void *)> decoder(tjInitDecompress(), tjDestroy);

@@ -17,7 +17,7 @@ Pyramid::Pyramid(std::span<const cv::Mat> clips, float texel) {
         if (levels_.size() < clips.size())
             clips[levels_.size()].copyTo(image);
         if (!levels_.empty()) {
-            // Each texel is the mean of sixteen finer ones, with the weights 1 3 3 1 in both directions. This is
+            // Each texel is the mean of sixteen finer texels, with the weights 1 3 3 1 in both directions. This is
             // smoother than a box filter, which would cause visible steps where the image is out of focus.
             const Level &finer = levels_.back();
             cv::Mat smooth = finer.texels.colRange(0, finer.side)

@@ -166,7 +166,7 @@ private:
                 add_streaming(at, descriptor);
             return;
         default:
-            return; // descriptors of other classes, or without use here, such as interface associations
+            return; // descriptors of other classes and unused ones, such as interface associations
         }
     }
 

@@ -35,7 +35,7 @@ struct Losses {
     std::uint64_t lost_packet = 0; // a packet was lost on the bus
     std::uint64_t malformed = 0;   // a payload had no valid header
     std::uint64_t truncated = 0, oversized = 0;
-    std::uint64_t superseded = 0; // replaced by a newer one, or not read in time
+    std::uint64_t superseded = 0; // replaced by a newer frame, or not read in time
 
     void count(Damage damage);
     bool operator==(const Losses &) const = default;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A USB camera, opened through libusb without device discovery. Only those nodes in /dev/bus/usb are used that may be
-// opened. The plugin therefore works in a sandbox that contains only one node. Functions that fail throw Failure with
-// a message for the user.
+// A USB camera, opened through libusb without device discovery. The plugin uses only those nodes in /dev/bus/usb
+// that it may open, so it works in a sandbox that contains only one node. Functions that fail throw Failure with a
+// message for the user.
 #pragma once
 
 #include "descriptors.hpp"
