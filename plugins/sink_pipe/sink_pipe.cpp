@@ -61,8 +61,7 @@ public:
     void start(const arhost_sink_setup &setup) {
         width_ = static_cast<int>(setup.width);
         height_ = static_cast<int>(setup.height);
-        // Y4M does not state the matrix. Programs assume that of standard-definition television (BT.601) up to this
-        // height.
+        // Y4M does not state the matrix. Programs assume BT.601 up to this height, and BT.709 for larger frames.
         constexpr int standard_definition = 576;
         const bool is_bt601 = matrix_ == "auto" ? height_ <= standard_definition : matrix_ == "bt601";
         if (format_.y4m)

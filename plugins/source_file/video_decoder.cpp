@@ -17,7 +17,7 @@ namespace arhost {
 
 namespace {
 
-// Returns an error code. Throws std::bad_alloc if libav ran out of memory, which is the only error that the file does
+// Returns `code`. Throws std::bad_alloc if libav ran out of memory, which is the only error that the file does
 // not cause.
 int checked(int code) {
     if (code == AVERROR(ENOMEM))

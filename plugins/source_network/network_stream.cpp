@@ -14,7 +14,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 constexpr AVRational nanoseconds = {1, 1'000'000'000};
 
-// Returns an error code. Throws std::bad_alloc if libav ran out of memory.
+// Returns `code`. Throws std::bad_alloc if libav ran out of memory.
 int checked(int code) {
     if (code == AVERROR(ENOMEM))
         throw std::bad_alloc();
@@ -22,7 +22,7 @@ int checked(int code) {
 }
 
 // Returns the protocols that libav may use for this URL and for all URLs that the server names (redirects,
-// playlists). They exclude local files and other protocols.
+// playlists). Local files and other protocols are excluded.
 const char *protocols_for(const std::string &url) {
     return url.starts_with("rtsp:") ? "rtsp,rtp,udp,tcp" : "http,https,tls,tcp";
 }

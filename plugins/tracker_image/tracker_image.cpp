@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// tracker_image: detects plane pictures, such as posters and the covers of books.
+// tracker_image: detects planar pictures, such as posters and book covers.
 #include "picture.hpp"
 
 #include <fiducial/observations.hpp>

@@ -76,7 +76,7 @@ std::optional<MatrixReader::Reading> MatrixReader::read(const Samples &samples) 
         const auto black = black_cells(upright);
         if (!black)
             return std::nullopt;
-        if (const auto word = arhost::fiducial::matrix_word(*black, cells_)) { // fits one orientation only
+        if (const auto word = arhost::fiducial::matrix_word(*black, cells_)) { // no other orientation fits
             const Samples picture = normalized(upright);
             return picture.empty() ? std::nullopt : std::optional(Reading{*word, turns, picture});
         }
