@@ -89,7 +89,8 @@ public:
           functions_(static_cast<const arhost_control *>(host_->get_extension(host_, ARHOST_CONTROL_EXTENSION))) {}
     explicit operator bool() const { return functions_ != nullptr; } // whether the host accepts commands
 
-    // May be called on any thread. Returns as arhost_control.send; without success, `take` is not called.
+    // May be called on any thread. Returns the status of arhost_control.send. If it is an error, `take` is not
+    // called.
     arhost_status send(const std::string &command, Take take) {
         auto pending = std::make_unique<Pending>(Pending{this, std::move(take)});
         Pending *const context = pending.get();
@@ -174,7 +175,7 @@ public:
     Iterator end() const { return {first_, count_}; }
     std::uint32_t size() const { return count_; }
     bool empty() const { return count_ == 0; }
-    // Returns the elements [first, first + count), as far as they exist.
+    // Returns the elements [first, first + count), without those past the end of the range.
     Elements part(std::uint32_t first, std::uint32_t count) const {
         if (first >= count_)
             return {first_, 0};
@@ -225,9 +226,9 @@ constexpr arhost_option_descriptor option(arhost_option_type type, const char *k
     return {sizeof(arhost_option_descriptor), type, key, default_value, minimum, maximum, choices, help};
 }
 
-// The structs of arhost/devices.h with the same fields, and "" for NULL. A plugin class supports the devices
-// extension if it has a static member function `std::vector<arhost::Device> devices()` or `devices(const arhost::Host
-// &)`.
+// C++ counterparts of the structs of arhost/devices.h: the same fields, with "" in place of NULL. A plugin class
+// supports the devices extension if it has a static member function `std::vector<arhost::Device> devices()` or
+// `devices(const arhost::Host &)`.
 struct DeviceSize {
     std::uint32_t width = 0, height = 0;
     std::vector<double> rates{};
@@ -335,7 +336,7 @@ template <ListsDevices T> std::vector<Device> devices_of(const Host &host) {
 }
 inline void report(const Device &d, arhost_take_device take, void *context) {
     const auto or_null = [](const std::string &text) { return text.empty() ? nullptr : text.c_str(); };
-    std::vector<std::vector<arhost_device_size>> sizes; // of each format
+    std::vector<std::vector<arhost_device_size>> sizes; // for each format
     std::vector<arhost_device_format> formats;
     for (const DeviceFormat &f : d.formats) {
         auto &list = sizes.emplace_back();
@@ -448,7 +449,7 @@ inline constexpr arhost_source source_functions = {
 template <class T> std::uint64_t state_size_of(arhost_instance *instance) {
     return instance_of<T>(instance).plugin.state_size();
 }
-// `aspect` is an optional member of the plugin class. The worker rejects the 0 that remains if it throws.
+// `aspect` is an optional member of the plugin class. If it throws, the result is 0, which the worker rejects.
 template <class T> double aspect_of(arhost_instance *instance, std::uint32_t marker) {
     double aspect = 0;
     with<T>(instance, [&](T &p) { return aspect = p.aspect(marker), ARHOST_STATUS_OK; });

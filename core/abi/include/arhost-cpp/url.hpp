@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Removes what is secret in URLs from texts that others may read.
+// Removes user names, passwords and queries from the URLs in texts that others may read.
 #pragma once
 
 #include <algorithm>

@@ -30,13 +30,13 @@ typedef void (*arhost_take_answer)(void *context, const char *answer);
 typedef struct arhost_control {
     uint32_t struct_size;
 
-    /* [any] Sends a command, such as {"command": "freeze"}, and returns at once; allowed in the state `started`.
-     * `take` is called once, unless the plugin is stopped before the answer arrives; it may be NULL. Answers arrive
-     * in any order; a command that starts a component is answered when the component runs.
-     * Returns ARHOST_STATUS_ERROR_INVALID_ARGUMENT if `command` is not a JSON object, is longer than
-     * ARHOST_MAX_COMMAND_SIZE bytes, or is sent before `start` has returned, ARHOST_STATUS_ERROR_OUT_OF_MEMORY if
-     * ARHOST_MAX_PENDING_COMMANDS commands have no answer yet, and ARHOST_STATUS_ERROR_IO if the host cannot keep up;
-     * `take` is then not called. */
+    /* [any] Sends a command, such as {"command": "freeze"}, and returns at once. Allowed in the state `started`.
+     * `take` may be NULL. It is called once, unless the plugin is stopped before the answer arrives. Answers may
+     * arrive in any order. A command that starts a component is answered when the component runs. Returns
+     * ARHOST_STATUS_ERROR_INVALID_ARGUMENT if `command` is not a JSON object, is longer than ARHOST_MAX_COMMAND_SIZE
+     * bytes, or is sent before `start` has returned. Returns ARHOST_STATUS_ERROR_OUT_OF_MEMORY if
+     * ARHOST_MAX_PENDING_COMMANDS commands have no answer yet. Returns ARHOST_STATUS_ERROR_IO if the host cannot keep
+     * up. If `send` returns an error, `take` is not called. */
     arhost_status (*send)(const arhost_host *host, const char *command, arhost_take_answer take, void *context);
 } arhost_control;
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * arhost/counters.h: the extension "arhost.counters/1", by which a plugin counts events, such as lost frames by
- * cause. The host adds the counts of restarted workers, and shows them in the status, the statistics and at the end
- * of a run.
+ * cause. If the worker restarts, the host continues the counts. The host shows them in the status, in the statistics
+ * and at the end of a run.
  */
 #ifndef ARHOST_COUNTERS_H
 #define ARHOST_COUNTERS_H
@@ -26,9 +26,9 @@ typedef void (*arhost_take_counter)(void *context, const char *name, uint64_t va
 typedef struct arhost_counters {
     uint32_t struct_size;
 
-    /* [worker, started] Passes each counter to `take`, also those that are 0: the same names in each call, at most
-     * ARHOST_MAX_COUNTERS. Called between two frames a few times per second, after each frame that fails, and before
-     * `stop`. */
+    /* [worker, started] Passes each counter to `take`, including those that are 0. Every call must pass the same
+     * names, at most ARHOST_MAX_COUNTERS. The worker calls `list` between two frames a few times per second, after
+     * each frame that fails, and before `stop`. */
     void (*list)(arhost_instance *instance, arhost_take_counter take, void *context);
 } arhost_counters;
 

@@ -20,8 +20,8 @@ extern "C" {
 
 #define ARHOST_DEVICES_EXTENSION "arhost.devices/2"
 
-/* The host ignores what exceeds these limits, and displays at most 256 bytes of each string. The whole list is at
- * most 4 MiB of JSON. */
+/* The host ignores list elements beyond these limits, and displays at most 256 bytes of each string. The whole list
+ * may have at most 4 MiB as JSON. */
 enum {
     ARHOST_MAX_DEVICES = 64,
     ARHOST_MAX_DEVICE_FORMATS = 128,  /* per device */
@@ -87,14 +87,14 @@ typedef struct arhost_device_control {
     int64_t minimum;       /* at most `maximum` */
     int64_t maximum;       /* bitmask: all bits that may be set */
     int64_t step;          /* at least 0. 0: no steps */
-    int64_t default_value; /* some cameras report one outside of the range */
+    int64_t default_value; /* some cameras report a value outside the range */
     int64_t value;         /* current value */
 } arhost_device_control;
 
 /* One device. Strings may be NULL, except where stated. Unset fields are 0. */
 typedef struct arhost_device {
     uint32_t struct_size;
-    uint32_t index; /* position in this list; if the option of the plugin takes a number, it is this one */
+    uint32_t index; /* position in this list; options that select a device by number use this number */
     arhost_device_kind kind;
     arhost_device_state state;
     int32_t is_default; /* non-zero: used if the user selects no device; at most one device is the default */
@@ -119,8 +119,8 @@ typedef void (*arhost_take_device)(void *context, const arhost_device *device);
 typedef struct arhost_devices {
     uint32_t struct_size;
 
-    /* [worker, negotiated or created] Calls `take` once per device, in order of `index`. Lists a device that exists
-     * but cannot be opened, too. Changes no setting of a device and takes no device away from another program.
+    /* [worker, negotiated or created] Calls `take` once per device, in order of `index`. Also lists devices that
+     * exist but cannot be opened. Must not change settings of a device, nor take a device away from another program.
      * Releases everything that it opened before it returns. The host may call `list` repeatedly. `list` may take
      * seconds while drivers load; the timeout of the host is about 20 s. Returns ARHOST_STATUS_OK without calling
      * `take` if there is no device or driver. If the devices cannot be enumerated, logs the reason with

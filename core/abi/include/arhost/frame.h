@@ -30,13 +30,13 @@ enum { ARHOST_YUV_MATRIX_BT601 = 1, ARHOST_YUV_MATRIX_BT709 = 2 };
 typedef int32_t arhost_yuv_range;
 enum { ARHOST_YUV_RANGE_LIMITED = 1, ARHOST_YUV_RANGE_FULL = 2 };
 
-/* How the codes of the pixels relate to light. Only trackers take it into account, to locate blurred edges;
- * composites and outputs use the codes as if they were sRGB. */
+/* Relation between pixel codes and light. Only trackers use it, to locate blurred edges. Composites and outputs treat
+ * the codes as sRGB. */
 typedef int32_t arhost_transfer;
 enum {
-    ARHOST_TRANSFER_SRGB = 0,  /* sRGB's curve, or one that is nearly the same: BT.601, BT.709; most cameras */
-    ARHOST_TRANSFER_LINEAR = 1 /* proportional to the light, as from some machine-vision cameras; or rendered by
-                                  averaging codes */
+    ARHOST_TRANSFER_SRGB = 0, /* sRGB's curve, or a similar one: BT.601, BT.709; most cameras */
+    ARHOST_TRANSFER_LINEAR =
+        1 /* proportional to the light, as from some machine-vision cameras or from a renderer that averages codes */
 };
 
 /* The clock that measured a capture time. */
@@ -75,7 +75,8 @@ typedef struct arhost_frame_format {
     uint64_t byte_size;    /* size of a slot */
 } arhost_frame_format;
 
-/* Computes the fields from `plane_count` on from the fields before it. Returns 1, or 0 if the latter are invalid. */
+/* Computes `plane_count` and all later fields from the fields before `plane_count`. Returns 1, or 0 if one of the
+ * latter is invalid. */
 static inline int32_t arhost_frame_layout(arhost_frame_format *format) {
     const uint64_t w = format->width, h = format->height;
     uint64_t row[ARHOST_MAX_PLANES] = {0, 0, 0};

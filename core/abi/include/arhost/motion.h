@@ -19,9 +19,8 @@ extern "C" {
 /* The transform of an object whose `moves` is set. There is one entry for each such object, in the order of the
  * scene's objects. */
 typedef struct arhost_moved_object {
-    uint32_t object;             /* index of the object in the scene */
-    uint32_t is_visible;         /* 0: the object is not in the scene now, neither for rays from the camera nor for
-                                    others, because the target that it belongs to is lost */
+    uint32_t object;     /* index of the object in the scene */
+    uint32_t is_visible; /* 0: all rays must ignore the object, because the target that it is attached to is lost */
     float world_from_object[12]; /* column-major 3×4, invertible; mm */
 } arhost_moved_object;
 

@@ -84,8 +84,8 @@ typedef int32_t arhost_severity;
 enum {
     ARHOST_SEVERITY_DEBUG = 1,
     ARHOST_SEVERITY_INFO = 2,
-    /* logged by a tracker: what it sees instead of the targets, such as "other markers were in view: tag25h9 7". The
-     * host adds it to its warning that targets were never seen. From other plugins, as ARHOST_SEVERITY_INFO */
+    /* A tracker logs what it sees instead of the targets, such as "other markers were in view: tag25h9 7". The host
+     * adds this text to its warning that targets were never seen. Other plugins: same as ARHOST_SEVERITY_INFO */
     ARHOST_SEVERITY_HINT = 3,
     ARHOST_SEVERITY_WARNING = 4,
     ARHOST_SEVERITY_ERROR = 5,
@@ -105,11 +105,11 @@ typedef struct arhost_host {
      * keep up. */
     void (*log)(const struct arhost_host *host, arhost_severity severity, const char *text);
 
-    /* [any] Reports progress and restarts the deadline for start-up (`create` and `start`) or for `stop`: call it at
-     * least every few seconds in these functions. Also restarts the deadline of a call that waits: `read` of a source
-     * with ARHOST_CAPABILITY_LIVE whose camera is lost, and a sink's `write` whose receiver, such as another program,
-     * does not take the frame. `fraction`: the completed fraction, 0 to 1, or negative if unknown. `what`: describes
-     * the current step to the user. */
+    /* [any] Reports progress and restarts the deadline for start-up (`create` and `start`) or for `stop`. Call it at
+     * least every few seconds in these functions. It also restarts the deadline of two calls that may wait: `read` of
+     * a source with ARHOST_CAPABILITY_LIVE while its camera is lost, and `write` of a sink while the receiver, such
+     * as another program, does not take the frame. `fraction`: the completed fraction, 0 to 1, or negative if
+     * unknown. `what`: describes the current step to the user. */
     void (*progress)(const struct arhost_host *host, double fraction, const char *what);
 
     /* [any] Returns non-zero if the running call must return soon, with ARHOST_STATUS_ERROR_CANCELLED. Costs one
@@ -132,11 +132,11 @@ enum {
     /* arhost_option.text; absolute, resolved against the working directory; or "-", see
      * ARHOST_CAPABILITY_STANDARD_OUTPUT */
     ARHOST_OPTION_OUTPUT_PATH = 6,
-    /* arhost_option.integer: the descriptor of a listening, non-blocking stream socket, which belongs to the worker
-     * and stays open until the process ends; -1: none. The host opens it, so that the plugin needs no permission to
-     * open others, and keeps it open while the worker restarts. arhost_option.text: the address: "127.0.0.1:8080",
-     * "[::1]:8080", or the absolute path of a Unix socket. In the configuration, a plain name stands for the Unix
-     * socket $XDG_RUNTIME_DIR/arhost/NAME.sock, and "" for none */
+    /* arhost_option.integer: the descriptor of a listening, non-blocking stream socket; -1: none. The worker owns the
+     * descriptor, which stays open until the process ends. The host opens the socket, so the plugin needs no
+     * permission to open sockets. The host keeps the socket open while the worker restarts. arhost_option.text: the
+     * address: "127.0.0.1:8080", "[::1]:8080", or the absolute path of a Unix socket. In the configuration, a plain
+     * name stands for the Unix socket $XDG_RUNTIME_DIR/arhost/NAME.sock, and "" for no socket */
     ARHOST_OPTION_LISTEN = 7
 };
 
@@ -176,18 +176,19 @@ static inline const arhost_option *arhost_find_option(const arhost_option *optio
 
 /* Optional capabilities: bits of arhost_descriptor.capabilities. */
 enum {
-    ARHOST_CAPABILITY_SEEK = 1 << 0, /* source: can start at any frame; frame N is the same wherever it starts */
-    ARHOST_CAPABILITY_LIVE = 1 << 1, /* source: a camera; frames not read in time are lost */
+    ARHOST_CAPABILITY_SEEK =
+        1 << 0, /* source: can start at any frame; the content of frame N does not depend on the start */
+    ARHOST_CAPABILITY_LIVE = 1 << 1,            /* source: a camera; frames not read in time are lost */
     ARHOST_CAPABILITY_LENS_DISTORTION = 1 << 2, /* raytracer: applies the lens distortion of arhost_intrinsics */
     /* sink: if the option `path` contains %d or %0Nd, it writes one numbered file per frame; without this capability,
      * the host treats the path as the name of a single file */
     ARHOST_CAPABILITY_NUMBERED_FILES = 1 << 3,
     ARHOST_CAPABILITY_REALTIME_SINK = 1 << 4, /* sink: needs only the latest frame */
-    /* raytracer: the parts of a scene that it renders, besides diffuse materials and point, directional and spot
-     * lights. It should accept scenes with other parts too: it shades other materials as diffuse, ignores textures
-     * and the environment, may ignore area lights or treat them as point lights, and leaves moving objects where they
-     * are at time 0. The worker then warns the user. If an incomplete image is useless, `start` may refuse the scene
-     * with ARHOST_STATUS_ERROR_UNSUPPORTED. */
+    /* raytracer: the features of a scene that it renders, in addition to diffuse materials and point, directional and
+     * spot lights. It should also accept scenes with other features: it shades other materials as diffuse, ignores
+     * textures and the environment, ignores area lights or treats them as point lights, and leaves moving objects
+     * where they are at time 0. The worker then warns the user. If an incomplete image is useless, `start` may reject
+     * the scene with ARHOST_STATUS_ERROR_UNSUPPORTED. */
     ARHOST_CAPABILITY_REFLECTION = 1 << 5,   /* the materials SPECULAR, MIRROR and METAL */
     ARHOST_CAPABILITY_GLASS = 1 << 6,        /* the material GLASS */
     ARHOST_CAPABILITY_ROUGHNESS = 1 << 7,    /* the material METALLIC_ROUGHNESS */
@@ -201,8 +202,9 @@ enum {
     ARHOST_CAPABILITY_STANDARD_OUTPUT = 1 << 12,
     ARHOST_CAPABILITY_VIDEO_INPUT = 1 << 13,   /* sink: reads arhost_output.video and depth_mm */
     ARHOST_CAPABILITY_OVERLAY_INPUT = 1 << 14, /* sink: reads arhost_output.overlay_rgba */
-    /* raytracer: renders images of any size up to that of the setup. The intrinsics of a request are then those of
-     * arhost::shading::scaled() (arhost/shading/lens.hpp), and arhost_image has their size. */
+    /* raytracer: renders images of any size up to that in arhost_raytracer_setup. In each call of `render`,
+     * arhost_image contains the size. The intrinsics for this size are those that arhost::shading::scaled() returns
+     * (arhost/shading/lens.hpp). */
     ARHOST_CAPABILITY_SCALED_IMAGES = 1 << 15,
     ARHOST_CAPABILITY_RUN_DESCRIPTION = 1 << 16, /* sink: reads arhost_sink_setup.run_description */
     ARHOST_CAPABILITY_REPORTS_POSES = 1 << 17    /* tracker: reports the poses of bodies (arhost_body_pose) */
@@ -222,10 +224,10 @@ typedef struct arhost_descriptor {
     uint32_t capabilities;   /* ARHOST_CAPABILITY_SEEK | … */
     uint32_t option_count;
     const arhost_option_descriptor *options; /* option_count elements; may be NULL if there are none */
-    /* Permissions that the plugin needs from the sandbox, a NULL-terminated list; NULL: none. "video" (/dev/video*),
+    /* Permissions that the plugin needs from the sandbox: a NULL-terminated list; NULL: none. "video" (/dev/video*),
      * "usb", "gpu", "display" (X or Wayland, and the GPU), "network", "listen" (accept connections on the sockets of
-     * its options), "processes" (fork and exec). The configuration
-     * grants them (`allow: [video]`); the host rejects the plugin before `create` if one of them is not granted. */
+     * its options), "processes" (fork and exec). The configuration grants permissions (`allow: [video]`). The host
+     * rejects the plugin before `create` if one of its needs is not granted. */
     const char *const *needs;
 } arhost_descriptor;
 

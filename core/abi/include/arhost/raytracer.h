@@ -16,10 +16,10 @@ extern "C" {
 
 typedef struct arhost_raytracer_setup {
     uint32_t struct_size;
-    uint32_t width, height;              /* size of the images, px; with ARHOST_CAPABILITY_SCALED_IMAGES, of the
-                                            largest ones: see arhost_image */
-    uint32_t reserved;                   /* 0 */
-    const arhost_scene *scene;           /* read-only, valid until `stop`; validated by the host */
+    uint32_t width, height;    /* size of the images, px; with ARHOST_CAPABILITY_SCALED_IMAGES, the maximum size (see
+                                  arhost_image) */
+    uint32_t reserved;         /* 0 */
+    const arhost_scene *scene; /* read-only, valid until `stop`; validated by the host */
     const arhost_intrinsics *intrinsics; /* the same in every request, except with ARHOST_CAPABILITY_SCALED_IMAGES;
                                             precompute ray tables here */
 } arhost_raytracer_setup;
@@ -35,11 +35,12 @@ typedef struct arhost_render_request {
 
 /* The image to write: R, G, B, A bytes, straight (not premultiplied) alpha, sRGB-encoded, top row first. Alpha is
  * exactly 0 where the primary ray hits nothing (the colour is then ignored) and 255 on virtual objects. Samples of a
- * pixel are averaged in linear light and then encoded; samples brighter than white count in full, up to a bound of at
- * least 100 times white. Virtual objects and shadows are averaged apart and blended in sRGB by their shares of the
- * alpha. Near clip: 1e-4 × scene extent. Write every pixel and nothing else. `rgba` is aligned to a 4,096-byte page
- * and its last page is fully mapped, so a GPU can import the memory; leave the bytes after the last row unchanged.
- * Between `start` and `stop`, `rgba` takes at most 8 different values. */
+ * pixel are averaged in linear light and then encoded. Samples brighter than white count in full, up to a bound of at
+ * least 100 times white. Samples of virtual objects and samples of shadows are averaged separately; the two averages
+ * are blended in sRGB, weighted by their shares of the alpha. Near clip: 1e-4 × scene extent. Write every pixel and
+ * nothing else. `rgba` is aligned to a 4,096-byte page and its last page is fully mapped, so a GPU can import the
+ * memory; leave the bytes after the last row unchanged. Between `start` and `stop`, the pointer `rgba` has at most 8
+ * different values. */
 typedef struct arhost_image {
     uint32_t struct_size;
     uint32_t stride; /* bytes per row, a multiple of 64 */
@@ -47,8 +48,8 @@ typedef struct arhost_image {
     uint8_t *rgba;
 } arhost_image;
 
-/* Optional results of `render`. Zeroed by the worker except for struct_size; leave fields zeroed that do not apply.
- */
+/* Optional results of `render`. The worker sets all fields except struct_size to 0; leave fields that do not apply at
+ * 0. */
 typedef struct arhost_render_info {
     uint32_t struct_size;
     int32_t has_region; /* non-zero: the following four fields are set; 0: the region is the whole image */
@@ -72,8 +73,8 @@ typedef struct arhost_raytracer {
     /* [worker, started] Called once after each successful `start`. */
     void (*stop)(arhost_instance *instance);
 
-    /* [worker, created] Returns the capabilities of this instance, if they depend on its options: those of the
-     * descriptor without some of ARHOST_CAPABILITY_EVERY_SCENE. Optional: may be NULL. */
+    /* [worker, created] Optional: may be NULL. Returns the capabilities of this instance, if they depend on its
+     * options: the descriptor's capabilities, of which it may clear only bits of ARHOST_CAPABILITY_EVERY_SCENE. */
     uint32_t (*capabilities)(arhost_instance *instance);
 } arhost_raytracer;
 

@@ -76,7 +76,7 @@ typedef struct arhost_texture {
     arhost_texel_format format;
     uint32_t width, height; /* texels, 1 to 16384 */
     arhost_wrap wrap_u, wrap_v;
-    uint32_t name;        /* of a NUL-terminated string: byte offset into `names` */
+    uint32_t name;        /* byte offset into `names` of a NUL-terminated string */
     arhost_buffer texels; /* width·height, top row first; stride 4 or 16 */
 } arhost_texture;
 
@@ -93,10 +93,9 @@ enum {
     ARHOST_MATERIAL_METALLIC_ROUGHNESS = 6 /* as in glTF 2.0: GGX specular over Lambert diffuse */
 };
 
-/* Colours are linear light, 0 to 1, Rec. 709 primaries. A texture field is an index or ARHOST_NONE. The
- * texture's value multiplies the corresponding constant of the material; it counts as 1 on a geometry without
- * texcoords. A model ignores fields that do not apply to it: mirror and glass have no diffuse colour and no
- * emission. */
+/* Colours are linear light, 0 to 1, Rec. 709 primaries. A texture field is an index or ARHOST_NONE. The value of the
+ * texture multiplies the corresponding constant of the material. On a geometry without texcoords, the factor is 1. A
+ * model ignores fields that do not apply to it: mirror and glass have no diffuse colour and no emission. */
 typedef struct arhost_material {
     arhost_material_model model;
     uint32_t colour_texture; /* multiplies ambient and diffuse; its alpha is compared with alpha_cutoff */
@@ -144,7 +143,7 @@ enum {
 typedef struct arhost_object {
     uint32_t geometry, material; /* indices */
     arhost_role role;
-    uint32_t name; /* byte offset into `names`, of a NUL-terminated string */
+    uint32_t name; /* byte offset into `names` of a NUL-terminated string */
     /* Column-major 3×4, invertible: the columns are the x, y and z axes and the origin, mm. The identity for a static
      * object whose vertices the loader has transformed to world coordinates. For a moving object, the transform at
      * time 0. */
@@ -197,11 +196,11 @@ typedef struct arhost_skin {
     arhost_buffer node_from_mesh; /* inverse bind matrices, one per joint: column-major 3×4 floats, stride 48 */
 } arhost_skin;
 
-/* A node that follows a target of the tracker: its pose is that of the target in the world. Ray tracers need not know
- * it, because arhost_motion contains the transforms that follow from it. */
+/* A node that follows a target of the tracker: the pose of the node in the world is that of the target. Ray tracers
+ * may ignore anchors, because arhost_motion contains the resulting transforms. */
 typedef struct arhost_anchor {
     uint32_t node;   /* without a parent, not animated */
-    uint32_t target; /* name of the target: byte offset into `names`, of a NUL-terminated string */
+    uint32_t target; /* byte offset into `names` of a NUL-terminated string: the name of the target */
 } arhost_anchor;
 
 /* ---- lights ---- */
@@ -223,9 +222,9 @@ enum {
 
 /* An area light illuminates like the mean of point lights with this `intensity` that are distributed uniformly over
  * its area (for a sphere: over its visible disc). A very small area light therefore equals a point light. Secondary
- * rays see it as a transparent surface of this area (of a rectangle, the front only; of a sphere, the disc) with the
- * radiance π · intensity / area for INVERSE_SQUARE; for NONE, multiplied by the square of the distance from the ray's
- * origin. */
+ * rays see an area light as a transparent surface of this area: only the front of a rectangle, or the disc of a
+ * sphere. For INVERSE_SQUARE, the radiance of this surface is π · intensity / area. For NONE, this value is
+ * multiplied by the square of the distance from the ray's origin. */
 typedef struct arhost_light {
     arhost_light_type type;
     arhost_falloff falloff;     /* NONE for directional lights */

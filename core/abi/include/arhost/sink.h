@@ -37,13 +37,13 @@ enum {
     ARHOST_OVERLAY_NONE = 3      /* no overlay, only video: no target in view, or a component is not running */
 };
 
-/* How the tracker has searched a frame for markers. All 0 if it has not processed the frame. */
+/* Statistics of the tracker's search for markers in a frame. All 0 if the tracker has not processed the frame. */
 typedef struct arhost_search {
     int32_t everywhere;         /* arhost_track_request.search_everywhere */
-    uint32_t observation_count; /* markers that it has reported */
-    uint32_t unlisted_count;    /* of these, those that no target lists */
+    uint32_t observation_count; /* markers that the tracker has reported */
+    uint32_t unlisted_count;    /* reported markers that no target lists */
     uint32_t expected_count;    /* markers that were expected */
-    uint32_t missed_count;      /* of these, those that it has not reported */
+    uint32_t missed_count;      /* expected markers that the tracker has not reported */
     int32_t candidate_count;    /* arhost_tracker_result.candidate_count */
 } arhost_search;
 
@@ -66,14 +66,15 @@ typedef struct arhost_record {
     uint32_t observation_count;
     /* The targets that have been seen so far, in the order of the configuration. */
     const arhost_target *targets;
-    /* The markers seen in this frame: those of the targets, then those that no target lists. */
+    /* The markers seen in this frame: first those of the targets, then those that no target lists. */
     const arhost_observation *observations;
-    char families[ARHOST_MAX_FAMILIES][ARHOST_MAX_FAMILY]; /* arhost_observation.family is an index in it */
+    char families[ARHOST_MAX_FAMILIES]
+                 [ARHOST_MAX_FAMILY]; /* names; arhost_observation.family is an index into this array */
     arhost_search search;
-    /* Where markers were expected: those that the tracker has reported, then those that it has missed. Their
-     * `marker` is an index in the setup of the tracker, which a sink does not have. A replay of a session has the
-     * numbers in `search`, but not these places, nor the observations that no target lists, nor `projected_px` and
-     * `false_positive_rate` of the others. */
+    /* The markers that were expected in this frame: first those that the tracker has reported, then those that it has
+     * missed. Their `marker` is an index into the setup of the tracker, which a sink does not have. The replay of a
+     * session provides the counts in `search`, but not this array, nor observations of markers that no target lists,
+     * nor `projected_px` and `false_positive_rate` of other observations. */
     const arhost_expected_marker *expected;
     uint32_t expected_count;
     uint32_t reserved; /* 0 */
@@ -108,11 +109,11 @@ typedef struct arhost_sink {
     arhost_status (*start)(arhost_instance *instance, const arhost_sink_setup *setup);
 
     /* [worker, started] Takes one frame; sequence numbers ascend. After ARHOST_STATUS_OK the host does not send the
-     * frame again, so it must survive a kill of the process. The frames in a file are in ascending order; if each
-     * frame has its own numbered file, the numbers ascend. Returns ARHOST_STATUS_END if the user closed the window,
-     * or the program that receives the frames: the host then closes this output, and ends the run if the
-     * configuration allows it (`control: [quit]`). After ARHOST_STATUS_ERROR_DEVICE_LOST the host restarts the sink
-     * and sends the frame again; after other errors it closes this output. */
+     * frame again, so the written frame must survive a kill of the process. The frames in a file are in ascending
+     * order; if each frame has its own numbered file, the numbers ascend. Returns ARHOST_STATUS_END if the user has
+     * closed the window or the program that receives the frames. The host then closes this output and, if the
+     * configuration allows it (`control: [quit]`), ends the run. After ARHOST_STATUS_ERROR_DEVICE_LOST the host
+     * restarts the sink and sends the frame again; after other errors it closes this output. */
     arhost_status (*write)(arhost_instance *instance, const arhost_output *output);
 
     /* [worker, started] Called about 30 times per second while no frame arrives, to process window events. Returns
@@ -123,9 +124,9 @@ typedef struct arhost_sink {
      * remains incomplete. */
     arhost_status (*stop)(arhost_instance *instance);
 
-    /* [worker, created] Returns the capabilities of this instance, if they depend on its options: those of the
-     * descriptor, or without ARHOST_CAPABILITY_VIDEO_INPUT or _OVERLAY_INPUT. The host copies only what its sinks
-     * read. Optional: may be NULL. */
+    /* [worker, created] Optional: may be NULL. Returns the capabilities of this instance, if they depend on its
+     * options: the descriptor's capabilities, of which it may clear only ARHOST_CAPABILITY_VIDEO_INPUT and
+     * ARHOST_CAPABILITY_OVERLAY_INPUT. The host copies only the images that its sinks read. */
     uint32_t (*capabilities)(arhost_instance *instance);
 } arhost_sink;
 

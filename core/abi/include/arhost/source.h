@@ -47,8 +47,9 @@ typedef struct arhost_frame_buffer {
     uint8_t *plane[ARHOST_MAX_PLANES];
     uint8_t *grey; /* full-range luma for trackers. After `read`, the worker computes it from the planes, unless
                       the source has set has_grey or `grey` is plane 0 */
-    /* NULL if !format->has_depth. Element x of row y, rows format->depth_stride bytes apart, is the distance in mm,
-     * along the camera's optical axis, of what pixel (x, y) of the picture shows; 0: unknown, 65535: this or more. */
+    /* NULL if !format->has_depth. The rows are format->depth_stride bytes apart. Element x of row y is the depth at
+     * pixel (x, y) of the picture: the distance in mm along the camera's optical axis. 0: unknown; 65535: 65,535 mm
+     * or more. */
     uint16_t *depth_mm;
     /* The requested frame, as an index into the full sequence of the source. In the first call it is first_sequence;
      * in each later call it is `sequence` + `skipped` + 1 of the previous call. A source that is late may drop

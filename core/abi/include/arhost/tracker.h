@@ -2,7 +2,7 @@
 /*
  * arhost/tracker.h: a tracker finds targets in frames.
  *
- * A target is a rigid thing with a name whose pose the application needs: a marker, a map of several markers (a
+ * A target is a rigid object with a name whose pose the application needs: a marker, a map of several markers (a
  * board, a box), or a body that the tracker knows by name.
  *
  * Most trackers are detectors: they report observations, the markers in a frame with their corners. The worker
@@ -51,11 +51,11 @@ typedef struct arhost_marker_config {
     uint32_t family;         /* index in arhost_tracker_setup.families */
     uint32_t target;         /* index in arhost_tracker_setup.targets */
     double corners_mm[4][3]; /* in the target's coordinates; they form a plane convex quadrilateral */
-    const char *file;        /* path of the print; NULL if the family defines it by the id. In the family "pattern", a
-                                pattern file of ARToolKit; in "image", a picture, whose `corners_mm` are those of a
-                                square of its width: see arhost_tracker.aspect */
-    double pattern_ratio;    /* side of the pattern, without its black border, relative to that of the square; 0 if
-                                `file` is NULL */
+    const char *file;     /* path of the file that defines the print; NULL if the family defines the print by the id.
+                             Family "pattern": an ARToolKit pattern file. Family "image": a picture; `corners_mm` then
+                             describe a square as wide as the picture (see arhost_tracker.aspect) */
+    double pattern_ratio; /* side of the pattern, without its black border, relative to that of the square; 0 if
+                             `file` is NULL */
 } arhost_marker_config;
 
 typedef struct arhost_tracker_setup {
@@ -74,19 +74,19 @@ typedef struct arhost_tracker_setup {
 typedef struct arhost_observation {
     uint32_t struct_size;
     int32_t id;
-    uint32_t family;            /* index in arhost_tracker_setup.families */
-    uint32_t hamming;           /* bits of the code that were corrected */
-    double corners_px[4][2];    /* in pixels of the distorted frame */
-    double decision_margin;     /* how clearly the bits were read, >= 0: larger is better, on a scale of the tracker's
-                                   own; 0: unknown */
-    double corner_sigma_px;     /* standard deviation of the noise of each coordinate of corners_px, >= 0; 0: unknown.
-                                   The covariance of a target with a single marker follows from it */
+    uint32_t family;         /* index in arhost_tracker_setup.families */
+    uint32_t hamming;        /* bits of the code that were corrected */
+    double corners_px[4][2]; /* in pixels of the distorted frame */
+    double decision_margin;  /* how clearly the bits were read, >= 0, on a scale that the tracker chooses: larger is
+                                better; 0: unknown */
+    double corner_sigma_px; /* standard deviation of the noise of each coordinate of corners_px, >= 0; 0: unknown. The
+                               worker computes the covariance of a target with a single marker from it */
     double false_positive_rate; /* the probability that a square with random bits reads as this marker, with at most
                                    `hamming` corrected bits: 0 to 1; 0: negligible or unknown; 1: the sighting is no
-                                   evidence. The worker reports a target only when its sightings are too unlikely to
-                                   be chance */
-    double projected_px[4][2];  /* for sinks: where the pose of the marker's target projects the corners; all 0 if it
-                                   does not. The worker sets it */
+                                   evidence. The worker reports a target only when it is very improbable that all its
+                                   sightings are false */
+    double projected_px[4][2];  /* set by the worker, for sinks: the projection of the marker's corners with the pose
+                                   of its target; all 0 if there is no projection */
 } arhost_observation;
 
 typedef int32_t arhost_target_state;
@@ -115,8 +115,9 @@ typedef struct arhost_tracker_result {
     arhost_observation *observations; /* ARHOST_MAX_OBSERVATIONS elements */
     arhost_body_pose *poses;          /* arhost_tracker_setup.target_count elements */
     uint32_t pose_count;              /* 0; set by a tracker with ARHOST_CAPABILITY_REPORTS_POSES */
-    /* -1: unknown. Set by a tracker that knows how many quadrilaterals it has examined, including those that turned
-     * out not to be markers; at least observation_count. Tells the user whether none was there or none was read. */
+    /* Set by a tracker that knows how many quadrilaterals it has examined, including those that turned out not to be
+     * markers: at least observation_count; -1: unknown. From it, the host can tell the user whether the tracker saw
+     * no quadrilateral or recognised none as a marker. */
     int32_t candidate_count;
 } arhost_tracker_result;
 
@@ -126,14 +127,14 @@ typedef struct arhost_target {
     arhost_target_state state;
     char name[ARHOST_MAX_NAME];
     uint32_t age_frames;        /* frames since the target was last seen; 0 if DETECTED */
-    uint32_t first_observation; /* the observations that belong to the target, in this frame: a range of */
-    uint32_t observation_count; /* arhost_record.observations */
+    uint32_t first_observation; /* the target's observations in this frame: index of the first */
+    uint32_t observation_count; /* and number, in arhost_record.observations */
     uint32_t reserved;          /* 0 */
     /* Target-to-camera matrix, column-major, OpenGL eye space: x right, y up, looking along −z; millimetres. The
      * rotation is orthonormal to 1e-9, the last row is 0 0 0 1. */
-    double mt[16]; /* with tracker.filter, it and projected_px are filtered; the fields below are not */
-    /* The second solution of the planar pose problem; all 0 if there is none. `mt` is the one that continues the
-     * motion of the earlier frames, or the one with the smaller error in the first frame. */
+    double mt[16]; /* with tracker.filter, mt and projected_px are filtered; the fields below are not */
+    /* The second solution of the planar pose problem; all 0 if there is none. `mt` is the solution that continues the
+     * motion of the earlier frames; in the first frame, the solution with the smaller error. */
     double mt_alternative[16];
     /* Covariance of translation (mm) and rotation (rad), row-major, in the axes of `mt`: the true pose is
      * {exp(r)·R, t + d} with (d, r) from this distribution. All 0: unknown. */
@@ -149,26 +150,26 @@ typedef struct arhost_expected_marker {
     uint32_t struct_size;
     uint32_t marker;         /* index in arhost_tracker_setup.markers */
     double corners_px[4][2]; /* may be outside of the frame */
-    double margin_px;        /* the corners are probably not further from these places */
+    double margin_px;        /* probable upper bound of the error of corners_px */
 } arhost_expected_marker;
 
 /* The input of `track`. */
 typedef struct arhost_track_request {
     uint32_t struct_size;
-    /* 0: a detector may search only where markers are expected, which takes less time. Not 0 if no marker is
-     * expected, after a target was lost, and at regular intervals. */
+    /* 0: to save time, a detector may search only where markers are expected. Non-zero: search the whole frame. The
+     * worker requests this if no marker is expected, after a target was lost, and at regular intervals. */
     int32_t search_everywhere;
     const arhost_frame *frame; /* read-only */
-    /* The memory of a tracker whose `state_size` is not 0; otherwise both are NULL. The host keeps it, so it survives
-     * the end of the worker process. Both are aligned to 64 bytes.
-     * `state_before`, read-only: the `state_after` of the last accepted call, also by a worker that has ended. NULL
-     * in the first frame, and after a swap to another tracker, a fallback, or a restart with another version or
-     * another state_size. `state_after`: to be written completely, also if nothing is detected. Its initial content
-     * is undefined. It is discarded if the call fails, and may be discarded even if it succeeds. */
+    /* Memory of the tracker that survives the end of the worker process, because the host keeps it. Both pointers are
+     * aligned to 64 bytes; both are NULL if `state_size` is 0. `state_before`, read-only: the `state_after` of the
+     * last accepted call, even if another worker process made that call. NULL in the first frame, and after a swap to
+     * another tracker, a fallback, or a restart with another version or another state_size. `state_after`: its
+     * initial content is undefined; write it completely, even if nothing is detected. The host discards it if the
+     * call fails, and may discard it even if the call succeeds. */
     const void *state_before;
     void *state_after;
     uint64_t state_size; /* bytes of each; 0 if both are NULL */
-    /* The markers that are expected because of the motion of their targets in earlier frames. */
+    /* The markers that the worker expects in this frame, from the motion of their targets in earlier frames. */
     const arhost_expected_marker *expected;
     uint32_t expected_count;
     uint32_t reserved; /* 0 */
@@ -177,30 +178,32 @@ typedef struct arhost_track_request {
 typedef struct arhost_tracker {
     uint32_t struct_size;
 
-    /* [worker, created] Called once. Returns ARHOST_STATUS_ERROR_CONFIGURATION if it does not know a family or body,
-     * or if a family has no marker with a listed id. Returns ARHOST_STATUS_ERROR_CONFIGURATION or
-     * ARHOST_STATUS_ERROR_UNSUPPORTED if the tracker does not support the lens model or its number of
-     * coefficients. */
+    /* [worker, created] Called once. Returns ARHOST_STATUS_ERROR_CONFIGURATION if the tracker does not know a family
+     * or body, or if a family has no marker with a listed id. Returns ARHOST_STATUS_ERROR_CONFIGURATION or
+     * ARHOST_STATUS_ERROR_UNSUPPORTED if the tracker does not support the lens model or its number of coefficients.
+     */
     arhost_status (*start)(arhost_instance *instance, const arhost_tracker_setup *setup);
 
-    /* [worker, started] Reports the markers of the setup's families that it sees, each once, and all copies if
-     * several markers have the same id. Markers that no target lists may be left out; if they are reported, the host
-     * can tell the user which markers are there instead of the listed ones. Returns ARHOST_STATUS_OK even if there is
-     * none. The result and `state_after` depend only on the request, not on earlier calls or the number of threads,
-     * so a restarted tracker continues with identical results. Frames may be missing or repeated, and a frame may be
-     * older than the previous one. */
+    /* [worker, started] Reports each visible marker of the setup's families once. If several markers with the same id
+     * are visible, reports all of them. Markers that no target lists may be omitted; if they are reported, the host
+     * can tell the user which markers are visible instead of the listed ones. Returns ARHOST_STATUS_OK even if no
+     * marker is visible. The result and `state_after` depend only on the request, not on earlier calls or the number
+     * of threads, so a restarted tracker continues with identical results. Frames may be missing or repeated, and a
+     * frame may be older than the previous one. */
     arhost_status (*track)(arhost_instance *instance, const arhost_track_request *request,
                            arhost_tracker_result *result);
 
     /* [worker, started] Called once, after a successful `start`. */
     void (*stop)(arhost_instance *instance);
 
-    /* [worker, started] Optional; NULL: 0. Called once, after `start`. Returns the size in bytes of the memory that
-     * the tracker needs from frame to frame (arhost_track_request.state_before), at most ARHOST_MAX_STATE. */
+    /* [worker, started] Optional; NULL: no memory. Called once, after `start`. Returns the size in bytes of the
+     * memory that the tracker needs from frame to frame (arhost_track_request.state_before), at most
+     * ARHOST_MAX_STATE. */
     uint64_t (*state_size)(arhost_instance *instance);
 
-    /* [worker, started] Optional; NULL: 1. Called after `start` for each marker of the family "image". Returns the
-     * height of the picture, divided by its width. The worker scales the marker's corners_mm along y accordingly. */
+    /* [worker, started] Optional; NULL: all pictures are square. Called after `start` for each marker of the family
+     * "image". Returns the height of the picture divided by its width. The worker scales the marker's corners_mm
+     * along y accordingly. */
     double (*aspect)(arhost_instance *instance, uint32_t marker);
 } arhost_tracker;
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // arhost/shading/lens.hpp: converts rays to pixels and pixels to rays for the lens models of arhost/camera.h, in
-// double precision. For tables, and for some points of each frame; ray() iterates, so it is too slow for each pixel.
+// double precision. Use it for tables and for a few points per frame: ray() iterates, so it is too slow for every
+// pixel.
 //
 // Axes: x right, y down, z forward (OpenCV). The image plane is z = 1.
 #pragma once
@@ -83,8 +84,8 @@ public:
         return Point2{intrinsics_.fx * p->x + intrinsics_.cx, intrinsics_.fy * p->y + intrinsics_.cy};
     }
 
-    // Returns the direction seen at a pixel, accurate to 1e-9: with z = 1, or with unit length for a fisheye lens.
-    // Returns nullopt if no direction maps to the pixel.
+    // Returns the direction seen at a pixel, accurate to 1e-9. The direction has z = 1, or unit length for a fisheye
+    // lens. Returns nullopt if no direction maps to the pixel.
     std::optional<Vec3T<double>> ray(Point2 pixel) const {
         const Point2 p{(pixel.x - intrinsics_.cx) / intrinsics_.fx, (pixel.y - intrinsics_.cy) / intrinsics_.fy};
         switch (intrinsics_.distortion) {

@@ -95,14 +95,15 @@ ARHOST_LEAF Float ggx_distribution(Float cosine_half, Float alpha) {
     return a2 / (Float(3.14159265358979) * d * d);
 }
 
-// Smith's masking function G1 is 2c divided by this: the fraction of the microfacets that is visible from a direction
-// at an angle with the cosine c to the normal.
+// The divisor d of Smith's masking function G1 = 2c / d. G1 is the fraction of the microfacets that is visible from a
+// direction whose angle to the normal has the cosine c.
 ARHOST_LEAF Float ggx_masking_divisor(Float cosine, Float alpha) {
     Float a2 = alpha * alpha;
     return cosine + sqrt(a2 + (Float(1.0) - a2) * cosine * cosine);
 }
 
-// Masking of the light, the fraction that remains if visible microfacets are sampled (ggx_half_vector in sampling.h).
+// Smith's masking function for the direction of the light. Only this factor remains if visible microfacets are
+// sampled (ggx_half_vector in sampling.h).
 ARHOST_LEAF Float ggx_masking(Float cosine, Float alpha) {
     return Float(2.0) * cosine / max(ggx_masking_divisor(cosine, alpha), Float(1e-7));
 }

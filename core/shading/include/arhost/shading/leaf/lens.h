@@ -3,7 +3,8 @@
 // (x'', y'', 1); focal lengths and principal point map it to a pixel. A leaf file: see ../scalar.hpp.
 //
 // The inverse has no closed form: ../lens.hpp computes it iteratively. Shaders read a ray table that was computed
-// with it.
+// with
+// ../lens.hpp.
 
 // Coefficients in OpenCV's order.
 struct BrownConrady {

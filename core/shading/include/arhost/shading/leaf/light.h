@@ -43,8 +43,8 @@ ARHOST_LEAF Float distance_to_disc(Vec3 to_centre, Float radius, Vec3 direction)
 }
 
 // Weight of a sample in multiple importance sampling with the balance heuristic (Veach and Guibas, Optimally
-// Combining Sampling Techniques, SIGGRAPH 1995). Each density is multiplied by the technique's number of samples. A
-// `density` of 0 stands for a light that no other technique can sample.
+// Combining Sampling Techniques, SIGGRAPH 1995). Each density is multiplied by the number of samples of its
+// technique. `density` = 0 means that no other technique can sample the light.
 ARHOST_LEAF Float balance_weight(Float density, Float other_density) {
     return select(density > Float(0.0), density / max(density + other_density, Float(1e-30)), Float(1.0));
 }

@@ -35,11 +35,11 @@ ARHOST_LEAF Vec3 shading_normal(Vec3 interpolated, Vec3 facet) {
     return facing(n, facet);
 }
 
-// A corner's part of the vector from a point of a flat triangle to the curved surface that the vertex normals
-// describe; the vector is the mean of the parts, weighted by the barycentric coordinates. Shadow rays start there, so
-// that the facets do not shadow themselves where the curved surface is lit. `to_corner`: vector from the point to the
-// corner; `normal`: the corner's normal, of any length. 0 where the surface is concave (J. Hanika, Hacking the Shadow
-// Terminator, Ray Tracing Gems II, 2021).
+// Contribution of one corner to the vector from a point of a flat triangle to the curved surface that the vertex
+// normals describe. The vector is the mean of the three contributions, weighted by the barycentric coordinates.
+// Shadow rays start on the curved surface, so that facets do not shadow themselves where this surface is lit.
+// `to_corner`: vector from the point to the corner; `normal`: the corner's normal, of any length. Returns 0 where the
+// surface is concave (J. Hanika, Hacking the Shadow Terminator, Ray Tracing Gems II, 2021).
 ARHOST_LEAF Vec3 lift_to_corner(Vec3 to_corner, Vec3 normal) {
     return normal * (max(dot(to_corner, normal), Float(0.0)) / max(dot(normal, normal), Float(1e-30)));
 }
