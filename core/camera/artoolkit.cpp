@@ -67,7 +67,8 @@ public:
         fail(message.str());
     }
 
-    // For factors that are close to 1. Also detects most truncated files, which have the size of a lower version.
+    // Checks a factor that is close to 1 in valid files. Also detects most truncated files, whose sizes are those of
+    // lower versions.
     void expect_scale(double value, std::size_t index) const {
         if (value >= 0.1 && value <= 10)
             return;
@@ -104,7 +105,7 @@ public:
     }
 
 private:
-    // These remove the number that they return from `bytes`.
+    // Each of the next functions reads a number from the start of `bytes` and removes it from `bytes`.
     static std::uint64_t big_endian(std::string_view &bytes, std::size_t byte_size) {
         std::uint64_t value = 0;
         for (const char byte : bytes.substr(0, byte_size))
@@ -139,9 +140,9 @@ double error_px(const arhost_intrinsics &lens, std::span<const Observation> obse
     return largest;
 }
 
-// Changes focal lengths, principal point, k1, k2, p1, p2 and k3 so that the squared distances between the pixels and
-// the projections have the smallest sum. Gauss–Newton method: the projection is linear in the coefficients for given
-// focal lengths, so a few steps suffice.
+// Adjusts focal lengths, principal point, k1, k2, p1, p2 and k3 to minimize the sum of the squared distances between
+// pixels and projections. Gauss–Newton method: for given focal lengths, the projection is linear in the coefficients,
+// so a few steps suffice.
 arhost_intrinsics fitted(arhost_intrinsics lens, std::span<const Observation> observations) {
     lens.coefficient_count = std::max(lens.coefficient_count, 5u);
     double *const k = lens.coefficients;
@@ -177,7 +178,7 @@ arhost_intrinsics fitted(arhost_intrinsics lens, std::span<const Observation> ob
 }
 
 // The distortion as a lens that maps a point (x, y) of the plane z = 1 to the observed pixel. `ideal_fx` and
-// `ideal_fy` are the focal lengths that map it to the ideal pixel, with the same principal point.
+// `ideal_fy` are focal lengths that map the same point to the ideal pixel, with the same principal point.
 struct Distortion {
     arhost_intrinsics lens{};
     double ideal_fx, ideal_fy;

@@ -37,8 +37,8 @@ arhost_intrinsics parse_camera(const yaml::Node &node);
 // principal point at the image centre, no distortion.
 arhost_intrinsics dissertation_camera(const Size &size);
 
-// Returns why the focal length is probably wrong, for a warning, or "": it is below 100 px, and the image is so wide
-// that its field of view would exceed that of most lenses.
+// Returns a warning that the focal length is probably wrong, or "". The warning occurs if the focal length is below
+// 100 px and gives the image a larger field of view than most lenses have.
 std::string doubt_about_focal_length(const arhost_intrinsics &intrinsics);
 
 // Throws if the intrinsics are not for an image of `width` × `height` px.

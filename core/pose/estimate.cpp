@@ -15,7 +15,8 @@ using Jacobian26 = Eigen::Matrix<double, 2, 6>;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 
-// Tukey's biweight for the length of an error in units of its noise: the loss is constant beyond the cutoff.
+// Tukey's biweight loss. Its argument is the length of an error in units of the noise. The loss is constant beyond
+// the cutoff.
 class Biweight {
 public:
     explicit Biweight(double cutoff) : cutoff2_(cutoff * cutoff) {}
@@ -58,9 +59,9 @@ Rigid moved(const Rigid &pose, const Vector6d &step) {
     return {orthonormal(rotation_by(step.tail<3>()) * pose.rotation), pose.translation_mm + step.head<3>()};
 }
 
-// The noise in units of sigma_px. For two-dimensional Gaussian errors, the median length is 1.177. The second factor
-// corrects the bias of few residuals after a fit (Rousseeuw and Leroy, Robust Regression and Outlier Detection,
-// 1987).
+// Estimates the noise from the median residual, in units of sigma_px. For two-dimensional Gaussian errors, the median
+// length is 1.177. The second factor corrects the bias that occurs after a fit to few residuals (Rousseeuw and Leroy,
+// Robust Regression and Outlier Detection, 1987).
 double noise_of(const std::vector<Residual> &residuals) {
     std::vector<double> lengths;
     lengths.reserve(residuals.size());
@@ -127,7 +128,7 @@ bool minimize(Rigid &pose, std::vector<Residual> &residuals, std::span<const Cor
 
 std::optional<Estimate> summarize(const Rigid &pose, const std::vector<Residual> &residuals,
                                   std::span<const Correspondence> points) {
-    // The prior knowledge of the noise, sigma_px, counts as much as this number of degrees of freedom.
+    // Weight of sigma_px, the noise assumed in advance, as a number of degrees of freedom.
     constexpr double prior_freedom = 12;
     Matrix6d normal = Matrix6d::Zero();
     double squares_px = 0, squares = 0;
@@ -189,7 +190,7 @@ bool is_convex_front(const std::array<Eigen::Vector2d, 4> &quad) {
     return true;
 }
 
-// Returns whether the corners are in front of the camera and it sees the front of the print.
+// Returns whether the corners are in front of the camera and the camera sees the front of the print.
 bool shows_front(const Rigid &camera_from_target, const ObservedMarker &marker) {
     std::array<Eigen::Vector3d, 4> corners;
     for (int i = 0; i < 4; ++i) {

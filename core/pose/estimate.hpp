@@ -35,16 +35,17 @@ struct Estimate {
     Matrix6d covariance;     // of translation (mm) and rotation (rad), in camera axes: the true pose is
                              // {rotation_by(r)·rotation, translation_mm + t} with (t, r) from this distribution
     double reprojection_px;  // RMS over the corners that are no outliers
-    double normalized_error; // sum of the squared errors, each divided by its sigma_px; an outlier counts as 5 times
-                             // the noise
-    std::size_t outliers;    // corners that do not fit to the others and were left out
+    double normalized_error; // sum of the squared errors, each divided by its sigma_px; an outlier counts as an error
+                             // of 5 times the noise
+    std::size_t outliers;    // corners that do not fit the others and were left out
     std::size_t freedom;     // degrees of freedom: coordinates of the other corners, less the 6 of the pose
 };
 
 // Minimizes the reprojection error with the Levenberg–Marquardt method, starting at `start`. With more than four
-// correspondences, finds the outliers first with Tukey's biweight loss: corners whose error exceeds 5 times the
-// noise, which is taken from the median error. Returns nullopt if a point gets behind the camera or the solution is
-// not unique. The covariance comes from sigma_px and from the residuals: the more corners, the less sigma_px counts.
+// correspondences, first finds the outliers with Tukey's biweight loss: corners whose error exceeds 5 times the
+// noise. The median error determines the noise. Returns nullopt if a point gets behind the camera or the solution is
+// not unique. The covariance is computed from sigma_px and from the residuals; the weight of sigma_px decreases with
+// the number of corners.
 std::optional<Estimate> refine(const Rigid &start, std::span<const Correspondence> points,
                                const Projection &projection);
 

@@ -22,7 +22,7 @@ Eigen::Matrix3d translation_covariance(const Estimate &estimate) {
 void advance(CovarianceMap covariance, double seconds, double acceleration) {
     Matrix6d step = Matrix6d::Identity();
     step.topRightCorner<3, 3>().diagonal().setConstant(seconds);
-    Eigen::Matrix<double, 6, 3> effect; // of an acceleration on value and velocity
+    Eigen::Matrix<double, 6, 3> effect; // effect of an acceleration on value and velocity
     effect << seconds * seconds / 2 * Eigen::Matrix3d::Identity(), seconds * Eigen::Matrix3d::Identity();
     covariance = step * covariance * step.transpose() + acceleration * acceleration * effect * effect.transpose();
 }

@@ -17,20 +17,21 @@ struct Motion {
 
 Motion begin_motion(const Estimate &first);
 
-// Returns the motion `seconds` later (≥ 0). The covariance grows by what accelerations of a hand can change.
+// Returns the motion `seconds` later (≥ 0). The covariance grows by the possible effect of a hand's accelerations.
 Motion predicted(Motion motion, double seconds);
 
-// The motion after a measured pose. Each direction is weighted by its covariance: that of a marker's tilt, for
-// example, is much larger than that of its position in the image.
+// Returns the motion after a measured pose. The covariance determines the weight of the measurement in each
+// direction. For example, the variance of a marker's tilt is much larger than that of the marker's position in the
+// image.
 Motion corrected(Motion motion, const Estimate &measured);
 
-// The squared Mahalanobis distance of a measured rotation from the predicted one: 3 on average for a measurement of
-// this motion.
+// Returns the squared Mahalanobis distance of a measured rotation from the predicted one. If the measurement belongs
+// to this motion, the mean of this distance is 3.
 double rotation_distance2(const Motion &motion, const Estimate &measured);
 
 Rigid pose_of(const Motion &motion);
 
-// The covariance, in mm², of where a point of the target is, in camera axes.
+// Returns the covariance of the position of a point of the target, in camera axes, mm².
 Eigen::Matrix3d covariance_of(const Motion &motion, const Eigen::Vector3d &on_target_mm);
 
 } // namespace arhost::pose

@@ -83,7 +83,7 @@ double squared_error(const Rigid &pose, std::span<const PlanePoint> points) {
 std::optional<std::array<Rigid, 2>> planar_poses(std::span<const PlanePoint> points) {
     if (points.size() < 4)
         return {};
-    // IPPE uses the homography's first-order behaviour at one point; the centroid is the best one.
+    // IPPE approximates the homography to first order at one point. The centroid is the best point for this.
     Eigen::Vector2d centre = Eigen::Vector2d::Zero();
     for (const PlanePoint &point : points)
         centre += point.on_target_mm / static_cast<double>(points.size());

@@ -10,14 +10,16 @@ namespace {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 constexpr double max_gap_s = 0.25;
-// Weight of the newest pose while the target rests: its noise is multiplied by √(w/(2 − w)) = 0.42.
+// Weight w of the newest pose while the target rests. The filter multiplies the noise by √(w/(2 − w)) = 0.42.
 constexpr double resting_weight = 0.3;
 // Weight of the newest innovation among the innovations.
 constexpr double newest = 0.4;
-// Squared length of the mean innovation, relative to the mean squared length: about newest/(2 − newest) = 0.25 for
-// noise, and 1 in steady motion without noise.
+// Limits of the squared length of the mean innovation, relative to the mean squared length. Below the first limit,
+// the target rests; above the second, it moves. The expected value is about newest/(2 − newest) = 0.25 for noise, and
+// 1 in steady motion without noise.
 constexpr double resting_share = 0.3, moving_share = 0.55;
-// Innovation of a jump, relative to the root mean square of the earlier ones.
+// Minimum length of an innovation that counts as a jump, relative to the root mean square of earlier
+// innovations.
 constexpr double jump = 5;
 
 bool continues(const Smoothing &memory, std::int64_t capture_ns) {
@@ -29,7 +31,7 @@ bool continues(const Smoothing &memory, std::int64_t capture_ns) {
            (rotation * rotation.transpose()).isIdentity(1e-6) && rotation.determinant() > 0;
 }
 
-// The weight of the newest pose, by how much the innovations agree.
+// Returns the weight of the newest pose. `share`: the quantity to which resting_share and moving_share refer.
 double weight(double share) {
     const double x = std::clamp((share - resting_share) / (moving_share - resting_share), 0.0, 1.0);
     return resting_weight + (1 - resting_weight) * x * x * (3 - 2 * x);
@@ -58,7 +60,7 @@ Rigid smoothed(Smoothing &memory, const Estimate &measured, std::int64_t capture
         return restart();
     const Vector6d in_noise = noise.matrixL().solve(innovation);
     const double square = in_noise.squaredNorm();
-    // Not less than the assumed noise, because the first innovations may be small by chance.
+    // At least the assumed noise, because the first innovations may be small by chance.
     const double mean_square = std::max(memory.weights > 0 ? memory.squares / memory.weights : 0, 6.0);
     if (!(square <= jump * jump * mean_square))
         return restart();

@@ -17,18 +17,18 @@ std::optional<double> seconds_since(const Track &track, std::int64_t capture_ns)
     return continues ? std::optional(seconds) : std::nullopt;
 }
 
-// The log-likelihood of the errors, up to a constant. Student's t-distribution, because large errors are mostly those
-// of the model (lens, print), not of the noise.
+// Returns the log-likelihood of the errors, up to a constant. Uses Student's t-distribution, because most large
+// errors are due to the model (lens, print), not to noise.
 double log_likelihood(const Estimate &estimate) {
     constexpr double tail = 8;
     return -(tail + static_cast<double>(estimate.freedom)) / 2 * std::log1p(estimate.normalized_error / tail);
 }
 
-// Squared Mahalanobis distance from which on a rotation does not continue a motion, but begins a new one.
+// Beyond this squared Mahalanobis distance, a rotation begins a new motion instead of continuing the old one.
 constexpr double max_distance2 = 60;
 
-// The branch from which a pose most likely follows, and the log-likelihood of this path (not normalized, so that a
-// branch whose motion is uncertain is not at a disadvantage).
+// The branch from which a pose most likely follows, and the log-likelihood of this path. The likelihood is not
+// normalized, so a branch whose motion is uncertain is not at a disadvantage.
 struct Path {
     std::size_t branch;
     double log_likelihood;
@@ -51,11 +51,13 @@ Path best_path(std::span<const Motion> branches, double log_odds, const Estimate
 Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_t capture_ns) {
     // Evidence is damped and limited, because the errors of successive frames have common causes.
     constexpr double damping = 0.95, max_evidence = 8;
-    // Below max_distance2 / 2, so that a branch rather goes on than follows from a jump of the likelier one.
+    // Less than max_distance2 / 2. Otherwise, a jump from the likelier branch could win over the continuation of the
+    // other.
     constexpr double max_log_odds = 20;
-    // Log-odds: from where on a branch is established, and against which an established one and another are left.
+    // Limits of the log-odds. The first: a branch becomes established. The others: the track leaves a branch when the
+    // odds against it exceed the second limit (established branches) or the third (other branches).
     constexpr double established_log_odds = 10, switch_log_odds = 14, early_switch_log_odds = 2;
-    // A switch between branches that are closer is hardly visible and needs less evidence.
+    // If the rotations of the branches differ by less, a switch is hardly visible and needs less evidence.
     constexpr double distinct_rad = 30 * std::numbers::pi / 180;
 
     std::array<Motion, 2> branches{};

@@ -17,17 +17,17 @@ namespace arhost::pose {
 struct Track {
     std::int64_t capture_ns;      // of the last frame in which the target was detected
     std::uint32_t branches;       // 0: never seen; 2 if the last frame permitted two poses, else 1
-    std::uint32_t is_established; // whether much spoke for branch[0] since the branches last met
+    std::uint32_t is_established; // non-zero: there was strong evidence for branch[0] since the branches last met
     double log_odds;  // log of P(branch[0] is the true one) / P(branch[1] is the true one), damped over time
     Motion branch[2]; // branch[0] is the chosen one
 };
 
-// Chooses among the poses of one frame (from estimate_poses; at least one), and returns the track for the next frame
-// and the index of the chosen pose. The reprojection errors of several frames and the continuity of the motion
-// decide: each pose is the end of the most likely path (Viterbi's algorithm). An established branch is left only if
-// much speaks against it: a single frame's errors often are noise, and each switch is a visible flip. Where the
-// branches meet, in a frontal view, the choice is open again. The first frame takes the pose of smallest error. A
-// track continues if at most 1 s passed since its last frame.
+// Chooses among the poses of one frame (from estimate_poses; at least one). Returns the track for the next frame and
+// the index of the chosen pose. The criteria are the reprojection errors of several frames and the continuity of the
+// motion: each pose is the end of the most likely path (Viterbi's algorithm). Leaving an established branch requires
+// strong evidence, because the errors of a single frame are often noise, and each switch is a visible flip. Where the
+// branches meet, in a frontal view, the choice is open again. In the first frame, chooses the pose of smallest error.
+// A track continues if at most 1 s has passed since its last frame.
 struct Step {
     Track track;
     std::size_t chosen;

@@ -178,8 +178,8 @@ public:
     std::size_t byte_size() const;
 
     // Writes the arena to `arena`, which must have byte_size() bytes and be aligned to 64 bytes. Frees each mesh and
-    // texture after writing it, to limit peak memory. Evaluates the pose of moving objects at time 0, so the scene
-    // must be valid if it has any.
+    // texture after writing it, to limit peak memory. If there are moving objects, the scene must be valid, because
+    // this function evaluates their poses at time 0.
     void write(std::span<std::byte> arena) &&;
     Arena build() &&;
 
@@ -207,9 +207,9 @@ private:
     Origins origins_;
 };
 
-// Validates an arena that another process wrote. Returns the first fault; nullopt if it is valid. Checks every
-// offset, count, index, enumerator and number, so ray tracers may use them unchecked if nobody can write to the arena
-// any more. Takes linear time in the size of the arena for any content.
+// Validates an arena that another process wrote. Returns the first fault; nullopt if the arena is valid. Checks every
+// offset, count, index, enumerator and number. Ray tracers may therefore use the values without checks, once nobody
+// can write to the arena any more. Takes linear time in the size of the arena for any content.
 std::optional<Fault> find_fault(std::span<const std::byte> arena);
 
 // Returns the text of find_fault, or "" if the arena is valid.

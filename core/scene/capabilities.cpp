@@ -40,7 +40,7 @@ std::uint32_t needed_for(const arhost_material &material) {
     return needed;
 }
 
-// The order of the bits.
+// In the order of the bits.
 constexpr std::pair<std::uint32_t, const char *> parts[] = {
     {ARHOST_CAPABILITY_REFLECTION, "reflecting materials"},
     {ARHOST_CAPABILITY_GLASS, "glass"},

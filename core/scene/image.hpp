@@ -33,7 +33,8 @@ Image read_image(const std::filesystem::path &file, std::span<const unsigned cha
 Image linearized(Image image, const Reporter &reporter);
 
 // Sets `rows` and `columns` to cumulative sums of luminance · sin(πv), for importance sampling. The luminance is the
-// mean over a texel, interpolated as by ray tracers. `texture` must be RGBA32F, repeated horizontally only.
+// mean over a texel of the texture as ray tracers interpolate it. `texture` must be RGBA32F and repeat only
+// horizontally.
 void add_cumulative_sums(Environment &environment, const Texture &texture, const Reporter &reporter);
 
 } // namespace arhost::scene

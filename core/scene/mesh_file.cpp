@@ -17,8 +17,8 @@ namespace arhost::scene {
 namespace {
 
 constexpr std::size_t chunk = 1 << 20; // bytes read between two progress reports
-// A compressed file may expand to this multiple of its size, or to max_small_expansion bytes if that is more. Meshes
-// shrink to a third to a tenth; a file of only zeros shrinks to a thousandth.
+// A compressed file may expand to this multiple of its size, or to max_small_expansion bytes if that is more.
+// Compression reduces meshes to between a third and a tenth, and a file of only zeros to a thousandth.
 constexpr std::uint64_t max_expansion = 100, max_small_expansion = 16 << 20;
 
 class File {

@@ -130,7 +130,7 @@ arhost_motion MotionEvaluator::at(double time_s, std::span<const Anchored> ancho
             deformed_.data(),      static_cast<std::uint32_t>(deformed_.size()), 0};
 }
 
-// A skinned object has the nodes of its joints, which all belong to the same anchor.
+// A skinned object is visible if its joints are. All of them belong to the same anchor.
 bool MotionEvaluator::is_visible(const arhost_object &object) const {
     const std::uint32_t node = object.skin == ARHOST_NONE
                                    ? object.node

@@ -22,7 +22,7 @@ inline bool is_moving(const arhost_scene &scene) {
     return scene.duration_s > 0 || scene.anchors.count > 0;
 }
 
-// Where an anchor is in a frame.
+// Visibility and pose of an anchor in a frame.
 struct Anchored {
     bool is_visible = false;
     glm::dmat4 world_from_anchor{1}; // not used if it is not visible
@@ -33,8 +33,9 @@ class MotionEvaluator {
 public:
     explicit MotionEvaluator(const arhost_scene &scene);
 
-    // Returns the motion at `time_s`. It repeats with the period duration_s of the scene. `anchors`: one element for
-    // each anchor of the scene; without them, the anchors are at the origin of the world. Valid until the next call.
+    // Returns the motion at `time_s`; the animation repeats with the period duration_s of the scene. `anchors`: one
+    // element for each anchor of the scene. If it is empty, the anchors are at the origin of the world. The result is
+    // valid until the next call.
     arhost_motion at(double time_s, std::span<const Anchored> anchors = {});
 
 private:

@@ -130,7 +130,7 @@ struct TrackerSetup {
     std::vector<const char *> family_names;
 };
 
-// Prepares an array for a plugin to fill, which may have written anything to it before.
+// Resets an array before a plugin fills it. In an earlier call, the plugin may have written anything to the array.
 template <class T> void reset(std::vector<T> &elements) {
     T element{};
     element.struct_size = sizeof element;
@@ -274,8 +274,8 @@ private:
     std::optional<TrackerSlot> layout_;
     std::vector<arhost_observation> observations_ = std::vector<arhost_observation>(ARHOST_MAX_OBSERVATIONS);
     std::vector<arhost_body_pose> poses_;
-    std::uint64_t state_size_ = 0;       // of the plugin
-    std::uint64_t plugin_offset_ = 0;    // of the plugin's state in a slot
+    std::uint64_t state_size_ = 0;       // size of the plugin's state
+    std::uint64_t plugin_offset_ = 0;    // offset of the plugin's state in a slot
     std::vector<Block> full_range_luma_; // only for a luma plane of limited range
 };
 

@@ -20,8 +20,8 @@ namespace {
 using namespace ipc;
 using namespace model;
 
-// The arhost_host that is passed to the plugin. Stores the last error that the plugin logged, which the messages
-// Failed and Stopped report.
+// The arhost_host that is passed to the plugin. Stores the last error that the plugin logged; the messages Failed and
+// Stopped contain this error.
 class PluginHost {
 public:
     PluginHost(Link &link, arhost_kind kind)

@@ -19,12 +19,13 @@ struct TargetSolver::Header {
 
 // The state of a target after the last frame. Plain data without pointers; all zero if it was never sighted.
 struct TargetSolver::Memory {
-    pose::Track track;                      // not of bodies
+    pose::Track track;                      // not used for bodies
     pose::Smoothing smoothing;              // only if the poses are filtered
     double mt[16];                          // the last reported pose
-    std::uint32_t was_reported, age_frames; // whether it was ever reported; frames since then
-    double log_chance; // logarithm of the probability that its sightings in successive frames are chance
-    std::uint32_t is_sighted, reserved; // whether it was seen in the last frame, reported or not
+    std::uint32_t was_reported, age_frames; // whether the target was ever reported; frames since the last report
+    double log_chance;                      // logarithm of the probability that all recent sightings are false
+    std::uint32_t is_sighted,
+        reserved; // is_sighted: whether the target was seen in the last frame, even if it was not reported
 };
 
 namespace {
@@ -33,16 +34,17 @@ using pose::Estimate;
 using pose::ObservedMarker;
 using pose::Rigid;
 
-// The errors of corners that the choice among poses allows for: more than their noise, because calibrations are not
-// exact. Those of a map contain the errors of its printed layout.
+// Standard deviations of corner errors, for the choice among poses. They exceed the noise, because calibrations are
+// not exact. That of a map includes the errors of its printed layout.
 constexpr double marker_sigma_px = 0.1, map_sigma_px = 0.5;
 
-// A target is reported if the probability that its sightings are chance is lower. A cluttered frame has dozens of
-// squares that look random, so at this limit, one of some hundred thousand frames has a false marker.
+// A target is reported if the probability that all its sightings are false is below exp(confirmed_log_chance). A
+// cluttered frame has dozens of squares that look random. With this limit, one of several hundred thousand frames has
+// a false marker.
 const double confirmed_log_chance = std::log(1e-7), certain_log_chance = std::log(1e-30),
              max_log_chance = std::log(double{ARHOST_MAX_MARKERS});
 
-// The noise of the corners of a tracker that does not know it.
+// Noise of the corners, if the tracker does not know it.
 constexpr double unknown_sigma_px = 0.3;
 
 [[noreturn]] void violation(const std::string &what) {
@@ -164,7 +166,8 @@ std::optional<arhost_expected_marker> TargetSolver::expected(const Marker &marke
     return whole.intersects(region) ? std::optional(expected) : std::nullopt;
 }
 
-// Whether a marker is where its target's motion leads, or at most its own side from there if the motion is uncertain.
+// Returns whether a marker is where the motion of its target predicts it. The tolerance is the uncertainty of the
+// prediction, but at most the marker's shortest side.
 bool TargetSolver::is_expected(const arhost_observation &observation, const pose::Motion &motion) const {
     const auto place = expected(*marker_of(observation), motion);
     if (!place)
@@ -239,9 +242,9 @@ ObservedMarker TargetSolver::observed(const arhost_observation &observation, dou
     return marker;
 }
 
-// If the same marker is seen several times, keeps the copy that is nearest to where the target is expected: by its
-// motion or, if it is unknown, by the target's other markers. Otherwise keeps the copy with the fewest corrected
-// bits, or that which was read most clearly.
+// If the same marker is seen several times, keeps one copy: the one nearest to where the target is expected,
+// according to its motion or, if that is unknown, to the target's other markers. If there is no expectation, keeps
+// the copy with the fewest corrected bits and, among equals, the one that was read most clearly.
 std::vector<const arhost_observation *> TargetSolver::without_copies(std::span<const arhost_observation> observations,
                                                                      const std::optional<pose::Motion> &predicted,
                                                                      double corner_sigma_px) const {
@@ -284,7 +287,7 @@ pose::Matrix6d TargetSolver::single_covariance(const Rigid &pose, const arhost_o
     return estimate ? estimate->covariance : pose::Matrix6d::Zero();
 }
 
-// Whether the corners are near their places in a pose of the target.
+// Returns whether the observed corners are near their projections with this pose of the target.
 bool TargetSolver::fits(const ObservedMarker &marker, const Rigid &pose) const {
     double squares = 0;
     for (std::size_t i = 0; i < 4; ++i) {
@@ -309,7 +312,7 @@ void TargetSolver::project(const Rigid &pose, arhost_observation &observation) c
         std::ranges::copy(corners_px[i], observation.projected_px[i]);
 }
 
-// `predicted`: from memory.track.
+// `predicted`: the motion predicted from memory.track.
 void TargetSolver::add_sighting(Memory &memory, const arhost_observation &seen,
                                 const std::optional<pose::Motion> &predicted) const {
     if (seen.false_positive_rate > 0 && !(predicted && is_expected(seen, *predicted))) {
@@ -328,7 +331,7 @@ void TargetSolver::solve(const Target &target, std::span<arhost_observation> obs
     for (const arhost_observation *observation : kept)
         markers.push_back(observed(*observation, target.corner_sigma_px()));
     std::vector<Estimate> poses = estimate_poses(markers, projection_);
-    // Something hides a corner of the only marker. With several markers, such corners are outliers.
+    // A single marker that does not fit has a hidden corner. With several markers, such corners are outliers.
     if (markers.size() == 1)
         std::erase_if(poses, [&](const Estimate &pose) { return !fits(markers.front(), pose.camera_from_target); });
     if (poses.empty())
@@ -371,7 +374,8 @@ void TargetSolver::solve(const arhost_tracker_result &reported, bool searched_ev
     const Header header{searched_everywhere ? 0 : header_of(before).frames_since_full_search + 1, 0};
     std::memcpy(after, &header, sizeof header);
     const std::span all(reported.observations, reported.observation_count);
-    std::vector<std::size_t> order; // of the observations: those of the first target, …, those of no target
+    std::vector<std::size_t>
+        order; // indices of the observations: those of the first target, …, then those of no target
     std::vector<std::size_t> target_of;
     for (std::size_t i = 0; i < all.size(); ++i) {
         const Marker *marker = marker_of(all[i]);

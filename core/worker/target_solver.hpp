@@ -13,17 +13,17 @@
 
 namespace arhost::worker {
 
-// Each call depends only on its arguments. The memory of the targets is passed as `before` and `after`, so it
-// survives the worker (ADR 26): the motion of each target, which tells the two solutions of the planar pose problem
-// apart (pose/track.hpp).
+// The result of each call depends only on the arguments. The memory of the targets is passed as `before` and `after`,
+// so it survives the worker (ADR 26). It contains the motion of each target, which distinguishes the two solutions of
+// the planar pose problem (pose/track.hpp).
 class TargetSolver {
 public:
     struct Settings {
         std::uint32_t
-            full_search_every; // longest interval, in frames, between searches of the whole frame; at least 1
+            full_search_every; // maximum interval, in frames, between searches of the whole frame; at least 1
         bool smooth = false;   // whether the poses are filtered (pose/smoothing.hpp)
-        bool confirm = true;   // whether a target is reported only when its sightings in successive frames are too
-                               // unlikely to be chance (arhost_observation.false_positive_rate; ADR 29)
+        bool confirm = true;   // whether a target is reported only when it is improbable that all its sightings are
+                               // false (arhost_observation.false_positive_rate; ADR 29)
     };
     TargetSolver(const arhost_intrinsics &intrinsics, const std::vector<model::Target> &targets,
                  const Settings &settings);
