@@ -21,7 +21,7 @@ std::filesystem::path control_group() {
 Layer report_control_group() {
     const std::filesystem::path group = control_group();
     if (!group.filename().string().starts_with(worker_group))
-        return {"control group", "none", ""}; // few machines delegate one, so this is not missing
+        return {"control group", "none", ""}; // not missing, because few machines delegate a group
     Layer layer{"control group", "", ""};
     const auto value = [&](const char *file) {
         std::string text;

@@ -49,7 +49,7 @@ inline bool has_memory_limit(const Policy &policy) {
     return !under_sanitizer && !policy.allows("gpu"); // GPU drivers map large regions
 }
 
-// Whether arhost-launcher has started this process in a PID namespace, which its parent is outside of.
+// Whether arhost-launcher has started this process in a PID namespace. The parent of this process is outside of it.
 inline bool has_pid_namespace() {
     return ::getppid() == 0;
 }

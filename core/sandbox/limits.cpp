@@ -61,8 +61,8 @@ Layer set_limits(const Policy &policy) {
         lower(layer, "memory", RLIMIT_DATA, memory_limit(policy));
     if (policy.writable.empty() && !policy.standard_output && !may_share_memory(policy))
         lower(layer, "files", RLIMIT_FSIZE, 0); // prevents writes to /tmp even if other layers are missing
-    // Half of the usual 1024, because all descriptors in unread messages of a user's processes count towards one
-    // limit, and a plugin must not exhaust it: the host and the scene loader need it, too.
+    // Half of the usual 1024. All descriptors in unread messages of a user's processes count towards one limit. A
+    // plugin must not reach this limit, because the host and the scene loader also need descriptors.
     lower(layer, "descriptors", RLIMIT_NOFILE, policy.makes_shared_memory ? 1024 : 512);
     lower(layer, "core", RLIMIT_CORE, 0);
     lower(layer, "stack", RLIMIT_STACK, 8 << 20);   // RLIMIT_DATA does not count the stack of the main thread
@@ -70,8 +70,9 @@ Layer set_limits(const Policy &policy) {
     lower(layer, "queues", RLIMIT_MSGQUEUE, 0);
     lower(layer, "priorities", RLIMIT_RTPRIO, 0); // a real-time thread could starve all others
     lower(layer, "nice", RLIMIT_NICE, 0);
-    // Since 5.14, Linux counts threads per user namespace, before that per user; it does not enforce the limit for
-    // root. The limit grows with the number of processors, because thread pools have one thread for each.
+    // Since version 5.14, Linux counts threads per user namespace; earlier versions count them per user. Linux does
+    // not enforce the limit for root. The limit grows with the number of processors, because thread pools have one
+    // thread for each.
     const bool is_own_count = has_pid_namespace() && kernel_is_at_least(5, 14);
     lower(layer, "threads", RLIMIT_NPROC, is_own_count ? 1024 + 4 * ::get_nprocs() : 8192);
     return layer;

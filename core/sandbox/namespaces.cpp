@@ -19,8 +19,8 @@ Layer enter_namespaces(const Policy &policy) {
         return has_left;
     };
     bool has_user_namespace = ::geteuid() != 0; // entered by arhost-launcher or below
-    // Root needs no user namespace, and in one it would lose access to the files of other users. arhost-launcher has
-    // started a worker in a user namespace, with the capability to create other namespaces in it.
+    // Root needs no user namespace, and in one it would lose access to the files of other users. Otherwise,
+    // arhost-launcher has started the worker in a user namespace, in which the worker may create other namespaces.
     if (::unshare(CLONE_NEWNS) != 0) {
         if (const std::string why_not = enter_user_namespace(); !why_not.empty()) {
             layer.missing = "user: " + why_not;

@@ -25,8 +25,8 @@ namespace fs = std::filesystem;
 constexpr std::uint64_t of_devices = MOUNT_ATTR_RDONLY | MOUNT_ATTR_NOSUID, // devices ignore RDONLY
     of_writable = MOUNT_ATTR_NOSUID | MOUNT_ATTR_NODEV, of_readable = of_writable | MOUNT_ATTR_RDONLY;
 
-// The new root is mounted on this folder before it becomes the root. Every system has it, and it is not /proc, which
-// must remain visible so that a user namespace may mount another one.
+// The new root is mounted on this folder before it becomes the root. Every system has /dev. /proc is unsuitable: it
+// must remain visible so that a user namespace may mount another /proc.
 constexpr const char *staging = "/dev";
 constexpr const char *control_groups = "/sys/fs/cgroup";
 
@@ -51,7 +51,7 @@ base::UniqueFd clone_tree(const fs::path &path, std::uint64_t attributes) {
     return tree;
 }
 
-using Report = std::function<void(const fs::path &path)>; // reports a path that errno prevents
+using Report = std::function<void(const fs::path &path)>; // reports a path that cannot be cloned; errno: the reason
 
 // The paths of the new root.
 class Contents {
@@ -68,8 +68,8 @@ public:
     void link(const fs::path &path, const fs::path &target) { links_.emplace(path, target); }
     const std::map<fs::path, fs::path> &links() const { return links_; }
 
-    // Clones the mounts. Omits a path that a folder already contains with the same attributes, and one that cannot be
-    // cloned, which it reports.
+    // Clones the mounts. Omits a path if a folder already contains it with the same attributes. Omits and reports a
+    // path that cannot be cloned.
     std::vector<Mount> clone(const Report &missing) const {
         std::vector<Mount> mounts;
         for (const auto &[path, attributes] : attributes_) { // each folder comes before its contents
@@ -141,7 +141,7 @@ bool attach(const base::UniqueFd &tree, const fs::path &path) {
     return ::syscall(SYS_move_mount, tree.get(), "", AT_FDCWD, path.c_str(), MOVE_MOUNT_F_EMPTY_PATH) == 0;
 }
 
-// Makes the plugin's own folder in /proc visible, but not PID 1. `proc`: the path of /proc.
+// Makes the plugin's own folder in /proc visible, but not that of PID 1. `proc`: the path of /proc.
 bool mount_own_processes(const fs::path &proc) {
     const fs::path processes = proc / "pids";
     std::error_code ignored;
@@ -149,7 +149,7 @@ bool mount_own_processes(const fs::path &proc) {
     if (!has_pid_namespace() ||
         ::mount("proc", processes.c_str(), "proc", MS_RDONLY | MS_NOSUID | MS_NODEV | MS_NOEXEC,
                 "subset=pid,hidepid=ptraceable") != 0) {
-        // In a container, /proc may be covered in part, and then the kernel refuses another one.
+        // In a container, parts of /proc may be covered; the kernel then refuses to mount another /proc.
         const fs::path self = fs::read_symlink("/proc/self", ignored);
         const base::UniqueFd tree = self.empty() ? base::UniqueFd() : clone_tree("/proc" / self, of_readable);
         if (!tree || !attach(tree, processes / self))
@@ -174,8 +174,8 @@ void mount_own_control_groups(const fs::path &path) {
 
 // Makes the folder `staging` the root and detaches the old root.
 bool enter_staging() {
-    // The second call of pivot_root(2)'s idiom for a new root without a folder for the old one: both are mounted at
-    // ".", the old root on top.
+    // Second part of the idiom in pivot_root(2) for a new root without a folder for the old one. pivot_root mounts
+    // the old root on top of the new one; umount2 then detaches the old root.
     return ::chdir(staging) == 0 && ::syscall(SYS_pivot_root, ".", ".") == 0 && ::umount2(".", MNT_DETACH) == 0 &&
            ::chdir("/") == 0;
 }

@@ -62,8 +62,8 @@ Level enter(Policy policy) {
         std::error_code ignored; // a later write to the folder reports the error
         std::filesystem::create_directories(folder, ignored);
     }
-    // The layers hide the folder where the device is found. A device that is connected later has another node, so the
-    // worker must be restarted.
+    // The other layers hide the folder where the device is found. A device that is connected later has another node,
+    // so the worker must then be restarted.
     if (!policy.usb_device.empty())
         if (const auto device = base::find_usb_device(policy.usb_device))
             policy.usb_node = device->node;

@@ -106,9 +106,9 @@ constexpr CallsOf allowed_by[] = {
     {"processes", {"execve", "execveat", "fork", "setpgid", "setsid", "vfork", "wait4", "waitid"}},
 };
 
-// Allowed with `network`, `listen` and `processes`; without them, libraries fall back to poll. The watches of epoll
-// are counted per user, and they slow down the host's use and release of shared files: the kernel calls or frees each
-// of them.
+// Allowed with `network`, `listen` and `processes`; without epoll, libraries fall back to poll. Reason: the kernel
+// counts epoll watches per user. Watches on shared files also slow down the host, because the kernel calls or frees
+// each watch when the host uses or releases a file.
 constexpr const char *epoll_calls[] = {"epoll_create", "epoll_create1", "epoll_ctl",
                                        "epoll_pwait",  "epoll_pwait2",  "epoll_wait"};
 
@@ -165,8 +165,8 @@ scmp_arg_cmp from(unsigned argument, std::uint64_t value) {
     return {argument, SCMP_CMP_GE, value, 0};
 }
 
-// Denies calls that could affect other processes: the target must be this process. Other ids are denied, because they
-// could belong to threads or groups of other processes.
+// Denies calls that could affect other processes: the target must be this process. Ids other than its own are denied,
+// because they could belong to threads or groups of other processes.
 void deny_reaching_others(Filter &filter, bool has_children) {
     const auto self = static_cast<std::uint64_t>(::getpid());
     if (!has_children) {
@@ -231,7 +231,7 @@ void deny_sockets(Filter &filter, const Policy &policy) {
     if (!policy.allows("network"))
         for (const std::uint64_t requests : {0x8900ul /* SIOC… */, 0x8b00ul /* wireless */})
             filter.deny("ioctl", {has_bits(1, 0xffffff00u, requests)});
-    // An inherited listening socket, shut down, could connect by sending its first data (TCP Fast Open).
+    // After a shutdown, an inherited listening socket could connect by sending its first data (TCP Fast Open).
     if (!policy.allows("network")) {
         filter.deny("sendto", {has_bits(3, MSG_FASTOPEN, MSG_FASTOPEN)});
         filter.deny("sendmsg", {has_bits(2, MSG_FASTOPEN, MSG_FASTOPEN)});
@@ -242,16 +242,16 @@ void deny_sockets(Filter &filter, const Policy &policy) {
             filter.deny("socketpair", {has_bits(1, 0xf, static_cast<unsigned>(type))});
 }
 
-// Denies larger buffers in the kernel than the default, which RLIMIT_DATA does not count, programs for the kernel
-// (BPF), and descriptors of the process at the other end.
+// Denies three kinds of socket options: kernel buffers larger than the default, which RLIMIT_DATA does not count;
+// programs for the kernel (BPF); and descriptors of the process at the other end.
 void deny_socket_options(Filter &filter, const Policy &policy) {
     constexpr int pass_pidfd = 76, peer_pidfd = 77; // not in Debian 12's headers
     std::set<int> options = {SO_SNDBUF,        SO_RCVBUF,     SO_SNDBUFFORCE,           SO_RCVBUFFORCE,
                              SO_ATTACH_FILTER, SO_ATTACH_BPF, SO_ATTACH_REUSEPORT_CBPF, SO_ATTACH_REUSEPORT_EBPF,
-                             SO_LINGER, // the last close of a socket would wait, also if the host closes it
+                             SO_LINGER, // the last close of a socket would wait, even in the host
                              pass_pidfd};
     if (policy.allows("usb"))
-        options.erase(SO_ATTACH_FILTER); // libudev filters its events
+        options.erase(SO_ATTACH_FILTER); // libudev uses it to filter events
     for (const int option : options)
         filter.deny("setsockopt", {equals(1, SOL_SOCKET), equals(2, static_cast<unsigned>(option))});
     filter.deny("getsockopt", {equals(1, SOL_SOCKET), equals(2, peer_pidfd)});

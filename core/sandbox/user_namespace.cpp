@@ -77,8 +77,8 @@ std::string to_text(const UserNamespaceFailure &failure, const std::filesystem::
 }
 
 std::string enter_user_namespace() {
-    // Tries it in a child process first: some systems allow the namespace but not the mapping, and a process cannot
-    // leave the namespace again.
+    // Tries the namespace in a child process first. Some systems allow the namespace but not the mapping, and a
+    // process cannot leave a user namespace again.
     UserNamespaceFailure failure = try_in_child();
     if (failure.step == Step::none)
         failure = try_here();

@@ -101,8 +101,8 @@ pid_t fork_sibling() {
 }
 
 // Starts a worker as PID 2 of a new PID namespace, as a child of this process. A helper process creates the
-// namespace, because a process without privileges cannot leave the user namespace that it needs to do so. Returns -1
-// if the namespaces are unavailable.
+// namespace: without privileges, this requires a user namespace, which a process cannot leave again. Returns -1 if
+// the namespaces are unavailable.
 pid_t fork_isolated(const Request &request, const std::vector<UniqueFd> &fds, Worker &worker) {
     int life[2], result[2];
     if (::pipe2(life, O_CLOEXEC) != 0)
@@ -177,8 +177,8 @@ void spawn(int socket, const Request &request, const std::vector<UniqueFd> &fds,
     send_struct(socket, reply, {pidfd.get()});
 }
 
-// Returns the USB device of a worker that has exited to the kernel's drivers, if it was killed before it could do so.
-// Starts a process for this, because drivers may take seconds.
+// Returns a USB device to the kernel's drivers, in case its worker was killed before it could do so. Starts a process
+// for this, because drivers may take seconds.
 void return_usb_device(const arhost::base::UsbIdentity &identity, Helpers &helpers) {
     const auto device = identity.empty() ? std::nullopt : arhost::base::find_usb_device(identity);
     if (!device || device->driver_less.empty())
@@ -193,15 +193,15 @@ void return_usb_device(const arhost::base::UsbIdentity &identity, Helpers &helpe
         helpers.insert(pid);
 }
 
-// Called after the host has exited. Kills the workers and their children, and exits. Uses _exit, because the leak
-// check of a sanitizer would stop this process at a normal exit, which conflicts with the SIGCONT that a waiting host
+// Called after the host has exited. Kills the workers and their children, and exits. Calls _exit, because at a normal
+// exit the leak check of a sanitizer would stop this process, which conflicts with the SIGCONT that a waiting host
 // sends.
 [[noreturn]] void end_all(const Workers &workers, ControlGroups &groups) {
     for (const auto &[pid, worker] : workers) {
         ::kill(-pid, SIGKILL);
         groups.end(worker.group);
     }
-    for (int i = 0; i < 500; ++i) { // gives up after half a second, because a process may hang in the kernel
+    for (int i = 0; i < 500; ++i) { // gives up after half a second, because a worker may hang in the kernel
         kill_orphans({});
         pid_t reaped;
         while ((reaped = ::waitpid(-1, nullptr, WNOHANG)) > 0) {

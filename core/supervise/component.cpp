@@ -19,8 +19,8 @@ bool is_valid_status(arhost_kind kind, arhost_status status) {
     return status == ARHOST_STATUS_OK || (status < 0 && status >= ARHOST_STATUS_ERROR_INTERNAL);
 }
 
-// Whether a restart may fix the error `status`: a new process reopens its device and starts with free memory. Other
-// errors are handled by the host: it restarts a source and disables a sink.
+// Whether a restart may fix the error `status`, because a new process reopens its device and starts with free memory.
+// The host handles other errors: it restarts a source and disables a sink.
 bool needs_new_process(arhost_kind kind, arhost_status status) {
     if (kind == ARHOST_KIND_SINK)
         return status == ARHOST_STATUS_ERROR_DEVICE_LOST;
@@ -104,7 +104,7 @@ void Component::end_process(const std::string &reason) {
         process_->end(reason);
 }
 
-// Returns the generation by which the worker knows this memory.
+// Returns the worker's generation number for this memory.
 std::uint32_t Component::attach(const RegionPointer &input) {
     for (const AttachedInput &attached : attached_inputs_)
         if (attached.region.lock() == input)
@@ -273,7 +273,7 @@ void Component::on_result(const Result &result) {
     waits_ = false;
     set_frame_deadline();
     callbacks_.result(command, result);
-    // Errors do not count as completed frames, nor do results because of which the host terminates the process.
+    // Does not count errors as completed frames, nor results because of which the host terminates the process.
     if (result.status > 0 && process_ && !process_->ending())
         restart_policy_.frame_done();
     if (stop_requested_)
@@ -315,8 +315,9 @@ void Component::on_died(const Death &death) {
             budget_.log_death(reason + ", after it had finished");
         return stopped(stop_response_->status, stop_response_->text);
     }
-    // Of the components that die during stop, only a sink is restarted, because it may have to complete files: once
-    // after the host has killed it for a hang, more often after crashes.
+    // If a component dies during stop, it is restarted only if it is a sink, because a sink may have to complete
+    // files. A sink that the host killed for a hang is restarted once; a sink that crashed, up to the limit
+    // quarantine_after.
     const bool is_sink = description_.kind == ARHOST_KIND_SINK;
     deaths_in_stop_ += !stop_sent_ ? 0 : death.by_host ? limits_.restart.quarantine_after - 1 : 1;
     if (stop_sent_ && (!is_sink || deaths_in_stop_ >= limits_.restart.quarantine_after)) {
@@ -367,7 +368,7 @@ void Component::spawn_after(std::chrono::milliseconds delay) {
     restart_timer_ = context_.reactor.at(context_.reactor.now() + delay, [this] { spawn(); });
 }
 
-// A camera that has worked may come back after any time. Sources have no fallback.
+// A camera that has worked may come back after any time. Sources have no fallback plugin.
 bool Component::may_wait_for_device() const {
     return description_.kind == ARHOST_KIND_SOURCE && description_.capabilities & ARHOST_CAPABILITY_LIVE &&
            restart_policy_.has_completed_frames();

@@ -72,13 +72,14 @@ public:
 
     void start();
     // Stops the component asynchronously: waits for the commands in flight, calls the plugin's `stop` and waits until
-    // the process has exited. If the process is dead, it is restarted first, because it may have to complete files.
+    // the process has exited. A dead process is restarted first, because the plugin may have to complete files.
     void stop();
     void kill(); // kills the process at once; it is not restarted
-    // Asks the plugin to return from the current call soon. It may then no longer wait.
+    // Asks the plugin to return from the current call soon. After this, a call that waits does not extend its
+    // deadline.
     void cancel_call();
-    // Whether a live source or a sink has reported progress in the current call: it waits for its camera, or for
-    // another program that does not take the frame.
+    // Whether a live source or a sink has reported progress in the current call. The source then waits for its
+    // camera, or the sink for another program that does not take the frame.
     bool waits() const { return waits_; }
     // Why a live source has no camera at present; "" if it has one.
     const std::string &missing_device() const { return missing_device_; }
@@ -103,8 +104,8 @@ public:
     // yet, attaches them first. Detaches inputs to which nothing refers any more.
     void submit(ipc::Command command, const RegionPointer &input = nullptr, const RegionPointer &state = nullptr);
 
-    // Answers a command of the sink, unless its worker is not the one that had sent the command: `restarts` is the
-    // number of restarts at that time.
+    // Answers a command of the sink. Does nothing if the worker that sent the command is no longer running:
+    // `restarts` is the number of restarts when the command was sent.
     void answer(const ipc::messages::Answer &answer, std::uint32_t restarts);
     // Changes an option of the running plugin. Calls `done` with "" or with the reason why the option is unchanged.
     // The caller has to pass the new value when a restarted worker creates the plugin.
@@ -158,7 +159,7 @@ private:
     enum class Handshake { opening, creating, done }; // waits for Hello; waits for Ready; has received both
     Handshake handshake_ = Handshake::opening;
     bool stop_requested_ = false, stop_sent_ = false, waits_ = false, call_cancelled_ = false;
-    bool has_lost_device_ = false; // the process has reported it
+    bool has_lost_device_ = false; // the current process has reported the loss of its device
     std::string missing_device_;
     std::optional<ipc::messages::Stopped> stop_response_;
     std::string configuration_error_, failure_; // text of Failed, or of an exception of `hello` or `ready`
@@ -168,7 +169,7 @@ private:
     RegionPointer output_;
     struct AttachedInput {
         std::weak_ptr<const Region> region;
-        std::uint32_t generation; // in the worker
+        std::uint32_t generation; // generation number in the worker
     };
     std::vector<AttachedInput> attached_inputs_;
     std::uint32_t next_generation_ = 1;

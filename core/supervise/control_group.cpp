@@ -47,9 +47,9 @@ bool has_mark(const fs::path &group, const char *attribute) {
     return ::getxattr(group.c_str(), attribute, &value, 1) == 1 && value == '1';
 }
 
-// Whether this process may create subgroups in `group`. Root may write to every group, but systemd manages those that
-// it has not marked as delegated. In a group whose parent belongs to another user, and in a container's topmost
-// group, there is no other manager.
+// Whether this process may create subgroups in `group`. Root may write to every group, but systemd manages the groups
+// that it has not marked as delegated. Two kinds of group have no other manager: a group whose parent belongs to
+// another user, and the topmost group of a container.
 bool is_delegated(const fs::path &group) {
     const auto is_writable = [](const fs::path &folder) {
         return ::access((folder / "cgroup.subtree_control").c_str(), W_OK) == 0 &&
@@ -90,8 +90,8 @@ bool ControlGroup::exceeded_memory() const {
     std::string name;
     for (int count = 0; file >> name >> count;)
         events[name] = count;
-    // The counter oom_kill includes kills because the machine ran out of memory. The counter oom does not: it counts
-    // how often the group reached its own limit.
+    // The counter oom counts how often the group reached its own limit. The counter oom_kill also includes kills
+    // because the machine ran out of memory.
     return events["oom"] > 0 && events["oom_kill"] > 0;
 }
 
@@ -119,7 +119,7 @@ ControlGroups::ControlGroups() {
         return;
     }
     delegated_ = own;
-    for (const char *controller : controllers) // separate writes, because one that is unavailable makes a write fail
+    for (const char *controller : controllers) // separate writes, because an unavailable controller makes one fail
         write(delegated_ / "cgroup.subtree_control", std::string("+") + controller);
     write(delegated_ / host_group / "cpu.weight", "1000"); // the default of workers is 100
 }

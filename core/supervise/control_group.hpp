@@ -4,8 +4,8 @@
 // in the kernel, threads of root. Workers get a smaller share of the processors than the host. arhost-launcher uses
 // them if the group in which arhost was started is delegated to it.
 //
-// The kernel applies limits only in groups that have no processes of their own next to subgroups ("no internal
-// process constraint"), so the launcher moves the host and itself to a subgroup:
+// The kernel applies limits only in a group without processes of its own beside its subgroups ("no internal process
+// constraint"), so the launcher moves the host and itself to a subgroup:
 //
 //   delegated group
 //   ├── arhost-host        host and launcher

@@ -94,8 +94,8 @@ void Launcher::discard() {
     for (int i = 0; i < 500 && ::waitpid(pid_, nullptr, WNOHANG) == 0; ++i)
         ::usleep(1000);
     std::vector<UniqueFd> fds;
-    // Receives its last reports. Does not wait for the end of file, because processes that are killed only below may
-    // still have its end of the socket open.
+    // Receives the launcher's last reports. Does not wait for the end of file, because the launcher's end of the
+    // socket may also be open in processes that are killed only below.
     for (Reply reply; socket_ && receive_struct(socket_.get(), reply, fds, MSG_DONTWAIT);)
         if (reply.kind == Reply::exited)
             record(reply.exit);
@@ -157,7 +157,7 @@ Spawned Launcher::spawn(const std::filesystem::path &program, Isolation isolatio
             continue;
         }
         const bool has_failed = reply->kind == Reply::failed;
-        if (has_failed || fds.size() != 1 || !fds[0]) // without fds[0]: too many open files
+        if (has_failed || fds.size() != 1 || !fds[0]) // no fds[0]: too many open files
             throw std::runtime_error(std::string("no process can be started: ") +
                                      std::strerror(has_failed ? reply->error : EMFILE));
         alive_.insert(reply->exit.pid);

@@ -136,7 +136,7 @@ void Process::receive_messages(int max_messages) {
             return end("protocol violation: it floods its control channel with messages");
         }
         if (!message.fds.empty() && !is<messages::Loaded>(message)) {
-            // The kernel frees what they refer to in the time of the host.
+            // Freeing the descriptors costs the host's time in the kernel.
             channel_watch_.cancel();
             return end("protocol violation: it sent file descriptors");
         }
@@ -201,7 +201,7 @@ void Process::receive_results() {
     }
 }
 
-// Reads at most 16 KiB per 10 ms. A worker that prints more waits until there is room in the pipe.
+// Reads at most 16 KiB per 10 ms. If a worker prints more, its writes block until the pipe has room.
 void Process::watch_output() {
     output_watch_ = context_.reactor.watch(spawned_.output.get(), [this] {
         read_output(16 << 10);

@@ -35,7 +35,7 @@ struct Death {
     std::string log_tail; // the last 20 lines that the worker logged or printed
 };
 
-// How the launcher isolates a worker with this policy.
+// Returns how the launcher isolates a worker with this policy.
 Isolation isolation_of(const sandbox::Policy &policy);
 
 class Process {

@@ -20,16 +20,17 @@ public:
     // Call this when the process has died. Returns the delay before the next start, or nullopt if the component is to
     // be disabled.
     //
-    // A component is proven when it has completed proven_after_frames in total. If it is proven and the dead process
-    // completed at least one frame, it restarts at once, however often it dies; but Component replaces one that has
-    // lost its device three times within a minute, if it has a fallback. Any other death counts as a failure: the
-    // delay starts at first_delay and doubles with each failure up to longest_delay; after quarantine_after failures
-    // in a row, the component is disabled. `jitter` (0 to 1) adds up to a quarter of the delay, so that components
-    // that share a failed device do not restart at the same time.
+    // A component is proven when it has completed proven_after_frames in total. A proven component restarts at once,
+    // however often it dies, if the dead process completed at least one frame. (If such a component has lost its
+    // device three times within a minute, Component switches to the fallback, if there is one.) Any other death
+    // counts as a failure: the delay starts at first_delay and doubles with each failure up to longest_delay; after
+    // quarantine_after failures in a row, the component is disabled. `jitter` (0 to 1) adds up to a quarter of the
+    // delay, so that components that share a failed device do not restart at the same time.
     std::optional<std::chrono::milliseconds> delay_after_death(double jitter);
 
     // Call this instead if the process of a live source has died because its device is lost. The device may return
-    // after any time, so this is no failure: the delay starts at 0 and grows up to longest_wait at most.
+    // after any time, so such a death does not count as a failure: the delay starts at 0 and grows up to
+    // longest_wait.
     std::chrono::milliseconds delay_while_device_is_lost(double jitter);
 
     std::uint32_t failures() const { return failures_; }
@@ -43,7 +44,7 @@ private:
 
     base::RestartLimits limits_;
     std::uint64_t frames_in_process_ = 0, frames_total_ = 0;
-    std::uint32_t failures_ = 0, waits_ = 0; // waits_: processes in a row that have not found the device
+    std::uint32_t failures_ = 0, waits_ = 0; // waits_: consecutive processes that have not found the device
 };
 
 } // namespace arhost::supervise

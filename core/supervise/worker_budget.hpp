@@ -17,7 +17,7 @@ public:
 
     // Lines per second, separately for deaths, warnings (and errors) and other lines, so that none displaces another.
     static constexpr int max_lines = 100;
-    // Cost of messages, in bytes. A worker that logs as much as arhost-worker lets its plugin stays far below.
+    // Cost of messages, in bytes. The largest amount that arhost-worker lets its plugin log costs far less.
     static constexpr std::size_t cost_per_message = 512, cost_per_second = 2 << 20, max_cost = 16 << 20;
 
     WorkerBudget(LogFunction log, std::string name) : log_(std::move(log)), name_(std::move(name)) {}
@@ -28,8 +28,8 @@ public:
     WorkerBudget(const WorkerBudget &) = delete;
     WorkerBudget &operator=(const WorkerBudget &) = delete;
 
-    // Logs a line that a worker sent or caused. Counts lines beyond the limit; the next line of a later second is
-    // preceded by their number. Only counts a line that was already printed in the last 10 s.
+    // Logs a line that a worker sent or caused. Lines beyond the limit are only counted; their number is logged
+    // before the next line of a later second. A line that was already printed in the last 10 s is also only counted.
     void log(arhost_severity severity, const std::string &text, Clock::time_point now = Clock::now());
     // Logs a warning about the death of a worker. The host has composed it from texts of limited size.
     void log_death(const std::string &text, Clock::time_point now = Clock::now());
@@ -39,8 +39,8 @@ public:
     // Deducts the cost of a message. Returns false if the budget is exhausted: it holds max_cost, and regains
     // cost_per_second.
     bool spend(std::size_t message_bytes, Clock::time_point now = Clock::now());
-    // The budget regains nothing for the time in which the host handled messages: so a flood also exhausts it if the
-    // host is slower than the flood.
+    // Call this after handling messages: the budget regains nothing for the time that this took. Otherwise, a flood
+    // would not exhaust the budget if the host handled messages more slowly than they arrive.
     void exclude(Clock::duration handling) { last_spent_ += handling; }
 
 private:
