@@ -51,7 +51,7 @@ bool Assembly::advance() {
 }
 
 FrameFlow::Intakes Assembly::intakes() const {
-    // A stage gets no more frames once its successor runs.
+    // Once its successor runs, a stage gets no more frames.
     const auto intake_of = [](const auto &current, const auto &next) {
         FrameFlow::Intake intake = current ? current->intake() : FrameFlow::Intake();
         if (next && next->running())
@@ -94,7 +94,7 @@ std::vector<Component *> Assembly::components() const {
 
 // ---- scenes ---------------------------------------------------------------------------------------------
 
-// Returns the tracker whose targets objects can belong to; null if there is none.
+// Returns the tracker to whose targets objects of a scene can be attached; null if there is none.
 const run_config::TrackerConfiguration *Assembly::tracker_of_anchors() const {
     // A session contains the poses of the targets, so its replay needs no tracker.
     const auto &recording = parts_.configuration.recording;
@@ -172,7 +172,7 @@ void Assembly::start_next_raytracer(Raytracer::Configuration configuration, std:
         parts_, std::move(configuration), std::move(scene),
         [this](const Stage &stage, const std::string &reason) { return abandon_swap(stage, reason); });
     next_raytracer_->swapped = done;
-    // Keeps what the command `set` has changed.
+    // Keeps the changes by the command `set`.
     if (raytracer_ && next_raytracer_->configuration() == raytracer_->configuration())
         parts_.options.copy(raytracer_->component(), next_raytracer_->component());
     next_raytracer_->start();
@@ -192,7 +192,7 @@ bool Assembly::abandon_swap(const Stage &stage, const std::string &reason) {
     return true;
 }
 
-// Exchanges a stage, which may be null, for its successor, once the successor runs and no frame is in the old stage.
+// Replaces a stage, which may be null, by its successor, once the successor runs and the old stage has no frames.
 template <class Kind> bool Assembly::finish_swap(std::unique_ptr<Kind> &current, std::unique_ptr<Kind> &next) {
     if (!next || !next->running() || (current && current->component().in_flight() > 0))
         return false;
@@ -219,8 +219,8 @@ Assembly::Exchanged Assembly::finish_swaps() {
     const Exchanged exchanged{finish_swap(tracker_, next_tracker_), finish_swap(raytracer_, next_raytracer_)};
     if ((exchanged.tracker && tracker_->configuration()->targets != targets_before->targets) ||
         (exchanged.raytracer && raytracer_->scene() != scene_before))
-        anchors_unchecked_ = true; // the edit of the tracker that the scene was checked with may have been abandoned
-    // The same edit may have changed both.
+        anchors_unchecked_ = true; // the scene was checked against an edit that may have been abandoned
+    // The same edit may have changed the tracker and the ray tracer.
     if (anchors_unchecked_ && !swaps_tracker() && !swaps_raytracer()) {
         anchors_unchecked_ = false;
         warn_of_hidden_objects();

@@ -12,7 +12,7 @@ namespace arhost::host {
 
 class Assembly {
 public:
-    // `watch_files` is called with files that are read: those of scenes. They may be names from the scene loader,
+    // `watch_files` is called with the files of a scene that are read. Their names may come from the scene loader,
     // which is not trusted.
     using WatchFiles = std::function<void(const std::set<std::filesystem::path> &)>;
     Assembly(RunParts &parts, Sightings &sightings, WatchFiles watch_files);
@@ -25,7 +25,7 @@ public:
     bool advance();
     FrameFlow::Intakes intakes() const;
     void end_input();    // has the same effect as the end of the source
-    void cancel_calls(); // of the tracker and the ray tracer, whose frames will not be shown
+    void cancel_calls(); // cancels calls of the tracker and the ray tracer, whose frames will not be shown
     void stop_loading();
 
     const Source &source() const { return source_; }
@@ -41,14 +41,14 @@ public:
     // Returns a pointer to a part of the latest configuration, which keeps that configuration alive.
     template <class Part> std::shared_ptr<const Part> shared(const Part &part) const { return {latest_, &part}; }
 
-    // ---- swaps: `done` is called when the new component has replaced the previous one, or has failed -----------
+    // ---- swaps: `done` is called when the new component has replaced the previous one, or has failed to ---------
     bool swaps_tracker() const { return next_tracker_ != nullptr; }
     bool swaps_raytracer() const { return next_raytracer_ || next_scene_loading_; }
     void swap_tracker(Tracker::Configuration configuration, const control::Done &done);
     void swap_raytracer(Raytracer::Configuration configuration, const control::Done &done);
     void swap_scene(const run_config::Scene &scene, const Raytracer::Configuration &raytracer,
                     const control::Done &done);
-    // Exchanges stages for their successors, once these run and no frame is in the old stage.
+    // Replaces stages by their successors, once these run and the old stages have no frames.
     struct Exchanged {
         bool tracker = false, raytracer = false;
         explicit operator bool() const { return tracker || raytracer; }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Decides from where the ray tracer sees the scene in each frame: the camera follows the targets, or a recording.
+// Determines the position of the ray tracer's camera in each frame, from the targets or from a recording.
 #pragma once
 
 #include "camera/coordinates.hpp"
@@ -15,11 +15,11 @@ namespace arhost::host {
 
 class Cameras {
 public:
-    // Settings of the tracker in use that concern its targets.
+    // Settings of the current tracker that concern its targets.
     struct Targets {
         std::string world;              // name of the target whose pose is that of the world
-        std::uint64_t grace_frames = 0; // World::locate
-        std::uint64_t held_frames = 0;  // for how many frames a frame without the world uses the last camera
+        std::uint64_t grace_frames = 0; // parameter of World::locate
+        std::uint64_t held_frames = 0;  // frames without a pose of the world that use the last camera
     };
 
     // `trajectory`: cameras to use instead of those from the targets; null: none.
@@ -30,12 +30,12 @@ public:
     // `is_same_world`: whether the previous and the new targets have the same world coordinates.
     void set_targets(Targets targets, bool is_same_world);
 
-    // Each sets the frame's camera, unless there is none for it.
+    // Each function sets the frame's camera, unless no camera is known for the frame.
     void set_from_targets(Frame &frame); // must be called for the frames in their order
     void set_from_recording(Frame &frame) const;
     // Also sets the recorded time, which determines the positions of animated objects.
     void set_from_trajectory(Frame &frame) const;
-    // Sets the camera again after `set_coordinates`, from the pose that `set_from_targets` has found.
+    // Sets the camera again after `set_coordinates`, from the pose that `set_from_targets` found.
     void update(Frame &frame);
 
 private:
@@ -46,7 +46,7 @@ private:
     camera::Coordinates coordinates_;
     Targets targets_;
     World world_;
-    std::optional<std::pair<std::uint64_t, arhost_camera>> last_; // with the number of its frame
+    std::optional<std::pair<std::uint64_t, arhost_camera>> last_; // with the number of the frame
 };
 
 } // namespace arhost::host

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The options with which the plugins of a run were created, and what the command `set` has changed since.
+// The options with which the plugins of a run were created, and their later changes by the command `set`.
 #pragma once
 
 #include "run_config/configuration.hpp"
@@ -16,16 +16,16 @@ namespace arhost::host {
 class ComponentOptions {
 public:
     struct InUse {
-        std::string path; // of the component in the configuration
+        std::string path; // configuration path of the component
         std::vector<model::OptionValue> values;
-        std::set<std::string> changed; // keys
+        std::set<std::string> changed; // keys of the changed options
         const model::OptionValue *find(std::string_view key) const;
     };
 
     explicit ComponentOptions(const supervise::LogFunction &log) : log_(log) {}
 
-    // Returns the options for creating a component's plugin: the configured ones, except for those that were changed.
-    // Throws as run_config::options_for.
+    // Returns the options for creating a component's plugin: the configured ones, with the changes applied. Throws
+    // the same exceptions as run_config::options_for.
     std::vector<model::OptionValue> choose(const supervise::Component &component, arhost_kind kind,
                                            const run_config::ComponentConfiguration &configuration,
                                            std::size_t candidate);

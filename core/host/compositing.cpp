@@ -14,7 +14,7 @@ using Clock = std::chrono::steady_clock;
 
 namespace {
 
-// Copies the video frame and the overlay, as far as sinks read them.
+// Copies the video frame and the overlay if sinks read them.
 void copy_inputs(const Frame &frame, const arhost_frame_format &format, const ImageView &overlay,
                  const Region &region, std::uint32_t inputs, std::span<std::byte> slot) {
     const OutputSlot layout(format);
@@ -73,7 +73,7 @@ void Compositing::write_record(Frame &frame, std::span<std::byte> slot) const {
     copy_array(frame.expected, OutputSlot::expected_offset);
 }
 
-// Returns the overlay in the size of the frame, and its region. It is valid until the next call.
+// Returns the overlay, scaled to the size of the frame, and its region. The result is valid until the next call.
 std::pair<ImageView, Region> Compositing::full_size_overlay(const Frame &frame) {
     const arhost_frame_format &format = parts_.video.format;
     const auto [width, height] = overlay_size(format, frame.quality);
@@ -100,7 +100,7 @@ void Compositing::check_buffers_unmodified(const Frame &frame) {
     check("raytracer.image-stays", frame.overlay_sample, frame.overlay, "the image changed after hand-over");
 }
 
-// Measures the age of the picture that the frame shows, and draws the next one.
+// Measures the age of the picture that the frame shows, and draws the next picture.
 void Compositing::exchange_time_code(std::span<const arhost_observation> observations, const OutputView &out) {
     const Clock::time_point now = Clock::now();
     if (!time_codes_)

@@ -14,7 +14,7 @@ public:
     Commands(RunParts &parts, Assembly &assembly, Outputs &outputs)
         : parts_(parts), assembly_(assembly), outputs_(outputs) {}
 
-    // Executes the command of a sink, and answers it now or later.
+    // Executes the command of a sink. Answers it during the call or later.
     void execute(SinkQueue &sink, const ipc::messages::Request &request);
 
 private:

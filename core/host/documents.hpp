@@ -22,11 +22,11 @@ nlohmann::ordered_json status_json(const RunParts &parts, const Assembly &assemb
 // The member `version` of session.json. Logs of version 1 have markers instead of targets.
 constexpr int session_version = 2;
 
-// Returns session.json, for the sinks that record the run (docs/sessions.md). `id`: of the sink. Throws
+// Returns session.json, for the sinks that record the run (docs/sessions.md). `id`: identifies the sink. Throws
 // std::runtime_error if the description is too long.
 std::string run_description(const RunParts &parts, const Assembly &assembly, const std::string &id);
 
-// Size and hash (64-bit FNV-1a, hexadecimal) of a regular file. The hash of larger files is "". Returns
+// Size and hash (64-bit FNV-1a, hexadecimal) of a regular file. For large files, the hash is "". The function returns
 // nullopt if the file cannot be read.
 struct Fingerprint {
     std::uint64_t bytes;

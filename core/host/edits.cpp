@@ -136,7 +136,7 @@ void Edits::apply(const run_config::Configuration &edited, const run_config::Con
     const auto differs = [&](std::string_view key) {
         return content_of(edited.node, key) != content_of(previous.node, key);
     };
-    // An edit that fails is tried again with the next one. The run logs the outcome of each.
+    // A failed edit is tried again together with the next edit. The run logs the outcome of each attempt.
     if (assembly_.tracker() && edited.tracker &&
         (differs("tracker") || edited.tracker->targets != previous.tracker->targets || print_changed ||
          std::exchange(tracker_edit_failed_, false)))

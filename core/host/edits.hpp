@@ -14,10 +14,10 @@ public:
     // `read` parses the configuration again and throws yaml::Error.
     Edits(RunParts &parts, Assembly &assembly, std::function<run_config::Configuration()> read);
 
-    // `files` may be names from the scene loader, which is not trusted: only their folders are opened.
+    // The names in `files` may come from the scene loader, which is not trusted: only their folders are opened.
     void watch(const FileWatch::Files &files);
-    // Applies the edits since the last call. Waits for the swaps in progress, so that the last edit is the one that
-    // stays.
+    // Applies the edits since the last call. Does nothing while swaps are in progress, so that the last edit takes
+    // effect last.
     void apply();
     void on_swapped(const Assembly::Exchanged &exchanged);
 
@@ -30,8 +30,8 @@ private:
     Assembly &assembly_;
     const std::function<run_config::Configuration()> read_;
     FileWatch file_watch_;
-    FileWatch::Files edited_; // to be applied
-    // Edits that have failed are tried again with the next one.
+    FileWatch::Files edited_; // edited files whose edits are not applied yet
+    // A failed edit is tried again together with the next edit.
     struct RaytracerEdit {
         Raytracer::Configuration raytracer;
         run_config::Scene scene;

@@ -37,8 +37,8 @@ struct Frame {
     }
 
     Stage stage = Stage::to_track;
-    bool overtaken = false; // mode live: a newer frame was shown; this one is dropped when its worker returns it
-    const run_config::RecordedFrame *recorded = nullptr; // of a session that is replayed
+    bool overtaken = false; // mode live: a newer frame was shown, so this frame is dropped when its worker returns it
+    const run_config::RecordedFrame *recorded = nullptr; // record of this frame in the session that is replayed
     bool held = false;                                   // uses the camera of an earlier frame
     std::uint32_t attempts = 0; // how often the worker died while processing this frame in the current stage
     Lease pixels;               // slot in the source's memory

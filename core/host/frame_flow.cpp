@@ -11,8 +11,8 @@ namespace {
 constexpr std::size_t max_reads_in_flight = 2;
 constexpr std::size_t max_waiting_for_delay = 3; // frames in mode live, for a component that catches up
 constexpr std::uint32_t max_attempts = 2; // per frame and component, if the worker dies while processing the frame
-constexpr std::chrono::milliseconds max_lateness{100}; // of a paced run that catches up
-constexpr double max_step_s = 10;                      // longer gaps in the time of a film are not waited for
+constexpr std::chrono::milliseconds max_lateness{100}; // maximum lateness of a paced run that catches up
+constexpr double max_step_s = 10; // longer gaps between the time stamps of recorded video are skipped
 
 const char *name_of(Frame::Stage waiting) {
     return waiting == Frame::Stage::to_track ? "tracker" : "raytracer";
@@ -189,10 +189,10 @@ void FrameFlow::on_rendered(Frame &frame, std::chrono::nanoseconds busy) {
     frame.stage = Frame::Stage::done;
 }
 
-// ---- waiting for a component, passing without it --------------------------------------------------------
+// ---- frames that wait for a component or skip it --------------------------------------------------------
 
-// Returns the oldest frame that waits for a component, if the component takes one. Lets frames pass that need not
-// wait.
+// Returns the oldest frame that waits for a component, if the component accepts one. Frames that need not wait skip
+// the component.
 Frame *FrameFlow::next_for(Frame::Stage waiting, const Intake &intake) {
     for (const auto &[sequence, frame] : frames_) {
         if (frame->stage != waiting)
@@ -204,7 +204,8 @@ Frame *FrameFlow::next_for(Frame::Stage waiting, const Intake &intake) {
     return nullptr;
 }
 
-// Lets a frame wait for a component. In mode live, it replaces the oldest frames that wait for the same one.
+// Makes a frame wait for a component. In mode live, the frame replaces the oldest frames that wait for the same
+// component.
 void FrameFlow::enqueue(Frame &frame, Frame::Stage stage) {
     frame.stage = stage;
     if (!settings_.live)
@@ -279,8 +280,8 @@ std::optional<FrameFlow::Action> FrameFlow::show(const Intakes &intakes) {
     return next(intakes); // its slots are free
 }
 
-// Whether a frame of a film must wait because the run is paced. A run that is too slow for the film shows the
-// following frames later, instead of faster.
+// Whether a frame of recorded video must wait because the run is paced. If the run is too slow, the following frames
+// are shown later instead of faster.
 bool FrameFlow::is_early(const Frame &frame) {
     if (settings_.live || interrupted_ || !paced_ ||
         (frame.record.clock != ARHOST_CLOCK_MEDIA && !settings_.recording))

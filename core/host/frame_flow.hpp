@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Decides which frame goes to which component and when, and which frames are dropped. Events go in: a frame has
-// arrived, a component has answered or has died. Actions come out: read, track, render, show. FrameFlow starts no
-// process, does not access the memory of frames, and takes the time from a clock.
+// Decides which frame goes to which component and when, and which frames are dropped. The inputs are events: a frame
+// has arrived, a component has answered or has died. The outputs are actions: read, track, render, show. FrameFlow
+// starts no process, does not access the memory of frames, and takes the time from a clock.
 //
 // In mode lockstep, every frame passes through all stages, and frames are shown in order; after the death of a
 // worker, its frames are processed again. In mode live, a newer frame replaces a frame that is still waiting, and
@@ -27,10 +27,11 @@ public:
 
     struct Settings {
         bool live = false;
-        bool has_source = true; // otherwise the frames are those of `trajectory`
+        bool has_source = true; // false: the frames are those of `trajectory`
         bool has_tracker = false, has_raytracer = false;
-        std::uint64_t max_frames = 0;               // 0: no limit; always set without a source
-        std::chrono::milliseconds max_latency{500}; // mode live: of a frame in a worker, before others pass it
+        std::uint64_t max_frames = 0; // 0: no limit; always set without a source
+        // Mode live: other frames overtake a frame that has been in a worker for this time.
+        std::chrono::milliseconds max_latency{500};
         bool has_timeline = false;
         const camera::Trajectory *trajectory = nullptr;   // cameras to use instead of the tracker's
         const run_config::Recording *recording = nullptr; // the frames of a session, which the source plays
@@ -71,19 +72,20 @@ public:
 
     // Returns the next action, which must be executed before the next call; nullopt if all frames wait for events.
     std::optional<Action> next(const Intakes &intakes);
-    // Until when the next frame waits, because the run is paced; nullopt if it does not.
+    // The time until which the next frame waits because the run is paced; nullopt if it does not wait.
     std::optional<Clock::time_point> due() const { return due_; }
 
     // ---- events ------------------------------------------------------------------------------------
     // The oldest read was answered. Returns its slot.
     Lease take_read();
-    // Whether the frame `sequence` of the source is missing; false for a read after one that has failed.
+    // Whether the run still expects the frame `sequence` of the source. False for frames that were requested after
+    // one whose read failed.
     bool expects(std::uint64_t sequence) const { return sequence < next_read_; }
     void read_again(std::uint64_t sequence) { next_read_ = sequence; } // and all later frames
     void on_arrived(std::unique_ptr<Frame> frame);
     // `unanswered`: the frames whose reads were not answered.
     void on_source_lost(std::span<const std::uint64_t> unanswered);
-    void on_input_ended() { input_ended_ = true; } // the source has no more frames, or none are to be read
+    void on_input_ended() { input_ended_ = true; } // the source has no more frames, or the run reads no more
 
     // A component has answered for the frame `sequence`. Returns the frame; nullptr if it is not needed any more.
     // Must be followed by on_tracked, on_rendered or on_failed for that frame.
@@ -91,8 +93,8 @@ public:
     void on_tracked(Frame &frame, std::chrono::nanoseconds busy);  // the frame has the targets
     void on_rendered(Frame &frame, std::chrono::nanoseconds busy); // the frame has the overlay
     void on_failed(Frame &frame, const char *stage);               // the frame passes without an overlay
-    // The worker has died. `waiting`: the stage of a frame that waits for it. `unanswered`: its frames, oldest first;
-    // it was processing the first one.
+    // The worker has died. `waiting`: the stage of frames that wait for this worker. `unanswered`: the worker's
+    // frames, oldest first; it was processing the first one.
     void on_lost(Frame::Stage waiting, std::span<const std::uint64_t> unanswered);
     void on_tracker_replaced() { tracker_pace_ = {}; }
     void on_raytracer_replaced() { raytracer_pace_ = {}; }
@@ -114,7 +116,7 @@ public:
     bool expects_more_frames() const { return !no_more_frames() || !reads_.empty(); }
     bool is_empty() const { return frames_.empty(); }
     const Frame *find(std::uint64_t sequence) const; // nullptr if there is no such frame
-    bool has_only_overtaken() const;                 // at least one frame, and none will be shown
+    bool has_only_overtaken() const;                 // there are frames, but none of them will be shown
     bool repeats_decisions(const Frame &frame) const {
         return frame.recorded && settings_.recording->repeats_decisions;
     }
@@ -124,11 +126,11 @@ public:
     const std::vector<arhost_target> &last_targets() const { return last_targets_; } // of the last shown frame
 
 private:
-    // Whether a worker catches up after a delay.
+    // Measures whether a worker can catch up after a delay.
     class Pace {
     public:
         void add(std::chrono::nanoseconds duration);
-        // Whether calls usually take less than three quarters of the time from frame to frame. True before the first
+        // Whether calls on average take less than three quarters of the time between frames. True before the first
         // result; false if the rate is unknown.
         bool keeps_up(double fps) const { return fps > 0 && mean_s_.value_or(0) < 0.75 / fps; }
 

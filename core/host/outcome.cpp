@@ -88,7 +88,7 @@ std::string unseen_targets(const run_config::Configuration &configuration, const
 }
 
 std::string misfitting_targets(const Statistics &statistics, const std::vector<model::Target> &targets) {
-    // Errors of a usable calibration or layout are smaller.
+    // A usable calibration or layout causes smaller errors.
     const auto fits = [](const TargetStatistics &seen) {
         return seen.mean_reprojection_px <= std::max(3.0, 0.01 * seen.largest_px);
     };

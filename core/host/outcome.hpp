@@ -17,15 +17,15 @@ struct Problem {
     bool is_missing_target = false; // the tracker works, but has seen none of its targets in any frame
 };
 
-// `targets`: those of the tracker at the end of the run.
+// `targets`: the targets of the tracker that was in use at the end of the run.
 std::optional<Problem> problem_with_run(const run_config::Configuration &configuration, const Statistics &statistics,
                                         const std::vector<model::Target> &targets);
 
-// Names the targets that were never seen although others were; "" if there are none.
+// Names the targets that were never seen, if others were seen; otherwise returns "".
 std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics,
                            const std::vector<model::Target> &targets);
 
-// Names the targets whose corners are not where the poses project them; "" if there are none.
+// Names the targets whose observed corners differ from the projections with their poses; "" if there are none.
 std::string misfitting_targets(const Statistics &statistics, const std::vector<model::Target> &targets);
 
 // Names a marker by its family and its id or, if it has one, its file: "tag36h11 23", "pattern hiro.patt".

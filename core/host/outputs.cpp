@@ -242,7 +242,7 @@ void Outputs::on_result(SinkQueue &sink, const Command &command, const Result &r
         parts_.context.log(ARHOST_SEVERITY_ERROR, name, reason);
         parts_.failures.add(name + ": " + reason, false, true);
         sink.answer(reason);
-    } // otherwise its receiver did not take the frame
+    } // otherwise the receiver did not take the frame in time
     close_sink(sink);
     sink.component->stop();
 }
@@ -339,7 +339,7 @@ SinkQueue &Outputs::start_output(const run_config::ComponentConfiguration &outpu
     return sink;
 }
 
-// Replaces the number in a numbered file name by the first one for which there is no file.
+// Replaces the number in a numbered file name by the first number for which no file exists.
 std::filesystem::path Outputs::free_path(const std::filesystem::path &pattern) const {
     if (pattern.filename().string().find('%') == std::string::npos)
         return pattern;

@@ -27,10 +27,10 @@ public:
     // Composites a frame and offers it to the outputs. Returns when the frame was composited.
     Frame::Clock::time_point show(Frame &frame);
     bool are_full() const; // no memory is free for a frame
-    void pump();           // submits waiting frames, stops outputs that end
+    void pump();           // submits waiting frames, stops outputs that are ending
     bool have_written_all() const;
     void stop();
-    void stop_waiting(); // lets sinks return that wait for their receivers
+    void stop_waiting(); // makes sinks return that wait for their receivers
     void remove_ended(); // the outputs that commands have started, and that have ended
 
     // ---- outputs that commands start; each throws control::Error -----------------------------------

@@ -8,15 +8,15 @@
 namespace arhost::host {
 namespace {
 
-constexpr double scale_step = 0.84; // an image with 0.7 times the pixels
+constexpr double scale_step = 0.84; // the resulting image has 0.7 times the pixels
 constexpr std::size_t min_images = 3;
 constexpr std::chrono::milliseconds window_length{500};
 constexpr int fast_windows_to_raise = 4, windows_to_confirm = 10;
 
-// Shares of the time per frame.
-constexpr double too_slow = 0.95; // lowers the quality
-constexpr double intended = 0.8;  // highest predicted time of the level that is then chosen
-constexpr double fast = 0.75;     // highest predicted time of a better level
+// In units of the time per frame.
+constexpr double too_slow = 0.95; // above this median, the quality is lowered
+constexpr double intended = 0.8;  // maximum predicted time of the level that is then chosen
+constexpr double fast = 0.75;     // maximum predicted time of a better level to which the quality is raised
 
 // A level that was too slow is tried again when the level below it takes this share of the time.
 constexpr double relief = 0.9;
@@ -49,7 +49,7 @@ void QualityController::change(std::size_t level) {
 }
 
 void QualityController::lower(double median) {
-    if (median_before_raise_ > 0) { // the last raise was a mistake
+    if (median_before_raise_ > 0) { // the last raise made the images too slow
         failed_level_ = level_;
         failed_from_median_ = median_before_raise_;
     }

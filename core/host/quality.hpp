@@ -13,14 +13,15 @@ namespace arhost::host {
 // The quality of one image.
 struct Quality {
     double scale = 1;          // size of the image relative to the frame
-    std::uint32_t samples = 0; // option `samples` of the ray tracer; 0: it has no such option, or it is not adapted
+    std::uint32_t samples = 0; // option `samples` of the ray tracer; 0: there is no such option, or it is not adapted
     bool operator==(const Quality &) const = default;
 };
 
 // Chooses among levels of quality: first fewer samples, then smaller images. To prevent oscillation,
-// - a level is left only if the median time of half a second exceeds the time per frame, and a better one is entered
-//   only if its predicted time stays well below it for two seconds;
-// - a better level that turned out to be too slow is not entered again until the time at the lower one has decreased.
+// - a level is left only if the median time of half a second exceeds the time per frame; a better level is entered
+//   only if its predicted time stays well below the time per frame for two seconds;
+// - a better level that turned out to be too slow is entered again only when the time at the next lower level has
+//   decreased.
 class QualityController {
 public:
     using Clock = std::chrono::steady_clock;

@@ -98,8 +98,8 @@ void Raytracer::render(Frame &frame) {
     component().submit(command, frame.anchors.region());
 }
 
-// Writes the poses of the anchors, the targets to which objects of the scene are attached. They come from this frame,
-// so that an object stays on its target even if the pose of the world comes from an earlier frame.
+// Writes the poses of the anchors: the targets to which objects of the scene are attached. The poses are those of
+// this frame, so that an object stays on its target even if the pose of the world is from an earlier frame.
 void Raytracer::write_anchors(const Frame &frame) const {
     auto *poses = reinterpret_cast<AnchorPose *>(frame.anchors.bytes().data());
     for (std::size_t i = 0; i < scene_->anchors.size(); ++i) {
@@ -142,7 +142,7 @@ void Raytracer::on_result(const Command &command, const Result &result) {
     }
 }
 
-// Begins to adapt the quality of images to `live.target_fps`, unless it is already adapted within the same limits.
+// Begins to adapt the quality of images to `live.target_fps`, unless a controller with the same limits exists.
 void Raytracer::start_quality() {
     samples_in_use_ = 0; // a new worker has the configured number
     const run_config::Configuration &run = parts_.configuration;
@@ -151,7 +151,7 @@ void Raytracer::start_quality() {
     const PluginDescription &plugin = component().description();
     const auto supports = [&](std::uint32_t capability) { return (plugin.capabilities & capability) != 0; };
     QualityController::Limits limits{.target_fps = run.target_fps};
-    // The worker that warps the images of a plugin without support for lenses needs them in full size.
+    // If the worker warps the images because the plugin does not support lenses, they must have full size.
     if (supports(ARHOST_CAPABILITY_SCALED_IMAGES) &&
         (supports(ARHOST_CAPABILITY_LENS_DISTORTION) || parts_.video.intrinsics.distortion == ARHOST_DISTORTION_NONE))
         limits.min_scale = run.min_scale;
@@ -171,11 +171,11 @@ void Raytracer::start_quality() {
 }
 
 void Raytracer::on_samples_changed() {
-    start_quality();     // its limit is the new value
-    samples_in_use_ = 0; // a reduction may have followed the new value
+    start_quality();     // the new value is the upper limit
+    samples_in_use_ = 0; // unknown, because a reduction may have been requested after the new value was
 }
 
-// Lets the images that are requested from now on have this number of samples; 0: does not change it.
+// Requests this number of samples for all later images; 0: no change.
 void Raytracer::request_samples(std::uint32_t samples) {
     if (samples == 0 || samples == samples_in_use_)
         return;
@@ -184,7 +184,7 @@ void Raytracer::request_samples(std::uint32_t samples) {
     value.key = "samples";
     value.type = ARHOST_OPTION_INTEGER;
     value.integer = samples;
-    // If a worker dies before it answers, start_quality() is called for the next one.
+    // If the worker dies before it answers, start_quality() is called for the next worker.
     component().set_option(value, [this, previous](const std::string &error) {
         if (!error.empty() && parts_.configuration.recording)
             component().log(ARHOST_SEVERITY_WARNING, "the recorded number of samples cannot be set: " + error);

@@ -32,9 +32,9 @@ public:
 
     FrameFlow::Intake intake() const override;
     void render(Frame &frame);
-    // From now on, its images count. `previous`: the stage that it replaces, or null.
+    // Makes this stage the current one. `previous`: the stage that it replaces, or null.
     void take_over(const Raytracer *previous);
-    void on_samples_changed(); // by the command `set`
+    void on_samples_changed(); // to be called when the command `set` has changed the number of samples
 
     const Configuration &configuration() const { return configuration_; }
     const std::shared_ptr<LoadedScene> &scene() const { return scene_; }
@@ -53,7 +53,7 @@ private:
     const std::shared_ptr<LoadedScene> scene_;
     std::shared_ptr<SlotPool> anchor_slots_;   // of AnchorPose; null if the scene has no anchors
     std::optional<QualityController> quality_; // only with `live.target_fps`
-    std::uint32_t samples_in_use_ = 0;         // the option of the current worker
+    std::uint32_t samples_in_use_ = 0;         // value of the option in the current worker
 };
 
 } // namespace arhost::host

@@ -38,7 +38,7 @@ void Run::log(const supervise::LogFunction &log, arhost_severity severity, const
               const std::string &text) {
     if (severity != ARHOST_SEVERITY_HINT || component != "tracker")
         log(severity, component, text);
-    else if (!assembly_.has_retired()) // otherwise it may be of a tracker that was replaced
+    else if (!assembly_.has_retired()) // otherwise, the hint may be from a replaced tracker
         sightings_.add_hint(text);
 }
 

@@ -23,8 +23,9 @@ public:
         // Applies edits of the configuration and of the scene while the run lasts. Parses the configuration again and
         // throws yaml::Error. Empty: edits are not applied.
         std::function<run_config::Configuration()> read_configuration{};
-        // Only checks that all components start: outputs write to subfolders of this folder instead of their own,
-        // which the permissions of their components must allow, and no frame is processed, unless `checks_frames`.
+        // Only checks that all components start. Outputs write to subfolders of this folder instead of their own
+        // folders; the permissions of their components must allow this. No frame is processed, unless
+        // `checks_frames`.
         std::optional<std::filesystem::path> check_scratch{};
         bool checks_frames = false;
     };
@@ -42,8 +43,8 @@ public:
     const Failures &failures() const { return parts_.failures; }
     const Statistics &statistics() const { return parts_.statistics; }
     ComponentTotals component_totals() const { return parts_.totals.plus(components()); }
-    std::vector<model::Target> targets() const; // that the tracker looks for now
-    // Describes the started components and what they have found, one per line, for the user.
+    std::vector<model::Target> targets() const; // the targets that the tracker currently looks for
+    // Describes the started components and their findings, one per line, for the user.
     std::vector<std::string> findings() const;
 
 private:

@@ -36,7 +36,7 @@ Json camera_json(const arhost_intrinsics &camera) {
             {"distortion", {{"model", model}, {"coefficients", coefficients}}}};
 }
 
-// The run waits while its files are hashed.
+// Limits the hashed data, because the run waits while files are hashed.
 constexpr std::uint64_t max_hashed_bytes = 32 << 20;
 
 Json plugin_json(const Component &component) {
@@ -121,8 +121,8 @@ std::string run_description(const RunParts &parts, const Assembly &assembly, con
                         {"folder", origin.folder.string()},
                         {"overridden", std::move(overridden)},
                         {"changed_options", changed_options(parts, assembly)}});
-    // Any sink can read the description, and sessions are passed on: it contains neither the outputs, whose options
-    // may be secret and which a replay does not use, nor names, passwords and queries of URLs.
+    // Any sink can read the description, and users pass sessions on. Therefore the description omits the outputs,
+    // whose options may be secret and which a replay does not use, and the names, passwords and queries of URLs.
     description["configuration"] =
         without_url_credentials(configuration.to_yaml({"outputs", "snapshot", "record"}), "") + "\n";
     std::string text = description.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -23,12 +23,12 @@ struct RunParts {
     RunParts(const RunParts &) = delete;
     RunParts &operator=(const RunParts &) = delete;
 
-    const run_config::Configuration &configuration; // with which the run has begun
+    const run_config::Configuration &configuration; // the configuration with which the run began
     supervise::Context context;
     Statistics statistics;
     Failures failures;
     ComponentOptions options;
-    ComponentTotals totals; // of the components that have ended before the run
+    ComponentTotals totals; // totals of the components that ended before the end of the run
     Cameras cameras;
     FrameFlow flow;
     Video video;
@@ -39,7 +39,7 @@ struct RunParts {
     bool take_if_ended(const supervise::Component &component);
     void log(arhost_severity severity, const std::string &text) const { context.log(severity, "arhost", text); }
 
-    // Returns callbacks that report failures of the component `name`; the others do nothing.
+    // Returns callbacks that report failures of the component `name`. The other callbacks do nothing.
     supervise::Component::Callbacks callbacks(const std::string &name, const yaml::Node &node);
 };
 

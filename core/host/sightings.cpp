@@ -41,7 +41,7 @@ void Sightings::add(Frame &frame) {
     warn_of_missing_targets();
 }
 
-// Counts the markers of no target, and those of targets without a pose.
+// Counts the markers that belong to no target, and those of targets without a pose.
 void Sightings::count_other_markers(Frame &frame) {
     std::set<std::string> unlisted, unconfirmed;
     std::vector<bool> has_pose(frame.observations.size());

@@ -20,11 +20,11 @@ class Sightings {
 public:
     explicit Sightings(RunParts &parts) : parts_(parts) {}
 
-    // `tracker` is the one in use from now on.
+    // `tracker`: the tracker that is in use from now on.
     void set_tracker(std::shared_ptr<const run_config::TrackerConfiguration> tracker);
     // Counts the results of the tracker. Sets `search.unlisted_count` and `families` of the frame's record.
     void add(Frame &frame);
-    // Keeps what the tracker sees instead of the targets for the warning that they were not seen.
+    // Stores what the tracker sees instead of the targets. The warning that targets were not seen contains this text.
     void add_hint(std::string text);
 
 private:

@@ -22,12 +22,12 @@ public:
     // Maximum number of waiting frames; if there are more, the queue drops the oldest. 0: unlimited, the run waits
     // for the sink.
     std::size_t max_waiting = 0;
-    std::string id;               // unique, also among runs; a restarted sink recognises its files by it
-    std::filesystem::path folder; // to write to instead of the configured ones; ""
+    std::string id;               // unique, also among runs; a restarted sink uses it to recognise its files
+    std::filesystem::path folder; // folder to write to instead of the configured folders; "": the configured ones
     bool closed = false;          // has failed or ended, and accepts no more frames
     bool has_quit = false;        // has ended the run; receives the remaining frames
-    bool ending = false;          // accepts no more frames, and stops once it has written those that wait
-    bool is_single = false;       // takes one frame, then ends
+    bool ending = false;          // accepts no more frames, and stops once it has written the waiting frames
+    bool is_single = false;       // accepts one frame, then ends
     // For an output that a command has started: its file, and what answers the command in progress.
     bool on_demand = false;
     std::string path;

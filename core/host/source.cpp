@@ -95,7 +95,7 @@ void Source::set_intrinsics(const messages::Ready &ready) {
         intrinsics = *configuration.camera;
     else if (ready.intrinsics)
         intrinsics = *ready.intrinsics;
-    else if (configuration.time_codes) // only the ids of markers matter, not their poses
+    else if (configuration.time_codes) // only the ids of markers matter here, not their poses
         intrinsics = camera::dissertation_camera({format.width, format.height});
     else if (configuration.tracker)
         configuration.source->node.fail("this source does not report camera intrinsics: add 'camera: {file: "
@@ -176,8 +176,8 @@ void Source::on_frame(Lease pixels, const Command &command, const Result &result
 }
 
 // Copies recorded data that the video of a session does not contain, such as the capture time. If the run repeats the
-// recorded decisions, also copies the results of the tracker: they may depend on frames that the recorded run
-// dropped.
+// recorded decisions, also copies the recorded results of the tracker, because they may depend on frames that the
+// recorded run dropped.
 void Source::repeat_record(Frame &frame) const {
     const run_config::RecordedFrame &recorded = *frame.recorded;
     frame.record.clock = recorded.clock;

@@ -48,7 +48,8 @@ Frame *Stage::accept(const Command &command, const Result &result) {
     Frame *const frame = parts_.flow.answered(command.sequence);
     if (!frame || result.status >= 0)
         return frame;
-    if (parts_.statistics.errors[{component_->name(), result.status}]++ == 0) // the end of the run tells how many
+    // Logs only the first error of each kind. The end of the run reports the number.
+    if (parts_.statistics.errors[{component_->name(), result.status}]++ == 0)
         component_->log(ARHOST_SEVERITY_WARNING,
                         "frame " + std::to_string(command.sequence) + ": " + status_text(result.status));
     parts_.flow.on_failed(*frame, component_->name().c_str());

@@ -11,8 +11,8 @@ namespace arhost::host {
 
 class Stage {
 public:
-    // Called when the stage is disabled. Returns whether it only was to replace another stage, so that the run does
-    // not fail.
+    // Called when the stage is disabled. Returns true if the stage was only meant to replace another stage, so that
+    // the run does not fail.
     using Abandon = std::function<bool(const Stage &stage, const std::string &reason)>;
 
     virtual ~Stage() = default;
@@ -25,7 +25,7 @@ public:
     control::Done swapped; // answers the command that has started this stage as the successor of another one
 
 protected:
-    // `waiting`: stage of a frame that waits for this one. `max_in_flight`: frames that the worker gets at a time.
+    // `waiting`: the stage of frames that wait for this one. `max_in_flight`: maximum number of frames in the worker.
     Stage(RunParts &parts, const char *name, const run_config::ComponentConfiguration &configuration,
           Frame::Stage waiting, std::size_t max_in_flight, Abandon abandon);
 

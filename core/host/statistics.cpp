@@ -119,7 +119,7 @@ void ComponentTotals::add(const supervise::Component &component) {
     restarts[component.name()] += component.restarts();
     for (const auto &[name, value] : component.counters())
         if (auto &counted = counters[component.name()];
-            counted.contains(name) || counted.size() < ARHOST_MAX_COUNTERS) // the names are the plugin's
+            counted.contains(name) || counted.size() < ARHOST_MAX_COUNTERS) // the plugin chooses the names
             counted[name] += value;
     for (const supervise::Crash &crash : component.crashes())
         crashes.push_back({component.name(), crash});

@@ -39,8 +39,8 @@ private:
     std::int64_t max_ns_ = 0;
 };
 
-// Times of a frame that was sent to the outputs. The time of a stage that the frame skipped is 0; so is the device
-// time if the ray tracer reported none.
+// Times of a frame that was sent to the outputs. Stages that the frame skipped have the time 0, as has the device if
+// the ray tracer reported no device time.
 struct FrameTimes {
     std::uint64_t frame = 0;
     std::chrono::steady_clock::time_point shown{};
@@ -74,7 +74,7 @@ struct TargetStatistics {
 
 // Totals of arhost_record.search.
 struct SearchStatistics {
-    std::uint64_t frames = 0, everywhere = 0; // frames that the tracker has processed; of these, those searched whole
+    std::uint64_t frames = 0, everywhere = 0; // frames that the tracker has processed; those searched completely
     std::uint64_t frames_with_candidate_count = 0, candidates = 0; // quadrilaterals that the tracker has examined
     std::uint64_t observations = 0, unlisted = 0, expected = 0, missed = 0; // markers
     void add(const arhost_search &search);
@@ -91,17 +91,18 @@ struct Statistics {
     SearchStatistics search;
     std::map<std::string, std::uint64_t> unlisted;    // frames with a marker that no target lists, by name
     std::map<std::string, std::uint64_t> unconfirmed; // frames with a listed marker whose target got no pose
-    std::vector<std::string> hints;                   // of the tracker: what it sees instead of the targets
+    std::vector<std::string> hints;                   // what the tracker saw instead of the targets
     std::map<std::string, std::uint64_t> dropped;     // number of dropped frames by stage
     std::map<std::string, std::uint64_t> skipped;     // number of unaugmented frames by the failed stage
     std::map<std::pair<std::string, arhost_status>, std::uint64_t> errors; // frames by stage and error
     StageTimings stages;
-    // From the capture of a frame until an output has written it, by output; `latency` of `stages` ends when the
-    // frame is composited. Both begin at the arrival of the frame if the source does not know when it was captured.
+    // Time from the capture of a frame until an output has written it, for each output. `latency` of `stages` ends
+    // when the frame is composited. If the source does not know the capture time, both begin at the arrival of the
+    // frame.
     StageTimings latencies;
     bool latency_from_capture = false;
     std::optional<Quality> quality;    // requested from the ray tracer; only with `live.target_fps`
-    std::uint64_t quality_changes = 0; // how often it was changed
+    std::uint64_t quality_changes = 0; // number of changes
     std::chrono::steady_clock::time_point first_frame{}, last_frame{};
     contracts::ContractChecks contract_checks; // checks of the components with `conform: true`
     std::vector<FrameTimes> timeline;          // only if the configuration requests it
@@ -123,13 +124,13 @@ struct ComponentTotals {
     ComponentTotals plus(const std::vector<supervise::Component *> &components) const;
 };
 
-// Returns the percentiles as one line: of the latencies, then of the stages.
+// Returns the percentiles of the latencies and then of the stages, as one line.
 std::string percentiles_text(const StageTimings::ByName &stages, const StageTimings::ByName &latencies);
 
 // Returns the member `latency` of the statistics and of the status document.
 nlohmann::ordered_json latency_json(const Statistics &statistics, const StageTimings::ByName &latencies);
 
-// Returns the member `quality` of both; null without `live.target_fps`.
+// Returns the member `quality` of the statistics and of the status document; null without `live.target_fps`.
 nlohmann::ordered_json quality_json(const Statistics &statistics);
 
 // Returns CSV with a header and one line per frame:
@@ -137,7 +138,7 @@ nlohmann::ordered_json quality_json(const Statistics &statistics);
 // of the first frame.
 std::string timeline_csv(const Statistics &statistics);
 
-// `components`: of all components of the run.
+// `components`: the totals of all components of the run.
 nlohmann::ordered_json report(const Statistics &statistics, const ComponentTotals &components,
                               double host_cpu_seconds);
 

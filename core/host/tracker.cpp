@@ -75,7 +75,7 @@ SlotLayout Tracker::on_ready(const messages::Ready &ready) {
 }
 
 void Tracker::on_disabled(const std::string &reason, bool is_configuration_error) {
-    // While the video runs, it continues without the whole tracker.
+    // While the video runs, the run continues without the tracker, so the message concerns all targets.
     const auto target = parts_.failures.video_runs() ? std::nullopt : quoted_target(reason, *configuration_);
     parts_.failures.add_disabled(target ? target->path() : "tracker", target.value_or(configuration_->node), reason,
                                  is_configuration_error);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The tracker of a run. The host owns its state: what a call writes is committed with its result, and survives the
-// worker (docs/adr/0026).
+// The tracker of a run. The host owns the tracker's state. The state that a call writes becomes valid with the call's
+// result, and survives the worker (docs/adr/0026).
 #pragma once
 
 #include "host/sightings.hpp"
@@ -17,12 +17,12 @@ public:
 
     void track(Frame &frame);
     const Configuration &configuration() const { return configuration_; }
-    // From now on, its results count. `previous`: the stage that it replaces, or null. Continues with the poses of
-    // its targets, if these are the same.
+    // Makes this stage the current one. `previous`: the stage that it replaces, or null. If both have the same
+    // targets, continues with the previous poses.
     void take_over(Tracker *previous);
 
 private:
-    // Who can read the plugin's part of a state: a worker with the same plugin.
+    // Identifies the workers that can read the plugin's part of a state: those with the same plugin.
     struct StateOwner {
         std::size_t candidate = 0;
         std::string version;
@@ -36,10 +36,10 @@ private:
 
     Sightings &sightings_;
     const Configuration configuration_;
-    const ipc::SharedMemory targets_; // those of the configuration, for its workers
+    const ipc::SharedMemory targets_; // the configured targets, for the workers
     const std::size_t family_count_;
     StateOwner state_owner_;               // the current worker
-    Lease state_;                          // what the last accepted call has written
+    Lease state_;                          // the state that the last accepted call has written
     bool state_is_of_solver_only_ = false; // another plugin wrote the rest (ipc::Command)
 };
 

@@ -11,7 +11,7 @@
 namespace arhost::host {
 namespace {
 
-// A product of two rigid transforms, whose rotation is orthonormal in spite of rounding errors.
+// Returns a product of two rigid transforms. Its rotation is orthonormal in spite of rounding errors.
 glm::dmat4 product(const glm::dmat4 &a, const glm::dmat4 &b) {
     glm::dmat4 m = a * b;
     const glm::dvec3 x = glm::normalize(glm::dvec3(m[0]));
