@@ -25,7 +25,8 @@ int standard_stream(const fs::path &file) {
     return -1;
 }
 
-// Returns the permissions of `file`, or those that open(2) would give it if it does not exist.
+// Returns the permissions of `file`. If it does not exist, returns the permissions with which open(2) would create
+// it.
 mode_t permissions_of(const fs::path &file) {
     struct stat status {};
     if (::stat(file.c_str(), &status) == 0)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The clock of deadlines and of decisions about frames. Tests replace it to set the time.
+// The clock for deadlines and for decisions about frames. Tests replace it to control the time.
 #pragma once
 
 #include <chrono>
@@ -22,7 +22,7 @@ public:
     time_point now() const override { return std::chrono::steady_clock::now(); }
 };
 
-// Returns the time in ns of CLOCK_MONOTONIC, as the ABI has it.
+// Returns the time in ns of CLOCK_MONOTONIC, the unit of the ABI.
 inline std::int64_t to_ns(Clock::time_point time) {
     return std::chrono::nanoseconds(time.time_since_epoch()).count();
 }

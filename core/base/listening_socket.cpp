@@ -133,7 +133,7 @@ void ListeningSocket::listen_at_path(const fs::path &path) {
             errno = EADDRINUSE;
         } catch (const std::system_error &error) {
             errno = EADDRINUSE;
-            if (error.code().value() == ECONNREFUSED) // its program has ended
+            if (error.code().value() == ECONNREFUSED) // the program that listened has ended
                 bound = ::unlink(path.c_str()) == 0 && bind();
         }
     }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Listening sockets of outputs, and the Unix sockets by which a running arhost is found.
+// Listening sockets of outputs, and the Unix sockets with which other programs find a running arhost.
 #pragma once
 
 #include "base/unique_fd.hpp"
@@ -14,9 +14,9 @@ namespace arhost::base {
 // variable is not set.
 std::filesystem::path named_socket(const std::string &name);
 
-// Returns why `address` is invalid, or "". Valid are a name of letters, digits, "-" and "_" that is not a number; the
-// absolute path of a Unix socket; "127.0.0.1:8080", "[::1]:8080" and "localhost:8080", whose port may be 0 for any
-// free port.
+// Returns why `address` is invalid, or "". Three forms are valid: a name of letters, digits, "-" and "_" that is not
+// a number; the absolute path of a Unix socket; "127.0.0.1:8080", "[::1]:8080" or "localhost:8080". The port 0 means
+// any free port.
 std::string problem_with_address(const std::string &address);
 
 // A non-blocking stream socket that listens at an address.
@@ -30,7 +30,7 @@ public:
     ListeningSocket &operator=(ListeningSocket &&) = delete;
 
     int fd() const { return fd_.get(); }
-    const std::string &address() const { return address_; } // with the path of a named socket and the actual port
+    const std::string &address() const { return address_; } // contains the path of a named socket and the actual port
 
 private:
     void listen_at_path(const std::filesystem::path &path);

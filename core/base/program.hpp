@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Parts that the programs of the command line share.
+// Utilities that the command-line programs share.
 #pragma once
 
 #include <filesystem>
@@ -17,9 +17,9 @@ struct InvalidInput : std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-// Establishes a known state, whatever the parent process has set up: reopens standard streams that are closed, so
-// that no socket gets descriptor 0, 1 or 2, and resets the signal handling. Ignores SIGPIPE and SIGXFSZ, so that the
-// failing system calls return an error instead.
+// Establishes a known state, independent of the parent process. Reopens standard streams that are closed, so that no
+// socket gets descriptor 0, 1 or 2, and resets the signal handling. Ignores SIGPIPE and SIGXFSZ, so that the failing
+// system calls return an error instead.
 void prepare_process();
 
 // Prints the error as a single line, even if a file name in it contains a line break. Returns `status`.

@@ -10,7 +10,7 @@
 
 namespace arhost::base {
 
-// A folder for temporary files, which is deleted by the destructor. `name`: how its name begins.
+// A folder for temporary files, which the destructor deletes. `name`: the beginning of the folder's name.
 class TemporaryFolder {
 public:
     explicit TemporaryFolder(const std::string &name) {

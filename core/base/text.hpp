@@ -13,9 +13,9 @@ bool is_utf8(std::string_view text);
 // Returns `text` with invalid UTF-8 replaced with U+FFFD.
 std::string valid_utf8(std::string_view text);
 
-// Returns `text` as one line of valid UTF-8 that cannot control a terminal and is valid in XML 1.0: replaces control
+// Returns `text` as one line of valid UTF-8 that cannot control a terminal and is valid in XML 1.0. Replaces control
 // characters, line breaks, bidirectional marks, U+FFFE and U+FFFF with spaces. Truncates the result to `max_size`
-// bytes; "…" follows a truncated text.
+// bytes and then appends "…".
 std::string printable(std::string_view text, std::size_t max_size = std::string_view::npos);
 
 } // namespace arhost::base

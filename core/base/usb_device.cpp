@@ -31,7 +31,7 @@ bool is_number(const std::string &text) {
            std::ranges::all_of(text, [](char c) { return c >= '0' && c <= '9'; });
 }
 
-// The interfaces of a device have folders named DEVICE:CONFIGURATION.INTERFACE beside its own.
+// In the folder that contains the device's folder, each interface has a folder named DEVICE:CONFIGURATION.INTERFACE.
 std::vector<unsigned> find_driver_less(const fs::path &devices, const std::string &device) {
     std::vector<unsigned> interfaces;
     std::error_code ignored;

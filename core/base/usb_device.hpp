@@ -22,12 +22,12 @@ struct UsbDevice {
     std::vector<unsigned> driver_less; // numbers of its interfaces that no driver uses
 };
 
-// Returns the connected device; if several match, the first by the name of its port.
+// Returns the connected device; if several match, that whose port comes first by name.
 std::optional<UsbDevice> find_usb_device(const UsbIdentity &identity,
                                          const std::filesystem::path &devices = usb_devices);
 
-// Lets the kernel's drivers use the interfaces that no driver uses, as after a device is connected. A process that
-// has taken them with usbfs and was killed has not returned them. May take seconds, because drivers query the device.
+// Makes the kernel's drivers use the interfaces that no driver uses, as after a device is connected. Necessary if a
+// process that has taken interfaces with usbfs was killed. May take seconds, because drivers query the device.
 void bind_usb_drivers(const UsbDevice &device);
 
 } // namespace arhost::base

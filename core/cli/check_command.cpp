@@ -24,8 +24,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Checks the plugins, fallbacks included, and their options. Returns the ray tracers.
-// `logs_notes`: warns of options that are set aside, which otherwise the run does.
+// Checks the plugins, fallbacks included, and their options. Returns the ray tracers. `logs_notes`: warns of options
+// that are ignored; otherwise the run warns of them.
 std::vector<model::PluginDescription> check_plugins(const run_config::Configuration &configuration,
                                                     supervise::Context &context, bool logs_notes) {
     const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
@@ -117,8 +117,7 @@ std::string with_own_folders(std::string text, const Folders &folders) {
 }
 
 // Starts all components once, without restarts, and prints what they report. The outputs may write only to a
-// temporary folder; messages name their own folder instead.
-// Returns the exit status.
+// temporary folder; messages name the configured folders instead. Returns the exit status.
 int check_by_opening(run_config::Configuration configuration, const Arguments &arguments,
                      supervise::Context context) {
     const base::TemporaryFolder scratch("arhost-check");

@@ -23,7 +23,7 @@ struct Arguments {
     double axis1[3] = {0, 0, 0}, axis2[3] = {0, 0, 0};
     bool verbose = false;
     bool allow_no_target = false; // a run in which the tracker sees no marker succeeds
-    bool debug_view = false;      // set the option of this name of every output that has it
+    bool debug_view = false;      // set the option `debug_view` of every output that has it
     bool watch = false;           // apply edits of the configuration and of the scene while the video runs
     bool in_process = false;      // run the plugins in the host's process, without timeouts and sandbox
 };
@@ -44,7 +44,7 @@ int run(const Arguments &arguments, supervise::Starter &launcher);
 int latency(Arguments arguments, supervise::Starter &launcher);
 int replay(const Arguments &arguments, const ReplayArguments &replay, supervise::Starter &launcher);
 // Checks a configuration. If `open`, also starts source, tracker, ray tracer and outputs as a run does, processes
-// `arguments.frames` frames, if given, and prints what it found; outputs then write to a temporary folder.
+// `arguments.frames` frames, if given, and prints the findings. Outputs then write to a temporary folder.
 int check(const Arguments &arguments, bool open, supervise::Starter &launcher);
 
 } // namespace arhost::cli

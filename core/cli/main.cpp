@@ -86,7 +86,7 @@ CommandLine add_check(CommandLine &app, Arguments &arguments, bool &no_open) {
     return command;
 }
 
-// The subcommands that other programs implement, because the host does not need what they do: `arhost devices` runs
+// The subcommands that separate programs implement, because the host does not need their code: `arhost devices` runs
 // arhost-devices.
 constexpr struct {
     const char *command, *description;

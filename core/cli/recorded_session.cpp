@@ -141,12 +141,12 @@ void expect_ascending(const Line &line, const RecordedFrame &frame, const Record
         line.fail("capture_ns: must not be less than in the line before");
 }
 
-// Reads the frames that the video, of `video_bytes` bytes, contains completely.
+// Reads the frames that the video contains completely. The video has `video_bytes` bytes.
 void read_log(Session &session, std::uint64_t video_bytes) {
     const fs::path file = session.folder / log_file;
     std::ifstream stream(file, std::ios::binary);
     std::vector<RecordedFrame> &frames = session.recording.frames;
-    std::uint64_t lacking = 0, end_before = 0; // frames that the video lacks; `video_end` of the line before
+    std::uint64_t lacking = 0, end_before = 0; // frames that the video lacks; `video_end` of the previous line
     bool is_complete = false;
     std::string text;
     for (Line line{file, 1}; std::getline(stream, text); ++line.number) {

@@ -24,8 +24,8 @@ struct Session {
     std::vector<std::string> changed_scene_files() const;
 };
 
-// Reads a session. Frames at the end that the video or the log does not have completely are left out, with a warning.
-// Throws yaml::Error, whose message names file and line, for anything else that is missing or damaged.
+// Reads a session. Omits frames at the end that are incomplete in the video or in the log, with a warning. If
+// anything else is missing or damaged, throws yaml::Error, whose message names file and line.
 Session read_session(const std::filesystem::path &folder);
 
 } // namespace arhost::cli

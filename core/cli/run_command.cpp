@@ -35,7 +35,7 @@ public:
     explicit Reports(const run_config::Configuration &configuration)
         : stats_(open(configuration.stats)), timeline_(open(configuration.timeline)) {}
 
-    // Writes those that the configuration has. Returns false if one cannot be written.
+    // Writes the configured files. Returns false if one cannot be written.
     bool write(const run_config::Configuration &configuration, const Statistics &statistics,
                const ComponentTotals &components, Console &console) {
         if (statistics.frames_in == 0)
@@ -71,7 +71,7 @@ private:
     base::AtomicFile stats_, timeline_;
 };
 
-// The signals that end a run, which a descriptor receives instead of the process.
+// The signals that end a run. A descriptor receives them instead of the process.
 class EndingSignals {
 public:
     EndingSignals() {
@@ -102,7 +102,7 @@ public:
     }
     bool arrived() const { return first_.has_value(); }
 
-    // From here on, signals end the process immediately.
+    // After this call, signals end the process immediately.
     void release() {
         while (base::take_signal(fd_.get()) > 0) {
         }
@@ -130,7 +130,7 @@ void log_contract_checks(const contracts::ContractChecks &checks, Console &conso
                         " contract checks passed");
 }
 
-// Logs what the plugins have counted: "lost_by_driver 3, superseded 12".
+// Logs the counters of the plugins: "lost_by_driver 3, superseded 12".
 void log_counters(const ComponentTotals &totals, Console &console) {
     for (const auto &[component, counters] : totals.counters) {
         std::vector<std::string> texts;
@@ -156,8 +156,8 @@ void log_latencies(const run_config::Configuration &configuration, const Statist
     }
 }
 
-// Logs what is wrong with the results of a run that `completed`, or was `stopped` by a signal. Returns false if the
-// run must not count as a success.
+// Logs problems with the results of a run that `completed` or was `stopped` by a signal. Returns false if the run
+// must not count as a success.
 bool log_problems(const run_config::Configuration &configuration, const Arguments &arguments,
                   const Statistics &statistics, const std::vector<model::Target> &targets, bool completed,
                   bool stopped, Console &console) {

@@ -38,8 +38,8 @@ void convert_row(const arhost_frame_format &format, const YuvMatrix &matrix, con
 
 constexpr std::uint32_t one = 128; // weights are multiples of 1/128, so that the sums fit in 32 bits
 
-// The two adjacent pixels of the small image that are interpolated for a pixel of the large one, and the weight of
-// the second.
+// The two adjacent pixels of the small image between which a pixel of the large image is interpolated, and the weight
+// of the second.
 struct Between {
     std::uint32_t first, second, weight;
 };

@@ -40,8 +40,8 @@ constexpr Region region_of(const arhost_render_info &info, std::uint32_t width, 
 
 // Enlarges an image of the size `from_width` × `from_height` to that of `format`, bilinearly with premultiplied
 // alpha. The edges of both images coincide. Writes only the pixels of the returned region, which covers the enlarged
-// `region`; the others keep their values, and callers must treat them as transparent. Clips `region`, which may come
-// from an untrusted worker. `rgba` has `stride` bytes per row.
+// `region`. Other pixels keep their values, and callers must treat them as transparent. Clips `region`, which may
+// come from an untrusted worker. `rgba` has `stride` bytes per row.
 Region enlarge(const ImageView &image, std::uint32_t from_width, std::uint32_t from_height, const Region &region,
                const arhost_frame_format &format, std::uint8_t *rgba, std::size_t stride);
 

@@ -126,8 +126,8 @@ void SourceChecks::check(ContractChecks &checks, const arhost_record &record, st
 
 std::string SourceChecks::problem_with_rate(double since_first_s, double since_last_s, std::uint32_t skipped,
                                             std::int64_t now_ns) const {
-    // tolerance_s: resolution of media clocks. head_start_s: media time that a source may be ahead because it began
-    // to produce frames before the host recorded the start.
+    // tolerance_s: resolution of media clocks. head_start_s: the media time may be ahead by this, because a source
+    // may produce frames before the host records the start.
     constexpr double tolerance_s = 0.001, head_start_s = 1;
     const double step_s = (1.0 + skipped) / rate_.fps;
     if (rate_.is_configured && std::abs(since_last_s - step_s) > tolerance_s)
@@ -241,8 +241,8 @@ void OverlayChecks::check(ContractChecks &checks, std::uint64_t frame, const arh
                 last = x;
             }
         }
-        // The pixels between them cannot be further left or right. With lens distortion, they may be further up or
-        // down, which is not checked, because undistorting a pixel takes a microsecond.
+        // Opaque pixels between the first and the last cannot be further left or right. With lens distortion, they
+        // may be further up or down. This is not checked, because undistorting a pixel takes a microsecond.
         if (can_check_place && first && misplaced.empty())
             misplaced = check_place(*first, y);
         if (can_check_place && last && misplaced.empty())

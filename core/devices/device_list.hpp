@@ -14,7 +14,7 @@
 
 namespace arhost::devices {
 
-// The fields have the meanings of those in arhost/devices.h. The texts are printable.
+// The fields have the same meanings as in arhost/devices.h. The texts are printable.
 struct DeviceSize {
     std::uint32_t width = 0, height = 0;
     bool is_rate_range = false;
@@ -59,8 +59,8 @@ constexpr std::size_t max_device_list_size = 4 * 1024 * 1024; // bytes of JSON
 DeviceDescription describe(const arhost_device *device);
 
 // The list as JSON in ASCII; nullopt: the plugin does not support the extension. to_text throws std::runtime_error if
-// the list is too long; devices_from_text throws it or nlohmann::json::exception if the list is malformed, too long,
-// or violates the contract.
+// the list is too long. devices_from_text throws std::runtime_error or nlohmann::json::exception if the list is
+// malformed, too long, or violates the contract.
 std::string to_text(const std::optional<DeviceList> &list);
 std::optional<DeviceList> devices_from_text(std::string_view text);
 

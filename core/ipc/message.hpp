@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// A message received from a control channel. Apart from channel.hpp because the full JSON header takes long to
+// A message received from a control channel. Separate from channel.hpp, because the full JSON header takes long to
 // compile.
 #pragma once
 

@@ -36,7 +36,7 @@ struct Command {
     std::uint64_t sequence;
     std::int64_t capture_ns;
     arhost_clock clock;
-    std::uint32_t state_is_of_solver_only; // non-zero: the plugin's part of the state is another plugin's
+    std::uint32_t state_is_of_solver_only; // non-zero: another plugin wrote the plugin's part of the state
     double time_s;
     arhost_camera camera;
 };
@@ -98,7 +98,7 @@ inline std::uint32_t overlay_stride(std::uint32_t width) {
     return (width * 4 + 63) / 64 * 64;
 }
 
-// A slot that a ray tracer's worker reads consists of one of these for each anchor of the scene.
+// A slot that a ray tracer's worker reads contains one AnchorPose for each anchor of the scene.
 struct AnchorPose {
     std::uint32_t is_visible;
     std::uint32_t reserved;
@@ -106,12 +106,13 @@ struct AnchorPose {
 };
 
 // Layout of a slot that a tracker's worker writes: a header, an arhost_target for each configured target, the
-// observations, the expected markers, then the state of the worker and of the plugin, which only the worker can read.
+// observations, the expected markers, then the states of the worker and of the plugin. Only the worker can read these
+// states.
 class TrackerSlot {
 public:
     struct Header {
         std::uint32_t observation_count, expected_count;
-        std::uint32_t missed_count; // of the expected markers
+        std::uint32_t missed_count; // number of expected markers that were missed
         std::int32_t searched_everywhere, candidate_count;
     };
     static constexpr std::uint64_t targets_offset = 64;
@@ -127,9 +128,9 @@ private:
     static std::uint64_t aligned(std::uint64_t offset) { return (offset + 63) / 64 * 64; }
 };
 
-// Layout of a slot that sinks read: the record, its targets, observations and expected markers (the pointers in the
-// record are not set), the composited image, the video frame and the overlay. The host fills the last two only if a
-// sink reads them; unused pages take no memory.
+// Layout of a slot that sinks read: the record, its targets, observations and expected markers, the composited image,
+// the video frame and the overlay. The pointers in the record are not set. The host fills the video frame and the
+// overlay only if a sink reads them; unused pages take no memory.
 class OutputSlot {
 public:
     static constexpr std::uint64_t targets_offset = (sizeof(arhost_record) + 63) / 64 * 64;

@@ -92,8 +92,8 @@ void Reactor::dispatch_events(std::optional<std::chrono::milliseconds> timeout) 
     }
 }
 
-// If this process was suspended since the last call, extends all deadlines by the duration of the suspension, because
-// the workers may have been suspended, too. Time in which this thread used a processor is not suspension.
+// Extends all deadlines if this process was suspended since the last call, by the duration of the suspension, because
+// the workers may have been suspended, too. Time in which this thread used a processor does not count as suspension.
 void Reactor::postpone_by_suspension(std::optional<std::chrono::milliseconds> timeout) {
     constexpr std::chrono::milliseconds noticeable{50}; // above the scheduling delays of a busy machine
     const Clock::time_point now = Clock::now(), before = std::exchange(last_wait_end_, now);

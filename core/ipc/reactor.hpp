@@ -74,7 +74,7 @@ private:
     std::uint64_t next_id_ = 1;
     std::map<std::uint64_t, Watch> watches_;
     std::multimap<Clock::time_point, Deadline> deadlines_;
-    Clock::time_point last_wait_end_ = Clock::now(); // of the system, also if `clock_` is another one
+    Clock::time_point last_wait_end_ = Clock::now(); // time of the system, even if `clock_` is another clock
     std::chrono::nanoseconds cpu_time_at_last_wait_end_;
 };
 

@@ -5,9 +5,9 @@
 //
 // Host → worker: a futex on a counter in the host's page. The host increments it without blocking; the worker cannot
 // modify it, because its mapping is read-only.
-// Worker → host: a byte in a pipe. The host waits for it with epoll. The worker has only the write end: it can
-// neither take bytes out again, nor set a flag that makes the host block. (An eventfd has one end, which both would
-// share.)
+// Worker → host: a byte in a pipe. The host waits for it with epoll. The worker has only the write end, so it can
+// neither read bytes from the pipe nor set a flag that makes the host block. (An eventfd would be unsuitable, because
+// host and worker would share its only end.)
 #pragma once
 
 #include "base/unique_fd.hpp"

@@ -9,7 +9,7 @@ namespace arhost::latency {
 namespace {
 
 constexpr std::uint32_t data_cells = 6;
-constexpr std::uint32_t cells = data_cells + 4; // with the black border and the white one around it
+constexpr std::uint32_t cells = data_cells + 4; // including the black border and the white border around it
 
 // The first 64 tags of the family tag36h11 (AprilTag 3, BSD licence): the cells in rows from the top left, 1 is
 // white.
@@ -58,7 +58,7 @@ std::optional<std::chrono::nanoseconds> TimeCodes::see(std::span<const arhost_ob
                                                        Clock::time_point now) {
     const auto is_code = [](const arhost_observation &one) { return one.id >= 0 && one.id < count; };
     const auto found = std::ranges::find_if(seen, is_code);
-    // Two codes in one picture: the exposure began before one was replaced by the other.
+    // If a picture shows two codes, the exposure began before the second code replaced the first.
     if (found == seen.end() || std::ranges::count_if(seen, is_code) != 1)
         return {};
     const auto code = static_cast<std::size_t>(found->id);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The pictures with which `arhost latency` measures the time from the camera's lens to the display: while the camera
-// is pointed at the window, each frame replaces the picture by the next one, and the tracker reports which picture a
-// frame shows. A picture is a tag of the family tag36h11: two tags that an exposure mixes are not mistaken for a
-// third, because all differ in 11 of 36 cells.
+// The pictures with which `arhost latency` measures the time from the camera's lens to the display. The camera is
+// pointed at the window; each frame replaces the picture by the next one, and the tracker reports which picture a
+// frame shows. A picture is a tag of the family tag36h11. An exposure may mix two tags, but the mixture is not
+// mistaken for a third tag, because all tags differ in at least 11 of 36 cells.
 #pragma once
 
 #include "compositor/compositor.hpp"
@@ -36,11 +36,11 @@ public:
 private:
     struct Picture {
         Clock::time_point drawn{};
-        bool is_seen = true; // also if it was not drawn yet
+        bool is_seen = true; // also true before the picture is drawn for the first time
     };
     std::array<Picture, count> pictures_;
     std::uint64_t drawn_ = 0;
-    Clock::time_point last_seen_; // or the time of the last reminder
+    Clock::time_point last_seen_; // time of the last picture that was seen, or of the last reminder
 };
 
 } // namespace arhost::latency

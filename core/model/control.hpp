@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The commands that outputs send while the video runs (docs/control.md). Control never widens privilege: a command
-// chooses among the scenes, plugins and options of the configuration; it never contains a path or a permission.
+// The commands that outputs send while the video runs (docs/control.md). Commands never extend privileges: a command
+// chooses among the scenes, plugins and options of the configuration, and never contains a path or a permission.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -54,7 +54,8 @@ class Error : public std::runtime_error {
 // command, or if the command is not granted.
 Command parse(const std::string &text, const std::set<std::string, std::less<>> &granted);
 
-// Called once with the answer to a command: "" and the answer's members, or the reason why the command failed.
+// Called once with the answer to a command. On success, `error` is "" and `members` contains the answer's members;
+// otherwise `error` is the reason for the failure.
 using Done = std::function<void(const std::string &error, const nlohmann::ordered_json &members)>;
 
 std::string answer_text(const std::string &error, const nlohmann::ordered_json &members);

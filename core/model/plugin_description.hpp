@@ -39,8 +39,8 @@ struct OptionValue {
     std::string text;
 };
 
-// Returns the options of a descriptor. Steps by struct_size, because the plugin's headers may be newer and its
-// structs larger.
+// Returns the options of a descriptor. Steps by struct_size, because a plugin that was built with newer headers has
+// larger structs.
 std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor &descriptor);
 
 PluginDescription describe(const arhost_descriptor &descriptor);
@@ -51,7 +51,7 @@ constexpr std::size_t max_text_size = 4096; // bytes, of each text of a descript
 
 // The events that a plugin has counted, by name (arhost/counters.h).
 using Counters = std::map<std::string, std::uint64_t>;
-bool are_valid(const Counters &counters); // number and names
+bool are_valid(const Counters &counters); // checks the number and the names
 
 const char *to_text(arhost_kind kind);
 const char *status_text(arhost_status status);

@@ -12,9 +12,9 @@ namespace arhost::model {
 
 struct TargetMarker {
     std::int32_t id = 0;
-    std::string family;                                // or dictionary
+    std::string family;                                // family or dictionary
     std::array<std::array<double, 3>, 4> corners_mm{}; // as in arhost_marker_config
-    std::string file{};                                // of a pattern; "" for others
+    std::string file{};                                // file of a pattern or picture; "" for other markers
     double pattern_ratio = 0;
     bool operator==(const TargetMarker &) const = default;
 };
@@ -26,8 +26,8 @@ struct Target {
     bool operator==(const Target &) const = default;
 };
 
-// The families of all markers, each once, in the order of their first marker. arhost_marker_config.family and
-// arhost_observation.family are indices in it.
+// Returns the families of all markers, each once, in the order of their first marker. arhost_marker_config.family and
+// arhost_observation.family are indices into this list.
 std::vector<std::string> families_of(const std::vector<Target> &targets);
 
 } // namespace arhost::model

@@ -56,7 +56,7 @@ constexpr Bgr bgr_from_yuv(const YuvMatrix &m, int y, int u, int v) {
 
 // 0.299, 0.587 and 0.114 (ITU-R BT.601-7 §2.5.1) in units of 1/65536. The sum is 65536.
 constexpr std::uint16_t red_weight = 19595, green_weight = 38470, blue_weight = 7471;
-// Half a grey level, plus the mean error of the three truncations.
+// Half a grey level, plus the mean total error of the three truncations.
 constexpr std::uint16_t grey_rounding = 129;
 
 constexpr std::uint8_t grey_from_rgb(unsigned r, unsigned g, unsigned b) {

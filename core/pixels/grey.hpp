@@ -20,8 +20,8 @@ void fill_grey(const arhost_frame_format &format, const std::uint8_t *const plan
 void fill_grey_reference(const arhost_frame_format &format, const std::uint8_t *const planes[ARHOST_MAX_PLANES],
                          std::uint8_t *grey);
 
-// Returns whether plane 0 is the grey plane, but has limited range. Trackers then get a copy of full range instead,
-// because the plane must remain as it is for the compositor and for outputs.
+// Returns whether plane 0 is the grey plane, but has limited range. Trackers then get a full-range copy, because the
+// compositor and the outputs need the original plane.
 constexpr bool has_limited_luma_plane(const arhost_frame_format &format) {
     return (format.pixel_format == ARHOST_PIXEL_FORMAT_NV12 || format.pixel_format == ARHOST_PIXEL_FORMAT_I420) &&
            format.yuv_range != ARHOST_YUV_RANGE_FULL;

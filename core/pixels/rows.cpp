@@ -76,9 +76,9 @@ using V8 = hn::Vec<decltype(d8)>;
 using V16 = hn::Vec<decltype(d16)>;
 using VI16 = hn::Vec<decltype(di16)>;
 
-// Divides a row into chunks of as many pixels as a vector has bytes, and calls chunk(in, out) for each of them.
-// `pair_bytes[i]` is the number of bytes that in[i] has for two pixels. The last, incomplete chunk is processed in
-// stack buffers, so that no bytes past the end of the row are accessed.
+// Divides a row into chunks. The number of pixels of a chunk equals the number of bytes of a vector. Calls chunk(in,
+// out) for each chunk. `pair_bytes[i]` is the number of bytes of in[i] for two pixels. The last, incomplete chunk is
+// processed in stack buffers, so that no bytes past the end of the row are accessed.
 template <std::size_t streams, std::size_t out_bytes, class Chunk>
 HWY_INLINE void for_each_chunk(std::array<Bytes, streams> in, const std::array<std::size_t, streams> &pair_bytes,
                                std::uint8_t *out, std::size_t count, const Chunk &chunk) {

@@ -116,8 +116,8 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
     return component;
 }
 
-// Lets a tracker read the prints of its targets. If the sandbox cannot grant a file, the plugin says that it cannot
-// read it.
+// Lets a tracker read the prints of its targets. If the sandbox cannot grant access to a print, the plugin reports
+// that it cannot read the file.
 void let_read_prints(TrackerConfiguration &tracker) {
     for (const Target &target : tracker.targets)
         for (const TargetMarker &marker : target.markers)
@@ -141,7 +141,7 @@ TrackerConfiguration parse_tracker(const yaml::Node &node, const Shared &shared,
     return tracker;
 }
 
-// The outputs, and those that the commands `snapshot` and `record` start.
+// Returns the outputs, and those that the commands `snapshot` and `record` start.
 std::vector<const ComponentConfiguration *> outputs_of(const Configuration &configuration) {
     std::vector<const ComponentConfiguration *> all;
     for (const ComponentConfiguration &output : configuration.outputs)
@@ -202,7 +202,7 @@ std::filesystem::path find_scene(const yaml::Node &scene, const std::filesystem:
     scene.fail("there is no scene file '" + file.string() + "'" + hint_at_similar_name(file));
 }
 
-// The source or the trajectory, and how the run proceeds through the frames.
+// Parses the source or the trajectory, and the settings for the sequence of frames.
 void parse_run(Configuration &configuration, const Shared &shared) {
     const yaml::Node &root = shared.root;
     const auto trajectory = root.find("trajectory");
@@ -252,7 +252,7 @@ void parse_camera(Configuration &configuration) {
         configuration.warnings.push_back(warning_at(*configuration.camera_node, doubt));
 }
 
-// The tracker and the ray tracer.
+// Parses the tracker and the ray tracer.
 void parse_stages(Configuration &configuration, const Shared &shared, const std::filesystem::path &built_in_plugins) {
     if (const auto node = shared.root.find("tracker")) {
         configuration.tracker = parse_tracker(*node, shared, configuration.warnings);
@@ -275,7 +275,7 @@ void parse_choices(Configuration &configuration, const Shared &shared,
         if (std::ranges::any_of(others, [&](const auto &other) { return other.name == name; }))
             node.fail("there are two with the name '" + name + "'; give each its own 'name'");
     };
-    // An alternative has the settings of the configured component that are not the plugin's.
+    // An alternative gets the settings of the configured component, except those of the plugin.
     const auto add_alternatives = [&](const char *kind, const auto &configured, auto &all) {
         if (configured)
             all.push_back(*configured);
@@ -344,7 +344,7 @@ void parse_live(Configuration &configuration, const yaml::Node &live) {
     configuration.min_samples = count_or_default(live, "live.min_samples", 1, 65536);
 }
 
-// The files that the host writes.
+// Parses the files that the host writes.
 void parse_reports(Configuration &configuration) {
     for (const auto &[key, file] :
          {std::pair{"stats", &configuration.stats}, std::pair{"timeline", &configuration.timeline}}) {

@@ -36,8 +36,8 @@ struct ComponentConfiguration {
     sandbox::Policy policy;                       // docs/security.md
     bool conform = false;                         // check results at run time (docs/conformance.md)
     std::set<std::string, std::less<>> control{}; // the commands that the output may send
-    bool debug_view = false;                      // of an output: set the option of this name, if the plugin has it
-    std::string name{}; // of a tracker or ray tracer among the alternatives; by default the plugin's
+    bool debug_view = false;                      // of an output: set the option `debug_view`, if the plugin has it
+    std::string name{}; // of a tracker or ray tracer among the alternatives; default: the name of the plugin
 };
 
 struct SourceConfiguration : ComponentConfiguration {
@@ -46,7 +46,7 @@ struct SourceConfiguration : ComponentConfiguration {
 
 struct TrackerConfiguration : ComponentConfiguration {
     std::vector<Target> targets;
-    std::vector<yaml::Node> target_nodes{}; // of each target
+    std::vector<yaml::Node> target_nodes{}; // for each target
     std::vector<std::filesystem::path> map_files{};
     std::uint32_t hold_frames = 0;
     std::uint32_t world_grace_frames = 90, full_search_every = 10;
@@ -89,12 +89,12 @@ struct Configuration {
     double target_fps = 0; // mode live: frame rate for which the quality of images is reduced; 0: never
     double min_scale = 0.5;
     std::uint32_t min_samples = 1;
-    // `arhost latency`: outputs get pictures of time codes in place of the frames. The camera sees the display that
-    // shows them, and the tracker reads the codes.
+    // `arhost latency`: outputs get pictures of time codes instead of the frames. The camera sees the display that
+    // shows these pictures, and the tracker reads the codes.
     bool time_codes = false;
     std::vector<std::string> warnings{};
     std::optional<std::filesystem::path> stats{}, timeline{}; // absolute
-    FilesInUse files{};                                       // without the files to which the scene refers
+    FilesInUse files{};                                       // without the files that the scene refers to
 
     std::vector<OutputFile> report_files() const; // the files that the host writes: `stats` and `timeline`
 };
@@ -116,10 +116,10 @@ void for_each_component(auto &configuration, const auto &function) {
 }
 
 // Returns the option values for creating a component's plugin. `candidate` is 0 for the plugin itself and 1 for the
-// fallback, for which the configured options are ignored and all options have their defaults. Throws yaml::Error if
-// the plugin has the wrong kind, needs a permission that is not allowed, or does not accept the options, or if an
-// input file cannot be read or an output file cannot be written.
-// Adds to `notes` the options that are set aside (resolve_options).
+// fallback. For the fallback, the configured options are ignored and all options have their defaults. Throws
+// yaml::Error if the plugin has the wrong kind, needs a permission that is not allowed, or does not accept the
+// options. Throws it also if an input file cannot be read or an output file cannot be written. Adds to `notes` the
+// options that are ignored (resolve_options).
 std::vector<model::OptionValue> options_for(const model::PluginDescription &plugin, arhost_kind kind,
                                             const ComponentConfiguration &component, std::size_t candidate,
                                             std::vector<std::string> &notes);

@@ -28,8 +28,8 @@ std::optional<NumberedName> pattern_of(const OutputFile &output) {
     return output.is_numbered ? numbered_name(output.path.output_path().filename()) : std::nullopt;
 }
 
-// Returns whether two file names, or their patterns `p` and `q`, can produce the same name. Two patterns can if they
-// differ only in digits, as f0%d and f%d do.
+// Returns whether two file names, or their patterns `p` and `q`, can produce the same name. Two patterns can do so if
+// they differ only in digits, as f0%d and f%d do.
 bool can_collide(const std::string &a, const std::optional<NumberedName> &p, const std::string &b,
                  const std::optional<NumberedName> &q) {
     if (!p || !q)

@@ -19,8 +19,8 @@ public:
     // Registers a file or folder that the run reads. `file` must be an absolute path.
     void read(const std::filesystem::path &file);
     void read_numbered(const std::filesystem::path &file_or_pattern);
-    // Registers an output. Which plugins write numbered files is not known yet, so a name like frame-%04d.png
-    // (frame-%04d.png) must not match a file that the run reads, but may match the file of another output.
+    // Registers an output. It is not known yet which plugins write numbered files. Therefore a name like
+    // frame-%04d.png must not match a file that the run reads, but may match the file of another output.
     void write(const yaml::Node &output);
 
     // Checks a file that a worker has reported as read. To be called after all calls of write(). Only compares names
@@ -33,7 +33,7 @@ private:
     struct Use {
         std::string path;
         std::optional<yaml::Node> output; // the output that writes the file; nullopt if the run reads the file
-        bool by_pattern = false;          // the output's name matches the file as a pattern
+        bool by_pattern = false;          // the output's name is a pattern that matches the file
     };
     const Use *find(const base::FileIdentity &file) const;
     void add(const base::FileIdentity &file, const std::optional<yaml::Node> &output, bool by_pattern = false);
@@ -41,7 +41,7 @@ private:
     std::map<std::string, Use> uses_; // each file has two keys: its real path and its "device:inode"
 };
 
-// An output file of a plugin that is known.
+// An output file of a component whose plugin is known.
 struct OutputFile {
     yaml::Node path;
     bool is_numbered; // the plugin has ARHOST_CAPABILITY_NUMBERED_FILES, so the path may be a pattern

@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::string_view blanks = " \t\r";
 
-// The lines with content. Empty lines and comments are left out.
+// The lines that are neither empty nor comments.
 class Lines {
 public:
     Lines(std::string file, std::string_view text) : file_(std::move(file)), text_(text) {}
@@ -48,10 +48,10 @@ public:
 private:
     std::string file_;
     std::string_view text_;
-    std::size_t number_ = 0; // of the last line
+    std::size_t number_ = 0; // number of the current line
 };
 
-// Parses numbers that are separated by blanks. Empty if something else is there.
+// Parses numbers that are separated by blanks. Returns an empty list if the line contains anything else.
 std::vector<double> numbers_in(std::string_view line) {
     std::vector<double> numbers;
     while (!line.empty()) {
@@ -81,7 +81,7 @@ MultiMarker parse_marker(Lines &lines, const std::string &name) {
     for (int row = 0; row < 3; ++row) {
         line = lines.require("the matrix of " + name);
         std::vector<double> numbers = numbers_in(line);
-        if (row == 0 && numbers.size() == 2) { // files of ARToolKit 2 have the centre here
+        if (row == 0 && numbers.size() == 2) { // in files of ARToolKit 2, this line contains the centre
             line = lines.require("the matrix of " + name);
             numbers = numbers_in(line);
         }

@@ -19,14 +19,14 @@ namespace arhost::run_config {
 // The record of a frame in a session's log: data that the video does not contain, and the decisions of the recorded
 // run.
 struct RecordedFrame {
-    std::uint64_t number; // in the recorded run; frames that it dropped are missing
+    std::uint64_t number; // number in the recorded run; frames that the recorded run dropped are missing
     std::int64_t capture_ns;
     arhost_clock clock;
     arhost_overlay overlay;
     double scale;          // quality of the overlay, as in host::Quality
-    std::uint32_t samples; // likewise
+    std::uint32_t samples; // samples per pixel, as in host::Quality
     std::vector<arhost_target> targets;
-    std::vector<arhost_observation> observations; // of the targets
+    std::vector<arhost_observation> observations; // observations of markers that belong to targets
     arhost_search search{};
     std::optional<camera::View> view;
     std::optional<std::pair<std::string, std::array<double, 16>>> truth; // truth_target and true_mt of arhost_record

@@ -11,7 +11,7 @@ namespace {
 
 using enum Type;
 
-// A key of the table. Its path is relative to that of its part.
+// A key of the table. `path` is relative to the path of the part that contains the key.
 struct Row {
     std::string_view path;
     Type type;
@@ -61,7 +61,7 @@ constexpr Row fallback = {
     "Plugin to use after this one has failed too often or has lost its device three times within a minute."};
 constexpr Row name = {"name", text, "the plugin's name", "Name for the command `swap`."};
 constexpr Row alternative_keys[] = {name, fallback, conform};
-// Of the outputs that commands start.
+// Keys of the outputs that commands start.
 constexpr Row command_output_keys[] = {
     {"path", output_path, "", "Output file; the host replaces %d or %03d by the first free number."}};
 
@@ -180,7 +180,7 @@ constexpr Row remaining_keys[] = {
 
 struct Part {
     Row component;           // without a path if the rows belong to no component
-    std::string_view plugin; // an example
+    std::string_view plugin; // an example of a plugin
     std::span<const Row> rows;
 };
 constexpr Part parts[] = {

@@ -36,7 +36,7 @@ using Corners = std::array<glm::dvec3, 4>;
 
 constexpr std::int32_t max_id = std::numeric_limits<std::int32_t>::max();
 constexpr double min_side_mm = 0.01, max_side_mm = 1e6, max_coordinate_mm = 1e7;
-constexpr double tolerance = 0.01;                                         // of places in a map, relative to the side
+constexpr double tolerance = 0.01; // of corners in a map, relative to the side
 constexpr const char *pattern_family = "pattern", *image_family = "image"; // arhost_marker_config.file
 constexpr double default_pattern_ratio = 0.5;                              // ARToolKit's
 constexpr const char *name_rule = "letters, digits, '_', '.' and '-'";
@@ -56,7 +56,7 @@ std::string parse_name(const yaml::Node &node, std::size_t size_with_nul) {
     return name;
 }
 
-// Bodies have the names that another program gave them.
+// Returns the name of a body, which another program has chosen.
 std::string parse_body(const yaml::Node &node) {
     std::string body = node.text();
     if (body.size() >= ARHOST_MAX_NAME || base::printable(body) != body)
@@ -78,8 +78,8 @@ std::string parse_family(const yaml::Node &map) {
     return name;
 }
 
-// Returns the same name for families that share markers: AprilTag's families are also dictionaries of OpenCV, and
-// DICT_6X6_50 has the first markers of DICT_6X6_250.
+// Returns the same name for families that share markers. AprilTag's families are also dictionaries of OpenCV.
+// DICT_6X6_50 contains the first markers of DICT_6X6_250.
 std::string canonical(const std::string &family) {
     constexpr std::string_view april_tag = "DICT_APRILTAG_";
     if (family.starts_with(april_tag))
@@ -215,7 +215,7 @@ glm::dvec3 centre_of(const Corners &corners) {
     return (corners[0] + corners[1] + corners[2] + corners[3]) / 4.0;
 }
 
-// Of a marker that is seen from its front, which is where the corners are clockwise.
+// Returns the normal that points to the side from which the corners are clockwise, the front of the marker.
 glm::dvec3 normal_of(const Corners &corners) {
     return glm::normalize(glm::cross(corners[3] - corners[1], corners[2] - corners[0]));
 }
@@ -235,7 +235,7 @@ Corners parse_corners(const yaml::Node &node) {
     for (std::size_t i = 0; i < 4; ++i) {
         const glm::dvec3 to = glm::normalize(corners[i] - corners[(i + 3) % 4]),
                          from = glm::normalize(corners[(i + 1) % 4] - corners[i]);
-        if (!(glm::dot(glm::cross(from, to), normal) > tolerance)) // also if the normal is not a number
+        if (!(glm::dot(glm::cross(from, to), normal) > tolerance)) // also true if the normal is NaN
             points[i].fail("the corners must form a convex quadrilateral in the order top left, top right, bottom "
                            "right, bottom left");
         if (std::abs(glm::dot(corners[i] - centre, normal)) > tolerance * mean_side(corners))
@@ -297,14 +297,14 @@ bool are_at_the_same_place(const Corners &a, const Corners &b) {
            glm::dot(normal_of(a), normal_of(b)) > 0;
 }
 
-// Whether both lie in one plane, and one covers a part of the other. A small marker may be inside a larger one.
+// Whether both markers lie in one plane and partly cover each other. A small marker may be inside a larger one.
 bool overlap(const Corners &a, const Corners &b) {
     const glm::dvec3 normal = normal_of(a);
     const double limit = tolerance * std::min(mean_side(a), mean_side(b));
-    constexpr double parallel = 0.9999; // cosine of the angle between the normals, at least
+    constexpr double parallel = 0.9999; // minimum cosine of the angle between the normals of parallel markers
     if (glm::dot(normal, normal_of(b)) < parallel || std::abs(glm::dot(normal, centre_of(b) - centre_of(a))) > limit)
         return false;
-    // How far the corners of `of` are outside of an edge of `from`.
+    // Returns how far the corners of `of` are outside of an edge of `from`.
     const auto outside = [&](const Corners &of, const Corners &from, std::size_t edge) {
         const glm::dvec3 outward = glm::normalize(glm::cross(normal, from[(edge + 1) % 4] - from[edge]));
         std::array<double, 4> distances{};
@@ -325,7 +325,7 @@ bool overlap(const Corners &a, const Corners &b) {
     return !is_apart_or_inside(a, b) && !is_apart_or_inside(b, a);
 }
 
-// The markers of all targets: a marker belongs to one target.
+// The owner of each marker: a marker belongs to one target.
 class Owners {
 public:
     void add(const yaml::Node &node, const Target &target) {
@@ -352,7 +352,7 @@ public:
     std::size_t family_count() const { return families_.size(); }
 
 private:
-    std::map<std::string, std::string> names_; // with the places of the targets
+    std::map<std::string, std::string> names_; // with the positions of the targets in the configuration
     std::map<std::pair<std::string, double>, std::string>
         prints_; // files and pattern ratios, with the names of targets
     std::map<std::pair<std::string, std::int32_t>, std::string> markers_;
@@ -434,7 +434,7 @@ std::string found_print(const fs::path &file, const Owner &owner, std::vector<fs
     return file.string();
 }
 
-// Takes the markers of a multi-marker file. `number`: the id that the first pattern gets.
+// Returns the markers of a multi-marker file. `number`: the id for the first pattern.
 std::vector<TargetMarker> markers_of(const std::vector<MultiMarker> &layout, const yaml::Node &target,
                                      const fs::path &folder, std::size_t number, std::vector<fs::path> &files,
                                      std::vector<std::string> &warnings) {
@@ -505,7 +505,7 @@ Target parse_map_target(const yaml::Node &node, std::size_t number, std::vector<
     return target;
 }
 
-// A pattern of ARToolKit or a picture. `number`: the id that the marker gets.
+// Parses a target that is an ARToolKit pattern or a picture. `number`: the id for the marker.
 Target parse_print_target(const yaml::Node &node, const char *kind, std::size_t number, std::vector<fs::path> &files,
                           std::vector<std::string> &warnings) {
     const bool is_pattern = std::string_view(kind) == pattern_family;
@@ -519,7 +519,8 @@ Target parse_print_target(const yaml::Node &node, const char *kind, std::size_t 
     return {parse_name(node.require("name"), ARHOST_MAX_NAME), {marker}, ""};
 }
 
-// A kind of target, which is named by the key that only it has, and the keys that apply to it besides `name`.
+// A kind of target. A target has this kind if it has the key that only this kind has. The other keys, besides `name`,
+// are those that apply to the kind.
 struct Kind {
     const char *key;
     std::vector<std::string_view> keys;
@@ -557,8 +558,8 @@ std::string kind_of(const yaml::Node &node) {
     return found->key;
 }
 
-// Returns the targets of an element of the list; several if it is a range of ids. `number`: of its first
-// marker.
+// Returns the targets of an element of the list; several if the element is a range of ids. `number`: the id for the
+// first marker.
 std::vector<Target> parse_target(const yaml::Node &node, std::size_t number, std::vector<fs::path> &files,
                                  std::vector<std::string> &warnings) {
     if (!node.is_map())
@@ -593,14 +594,14 @@ std::vector<Target> parse_target(const yaml::Node &node, std::size_t number, std
     return targets;
 }
 
-// Returns the option with which earlier versions chose the family of all markers, if the tracker has it.
+// Returns the tracker's option that chose the family of all markers in earlier versions, if it is set.
 std::optional<yaml::Node> family_option(const yaml::Node &tracker, const char *name) {
     const auto options = tracker.find("options");
     const auto option = options && options->is_map() ? options->find(name) : std::nullopt;
     return option && option->is_scalar() ? option : std::nullopt;
 }
 
-// Returns the family in the syntax of a target, which is that of all markers of a configuration for earlier versions.
+// Returns the family that earlier versions used for all markers of a configuration, in the syntax of a target.
 std::string family_of_all_markers(const yaml::Node &tracker) {
     if (const auto file = family_option(tracker, "dictionary_file"))
         return "dictionary: " + fs::path(file->text()).stem().string();

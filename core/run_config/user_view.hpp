@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Checks files with the user's permissions before a plugin opens them. The plugin would report what its sandbox
-// shows, for example "permission denied" for a file that does not exist.
+// Checks files with the user's permissions before a plugin opens them. The errors of a plugin would describe the view
+// from its sandbox, for example "permission denied" for a file that does not exist.
 #pragma once
 
 #include "sandbox/sandbox.hpp"

@@ -24,8 +24,8 @@ struct TargetSolver::Memory {
     double mt[16];                          // the last reported pose
     std::uint32_t was_reported, age_frames; // whether the target was ever reported; frames since the last report
     double log_chance;                      // logarithm of the probability that all recent sightings are false
-    std::uint32_t is_sighted,
-        reserved; // is_sighted: whether the target was seen in the last frame, even if it was not reported
+    // is_sighted: whether the target was seen in the last frame, even if it was not reported.
+    std::uint32_t is_sighted, reserved;
 };
 
 namespace {
@@ -374,8 +374,8 @@ void TargetSolver::solve(const arhost_tracker_result &reported, bool searched_ev
     const Header header{searched_everywhere ? 0 : header_of(before).frames_since_full_search + 1, 0};
     std::memcpy(after, &header, sizeof header);
     const std::span all(reported.observations, reported.observation_count);
-    std::vector<std::size_t>
-        order; // indices of the observations: those of the first target, …, then those of no target
+    // Indices of the observations: those of the first target, …, then those of no target.
+    std::vector<std::size_t> order;
     std::vector<std::size_t> target_of;
     for (std::size_t i = 0; i < all.size(); ++i) {
         const Marker *marker = marker_of(all[i]);

@@ -182,8 +182,8 @@ YAML::Node read(std::string text) {
             throw YAML::ParserException(*quote, "this quoted value is not terminated");
     };
     try {
-        // Does not use YAML::LoadAll, because it does not return for "[1], 2": the comma starts a new document but is
-        // never consumed, so LoadAll produces documents without end.
+        // Does not use YAML::LoadAll, which does not return for "[1], 2": the comma starts a new document but is
+        // never consumed, so LoadAll produces an infinite number of documents.
         while (marks.documents.size() < 2 && parser.HandleNextDocument(marks)) {
         }
     } catch (const YAML::Exception &) {

@@ -50,21 +50,21 @@ public:
         return *this;
     }
 
-    // Parses the contents of a file. Throws Error as read_file does, and if it has a syntax error.
+    // Parses the contents of a file. Throws the errors of read_file, and Error if the file has a syntax error.
     static Node load(const std::filesystem::path &file);
     // Parses `text`. `name` is used as the file name in error messages.
     static Node parse(const std::string &text, const std::string &name);
 
-    // The folders to which paths in a document are relative: that of its file and, by key path, those of the values
-    // that were overridden.
+    // The folders to which paths in a document are relative: the folder of the document's file and, for overridden
+    // values, the folders of the overrides by key path.
     struct Origin {
         std::filesystem::path folder;
         std::map<std::string, std::filesystem::path> overridden;
     };
     Origin origin() const;
-    // Reads a copy: paths have the meaning that they had in the original.
+    // Reads a copy of a document. Paths have the same meaning as in the original.
     static Node load_copy(const std::filesystem::path &file, const Origin &origin);
-    // This value as YAML, without comments; of a map, without these keys.
+    // Returns this value as YAML without comments; if it is a map, without the keys `omitted`.
     std::string to_yaml(std::initializer_list<std::string_view> omitted = {}) const;
 
     // Creates a scalar that is not from a file. `name` is used as the file name in error messages.
@@ -89,14 +89,14 @@ public:
     std::string where() const;                                // "file:line:column"
     [[noreturn]] void fail(const std::string &message) const; // throws Error with where() and path()
 
-    // For maps. `allow_keys` rejects duplicate keys and unknown keys (and suggests the most similar known key), at
-    // the position of the key; it must be called before the lookups.
+    // For maps. `allow_keys` rejects duplicate keys and unknown keys, at the position of the key. It suggests the
+    // most similar known key. It must be called before the lookups.
     void allow_keys(std::span<const std::string_view> keys) const;
     void allow_keys(std::initializer_list<std::string_view> keys) const {
         allow_keys(std::span(keys.begin(), keys.size()));
     }
-    // Like `allow_keys`, but accepts unknown keys that resemble no known one, unless they were set by an option of
-    // the command line, and returns them.
+    // Like `allow_keys`, but accepts and returns unknown keys that resemble no known key. Rejects them if an option
+    // of the command line set them.
     std::vector<Node> set_aside_keys(std::span<const std::string_view> keys) const;
     std::optional<Node> find(std::string_view key) const;
     Node require(std::string_view key) const;
@@ -117,14 +117,14 @@ public:
     std::string choice(std::initializer_list<std::string_view> choices) const {
         return choice(std::span(choices.begin(), choices.size()));
     }
-    // Returns whether the value resembles none of the choices, and was not set by an option of the command line.
+    // Returns whether the value resembles none of the choices. Returns false if an option of the command line set it.
     bool is_unlike(std::span<const std::string_view> choices) const;
     std::vector<double> reals() const;                  // a sequence of finite numbers
     std::vector<double> reals(std::size_t count) const; // exactly `count` numbers
 
     // Return absolute UTF-8 paths without `.` and `..`. A `..` after a symbolic link refers to the parent of the
     // link's target, as in the kernel's path resolution.
-    // input_path: relative to the document's folder; if the value was set with `--set`, to the working directory.
+    // input_path: relative to the document's folder, or to the working directory if the value was set with `--set`.
     // output_path: relative to the working directory.
     std::filesystem::path input_path() const;
     std::filesystem::path output_path() const;

@@ -35,8 +35,8 @@ enum { ARHOST_YUV_RANGE_LIMITED = 1, ARHOST_YUV_RANGE_FULL = 2 };
 typedef int32_t arhost_transfer;
 enum {
     ARHOST_TRANSFER_SRGB = 0, /* sRGB's curve, or a similar one: BT.601, BT.709; most cameras */
-    ARHOST_TRANSFER_LINEAR =
-        1 /* proportional to the light, as from some machine-vision cameras or from a renderer that averages codes */
+    /* Proportional to the light, as from some machine-vision cameras or from a renderer that averages codes. */
+    ARHOST_TRANSFER_LINEAR = 1
 };
 
 /* The clock that measured a capture time. */

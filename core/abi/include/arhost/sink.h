@@ -68,8 +68,8 @@ typedef struct arhost_record {
     const arhost_target *targets;
     /* The markers seen in this frame: first those of the targets, then those that no target lists. */
     const arhost_observation *observations;
-    char families[ARHOST_MAX_FAMILIES]
-                 [ARHOST_MAX_FAMILY]; /* names; arhost_observation.family is an index into this array */
+    /* Names of the families. arhost_observation.family is an index into this array. */
+    char families[ARHOST_MAX_FAMILIES][ARHOST_MAX_FAMILY];
     arhost_search search;
     /* The markers that were expected in this frame: first those that the tracker has reported, then those that it has
      * missed. Their `marker` is an index into the setup of the tracker, which a sink does not have. The replay of a
