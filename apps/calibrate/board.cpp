@@ -27,9 +27,9 @@ const aruco::DictionaryType &dictionary_type(const std::string &name) {
     return *type;
 }
 
-// Moves each corner to where the edges of its four squares meet. `clear_mm`: distance from a corner to the next edge
-// that is not one of these. OpenCV's ChArUco detector also refines, but only to 0.1 px. Returns which corners were
-// refined; the others are too near to the border of the image, or not where they were expected.
+// Moves each corner to the place where the edges of its four squares meet. `clear_mm`: distance from a corner to the
+// nearest other edge. OpenCV's ChArUco detector also refines, but only to 0.1 px. Returns which corners were refined.
+// Other corners are too near to the border of the image, or too far from the expected place.
 std::vector<bool> refine(const cv::Mat &grey, View &view, double clear_mm) {
     std::vector<bool> is_refined(view.board_mm.size());
     std::vector<cv::Point2f> board(view.board_mm.size());
@@ -53,7 +53,7 @@ std::vector<bool> refine(const cv::Mat &grey, View &view, double clear_mm) {
         std::vector<cv::Point2f> corner{at};
         cv::cornerSubPix(grey, corner, {half, half}, {-1, -1},
                          {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 100, 0.001});
-        is_refined[i] = corner[0] != at; // the initial position is returned for a corner that is too far from it
+        is_refined[i] = corner[0] != at; // the result equals the initial position if that is too far from the corner
         view.image_px[i] = corner[0];
     }
     return is_refined;
@@ -164,7 +164,7 @@ std::optional<View> Board::find(const cv::Mat &grey) const {
 
 std::string Board::seen_instead(const cv::Mat &grey) const {
     std::string best;
-    std::size_t most = 2; // of other dictionaries, one or two markers may be wrong detections
+    std::size_t most = 2; // a detection of one or two markers of another dictionary may be wrong
     for (const aruco::DictionaryType &type : aruco::dictionary_types)
         if (const std::size_t count = aruco::detect(grey, aruco::predefined(type.name), {}).ids.size();
             count > most) {

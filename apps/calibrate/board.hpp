@@ -42,7 +42,8 @@ public:
     std::string description() const;
     // Returns std::nullopt if the image does not show the board, or too few of its corners.
     std::optional<View> find(const cv::Mat &grey) const;
-    // For a message: which other board the image shows, such as "markers of DICT_4X4_50", or "".
+    // For a message: describes another board that the image shows, such as "markers of DICT_4X4_50"; "" if there is
+    // none.
     std::string seen_instead(const cv::Mat &grey) const;
 
 private:

@@ -73,9 +73,9 @@ double rms(const std::vector<double> &values) {
                      static_cast<double>(values.size()));
 }
 
-// Standard deviations of fx, fy, cx, cy: from the inverse of the normal equations, and the residuals. OpenCV's
-// calibrateCamera divides by the number of corners instead of coordinates, so its deviations are too large by √2, and
-// its fisheye::calibrate returns the uncertainties of one iteration's step.
+// Standard deviations of fx, fy, cx, cy, computed from the inverse of the normal equations and the residuals. Those
+// of OpenCV's calibrateCamera are too large by √2, because it divides by the number of corners instead of
+// coordinates. OpenCV's fisheye::calibrate returns the uncertainties of one iteration's step.
 std::array<double, 4> deviations_px(const std::vector<View> &views, const Solution &solution) {
     const int lens_parameters = 4 + static_cast<int>(solution.lens.coefficients.size()), pose_parameters = 6;
     const int count = lens_parameters + pose_parameters * static_cast<int>(views.size());
@@ -110,8 +110,9 @@ Solution solve(const std::vector<View> &views, const cv::Size &image, Model mode
     std::ranges::transform(views, board_mm.begin(), &View::board_mm);
     std::ranges::transform(views, image_px.begin(), &View::image_px);
     const cv::TermCriteria criteria(cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 200, 1e-10);
-    // fisheye::calibrate begins with a focal length, by default that of 180 degrees. It fails or finds a local
-    // minimum if that is far from the real one. calibrateCamera computes the first focal length from the views.
+    // fisheye::calibrate starts with a given focal length, by default that of 180 degrees. If the start is far from
+    // the real focal length, it fails or finds a local minimum. calibrateCamera computes the first focal length from
+    // the views.
     std::vector<double> first_focal_lengths{0};
     if (model == Model::fisheye)
         first_focal_lengths = {0.32, 0.5, 0.8}; // relative to the larger side of the image
@@ -160,8 +161,9 @@ Solution solve(const std::vector<View> &views, const cv::Size &image, Model mode
     return best;
 }
 
-// Removes corners with errors far above the others, which ChArUco's detector sometimes places at a corner of a
-// marker. Returns whether there were any. A view with many such corners is wrong as a whole, and is not changed.
+// Removes corners with errors far above those of the others: ChArUco's detector sometimes reports the corner of a
+// marker instead. Returns whether there were any. If a view has many such corners, the whole view is wrong; it is not
+// changed.
 bool leave_out_corners(std::vector<View> &views, const std::vector<std::vector<double>> &residuals) {
     std::vector<double> all;
     for (const std::vector<double> &of_view : residuals)
@@ -224,7 +226,7 @@ Calibration calibrate(std::span<const View> views, const cv::Size &image, Model 
             continue;
         std::vector<double> errors(chosen.size());
         std::ranges::transform(residuals, errors.begin(), rms);
-        // A wrong view raises the errors of all others, so only the worst one is left out at a time.
+        // A wrong view increases the errors of all other views, so only the worst view is removed at a time.
         const auto worst = std::ranges::max_element(errors) - errors.begin();
         const double worst_px = errors[static_cast<std::size_t>(worst)];
         if (worst_px > 3 * median(errors) + 0.1 && indices.size() > fewest_views &&

@@ -10,7 +10,8 @@
 namespace arhost::calibrate {
 namespace {
 
-// Mean distance in px by which the corners that both views contain have moved; infinite without such corners.
+// Returns the mean distance in px between the positions of the corners that both views contain; infinity if there are
+// none.
 double motion_px(const View &from, const View &to) {
     double sum = 0;
     std::size_t count = 0;
@@ -56,12 +57,12 @@ Collector::Verdict Collector::offer(const std::optional<View> &view, double edge
 
 void Collector::take(const View &view) {
     views_.push_back(view);
-    // The tilts depend on the focal length, so they are computed again with the best that is known.
+    // The tilts depend on the focal length, so they are recomputed with the best known focal length.
     if (views_.size() >= next_calibration_) {
         next_calibration_ = views_.size() * 5 / 4 + 1;
         try {
             lens_ = calibrate(views_, image_, model_).lens;
-        } catch (const std::runtime_error &) { // views without enough tilts; those that follow will help
+        } catch (const std::runtime_error &) { // the tilts of the views differ too little; more views will follow
         }
     }
     coverage_ = Coverage(image_);

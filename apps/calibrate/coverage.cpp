@@ -47,7 +47,8 @@ std::size_t Coverage::new_cells(const View &view) const {
 }
 
 std::vector<std::string> Coverage::missing() const {
-    // The corners of the image come first: the lens is bent most there, and boards rarely get there by chance.
+    // The corners of the image come first, because the lens distortion is largest there, and boards are rarely placed
+    // there by chance.
     struct Region {
         int column, row;
         const char *name;

@@ -38,10 +38,10 @@ private:
     std::size_t views_ = 0;
 };
 
-// Where a board is in the image, and how it is turned; each number is 0 to about 1.
+// Position of a board in the image, and its tilts; each number is 0 to about 1.
 using Placement = std::array<double, 5>;
 Placement placement_of(const View &view, const Tilt &tilt, const cv::Size &image);
-// Distance to the nearest other placement; infinite if there is none.
+// Returns the distance to the nearest other placement; infinite if there is none.
 double novelty(const Placement &placement, std::span<const Placement> others);
 
 // Returns the indices of at most `count` views that together cover most parts of the image and most tilts, in

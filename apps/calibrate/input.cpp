@@ -34,7 +34,7 @@ void check_size(const cv::Size &size, const std::string &name) {
                                              size.width, size.height, static_cast<int>(ARHOST_MAX_IMAGE_SIDE)));
 }
 
-// Turns the image as its metadata request, as source_file does.
+// Reads an image and turns it as its metadata requests, as source_file does.
 cv::Mat read_image(const fs::path &file) {
     std::error_code error;
     if (!fs::exists(file, error))
@@ -160,8 +160,8 @@ bool show(const cv::Mat &frame, const std::optional<View> &view, const Collector
     return key == 'q' || key == 27;
 }
 
-// Whether there is a display. OpenCV's window library aborts the process if it cannot open the one that the
-// environment names, so a child process tries it first.
+// Returns whether there is a display. If OpenCV's window library cannot open the display that the environment names,
+// it aborts the process. Therefore a child process tries to open it first.
 bool can_open_window() {
     const auto is_set = [](const char *name) {
         const char *value = std::getenv(name);
@@ -234,7 +234,7 @@ Views views_of_video(const fs::path &file, const Board &board, Model model, std:
     while (frames.next(frame)) {
         const cv::Mat grey = grey_of(frame);
         if (!collector)
-            collector.emplace(frames.size(), model, 3 * limit); // the best are chosen later
+            collector.emplace(frames.size(), model, 3 * limit); // the best views are chosen later
         std::optional<View> view;
         counts.add(offer(*collector, board, grey, frames.count(), view));
         if (frames.count() % 100 == 1 && collector->views().empty())
@@ -252,7 +252,8 @@ Views views_of_video(const fs::path &file, const Board &board, Model model, std:
 }
 
 Views views_of_camera(const CameraOptions &camera, const Board &board, Model model, std::size_t limit) {
-    const bool with_window = camera.with_window && can_open_window(); // first, because threads do not survive a fork
+    // Before any threads start, because only the calling thread survives a fork.
+    const bool with_window = camera.with_window && can_open_window();
     cv::VideoCapture capture(camera.name, camera.name.starts_with("/dev/") ? cv::CAP_V4L2 : cv::CAP_ANY);
     if (!capture.isOpened())
         throw std::runtime_error(fmt::format(
@@ -288,7 +289,7 @@ Views views_of_camera(const CameraOptions &camera, const Board &board, Model mod
             last_line = line;
         }
         is_stopped = (with_window && show(frame, view, *collector, line)) || collector->is_full();
-        // The calibration may leave out views, or fail, after which more are needed.
+        // The calibration may fail or omit views; then more views are needed.
         if (verdict == Collector::Verdict::taken && collector->is_complete()) {
             try {
                 const Calibration calibration = calibrate(collector->views(), frames.size(), model);

@@ -13,11 +13,11 @@ struct Views {
     cv::Size image; // px
     std::vector<View> views;
     std::vector<std::string> without_board; // names of images
-    std::string summary;                    // of the frames of a video or camera
+    std::string summary;                    // describes the frames of a video or camera
     std::string seen_instead;               // see Board; only if there are no views
 };
 
-// These throw std::runtime_error, which names the file and what is wrong with it.
+// These functions throw std::runtime_error, whose message names the file and the problem.
 
 Views views_of_images(const std::vector<std::filesystem::path> &files, const Board &board);
 // Takes at most `limit` views.

@@ -192,7 +192,8 @@ std::string calibrate(const Arguments &arguments) {
     const bool is_refused = is_wrong || (!missing.empty() && !arguments.accept_poor_coverage);
     if (is_refused)
         std::fputs(text.c_str(), stdout);
-    if (!arguments.coverage.empty()) { // also of refused views, because it shows what is missing
+    // Draws refused views, too, because the picture shows what is missing.
+    if (!arguments.coverage.empty()) {
         std::vector<unsigned char> png;
         cv::imencode(".png", coverage_picture(found.views, calibration, coverage), png,
                      {cv::IMWRITE_PNG_COMPRESSION, 9});

@@ -12,7 +12,7 @@ namespace {
 
 const cv::Scalar white(255, 255, 255), black(0, 0, 0), grey(190, 190, 190), shade(215, 215, 245), dark(90, 90, 90);
 
-// The smallest of 1, 2, 5, 10, … times a power of ten that is not below `value`.
+// Returns the smallest number of the series 1, 2, 5, 10, … times a power of ten that is at least `value`.
 double round_up(double value) {
     const double power = std::pow(10, std::floor(std::log10(std::max(value, 1e-6))));
     for (const double step : {1.0, 2.0, 5.0})
@@ -27,7 +27,8 @@ public:
     Colours() {
         cv::Mat ramp(1, 256, CV_8U);
         for (int i = 0; i < 256; ++i)
-            ramp.at<std::uint8_t>(i) = static_cast<std::uint8_t>(20 + i * 215 / 255); // its ends are almost black
+            ramp.at<std::uint8_t>(i) =
+                static_cast<std::uint8_t>(20 + i * 215 / 255); // the map's ends are almost black
         cv::applyColorMap(ramp, table_, cv::COLORMAP_TURBO);
     }
     cv::Scalar at(double fraction) const {

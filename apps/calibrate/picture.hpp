@@ -7,8 +7,8 @@
 
 namespace arhost::calibrate {
 
-// Returns a BGR picture of the image's shape with a legend below: the cells without corners are shaded, and each
-// corner has the colour of its residual. Those of dropped views are crosses.
+// Returns a BGR picture of the image's shape with a legend below. Cells without corners are shaded. Each corner has
+// the colour of its residual; corners of dropped views are crosses.
 cv::Mat coverage_picture(std::span<const View> views, const Calibration &calibration, const Coverage &coverage);
 
 } // namespace arhost::calibrate

@@ -20,9 +20,9 @@ using Json = nlohmann::ordered_json;
 namespace base = arhost::base;
 
 struct Arguments {
-    std::string name = "arhost"; // of the run: its socket is $XDG_RUNTIME_DIR/arhost/NAME.sock
+    std::string name = "arhost"; // name of the run: its socket is $XDG_RUNTIME_DIR/arhost/NAME.sock
     std::string command;
-    std::vector<std::string> values; // of the command's members
+    std::vector<std::string> values; // values of the command's members
     bool json = false;               // print the answer as it is
 };
 
@@ -70,7 +70,7 @@ std::string receive_line(int socket) {
     return line.substr(0, line.find('\n'));
 }
 
-// Prints the answer's members for a reader.
+// Prints the answer's members for a human reader.
 void print_members(const Json &answer) {
     for (const auto &[key, value] : answer.items())
         if (key == "status")

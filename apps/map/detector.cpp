@@ -35,7 +35,7 @@ std::vector<Detection> best_of_each(const std::vector<Candidate> &candidates) {
     return detections;
 }
 
-// As tracker_apriltag with its default options.
+// Detects markers like tracker_apriltag with its default options.
 class AprilTags {
 public:
     AprilTags(const apriltag::FamilyType &type, const std::set<int> &ids, const arhost_intrinsics &camera)
@@ -71,7 +71,7 @@ private:
     apriltag::Detector detector_{apriltag_detector_create(), apriltag_detector_destroy};
 };
 
-// As tracker_aruco with its default options.
+// Detects markers like tracker_aruco with its default options.
 class ArucoMarkers {
 public:
     ArucoMarkers(const aruco::DictionaryType &type, const std::set<int> &ids, const arhost_intrinsics &camera)

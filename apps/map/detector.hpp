@@ -16,7 +16,7 @@
 
 namespace arhost::map {
 
-// Returns the markers in a grey image, in the order of their ids; of a marker that is found twice, the better
+// Returns the markers in a grey image, in the order of their ids. If a marker is found twice, returns the better
 // detection.
 using Detector = std::function<std::vector<Detection>(const cv::Mat &grey)>;
 

@@ -23,7 +23,7 @@ using pose::Rigid;
 
 constexpr double degree = std::numbers::pi / 180;
 
-// A pose as Ceres sees it: unit quaternion x y z w, translation in mm.
+// A pose in the form that Ceres optimizes: unit quaternion x y z w, translation in mm.
 using Parameters = std::array<double, 7>;
 using PoseManifold = ceres::ProductManifold<ceres::EigenQuaternionManifold, ceres::EuclideanManifold<3>>;
 
@@ -84,7 +84,7 @@ struct Reprojection {
     }
 };
 
-// Lets a long optimization be stopped by an exception of `progress`, which must not pass through Ceres.
+// Makes an exception of `progress` stop a long optimization. The exception must not propagate through Ceres.
 class Stop final : public ceres::IterationCallback {
 public:
     explicit Stop(const std::function<void(const std::string &)> &progress) : progress_(progress) {}
@@ -115,7 +115,7 @@ double median(std::vector<double> values) {
     return *middle;
 }
 
-// At most `count` of the items, evenly distributed.
+// Returns at most `count` of the items, evenly distributed.
 template <class Item> std::vector<Item> sample(const std::vector<Item> &items, std::size_t count) {
     if (items.size() <= count)
         return items;
@@ -146,7 +146,7 @@ struct MarkerState {
     bool is_ambiguous = false;
 };
 
-// Poses that lead to the same minimum of the error.
+// Returns whether two poses are so close that they lead to the same minimum of the error.
 bool is_near(const Rigid &a, const Rigid &b, double tolerance_mm) {
     return pose::angle_between_rad(a.rotation, b.rotation) < 12 * degree &&
            (a.translation_mm - b.translation_mm).norm() < tolerance_mm;
@@ -191,7 +191,7 @@ public:
 private:
     static constexpr double rough = 1e-4; // relative change of the cost in the last step of an optimization
 
-    struct Variable { // of an optimization
+    struct Variable { // the variables of an optimization
         std::set<std::size_t> markers;
         std::vector<std::size_t> frames;
     };
@@ -209,7 +209,7 @@ private:
         views_.push_back(std::move(view));
     }
 
-    // The number of frames that show this marker together with some of the others.
+    // Returns the number of frames that show this marker together with some of the others.
     template <class IsOther> std::size_t shared_frames(std::size_t marker, const IsOther &is_other) const {
         return static_cast<std::size_t>(std::ranges::count_if(markers_[marker].views, [&](std::size_t view) {
             return std::ranges::any_of(frames_[views_[view].frame].views, [&](std::size_t other) {
@@ -218,7 +218,7 @@ private:
         }));
     }
 
-    // All markers that are connected with this one.
+    // Returns all markers that are connected with this one through common frames.
     std::set<std::size_t> group_of(std::size_t seed) const {
         std::set<std::size_t> group{seed};
         for (bool grows = true; grows;) {
@@ -231,7 +231,8 @@ private:
         return group;
     }
 
-    // Chooses the largest group of connected markers, or that of `origin`. Returns the markers that are not in it.
+    // Chooses the largest group of connected markers, or the group that contains `origin`. Returns the markers
+    // outside of the chosen group.
     std::vector<Refusal> choose_group() {
         std::vector<std::size_t> seeds(markers_.size());
         std::iota(seeds.begin(), seeds.end(), 0);
@@ -296,7 +297,8 @@ private:
         return result;
     }
 
-    // RMS over the corners; nullopt if frame or marker have no pose or the camera cannot see the marker there.
+    // Returns the RMS over the corners; nullopt if frame or marker have no pose or the camera cannot see the marker
+    // there.
     std::optional<double> error_px(const View &view) const {
         const auto &camera_from_map = frames_[view.frame].camera_from_map;
         const MarkerState &marker = markers_[view.marker];
@@ -316,7 +318,8 @@ private:
         return std::sqrt(squares / 4);
     }
 
-    // The views of a frame that fit; none if there is only one, which tells nothing about the map.
+    // Returns the views of a frame that fit. If there is only one, returns none, because a single view contains no
+    // information about the map.
     std::vector<std::size_t> useful_views_of(std::size_t frame) const {
         std::vector<std::size_t> useful;
         for (const std::size_t view : frames_[frame].views)
@@ -392,7 +395,7 @@ private:
         return summary.final_cost;
     }
 
-    // Position in mm and rotation in rad, each in its most uncertain direction.
+    // Returns the standard deviations of position (mm) and rotation (rad), each in its most uncertain direction.
     std::map<std::size_t, std::pair<double, double>>
     standard_deviations(ceres::Problem &problem, const std::map<std::size_t, Parameters> &markers,
                         double typical_px) const {
@@ -433,7 +436,8 @@ private:
         frames_[frame].camera_from_map = poses.empty() ? std::nullopt : std::optional(poses[0].camera_from_target);
     }
 
-    // The depth of a single marker, and with it a place that a single frame permits, is imprecise.
+    // Tolerance for a marker's position. The depth of a single marker is imprecise, and so is a position that was
+    // computed from a single frame.
     double tolerance_mm(const MarkerState &marker) const {
         double distance_mm = 0;
         for (const std::size_t view : marker.views)
@@ -441,8 +445,8 @@ private:
         return std::max(marker.side_mm / 2, 0.05 * distance_mm / static_cast<double>(marker.views.size()));
     }
 
-    // Finds where a marker is relative to the others, which stay where they are. Considers the poses that single
-    // frames permit, and lets those that fit best to all frames compete.
+    // Finds the pose of a marker relative to the others, which stay fixed. The candidates are the poses that single
+    // frames permit. The candidates that fit best to all frames are refined, and the best result is chosen.
     void place(std::size_t index) {
         MarkerState &marker = markers_[index];
         struct Witness {
@@ -477,7 +481,7 @@ private:
                     candidates.push_back({camera_from_map.inverse() * camera_from_marker, 0});
         if (marker.map_from_marker)
             candidates.push_back({*marker.map_from_marker, 0});
-        constexpr double bound_px = 20; // single frames are wrong, or their poses are imprecise
+        constexpr double bound_px = 20; // limits the error of frames that are wrong or whose poses are imprecise
         for (Candidate &candidate : candidates)
             for (const Witness &witness : witnesses) {
                 double least = bound_px;
@@ -522,7 +526,7 @@ private:
         if (finalists.empty())
             return;
         marker.map_from_marker = finalists[0].map_from_marker;
-        // A likelihood ratio of e^8.
+        // Corresponds to a likelihood ratio of e^8.
         const double margin = 8 * typical_px * typical_px / 2;
         marker.is_ambiguous = std::ranges::any_of(finalists, [&](const Candidate &other) {
             return other.cost < finalists[0].cost + margin &&
@@ -532,7 +536,7 @@ private:
         });
     }
 
-    // Places one marker after the other, those with the best view of the others first.
+    // Places one marker after the other. Markers that are seen best together with placed markers come first.
     void grow() {
         fixed_ = seed_;
         for (const Marker &given : settings_.layout)
@@ -571,9 +575,10 @@ private:
                 skipped_.insert(*next);
                 continue;
             }
+            // Frames with many markers keep their poses, because one marker changes such a pose little.
             for (const std::size_t view : markers_[*next].views)
                 if (const std::size_t frame = views_[view].frame;
-                    !frames_[frame].camera_from_map || observed(frame).size() <= 4) // of more, one changes little
+                    !frames_[frame].camera_from_map || observed(frame).size() <= 4)
                     pose_frame(frame);
             ++placed;
             settings_.progress(fmt::format("{} of {} markers placed", placed, group_.size()));
@@ -584,7 +589,7 @@ private:
         }
     }
 
-    // Chooses poses again, now that all markers are known. Returns whether one has changed.
+    // Places each marker again, now that all markers are known. Returns whether the pose of one has changed.
     bool revise() {
         settings_.progress("checking all poses");
         for (std::size_t frame = 0; frame < frames_.size(); ++frame)
@@ -608,7 +613,7 @@ private:
         return has_changed;
     }
 
-    // Decides which views fit, and adjusts the map to these.
+    // Decides which views fit, and adjusts the map to those views.
     void classify() {
         for (int round = 0; round < 3; ++round) {
             adjust_all(rough);
@@ -645,7 +650,7 @@ private:
         return group_.size() < before;
     }
 
-    // Moves the map into its final frame.
+    // Transforms the map to its final frame.
     void anchor() {
         if (group_.empty())
             return;
@@ -685,8 +690,8 @@ private:
                 frame.camera_from_map = *frame.camera_from_map * new_from_old.inverse();
     }
 
-    // A frame whose plane z = 0 fits the markers' corners best; its origin and x axis are those of the map, projected
-    // onto that plane.
+    // Returns a frame whose plane z = 0 fits the markers' corners best. Its origin and x axis are the projections of
+    // those of the map onto that plane.
     Rigid plane_from_map() const {
         std::vector<Eigen::Vector3d> points;
         Eigen::Vector3d centre = Eigen::Vector3d::Zero(), front = Eigen::Vector3d::Zero();
@@ -762,7 +767,7 @@ private:
     std::vector<FrameState> frames_;
     std::vector<MarkerState> markers_; // by id
     std::vector<View> views_;
-    std::set<std::size_t> group_, skipped_; // the markers of the map; those that could not be placed
+    std::set<std::size_t> group_, skipped_; // the markers of the map; the markers that could not be placed
     std::size_t seed_ = 0, fixed_ = 0;
 };
 

@@ -12,8 +12,8 @@
 
 namespace arhost::map {
 
-// Reads the markers of a map file. Throws yaml::Error, which names file, line and key, also if the map is of another
-// family.
+// Reads the markers of a map file. Throws yaml::Error, whose message names file, line and key. Throws it also if the
+// map is of another family.
 std::vector<Marker> read_map(const std::filesystem::path &file, const marker::Family &family);
 
 // `comment`: the first lines, each beginning with #.

@@ -115,12 +115,12 @@ private:
             draw(*family.picture, left, top, marker.side_mm * scale_);
     }
 
-    // Each sample reaches to the right and bottom edge, below the following ones: between neighbours that end at the
-    // same edge, an antialiased line would show.
+    // Draws each sample up to the right and bottom edge, below the samples that follow. If neighbouring samples ended
+    // at the same edge, an antialiased line would show between them.
     void draw(const Picture &picture, double left, double top, double side) {
         const double first = side * (1 - picture.ratio) / 2, pitch = side * picture.ratio / picture.side;
         const auto edge = [&](int samples) { return placed(first + samples * pitch); };
-        if (whole_) // the surface has only ink, which brighter samples must replace
+        if (whole_) // the surface stores only ink, and a brighter sample must replace the ink below it
             cairo_set_operator(context_.get(), CAIRO_OPERATOR_SOURCE);
         for (int i = 0; i < picture.side * picture.side; ++i) {
             const double white = picture.grey[static_cast<std::size_t>(i)] / 255.0;
@@ -136,7 +136,7 @@ private:
         cairo_set_source_rgb(context_.get(), 0, 0, 0);
     }
 
-    // Adds a rectangle to the path. cairo_rectangle() would round the width instead of the right edge.
+    // Adds a rectangle to the path. Unlike cairo_rectangle(), which would round the width, rounds the right edge.
     void add(double left, double top, double right, double bottom) {
         cairo_move_to(context_.get(), left, top);
         cairo_line_to(context_.get(), right, top);

@@ -26,7 +26,7 @@ constexpr double artoolkit_quiet = 0.125; // half of the border
 
 Family april_tags(const apriltag::FamilyType &type) {
     const std::shared_ptr<apriltag_family_t> family(type.create(), type.destroy);
-    // Families with a reversed border have bits outside it. The others only have their quiet zone there.
+    // Families with a reversed border have bits outside of the border. The others only have their quiet zone there.
     const int cells = family->reversed_border ? family->total_width : family->width_at_border;
     return {type.name,
             false,
@@ -63,7 +63,8 @@ Family aruco_markers(const aruco::DictionaryType &type) {
             1.0 / cells};
 }
 
-// In halves of the code's cells, because the border is half as wide as all of them.
+// Returns the family of matrix codes. Its cells are half as large as those of the code, because the border is half as
+// wide as all cells of the code together.
 Family matrix_codes(const fiducial::MatrixFamily &type) {
     const int side = 4 * type.side;
     return {type.name,

@@ -58,7 +58,7 @@ std::function<std::string(const std::string &)> length_from(double minimum_mm, d
     };
 }
 
-// The consecutive ids of a board: those given, or those that begin with the only one that is given.
+// Returns the consecutive ids of a board: the given ids or, if only one is given, those that begin with it.
 std::vector<int> board_ids(const Family &family, std::vector<int> ids, std::size_t count) {
     if (ids.size() == 1) {
         if (ids.front() + count > static_cast<std::size_t>(family.count))
@@ -183,7 +183,7 @@ Result draw(const Arguments &arguments) {
                                count == 1 ? "" : "s", mm_text(document.width_mm), mm_text(document.height_mm))};
 }
 
-// Writes all files, or removes those that it has written and throws.
+// Writes all files. If this fails, removes the files that it has written, and throws.
 void write(const std::vector<File> &files) {
     std::vector<std::unique_ptr<base::AtomicFile>> targets;
     targets.reserve(files.size());

@@ -18,7 +18,7 @@ std::string id_range(const std::vector<int> &ids) {
     return fmt::format("{}-{}", ids.front(), ids.back());
 }
 
-// A page's orientation, and how many items it has room for.
+// The orientation of a page, and the number of items for which it has room.
 struct Layout {
     double width_mm, height_mm, margin_mm;
     std::size_t columns, rows;
@@ -39,7 +39,8 @@ private:
     }
 };
 
-// Draws the ruler, whose length is between the outer edges of its first and last tick, and the texts of the footer.
+// Draws the ruler and the texts of the footer. The length of the ruler is the distance between the outer edges of its
+// first and last tick.
 void add_footer(Page &page, const Layout &layout, std::size_t number, std::size_t count) {
     const double left = layout.margin_mm, bottom = layout.height_mm - layout.margin_mm;
     const double top = bottom - ruler_height_mm, baseline = top - 1.5;

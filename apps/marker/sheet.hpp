@@ -70,7 +70,7 @@ struct Document {
 };
 
 // Places items of equal size on as few pages as possible, portrait or landscape. Throws std::runtime_error if the
-// paper is too small, or if more than `max_pages` were needed.
+// paper is too small, or if more than `max_pages` pages would be necessary.
 inline constexpr std::size_t max_pages = 500;
 Document lay_out(const std::vector<Item> &items, const Paper &paper, bool cut_marks);
 

@@ -15,12 +15,12 @@
 
 namespace arhost::plugin_tools {
 
-// The plugin's devices; nullopt if the plugin does not implement arhost/devices.h; or the reason why the devices
+// The plugin's devices; or nullopt if the plugin does not implement arhost/devices.h; or the reason why the devices
 // cannot be listed.
 using DevicesResult = std::variant<std::optional<devices::DeviceList>, std::string>;
 
-// Of the permissions in `needs` (from the plugin's descriptor), only those for devices are granted, and not network
-// and processes. The timeout is long because drivers may load slowly.
+// Grants only the permissions in `needs` (from the plugin's descriptor) that concern devices, not network and
+// processes. The timeout is long because drivers may load slowly.
 DevicesResult list_devices(supervise::Context &context, const std::filesystem::path &plugin, sandbox::Policy policy,
                            const std::vector<std::string> &needs,
                            std::chrono::seconds timeout = std::chrono::seconds(20));

@@ -31,8 +31,8 @@ Section section_of(const DeviceDescription &device) {
     return device.kind == ARHOST_DEVICE_DISPLAY ? Section::displays : Section::gpus;
 }
 
-// Returns the status of the device node, or nullopt. Plugins are not trusted: a path elsewhere may be on a file
-// system that blocks.
+// Returns the status of the device node, or nullopt. Ignores paths outside of /dev, because plugins are not trusted
+// and another path may be on a file system that blocks.
 std::optional<struct stat> status_of(const fs::path &node) {
     struct stat status {};
     if (!node.native().starts_with("/dev/") || ::stat(node.c_str(), &status) != 0 || !S_ISCHR(status.st_mode))

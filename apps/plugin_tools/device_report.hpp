@@ -23,12 +23,14 @@ struct PluginDevices {
 // Returns the processes that have opened a character device, as far as this user may know: "ffmpeg (process 1234)".
 std::vector<std::string> holders_of(const std::filesystem::path &node);
 
-// Returns why the device cannot be opened and what to do; "" if it can. A worker cannot see other processes, so the
-// host looks for the processes that use a busy device, and for the group that may open a forbidden one.
+// Returns why the device cannot be opened and what to do; "" if it can be opened. A worker cannot see other
+// processes. Therefore the host looks for the processes that use a busy device, and for the group that may open a
+// forbidden device.
 std::string problem_with(const devices::DeviceDescription &device);
 
 nlohmann::ordered_json devices_as_json(const std::vector<PluginDevices> &plugins);
-// One line per element. Texts of plugins are printable, but those of `problem` may not be.
+// Returns one line per element. Texts of plugins are printable, but the texts of `problem` may contain other
+// characters.
 std::vector<std::string> devices_as_text(const std::vector<PluginDevices> &plugins);
 
 } // namespace arhost::plugin_tools

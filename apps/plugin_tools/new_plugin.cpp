@@ -54,8 +54,8 @@ void check_name(const std::string &name, const std::string &language, const fs::
           "std",   "super",  "test"})
         if (name == taken)
             refuse_taken(name, "is reserved by a build tool or a language");
-    // A script named like a standard module would hide it. Names with an underscore cannot clash, except those listed
-    // below.
+    // A script with the name of a standard module would hide the module. Names with an underscore cannot clash,
+    // except those listed below.
     if (language == "python" && name.find('_') == std::string::npos)
         refuse_taken(name, "has no underscore; a Python plugin needs one, so that it cannot hide a standard module");
     for (const char *module : {"py_compile", "pydoc_data", "sre_compile", "sre_constants", "sre_parse"})

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The plugins that a command asks, each in a worker of its own.
+// The plugins that a command queries, each in its own worker.
 #pragma once
 
 #include "command_line/command_line.hpp"

@@ -11,7 +11,7 @@ namespace {
 using namespace run_config;
 using enum Type;
 
-// Of each Type: its name in the documentation and in JSON Schema.
+// The name of each Type in the documentation and in JSON Schema.
 struct TypeName {
     const char *documented, *json;
 };
