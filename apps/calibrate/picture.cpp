@@ -27,8 +27,7 @@ public:
     Colours() {
         cv::Mat ramp(1, 256, CV_8U);
         for (int i = 0; i < 256; ++i)
-            ramp.at<std::uint8_t>(i) =
-                static_cast<std::uint8_t>(20 + i * 215 / 255); // the map's ends are almost black
+            ramp.at<std::uint8_t>(i) = static_cast<std::uint8_t>(20 + i * 215 / 255); // the ends are almost black
         cv::applyColorMap(ramp, table_, cv::COLORMAP_TURBO);
     }
     cv::Scalar at(double fraction) const {

@@ -18,8 +18,7 @@ constexpr double newest = 0.4;
 // the target rests; above the second, it moves. The expected value is about newest/(2 − newest) = 0.25 for noise, and
 // 1 in steady motion without noise.
 constexpr double resting_share = 0.3, moving_share = 0.55;
-// Minimum length of an innovation that counts as a jump, relative to the root mean square of earlier
-// innovations.
+// Minimum length of an innovation that counts as a jump, relative to the root mean square of earlier innovations.
 constexpr double jump = 5;
 
 bool continues(const Smoothing &memory, std::int64_t capture_ns) {

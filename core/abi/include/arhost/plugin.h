@@ -176,7 +176,7 @@ static inline const arhost_option *arhost_find_option(const arhost_option *optio
 
 /* Optional capabilities: bits of arhost_descriptor.capabilities. */
 enum {
-    ARHOST_CAPABILITY_SEEK = 1 << 0, /* source: can start at any frame; frame N is the same wherever it starts */
+    ARHOST_CAPABILITY_SEEK = 1 << 0, /* source: can start at any frame; frame N is the same for every start */
     ARHOST_CAPABILITY_LIVE = 1 << 1, /* source: a camera; frames not read in time are lost */
     ARHOST_CAPABILITY_LENS_DISTORTION = 1 << 2, /* raytracer: applies the lens distortion of arhost_intrinsics */
     /* sink: if the option `path` contains %d or %0Nd, it writes one numbered file per frame; without this capability,

@@ -115,9 +115,9 @@ typedef struct arhost_tracker_result {
     arhost_observation *observations; /* ARHOST_MAX_OBSERVATIONS elements */
     arhost_body_pose *poses;          /* arhost_tracker_setup.target_count elements */
     uint32_t pose_count;              /* 0; set by a tracker with ARHOST_CAPABILITY_REPORTS_POSES */
-    /* Set by a tracker that knows how many quadrilaterals it has examined, including those that turned out not to be
-     * markers: at least observation_count; -1: unknown. From it, the host can tell the user whether the tracker saw
-     * no quadrilateral or recognised none as a marker. */
+    /* -1: unknown; set by the tracker. Number of quadrilaterals that the tracker has examined, including those that
+     * turned out not to be markers; at least observation_count. From this number, the host can tell the user whether
+     * the tracker saw no quadrilateral or recognised none as a marker. */
     int32_t candidate_count;
 } arhost_tracker_result;
 
@@ -127,8 +127,8 @@ typedef struct arhost_target {
     arhost_target_state state;
     char name[ARHOST_MAX_NAME];
     uint32_t age_frames;        /* frames since the target was last seen; 0 if DETECTED */
-    uint32_t first_observation; /* the target's observations in this frame: index of the first */
-    uint32_t observation_count; /* and number, in arhost_record.observations */
+    uint32_t first_observation; /* index of the target's first observation in arhost_record.observations */
+    uint32_t observation_count; /* number of the target's observations in this frame; they are consecutive */
     uint32_t reserved;          /* 0 */
     /* Target-to-camera matrix, column-major, OpenGL eye space: x right, y up, looking along −z; millimetres. The
      * rotation is orthonormal to 1e-9, the last row is 0 0 0 1. */

@@ -2,9 +2,8 @@
 // Lens distortion: maps directions to image points. Axes: x right, y down, z forward (OpenCV). An image point is
 // (x'', y'', 1); focal lengths and principal point map it to a pixel. A leaf file: see ../scalar.hpp.
 //
-// The inverse has no closed form: ../lens.hpp computes it iteratively. Shaders read a ray table that was computed
-// with
-// ../lens.hpp.
+// The inverse has no closed form: ../lens.hpp computes it iteratively. Shaders read a ray table, which
+// ../lens.hpp has computed.
 
 // Coefficients in OpenCV's order.
 struct BrownConrady {
