@@ -30,7 +30,7 @@ Tilt tilt_of(const View &view, const Lens &lens);
 Lens assumed_lens(const cv::Size &image);
 
 struct UsedView {
-    std::size_t index; // in the list of views
+    std::size_t index; // index in the list of views
     double error_px;   // RMS over the corners
     Tilt tilt;
     std::vector<cv::Point2f> corners_px; // without removed corners

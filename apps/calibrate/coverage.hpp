@@ -21,7 +21,7 @@ public:
     void add(const View &view, const Tilt &tilt);
 
     bool is_covered(int column, int row) const { return covered_[index(column, row)]; }
-    double fraction() const; // of the cells that contain corners
+    double fraction() const; // fraction of the cells that contain corners
     std::size_t new_cells(const View &view) const;
     Tilt lowest() const { return lowest_; }
     Tilt highest() const { return highest_; }

@@ -451,7 +451,7 @@ private:
         MarkerState &marker = markers_[index];
         struct Witness {
             std::size_t view;
-            std::vector<Rigid> camera_from_map; // by the other markers
+            std::vector<Rigid> camera_from_map; // poses that follow from the other markers
         };
         std::vector<std::size_t> shared;
         for (const std::size_t view : marker.views)
@@ -765,7 +765,7 @@ private:
     pose::Projection projection_;
     const Settings &settings_;
     std::vector<FrameState> frames_;
-    std::vector<MarkerState> markers_; // by id
+    std::vector<MarkerState> markers_; // by ascending id
     std::vector<View> views_;
     std::set<std::size_t> group_, skipped_; // the markers of the map; the markers that could not be placed
     std::size_t seed_ = 0, fixed_ = 0;

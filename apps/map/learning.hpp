@@ -33,7 +33,7 @@ struct Marker {
 };
 
 struct Settings {
-    std::map<int, double> sides_mm; // of all markers that may be detected; others are ignored
+    std::map<int, double> sides_mm; // sides of all markers that may be detected; other markers are ignored
     std::optional<int> origin;      // the map's frame is that of this marker; default: the smallest id
     std::vector<Marker> layout; // initial estimate; the map's frame is that of the layout, unless `origin` is given
     bool is_plane = false;      // turn the map's frame so that z = 0 is the plane that fits the corners best
@@ -44,7 +44,7 @@ struct Settings {
 struct LearnedMarker : Marker {
     std::size_t views = 0;         // frames that show the marker together with other markers, and in which it fits
     std::size_t misfits = 0;       // frames in which the marker is elsewhere, because it was moved, hidden or misread
-    double rms_px = 0;             // of the corners' reprojection errors in the views that fit
+    double rms_px = 0;             // RMS of the corners' reprojection errors in the views that fit
     double position_sigma_mm = 0;  // standard deviation, in the direction in which it is largest, relative to
     double rotation_sigma_rad = 0; // the marker that fixes the frame
     bool is_ambiguous = false;     // another tilt fits the images nearly as well
@@ -56,8 +56,8 @@ struct Refusal {
 };
 
 struct Map {
-    std::vector<LearnedMarker> markers; // by id; empty if no marker was seen together with another one
-    std::vector<Refusal> refused;       // by id
+    std::vector<LearnedMarker> markers; // by ascending id; empty if no marker was seen together with another one
+    std::vector<Refusal> refused;       // by ascending id
     std::vector<std::string> misfits;   // names of frames in which most markers do not fit
     std::size_t frames = 0;             // frames that were used
     int origin = 0;                     // the marker that fixes the frame

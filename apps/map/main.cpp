@@ -162,8 +162,8 @@ void warn(const std::string &text) {
 struct Observations {
     arhost_intrinsics camera;
     std::vector<Frame> frames;
-    std::map<int, double> sides_mm; // of the markers that were seen
-    std::set<int> unseen;           // of the markers that --ids lists
+    std::map<int, double> sides_mm; // sides of the markers that were seen
+    std::set<int> unseen;           // markers of --ids that were not seen
 };
 
 Observations observe(const Arguments &arguments, const Family &family, const Sides &sides, Progress &progress) {

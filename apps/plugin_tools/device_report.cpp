@@ -196,7 +196,7 @@ std::string headline(const DeviceDescription &d, const std::string &plugin) {
 
 struct SectionText {
     Section section;
-    arhost_kind kind; // of the plugins that list these devices
+    arhost_kind kind; // kind of the plugins that list these devices
     const char *nothing;
 };
 constexpr SectionText sections[] = {

@@ -95,7 +95,7 @@ public:
 
 private:
     bool checks_place_ = false;             // whether raytracer.place is checked
-    std::optional<shading::Lens> lens_;     // of the camera, which has the same lens in all frames
+    std::optional<shading::Lens> lens_;     // lens of the camera, the same in all frames
     std::optional<scene::Box> virtual_box_; // world coordinates, mm; nullopt if the scene has no virtual object
 };
 

@@ -46,7 +46,7 @@ private:
     camera::Coordinates coordinates_;
     Targets targets_;
     World world_;
-    std::optional<std::pair<std::uint64_t, arhost_camera>> last_; // with the number of the frame
+    std::optional<std::pair<std::uint64_t, arhost_camera>> last_; // last camera, with the number of its frame
 };
 
 } // namespace arhost::host

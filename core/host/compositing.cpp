@@ -14,7 +14,7 @@ using Clock = std::chrono::steady_clock;
 
 namespace {
 
-// Copies the video frame and the overlay if sinks read them.
+// Copies the video frame and the overlay, each only if a sink reads it.
 void copy_inputs(const Frame &frame, const arhost_frame_format &format, const ImageView &overlay,
                  const Region &region, std::uint32_t inputs, std::span<std::byte> slot) {
     const OutputSlot layout(format);

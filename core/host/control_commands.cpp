@@ -47,7 +47,7 @@ void Commands::execute(SinkQueue &sink, const messages::Request &request) {
         if (changes_run)
             sink.component->log(ARHOST_SEVERITY_INFO, "command: " + request.command);
         std::visit([&](const auto &each) { execute(each, done); }, command);
-    } catch (const std::exception &error) { // also if no process or memory can be created
+    } catch (const std::exception &error) { // also thrown if no process or memory can be created
         done(error.what(), {});
     }
 }

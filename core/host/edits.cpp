@@ -157,7 +157,7 @@ void Edits::apply(const run_config::Configuration &edited, const run_config::Con
     const bool loads_scene = failed || scene_changed || other_scene || differs("coordinates");
     if (!loads_scene && !differs("raytracer"))
         return;
-    failed_raytracer_edit_ = edit; // until the ray tracer has been replaced
+    failed_raytracer_edit_ = edit; // remains set until the ray tracer has been replaced
     const auto ignored = [](const std::string &, const nlohmann::ordered_json &) {};
     if (loads_scene)
         assembly_.swap_scene(edit.scene, edit.raytracer, ignored);

@@ -46,7 +46,7 @@ struct Frame {
     Lease anchors;              // slot that the ray tracer reads, while rendering
     Lease overlay;              // slot in the ray tracer's memory
     arhost_render_info render{};
-    Quality quality;                    // of the overlay
+    Quality quality;                    // quality of the overlay
     arhost_record record{};             // without the arrays and their lengths
     std::vector<arhost_target> targets; // those seen so far
     std::vector<arhost_observation> observations;
@@ -75,7 +75,7 @@ inline bool is_visible(const arhost_target &target) {
 struct OutputFrame {
     std::uint64_t sequence;
     Lease slot;
-    Frame::Clock::time_point captured; // as in Frame
+    Frame::Clock::time_point captured; // as Frame::captured
     std::uint32_t inputs;              // what `slot` has: ARHOST_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT
 };
 using OutputFramePointer = std::shared_ptr<const OutputFrame>;

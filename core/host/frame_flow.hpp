@@ -45,8 +45,8 @@ public:
     };
     struct Intake {
         Readiness readiness = Readiness::disabled;
-        SlotPool *slots = nullptr;   // for what the component writes
-        SlotPool *anchors = nullptr; // of a ray tracer whose scene has anchors
+        SlotPool *slots = nullptr;   // slots for the results of the component
+        SlotPool *anchors = nullptr; // slots for anchors, if a ray tracer's scene has anchors
     };
     struct Intakes {
         Intake source, tracker, raytracer;
@@ -64,7 +64,7 @@ public:
         Frame &frame;
     };
     struct Show {
-        std::unique_ptr<Frame> frame; // with the overlay, if it has one; to be passed to on_shown()
+        std::unique_ptr<Frame> frame; // contains the overlay, if there is one; to be passed to on_shown()
     };
     using Action = std::variant<Read, Track, Render, Show>;
 
@@ -98,13 +98,13 @@ public:
     void on_lost(Frame::Stage waiting, std::span<const std::uint64_t> unanswered);
     void on_tracker_replaced() { tracker_pace_ = {}; }
     void on_raytracer_replaced() { raytracer_pace_ = {}; }
-    void on_coordinates_changed(); // of the cameras, because the scene was replaced
+    void on_coordinates_changed(); // the coordinates of the cameras have changed, because the scene was replaced
 
     void on_shown(Frame &frame, Clock::time_point composited);
     void on_interrupted() { interrupted_ = true; } // frames are not delayed any more
 
     // ---- state -------------------------------------------------------------------------------------
-    void set_rate(double fps) { fps_ = fps; } // of the source; 0: unknown
+    void set_rate(double fps) { fps_ = fps; } // frame rate of the source; 0: unknown
     // Mode lockstep: shows recorded video at the rate of its time stamps.
     void set_paced(bool paced) { paced_ = paced; }
     void set_frozen(bool frozen) { frozen_ = frozen; } // no further frames are taken from the source
@@ -123,7 +123,7 @@ public:
     const run_config::RecordedFrame *recorded(std::uint64_t sequence) const {
         return settings_.recording ? &settings_.recording->frames[sequence] : nullptr;
     }
-    const std::vector<arhost_target> &last_targets() const { return last_targets_; } // of the last shown frame
+    const std::vector<arhost_target> &last_targets() const { return last_targets_; } // in the last shown frame
 
 private:
     // Measures whether a worker can catch up after a delay.
@@ -166,7 +166,7 @@ private:
     bool paced_ = false, frozen_ = false, input_ended_ = false, interrupted_ = false;
     std::deque<Lease> reads_; // slots of the reads without an answer, oldest first
     std::uint64_t next_read_ = 0;
-    std::map<std::uint64_t, std::unique_ptr<Frame>> frames_; // by number in the run
+    std::map<std::uint64_t, std::unique_ptr<Frame>> frames_; // by number of the frame in the run
     Pace tracker_pace_, raytracer_pace_;
     struct Paced {
         std::int64_t media_ns;

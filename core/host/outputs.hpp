@@ -40,7 +40,7 @@ public:
     const std::vector<std::unique_ptr<SinkQueue>> &sinks() const { return sinks_; }
 
 private:
-    static constexpr std::size_t max_started = 4; // by commands, at the same time
+    static constexpr std::size_t max_started = 4; // outputs that commands have started and that still run
 
     SinkQueue &make_sink(const run_config::ComponentConfiguration &output, const std::string &name,
                          const std::string &path = "");
@@ -69,7 +69,7 @@ private:
     OutputFramePointer last_frame_; // for snapshots
     std::map<const run_config::ComponentConfiguration *, run_config::OutputFile> files_;
     std::map<std::pair<const run_config::ComponentConfiguration *, std::string>, base::ListeningSocket>
-        sockets_; // by output and option
+        sockets_; // by output and option; sockets stay open while a worker restarts
 };
 
 // Returns all components of a run, including those that start or end.

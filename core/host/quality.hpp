@@ -44,7 +44,7 @@ public:
     bool add(const Quality &quality, std::chrono::nanoseconds render_time, Clock::time_point now);
 
 private:
-    double relative_cost(std::size_t level) const; // of an image, relative to the current level
+    double relative_cost(std::size_t level) const; // cost of an image, relative to the current level
     void change(std::size_t level);
     void lower(double median);
 

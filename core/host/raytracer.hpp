@@ -51,7 +51,7 @@ private:
 
     const Configuration configuration_;
     const std::shared_ptr<LoadedScene> scene_;
-    std::shared_ptr<SlotPool> anchor_slots_;   // of AnchorPose; null if the scene has no anchors
+    std::shared_ptr<SlotPool> anchor_slots_;   // slots for AnchorPose; null if the scene has no anchors
     std::optional<QualityController> quality_; // only with `live.target_fps`
     std::uint32_t samples_in_use_ = 0;         // value of the option in the current worker
 };

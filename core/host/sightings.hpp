@@ -33,7 +33,7 @@ private:
 
     RunParts &parts_;
     std::shared_ptr<const run_config::TrackerConfiguration> tracker_;
-    std::vector<std::string> families_;                                  // of the targets' markers
+    std::vector<std::string> families_;                                  // families of the targets' markers
     std::map<std::pair<std::string, std::int32_t>, std::string> listed_; // the targets' markers, by family and id
     bool has_warned_ = false;
 };

@@ -31,7 +31,7 @@ private:
 
     RunParts &parts_;
     std::unique_ptr<supervise::Component> component_;
-    std::shared_ptr<SlotPool> slots_; // of the current worker; null unless it is running
+    std::shared_ptr<SlotPool> slots_; // slots of the current worker; null unless the worker is running
     std::uint64_t skipped_ = 0;       // frames that the source has skipped
     std::int64_t last_capture_ns_ = INT64_MIN;
     std::size_t candidate_ = 0;                     // plugin of the current worker

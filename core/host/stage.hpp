@@ -41,7 +41,7 @@ protected:
     Frame *accept(const ipc::Command &command, const ipc::Result &result);
 
     RunParts &parts_;
-    std::shared_ptr<SlotPool> slots_; // of the current worker; null unless it is running
+    std::shared_ptr<SlotPool> slots_; // slots of the current worker; null unless the worker is running
 
 private:
     const std::size_t max_in_flight_;

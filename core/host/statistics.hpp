@@ -87,7 +87,7 @@ struct Statistics {
     std::uint64_t tracked = 0;                       // frames with at least one detected target
     std::uint64_t augmented = 0;                     // frames composited with an overlay
     std::uint64_t composited = 0;                    // frames sent to the outputs, augmented or not
-    std::map<std::string, TargetStatistics> targets; // by name
+    std::map<std::string, TargetStatistics> targets; // by name of the target
     SearchStatistics search;
     std::map<std::string, std::uint64_t> unlisted;    // frames with a marker that no target lists, by name
     std::map<std::string, std::uint64_t> unconfirmed; // frames with a listed marker whose target got no pose

@@ -64,7 +64,8 @@ Component::Create Tracker::on_hello(const PluginDescription &plugin, std::size_t
 }
 
 SlotLayout Tracker::on_ready(const messages::Ready &ready) {
-    constexpr std::uint64_t max_size = 2 * std::uint64_t{ARHOST_MAX_STATE}; // of the plugin and the worker itself
+    // The plugin and the worker itself each have a state.
+    constexpr std::uint64_t max_size = 2 * std::uint64_t{ARHOST_MAX_STATE};
     if (ready.state_size > max_size)
         throw ProtocolViolation("the state has " + std::to_string(ready.state_size) + " bytes; the limit is " +
                                 std::to_string(max_size));

@@ -229,7 +229,8 @@ std::vector<Rigid> poses_from(const ObservedMarker &marker, const Projection &pr
     return poses;
 }
 
-// The error of a start pose: bounded for each corner, so that wrong markers do not outvote the right ones.
+// Returns the error of a start pose. The error of each corner is bounded, so that wrong markers do not outvote the
+// right ones.
 double start_error(const Rigid &pose, std::span<const Correspondence> points, const Projection &projection) {
     constexpr double bound_px = 10;
     double sum = 0;

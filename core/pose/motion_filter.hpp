@@ -12,7 +12,8 @@ namespace arhost::pose {
 struct Motion {
     double rotation[9], angular_velocity_rad_s[3]; // matrices are column-major
     double translation_mm[3], velocity_mm_s[3];
-    double turn_covariance[36], shift_covariance[36]; // of rotation and angular velocity; of translation and velocity
+    // turn: rotation and angular velocity; shift: translation and velocity.
+    double turn_covariance[36], shift_covariance[36];
 };
 
 Motion begin_motion(const Estimate &first);

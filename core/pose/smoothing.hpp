@@ -12,7 +12,7 @@ namespace arhost::pose {
 // The memory of one target. Plain data without pointers, because it is kept in shared memory across restarts; all
 // zero if there is no earlier pose.
 struct Smoothing {
-    std::int64_t capture_ns; // of the last pose
+    std::int64_t capture_ns; // capture time of the last pose
     double rotation[9], translation_mm[3];
     // Weighted sums of the innovations in units of the measurement noise, of their squared lengths, and of the
     // weights. The innovations of a resting target cancel out; those of a moving one point the same way.

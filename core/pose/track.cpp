@@ -77,7 +77,7 @@ Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_
     if (poses.size() > 1) {
         const double evidence = log_likelihood(poses[0]) - log_likelihood(poses[1]),
                      log_odds = paths[0].log_likelihood - paths[1].log_likelihood +
-                                std::clamp(evidence, -max_evidence, max_evidence); // that poses[0] is the true one
+                                std::clamp(evidence, -max_evidence, max_evidence); // log-odds for poses[0]
         // Where the branches meet, both poses may follow from the same branch.
         const bool is_fork = paths[0].branch == paths[1].branch, is_established = !is_fork && before.is_established;
         const double apart_rad =
@@ -85,7 +85,7 @@ Step next_step(const Track &before, std::span<const Estimate> poses, std::int64_
         const double limit = is_fork ? 0
                                      : (is_established ? switch_log_odds : early_switch_log_odds) *
                                            std::min(apart_rad / distinct_rad, 1.0);
-        const std::size_t first = paths[1].branch < paths[0].branch ? 1 : 0; // the one that follows from branch[0]
+        const std::size_t first = paths[1].branch < paths[0].branch ? 1 : 0; // the pose that follows from branch[0]
         const bool switches = (first == 0 ? log_odds : -log_odds) < -limit;
         step.chosen = switches ? 1 - first : first;
         track.log_odds = step.chosen == 0 ? log_odds : -log_odds;

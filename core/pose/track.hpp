@@ -15,7 +15,7 @@ namespace arhost::pose {
 // The memory of one target. Plain data without pointers, because it is kept in shared memory across restarts;
 // all zero if the target was never seen.
 struct Track {
-    std::int64_t capture_ns;      // of the last frame in which the target was detected
+    std::int64_t capture_ns;      // capture time of the last frame in which the target was detected
     std::uint32_t branches;       // 0: never seen; 2 if the last frame permitted two poses, else 1
     std::uint32_t is_established; // non-zero: there was strong evidence for branch[0] since the branches last met
     double log_odds;  // log of P(branch[0] is the true one) / P(branch[1] is the true one), damped over time

@@ -46,7 +46,7 @@ struct SourceConfiguration : ComponentConfiguration {
 
 struct TrackerConfiguration : ComponentConfiguration {
     std::vector<Target> targets;
-    std::vector<yaml::Node> target_nodes{}; // for each target
+    std::vector<yaml::Node> target_nodes{}; // the node of each target
     std::vector<std::filesystem::path> map_files{};
     std::uint32_t hold_frames = 0;
     std::uint32_t world_grace_frames = 90, full_search_every = 10;

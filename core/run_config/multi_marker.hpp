@@ -17,7 +17,7 @@ struct MultiMarker {
     std::string where; // "marker.dat:12"
     std::string print; // the file of a pattern, or the id of a matrix code
     double side_mm;
-    glm::dmat3 rotation; // from the marker to the map
+    glm::dmat3 rotation; // from the marker's to the map's coordinates
     glm::dvec3 position_mm;
 
     [[noreturn]] void fail(const std::string &message) const; // throws yaml::Error

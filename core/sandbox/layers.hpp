@@ -75,7 +75,7 @@ Layer filter_system_calls(const Policy &policy);
 // The paths to which a policy grants access, with wildcards expanded. Patterns that match nothing are omitted.
 struct Paths {
     std::vector<std::filesystem::path> readable, devices; // devices may be read, written and controlled with ioctl
-    std::vector<std::filesystem::path> sockets;           // of the X or Wayland server
+    std::vector<std::filesystem::path> sockets;           // sockets of the X or Wayland server
 };
 Paths paths_of(const Policy &policy);
 

@@ -126,7 +126,8 @@ private:
     std::vector<std::size_t> &of_table(Table table) { return tables_[static_cast<std::size_t>(table)]; }
 
     std::vector<std::string> texts_;
-    std::array<std::vector<std::size_t>, table_count> tables_; // for each element: the number of its text; 0: none
+    // For each element: the index of its text in texts_, plus 1; 0: none.
+    std::array<std::vector<std::size_t>, table_count> tables_;
 };
 
 // 64-byte aligned memory that holds an arena.
@@ -157,7 +158,8 @@ public:
     Settings settings;
     Environment environment;
 
-    void set_origin(std::string origin) { origins_.set(std::move(origin)); } // of the elements added from now on
+    // Sets the origin of the elements that are added from now on.
+    void set_origin(std::string origin) { origins_.set(std::move(origin)); }
     const Origins &origins() const { return origins_; }
 
     // Each function returns the index of the new element.
@@ -195,7 +197,7 @@ private:
     void apply_initial_motion(std::span<std::byte> arena) const;
 
     std::vector<Geometry> geometries_;
-    std::vector<std::pair<std::uint32_t, Texture>> textures_; // with the name's offset
+    std::vector<std::pair<std::uint32_t, Texture>> textures_; // first: offset of the name in `names`
     std::vector<arhost_material> materials_;
     std::vector<arhost_object> objects_;
     std::vector<arhost_light> lights_;

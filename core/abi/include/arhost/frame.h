@@ -75,8 +75,8 @@ typedef struct arhost_frame_format {
     uint64_t byte_size;    /* size of a slot */
 } arhost_frame_format;
 
-/* Computes `plane_count` and all later fields from the fields before `plane_count`. Returns 1, or 0 if one of
- * these is invalid. */
+/* Computes `plane_count` and all later fields from the fields before `plane_count`. Returns 1, or 0 if one of the
+ * input fields is invalid. */
 static inline int32_t arhost_frame_layout(arhost_frame_format *format) {
     const uint64_t w = format->width, h = format->height;
     uint64_t row[ARHOST_MAX_PLANES] = {0, 0, 0};

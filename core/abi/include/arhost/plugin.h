@@ -195,7 +195,7 @@ enum {
     ARHOST_CAPABILITY_AREA_LIGHTS = 1 << 9,  /* rectangles and spheres */
     ARHOST_CAPABILITY_ENVIRONMENT = 1 << 10, /* the environment map */
     ARHOST_CAPABILITY_MOTION = 1 << 11,      /* arhost_motion */
-    ARHOST_CAPABILITY_EVERY_SCENE = 0xfe0,   /* all of these: REFLECTION to MOTION */
+    ARHOST_CAPABILITY_EVERY_SCENE = 0xfe0,   /* all bits from REFLECTION to MOTION */
     /* sink: accepts "-" as the option `path`, and then writes to standard output, descriptor 1. Without this
      * capability, the host rejects "-" as the path of an output. */
     ARHOST_CAPABILITY_STANDARD_OUTPUT = 1 << 12,

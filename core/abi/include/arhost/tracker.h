@@ -28,7 +28,7 @@ extern "C" {
 
 enum {
     ARHOST_MAX_TARGETS = 1024,
-    ARHOST_MAX_MARKERS = 1024, /* of all targets */
+    ARHOST_MAX_MARKERS = 1024, /* maximum number of markers of all targets together */
     ARHOST_MAX_OBSERVATIONS = 1024,
     ARHOST_MAX_FAMILIES = 16,
     ARHOST_MAX_FAMILY = 32, /* name of a family, with the terminating NUL */
@@ -62,7 +62,7 @@ typedef struct arhost_tracker_setup {
     uint32_t struct_size;
     uint32_t target_count; /* at least 1 */
     const arhost_frame_format *format;
-    const arhost_intrinsics *intrinsics; /* of the camera; width and height are those of the frames */
+    const arhost_intrinsics *intrinsics; /* intrinsics of the camera; width and height are those of the frames */
     const arhost_target_config *targets;
     const arhost_marker_config *markers;
     uint32_t marker_count;
