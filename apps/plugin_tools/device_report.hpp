@@ -20,7 +20,7 @@ struct PluginDevices {
     std::string problem; // why the plugin cannot list its devices; "" if it can
 };
 
-// Returns the processes that have opened a character device, as far as this user may know: "ffmpeg (process 1234)".
+// Returns the processes that have opened a character device, if this user may see them: "ffmpeg (process 1234)".
 std::vector<std::string> holders_of(const std::filesystem::path &node);
 
 // Returns why the device cannot be opened and what to do; "" if it can be opened. A worker cannot see other

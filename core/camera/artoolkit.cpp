@@ -2,8 +2,8 @@
 //
 // The file format is that of artoolkitX, Source/ARX/AR/paramFile.c (arParamLoad); the formulas are those of
 // paramDistortion.c (arParamIdeal2Observ). All numbers are big-endian: the 32-bit integers xsize and ysize, the
-// 3×4 matrix `mat` in doubles, row by row, and the doubles `dist_factor`. The number of the latter determines the
-// version of the distortion:
+// 3×4 matrix `mat` in doubles, row by row, and the doubles `dist_factor`. The number of elements of `dist_factor`
+// determines the version of the distortion:
 //   1: x0 y0 f1 s (arParamLoad swaps the last two)    2: x0 y0 s f1 f2    3: x0 y0 s a f1 f2
 //   4: k1 k2 p1 p2 fx fy x0 y0 s    5: k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 fx fy x0 y0 s
 // `mat` projects a point in camera coordinates (x right, y down, z forward) to the ideal pixel (ix, iy), and

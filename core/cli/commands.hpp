@@ -23,7 +23,7 @@ struct Arguments {
     double axis1[3] = {0, 0, 0}, axis2[3] = {0, 0, 0};
     bool verbose = false;
     bool allow_no_target = false; // a run in which the tracker sees no marker succeeds
-    bool debug_view = false;      // set the option `debug_view` of every output that has it
+    bool debug_view = false;      // set the option `debug_view` of each output that has this option
     bool watch = false;           // apply edits of the configuration and of the scene while the video runs
     bool in_process = false;      // run the plugins in the host's process, without timeouts and sandbox
 };

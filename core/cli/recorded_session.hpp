@@ -17,7 +17,7 @@ struct Session {
     yaml::Node description;   // session.json
     yaml::Node configuration; // configuration.yaml, with the paths of the recorded run
     run_config::Recording recording;
-    std::string warning; // what is missing at the end, as a message for the user; ""
+    std::string warning; // describes what is missing at the end of the session, for the user; "" if nothing is
 
     std::filesystem::path video() const { return folder / "video.mkv"; }
     // Describes the scene files that have changed since the recording, one message each.

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The contract checks that `conform: true` enables (docs/conformance.md). They inspect a sample of the run's frames
-// and report violations of the ABI; they do not change the run. Values that could harm the host are always rejected,
-// with or without these checks (host/frame_validation.hpp).
+// The contract checks that `conform: true` enables (docs/conformance.md). They inspect a sample of the run's frames,
+// report violations of the ABI, and do not change the run. Independently of these checks, the host always rejects
+// values that could harm it (host/frame_validation.hpp).
 #pragma once
 
 #include "compositor/compositor.hpp"

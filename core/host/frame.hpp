@@ -48,7 +48,7 @@ struct Frame {
     arhost_render_info render{};
     Quality quality;                    // quality of the overlay
     arhost_record record{};             // without the arrays and their lengths
-    std::vector<arhost_target> targets; // those seen so far
+    std::vector<arhost_target> targets; // the targets that have been seen so far
     std::vector<arhost_observation> observations;
     std::vector<arhost_expected_marker> expected;
     std::optional<std::array<double, 16>> world;              // the pose of the world, as arhost_target.mt

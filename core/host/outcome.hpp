@@ -34,7 +34,7 @@ std::string marker_name(const model::TargetMarker &marker);
 // Describes what a tracker looks for, such as "desk (tag36h11 23), board (map of 12 markers)".
 std::string describe_targets(const std::vector<model::Target> &targets);
 
-// Tells what the tracker saw instead of the unseen targets, as "; it saw tag36h11 5 (30 frames)"; "" if nothing.
+// Describes what the tracker saw instead of the unseen targets, as "; it saw tag36h11 5 (30 frames)"; "" if nothing.
 std::string seen_instead(const Statistics &statistics, const std::vector<model::Target> &unseen);
 
 // Returns a hint on what to check if targets are not seen, such as "; compare the numbers and the family with the

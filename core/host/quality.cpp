@@ -18,7 +18,8 @@ constexpr double too_slow = 0.95; // above this median, the quality is lowered
 constexpr double intended = 0.8;  // maximum predicted time of the level that is then chosen
 constexpr double fast = 0.75;     // maximum predicted time of a better level to which the quality is raised
 
-// A level that was too slow is tried again when the level below it takes this share of the time.
+// A level that was too slow is tried again when the median time at the next lower level has decreased to this share
+// of its earlier value.
 constexpr double relief = 0.9;
 
 std::vector<Quality> levels_of(const QualityController::Limits &limits) {

@@ -35,9 +35,9 @@ public:
 
     // Runs until all frames are output. Returns false if the run failed or a component was disabled.
     bool run();
-    // Handles Ctrl-C. The first call lets the frames in progress finish and then ends the run, after the longest
-    // stop_deadline_ms of the components at the latest; a second call ends the run immediately. Must be called from
-    // the reactor.
+    // Handles Ctrl-C. The first call lets the frames in progress finish and then ends the run, at the latest after
+    // the longest stop_deadline_ms of the components. A second call ends the run immediately. Must be called from the
+    // reactor.
     void interrupt();
 
     const Failures &failures() const { return parts_.failures; }

@@ -35,7 +35,7 @@ struct RunParts {
 
     bool live() const { return configuration.mode == run_config::Mode::live; }
     std::int64_t now_ns() const { return base::to_ns(context.reactor.now()); }
-    // If the component has stopped, or will not be restarted, keeps its totals and returns true.
+    // Returns whether the component has stopped or will not be restarted. If so, keeps its totals.
     bool take_if_ended(const supervise::Component &component);
     void log(arhost_severity severity, const std::string &text) const { context.log(severity, "arhost", text); }
 

@@ -28,14 +28,14 @@ public:
     bool has_quit = false;        // has ended the run; receives the remaining frames
     bool ending = false;          // accepts no more frames, and stops once it has written the waiting frames
     bool is_single = false;       // accepts one frame, then ends
-    // For an output that a command has started: its file, and what answers the command in progress.
+    // For an output that a command has started: its file, and the function that answers the command in progress.
     bool on_demand = false;
     std::string path;
     control::Done done;
 
     void offer(OutputFramePointer frame);
-    // Sets what the sink reads (ARHOST_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT), and removes waiting frames without
-    // it.
+    // Sets the images that the sink reads (ARHOST_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT), and removes waiting frames
+    // that lack them.
     void set_inputs(std::uint32_t inputs);
     std::uint32_t inputs() const { return closed ? 0 : inputs_; }
     bool awaits_its_frame() const { return is_single && !ending; }

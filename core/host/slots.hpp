@@ -42,8 +42,8 @@ private:
     std::uint32_t index_ = 0;
 };
 
-// The slots of one shared-memory region. A restarted component gets a new region and a new pool; the leases of the
-// old pool keep the old region mapped until its last frame is done.
+// The slots of one shared-memory region. A restarted component gets a new region and a new pool. The old region stays
+// mapped until the last frame that holds a lease of the old pool is done.
 class SlotPool : public std::enable_shared_from_this<SlotPool> {
 public:
     explicit SlotPool(std::shared_ptr<const supervise::Region> region);

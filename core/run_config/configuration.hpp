@@ -36,8 +36,8 @@ struct ComponentConfiguration {
     sandbox::Policy policy;                       // docs/security.md
     bool conform = false;                         // check results at run time (docs/conformance.md)
     std::set<std::string, std::less<>> control{}; // the commands that the output may send
-    bool debug_view = false;                      // of an output: set the option `debug_view`, if the plugin has it
-    std::string name{}; // of a tracker or ray tracer among the alternatives; default: the name of the plugin
+    bool debug_view = false; // set the output's option `debug_view`, if the plugin has this option
+    std::string name{};      // of a tracker or ray tracer among the alternatives; default: the name of the plugin
 };
 
 struct SourceConfiguration : ComponentConfiguration {

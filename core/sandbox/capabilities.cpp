@@ -8,8 +8,8 @@
 
 namespace arhost::sandbox {
 
-// Root keeps CAP_DAC_OVERRIDE, because in a container it may have to write files of other users in mounted volumes;
-// Landlock and the mounts limit which files it can write. Other users keep no capability.
+// Root keeps CAP_DAC_OVERRIDE, because a process in a container may have to write files of other users in mounted
+// volumes. Landlock and the mounts limit the files that it can write. Other users keep no capability.
 Layer drop_capabilities() {
     const unsigned kept = CAP_DAC_OVERRIDE, mask = ::geteuid() == 0 ? 1u << kept : 0;
     for (unsigned capability = 0; ::prctl(PR_CAPBSET_READ, capability, 0, 0, 0) >= 0; ++capability)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Namespaces: no other processes, no network, no System V IPC objects, no names of other control groups, and a root
-// folder with only what the policy grants.
+// Namespaces: no access to other processes, the network, System V IPC objects, or the names of other control groups.
+// The root folder contains only what the policy grants.
 #include "sandbox/layers.hpp"
 
 #include <sched.h>

@@ -91,8 +91,9 @@ bool complete(const Level &level);
 // Returns, for example, "no_new_privs: yes; namespaces: user, net; … MISSING landlock: not in this kernel".
 std::string to_text(const Level &level);
 
-// Enters a user namespace that maps only the calling user; in it, the process has all capabilities. Returns an empty
-// string, or why this is impossible and what an administrator can change. The process must be single-threaded.
+// Enters a user namespace that maps only the calling user. In it, the process has all capabilities. Returns "", or
+// why the process cannot enter the namespace and what an administrator can change. The process must be
+// single-threaded.
 std::string enter_user_namespace();
 
 // Permanently sandboxes the calling process, which must be single-threaded. Returns the state of each layer; throws

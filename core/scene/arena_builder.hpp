@@ -111,7 +111,7 @@ struct Fault {
     std::size_t index = 0;
 };
 
-// Where the elements of an arena come from, as the user knows it: "scene.yaml:6:5: objects[0]".
+// The origin of each element of an arena, as the user knows it: "scene.yaml:6:5: objects[0]".
 class Origins {
 public:
     // Sets the origin of the elements that are added from now on.

@@ -17,7 +17,7 @@
 
 namespace arhost::scene {
 
-// Whether objects may move or deform, so that ray tracers get an arhost_motion.
+// Whether objects may move or deform. Ray tracers then get an arhost_motion.
 inline bool is_moving(const arhost_scene &scene) {
     return scene.duration_s > 0 || scene.anchors.count > 0;
 }

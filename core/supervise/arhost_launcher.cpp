@@ -56,14 +56,15 @@ using Helpers = std::set<pid_t>;         // processes that return USB devices
     ::signal(SIGCHLD, SIG_IGN);         // the kernel reaps orphans
     ::dup2(pipe, 0);
     if (::syscall(SYS_close_range, 1u, ~0u, 0u) != 0)
-        ::_exit(1); // another open end of the pipe would keep the namespace
+        ::_exit(1); // the namespace would survive if this process kept another end of the pipe open
     char byte;
     while (::read(0, &byte, 1) < 0 && errno == EINTR) {
     }
     ::_exit(0);
 }
 
-// Lets the program that this process executes keep CAP_SYS_ADMIN in its user namespace, to enter its sandbox.
+// Makes the next program that this process executes keep CAP_SYS_ADMIN in its user namespace, which it needs to enter
+// its sandbox.
 void keep_capability() {
     if (::geteuid() == 0)
         return;

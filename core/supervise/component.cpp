@@ -374,8 +374,8 @@ bool Component::may_wait_for_device() const {
            restart_policy_.has_completed_frames();
 }
 
-// Restarts the process until it finds its device: a worker's sandbox has no devices that were connected later. Counts
-// and reports one restart, however long this takes.
+// Restarts the process until it finds its device, because a worker's sandbox has no devices that were connected
+// later. Counts and reports one restart, however many attempts are necessary.
 void Component::wait_for_device(const std::string &reason) {
     restarts_ += missing_device_.empty();
     if (missing_device_ != reason)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // A supervised plugin: starts a worker, enforces its deadlines, restarts it if it dies or hangs, and disables it if
-// it keeps failing. The host submits commands; it receives results, and is notified of lost commands.
+// it keeps failing. The host submits commands to the component. The component reports results and lost commands.
 #pragma once
 
 #include "ipc/messages.hpp"
@@ -179,7 +179,7 @@ private:
     std::uint64_t next_ticket_ = 1;
     std::uint32_t restarts_ = 0;
     double cpu_seconds_of_dead_ = 0;
-    model::Counters counters_, counters_of_dead_; // of the current process, and of those before it
+    model::Counters counters_, counters_of_dead_; // counters of the current process; sums over the earlier processes
     std::deque<Crash> crashes_;
     std::uint32_t deaths_in_stop_ = 0;
     ipc::Reactor::Registration deadline_, total_deadline_, restart_timer_;

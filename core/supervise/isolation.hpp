@@ -17,7 +17,7 @@ struct Isolation {
     std::uint64_t memory_bytes = 0; // limit of the control group; 0: none
     // The worker's standard output is that of the host, which the launcher has inherited.
     bool standard_output = false;
-    // base::UsbIdentity of the device that the kernel's drivers get back if the worker is killed; "": none
+    // base::UsbIdentity of the device to return to the kernel's drivers if the worker is killed; "": none
     std::array<char, base::max_usb_identity + 1> usb_device{};
 };
 

@@ -89,8 +89,8 @@ std::optional<Reply> Launcher::receive_reply(std::vector<UniqueFd> &fds) {
 
 void Launcher::discard() {
     ::kill(pid_, SIGKILL); // the launcher may have closed its socket without exiting
-    // Waits for its exit, but gives up after half a second: the launcher may hang in the kernel, or a debugger may
-    // not have collected its exit status.
+    // Waits for the launcher to exit, but gives up after half a second: the launcher may hang in the kernel, or a
+    // debugger may not have collected its exit status.
     for (int i = 0; i < 500 && ::waitpid(pid_, nullptr, WNOHANG) == 0; ++i)
         ::usleep(1000);
     std::vector<UniqueFd> fds;

@@ -55,7 +55,7 @@ private:
     Clock::time_point second_ends_{}, last_spent_{};
     LineCount other_lines_, warnings_, deaths_;
     std::map<std::pair<arhost_severity, std::string>, Clock::time_point>
-        recent_lines_;                  // with the time when they were printed
+        recent_lines_;                  // by severity and text: the time of printing
     std::uint64_t repetitions_[2] = {}; // repeated lines that were not printed; [1]: warnings and errors
     double left_ = max_cost;
 };

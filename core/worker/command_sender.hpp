@@ -17,7 +17,7 @@ public:
     explicit CommandSender(Link &link) : link_(link) {}
 
     void enable(); // the plugin is started
-    // As arhost_control.send; may be called on any thread.
+    // Same as arhost_control.send. May be called on any thread.
     arhost_status send(const char *command, arhost_take_answer take, void *context);
     // Calls the function that waits for the answer. Must be called on the worker's main thread.
     void deliver(const ipc::messages::Answer &answer);

@@ -246,7 +246,7 @@ private:
     Memory memory_;
     arhost_instance *instance_ = nullptr;
     std::unique_ptr<Service> service_;
-    Counters counters_; // as last sent
+    Counters counters_; // the values that were last sent
     std::chrono::steady_clock::time_point next_counters_;
     bool stopped_ = false;
 };

@@ -43,8 +43,9 @@ public:
     std::uint32_t move_missed_to_end(Expectation &expectation, const arhost_tracker_result &reported) const;
 
     struct Output {
-        std::span<arhost_target> targets;           // one for each target; state 0 if it was never reported
-        std::span<arhost_observation> observations; // at least as many as reported; those of the same target adjoin
+        std::span<arhost_target> targets; // one for each target; state 0 if it was never reported
+        // At least as many as reported. Observations of the same target are adjacent.
+        std::span<arhost_observation> observations;
     };
     // Throws std::runtime_error if the report violates the contract. `before`: what the last accepted call wrote to
     // `after`; null in the first frame.
@@ -53,7 +54,7 @@ public:
 
 private:
     struct Marker {
-        std::uint32_t index; // in arhost_tracker_setup.markers
+        std::uint32_t index; // index in arhost_tracker_setup.markers
         std::size_t target;
         std::array<Eigen::Vector3d, 4> corners_mm;
     };
@@ -85,7 +86,7 @@ private:
     pose::Projection projection_;
     std::vector<Target> targets_;
     std::map<std::pair<std::uint32_t, std::int32_t>, Marker> markers_; // by family and id
-    std::vector<std::uint32_t> marker_counts_;                         // of each family
+    std::vector<std::uint32_t> marker_counts_;                         // number of markers of each family
     Settings settings_;
 };
 

@@ -133,7 +133,7 @@ private:
     struct Document {
         std::string name;
         std::map<std::string, std::string> overrides{}; // maps a key path to the option that set it
-        std::optional<Origin> origin{};                 // of a copy
+        std::optional<Origin> origin{};                 // set if the document is a copy
     };
     Node(const YAML::Node &node, std::string path, std::shared_ptr<Document> document)
         : node_(node), path_(std::move(path)), document_(std::move(document)) {}

@@ -91,10 +91,11 @@ typedef struct arhost_observation {
 
 typedef int32_t arhost_target_state;
 enum {
-    ARHOST_TARGET_DETECTED = 1,  /* seen in this frame */
-    ARHOST_TARGET_PREDICTED = 2, /* the pose comes from the motion model of a tracker that reports poses: smoothed if
-                                    the target was seen in this frame (age_frames 0), extrapolated otherwise */
-    ARHOST_TARGET_LOST = 3       /* not seen, pose unknown; `mt` is the last known pose */
+    ARHOST_TARGET_DETECTED = 1, /* seen in this frame */
+    /* The pose comes from the motion model of a tracker that reports poses: a smoothed pose if the target was seen in
+     * this frame (age_frames 0), otherwise an extrapolated one. */
+    ARHOST_TARGET_PREDICTED = 2,
+    ARHOST_TARGET_LOST = 3 /* not seen, pose unknown; `mt` is the last known pose */
 };
 
 /* The pose of a body, from a tracker with ARHOST_CAPABILITY_REPORTS_POSES. The fields are those of arhost_target. */
@@ -121,7 +122,7 @@ typedef struct arhost_tracker_result {
     int32_t candidate_count;
 } arhost_tracker_result;
 
-/* A target as the outputs get it (arhost/sink.h). */
+/* A target as the outputs receive it (arhost/sink.h). */
 typedef struct arhost_target {
     uint32_t struct_size;
     arhost_target_state state;
