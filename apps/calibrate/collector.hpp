@@ -23,7 +23,7 @@ public:
     const Lens &lens() const { return lens_; }
     bool is_full() const { return views_.size() >= limit_; }
     bool is_complete() const { return coverage_.missing().empty(); }
-    // The next instruction for the person who holds the board.
+    // Returns the next instruction for the person who holds the board.
     std::string advice() const;
 
 private:

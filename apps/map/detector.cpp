@@ -44,7 +44,7 @@ public:
         detector_->quad_sigma = 0;
         detector_->refine_edges = true;
         detector_->decode_sharpening = 0.25;
-        // The decoding table of a large family would take gigabytes with two bit errors.
+        // With two bit errors, the decoding table of a large family would take gigabytes.
         const bool is_large = family_.tags()->ncodes > 10'000;
         apriltag_detector_add_family_bits(detector_.get(), family_.tags(),
                                           std::min(type.default_max_hamming, is_large ? 1 : 2));

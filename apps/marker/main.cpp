@@ -122,7 +122,7 @@ void expect_consistent(const Arguments &arguments) {
            "--map: the file's name must end in .yaml, such as board.map.yaml");
 }
 
-// The boards or markers to print, all of the same size.
+// Returns the boards or markers to print, all of the same size.
 std::vector<Item> items_of(const Arguments &arguments, const Family &family, const std::vector<int> &ids) {
     const auto [columns, rows] = arguments.grid;
     const auto [squares_x, squares_y] = arguments.charuco;

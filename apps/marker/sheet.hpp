@@ -38,8 +38,8 @@ Item grid_board(const Family &family, const std::vector<int> &ids, int columns, 
 Item charuco_board(const Family &family, const std::vector<int> &ids, int columns, int rows, double square_mm,
                    double marker_mm);
 
-// The map file of a board, in the board's frame: origin at its centre, x right, y up on the print, z out of the
-// paper.
+// Returns the map file of a board, in the board's frame: origin at its centre, x right, y up on the print, z out of
+// the paper.
 std::string map_of(const Item &board, const Family &family);
 
 struct Line {

@@ -174,7 +174,7 @@ std::string text_of(const DeviceControl &control) {
     return control.value ? text + fmt::format(", now {}", *control.value) : text;
 }
 
-// The line that introduces a device.
+// Returns the line that introduces a device.
 std::string headline(const DeviceDescription &d, const std::string &plugin) {
     switch (section_of(d)) {
     case Section::cameras:

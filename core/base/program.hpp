@@ -12,7 +12,7 @@ namespace arhost::base {
 
 enum ExitStatus { success = 0, failed = 1, invalid_input = 2, interrupted = 130 }; // docs/config.md
 
-// The user's input is invalid: the command line, a configuration or another file.
+// Thrown if the user's input is invalid: the command line, a configuration or another file.
 struct InvalidInput : std::runtime_error {
     using std::runtime_error::runtime_error;
 };

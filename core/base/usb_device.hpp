@@ -14,7 +14,7 @@ namespace arhost::base {
 using UsbIdentity = std::string;
 constexpr std::size_t max_usb_identity = 200; // bytes
 
-// The folder of the USB devices in sysfs. Tests use another one.
+// The folder of the USB devices in sysfs. Tests use another folder.
 constexpr const char *usb_devices = "/sys/bus/usb/devices";
 
 struct UsbDevice {

@@ -172,7 +172,7 @@ arhost_intrinsics read_opencv_or_ros(const Node &root, const std::optional<Size>
     return intrinsics;
 }
 
-// Whether this is a camchain: a map of cameras.
+// Whether the document is a camchain: a map of cameras.
 bool is_kalibr(const Node &root) {
     return std::ranges::any_of(
         root.entries(), [](const auto &entry) { return entry.second.is_map() && entry.second.find("camera_model"); });

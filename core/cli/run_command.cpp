@@ -28,7 +28,7 @@ double cpu_seconds_of_host() {
     return supervise::cpu_seconds(usage);
 }
 
-// The files of the statistics and of the timeline. Must be opened before workers run, because they could create a
+// The files of the statistics and of the timeline. Must be opened before workers run, because a worker could create a
 // link or a pipe with the file's name.
 class Reports {
 public:

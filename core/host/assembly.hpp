@@ -35,7 +35,7 @@ public:
     Raytracer *raytracer() const { return raytracer_.get(); }
     std::vector<supervise::Component *> components() const; // including those that start or end
 
-    // The configuration, or its last edit: the choices for swaps.
+    // The configuration or, after edits, the last edited one. Swaps choose from it.
     const std::shared_ptr<const run_config::Configuration> &latest() const { return latest_; }
     void set_latest(std::shared_ptr<const run_config::Configuration> latest) { latest_ = std::move(latest); }
     // Returns a pointer to a part of the latest configuration, which keeps that configuration alive.

@@ -50,7 +50,7 @@ FileWatch::Files paths_to(const std::filesystem::path &file) {
     return {file, base::real_path(file)};
 }
 
-// The configuration's file, and the maps and prints of the targets.
+// Returns the configuration's file, and the maps and prints of the targets.
 FileWatch::Files configuration_files(const run_config::Configuration &configuration) {
     FileWatch::Files files = paths_to(std::filesystem::absolute(configuration.node.file()));
     if (configuration.tracker)
@@ -59,7 +59,8 @@ FileWatch::Files configuration_files(const run_config::Configuration &configurat
     return files;
 }
 
-// Whether the file of a pattern or picture was edited. The targets contain only its path.
+// Whether the file of a pattern or picture was edited. Such an edit does not change the targets, which contain only
+// the path of the file.
 bool has_edited_print(const run_config::TrackerConfiguration &tracker, const FileWatch::Files &edited) {
     for (const model::Target &target : tracker.targets)
         for (const model::TargetMarker &marker : target.markers)

@@ -26,7 +26,7 @@ public:
                       bool is_configuration_error);
 
     bool ends_run() const { return ends_run_; } // whether the run must end at once
-    // The first failure, as a message for the user; "" if there was none.
+    // Returns the first failure, as a message for the user; "" if there was none.
     const std::string &text() const { return text_; }
     bool was_logged() const { return was_logged_; }
     bool is_configuration_error() const { return is_configuration_error_; }

@@ -258,7 +258,7 @@ void FrameFlow::on_lost(Frame::Stage waiting, std::span<const std::uint64_t> una
 // ---- frames → outputs -----------------------------------------------------------------------------------
 
 std::optional<FrameFlow::Action> FrameFlow::show(const Intakes &intakes) {
-    // The oldest frame; in mode live, the newest frame that is done.
+    // In mode lockstep the oldest frame; in mode live the newest frame that is done.
     auto ready = frames_.begin();
     if (settings_.live)
         for (auto it = frames_.begin(); it != frames_.end(); ++it)

@@ -43,7 +43,7 @@ struct RunParts {
     supervise::Component::Callbacks callbacks(const std::string &name, const yaml::Node &node);
 };
 
-// The memory that a component's worker writes; null if there is none.
+// Returns the memory that a component's worker writes; null if there is none.
 std::shared_ptr<SlotPool> slots_of(const supervise::Component &component);
 
 std::vector<std::uint64_t> sequences_of(const std::vector<ipc::Command> &commands);

@@ -16,7 +16,7 @@ namespace {
 
 std::chrono::nanoseconds latency_of(const OutputFrame &frame, const Result &result) {
     const std::int64_t captured_ns = std::chrono::nanoseconds(frame.captured.time_since_epoch()).count();
-    // The worker may report any number.
+    // The value comes from the worker, so it may be any number.
     return std::chrono::nanoseconds(
         std::clamp(result.ended_ns, captured_ns, base::to_ns(base::steady_clock().now())) - captured_ns);
 }

@@ -64,7 +64,7 @@ private:
     Clock::time_point window_begin_{}, previous_begin_{};
 };
 
-// The frames in which a target was detected.
+// Statistics of the frames in which a target was detected.
 struct TargetStatistics {
     std::uint64_t frames = 0;
     double smallest_px = 0, largest_px = 0; // mean side of its markers in the image; 0 for a body

@@ -30,7 +30,7 @@ public:
     // Returns the age of the picture that a frame shows. Returns nullopt if it shows none or several, or if an
     // earlier frame has already shown it. Ages above the time of `count` frames are reported too low.
     std::optional<std::chrono::nanoseconds> see(std::span<const arhost_observation> seen, Clock::time_point now);
-    // Whether no frame has shown a picture for `limit`. Returns true at most once per `limit`.
+    // Whether no frame has shown a picture for the duration `limit`. Returns true at most once per `limit`.
     bool is_overdue(std::chrono::nanoseconds limit, Clock::time_point now);
 
 private:

@@ -202,7 +202,7 @@ bool shows_front(const Rigid &camera_from_target, const ObservedMarker &marker) 
     return normal.dot(corners[0]) < 0;
 }
 
-// The two poses of the target that one of its markers permits.
+// Returns the two possible poses of the target according to one of its markers.
 std::vector<Rigid> poses_from(const ObservedMarker &marker, const Projection &projection) {
     std::array<Eigen::Vector2d, 4> on_image;
     for (int i = 0; i < 4; ++i) {

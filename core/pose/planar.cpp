@@ -33,7 +33,7 @@ template <class Get> Normalization normalization(std::span<const PlanePoint> poi
     return result;
 }
 
-// The homography from the target's plane to the image, by the direct linear transform.
+// Returns the homography from the target's plane to the image. Uses the direct linear transform.
 std::optional<Eigen::Matrix3d> homography(std::span<const PlanePoint> points) {
     const auto on_target = normalization(points, [](const PlanePoint &p) { return p.on_target_mm; }),
                on_image = normalization(points, [](const PlanePoint &p) { return p.on_image; });
@@ -55,7 +55,7 @@ std::optional<Eigen::Matrix3d> homography(std::span<const PlanePoint> points) {
     return Eigen::Matrix3d(on_image.matrix().inverse() * normalized * on_target.matrix());
 }
 
-// The translation that minimizes the algebraic error of the points for a given rotation.
+// Returns the translation that minimizes the algebraic error of the points for a given rotation.
 Eigen::Vector3d translation_for(const Eigen::Matrix3d &rotation, std::span<const PlanePoint> points) {
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -95,7 +95,7 @@ std::optional<std::array<Rigid, 2>> planar_poses(std::span<const PlanePoint> poi
         return {};
     const Eigen::Matrix3d H = *h / (*h)(2, 2);
 
-    // The centre's image and the derivative of the homography there.
+    // The image of the centre, and the derivative of the homography at the centre.
     const Eigen::Vector2d v = H.topRightCorner<2, 1>();
     const Eigen::Matrix2d J = H.topLeftCorner<2, 2>() - v * H.bottomLeftCorner<1, 2>();
     // turn·(0, 0, 1) is the direction of v.

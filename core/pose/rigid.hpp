@@ -24,12 +24,12 @@ struct Rigid {
     Rigid inverse() const { return {rotation.transpose(), -(rotation.transpose() * translation_mm)}; }
 };
 
-// The matrix [v]× with [v]×·w = v × w.
+// Returns the matrix [v]× with [v]×·w = v × w.
 inline Eigen::Matrix3d cross_matrix(const Eigen::Vector3d &v) {
     return (Eigen::Matrix3d() << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0).finished();
 }
 
-// The rotation by |vector| rad about `vector` (Rodrigues' formula).
+// Returns the rotation by |vector| rad about `vector` (Rodrigues' formula).
 inline Eigen::Matrix3d rotation_by(const Eigen::Vector3d &vector) {
     const double angle = vector.norm();
     if (angle < 1e-12)
@@ -37,7 +37,7 @@ inline Eigen::Matrix3d rotation_by(const Eigen::Vector3d &vector) {
     return Eigen::AngleAxisd(angle, vector / angle).toRotationMatrix();
 }
 
-// The inverse of rotation_by, with a length of at most π.
+// Inverse of rotation_by. The returned vector has a length of at most π.
 inline Eigen::Vector3d rotation_vector(const Eigen::Matrix3d &rotation) {
     const Eigen::AngleAxisd turn(rotation);
     return turn.angle() * turn.axis();
@@ -52,7 +52,7 @@ inline Eigen::Matrix3d orthonormal(const Eigen::Matrix3d &rotation) {
     return Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
 }
 
-// The pose as arhost_target.mt: column-major, in OpenGL eye space.
+// Returns the pose as arhost_target.mt: column-major, in OpenGL eye space.
 inline std::array<double, 16> matrix_of(const Rigid &pose) {
     std::array<double, 16> matrix{};
     Eigen::Map<Eigen::Matrix4d> m(matrix.data());

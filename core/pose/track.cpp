@@ -10,7 +10,8 @@ namespace {
 
 constexpr double max_gap_s = 1;
 
-// The time since the last frame of a track; nullopt if it does not continue, or has invalid bytes.
+// Returns the time since the last frame of a track; nullopt if this frame does not continue the track, or if the
+// track has invalid bytes.
 std::optional<double> seconds_since(const Track &track, std::int64_t capture_ns) {
     const double seconds = 1e-9 * (static_cast<double>(capture_ns) - static_cast<double>(track.capture_ns));
     const bool continues = (track.branches == 1 || track.branches == 2) && seconds >= 0 && seconds <= max_gap_s;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The pose of a target over time: which of two solutions of the planar pose problem is the true one, and where the
-// target will be in the next frame.
+// The pose of a target over time: decides which of two solutions of the planar pose problem is the true one, and
+// predicts the pose in the next frame.
 #pragma once
 
 #include "pose/motion_filter.hpp"
