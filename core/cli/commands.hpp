@@ -32,6 +32,7 @@ struct Arguments {
 struct ReplayArguments {
     std::string session, trajectory, scene, tracker, raytracer, output, stats, timeline; // "" if not given
     std::optional<std::uint32_t> width, height;                                          // px
+    std::vector<std::string> allow{}; // permissions, files and folders (session_grants.hpp)
     bool with_pipeline = false;
 };
 

@@ -18,6 +18,7 @@ run_config::Configuration latency_configuration(const Arguments &arguments) {
                                     "100}}]}}",
                                     latency::TimeCodes::count - 1),
                         "arhost latency");
+    override_settings(root, arguments);
     run_config::Configuration configuration = parse_configuration(root, arguments);
     if (!configuration.source || configuration.outputs.empty())
         throw yaml::Error(arguments.file + ": to measure latency, it needs the camera as 'source' and an output that "

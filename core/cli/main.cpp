@@ -44,6 +44,11 @@ CommandLine add_replay(CommandLine &app, Arguments &arguments, ReplayArguments &
         .option("--raytracer", replay.raytracer,
                 "The ray tracer, instead of the recorded one (for a trajectory, default rt_embree)")
         .type_name("PLUGIN");
+    command
+        .option("--allow", replay.allow,
+                "Grant what the session asks for beyond its folder: a permission such as gpu, a file or a folder "
+                "(repeatable)")
+        .type_name("WHAT");
     command.flag("--with-pipeline", replay.with_pipeline,
                  "For a trajectory: also run source, tracker and compositor");
     command

@@ -93,7 +93,7 @@ void expect_watchable(const run_config::Configuration &configuration) {
 
 } // namespace
 
-run_config::Configuration parse_configuration(yaml::Node &root, const Arguments &arguments) {
+void override_settings(yaml::Node &root, const Arguments &arguments) {
     for (const std::string &setting : arguments.settings) {
         const std::size_t equals = setting.find('=');
         if (equals == 0 || equals == std::string::npos)
@@ -104,6 +104,9 @@ run_config::Configuration parse_configuration(yaml::Node &root, const Arguments 
         root.override_value("frames", std::to_string(*arguments.frames), "--frames");
     if (arguments.in_process)
         root.override_value("sandbox", "none");
+}
+
+run_config::Configuration parse_configuration(const yaml::Node &root, const Arguments &arguments) {
     run_config::Configuration configuration = run_config::parse(root, base::own_prefix() / "lib/arhost/plugins");
     if (const auto coordinates = coordinates_of(arguments))
         configuration.coordinates = coordinates;
@@ -119,6 +122,7 @@ run_config::Configuration parse_configuration(yaml::Node &root, const Arguments 
 
 run_config::Configuration read_configuration(const Arguments &arguments) {
     yaml::Node root = yaml::Node::load(arguments.file);
+    override_settings(root, arguments);
     return parse_configuration(root, arguments);
 }
 

@@ -10,7 +10,9 @@ namespace arhost::cli {
 
 run_config::Configuration read_configuration(const Arguments &arguments);
 
-// As read_configuration(), of a configuration that the caller has loaded.
-run_config::Configuration parse_configuration(yaml::Node &root, const Arguments &arguments);
+// As read_configuration(), in two steps, of a configuration that the caller has loaded: applies `--set` and other
+// options to its values; parses it.
+void override_settings(yaml::Node &root, const Arguments &arguments);
+run_config::Configuration parse_configuration(const yaml::Node &root, const Arguments &arguments);
 
 } // namespace arhost::cli

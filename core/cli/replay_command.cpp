@@ -3,6 +3,7 @@
 #include "cli/read_configuration.hpp"
 #include "cli/recorded_session.hpp"
 #include "cli/run_command.hpp"
+#include "cli/session_grants.hpp"
 
 #include <algorithm>
 
@@ -31,7 +32,7 @@ void override_outputs(yaml::Node &root, const ReplayArguments &replay) {
     if (!replay.timeline.empty())
         root.override_text("timeline", replay.timeline, "--timeline");
     if (replay.output.empty() || replay.output == "none")
-        return root.override_value("outputs", "[]", "arhost replay");
+        return root.override_value("outputs", "[]", replayed);
     root.override_value("outputs", "[{plugin: " + sink_for(replay.output) + "}]", "--output");
     root.override_text("outputs[0].path", replay.output, "--output");
 }
@@ -42,7 +43,7 @@ void override_plugin(yaml::Node &root, const char *component, const std::string 
         return;
     root.override_text(std::string(component) + ".plugin", plugin, option);
     const auto node = root.find(component);
-    for (const char *key : {"options", "fallback", "allow"})
+    for (const char *key : {"options", "path", "fallback", "allow", "reads", "usb"})
         yaml::Node(*node).remove(key);
 }
 
@@ -79,8 +80,7 @@ void choose_recorded(run_config::Configuration &configuration, const yaml::Node 
     std::iter_swap(configuration.scenes.begin(), found);
 }
 
-// Sessions are files of plugins, which are not trusted: removes what would let a session run other programs or write
-// files.
+// Removes what would let a session run other programs or write files; no replay needs it.
 void remove_grants(yaml::Node &root, const ReplayArguments &replay) {
     for (const char *key : {"sandbox", "plugin_path"})
         root.remove(key);
@@ -125,19 +125,19 @@ bool is_option_of_stage(std::string_view path) {
 void play_video(yaml::Node &root, const Session &session, bool is_recorded) {
     for (const char *key : {"record", "snapshot", "stats", "timeline", "frames"})
         root.remove(key);
-    root.override_value("mode", "lockstep", "arhost replay");
-    root.override_value("source", "{plugin: source_file}", "arhost replay");
-    root.override_text("source.path", session.video().string(), "arhost replay");
+    root.override_value("mode", "lockstep", replayed);
+    root.override_value("source", "{plugin: source_file}", replayed);
+    root.override_text("source.path", session.video().string(), replayed);
     if (const double fps = session.description.require("fps").real(0); fps > 0)
-        root.override_text("source.fps", session.description.require("fps").text(), "arhost replay");
+        root.override_text("source.fps", session.description.require("fps").text(), replayed);
     const yaml::Node camera = session.description.require("camera");
     if (!camera.is_null() && (is_recorded || !root.find("camera")))
-        root.override_value("camera", camera.to_yaml(), "arhost replay");
+        root.override_value("camera", camera.to_yaml(), replayed);
     const yaml::Node changed = session.description.require("changed_options");
     for (const auto &[path, value] : is_recorded ? changed.entries() : decltype(changed.entries())()) {
         if (!is_option_of_stage(path))
             value.fail("'" + path + "' is not an option of the tracker or ray tracer");
-        root.override_text(path, value.text(), "arhost replay");
+        root.override_text(path, value.text(), replayed);
     }
 }
 
@@ -168,8 +168,14 @@ run_config::Configuration session_configuration(const Arguments &arguments, cons
     if (!replay.scene.empty())
         root.override_text("raytracer.scene", replay.scene, "--scene");
     override_outputs(root, replay);
-    run_config::Configuration configuration = parse_configuration(root, arguments);
+    override_settings(root, arguments);
     session.recording.repeats_decisions = rendering_of(root) == recorded;
+    if (is_recorded)
+        expect_granted(root, session, replay.allow, !session.recording.repeats_decisions);
+    else if (!replay.allow.empty())
+        throw yaml::Error("--allow grants what a recorded configuration asks for; with --config, use 'allow' and "
+                          "'reads' in that file");
+    run_config::Configuration configuration = parse_configuration(root, arguments);
     if (session.recording.repeats_decisions) {
         choose_recorded(configuration, session.description);
         configuration.tracker.reset(); // its results are in the log
@@ -193,10 +199,9 @@ yaml::Node trajectory_root(const Arguments &arguments, const ReplayArguments &re
         "source: {plugin: source_synthetic, options: {frames: 0, id: 0, side_mm: 80}}\n"
         "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
         "raytracer: {plugin: rt_embree}\n";
-    yaml::Node root =
-        !arguments.file.empty()
-            ? yaml::Node::load(arguments.file)
-            : yaml::Node::parse(replay.with_pipeline ? default_pipeline : default_raytracer, "arhost replay");
+    yaml::Node root = !arguments.file.empty()
+                          ? yaml::Node::load(arguments.file)
+                          : yaml::Node::parse(replay.with_pipeline ? default_pipeline : default_raytracer, replayed);
     if (arguments.file.empty() && replay.scene.empty())
         throw yaml::Error("--scene is missing: the scene to render, as in --scene optix-cs");
     root.override_text("trajectory", replay.trajectory, "--trajectory");
@@ -215,7 +220,7 @@ yaml::Node trajectory_root(const Arguments &arguments, const ReplayArguments &re
                             "--width, --height");
     override_outputs(root, replay);
     if ((replay.output.empty() || replay.output == "none") && replay.with_pipeline)
-        root.override_value("outputs", "[{plugin: sink_null}]", "arhost replay");
+        root.override_value("outputs", "[{plugin: sink_null}]", replayed);
     return root;
 }
 
@@ -223,6 +228,9 @@ yaml::Node trajectory_root(const Arguments &arguments, const ReplayArguments &re
 // The file's outputs are ignored because they may be the outputs of the recorded run.
 run_config::Configuration trajectory_configuration(const Arguments &arguments, const ReplayArguments &replay) {
     yaml::Node root = trajectory_root(arguments, replay);
+    override_settings(root, arguments);
+    if (!replay.allow.empty())
+        throw yaml::Error("--allow is for sessions; remove it");
     run_config::Configuration configuration = parse_configuration(root, arguments);
     if (replay.width && configuration.trajectory->intrinsics)
         throw yaml::Error("--width, --height: " + replay.trajectory +

@@ -92,7 +92,7 @@ TEST(Sessions, AReplayShowsObjectsOnTheirTargets) {
     run.write("anchored.yaml", "version: 1\naxes: z-up\nambient: 1\nmaterials: {grey: {model: diffuse, diffuse: 1}}\n"
                                "objects: [{sphere: {radius: 8}, material: grey, on: tag36h11-0}]\n");
     ASSERT_EQ(run.run(), 0) << run.output();
-    ASSERT_EQ(run.run(replaying()), 0) << run.output();
+    ASSERT_EQ(run.run(replaying({"--allow", "anchored.yaml"})), 0) << run.output();
     expect_same(run);
 }
 
@@ -261,6 +261,16 @@ TEST(Sessions, AnEditedSessionGainsNoPermission) {
     other.replace(other.find("tracker_aruco"), std::string("tracker_aruco").size(), "./tracker_aruco.so");
     run.write("take/configuration.yaml", other);
     run.expect(replaying(), 2, {"tracker.plugin: is a file, which a session cannot choose"});
+    // A script in the session's folder is code, too.
+    run.write("take/code.py", "import os\n");
+    const std::string script = run.path("take/code.py").string();
+    other = configuration;
+    other.replace(other.find("rt_embree"), 9, "rt_python, allow: [network, processes]");
+    other.replace(other.find("options: {}, deadline"), 11, "options: {script: " + script + "}");
+    run.write("take/configuration.yaml", other);
+    run.expect(replaying(), 2,
+               {"the permission 'network' for raytracer, the permission 'processes' for raytracer",
+                "the code '" + script + "' (raytracer.options.script)"});
 }
 
 TEST(Sessions, AFullDiskKeepsTheFramesBefore) {
@@ -341,7 +351,7 @@ TEST(Sessions, AReplayWorksFromAnyFolderWithRelativePaths) {
     run.write("lab/run.yaml", recording("lockstep", "5"));
     ASSERT_EQ(run.run({"--config", "lab/run.yaml", "--set", "raytracer.scene=own.yaml"}), 0) << run.output();
     std::filesystem::rename(run.path("take"), run.path("lab/take"));
-    auto arguments = replaying();
+    auto arguments = replaying({"--allow", "."});
     arguments[1] = "lab/take";
     ASSERT_EQ(run.run(arguments), 0) << run.output();
     expect_same(run);
