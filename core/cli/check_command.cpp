@@ -69,7 +69,7 @@ void check_scene(const run_config::Configuration &configuration, supervise::Cont
     std::optional<std::string> outcome;
     std::uint32_t needed = 0;
     const SceneLoading loading(
-        context, configuration.raytracer->scene, configuration.sandbox, configuration.raytracer->limits,
+        context, configuration.raytracer->scene, configuration.raytracer->policy, configuration.raytracer->limits,
         configuration.files,
         {[&](const ipc::SharedMemory &arena, const std::vector<Anchor> &anchors, const auto &) {
              needed = scene::needed_capabilities(arena.map(ipc::Access::read_only).as<const arhost_scene>());

@@ -114,8 +114,8 @@ private:
         const fs::path real = real_path(path);
         const auto has = [&](const fs::path &folder) { return sandbox::contains(folder, real); };
         if (!std::ranges::any_of(paths_, has) && (is_code || !std::ranges::any_of(own_, has)))
-            missing_.push_back({(is_code ? "the code '" : "the file '") + real.string() + "' (" + node.path() + ")",
-                                real.string()});
+            missing_.push_back(
+                {(is_code ? "the code '" : "the file '") + real.string() + "' (" + node.path() + ")", real.string()});
     }
 
     std::vector<fs::path> own_;

@@ -133,7 +133,7 @@ std::unique_ptr<SceneLoading> Assembly::load(const run_config::Scene &scene,
         on_failed(reason);
     };
     watch_files_({scene.file, base::real_path(scene.file)});
-    return std::make_unique<SceneLoading>(parts_.context, scene.file, parts_.configuration.sandbox, raytracer.limits,
+    return std::make_unique<SceneLoading>(parts_.context, scene.file, raytracer.policy, raytracer.limits,
                                           parts_.configuration.files, std::move(callbacks));
 }
 

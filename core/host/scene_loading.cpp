@@ -45,16 +45,18 @@ std::string problem_with(const std::vector<Anchor> &anchors, const run_config::T
     return "";
 }
 
-SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
-                           const base::Limits &limits, run_config::FilesInUse files, Callbacks callbacks)
+SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene,
+                           const sandbox::Policy &raytracer, const base::Limits &limits, run_config::FilesInUse files,
+                           Callbacks callbacks)
     : context_(context), callbacks_(std::move(callbacks)), files_(std::move(files)), scene_(scene.string()),
       timeout_(limits.start), budget_(context.log, "scene") {
     supervise::Process::Callbacks process_callbacks;
     process_callbacks.message = [this](Message &message) { on_message(message); };
     process_callbacks.result = [](const Result &) {};
     process_callbacks.died = [this](const supervise::Death &death) { on_died(death); };
-    process_ = std::make_unique<supervise::Process>(context, budget_, std::move(process_callbacks),
-                                                    messages::Load{scene_}, policy_of(sandbox));
+    process_ = std::make_unique<supervise::Process>(
+        context, budget_, std::move(process_callbacks),
+        messages::Load{scene_, {raytracer.readable.begin(), raytracer.readable.end()}}, policy_of(raytracer.mode));
     restart_deadline();
     total_deadline_ = context_.reactor.at(context_.reactor.now() + limits.start_total, [this, limits] {
         process_->end("took longer than " + std::to_string(limits.start_total.count()) +

@@ -40,8 +40,9 @@ public:
         std::function<void(const std::string &reason, const Files &files)> failed;
     };
     // `limits.start` is the maximum time between two messages of the loader, `limits.start_total` the maximum time of
-    // loading. Loading fails if the scene refers to a file that the run writes, according to `files`.
-    SceneLoading(supervise::Context &context, const std::filesystem::path &scene, sandbox::Mode sandbox,
+    // loading. Loading fails if the scene refers to a file that the run writes, according to `files`. glTF files may
+    // refer to the files outside their folders that `raytracer`, the policy of the ray tracer, makes readable to it.
+    SceneLoading(supervise::Context &context, const std::filesystem::path &scene, const sandbox::Policy &raytracer,
                  const base::Limits &limits, run_config::FilesInUse files, Callbacks callbacks);
 
 private:

@@ -208,7 +208,7 @@ template <class T> T parse(const Message &message) {
     ARHOST_CONVERTED(name)
 
 ARHOST_MESSAGE(Open, plugin, sandbox)
-ARHOST_MESSAGE(Load, scene, sandbox)
+ARHOST_MESSAGE(Load, scene, readable, sandbox)
 ARHOST_CONVERTED(ListDevices)
 ARHOST_CONVERTED(Create)
 ARHOST_MESSAGE(Attach, is_output, generation, layout)

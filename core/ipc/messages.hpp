@@ -55,8 +55,9 @@ struct Open {
 // The first message to a worker that loads a scene.
 struct Load {
     static constexpr const char *type = "load";
-    std::string scene; // path of the scene file
-    Json sandbox{};    // sandbox::Policy
+    std::string scene;                   // path of the scene file
+    std::vector<std::string> readable{}; // files and folders that glTF files outside of them may refer to
+    Json sandbox{};                      // sandbox::Policy
 };
 
 // May be sent after Hello and before Create, any number of times. The worker answers with Devices, in

@@ -56,9 +56,9 @@ bool read_file(std::vector<unsigned char> *content, std::string *error, const st
     const std::filesystem::path resolved = std::filesystem::canonical(file, unresolved);
     if (!unresolved &&
         std::ranges::none_of(resources.readable, [&](const auto &folder) { return is_below(resolved, folder); }))
-        throw MeshError(
-            resources.gltf + ": refers to '" + resolved.string() +
-            "', which is outside its folder; move that file there, or list it under 'reads' in the scene");
+        throw MeshError(resources.gltf + ": refers to '" + resolved.string() +
+                        "', which is outside its folder; move that file there, or list it under 'reads' of the ray "
+                        "tracer in the configuration");
     resources.reporter.reads(file);
     std::error_code ignored;
     if (is_file(resolved, nullptr) && std::filesystem::file_size(resolved, ignored) <= file_limit)

@@ -560,26 +560,21 @@ TriangleMesh mesh_of(const Node &object, const Node &path, const Transform &worl
     }
 }
 
-// Resolves all links.
-std::filesystem::path existing_path_of(const Node &node) {
-    std::error_code error;
-    std::filesystem::path path = std::filesystem::canonical(node.input_path(), error);
-    if (error)
-        node.fail("there is no file or folder '" + node.input_path().string() + "': " + error.message());
-    return path;
-}
-
 class SceneLoader {
 public:
-    SceneLoader(const Node &root, const LoadCallbacks &callbacks)
-        : root_(root), callbacks_(callbacks), textures_(builder_, callbacks) {}
+    SceneLoader(const Node &root, const LoadCallbacks &callbacks, const std::vector<std::filesystem::path> &readable)
+        : root_(root), callbacks_(callbacks), textures_(builder_, callbacks) {
+        std::error_code ignored;
+        for (const std::filesystem::path &path : readable)
+            readable_.push_back(std::filesystem::weakly_canonical(path, ignored));
+    }
 
     ArenaBuilder load() {
         root_.allow_keys({"version", "axes", "max_depth", "ambient", "background", "shadow_alpha", "coloured_shadows",
                           "environment", "materials", "lights", "objects", "reads"});
         if (const auto reads = root_.find("reads"))
-            for (const Node &node : reads->items())
-                reads_.push_back(existing_path_of(node));
+            reads->fail("a scene grants nothing; list these files under 'reads' of the ray tracer, in the "
+                        "configuration, and remove this key");
         builder_.settings = settings_of(root_);
         if (const auto environment = root_.find("environment")) {
             set_origin(*environment);
@@ -637,7 +632,8 @@ private:
             const Transform to_scene_axes =
                 builder_.settings.axes == ARHOST_AXES_Z_UP ? Transform::rotation({1, 0, 0}, 90) : Transform();
             add_gltf_file(node, shape,
-                          {name, world_from_object * to_scene_axes, motion_node, role, material, {}, reads_}, part);
+                          {name, world_from_object * to_scene_axes, motion_node, role, material, {}, readable_},
+                          part);
         } else {
             const std::uint32_t geometry = add_geometry(node, shape_key, shape, world_from_object, *material, part);
             const bool moves = motion_node != ARHOST_NONE;
@@ -775,17 +771,19 @@ private:
     Textures textures_;
     std::map<std::string, std::uint32_t> materials_;
     std::map<std::string, std::uint32_t> anchors_; // nodes, by name of the target
-    std::vector<std::filesystem::path> reads_;     // without links
+    std::vector<std::filesystem::path> readable_;  // without links
 };
 
 } // namespace
 
-ArenaBuilder load_scene(const yaml::Node &root, const LoadCallbacks &callbacks) {
-    return SceneLoader(root, callbacks).load();
+ArenaBuilder load_scene(const yaml::Node &root, const LoadCallbacks &callbacks,
+                        const std::vector<std::filesystem::path> &readable) {
+    return SceneLoader(root, callbacks, readable).load();
 }
 
-ArenaBuilder load_scene(const std::filesystem::path &file, const LoadCallbacks &callbacks) {
-    return load_scene(Node::load(file), callbacks);
+ArenaBuilder load_scene(const std::filesystem::path &file, const LoadCallbacks &callbacks,
+                        const std::vector<std::filesystem::path> &readable) {
+    return load_scene(Node::load(file), callbacks, readable);
 }
 
 } // namespace arhost::scene

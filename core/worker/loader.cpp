@@ -19,7 +19,8 @@ int load_scene(Link &link, const ipc::messages::Load &load) {
         const base::FileIdentity identity = base::identity_of(file);
         link.send(ipc::messages::Reads{identity.path, identity.node});
     };
-    scene::ArenaBuilder builder = scene::load_scene(load.scene, callbacks);
+    scene::ArenaBuilder builder =
+        scene::load_scene(load.scene, callbacks, {load.readable.begin(), load.readable.end()});
     const scene::Origins origins = builder.origins();
     const ipc::SharedMemory memory = ipc::SharedMemory::create("arhost-scene", builder.byte_size());
     {

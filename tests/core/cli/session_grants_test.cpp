@@ -19,7 +19,8 @@ protected:
     SessionGrants() {
         for (const char *folder : {"take", "secrets"})
             std::filesystem::create_directory(scratch_.path() / folder);
-        for (const char *file : {"take/scene.yaml", "take/code.py", "secrets/key", "secrets/map.yaml", "secrets/1.png"})
+        for (const char *file :
+             {"take/scene.yaml", "take/code.py", "secrets/key", "secrets/map.yaml", "secrets/1.png"})
             std::ofstream(scratch_.path() / file) << "x";
         std::filesystem::create_symlink(secrets(), scratch_.path() / "take/link");
     }
@@ -93,21 +94,23 @@ TEST_F(SessionGrants, NothingIsGrantedByTheSessionItself) {
 }
 
 TEST_F(SessionGrants, AFolderGrantsItsFiles) {
-    EXPECT_EQ(missing("raytracer: {options: {script: TAKE/code.py, key: SECRETS/key}}", {"SECRETS", "TAKE"}), "no error");
+    EXPECT_EQ(missing("raytracer: {options: {script: TAKE/code.py, key: SECRETS/key}}", {"SECRETS", "TAKE"}),
+              "no error");
     EXPECT_THAT(missing("raytracer: {reads: [SECRETS]}", {"SECRETS/key"}), HasSubstr(" --allow " + secrets()));
 }
 
 TEST_F(SessionGrants, OneMessageNamesAllThatIsMissing) {
     const std::string error =
         missing("raytracer: {allow: [gpu], scene: SECRETS/map.yaml}\ntracker: {allow: [gpu], reads: [SECRETS]}");
-    EXPECT_THAT(error, HasSubstr("take: the session asks for the permission 'gpu' for tracker, the file '" + secrets() +
-                                 "' (tracker.reads[0]), the permission 'gpu' for raytracer, the file '" + secrets() +
-                                 "/map.yaml' (raytracer.scene); "));
+    EXPECT_THAT(error, HasSubstr("take: the session asks for the permission 'gpu' for tracker, the file '" +
+                                 secrets() + "' (tracker.reads[0]), the permission 'gpu' for raytracer, the file '" +
+                                 secrets() + "/map.yaml' (raytracer.scene); "));
     EXPECT_THAT(error, HasSubstr("add --allow gpu --allow " + secrets() + " --allow " + secrets() + "/map.yaml, or"));
 }
 
 TEST_F(SessionGrants, WhatTheSessionContainsNeedsNone) {
-    EXPECT_EQ(missing("raytracer: {scene: TAKE/scene.yaml, options: {samples: 4, file: TAKE/code.py, none: /none}}"), "no error");
+    EXPECT_EQ(missing("raytracer: {scene: TAKE/scene.yaml, options: {samples: 4, file: TAKE/code.py, none: /none}}"),
+              "no error");
 }
 
 TEST_F(SessionGrants, ATrackerThatDoesNotRunNeedsNone) {

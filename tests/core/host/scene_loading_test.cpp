@@ -35,6 +35,7 @@ struct FakeLoader final : supervise::Starter {
 };
 
 struct SceneLoadingTest : testing::Test {
+    const sandbox::Policy raytracer{.mode = sandbox::Mode::permissive};
     // Returns the failure that is reported after the loader has sent these messages and exited.
     std::string reason_after(const std::vector<Json> &messages) {
         base::Limits limits;
@@ -43,7 +44,7 @@ struct SceneLoadingTest : testing::Test {
         for (const char *name : {"a.mp4", "b.mp4"})
             files.write(yaml::Node::parse("{path: '" + (folder / name).string() + "'}", "run.yaml").require("path"));
         std::string failure;
-        host::SceneLoading loading(context, folder / "scene.yaml", sandbox::Mode::permissive, limits, files,
+        host::SceneLoading loading(context, folder / "scene.yaml", raytracer, limits, files,
                                    {[&](const SharedMemory &, const auto &, const auto &) { failure = "none"; },
                                     [&](const std::string &reason, const auto &) { failure = reason; }});
         for (const Json &message : messages)
@@ -85,7 +86,7 @@ TEST_F(SceneLoadingTest, EndsALoaderThatReportsProgressForever) {
     limits.start = std::chrono::hours(1);
     limits.start_total = std::chrono::milliseconds(30);
     std::string failure;
-    host::SceneLoading loading(context, folder / "scene.yaml", sandbox::Mode::permissive, limits, {},
+    host::SceneLoading loading(context, folder / "scene.yaml", raytracer, limits, {},
                                {[&](const SharedMemory &, const auto &, const auto &) { failure = "none"; },
                                 [&](const std::string &reason, const auto &) { failure = reason; }});
     const Json progress = encode(messages::Progress{0.5, "still busy"});

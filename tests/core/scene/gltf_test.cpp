@@ -252,7 +252,7 @@ TEST(Gltf, ReportsAllFilesItReads) {
 }
 
 // A glTF file may come from somebody else: its buffers and images must not be files of the user.
-TEST(Gltf, ReadsOnlyFilesBelowItsFolderAndThoseOfTheKeyReads) {
+TEST(Gltf, ReadsOnlyFilesBelowItsFolderAndThoseTheCallerGrants) {
     namespace fs = std::filesystem;
     const ScratchFolder folder;
     const Gltf gltf = triangle();
@@ -264,26 +264,29 @@ TEST(Gltf, ReadsOnlyFilesBelowItsFolderAndThoseOfTheKeyReads) {
     fs::create_symlink(folder.path() / "home/.ssh/id_rsa", folder.path() / "scene/models/file-link.bin");
     fs::create_directory_symlink(folder.path() / "home", folder.path() / "scene/models/folder-link");
     fs::create_symlink("parts/a.bin", folder.path() / "scene/models/inner-link.bin");
-    const auto error_with = [&](const std::string &uri, const std::string &reads) {
+    const auto error_with = [&](const std::string &uri, const std::vector<fs::path> &readable = {},
+                                const std::string &key = "") {
         write_file(folder.path() / "scene/models/a.gltf", gltf.json(R"(, "uri": ")" + uri + "\""));
         write_file(folder.path() / "scene/s.yaml",
-                   "version: 1\naxes: y-up\nmaterials: {}\n" + reads + "objects:\n  - {gltf: models/a.gltf}\n");
-        return arhost::test::error_of([&] { load_scene(folder.path() / "scene/s.yaml"); });
+                   "version: 1\naxes: y-up\nmaterials: {}\n" + key + "objects:\n  - {gltf: models/a.gltf}\n");
+        return arhost::test::error_of([&] { load_scene(folder.path() / "scene/s.yaml", {}, readable); });
     };
     for (const char *inside : {"parts/a.bin", "parts/../parts/a.bin", "inner-link.bin"})
-        EXPECT_EQ(error_with(inside, ""), "no error") << inside;
+        EXPECT_EQ(error_with(inside), "no error") << inside;
     for (const char *outside : {"../../home/.ssh/id_rsa", "parts/../../../home/.ssh/id_rsa", "../models-secret.bin",
                                 "file-link.bin", "folder-link/.ssh/id_rsa", "%2e%2e/%2e%2e/home/.ssh/id_rsa"})
-        EXPECT_THAT(error_with(outside, ""),
-                    testing::AllOf(HasSubstr("a.gltf: refers to '"), HasSubstr("', which is outside its folder; move "
-                                                                               "that file there, or list it under "
-                                                                               "'reads' in the scene")))
+        EXPECT_THAT(error_with(outside),
+                    testing::AllOf(HasSubstr("a.gltf: refers to '"),
+                                   HasSubstr("', which is outside its folder; move that file there, or list it under "
+                                             "'reads' of the ray tracer in the configuration")))
             << outside;
-    for (const char *reads :
-         {"reads: [../home]\n", "reads: [../home/.ssh/id_rsa]\n", "reads: [models/folder-link]\n"})
-        EXPECT_EQ(error_with("../../home/.ssh/id_rsa", reads), "no error") << reads;
-    EXPECT_THAT(error_with("../../home/.ssh/id_rsa", "reads: [models]\n"), HasSubstr("is outside its folder"));
-    EXPECT_THAT(error_with("parts/a.bin", "reads: [none]\n"), HasSubstr("s.yaml:4:9: reads[0]: there is no file"));
+    for (const char *granted : {"home", "home/.ssh/id_rsa", "scene/models/folder-link"})
+        EXPECT_EQ(error_with("../../home/.ssh/id_rsa", {folder.path() / granted}), "no error") << granted;
+    EXPECT_THAT(error_with("../../home/.ssh/id_rsa", {folder.path() / "scene/models", folder.path() / "none"}),
+                HasSubstr("is outside its folder"));
+    EXPECT_THAT(
+        error_with("parts/a.bin", {}, "reads: [../home]\n"),
+        HasSubstr("s.yaml:4:8: reads: a scene grants nothing; list these files under 'reads' of the ray tracer"));
 }
 
 TEST(Gltf, ReportsHowItHandlesAlpha) {
