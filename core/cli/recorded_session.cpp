@@ -28,6 +28,22 @@ void expect_file(const fs::path &file, const char *advice) {
                           advice);
 }
 
+// A frame with 1,024 targets and 1,024 observations takes less than 3 MB.
+constexpr std::size_t max_line_bytes = 4 << 20;
+constexpr int max_depth = 8; // an observation's corners are at depth 6
+
+// Reads a line without its end. Returns false if there is none, or if the file ends within it.
+// Reads at most max_line_bytes + 1 bytes.
+bool read_line(std::istream &stream, std::string &text) {
+    text.clear();
+    for (int c; text.size() <= max_line_bytes && (c = stream.get()) != std::istream::traits_type::eof();) {
+        if (c == '\n')
+            return true;
+        text.push_back(static_cast<char>(c));
+    }
+    return text.size() > max_line_bytes;
+}
+
 // A line of the log, for error messages.
 struct Line {
     const fs::path &file;
@@ -149,11 +165,15 @@ void read_log(Session &session, std::uint64_t video_bytes) {
     std::uint64_t lacking = 0, end_before = 0; // frames that the video lacks; `video_end` of the previous line
     bool is_complete = false;
     std::string text;
-    for (Line line{file, 1}; std::getline(stream, text); ++line.number) {
-        if (stream.eof()) // no line end: the line is truncated
-            break;
+    for (Line line{file, 1}; read_line(stream, text); ++line.number) {
+        if (text.size() > max_line_bytes)
+            line.fail("is longer than 4 MiB, which no frame needs");
         try {
-            const nlohmann::json object = nlohmann::json::parse(text);
+            const nlohmann::json object = nlohmann::json::parse(text, [&](int depth, auto, auto &) {
+                if (depth > max_depth)
+                    line.fail("is nested more deeply than the record of a frame");
+                return true;
+            });
             if (is_complete)
                 line.fail("follows the line that ends the recording");
             if (object.is_object() && object.contains("end")) {

@@ -139,6 +139,14 @@ TEST_F(SessionFolder, AnInterruptedRecordingEndsAtItsLastCompleteLine) {
     }
 }
 
+// 60 million brackets would take gigabytes.
+TEST_F(SessionFolder, LongAndDeepLinesAreRejected) {
+    EXPECT_THAT(error_of_log(line(0) + std::string(5 << 20, ' ') + line(1)),
+                StartsWith("2:1: is longer than 4 MiB, which no frame needs"));
+    EXPECT_THAT(error_of_log(line(0) + std::string(1 << 20, '[') + "\n"),
+                StartsWith("2:1: is nested more deeply than the record of a frame"));
+}
+
 TEST_F(SessionFolder, DamagedLinesAreReportedWithTheirPosition) {
     const test::ErrorCase cases[] = {
         {line(0) + "{\"frame\": 1, ]\n" + line(2),
