@@ -5,9 +5,12 @@
 #include "embedded_files.hpp"
 #include "metrics.hpp"
 
+#include <algorithm>
 #include <fcntl.h>
 #include <microhttpd.h>
+#include <netinet/in.h>
 #include <random>
+#include <strings.h>
 #include <sys/socket.h>
 #include <utility>
 
@@ -15,7 +18,7 @@ namespace arhost::web {
 namespace {
 
 constexpr unsigned max_connections = 128, max_connections_per_address = 64;
-constexpr std::size_t max_viewers = 48;
+constexpr std::size_t max_viewers = 48, max_viewers_per_address = 24;
 constexpr std::size_t connection_memory = 16384, stream_block = 65536; // bytes
 constexpr unsigned inactivity_s = 30;
 constexpr auto request_time = std::chrono::seconds(10), response_time = std::chrono::seconds(60),
@@ -30,6 +33,34 @@ constexpr std::string_view boundary = "arhostframe";
 std::string header(MHD_Connection *connection, const char *name) {
     const char *value = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, name);
     return value ? value : "";
+}
+
+// Whether the request has two headers of this name.
+bool is_repeated(MHD_Connection *connection, const char *name) {
+    std::pair<const char *, int> count{name, 0};
+    MHD_get_connection_values(
+        connection, MHD_HEADER_KIND,
+        [](void *into, MHD_ValueKind, const char *key, const char *) {
+            auto &[wanted, found] = *static_cast<std::pair<const char *, int> *>(into);
+            found += ::strcasecmp(key, wanted) == 0;
+            return MHD_YES;
+        },
+        &count);
+    return count.second > 1;
+}
+
+// Returns the client's IPv4 address, or the /64 network of its IPv6 address, in which one client can have any number
+// of addresses.
+std::string address_of(MHD_Connection *connection) {
+    const auto *info = MHD_get_connection_info(connection, MHD_CONNECTION_INFO_CLIENT_ADDRESS);
+    if (!info || !info->client_addr)
+        return "";
+    if (info->client_addr->sa_family == AF_INET) {
+        const auto *v4 = reinterpret_cast<const sockaddr_in *>(info->client_addr);
+        return {reinterpret_cast<const char *>(&v4->sin_addr), sizeof v4->sin_addr};
+    }
+    const auto *v6 = reinterpret_cast<const sockaddr_in6 *>(info->client_addr);
+    return {reinterpret_cast<const char *>(&v6->sin6_addr), IN6_IS_ADDR_V4MAPPED(&v6->sin6_addr) ? 16u : 8u};
 }
 
 std::string make_nonce() {
@@ -58,6 +89,7 @@ struct Server::Request {
 struct Server::Viewer {
     Server *server;
     MHD_Connection *connection;
+    std::string address;     // of the client (address_of)
     bool is_waiting = false; // suspended, guarded by mutex_
     std::uint64_t number = 0;
     Clock::time_point sent_at{};
@@ -191,6 +223,13 @@ void Server::limit_time(MHD_Connection *connection, std::chrono::seconds time) {
 
 // Checks the headers of a request, before its body arrives. Returns whether the connection remains usable.
 bool Server::check(const Request &request) {
+    // A proxy in front of this server could find another end of the request, or another host.
+    if (is_repeated(request.connection, "Host") || is_repeated(request.connection, "Content-Length") ||
+        is_repeated(request.connection, "Transfer-Encoding") ||
+        (!header(request.connection, "Content-Length").empty() &&
+         !header(request.connection, "Transfer-Encoding").empty()))
+        return refuse(request, MHD_HTTP_BAD_REQUEST,
+                      "give one header Host, and one header Content-Length or Transfer-Encoding");
     const std::string host = header(request.connection, "Host"), origin = header(request.connection, "Origin");
     if (!is_own_host(host, settings_.hosts))
         return refuse(request, MHD_HTTP_MISDIRECTED_REQUEST,
@@ -351,15 +390,8 @@ bool Server::respond_with_snapshot(const Request &request) {
 }
 
 bool Server::respond_with_stream(const Request &request) {
-    auto viewer = std::make_unique<Viewer>(Viewer{this, request.connection});
-    {
-        const std::lock_guard lock(mutex_);
-        if (viewers_.size() < max_viewers)
-            viewers_.insert(viewer.get());
-        else
-            viewer.reset();
-    }
-    if (!viewer)
+    auto viewer = std::make_unique<Viewer>(Viewer{this, request.connection, address_of(request.connection)});
+    if (!admit(*viewer))
         return refuse(request, MHD_HTTP_SERVICE_UNAVAILABLE, "there are too many viewers");
     viewer->head = "--" + std::string(boundary) + "\r\n";
     viewer->jpeg = std::make_shared<Jpeg>();
@@ -373,6 +405,29 @@ bool Server::respond_with_stream(const Request &request) {
     const std::string type = "multipart/x-mixed-replace; boundary=" + std::string(boundary);
     MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, type.c_str());
     return queue(request, MHD_HTTP_OK, response);
+}
+
+// Registers a viewer. If there are too many viewers, the address with the most of them loses one to an address with
+// fewer. Returns false if this viewer has to wait.
+bool Server::admit(Viewer &viewer) {
+    const std::lock_guard lock(mutex_);
+    std::map<std::string_view, std::size_t> counts;
+    for (const Viewer *each : viewers_)
+        ++counts[each->address];
+    if (counts[viewer.address] >= max_viewers_per_address)
+        return false;
+    if (viewers_.size() >= max_viewers) {
+        const auto count_of = [&](const Viewer *each) { return counts[each->address]; };
+        Viewer *loser = *std::ranges::max_element(viewers_, {}, count_of);
+        if (count_of(loser) <= counts[viewer.address] + 1)
+            return false;
+        viewers_.erase(loser);
+        ::shutdown(connections_.at(loser->connection).fd, SHUT_RDWR); // the server's thread then closes it
+        if (std::exchange(loser->is_waiting, false))
+            MHD_resume_connection(loser->connection);
+    }
+    viewers_.insert(&viewer);
+    return true;
 }
 
 // Copies the next bytes of the stream. Browsers show a frame only when they receive the boundary after it, so the
@@ -436,6 +491,8 @@ bool Server::respond(const Request &request, unsigned status, const char *type, 
     if (!response)
         return false;
     MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, type);
+    if (status == MHD_HTTP_BAD_REQUEST) // where the next request begins is unknown
+        MHD_add_response_header(response, MHD_HTTP_HEADER_CONNECTION, "close");
     if (status == MHD_HTTP_UNAUTHORIZED)
         MHD_add_response_header(response, MHD_HTTP_HEADER_WWW_AUTHENTICATE, "Bearer");
     if (status == MHD_HTTP_METHOD_NOT_ALLOWED)

@@ -58,6 +58,7 @@ private:
     bool respond_with_page(const Request &request);
     bool respond_with_snapshot(const Request &request);
     bool respond_with_stream(const Request &request);
+    bool admit(Viewer &viewer);
     bool respond(const Request &request, unsigned status, const char *type, std::string_view body,
                  const std::string &nonce = "");
     bool refuse(const Request &request, unsigned status, const std::string &error);

@@ -22,13 +22,17 @@ struct HttpAnswer {
 // A TCP connection to 127.0.0.1.
 class HttpClient {
 public:
-    explicit HttpClient(std::uint16_t port, int receive_buffer = 0) : fd_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    // `from`: the last byte of the client's own address, 127.0.0.x.
+    explicit HttpClient(std::uint16_t port, int receive_buffer = 0, std::uint32_t from = 1)
+        : fd_(::socket(AF_INET, SOCK_STREAM, 0)) {
         const timeval limit{30, 0};
         ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
         if (receive_buffer > 0)
             ::setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
         sockaddr_in address{};
         address.sin_family = AF_INET;
+        address.sin_addr.s_addr = htonl(INADDR_LOOPBACK + from - 1);
+        ::bind(fd_, reinterpret_cast<const sockaddr *>(&address), sizeof address);
         address.sin_port = htons(port);
         address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
         ::connect(fd_, reinterpret_cast<const sockaddr *>(&address), sizeof address);

@@ -280,6 +280,44 @@ TEST(SinkWeb, SurvivesMalformedRequests) {
     EXPECT_EQ(run.stats()["restarts"]["sink_web"], 0) << run.output();
 }
 
+TEST(SinkWeb, RefusesRequestsWhoseEndOrHostIsAmbiguous) {
+    WebRun run;
+    const std::string command = R"({"command": "status"})", length = std::to_string(command.size());
+    for (const std::string &headers :
+         {"Host: localhost\r\nHost: 127.0.0.1\r\nContent-Length: " + length,
+          "Host: localhost\r\nContent-Length: " + length + "\r\nContent-Length: 5",
+          "Host: localhost\r\nContent-Length: " + length + "\r\nTransfer-Encoding: chunked",
+          std::string("Host: localhost\r\nTransfer-Encoding: chunked\r\nTransfer-Encoding: chunked")}) {
+        HttpClient client = run.connect();
+        client.send("POST /api/control HTTP/1.1\r\n" + headers + "\r\nContent-Type: application/json\r\n\r\n" +
+                    command);
+        const std::string answer = client.receive_all(); // until the server closes the connection
+        EXPECT_THAT(answer, StartsWith("HTTP/1.1 400")) << headers;
+        EXPECT_THAT(answer, testing::Not(HasSubstr("\"ok\":true"))) << headers;
+    }
+    run.expect_quit();
+}
+
+TEST(SinkWeb, OneAddressCannotTakeAllViewers) {
+    WebRun run;
+    std::vector<HttpClient> viewers;
+    const auto status_of_stream = [&](std::uint32_t from) {
+        HttpClient &client = viewers.emplace_back(run.port(), 0, from);
+        client.send("GET /stream.mjpg HTTP/1.1\r\nHost: localhost\r\n\r\n");
+        return client.receive_to("\r\n\r\n").substr(9, 3);
+    };
+    for (const std::uint32_t from : {2u, 3u})
+        for (int i = 0; i < 24; ++i)
+            ASSERT_EQ(status_of_stream(from), "200") << from << " " << i;
+    EXPECT_EQ(status_of_stream(2), "503") << "24 viewers per address";
+    for (int i = 0; i < 16; ++i)
+        EXPECT_EQ(status_of_stream(4), "200") << "takes the place of a viewer of an address with more, " << i;
+    EXPECT_EQ(status_of_stream(4), "503") << "each address has a third";
+    EXPECT_EQ(status_of_stream(5), "200");
+    EXPECT_NE(viewers.back().receive_frame(), "");
+    run.expect_quit();
+}
+
 TEST(SinkWeb, AViewerThatDoesNotReadDelaysNobody) {
     WebRun run;
     std::vector<HttpClient> viewers;
