@@ -4,6 +4,7 @@
 #include "base/atomic_file.hpp"
 #include "base/program.hpp"
 #include "base/write_all.hpp"
+#include "cli/output_locks.hpp"
 #include "cli/read_configuration.hpp"
 #include "host/outcome.hpp"
 #include "host/run.hpp"
@@ -192,6 +193,7 @@ void show_warnings(const run_config::Configuration &configuration, Console &cons
 }
 
 int run(const run_config::Configuration &configuration, const Arguments &arguments, supervise::Starter &launcher) {
+    const OutputLocks locks(configuration);
     EndingSignals signals; // before the console's thread starts, because that thread must not receive these signals
     Reports reports(configuration);
     Console console(arguments.verbose);

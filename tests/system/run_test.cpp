@@ -154,6 +154,27 @@ TEST(Run, WorksWithoutTrackerAndRayTracer) {
     EXPECT_EQ(counted(run).size(), 5u);
 }
 
+TEST(Run, RefusesAnOutputThatAnotherRunWrites) {
+    const auto writing = [](const std::string &path, int frames) {
+        return "version: 1\nsource: {plugin: source_counter, options: {frames: " + std::to_string(frames) +
+               ", delay_ms: 5}}\noutputs: [{plugin: sink_counter, path: " + path + "}]\n";
+    };
+    ArhostRun first(writing("counted.txt", 1000000));
+    std::filesystem::create_directory_symlink(".", first.path("link"));
+    first.start();
+    ASSERT_TRUE(first.wait_for_lines(5)) << first.output();
+    ArhostRun second(writing(first.path("link/counted.txt").string(), 5));
+    second.expect(2, {"run.yaml:3:",
+                      "outputs[0].path: '" + first.path("counted.txt").string() +
+                          "' is being written by another run (process " + std::to_string(first.pid()) + ", ",
+                      "run.yaml); end that run, or choose another path"});
+    const auto lines = first.lines();
+    EXPECT_TRUE(first.wait_for_lines(lines + 5)) << "the first run continues";
+    send_signal(first.pid(), SIGKILL);
+    first.wait();
+    EXPECT_EQ(second.run(), 0) << "a killed run holds no lock: " << second.output();
+}
+
 TEST(Run, FeedsSeveralOutputs) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 50}}\n"
                   "outputs:\n- {plugin: sink_counter, path: counted.txt}\n- {plugin: sink_counter, path: second.txt, "
