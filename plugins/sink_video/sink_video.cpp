@@ -77,6 +77,8 @@ public:
         first_ = static_cast<std::int64_t>(setup.first_sequence);
         if (first_ > 0)
             begin();
+        else
+            recover();
     }
 
     arhost_status write(const arhost_output &output) {
@@ -113,13 +115,55 @@ public:
     }
 
 private:
-    // Begins a segment. It is called for the first frame instead of in start(), so that a run that fails to start
-    // does not delete the segments of an earlier run.
+    // Makes a video of the segments that an earlier run has left, because it was killed or the disk was full. Drops a
+    // single frame: this run wrote it, if it was killed before the host received the answer.
+    void recover() {
+        const std::vector<Segment> segments = find_segments(path_);
+        if (segments.empty())
+            return;
+        std::int64_t frames = 0;
+        try {
+            frames = join(
+                segments, partial_, format_, settings_.fps,
+                [&](double fraction) { host_.progress(fraction, "recovering the video of an earlier run"); },
+                [&](const std::string &text) { host_.warn(text); });
+            if (frames > 1) {
+                const fs::path recovered = free_sibling();
+                if (std::error_code error; fs::rename(partial_, recovered, error), error)
+                    throw files::io_failure("cannot write", recovered, error.value());
+                host_.warn("an earlier run was interrupted while it wrote '" + path_.string() + "'; its " +
+                           std::to_string(frames) + " frames are now in '" + recovered.string() + "'");
+            }
+        } catch (const Failure &failure) {
+            files::remove_file(partial_);
+            throw Failure(failure.status(),
+                          std::string(failure.what()) + "; an earlier run was interrupted while it wrote '" +
+                              path_.string() + "': move its frames, '" +
+                              files::hidden_sibling(path_, ".from*.mkv").string() + "', to another folder");
+        }
+        files::remove_file(partial_);
+        for (const Segment &segment : segments)
+            files::remove_file(segment.path);
+    }
+
+    // Returns the first free name of "demo.recovered-1.mp4", "demo.recovered-2.mp4", …
+    fs::path free_sibling() const {
+        fs::path free;
+        std::error_code ignored;
+        for (int i = 1; free.empty() || fs::exists(free, ignored); ++i) {
+            free = path_;
+            free.replace_filename(path_.stem().string() + ".recovered-" + std::to_string(i) +
+                                  path_.extension().string());
+        }
+        return free;
+    }
+
+    // Begins a segment.
     void begin() {
         bool has_beginning = false;
         for (const Segment &segment : find_segments(path_))
             if (segment.first >= first_)
-                files::remove_file(segment.path); // the segment created below, or one left by an earlier run
+                files::remove_file(segment.path); // the segment created below
             else
                 has_beginning |= segment.first == 0;
         files::remove_file(partial_);

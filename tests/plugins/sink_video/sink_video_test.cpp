@@ -11,6 +11,7 @@ using namespace arhost::test;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::UnorderedElementsAre;
 
 namespace {
 
@@ -350,19 +351,29 @@ TEST_F(SinkVideo, AKillWhileFinishingLeavesAWholeVideo) {
     EXPECT_THAT(names(), ElementsAre("demo.mp4"));
 }
 
-TEST_F(SinkVideo, AFreshStartRemovesSegmentsOfAnEarlierRun) {
+TEST_F(SinkVideo, AFreshStartRecoversTheFramesOfAnEarlierRun) {
     run_and_die(0, 5);
     run_and_die(5, 9);
     std::ofstream(path(".demo.mp4.partial")) << "x";
     std::ofstream(path(".demo.mp4.from7.txt")) << "unrelated";
-    run(sink(), 0, 3);
+    std::ofstream(path("demo.recovered-1.mp4")) << "an earlier one";
+    SinkUnderTest s = sink();
+    s.run(width, height, 0, 3);
+    EXPECT_THAT(s.log(), HasSubstr("4 an earlier run was interrupted while it wrote '" + path().string() +
+                                   "'; its 9 frames are now in '" + path("demo.recovered-2.mp4").string() + "'"));
     EXPECT_EQ(read_video(path()).numbers(), numbers(0, 3));
-    EXPECT_THAT(names(), ElementsAre(".demo.mp4.from7.txt", "demo.mp4"));
+    EXPECT_EQ(read_video(path("demo.recovered-2.mp4")).numbers(), numbers(0, 9));
+    EXPECT_THAT(names(), UnorderedElementsAre(".demo.mp4.from7.txt", "demo.mp4", "demo.recovered-1.mp4",
+                                              "demo.recovered-2.mp4"));
 }
 
-TEST_F(SinkVideo, ARunThatFailsToStartKeepsEarlierSegments) {
+TEST_F(SinkVideo, FramesThatCannotBeRecoveredStay) {
     run_and_die(0, 5);
-    sink().run(width, height, 0, 0);
+    const FileSizeLimit limit(100);
+    SinkUnderTest s = sink();
+    EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_IO);
+    EXPECT_THAT(s.log(),
+                HasSubstr("move its frames, '" + path(".demo.mp4.from*.mkv").string() + "', to another folder"));
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv"));
 }
 
