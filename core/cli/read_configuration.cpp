@@ -5,6 +5,8 @@
 #include "base/program.hpp"
 #include "camera/coordinates.hpp"
 
+#include <cstdlib>
+
 namespace arhost::cli {
 namespace {
 
@@ -94,6 +96,8 @@ void expect_watchable(const run_config::Configuration &configuration) {
 } // namespace
 
 void override_settings(yaml::Node &root, const Arguments &arguments) {
+    if (const char *home = std::getenv("HOME"))
+        root.expand_home(home);
     for (const std::string &setting : arguments.settings) {
         const std::size_t equals = setting.find('=');
         if (equals == 0 || equals == std::string::npos)

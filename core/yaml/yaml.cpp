@@ -521,7 +521,9 @@ std::filesystem::path Node::output_path() const {
 }
 
 std::filesystem::path Node::path_below(const std::filesystem::path &folder) const {
-    std::filesystem::path path = without_dots(folder / text());
+    const std::string text = this->text();
+    const bool is_below_home = text.starts_with("~/") && !document_->home.empty();
+    std::filesystem::path path = without_dots(is_below_home ? document_->home / text.substr(2) : folder / text);
     if (!base::is_utf8(path.native())) // the plugin interface requires UTF-8 paths
         fail("the path " + in_quotes(path) + " is not valid UTF-8; rename the file or the folder");
     return path;

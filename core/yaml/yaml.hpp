@@ -79,6 +79,10 @@ public:
 
     void remove(const std::string &key); // a key of a map, if it exists
 
+    // From here on, paths of this document that begin with "~/" are below `home`. For configurations; scenes and
+    // other content name no files in a user's home.
+    void expand_home(const std::filesystem::path &home) { document_->home = home; }
+
     bool is_map() const { return node_.IsMap(); }
     bool is_sequence() const { return node_.IsSequence(); }
     bool is_scalar() const { return node_.IsScalar(); }
@@ -134,6 +138,7 @@ private:
         std::string name;
         std::map<std::string, std::string> overrides{}; // maps a key path to the option that set it
         std::optional<Origin> origin{};                 // set if the document is a copy
+        std::filesystem::path home{};                   // replaces \"~\" in paths; empty: nothing does
     };
     Node(const YAML::Node &node, std::string path, std::shared_ptr<Document> document)
         : node_(node), path_(std::move(path)), document_(std::move(document)) {}

@@ -138,6 +138,16 @@ TEST(Yaml, RejectsInvalidUtf8AndControlCharacters) {
     EXPECT_THAT(error_of([] { Node::parse(std::string("a\0:\0 \0'\0", 8), "a.yaml"); }), HasSubstr("a.yaml:1:2"));
 }
 
+TEST(Yaml, PathsBelowTheHomeFolderAreExpandedOnRequest) {
+    Node root = Node::parse("a: ~/x/../y\nb: ~user/x\nc: x~/y", "/lab/a.yaml");
+    EXPECT_EQ(root.require("a").input_path(), "/lab/~/y") << "content";
+    root.expand_home("/home/u");
+    EXPECT_EQ(root.require("a").input_path(), "/home/u/y");
+    EXPECT_EQ(root.require("a").output_path(), "/home/u/y");
+    EXPECT_EQ(root.require("b").input_path(), "/lab/~user/x");
+    EXPECT_EQ(root.require("c").input_path(), "/lab/x~/y");
+}
+
 TEST(Yaml, RejectsPathsThatAreNotUtf8) {
     EXPECT_THAT(error_of([] { Node::parse("a: b.png", "caf\xe9/lab.yaml").require("a").input_path(); }),
                 HasSubstr("/b.png' is not valid UTF-8; rename"));
