@@ -148,9 +148,8 @@ void Run::interrupt() {
     if (!parts_.flow.was_interrupted()) {
         parts_.flow.on_interrupted();
         std::chrono::milliseconds limit{0};
-        for_each_component(parts_.configuration, [&](const run_config::ComponentConfiguration &component) {
-            limit = std::max(limit, component.limits.stop);
-        });
+        for (const Component *component : components())
+            limit = std::max(limit, component->limits().stop);
         interrupt_deadline_ = parts_.context.reactor.at(parts_.context.reactor.now() + limit, [this, limit] {
             std::string late;
             for (const Component *component : components())

@@ -36,8 +36,8 @@ public:
     // Runs until all frames are output. Returns false if the run failed or a component was disabled.
     bool run();
     // Handles Ctrl-C. The first call lets the frames in progress finish and then ends the run, at the latest after
-    // the longest stop_deadline_ms of the components. A second call ends the run immediately. Must be called from the
-    // reactor.
+    // the longest stop_deadline_ms of the components that run at the time of the call. A second call ends the run
+    // immediately. Must be called from the reactor.
     void interrupt();
 
     const Failures &failures() const { return parts_.failures; }

@@ -94,6 +94,7 @@ public:
     const std::filesystem::path &plugin() const { return plugins_[candidate_]; }
     std::size_t candidate() const { return candidate_; } // index of plugin() in the list of plugins
     const model::PluginDescription &description() const { return description_; }
+    const base::Limits &limits() const { return limits_; }
     pid_t pid() const { return process_ ? process_->pid() : 0; }
 
     // The output slots of the current process; null until the state is `running`.
