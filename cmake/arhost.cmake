@@ -45,6 +45,21 @@ endfunction()
 # the shading headers of core/.
 include(${CMAKE_CURRENT_LIST_DIR}/arhost_add_plugin.cmake)
 
+# arhost_scale_timeout(variable): multiplies a number of seconds with the environment variable ARHOST_TEST_TIME_SCALE,
+# which also scales the limits in the tests (tests/support/waiting.hpp). Rounds up the scale.
+function(arhost_scale_timeout variable)
+  if("$ENV{ARHOST_TEST_TIME_SCALE}" MATCHES "^([0-9]+)(\\.[0-9]*)?$")
+    set(scale ${CMAKE_MATCH_1})
+    if("${CMAKE_MATCH_2}" MATCHES "[1-9]")
+      math(EXPR scale "${scale} + 1")
+    endif()
+    if(scale GREATER 0)
+      math(EXPR scaled "${${variable}} * ${scale}")
+      set(${variable} ${scaled} PARENT_SCOPE)
+    endif()
+  endif()
+endfunction()
+
 # arhost_add_test_program(name SOURCES … [LIBRARIES …] [DEPENDS targets…]): a GoogleTest program that another command runs.
 function(arhost_add_test_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LIBRARIES;DEPENDS" ${ARGN})
@@ -60,7 +75,8 @@ endfunction()
 
 # arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…] [SERIAL] [STATISTICAL filter]
 # [EXHAUSTIVE [filter]]): a GoogleTest program; each of its tests is a CTest test. For each label, the target `<label>-tests`
-# builds all programs that have it. SERIAL: while one of these tests runs, CTest runs no other. STATISTICAL: these tests measure over many samples, check all values or repeat others;
+# builds all programs that have it. TIMEOUT: 60 by default; see arhost_scale_timeout. SERIAL: while one of these tests
+# runs, CTest runs no other. STATISTICAL: these tests measure over many samples, check all values or repeat others;
 # sanitizers omit them, because other tests execute the same code. EXHAUSTIVE: these tests, or those of instantiations
 # named `Exhaustive`, have the label `exhaustive` and ten times the timeout, and sanitizers omit them, too.
 function(arhost_add_test name)
@@ -71,6 +87,7 @@ function(arhost_add_test name)
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 60)
   endif()
+  arhost_scale_timeout(ARG_TIMEOUT)
   arhost_add_test_program(${name} SOURCES ${ARG_SOURCES} LIBRARIES ${ARG_LIBRARIES} DEPENDS ${ARG_DEPENDS})
   foreach(label ${ARG_LABELS})
     if(NOT TARGET ${label}-tests)
@@ -113,6 +130,7 @@ function(arhost_add_vm_test name target)
     list(APPEND labels exhaustive)
     set(timeout 1800)
   endif()
+  arhost_scale_timeout(timeout)
   set(modules)
   foreach(module ${ARG_MODULES})
     list(APPEND modules -m ${module})

@@ -41,11 +41,23 @@ inline std::uint64_t waits_of(pid_t pid) {
     return count.empty() ? 0 : std::stoull(count);
 }
 
-// Returns whether a process waits in a function of the kernel, such as "pipe_write".
+// Returns whether a process waits in a function of the kernel, such as "pipe_write". Always false if the kernel does
+// not show this user where the process waits.
 inline bool is_waiting_in(pid_t pid, const std::string &function) {
     std::ifstream file("/proc/" + std::to_string(pid) + "/wchan");
     std::string name;
     return file >> name && name.find(function) != std::string::npos;
+}
+
+// Returns whether a process waits and the kernel does not show this user where.
+inline bool waits_at_hidden_place(pid_t pid) {
+    const std::uint64_t waits = waits_of(pid);
+    const auto is_asleep = [&] { return status_of(pid, "State").starts_with("S") && waits_of(pid) == waits; };
+    if (!is_asleep())
+        return false;
+    std::ifstream file("/proc/" + std::to_string(pid) + "/wchan");
+    std::string name;
+    return (!(file >> name) || name == "0") && is_asleep();
 }
 
 } // namespace arhost::test

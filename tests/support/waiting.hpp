@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Tests wait for other processes with these functions. They neither sleep for a fixed time nor measure time.
+// Tests wait for other processes with these functions, which return once an event has occurred.
 #pragma once
 
 #include <chrono>
@@ -16,9 +16,11 @@ inline std::chrono::milliseconds scaled(std::chrono::milliseconds time) {
     return std::chrono::duration_cast<std::chrono::milliseconds>(time * (scale > 0 ? scale : 1));
 }
 
-// Calls `condition` until it returns true. Returns false after `limit`, which only a defect exceeds.
+// Calls `condition` until it returns true. Returns false after `limit`, which only a defect exceeds. The default is
+// half the shortest limit that CTest sets for a test, so that the test reports the defect itself.
 template <class Condition>
-bool eventually(const Condition &condition, std::chrono::milliseconds limit = std::chrono::minutes(1)) {
+[[nodiscard]] bool eventually(const Condition &condition,
+                              std::chrono::milliseconds limit = std::chrono::seconds(30)) {
     const auto end = std::chrono::steady_clock::now() + scaled(limit);
     while (!condition()) {
         if (std::chrono::steady_clock::now() > end)

@@ -30,7 +30,8 @@ TEST(Live, ASlowRayTracerDropsFramesAndCountsThem) {
     expect_own_overlays(lines);
     const auto stats = run.stats();
     EXPECT_EQ(stats["frames"]["in"], 120);
-    EXPECT_GT(stats["frames"]["dropped"]["raytracer"], 0);
+    // At 30 fps and 300 ms per image, at least eight of nine frames are dropped on any machine.
+    EXPECT_GE(stats["frames"]["dropped"]["raytracer"], 25);
     EXPECT_EQ(dropped(stats) + lines.size(), 120u) << "each frame is either shown or counted as dropped\n"
                                                    << stats.dump(1);
     for (const auto &line : lines)
@@ -53,14 +54,17 @@ TEST(Live, CancelsAnUnneededImageAtTheEnd) {
     EXPECT_EQ(run.stats()["restarts"]["raytracer"], 0);
 }
 
-// Uses the real plugins at 30 fps. With 64 samples per pixel, the ray tracer cannot keep up on any machine.
+// Uses the real plugins at 30 fps. With 64 samples per pixel, the ray tracer cannot keep up on any machine. If the
+// machine is busy, the tracker does not get every frame. tracker_aruco refines corners from where it expects them, so
+// its poses differ slightly after a gap. tracker_apriltag detects the marker in the whole frame, independently of
+// earlier frames.
 TEST(Live, ShownFramesEqualThoseOfLockstep) {
 #if defined(__SANITIZE_ADDRESS__)
     GTEST_SKIP() << "takes minutes under a sanitizer";
 #endif
     const std::string yaml =
         "version: 1\nsource: {plugin: source_synthetic, fps: 30, options: {frames: 45, width: 320, height: 180}}\n"
-        "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: "
+        "tracker: {plugin: tracker_apriltag, full_search_every: 1, targets: [{marker: 0, family: tag36h11, side_mm: "
         "80}]}\n"
         "raytracer: {plugin: rt_embree, scene: " +
         arhost::test::source_directory() +
@@ -106,13 +110,14 @@ TEST(Live, AStoppedOutputDropsOnlyItsOwnFrames) {
     send_signal(stopped, SIGCONT);
     send_signal(run.pid(), SIGINT);
     ASSERT_EQ(run.wait(), 130) << run.output();
-    EXPECT_GE(run.stats()["frames"]["dropped"]["sink_realtime"], 40);
-    EXPECT_EQ(run.stats()["frames"]["composited"], run.lines());
+    const auto frames = run.stats()["frames"];
+    EXPECT_GE(frames["dropped"]["sink_realtime"], 40);
+    EXPECT_EQ(frames["composited"], run.lines() + frames["dropped"].value("sink_counter", 0u)) << frames.dump(1);
 }
 
-// The source cannot deliver frames at this rate, so it skips many.
+// The source cannot deliver frames at this rate, so it skips many. The video lasts for 10 s.
 TEST(Live, ARestartedSourceDoesNotRepeatSkippedFrames) {
-    ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_synthetic, fps: 10000, options: {frames: 20000}, "
+    ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_synthetic, fps: 10000, options: {frames: 100000}, "
                   "conform: true}\ncamera: {width: 64, height: 48, fx: 60}\n"
                   "outputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n");
     run.start();
@@ -123,7 +128,7 @@ TEST(Live, ARestartedSourceDoesNotRepeatSkippedFrames) {
     EXPECT_EQ(stats["restarts"]["source"], 1) << run.output();
     EXPECT_GE(stats["frames"]["dropped"]["source"], 15);
     // Each frame is either delivered or reported as skipped; only the last frames may be missing.
-    EXPECT_LE(stats["frames"]["in"].get<int>() + stats["frames"]["dropped"]["source"].get<int>(), 20000);
+    EXPECT_LE(stats["frames"]["in"].get<int>() + stats["frames"]["dropped"]["source"].get<int>(), 100000);
     for (const auto &[promise, entry] : stats["conformance"].items())
         EXPECT_EQ(entry["violations"], 0) << promise;
 }

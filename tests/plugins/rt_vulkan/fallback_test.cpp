@@ -49,7 +49,7 @@ protected:
         return std::ranges::count_if(lines, [](const CountedLine &line) { return line.kind != ARHOST_OVERLAY_NONE; });
     }
     void remove_drivers() {
-        eventually([&] { return !run_.running() || overlaid() >= 20; });
+        EXPECT_TRUE(run_.eventually([&] { return overlaid() >= 20; })) << run_.output();
         fs::remove_all(drivers_);
         ASSERT_GT(run_.worker("rt_vulkan"), 0) << run_.output();
         ::kill(run_.worker("rt_vulkan"), SIGKILL); // the host restarts the worker, as it does after a device loss

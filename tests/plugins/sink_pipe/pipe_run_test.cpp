@@ -24,8 +24,7 @@ std::string yaml(const std::string &output, const std::string &source = "frames:
 }
 
 void wait_for_output(const ArhostRun &run, const std::string &text) {
-    eventually([&] { return !run.running() || run.output().find(text) != std::string::npos; });
-    EXPECT_THAT(run.output(), HasSubstr(text));
+    EXPECT_TRUE(run.wait_for_output(text)) << run.output();
 }
 
 // A run that writes to a FIFO, with a reader.
@@ -152,8 +151,7 @@ TEST(PipeRun, APausedReaderOnlyDropsItsOwnFramesOfALiveRun) {
     const auto lines = [&] {
         return count_of(run.exists("out/poses.jsonl") ? run.read("out/poses.jsonl") : "", "\n");
     };
-    eventually([&] { return !run.running() || lines() >= 150; });
-    EXPECT_GE(lines(), 150u) << "the paused reader holds up the run";
+    EXPECT_TRUE(run.eventually([&] { return lines() >= 150; })) << "the paused reader holds up the run";
     const std::string video = reader.read_all();
     EXPECT_EQ(run.wait(), 0) << run.output();
     EXPECT_EQ(count_of(video, "YUV4MPEG2"), 1u);

@@ -193,7 +193,7 @@ TEST_F(VividLoop, ARunContinuesWhenALostDeviceIsBack) {
                   "outputs: [{plugin: sink_v4l2, allow: [video], options: {device: " +
                   output_.path() + "}}, {plugin: sink_poses, path: out/poses.jsonl}]\nstats: stats.json\n");
     run.start();
-    eventually([&] { return !run.running() || run.exists("out/poses.jsonl"); });
+    EXPECT_TRUE(run.eventually([&] { return run.exists("out/poses.jsonl"); })) << run.output();
     output_.set("Disconnect", 1);
     output_.release(); // vivid connects again when all programs have closed it
     capture_.release();

@@ -79,9 +79,11 @@ TEST(NetworkRun, ContinuesWhenTheCameraComesBack) {
     ARHOST_REQUIRE_FFMPEG();
     const Media media;
     CameraServer server("http", media);
-    ArhostRun run(configuration("plugin: source_network, allow: [network], deadline_ms: 1000, options: {url: \"" +
-                                    server.url("mjpeg", user_and_password) + "\"}",
-                                100));
+    const auto deadline = scaled(std::chrono::seconds(1));
+    ArhostRun run(
+        configuration("plugin: source_network, allow: [network], deadline_ms: " + std::to_string(deadline.count()) +
+                          ", options: {url: \"" + server.url("mjpeg", user_and_password) + "\"}",
+                      100));
     run.start();
     const auto wait_for = [&](const char *text) {
         EXPECT_TRUE(eventually([&] { return run.output().find(text) != std::string::npos; })) << run.output();
@@ -89,7 +91,7 @@ TEST(NetworkRun, ContinuesWhenTheCameraComesBack) {
     wait_for("160×120 px");
     server.kill();
     wait_for("reconnecting until it is back");
-    std::this_thread::sleep_for(std::chrono::milliseconds(2500)); // longer than deadline_ms
+    std::this_thread::sleep_for(2.5 * deadline); // the outage
     server.start();
     EXPECT_EQ(run.wait(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("is back"));
