@@ -75,7 +75,7 @@ endfunction()
 
 # arhost_add_test(name SOURCES … [LIBRARIES …] [LABELS …] [TIMEOUT s] [DEPENDS targets…] [SERIAL] [STATISTICAL filter]
 # [EXHAUSTIVE [filter]]): a GoogleTest program; each of its tests is a CTest test. For each label, the target `<label>-tests`
-# builds all programs that have it. TIMEOUT: 60 by default; see arhost_scale_timeout. SERIAL: while one of these tests
+# builds all programs that have it. TIMEOUT: 120 by default; see arhost_scale_timeout. SERIAL: while one of these tests
 # runs, CTest runs no other. STATISTICAL: these tests measure over many samples, check all values or repeat others;
 # sanitizers omit them, because other tests execute the same code. EXHAUSTIVE: these tests, or those of instantiations
 # named `Exhaustive`, have the label `exhaustive` and ten times the timeout, and sanitizers omit them, too.
@@ -85,7 +85,7 @@ function(arhost_add_test name)
     set(ARG_EXHAUSTIVE "Exhaustive/*")
   endif()
   if(NOT ARG_TIMEOUT)
-    set(ARG_TIMEOUT 60)
+    set(ARG_TIMEOUT 120)
   endif()
   arhost_scale_timeout(ARG_TIMEOUT)
   arhost_add_test_program(${name} SOURCES ${ARG_SOURCES} LIBRARIES ${ARG_LIBRARIES} DEPENDS ${ARG_DEPENDS})

@@ -17,7 +17,7 @@ inline std::chrono::milliseconds scaled(std::chrono::milliseconds time) {
 }
 
 // Calls `condition` until it returns true. Returns false after `limit`, which only a defect exceeds. The default is
-// half the shortest limit that CTest sets for a test, so that the test reports the defect itself.
+// shorter than the limits that CTest sets for tests, so that the test reports the defect itself.
 template <class Condition>
 [[nodiscard]] bool eventually(const Condition &condition,
                               std::chrono::milliseconds limit = std::chrono::seconds(30)) {
