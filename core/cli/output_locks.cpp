@@ -31,6 +31,20 @@ fs::path lock_folder() {
     return is_own ? folder : fs::path();
 }
 
+// Opens a lock and takes it. Opens it again if the run that held it has removed its file in the meantime. Returns
+// without a descriptor if the file cannot be opened; `is_taken`: another run holds the lock.
+base::UniqueFd take(const fs::path &name, bool &is_taken) {
+    for (;;) {
+        base::UniqueFd lock(::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
+        is_taken = lock && ::flock(lock.get(), LOCK_EX | LOCK_NB) != 0;
+        struct stat opened {
+        }, current{};
+        if (!lock || is_taken || ::fstat(lock.get(), &opened) != 0 ||
+            (::stat(name.c_str(), &current) == 0 && opened.st_ino == current.st_ino))
+            return lock;
+    }
+}
+
 // Whether an output to this path creates files.
 bool creates_files(const yaml::Node &path) {
     std::error_code ignored;
@@ -50,10 +64,11 @@ OutputLocks::OutputLocks(const run_config::Configuration &configuration) {
             continue;
         const std::string file = base::real_path(path->output_path()).string();
         const fs::path name = folder / fmt::format("output-{:016x}", std::hash<std::string>()(file));
-        base::UniqueFd lock(::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
+        bool is_taken = false;
+        base::UniqueFd lock = take(name, is_taken);
         if (!lock)
             continue;
-        if (::flock(lock.get(), LOCK_EX | LOCK_NB) != 0) {
+        if (is_taken) {
             char owner[512];
             const ssize_t size = ::pread(lock.get(), owner, sizeof owner, 0);
             path->fail("'" + base::printable(file) + "' is being written by another run (" +
@@ -63,8 +78,13 @@ OutputLocks::OutputLocks(const run_config::Configuration &configuration) {
         const std::string owner = fmt::format("process {}, {}", ::getpid(), configuration.node.file().string());
         if (::ftruncate(lock.get(), 0) == 0)
             (void)::pwrite(lock.get(), owner.data(), owner.size(), 0);
-        locks_.push_back(std::move(lock));
+        locks_.push_back({name, std::move(lock)});
     }
+}
+
+OutputLocks::~OutputLocks() {
+    for (const Lock &lock : locks_)
+        (void)::unlink(lock.name.c_str());
 }
 
 } // namespace arhost::cli

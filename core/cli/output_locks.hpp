@@ -6,6 +6,7 @@
 #include "base/unique_fd.hpp"
 #include "run_config/configuration.hpp"
 
+#include <filesystem>
 #include <vector>
 
 namespace arhost::cli {
@@ -17,9 +18,16 @@ namespace arhost::cli {
 class OutputLocks {
 public:
     explicit OutputLocks(const run_config::Configuration &configuration);
+    ~OutputLocks();
+    OutputLocks(const OutputLocks &) = delete;
+    OutputLocks &operator=(const OutputLocks &) = delete;
 
 private:
-    std::vector<base::UniqueFd> locks_;
+    struct Lock {
+        std::filesystem::path name;
+        base::UniqueFd fd;
+    };
+    std::vector<Lock> locks_;
 };
 
 } // namespace arhost::cli

@@ -33,7 +33,8 @@ public:
     // Each function sets the frame's camera, unless no camera is known for the frame.
     void set_from_targets(Frame &frame); // must be called for the frames in their order
     void set_from_recording(Frame &frame) const;
-    // Also sets the recorded time, which determines the positions of animated objects.
+    // Also sets the frame's capture time to that of the trajectory, if it has times. The capture time determines the
+    // positions of animated objects.
     void set_from_trajectory(Frame &frame) const;
     // Sets the camera again after `set_coordinates`, from the pose that `set_from_targets` found.
     void update(Frame &frame);

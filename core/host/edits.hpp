@@ -16,8 +16,8 @@ public:
 
     // The names in `files` may come from the scene loader, which is not trusted: only their folders are opened.
     void watch(const FileWatch::Files &files);
-    // Applies the edits since the last call. Does nothing while swaps are in progress, so that the last edit takes
-    // effect last.
+    // Applies the edits of watched files that have not been applied yet. While a tracker, ray tracer or scene is
+    // being swapped, does nothing: a later call applies them, so the newest edit takes effect last.
     void apply();
     void on_swapped(const Assembly::Exchanged &exchanged);
 

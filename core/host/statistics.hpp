@@ -39,8 +39,8 @@ private:
     std::int64_t max_ns_ = 0;
 };
 
-// Times of a frame that was sent to the outputs. Stages that the frame skipped have the time 0, as has the device if
-// the ray tracer reported no device time.
+// Times of a frame that was sent to the outputs. A stage that the frame skipped has the time 0. `device` is 0, too,
+// if the ray tracer reported no device time.
 struct FrameTimes {
     std::uint64_t frame = 0;
     std::chrono::steady_clock::time_point shown{};

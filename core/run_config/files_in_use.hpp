@@ -26,7 +26,8 @@ public:
     // Checks a file that a worker has reported as read. To be called after all calls of write(). Only compares names
     // and inode numbers and does not access the file, because the worker is not trusted.
     void check_read(const base::FileIdentity &file) const;
-    // Checks a file of arhost itself. To be called after all calls of write().
+    // Throws if an output would overwrite `file`, one of arhost's own programs, libraries and plugins. To be called
+    // after all calls of write().
     void protect(const base::FileIdentity &file) const;
 
 private:

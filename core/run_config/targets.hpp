@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Parses the targets of a tracker: single markers, maps of markers, bodies.
+// Parses the targets of a tracker: single markers, maps of several markers, and bodies (rigid objects that the
+// tracker knows by name and whose poses it reports itself).
 #pragma once
 
 #include "model/target.hpp"

@@ -10,7 +10,8 @@
 #include <cstring>
 #include <unistd.h>
 
-// Code built with sanitizers needs exceptions: sanitizers reserve terabytes of address space and start processes.
+// The sandbox is less strict in builds with sanitizers, because these reserve terabytes of address space and start
+// processes.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define ARHOST_UNDER_SANITIZER 1
 #elif defined(__has_feature)

@@ -227,7 +227,8 @@ void deny_sockets(Filter &filter, const Policy &policy) {
             filter.deny("socket", {equals(0, family)});
     filter.deny("socket", {from(0, end)});
     filter.deny("socketpair", {differs(0, AF_UNIX)});
-    // The inherited sockets belong to the host's network namespace, whose addresses these requests return.
+    // Denies the ioctl requests for network interfaces. The inherited sockets belong to the host's network namespace,
+    // so these requests would return the addresses of that namespace.
     if (!policy.allows("network"))
         for (const std::uint64_t requests : {0x8900ul /* SIOC… */, 0x8b00ul /* wireless */})
             filter.deny("ioctl", {has_bits(1, 0xffffff00u, requests)});

@@ -76,8 +76,9 @@ void keep_capability() {
     ::prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_RAISE, CAP_SYS_ADMIN, 0, 0);
 }
 
-// Runs in the child after fork. Executes arhost-worker, with the control channel as descriptor 3 and the doorbell as
-// descriptor 4. `parent`: the value of getppid(2).
+// Runs in the child after fork. Executes arhost-worker, with the control channel as descriptor 3 and the doorbell
+// (ipc::DoorbellPair) as descriptor 4. Fails if getppid(2) does not return `parent`, because the parent has then
+// ended.
 [[noreturn]] void exec_worker(const Request &request, const std::vector<UniqueFd> &fds, pid_t parent) {
     // A separate session, so that the worker has no controlling terminal, a kill of the process group reaches the
     // processes that the worker forks, and Ctrl-C in the terminal reaches only the host.

@@ -285,7 +285,8 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
         for (int b = 0; b < a; ++b)
             normal[a * count + b] = normal[b * count + a];
 
-    // Then converts these to derivatives with respect to the corners, which determine the homography.
+    // Second step: converts `normal` and `gradient` to derivatives with respect to the coordinates of the corners,
+    // which determine the homography, in place of its elements.
     cv::Matx<double, count, unknowns> by_unknown = cv::Matx<double, count, unknowns>::zeros();
     for (int i = 0; i < 8; ++i) {
         constexpr double step_px = 0.1;

@@ -248,8 +248,9 @@ private:
             seen.candidates += detector_->nquads;
     }
 
-    // The library computes its threshold per 4×4 px tile of the decimated image. In regions on this grid, the tiles
-    // are the same as in the whole frame.
+    // Returns the side of a threshold tile in px of the frame: the library computes its threshold per 4×4 px tile of
+    // the decimated image. If a search region begins at a multiple of this side, its tiles are those of the whole
+    // frame.
     int grid_px() const { return decimate_ == 1.5 ? 6 : 4 * static_cast<int>(decimate_); }
 
     arhost::Host host_;

@@ -173,6 +173,7 @@ TEST(Run, RefusesAnOutputThatAnotherRunWrites) {
     send_signal(first.pid(), SIGKILL);
     first.wait();
     EXPECT_EQ(second.run(), 0) << "a killed run holds no lock: " << second.output();
+    EXPECT_EQ(second.run(), 0) << "nor does a run that has ended: " << second.output();
 }
 
 TEST(Run, FeedsSeveralOutputs) {

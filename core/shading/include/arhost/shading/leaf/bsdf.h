@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Surface scattering. A leaf file: see ../scalar.hpp.
-// All directions have unit length and point away from the surface, except `incident`.
+// All directions have unit length. They point away from the surface, except `incident`, which points at it.
 
 // Lambert's cosine law (Lambert 1760).
 ARHOST_LEAF Float lambert(Vec3 normal, Vec3 to_light) {
