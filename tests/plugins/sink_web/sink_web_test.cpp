@@ -389,7 +389,7 @@ TEST(SinkWeb, HostileClientsCostNoFrameAndLittleMemory) {
     hostile.reserve(connections + 200);
     const auto attack = [&](std::size_t count, const std::string &text, int receive_buffer = 0) {
         for (std::size_t i = 0; i < count; ++i)
-            hostile.emplace_back(run.port(), static_cast<int>(hostile.size() / 40), text, receive_buffer);
+            hostile.emplace_back(run.port(), static_cast<int>(hostile.size() / 20), text, receive_buffer);
         for (int i = 0; i < 15; ++i)
             ASSERT_NE(viewer.receive_frame(), "") << run.output();
     };
