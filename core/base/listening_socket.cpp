@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "base/listening_socket.hpp"
 
+#include "base/runtime_folder.hpp"
+
 #include <algorithm>
 #include <charconv>
-#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <netdb.h>
@@ -72,17 +73,6 @@ sockaddr_un unix_address(const fs::path &path) {
     return address;
 }
 
-// Creates the folder of named sockets. Others must not be able to replace the sockets.
-void make_private_folder(const fs::path &folder) {
-    if (::mkdir(folder.c_str(), 0700) != 0 && errno != EEXIST)
-        throw_errno("cannot create the folder '" + folder.string() + "'");
-    struct stat status {};
-    if (::lstat(folder.c_str(), &status) != 0 || !S_ISDIR(status.st_mode) || status.st_uid != ::geteuid() ||
-        (status.st_mode & 077) != 0)
-        throw std::runtime_error("the folder '" + folder.string() +
-                                 "' is not a folder of this user with mode 0700; remove it or correct its mode");
-}
-
 UniqueFd make_socket(int family) {
     return checked(::socket(family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), "socket");
 }
@@ -90,10 +80,7 @@ UniqueFd make_socket(int family) {
 } // namespace
 
 fs::path named_socket(const std::string &name) {
-    const char *runtime = std::getenv("XDG_RUNTIME_DIR");
-    const fs::path folder = runtime && *runtime == '/' ? fs::path(runtime) / "arhost"
-                                                       : fs::path("/tmp/arhost-" + std::to_string(::geteuid()));
-    return folder / (name + ".sock");
+    return runtime_folder() / (name + ".sock");
 }
 
 std::string problem_with_address(const std::string &address) {
@@ -109,9 +96,8 @@ ListeningSocket::ListeningSocket(const std::string &address) : address_(address)
     if (const std::string problem = problem_with_address(address); !problem.empty())
         throw std::runtime_error("'" + address + "' " + problem);
     if (is_name(address)) {
-        const fs::path path = named_socket(address);
-        make_private_folder(path.parent_path());
-        listen_at_path(path);
+        make_runtime_folder();
+        listen_at_path(named_socket(address));
     } else if (address.starts_with('/')) {
         listen_at_path(address);
     } else {

@@ -2,14 +2,15 @@
 #include "cli/output_locks.hpp"
 
 #include "base/file_identity.hpp"
+#include "base/runtime_folder.hpp"
 #include "base/text.hpp"
 #include "run_config/access.hpp"
 
 #include <spdlog/fmt/fmt.h>
 
-#include <cstdlib>
 #include <fcntl.h>
 #include <functional>
+#include <stdexcept>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -18,18 +19,6 @@ namespace arhost::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Returns the folder of the locks, or "" if it cannot be created or belongs to another user.
-fs::path lock_folder() {
-    const char *runtime = std::getenv("XDG_RUNTIME_DIR");
-    const fs::path folder =
-        runtime && *runtime ? fs::path(runtime) / "arhost" : fs::path("/tmp/arhost-" + std::to_string(::getuid()));
-    (void)::mkdir(folder.c_str(), 0700);
-    struct stat status {};
-    const bool is_own = ::lstat(folder.c_str(), &status) == 0 && S_ISDIR(status.st_mode) &&
-                        status.st_uid == ::getuid() && !(status.st_mode & 022);
-    return is_own ? folder : fs::path();
-}
 
 // Opens a lock and takes it. Opens it again if the run that held it has removed its file in the meantime. Returns
 // without a descriptor if the file cannot be opened; `is_taken`: another run holds the lock.
@@ -55,15 +44,17 @@ bool creates_files(const yaml::Node &path) {
 } // namespace
 
 OutputLocks::OutputLocks(const run_config::Configuration &configuration) {
-    const fs::path folder = lock_folder();
-    if (folder.empty())
-        return;
+    try {
+        base::make_runtime_folder();
+    } catch (const std::runtime_error &) {
+        return; // a run must not fail because of a foreign folder
+    }
     for (const run_config::ComponentConfiguration &output : configuration.outputs) {
         const auto path = run_config::path_of(output.node);
         if (!path || !creates_files(*path))
             continue;
         const std::string file = base::real_path(path->output_path()).string();
-        const fs::path name = folder / fmt::format("output-{:016x}", std::hash<std::string>()(file));
+        const fs::path name = base::runtime_folder() / fmt::format("output-{:016x}", std::hash<std::string>()(file));
         bool is_taken = false;
         base::UniqueFd lock = take(name, is_taken);
         if (!lock)
