@@ -43,7 +43,7 @@ Json command_of(const Arguments &arguments) {
     const std::vector<std::string> &members = // the command line was checked
         std::ranges::find(commands, arguments.command, &decltype(commands)::value_type::first)->second;
     if (arguments.values.size() > members.size())
-        throw std::runtime_error("'" + arguments.command + "' takes at most " + std::to_string(members.size()) +
+        throw base::InvalidInput("'" + arguments.command + "' takes at most " + std::to_string(members.size()) +
                                  " values");
     for (std::size_t i = 0; i < arguments.values.size(); ++i) {
         const std::string &value = arguments.values[i];
@@ -52,7 +52,7 @@ Json command_of(const Arguments &arguments) {
         else if (value == "on" || value == "off")
             command["on"] = value == "on";
         else
-            throw std::runtime_error("'" + arguments.command + "' takes 'on' or 'off'; without one, it toggles");
+            throw base::InvalidInput("'" + arguments.command + "' takes 'on' or 'off'; without one, it toggles");
     }
     return command;
 }
@@ -70,14 +70,65 @@ std::string receive_line(int socket) {
     return line.substr(0, line.find('\n'));
 }
 
+void print(const std::string &line) {
+    std::printf("%s\n", base::printable(line).c_str());
+}
+
+std::string number(const Json &value, int digits) {
+    char text[64];
+    std::snprintf(text, sizeof text, "%.*f", digits, value.is_number() ? value.get<double>() : 0.0);
+    return text;
+}
+
+std::string count(std::uint64_t number, const std::string &noun) {
+    return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
+}
+
+// Prints what a user asks first: whether all components run, how fast, what the tracker sees, and what went wrong.
+void print_status(const Json &status) {
+    const Json &frames = status.at("frames"), &scene = status.at("scene"), &recording = status.at("recording");
+    print("arhost " + status.at("arhost").get<std::string>() + ", mode " + status.at("mode").get<std::string>() +
+          (scene.is_string() ? ", scene " + scene.get<std::string>() : "") +
+          (status.at("frozen").get<bool>() ? ", frozen" : "") +
+          (recording.is_string() ? ", recording " + recording.get<std::string>() : ""));
+    std::string rate = number(status.at("fps"), 1) + " fps";
+    if (const auto latency = status.at("stages").find("latency"); latency != status.at("stages").end())
+        rate += ", latency p50 " + number(latency->at("p50_ms"), 1) + " ms, p95 " + number(latency->at("p95_ms"), 1) +
+                " ms, p99 " + number(latency->at("p99_ms"), 1) + " ms, from " +
+                status.at("latency").at("from").get<std::string>();
+    print(rate);
+    std::string dropped;
+    for (const auto &[cause, number] : frames.at("dropped").items())
+        if (number != 0)
+            dropped += (dropped.empty() ? ", dropped: " : ", ") + cause + " " + number.dump();
+    print(count(frames.at("composited"), "frame") + ": " + frames.at("tracked").dump() + " with a target, " +
+          frames.at("augmented").dump() + " with an overlay" + dropped);
+    for (const Json &target : status.at("targets"))
+        print("target " + target.at("name").get<std::string>() + ": " + target.at("state").get<std::string>() +
+              (target.at("state") == "lost"
+                   ? ""
+                   : ", distance " + number(target.at("distance_mm"), 0) + " mm, reprojection error " +
+                         number(target.at("reprojection_px"), 2) + " px"));
+    if (const Json &missing = status.at("missing_target"); missing.is_string())
+        print("no target: " + missing.get<std::string>());
+    for (const Json &component : status.at("components")) {
+        const std::uint64_t restarts = component.at("restarts");
+        print(component.at("name").get<std::string>() + ": " + component.at("plugin").get<std::string>() + " " +
+              component.at("version").get<std::string>() + ", " + component.at("state").get<std::string>() +
+              (restarts > 0 ? ", " + count(restarts, "restart") : ""));
+    }
+    for (const Json &message : status.at("messages"))
+        print(message.at("time").get<std::string>() + " " + message.at("severity").get<std::string>() + ": " +
+              message.at("component").get<std::string>() + ": " + message.at("text").get<std::string>());
+}
+
 // Prints the answer's members for a human reader.
 void print_members(const Json &answer) {
     for (const auto &[key, value] : answer.items())
         if (key == "status")
-            std::printf("%s\n", value.dump(2).c_str());
+            print_status(value);
         else if (key != "ok" && key != "granted")
-            std::printf("%s: %s\n", key.c_str(),
-                        base::printable(value.is_string() ? value.get<std::string>() : value.dump()).c_str());
+            print(key + ": " + (value.is_string() ? value.get<std::string>() : value.dump()));
 }
 
 // Returns the exit status. Prints the answer, or an error.
@@ -121,7 +172,7 @@ int main(int argc, char **argv) {
     app.option("--name", arguments.name, "Name of the run, the option 'listen' of its sink_control")
         .type_name("NAME")
         .show_default();
-    app.flag("--json", arguments.json, "Print the answer as JSON");
+    app.flag("--json", arguments.json, "Print the complete answer as JSON; of the status, it has more");
     return base::exit_status_of([&] {
         const auto status = app.parse(argc, argv);
         return status ? *status : send(arguments);

@@ -23,8 +23,10 @@ template <class Choice> const Choice &find_choice(const std::vector<Choice> &cho
         return *found;
     std::string names;
     for (const Choice &choice : choices)
-        names += (names.empty() ? "; choose one of: " : ", ") + choice.name;
-    throw control::Error("there is no '" + base::printable(name, 100) + "'" + names);
+        names += (names.empty() ? "choose one of: " : ", ") + choice.name;
+    if (name.empty())
+        throw control::Error(names.empty() ? "there is nothing to choose from" : names);
+    throw control::Error("there is no '" + base::printable(name, 100) + "'" + (names.empty() ? "" : "; " + names));
 }
 
 void expect_no_swap(bool in_progress, const char *component) {
@@ -47,6 +49,8 @@ void Commands::execute(SinkQueue &sink, const messages::Request &request) {
         if (changes_run)
             sink.component->log(ARHOST_SEVERITY_INFO, "command: " + request.command);
         std::visit([&](const auto &each) { execute(each, done); }, command);
+    } catch (const control::NotGranted &error) { // an output that may not ask for the status, too, must know its keys
+        done(error.what(), {{"granted", sink.configuration->control}});
     } catch (const std::exception &error) { // also thrown if no process or memory can be created
         done(error.what(), {});
     }
@@ -108,8 +112,10 @@ void Commands::execute(const control::Set &set, const control::Done &done) {
         std::string names;
         for (const std::string &key : plugin.changeable)
             names += (names.empty() ? "" : ", ") + key;
-        throw control::Error("'" + base::printable(set.option, 100) + "' cannot be changed while " + plugin.id +
-                             " runs; " + (names.empty() ? "none of its options can" : "these can: " + names));
+        throw control::Error(
+            (set.option.empty() ? "choose an option that can be changed while "
+                                : "'" + base::printable(set.option, 100) + "' cannot be changed while ") +
+            plugin.id + " runs; " + (names.empty() ? "none of its options can" : "these can: " + names));
     }
     OptionValue value;
     try {

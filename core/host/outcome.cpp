@@ -87,6 +87,23 @@ std::string unseen_targets(const run_config::Configuration &configuration, const
                        seen_instead(statistics, unseen));
 }
 
+std::string looks_for(const Statistics &statistics, const std::vector<model::Target> &targets) {
+    return "it looks for " + describe_targets(targets) + seen_instead(statistics, targets) + how_to_compare(targets);
+}
+
+std::string missing_target(const run_config::Configuration &configuration, const Statistics &statistics,
+                           const std::vector<model::Target> &targets, std::chrono::steady_clock::time_point now) {
+    constexpr std::chrono::seconds grace{1}; // targets are lost for a moment, too
+    if (!configuration.tracker || configuration.trajectory || configuration.time_codes ||
+        !statistics.without_target_since || now - *statistics.without_target_since < grace)
+        return {};
+    return (statistics.targets.empty()
+                ? std::string("the tracker has seen no target yet; ")
+                : fmt::format("the tracker has seen no target for {} s; ",
+                              duration_cast<std::chrono::seconds>(now - *statistics.without_target_since).count())) +
+           looks_for(statistics, targets);
+}
+
 std::string misfitting_targets(const Statistics &statistics, const std::vector<model::Target> &targets) {
     // A usable calibration or layout causes smaller errors.
     const auto fits = [](const TargetStatistics &seen) {

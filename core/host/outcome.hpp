@@ -25,6 +25,13 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
 std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics,
                            const std::vector<model::Target> &targets);
 
+// Says what the tracker looks for, what it saw instead, and what to check: "it looks for 'desk' (tag36h11 23); …".
+std::string looks_for(const Statistics &statistics, const std::vector<model::Target> &targets);
+
+// If no target was visible for a while, says so and what the tracker looks for; otherwise returns "".
+std::string missing_target(const run_config::Configuration &configuration, const Statistics &statistics,
+                           const std::vector<model::Target> &targets, std::chrono::steady_clock::time_point now);
+
 // Names the targets whose observed corners differ from the projections with their poses; "" if there are none.
 std::string misfitting_targets(const Statistics &statistics, const std::vector<model::Target> &targets);
 

@@ -79,6 +79,7 @@ SinkQueue &Outputs::make_sink(const run_config::ComponentConfiguration &output, 
     sink->id = random_id();
     sink->max_waiting = parts_.live() ? live_sink_depth : 0;
     sink->path = path;
+    sink->first_message = parts_.messages.last_number();
     Component::Callbacks callbacks = parts_.callbacks(name, output.node);
     callbacks.hello = [this, sink](const PluginDescription &plugin, std::size_t candidate) {
         return on_hello(*sink, plugin, candidate);
@@ -94,17 +95,14 @@ SinkQueue &Outputs::make_sink(const run_config::ComponentConfiguration &output, 
     callbacks.lost = [sink](const std::vector<Command> &) { sink->on_lost(); };
     callbacks.end_requested = [this, sink] { end_sink(*sink); };
     callbacks.request = [this, sink](const messages::Request &request) { on_request_(*sink, request); };
-    callbacks.stopped = [sink, report = callbacks.stopped](arhost_status status, const std::string &text) {
+    callbacks.stopped = [this, sink, report = callbacks.stopped](arhost_status status, const std::string &text) {
         report(status, text);
-        sink->answer(sink->awaits_its_frame()     ? "the run ended before the next frame"
-                     : status == ARHOST_STATUS_OK ? ""
-                     : text.empty()               ? status_text(status)
-                                                  : text);
+        conclude(*sink, status == ARHOST_STATUS_OK ? "" : text.empty() ? status_text(status) : text);
     };
     callbacks.disabled = [this, sink, report = callbacks.disabled](const std::string &reason,
                                                                    bool is_configuration_error) {
         report(reason, is_configuration_error);
-        sink->answer(reason);
+        conclude(*sink, reason);
         close_sink(*sink);
     };
     sink->component = std::make_unique<Component>(parts_.context, name, output.plugins, output.limits, output.policy,
@@ -241,8 +239,8 @@ void Outputs::on_result(SinkQueue &sink, const Command &command, const Result &r
                                    status_text(result.status) + "; see the output's messages above";
         parts_.context.log(ARHOST_SEVERITY_ERROR, name, reason);
         parts_.failures.add(name + ": " + reason, false, true);
-        sink.answer(reason);
-    } // otherwise the receiver did not take the frame in time
+        sink.failure = reason; // the output's own message, which explains it, may arrive later
+    }                          // otherwise the receiver did not take the frame in time
     close_sink(sink);
     sink.component->stop();
 }
@@ -264,6 +262,28 @@ void Outputs::end_sink(SinkQueue &sink) {
                            ? "has ended"
                            : "has ended; the other outputs continue ('control: [quit]' lets it end the run)");
     sink.component->stop();
+}
+
+void Outputs::conclude(SinkQueue &sink, std::string error) {
+    if (sink.awaits_its_frame())
+        error = "the run ended before the next frame";
+    else if (error.empty() && !sink.failure.empty())
+        error = sink.failure;
+    else if (error.empty() && sink.on_demand && !sink.has_written())
+        error = "no frame arrived, so no file was written";
+    if (!sink.failure.empty()) // prefers the output's own message
+        if (const std::string reason =
+                parts_.messages.error_of(sink.component->name(), sink.first_message, sink.failure);
+            !reason.empty())
+            error = reason;
+    if (sink.on_demand && !sink.done && !sink.is_single && !error.empty())
+        failed_recording_ = "the recording '" + sink.path + "' failed: " + error;
+    if (sink.on_demand && !sink.path.empty() && error.empty()) {
+        written_files_.emplace(written_files_.empty() ? 1 : written_files_.rbegin()->first + 1, sink.path);
+        if (written_files_.size() > max_files)
+            written_files_.erase(written_files_.begin());
+    }
+    sink.answer(error);
 }
 
 void Outputs::close_sink(SinkQueue &sink) {
@@ -311,13 +331,17 @@ void Outputs::set_recording(std::optional<bool> on, const control::Done &done) {
     const auto active = std::ranges::find_if(sinks_, [](const auto &sink) {
         return sink->on_demand && sink->component->name() == "record" && !sink->ending;
     });
-    const bool is_recording = active != sinks_.end();
-    if (on.value_or(!is_recording) == is_recording)
-        throw control::Error(is_recording ? "a recording is already in progress" : "there is no recording to stop");
-    if (!is_recording) {
+    const bool is_recording = active != sinks_.end() && !(*active)->closed;
+    if (on.value_or(!is_recording)) {
+        if (is_recording)
+            throw control::Error("a recording is already in progress");
+        failed_recording_.clear();
         start_output(*parts_.configuration.record, "record", done);
         return;
     }
+    if (active == sinks_.end())
+        throw control::Error(failed_recording_.empty() ? "there is no recording to stop"
+                                                       : std::exchange(failed_recording_, ""));
     SinkQueue &sink = **active;
     if (!sink.component->running())
         throw control::Error("the recording is starting; retry when it has started");

@@ -38,8 +38,11 @@ public:
     void set_recording(std::optional<bool> on, const control::Done &done); // nullopt: toggle
 
     const std::vector<std::unique_ptr<SinkQueue>> &sinks() const { return sinks_; }
+    // The last snapshots and recordings that were written completely, by their numbers.
+    const std::map<std::uint64_t, std::string> &files() const { return written_files_; }
 
 private:
+    static constexpr std::size_t max_files = 100;
     static constexpr std::size_t max_started = 4; // outputs that commands have started and that still run
 
     SinkQueue &make_sink(const run_config::ComponentConfiguration &output, const std::string &name,
@@ -56,6 +59,8 @@ private:
     void on_running(SinkQueue &sink);
     void on_result(SinkQueue &sink, const ipc::Command &command, const ipc::Result &result);
     void end_sink(SinkQueue &sink); // the sink has ended
+    // Answers the command in progress when the component of an output has stopped; `error`: why it failed.
+    void conclude(SinkQueue &sink, std::string error);
     void close_sink(SinkQueue &sink);
     void end_without_sinks(); // ends the run if all outputs are closed
 
@@ -67,6 +72,8 @@ private:
     std::shared_ptr<SlotPool> slots_;
     Compositing compositing_;
     OutputFramePointer last_frame_; // for snapshots
+    std::map<std::uint64_t, std::string> written_files_;
+    std::string failed_recording_; // why the last recording failed; "" if it did not, or a command was told
     std::map<const run_config::ComponentConfiguration *, run_config::OutputFile> files_;
     std::map<std::pair<const run_config::ComponentConfiguration *, std::string>, base::ListeningSocket>
         sockets_; // by output and option; sockets stay open while a worker restarts

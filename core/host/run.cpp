@@ -30,12 +30,15 @@ Run::Run(const run_config::Configuration &configuration, const supervise::Contex
           [this](SinkQueue &sink, const messages::Request &request) { commands_.execute(sink, request); },
           options_.check_scratch),
       commands_(parts_, assembly_, outputs_) {
+    for (const std::string &warning : configuration.warnings) // which the caller has printed
+        parts_.messages.add(ARHOST_SEVERITY_WARNING, "arhost", warning);
     if (options_.read_configuration)
         edits_.emplace(parts_, assembly_, options_.read_configuration);
 }
 
 void Run::log(const supervise::LogFunction &log, arhost_severity severity, const std::string &component,
               const std::string &text) {
+    parts_.messages.add(severity, component, text);
     if (severity != ARHOST_SEVERITY_HINT || component != "tracker")
         log(severity, component, text);
     else if (!assembly_.has_retired()) // otherwise, the hint may be from a replaced tracker

@@ -7,6 +7,7 @@
 #include "host/component_options.hpp"
 #include "host/failures.hpp"
 #include "host/frame_flow.hpp"
+#include "host/message_log.hpp"
 
 namespace arhost::host {
 
@@ -25,6 +26,7 @@ struct RunParts {
 
     const run_config::Configuration &configuration; // the configuration with which the run began
     supervise::Context context;
+    MessageLog messages;
     Statistics statistics;
     Failures failures;
     ComponentOptions options;

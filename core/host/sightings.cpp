@@ -36,6 +36,11 @@ void Sightings::add(Frame &frame) {
     for (std::size_t i = 0; i < families_.size(); ++i)
         families_[i].copy(frame.record.families[i], ARHOST_MAX_FAMILY - 1);
     ++parts_.statistics.tracker_results;
+    auto &without_target_since = parts_.statistics.without_target_since;
+    if (std::ranges::any_of(frame.targets, is_visible))
+        without_target_since.reset();
+    else if (!without_target_since)
+        without_target_since = parts_.context.reactor.now();
     count_other_markers(frame);
     count_targets(frame, parts_.statistics);
     warn_of_missing_targets();
@@ -75,8 +80,7 @@ void Sightings::warn_of_missing_targets() {
     const std::vector<model::Target> &targets = tracker_->targets;
     if (parts_.statistics.targets.empty())
         parts_.context.log(ARHOST_SEVERITY_WARNING, "tracker",
-                           "has seen no target yet; it looks for " + describe_targets(targets) +
-                               seen_instead(parts_.statistics, targets) + how_to_compare(targets));
+                           "has seen no target yet; " + looks_for(parts_.statistics, targets));
     else if (const std::string unseen = unseen_targets(parts_.configuration, parts_.statistics, targets);
              !unseen.empty())
         parts_.context.log(ARHOST_SEVERITY_WARNING, "tracker", unseen);

@@ -32,6 +32,8 @@ public:
     bool on_demand = false;
     std::string path;
     control::Done done;
+    std::string failure;             // why a frame could not be written; "": none
+    std::uint64_t first_message = 0; // messages after this number are about this output
 
     void offer(OutputFramePointer frame);
     // Sets the images that the sink reads (ARHOST_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT), and removes waiting frames
@@ -44,6 +46,7 @@ public:
     void on_result(const ipc::Command &command, const ipc::Result &result);
     void on_lost();
 
+    bool has_written() const { return next_sequence_ > 0; } // at least one frame
     bool empty() const { return waiting_.empty() && unconfirmed_.empty(); }
     void clear();
     void answer(const std::string &error); // answers the command in progress; error "": success

@@ -91,9 +91,11 @@ struct Statistics {
     SearchStatistics search;
     std::map<std::string, std::uint64_t> unlisted;    // frames with a marker that no target lists, by name
     std::map<std::string, std::uint64_t> unconfirmed; // frames with a listed marker whose target got no pose
-    std::vector<std::string> hints;                   // what the tracker saw instead of the targets
-    std::map<std::string, std::uint64_t> dropped;     // number of dropped frames by stage
-    std::map<std::string, std::uint64_t> skipped;     // number of unaugmented frames by the failed stage
+    // Since when no result of the tracker had a visible target; nullopt: the last one had, or there was none.
+    std::optional<std::chrono::steady_clock::time_point> without_target_since;
+    std::vector<std::string> hints;               // what the tracker saw instead of the targets
+    std::map<std::string, std::uint64_t> dropped; // number of dropped frames by stage
+    std::map<std::string, std::uint64_t> skipped; // number of unaugmented frames by the failed stage
     std::map<std::pair<std::string, arhost_status>, std::uint64_t> errors; // frames by stage and error
     StageTimings stages;
     // Time from the capture of a frame until an output has written it, for each output. `latency` of `stages` ends

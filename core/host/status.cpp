@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/documents.hpp"
+#include "host/outcome.hpp"
 #include "host/outputs.hpp"
 
 #include <nlohmann/json.hpp>
@@ -110,6 +111,7 @@ Json target_json(const arhost_target &target) {
     return {{"name", target.name},
             {"state", to_text(target)},
             {"distance_mm", std::hypot(target.mt[12], target.mt[13], target.mt[14])},
+            {"mt", target.mt},
             {"reprojection_px", target.reprojection_px}};
 }
 
@@ -118,6 +120,11 @@ Json target_json(const arhost_target &target) {
 Json status_json(const RunParts &parts, const Assembly &assembly, const Outputs &outputs) {
     const Statistics &statistics = parts.statistics;
     const run_config::Configuration &latest = *assembly.latest();
+    const Tracker *const tracker = assembly.tracker();
+    const std::string missing = tracker
+                                    ? missing_target(parts.configuration, statistics,
+                                                     tracker->configuration()->targets, parts.context.reactor.now())
+                                    : "";
     Json targets = Json::array();
     for (const arhost_target &target : parts.flow.last_targets())
         targets.push_back(target_json(target));
@@ -138,9 +145,12 @@ Json status_json(const RunParts &parts, const Assembly &assembly, const Outputs 
     Json recording = nullptr;
     for (const auto &sink : outputs.sinks()) {
         components.push_back(component_json(*sink->component, parts.options));
-        if (sink->on_demand && sink->component->name() == "record")
+        if (sink->on_demand && sink->component->name() == "record" && !sink->closed)
             recording = sink->path;
     }
+    Json files = Json::array();
+    for (const auto &[number, file] : outputs.files())
+        files.push_back({{"number", number}, {"file", file}});
     return {{"arhost", ARHOST_VERSION},
             {"mode", parts.live() ? "live" : "lockstep"},
             {"frozen", parts.flow.is_frozen()},
@@ -156,10 +166,13 @@ Json status_json(const RunParts &parts, const Assembly &assembly, const Outputs 
             {"latency", latency_json(statistics, statistics.latencies.recent())},
             {"quality", quality_json(statistics)},
             {"targets", std::move(targets)},
+            {"missing_target", missing.empty() ? Json() : Json(missing)},
             {"components", std::move(components)},
             {"scene", assembly.raytracer() ? Json(assembly.raytracer()->scene()->source.name) : Json(nullptr)},
             {"scenes", names_of(latest.scenes)},
-            {"recording", std::move(recording)}};
+            {"recording", std::move(recording)},
+            {"files", std::move(files)},
+            {"messages", parts.messages.to_json()}};
 }
 
 } // namespace arhost::host

@@ -23,6 +23,7 @@ public:
             throw Error(std::string("'") + key + "' must be a string");
         return value.get<std::string>();
     }
+    std::string text_or_missing(const char *key) { return find(key) ? text(key) : ""; }
     std::optional<bool> boolean(const char *key) {
         const Json *value = find(key);
         if (!value)
@@ -79,14 +80,14 @@ Command parse_members(const std::string &name, Members &members, const std::set<
     if (name == "record")
         return Record{members.boolean("on")};
     if (name == "load_scene")
-        return LoadScene{members.text("scene")};
+        return LoadScene{members.text_or_missing("scene")};
     if (name == "swap") {
         const std::string component = parse_component(members);
-        return Swap{component, members.text("plugin")};
+        return Swap{component, members.text_or_missing("plugin")};
     }
     if (name == "set") {
-        const std::string component = members.text("component"), option = members.text("option");
-        return Set{component, option, members.scalar("value")};
+        const std::string component = members.text("component"), option = members.text_or_missing("option");
+        return Set{component, option, option.empty() ? "" : members.scalar("value")};
     }
     return Status{granted};
 }
@@ -102,7 +103,8 @@ Command parse(const std::string &text, const std::set<std::string, std::less<>> 
     if (std::ranges::find(names, name) == names.end())
         throw Error("unknown command '" + base::printable(name, 100) + "'");
     if (!granted.contains(name))
-        throw Error("the configuration does not grant '" + name + "' to this output: add it to its key 'control'");
+        throw NotGranted("the configuration does not grant '" + name +
+                         "' to this output: add it to its key 'control'");
     Command command = parse_members(name, members, granted);
     members.expect_no_more();
     return command;

@@ -26,11 +26,11 @@ struct Record {
     std::optional<bool> on; // nullopt: toggle
 };
 struct LoadScene {
-    std::string scene;
+    std::string scene; // "": missing, the answer lists the names
 };
 struct Swap {
     std::string component; // "tracker" or "raytracer"
-    std::string plugin;    // name of an alternative
+    std::string plugin;    // name of an alternative; "": missing, the answer lists the names
 };
 struct Set {
     std::string component, option;
@@ -50,8 +50,12 @@ class Error : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-// Parses a command. `granted`: the elements of the output's key `control`. Throws Error if the text is not a valid
-// command, or if the command is not granted.
+struct NotGranted : Error {
+    using Error::Error;
+};
+
+// Parses a command. `granted`: the elements of the output's key `control`. Throws NotGranted if the command is not
+// granted, and Error if the text is not a valid command.
 Command parse(const std::string &text, const std::set<std::string, std::less<>> &granted);
 
 // Called once with the answer to a command. On success, `error` is "" and `members` contains the answer's members;

@@ -165,6 +165,8 @@ TEST(Control, StatusDescribesTheRun) {
     EXPECT_GT(status["stages"]["latency"]["count"], 0);
     EXPECT_EQ(status["latency"]["from"], "arrival");
     EXPECT_EQ(status["targets"][0]["name"], "tag36h11-3");
+    EXPECT_EQ(status["targets"][0]["mt"].size(), 16);
+    EXPECT_EQ(status["missing_target"], nullptr);
     const Json tracker = run.status_of("tracker");
     EXPECT_EQ(tracker["plugin"], "tracker_counter");
     EXPECT_EQ(tracker["state"], "running");
@@ -328,6 +330,10 @@ TEST(Control, WritesSnapshotsToFreeNames) {
         EXPECT_TRUE(read_file(file).starts_with("\x89PNG"));
     }
     EXPECT_EQ(run.read("out/snapshot-01.png"), "kept");
+    const Json files = run.status()["files"];
+    ASSERT_EQ(files.size(), 2u);
+    EXPECT_EQ(files[1]["number"], 2);
+    EXPECT_EQ(files[1]["file"], run.path("out/snapshot-03.png").string());
     EXPECT_EQ(run.quit(), 0) << run.output();
 }
 
@@ -372,6 +378,50 @@ TEST(Control, RecordsFromCommandToCommand) {
     EXPECT_EQ(run.succeed({{"command", "record"}})["file"], run.path("out/take-02.jsonl").string());
     EXPECT_EQ(run.quit(), 0) << run.output();
     EXPECT_TRUE(run.exists("out/take-02.jsonl")) << "the end of the run completes the recording";
+}
+
+TEST(Control, ARecordingThatCannotBeWrittenIsReported) {
+    std::string configuration = controlled("live");
+    const std::string record = "{plugin: sink_poses, path: out/take-%02d.jsonl}";
+    configuration.replace(configuration.find(record), record.size(),
+                          "{plugin: sink_realtime, path: out/take-%02d.txt}");
+    ControlledRun run(configuration);
+    run.start_and_connect();
+    const Json before = run.status()["messages"]; // about the configuration
+    for (const Json &message : before)
+        EXPECT_EQ(message["severity"], "warning");
+    const std::string file = run.succeed({{"command", "record"}})["file"];
+    constexpr int misbehave_error = 5; // MISBEHAVE_ERROR in plugins/misbehave.h
+    ASSERT_EQ(::sigqueue(run.worker("sink_realtime"), SIGRTMIN, {.sival_int = misbehave_error}), 0);
+    EXPECT_TRUE(run.eventually([&] { return run.status()["recording"].is_null(); }));
+    EXPECT_EQ(run.error_of({{"command", "record"}, {"on", false}}),
+              "the recording '" + file + "' failed: an error, as requested");
+    EXPECT_EQ(run.error_of({{"command", "record"}, {"on", false}}), "there is no recording to stop");
+    Json messages = run.status()["messages"];
+    messages.erase(messages.begin(), messages.begin() + static_cast<std::ptrdiff_t>(before.size()));
+    std::string texts;
+    for (const Json &message : messages) {
+        EXPECT_EQ(message["severity"], "error");
+        EXPECT_EQ(message["component"], "record");
+        texts += message["text"].get<std::string>() + "\n";
+    }
+    EXPECT_THAT(texts, testing::AllOf(HasSubstr("an error, as requested\n"), HasSubstr("cannot write frame ")));
+    EXPECT_EQ(run.quit(), 1) << run.output();
+}
+
+TEST(Control, ARecordingWithoutAFrameIsNoSuccess) {
+    ControlledRun run(controlled("lockstep"));
+    run.start_and_connect();
+    run.succeed({{"command", "freeze"}, {"on", true}});
+    EXPECT_TRUE(run.eventually([&] {
+        const Json frames = run.status()["frames"];
+        return frames["in"] == frames["composited"];
+    }));
+    const std::string file = run.succeed({{"command", "record"}})["file"];
+    EXPECT_EQ(run.error_of({{"command", "record"}}), "no frame arrived, so no file was written");
+    EXPECT_FALSE(std::filesystem::exists(file));
+    EXPECT_THAT(run.status()["files"], testing::IsEmpty());
+    EXPECT_EQ(run.quit(), 0) << run.output();
 }
 
 TEST(Control, ChangesAnOptionAlsoForARestartedPlugin) {
@@ -444,7 +494,7 @@ TEST(Control, RejectsWhatTheConfigurationDoesNotGrantOrList) {
     Json with_path = swap("tracker", "second");
     with_path["allow"] = {"network"};
     EXPECT_THAT(run.error_of(with_path), HasSubstr("unknown member 'allow'"));
-    EXPECT_THAT(run.error_of({{"command", "load_scene"}}), HasSubstr("'scene' is missing"));
+    EXPECT_THAT(run.error_of({{"command", "swap"}}), HasSubstr("'component' is missing"));
     EXPECT_THAT(run.error_of({{"command", 3}}), HasSubstr("'command' must be a string"));
     run.send("[1, 2]\n");
     EXPECT_THAT(run.receive()["error"], HasSubstr("must be a JSON object"));
@@ -452,6 +502,40 @@ TEST(Control, RejectsWhatTheConfigurationDoesNotGrantOrList) {
     EXPECT_THAT(run.receive()["error"], HasSubstr("must be a JSON object"));
     EXPECT_EQ(run.quit(), 0) << run.output();
     expect_all_frames_with_their_overlays(run);
+}
+
+TEST(Control, ListsTheChoicesIfTheNameIsMissing) {
+    ControlledRun run(controlled("lockstep"));
+    run.start_and_connect();
+    EXPECT_EQ(run.error_of({{"command", "swap"}, {"component", "raytracer"}}),
+              "choose one of: rt_counter, second, broken");
+    EXPECT_EQ(run.error_of({{"command", "load_scene"}}), "choose one of: scene, other");
+    EXPECT_EQ(run.error_of({{"command", "set"}, {"component", "raytracer"}}),
+              "choose an option that can be changed while rt_counter runs; none of its options can");
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
+TEST(Control, ARefusalNamesWhatIsGranted) {
+    ControlledRun run(controlled("lockstep", "", "[quit, status]"));
+    run.start_and_connect();
+    EXPECT_THAT(run.command({{"command", "freeze"}})["granted"], ElementsAre("quit", "status"));
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
+TEST(Control, TheStatusSaysWhichMarkerIsSeenInsteadOfTheTarget) {
+    ControlledRun run(
+        "version: 1\nmode: live\n"
+        "source: {plugin: source_synthetic, fps: 30, options: {frames: 0, id: 5, side_mm: 80, width: 320, "
+        "height: 240}}\n"
+        "tracker: {plugin: tracker_aruco, targets: [{name: cup, marker: 0, family: tag36h11, side_mm: "
+        "80}]}\n"
+        "outputs: [{plugin: sink_control, allow: [listen], control: [quit, status]}]\n");
+    run.start_and_connect();
+    EXPECT_TRUE(run.eventually([&] { return run.status()["missing_target"].is_string(); }));
+    EXPECT_THAT(
+        run.status()["missing_target"].get<std::string>(),
+        HasSubstr("the tracker has seen no target yet; it looks for 'cup' (tag36h11 0); it saw tag36h11 5 ("));
+    EXPECT_EQ(run.quit(), 1) << "no target was seen";
 }
 
 TEST(Control, AnswersCommandsSentAtOnceInTheirOrder) {
@@ -584,9 +668,20 @@ TEST(Ctl, SendsCommandsAndPrintsTheirAnswers) {
     EXPECT_EQ(ctl({"freeze", "on"}, 0), "frozen: true\n");
     EXPECT_EQ(ctl({"freeze"}, 0), "frozen: false\n");
     EXPECT_EQ(ctl({"--json", "freeze"}, 0), "{\"ok\":true,\"frozen\":true}\n");
-    EXPECT_EQ(Json::parse(ctl({"status"}, 0))["frozen"], true);
-    EXPECT_EQ(ctl({"freeze", "maybe"}, 1), "error: 'freeze' takes 'on' or 'off'; without one, it toggles\n");
-    EXPECT_EQ(ctl({"quit", "now"}, 1), "error: 'quit' takes at most 0 values\n");
+    EXPECT_EQ(Json::parse(ctl({"--json", "status"}, 0))["status"]["frozen"], true);
+    EXPECT_THAT(
+        ctl({"status"}, 0),
+        testing::MatchesRegex(
+            "arhost [0-9.]+, mode live, scene scene, frozen\n[0-9.]+ fps, latency p50 [0-9.]+ ms, p95 [0-9.]+ ms, "
+            "p99 "
+            "[0-9.]+ ms, from arrival\n[0-9]+ frames: [0-9]+ with a target, [0-9]+ with an overlay(, dropped: .*)?\n"
+            "target tag36h11-3: detected, distance [0-9]+ mm, reprojection error [0-9.]+ px\n"
+            "source: source_counter [0-9.]+, running\ntracker: tracker_counter [0-9.]+, running\n"
+            "raytracer: rt_counter [0-9.]+, running\nsink_counter: sink_counter [0-9.]+, running\n"
+            "sink_control: sink_control [0-9.]+, running\n[-0-9T:.]+Z warning: arhost: run.yaml:6:40: .*\n"));
+    EXPECT_EQ(ctl({"freeze", "maybe"}, 2), "error: 'freeze' takes 'on' or 'off'; without one, it toggles\n");
+    EXPECT_EQ(ctl({"quit", "now"}, 2), "error: 'quit' takes at most 0 values\n");
+    EXPECT_EQ(ctl({"swap", "raytracer"}, 1), "error: choose one of: rt_counter, second, broken\n");
     EXPECT_EQ(ctl({"swap", "tracker", "nothing"}, 1),
               "error: there is no 'nothing'; choose one of: tracker_counter, second, broken\n");
     EXPECT_THAT(ctl({"--name", "other", "status"}, 1),

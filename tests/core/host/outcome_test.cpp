@@ -102,6 +102,25 @@ TEST_F(Outcome, NamesTargetsThatDoNotFit) {
     EXPECT_EQ(misfitting_targets(statistics, targets), "");
 }
 
+TEST_F(Outcome, SaysThatNoTargetIsVisibleAndWhatIsInstead) {
+    using std::chrono::seconds;
+    const std::chrono::steady_clock::time_point start{};
+    const auto missing = [&](seconds after) {
+        return missing_target(*configuration, statistics, configuration->tracker->targets, start + after);
+    };
+    EXPECT_EQ(missing(seconds(60)), "") << "a target is visible";
+    statistics.without_target_since = start;
+    statistics.unlisted = {{"D 24", 29}};
+    EXPECT_EQ(missing(seconds(0)), "");
+    EXPECT_EQ(missing(seconds(3)),
+              "the tracker has seen no target yet; it looks for 'desk' (D 23), 'cup' (D 7); it saw D 24 (29 frames); "
+              "compare the numbers and the family with the print");
+    statistics.targets["cup"].frames = 20;
+    EXPECT_THAT(missing(seconds(3)), testing::StartsWith("the tracker has seen no target for 3 s; it looks for "));
+    configuration->trajectory.emplace();
+    EXPECT_EQ(missing(seconds(3)), "") << "the poses do not come from the tracker";
+}
+
 TEST_F(Outcome, ReportsThatEveryOverlayWasLateInModeLive) {
     statistics.augmented = 0;
     statistics.targets["desk"].frames = 20;
