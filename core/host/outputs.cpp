@@ -236,7 +236,7 @@ void Outputs::on_result(SinkQueue &sink, const Command &command, const Result &r
         // with the other outputs.
         const std::string &name = sink.component->name();
         const std::string reason = "cannot write frame " + std::to_string(command.sequence) + ": " +
-                                   status_text(result.status) + "; see the output's messages above";
+                                   status_text(result.status) + "; this output is closed";
         parts_.context.log(ARHOST_SEVERITY_ERROR, name, reason);
         parts_.failures.add(name + ": " + reason, false, true);
         sink.failure = reason; // the output's own message, which explains it, may arrive later

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <netinet/in.h>
 #include <sys/socket.h>
+#include <vector>
 
 namespace arhost::web {
 namespace {
@@ -37,6 +38,23 @@ bool is_ip_address(const std::string &text) {
     return ::inet_pton(AF_INET, text.c_str(), &address) == 1;
 }
 
+// Returns the names in a comma-separated list.
+std::vector<std::string_view> names_of(std::string_view list) {
+    std::vector<std::string_view> names;
+    for (std::size_t begin = 0; begin <= list.size();) {
+        const std::size_t end = std::min(list.find(',', begin), list.size());
+        std::string_view name = list.substr(begin, end - begin);
+        while (name.starts_with(' '))
+            name.remove_prefix(1);
+        while (name.ends_with(' '))
+            name.remove_suffix(1);
+        if (!name.empty())
+            names.push_back(name);
+        begin = end + 1;
+    }
+    return names;
+}
+
 } // namespace
 
 bool is_local(int socket) {
@@ -61,20 +79,18 @@ bool is_own_host(std::string_view host, std::string_view hosts) {
     const std::string name = without_port(host);
     if (name.empty())
         return false;
-    if (is_ip_address(name) || equal_ignoring_case(name, "localhost"))
-        return true;
-    for (std::size_t begin = 0; begin <= hosts.size();) {
-        const std::size_t end = std::min(hosts.find(',', begin), hosts.size());
-        std::string_view allowed = hosts.substr(begin, end - begin);
-        while (allowed.starts_with(' '))
-            allowed.remove_prefix(1);
-        while (allowed.ends_with(' '))
-            allowed.remove_suffix(1);
-        if (equal_ignoring_case(name, allowed))
-            return true;
-        begin = end + 1;
-    }
-    return false;
+    return is_ip_address(name) || equal_ignoring_case(name, "localhost") ||
+           std::ranges::any_of(names_of(hosts),
+                               [&](std::string_view allowed) { return equal_ignoring_case(name, allowed); });
+}
+
+std::string url_of(const std::string &address, std::string_view hosts) {
+    const std::size_t colon = address.rfind(':');
+    const std::string host = address.substr(0, colon);
+    if (host != "0.0.0.0" && host != "[::]")
+        return "http://" + address + "/";
+    const std::vector<std::string_view> names = names_of(hosts);
+    return "http://" + (names.empty() ? "localhost" : std::string(names.front())) + address.substr(colon) + "/";
 }
 
 bool is_own_origin(std::string_view origin, std::string_view host) {

@@ -11,6 +11,10 @@ namespace arhost::web {
 // Returns whether only this machine can reach the listening socket.
 bool is_local(int socket);
 
+// Returns the URL of the page at ADDRESS:PORT. If the server listens at all addresses of the machine, it is that with
+// the first name in the comma-separated list `hosts` or, without one, with `localhost`.
+std::string url_of(const std::string &address, std::string_view hosts);
+
 // Returns whether the header `Host` names this server: by an IP address, by `localhost`, or by a name in the
 // comma-separated list `hosts`. A page that reaches the server by DNS rebinding has another name.
 bool is_own_host(std::string_view host, std::string_view hosts);

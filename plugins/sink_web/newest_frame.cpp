@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "newest_frame.hpp"
 
+#include "sink_common/record_line.hpp"
+
 #include <turbojpeg.h>
 
 namespace arhost::web {
@@ -23,9 +25,17 @@ void NewestFrame::put(const arhost_output &output) {
     written_.bgr.resize(row * output.height);
     for (std::size_t y = 0; y < output.height; ++y)
         std::copy_n(output.bgr + y * output.stride, row, written_.bgr.data() + y * row);
+    std::string line;
+    record::append_line(line, *output.record);
     const std::lock_guard lock(mutex_);
     std::swap(written_, newest_);
+    poses_ = {newest_.number, std::move(line)};
     number_ = newest_.number;
+}
+
+NewestFrame::Poses NewestFrame::newest_poses() const {
+    const std::lock_guard lock(mutex_);
+    return poses_;
 }
 
 std::shared_ptr<const Jpeg> NewestFrame::newest() {

@@ -30,6 +30,13 @@ public:
     // Called by the server's thread. Returns the newest frame, or nullptr if there is none.
     std::shared_ptr<const Jpeg> newest();
 
+    // Targets, poses and camera of a frame, as one line of JSON (plugins/sink_poses/README.md).
+    struct Poses {
+        std::uint64_t number = 0; // of the frame; 0: there is none
+        std::string line{};
+    };
+    Poses newest_poses() const;
+
 private:
     struct Picture {
         std::uint64_t number = 0;
@@ -44,8 +51,9 @@ private:
     std::atomic<std::uint64_t> number_{0}, encoded_{0};
     std::atomic<int> quality_;
     Picture written_; // belongs to the plugin's thread
-    std::mutex mutex_;
-    Picture newest_;   // guarded by mutex_
+    mutable std::mutex mutex_;
+    Picture newest_; // guarded by mutex_, as is `poses_`
+    Poses poses_;
     Picture encoding_; // belongs to the server's thread, as do the following members
     std::unique_ptr<void, Free> compressor_;
     std::shared_ptr<const Jpeg> jpeg_;

@@ -4,8 +4,10 @@
 #include "checks.hpp"
 #include "embedded_files.hpp"
 #include "metrics.hpp"
+#include "run_files.hpp"
 
 #include <algorithm>
+#include <array>
 #include <fcntl.h>
 #include <microhttpd.h>
 #include <netinet/in.h>
@@ -28,7 +30,7 @@ constexpr auto last_answer_time = std::chrono::seconds(1);
 // After this time without a new frame, viewers receive the last frame again. Sending it shows whether they are still
 // connected.
 constexpr auto repeat_time = std::chrono::seconds(1);
-constexpr std::string_view boundary = "arhostframe";
+constexpr std::string_view boundary = "arhostframe", files_path = "/files/";
 
 std::string header(MHD_Connection *connection, const char *name) {
     const char *value = MHD_lookup_connection_value(connection, MHD_HEADER_KIND, name);
@@ -87,15 +89,26 @@ struct Server::Request {
 };
 
 struct Server::Viewer {
+    enum class Shows { pictures, poses, end };
     Server *server;
     MHD_Connection *connection;
-    std::string address;     // of the client (address_of)
-    bool is_waiting = false; // suspended, guarded by mutex_
-    std::uint64_t number = 0;
+    std::string address; // of the client (address_of)
+    Shows shows;
+    bool is_waiting = false;  // suspended, guarded by mutex_
+    std::uint64_t number = 0; // of the last frame that was sent
     Clock::time_point sent_at{};
+    bool has_end = false; // the last part is being sent
+    std::string text{};   // precedes the JPEG
     std::shared_ptr<const Jpeg> jpeg{};
-    std::string head{};       // precedes the JPEG
-    std::size_t position = 0; // position in the concatenation of head, JPEG and end
+    std::size_t position = 0; // position in the concatenation of text, JPEG and the boundary after it
+
+    bool shows_pictures() const { return shows == Shows::pictures; }
+};
+
+struct Server::Download {
+    Server *server;
+    MHD_Connection *connection;
+    RunFile file;
 };
 
 struct Server::Callbacks {
@@ -138,7 +151,7 @@ struct Server::Callbacks {
         server.limit_time(connection, request_time); // time limit for the next request
         const std::lock_guard lock(server.mutex_);
         if (request && (*request)->was_suspended && --server.unsent_answers_ == 0)
-            server.all_sent_.notify_all();
+            server.was_sent_.notify_all();
     }
 
     static void notify(void *self, MHD_Connection *connection, void **,
@@ -162,10 +175,22 @@ struct Server::Callbacks {
         }
     }
 
+    static ssize_t read_file(void *download, std::uint64_t offset, char *to, std::size_t size) noexcept {
+        auto &self = *static_cast<Download *>(download);
+        self.server->limit_time(self.connection, frame_time);
+        const std::ptrdiff_t got = self.file.read(offset, to, size);
+        return got > 0 ? got : MHD_CONTENT_READER_END_WITH_ERROR; // 0: the file has become shorter
+    }
+
+    static void free_download(void *download) noexcept {
+        const std::unique_ptr<Download> self(static_cast<Download *>(download));
+    }
+
     static void free_viewer(void *viewer) noexcept {
         const std::unique_ptr<Viewer> self(static_cast<Viewer *>(viewer));
         const std::lock_guard lock(self->server->mutex_);
         self->server->viewers_.erase(self.get());
+        self->server->was_sent_.notify_all();
     }
 };
 
@@ -194,8 +219,10 @@ Server::~Server() {
             const SharedRequest request = *suspended_.begin();
             resume(request);
         }
-        // The answer to `quit` may have arrived only now.
-        all_sent_.wait_for(lock, last_answer_time, [this] { return unsent_answers_ == 0; });
+        // The answer to `quit` may have arrived only now, and pages wait for the event `end`.
+        was_sent_.wait_for(lock, last_answer_time, [this] {
+            return unsent_answers_ == 0 && std::ranges::all_of(viewers_, &Viewer::shows_pictures);
+        });
     }
     MHD_stop_daemon(daemon_);
 }
@@ -204,7 +231,8 @@ void Server::tick() {
     const std::lock_guard lock(mutex_);
     const auto now = Clock::now();
     for (Viewer *viewer : viewers_)
-        if (viewer->is_waiting && (viewer->number != frame_.number() || now - viewer->sent_at >= repeat_time)) {
+        if (viewer->is_waiting && ((viewer->shows != Viewer::Shows::end && viewer->number != frame_.number()) ||
+                                   now - viewer->sent_at >= repeat_time)) {
             viewer->is_waiting = false;
             MHD_resume_connection(viewer->connection);
         }
@@ -263,11 +291,16 @@ bool Server::process(const SharedRequest &request) {
     const std::string &path = request->path;
     if (path == "/stream.mjpg")
         return respond_with_stream(*request);
+    if (path == "/api/events")
+        return respond_with_events(*request);
+    if (path == "/api/targets")
+        return respond_with_targets(*request);
     if (path == "/snapshot.jpg")
         return respond_with_snapshot(*request);
     if (path == "/openapi.json")
         return respond(*request, MHD_HTTP_OK, "application/json", openapi_json());
-    if (path != "/" && path != "/api/status" && path != "/api/control" && path != "/metrics")
+    if (path != "/" && !path.starts_with(files_path) && path != "/api/status" && path != "/api/control" &&
+        path != "/metrics")
         return refuse(*request, MHD_HTTP_NOT_FOUND, "there is no such resource");
     if (!request->answer.empty())
         return respond_with_answer(*request);
@@ -342,11 +375,13 @@ void Server::resume(const SharedRequest &request) {
 bool Server::respond_with_answer(const Request &request) {
     if (request.path == "/")
         return respond_with_page(request);
+    if (request.path.starts_with(files_path))
+        return respond_with_file(request);
     if (request.path == "/metrics") {
         OwnCounts own{frame_.number(), frame_.encoded(), 0, 0};
         {
             const std::lock_guard lock(mutex_);
-            own.viewers = viewers_.size();
+            own.viewers = static_cast<std::size_t>(std::ranges::count_if(viewers_, &Viewer::shows_pictures));
             own.connections = connections_.size();
         }
         return respond(request, MHD_HTTP_OK, "text/plain; version=0.0.4; charset=utf-8",
@@ -364,11 +399,12 @@ bool Server::respond_with_page(const Request &request) {
     std::string status;
     for (const char c : request.answer)
         status += c == '<' ? "\\u003c" : std::string(1, c); // in JSON, '<' occurs only in strings
-    const std::map<std::string_view, std::string> values = {{"nonce", nonce},
-                                                            {"status", status},
-                                                            {"width", std::to_string(settings_.width)},
-                                                            {"height", std::to_string(settings_.height)},
-                                                            {"token", settings_.token.empty() ? " hidden" : ""}};
+    const std::map<std::string_view, std::string> values = {
+        {"nonce", nonce},
+        {"status", status},
+        {"width", std::to_string(settings_.width)},
+        {"height", std::to_string(settings_.height)},
+        {"needs_token", settings_.token.empty() ? "false" : "true"}};
     std::string page;
     std::string_view rest = page_html();
     for (std::size_t at = 0; (at = rest.find("{{")) != std::string_view::npos;) {
@@ -389,12 +425,56 @@ bool Server::respond_with_snapshot(const Request &request) {
                    {reinterpret_cast<const char *>(jpeg->bytes.data()), jpeg->bytes.size()});
 }
 
+// The number in the request selects a file of the host's list, so the client cannot name any other file.
+bool Server::respond_with_file(const Request &request) {
+    const auto path = path_of_file(request.answer, request.path.substr(files_path.size()));
+    if (!path)
+        return refuse(request, MHD_HTTP_NOT_FOUND, "the run has not written a file with this number");
+    std::unique_ptr<Download> download;
+    try {
+        download.reset(new Download{this, request.connection, RunFile(*path)});
+    } catch (const std::exception &) {
+        return refuse(request, MHD_HTTP_FORBIDDEN,
+                      "this output cannot read the file: list its folder in the key 'reads' of the output sink_web");
+    }
+    const std::uint64_t size = download->file.size();
+    MHD_Response *response = MHD_create_response_from_callback(size, stream_block, Callbacks::read_file,
+                                                               download.get(), Callbacks::free_download);
+    if (!response)
+        return false;
+    download.release(); // NOLINT(bugprone-unused-return-value): the response owns it
+    MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, "application/octet-stream");
+    MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_DISPOSITION, disposition_of(*path).c_str());
+    return queue(request, MHD_HTTP_OK, response);
+}
+
+bool Server::respond_with_targets(const Request &request) {
+    const NewestFrame::Poses poses = frame_.newest_poses();
+    if (poses.number == 0)
+        return refuse(request, MHD_HTTP_SERVICE_UNAVAILABLE, "there is no frame yet");
+    return respond(request, MHD_HTTP_OK, "application/json", poses.line);
+}
+
 bool Server::respond_with_stream(const Request &request) {
-    auto viewer = std::make_unique<Viewer>(Viewer{this, request.connection, address_of(request.connection)});
+    auto viewer = std::make_unique<Viewer>(
+        Viewer{this, request.connection, address_of(request.connection), Viewer::Shows::pictures});
+    viewer->text = "--" + std::string(boundary) + "\r\n";
+    return respond_to_viewer(request, std::move(viewer),
+                             "multipart/x-mixed-replace; boundary=" + std::string(boundary));
+}
+
+bool Server::respond_with_events(const Request &request) {
+    const char *const only = MHD_lookup_connection_value(request.connection, MHD_GET_ARGUMENT_KIND, "only");
+    if (only && only != std::string_view("end"))
+        return refuse(request, MHD_HTTP_BAD_REQUEST, "the value of 'only' must be 'end'");
+    auto viewer = std::make_unique<Viewer>(Viewer{this, request.connection, address_of(request.connection),
+                                                  only ? Viewer::Shows::end : Viewer::Shows::poses});
+    return respond_to_viewer(request, std::move(viewer), "text/event-stream");
+}
+
+bool Server::respond_to_viewer(const Request &request, std::unique_ptr<Viewer> viewer, const std::string &type) {
     if (!admit(*viewer))
         return refuse(request, MHD_HTTP_SERVICE_UNAVAILABLE, "there are too many viewers");
-    viewer->head = "--" + std::string(boundary) + "\r\n";
-    viewer->jpeg = std::make_shared<Jpeg>();
     MHD_Response *response = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, stream_block, Callbacks::read,
                                                                viewer.get(), Callbacks::free_viewer);
     if (!response) {
@@ -402,23 +482,25 @@ bool Server::respond_with_stream(const Request &request) {
         return false;
     }
     viewer.release(); // NOLINT(bugprone-unused-return-value): the response owns it
-    const std::string type = "multipart/x-mixed-replace; boundary=" + std::string(boundary);
     MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, type.c_str());
     return queue(request, MHD_HTTP_OK, response);
 }
 
-// Registers a viewer. If there are too many viewers, the address with the most of them loses one to an address with
-// fewer. Returns false if this viewer has to wait.
+// Registers a viewer of pictures or of events, for each of which the limits apply. If there are too many viewers, the
+// address with the most of them loses one to an address with fewer. Returns false if this viewer has to wait.
 bool Server::admit(Viewer &viewer) {
     const std::lock_guard lock(mutex_);
+    std::vector<Viewer *> others;
+    std::ranges::copy_if(viewers_, std::back_inserter(others),
+                         [&](const Viewer *each) { return each->shows_pictures() == viewer.shows_pictures(); });
     std::map<std::string_view, std::size_t> counts;
-    for (const Viewer *each : viewers_)
+    for (const Viewer *each : others)
         ++counts[each->address];
     if (counts[viewer.address] >= max_viewers_per_address)
         return false;
-    if (viewers_.size() >= max_viewers) {
+    if (others.size() >= max_viewers) {
         const auto count_of = [&](const Viewer *each) { return counts[each->address]; };
-        Viewer *loser = *std::ranges::max_element(viewers_, {}, count_of);
+        Viewer *loser = *std::ranges::max_element(others, {}, count_of);
         if (count_of(loser) <= counts[viewer.address] + 1)
             return false;
         viewers_.erase(loser);
@@ -430,44 +512,69 @@ bool Server::admit(Viewer &viewer) {
     return true;
 }
 
+// Sets what the viewer receives next, unless it must wait for that.
+Server::Next Server::prepare_next(Viewer &viewer) {
+    bool has_new = false;
+    {
+        const std::lock_guard lock(mutex_);
+        if (viewer.has_end || (is_stopping_ && viewer.shows_pictures()))
+            return Next::end;
+        viewer.position = 0;
+        if (is_stopping_) {
+            viewer.has_end = true;
+            viewer.text = "event: end\ndata: {}\n\n";
+            return Next::ready;
+        }
+        const std::uint64_t number = frame_.number();
+        const auto now = Clock::now();
+        auto &deadline = connections_.at(viewer.connection).deadline;
+        has_new = number > 0 && number != viewer.number && viewer.shows != Viewer::Shows::end;
+        if (!has_new && ((number == 0 && viewer.shows_pictures()) || now - viewer.sent_at < repeat_time)) {
+            deadline = Clock::time_point::max();
+            viewer.is_waiting = true;
+            viewer.text.clear();
+            viewer.jpeg.reset();
+            MHD_suspend_connection(viewer.connection);
+            return Next::wait;
+        }
+        deadline = now + frame_time;
+        viewer.sent_at = now;
+    }
+    if (viewer.shows_pictures()) {
+        viewer.jpeg = frame_.newest();
+        if (!viewer.jpeg)
+            throw std::runtime_error("the encoder has failed");
+        viewer.number = viewer.jpeg->number;
+        viewer.text = "Content-Type: image/jpeg\r\nX-Received-Ns: " + std::to_string(viewer.jpeg->received.count()) +
+                      "\r\nContent-Length: " + std::to_string(viewer.jpeg->bytes.size()) + "\r\n\r\n";
+    } else if (has_new) {
+        NewestFrame::Poses poses = frame_.newest_poses();
+        viewer.number = poses.number;
+        viewer.text = "event: frame\ndata: " + poses.line + "\n"; // the line ends with a line break
+    } else {
+        viewer.text = ":\n\n"; // a comment, which shows whether the client is still connected
+    }
+    return Next::ready;
+}
+
 // Copies the next bytes of the stream. Browsers show a frame only when they receive the boundary after it, so the
 // boundary is sent with the frame.
 std::ptrdiff_t Server::read_stream(Viewer &viewer, std::span<char> to) {
     static const std::string end = "\r\n--" + std::string(boundary) + "\r\n";
-    const auto size_of = [&](const Viewer &v) {
-        return v.head.size() + (v.number > 0 ? v.jpeg->bytes.size() + end.size() : 0);
+    const auto parts = [&]() -> std::array<std::string_view, 3> {
+        if (!viewer.jpeg)
+            return {viewer.text, {}, {}};
+        return {
+            viewer.text, {reinterpret_cast<const char *>(viewer.jpeg->bytes.data()), viewer.jpeg->bytes.size()}, end};
     };
-    if (viewer.position == size_of(viewer)) {
-        {
-            const std::lock_guard lock(mutex_);
-            if (is_stopping_)
-                return MHD_CONTENT_READER_END_OF_STREAM;
-            const std::uint64_t number = frame_.number();
-            const auto now = Clock::now();
-            auto &deadline = connections_.at(viewer.connection).deadline;
-            if (number == 0 || (number == viewer.number && now - viewer.sent_at < repeat_time)) {
-                deadline = Clock::time_point::max();
-                viewer.is_waiting = true;
-                MHD_suspend_connection(viewer.connection);
-                return 0;
-            }
-            deadline = now + frame_time;
-            viewer.sent_at = now;
-        }
-        std::shared_ptr<const Jpeg> jpeg = frame_.newest();
-        if (!jpeg) // the encoder has failed
-            return MHD_CONTENT_READER_END_WITH_ERROR;
-        viewer.jpeg = std::move(jpeg);
-        viewer.number = viewer.jpeg->number;
-        viewer.head = "Content-Type: image/jpeg\r\nX-Received-Ns: " + std::to_string(viewer.jpeg->received.count()) +
-                      "\r\nContent-Length: " + std::to_string(viewer.jpeg->bytes.size()) + "\r\n\r\n";
-        viewer.position = 0;
-    }
+    std::size_t size = 0;
+    for (const std::string_view part : parts())
+        size += part.size();
+    if (viewer.position == size)
+        if (const Next next = prepare_next(viewer); next != Next::ready)
+            return next == Next::wait ? 0 : MHD_CONTENT_READER_END_OF_STREAM;
     std::size_t copied = 0, begin = 0; // position of the current part within the whole
-    const std::string_view jpeg(reinterpret_cast<const char *>(viewer.jpeg->bytes.data()), viewer.jpeg->bytes.size());
-    for (const std::string_view part : {std::string_view(viewer.head), jpeg, std::string_view(end)}) {
-        if (viewer.number == 0 && begin > 0)
-            break;
+    for (const std::string_view part : parts()) {
         if (viewer.position < begin + part.size() && copied < to.size()) {
             const std::string_view rest = part.substr(viewer.position - begin, to.size() - copied);
             std::ranges::copy(rest, to.data() + copied);

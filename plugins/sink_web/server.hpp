@@ -39,6 +39,7 @@ private:
     struct Callbacks; // callbacks of libmicrohttpd
     struct Request;
     struct Viewer;
+    struct Download;
     using SharedRequest = std::shared_ptr<Request>;
     struct Connection {
         int fd;
@@ -57,7 +58,11 @@ private:
     bool respond_with_answer(const Request &request);
     bool respond_with_page(const Request &request);
     bool respond_with_snapshot(const Request &request);
+    bool respond_with_file(const Request &request);
+    bool respond_with_targets(const Request &request);
     bool respond_with_stream(const Request &request);
+    bool respond_with_events(const Request &request);
+    bool respond_to_viewer(const Request &request, std::unique_ptr<Viewer> viewer, const std::string &type);
     bool admit(Viewer &viewer);
     bool respond(const Request &request, unsigned status, const char *type, std::string_view body,
                  const std::string &nonce = "");
@@ -65,6 +70,8 @@ private:
     bool queue(const Request &request, unsigned status, MHD_Response *response, const std::string &nonce = "");
     void limit_time(MHD_Connection *connection, std::chrono::seconds time);
     std::ptrdiff_t read_stream(Viewer &viewer, std::span<char> to);
+    enum class Next { ready, wait, end };
+    Next prepare_next(Viewer &viewer);
 
     Settings settings_;
     NewestFrame &frame_;
@@ -75,8 +82,8 @@ private:
     std::map<MHD_Connection *, Connection> connections_;
     std::set<Viewer *> viewers_;
     std::set<SharedRequest> suspended_, waiting_for_status_;
-    std::size_t unsent_answers_ = 0; // answers to requests that were suspended
-    std::condition_variable all_sent_;
+    std::size_t unsent_answers_ = 0;   // answers to requests that were suspended
+    std::condition_variable was_sent_; // an answer, or the end of a stream
 };
 
 } // namespace arhost::web

@@ -33,7 +33,12 @@ public:
         settings_.height = setup.height;
         debug_view_.start(setup);
         server_ = std::make_unique<arhost::web::Server>(settings_, frame_, control_);
-        host_.info(address_.starts_with('/') ? "listens at " + address_ : "open http://" + address_ + "/");
+        if (address_.starts_with('/'))
+            return host_.info("listens at " + address_);
+        const std::string url = arhost::web::url_of(address_, settings_.hosts);
+        host_.info(
+            "open " + url +
+            (url.find(address_) != std::string::npos ? "" : "; other machines can use any address of this one"));
     }
 
     arhost_status write(const arhost_output &output) {

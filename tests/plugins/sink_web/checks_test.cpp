@@ -31,3 +31,11 @@ TEST(WebChecks, AcceptsOnlyTheWholeToken) {
                                "Bearer abcdefgh1234567", "Bearer abcdefgh123456789", "Bearer abcdefgh12345679"})
         EXPECT_FALSE(has_token(header, "abcdefgh12345678")) << header;
 }
+
+TEST(WebChecks, TheUrlThatIsShownCanBeOpened) {
+    EXPECT_EQ(url_of("127.0.0.1:8080", ""), "http://127.0.0.1:8080/");
+    EXPECT_EQ(url_of("192.168.1.7:80", "lab"), "http://192.168.1.7:80/");
+    EXPECT_EQ(url_of("0.0.0.0:8080", ""), "http://localhost:8080/");
+    EXPECT_EQ(url_of("[::]:8080", " , "), "http://localhost:8080/");
+    EXPECT_EQ(url_of("0.0.0.0:8080", " lab, rig.example"), "http://lab:8080/");
+}

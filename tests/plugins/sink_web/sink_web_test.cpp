@@ -44,6 +44,7 @@ public:
     };
     explicit WebRun(const Configuration &configuration) : ArhostRun(configuration.text) {
         write("scene.yaml", small_scene);
+        std::filesystem::create_directories(path("out")); // so that a key `reads` can name it
         start();
         const std::regex url("http://127\\.0\\.0\\.1:([0-9]+)/");
         std::string text;
@@ -184,6 +185,74 @@ TEST(SinkWeb, GivesTheStatusAndTheGrantedCommands) {
                       HasSubstr("arhost_latency_milliseconds{output=\"sink_web\",quantile=\"0.99\"} "),
                       HasSubstr("arhost_web_viewers 0\n")));
     run.expect_quit();
+}
+
+TEST(SinkWeb, GivesThePosesOfTheNewestFrame) {
+    WebRun run;
+    run.wait_for([&] { return !Json::parse(run.get("/api/targets").body)["targets"].empty(); });
+    const Json line = Json::parse(run.get("/api/targets").body);
+    EXPECT_EQ(line["targets"][0]["name"], "tag36h11-0");
+    EXPECT_EQ(line["targets"][0]["mt"].size(), 16u);
+    run.expect_quit();
+}
+
+TEST(SinkWeb, SendsThePosesOfEachFrameAndTheEndAsEvents) {
+    WebRun run;
+    HttpClient events = run.connect(), end = run.connect();
+    events.send("GET /api/events HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    end.send("GET /api/events?only=end HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    EXPECT_THAT(events.receive_to("\r\n\r\n"), AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("text/event-stream")));
+    std::uint64_t last = 0;
+    for (int i = 0; i < 10; ++i) {
+        events.receive_to("event: frame\ndata: ");
+        const Json line = Json::parse(events.receive_to("\n\n"));
+        EXPECT_TRUE(i == 0 || line["frame"] > last) << line;
+        last = line["frame"];
+    }
+    EXPECT_EQ(run.get("/api/events?only=beginning").status, 400);
+    run.expect_quit();
+    EXPECT_THAT(events.receive_all(), HasSubstr("event: end\ndata: {}\n\n"));
+    EXPECT_THAT(end.receive_all(), AllOf(HasSubstr("event: end\n"), testing::Not(HasSubstr("event: frame\n"))));
+}
+
+TEST(SinkWeb, EventsHaveTheLimitsOfViewers) {
+    WebRun run;
+    std::vector<HttpClient> viewers;
+    const auto status_of = [&](const std::string &path) {
+        HttpClient &client = viewers.emplace_back(run.connect());
+        client.send("GET " + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
+        return client.receive_to("\r\n\r\n").substr(9, 3);
+    };
+    for (int i = 0; i < 24; ++i)
+        ASSERT_EQ(status_of(i % 2 ? "/api/events" : "/api/events?only=end"), "200") << i;
+    EXPECT_EQ(status_of("/api/events"), "503");
+    EXPECT_EQ(status_of("/stream.mjpg"), "200") << "pictures have places of their own";
+    run.expect_quit();
+}
+
+TEST(SinkWeb, SendsOnlyFilesThatTheRunHasWrittenAndThatItMayRead) {
+    for (const bool may_read : {true, false}) {
+        std::string text = yaml("[quit, snapshot, status]", "listen: \"127.0.0.1:0\"") +
+                           "snapshot: {plugin: sink_images, path: out/s-%02d.png}\n";
+        const std::string allow = "allow: [listen]";
+        if (may_read)
+            text.replace(text.find(allow), allow.size(), allow + ", reads: [out]");
+        WebRun run(WebRun::Configuration{text});
+        EXPECT_EQ(run.get("/files/1").status, 404) << "nothing was written yet";
+        EXPECT_EQ(run.post(R"({"command":"snapshot"})").status, 200);
+        const HttpAnswer file = run.get("/files/1");
+        EXPECT_EQ(file.status, may_read ? 200 : 403);
+        if (may_read) {
+            EXPECT_EQ(file.body, run.read("out/s-01.png"));
+            EXPECT_THAT(file.head, HasSubstr("Content-Disposition: attachment; filename=\"s-01.png\""));
+        } else {
+            EXPECT_THAT(file.body, HasSubstr("'reads'"));
+        }
+        for (const char *path : {"/files/2", "/files/", "/files/01", "/files/../run.yaml", "/files/%2e%2e%2frun.yaml",
+                                 "/files//etc/passwd", "/files/1/../../run.yaml"})
+            EXPECT_EQ(run.get(path).status, 404) << path;
+        run.expect_quit();
+    }
 }
 
 TEST(SinkWeb, EncodesNothingWithoutViewers) {

@@ -26,27 +26,30 @@ const scene = "version: 1\naxes: z-up\nmaterials: {m: {model: diffuse, diffuse: 
     "objects: [{sphere: {centre: [0, 0, 10], radius: 10}, material: m}]\n";
 
 class Run {
-  // `options`: of sink_web, in YAML.
-  constructor({width = 160, height = 120, control = commands, options = "quality: 80"} = {}) {
+  // `options`: of sink_web, in YAML; `seen`: the marker in the picture; `record`: the output of the command.
+  constructor({width = 160, height = 120, control = commands, options = "quality: 80", seen = 0,
+               record = "{plugin: sink_video, path: out/take-%03d.mkv}"} = {}) {
     this.folder = fs.mkdtempSync(path.join(os.tmpdir(), "arhost-web-"));
+    fs.mkdirSync(path.join(this.folder, "out"));
     for (const name of ["scene.yaml", "other.yaml"])
       fs.writeFileSync(path.join(this.folder, name), scene);
     fs.writeFileSync(path.join(this.folder, "run.yaml"), `version: 1
 mode: live
-source: {plugin: source_synthetic, fps: 30, options: {frames: 0, id: 0, side_mm: 80, width: ${width}, height: ${height}}}
+source: {plugin: source_synthetic, fps: 30, options: {frames: 0, id: ${seen}, side_mm: 80, width: ${width}, height: ${height}}}
 tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}], hold_frames: 3}
 raytracer: {plugin: rt_embree, scene: scene.yaml}
 scenes: [other.yaml]
 alternatives: {raytracer: [{name: smooth, plugin: rt_embree, options: {samples: 2}}]}
 snapshot: {plugin: sink_images, path: out/snapshot-%03d.png}
-record: {plugin: sink_video, path: out/take-%03d.mkv}
-outputs: [{plugin: sink_web, allow: [listen], control: ${control}, options: {listen: "127.0.0.1:0", ${options}}}]
+record: ${record}
+outputs: [{plugin: sink_web, allow: [listen], reads: [out], control: ${control}, options: {listen: "127.0.0.1:0", ${options}}}]
 stats: stats.json
 `);
   }
   async start() {
     this.output = "";
-    this.process = spawn(path.join(build, "bin", "arhost"), ["--config", "run.yaml"], {cwd: this.folder});
+    this.process = spawn(path.join(build, "bin", "arhost"), ["--config", "run.yaml"],
+                         {cwd: this.folder, env: {...process.env, ARHOST_PLUGIN_PATH: path.join(build, "tests", "plugins")}});
     this.ended = new Promise(resolve => this.process.on("exit", resolve));
     for (const stream of [this.process.stdout, this.process.stderr])
       stream.on("data", text => { this.output += text; });

@@ -5,6 +5,7 @@ const assert = require("node:assert");
 const {after, afterEach, before, test} = require("node:test");
 const fs = require("node:fs");
 const path = require("node:path");
+const {execFileSync} = require("node:child_process");
 const {source: axe} = require("axe-core");
 const {Run, launch, patience_s, until} = require("./arhost.cjs");
 
@@ -42,6 +43,7 @@ async function moves(page) {
 const eventually = (page, condition, argument) => until(String(condition), () => page.evaluate(condition, argument));
 const result = (page, text) => eventually(page, expected => document.getElementById("result").textContent.includes(expected), text);
 const isState = text => document.getElementById("state").textContent === text;
+const areDead = page => page.evaluate(() => [...document.querySelectorAll("main button, main select, main input")].every(each => each.disabled));
 const file = name => path.join(run.folder, name);
 
 test("the picture moves", async () => {
@@ -115,8 +117,11 @@ test("a scene is loaded and the ray tracer swapped", async () => {
 test("changed options are set with the keyboard alone", async () => {
   const {page, close} = await open();
   const value = async () => (await run.component("sink_web")).options.find(each => each.option === "quality").value;
-  for (let i = 0; i < 80 && await page.evaluate(() => document.activeElement.id) !== "option-sink_web-quality"; ++i)
+  for (let i = 0; i < 80 && await page.evaluate(() => document.activeElement.id) !== "option-sink_web-quality"; ++i) {
     await page.keyboard.press("Tab");
+    if (await page.evaluate(() => document.activeElement.matches("#options-of-sink_web:not([open]) summary")))
+      await page.keyboard.press("Enter");
+  }
   const outline = await page.evaluate(() => getComputedStyle(document.activeElement).outlineStyle);
   assert.notStrictEqual(outline, "none", "the focus must be visible");
   await page.keyboard.press("Control+A");
@@ -136,6 +141,7 @@ for (const [name, settings] of [["a desktop", {}], ["a phone", {viewport: phone}
   test("axe finds no violation on " + name, async () => {
     const {page, close} = await open(settings);
     await page.waitForSelector("#options:not(:empty)");
+    await page.evaluate(() => document.querySelectorAll("#options details").forEach(each => { each.open = true; }));
     const {violations} = await page.evaluate(axe + "; axe.run()");
     assert.deepStrictEqual(violations.map(each => each.id + ": " + each.nodes.map(node => node.html.slice(0, 120)).join(" | ")), []);
     assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= innerWidth), "the page scrolls sideways");
@@ -170,13 +176,20 @@ test("ten viewers get moving pictures", async () => {
   await Promise.all(viewers.map(viewer => viewer.close()));
 });
 
-test("commands need the token, which the page asks for", async () => {
+test("commands need the token, which the page asks for and remembers", async () => {
   const own = await new Run({options: "token: 0123456789abcdef"}).start();
   const {page} = await open({}, own.url);
-  await page.click("#command-freeze");
-  await result(page, "need the token");
+  await page.waitForSelector("#command-freeze");
+  assert.ok(await page.locator("#command-freeze").isDisabled(), "before the token is known");
+  await page.fill("#token", "0123456789abcdee");
+  await page.keyboard.press("Enter");
+  await result(page, "This token is wrong.");
+  assert.ok(await page.locator("#command-freeze").isDisabled());
   await page.fill("#token", "0123456789abcdef");
-  await page.keyboard.press("Tab");
+  await page.keyboard.press("Enter");
+  await result(page, "The token is right.");
+  assert.ok(!await page.locator("#token").isVisible());
+  await page.reload({waitUntil: "commit"});
   await page.click("#command-freeze");
   await result(page, "The video is frozen.");
   await own.stop();
@@ -202,6 +215,120 @@ test("quit ends the run after a confirmation", async () => {
   page.once("dialog", dialog => dialog.accept());
   await page.click("#command-quit");
   assert.strictEqual(await own.ended, 0, own.output);
+  await eventually(page, isState, "ended");
+  assert.match(await page.locator("#ended").innerText(), /The run has ended[\s\S]*\d+ frames, \d+ with a target, .*no error\./);
+  assert.ok(await areDead(page));
+  await own.stop();
+});
+
+test("a lost connection disables the controls until it is back", async () => {
+  const own = await new Run().start();
+  const {page} = await open({}, own.url);
+  await eventually(page, isState, "running");
+  own.process.kill("SIGSTOP");
+  await eventually(page, isState, "no connection");
+  assert.ok(await areDead(page));
+  own.process.kill("SIGCONT");
+  await eventually(page, isState, "running");
+  assert.ok(await page.locator("#command-freeze").isEnabled());
+  await moves(page);
+  own.process.kill("SIGKILL");
   await eventually(page, isState, "no connection");
   await own.stop();
+});
+
+test("a recording that fails is reported", async () => {
+  const own = await new Run({record: "{plugin: sink_poses, path: out/take-%03d.jsonl}"}).start();
+  const {page, close} = await open({}, own.url);
+  await page.click("#command-record");
+  await result(page, "Recording ");
+  execFileSync("prlimit", ["--pid", own.worker("sink_poses"), "--fsize=1000"]); // like a full disk
+  await result(page, "record: ");
+  await eventually(page, () => document.getElementById("problems").textContent.includes("error"));
+  assert.match(await page.locator("#messages").innerText(), /record: .*take-001\.jsonl.*File too large/);
+  await page.waitForSelector("#command-record[aria-pressed=false]");
+  const answer = await (await fetch(own.url + "api/control", {method: "POST", headers: {"Content-Type": "application/json"},
+    body: JSON.stringify({command: "record", on: false})})).json();
+  assert.match(answer.error, /^the recording '.*take-001\.jsonl' failed: .*File too large/);
+  await close();
+  await own.stop();
+});
+
+test("a wrong marker is named", async () => {
+  const own = await new Run({seen: 5}).start();
+  const {page, close} = await open({}, own.url);
+  await eventually(page, isState, "no target");
+  await eventually(page, () => document.getElementById("hint").textContent.includes("it looks for 'tag36h11-0' (tag36h11 0); it saw tag36h11 5 ("));
+  assert.ok(await page.locator("#hint").isVisible());
+  await close();
+  await own.stop();
+});
+
+const viewers = async () => Number(/arhost_web_viewers (\d+)\n/.exec(await (await fetch(run.url + "metrics")).text())[1]);
+const setHidden = (page, isHidden) => page.evaluate(value => {
+  Object.defineProperty(document, "hidden", {value, configurable: true});
+  document.dispatchEvent(new Event("visibilitychange"));
+}, isHidden);
+
+test("a hidden page closes its streams", async () => {
+  await until("no stream", async () => await viewers() === 0);
+  const {page, close} = await open();
+  await until("a stream", async () => await viewers() === 1);
+  await setHidden(page, true);
+  await until("no stream", async () => await viewers() === 0);
+  await setHidden(page, false);
+  await until("a stream", async () => await viewers() === 1);
+  await moves(page);
+  await close();
+});
+
+test("many windows of one browser do not block each other", async () => {
+  const context = await browser.newContext({viewport: desktop}), pages = [];
+  while (pages.length < 7) {
+    pages.push(await context.newPage());
+    pages[pages.length - 1].setDefaultTimeout(1000 * patience_s);
+    await pages[pages.length - 1].goto(run.url, {waitUntil: "commit"});
+    await pages[pages.length - 1].waitForSelector("#command-freeze");
+  }
+  for (const page of [pages[0], pages[6]])
+    for (const [isFrozen, text] of [[true, "The video is frozen."], [false, "The video goes on."]]) {
+      await page.waitForSelector("#command-freeze[aria-pressed=" + !isFrozen + "]");
+      await page.click("#command-freeze");
+      await result(page, text);
+    }
+  await Promise.all(pages.map(page => moves(page)));
+});
+
+test("the picture stays in view while an option is changed", async () => {
+  for (const viewport of [desktop, phone]) {
+    const {page, close} = await open({viewport});
+    await page.waitForSelector("#options-of-raytracer");
+    assert.ok(!await page.locator("#option-raytracer-samples").isVisible(), "options are collapsed");
+    await page.click("#options-of-raytracer summary");
+    await page.locator("#option-raytracer-samples").scrollIntoViewIfNeeded();
+    const picture = await page.locator("#picture").boundingBox(), field = await page.locator("#option-raytracer-samples").boundingBox();
+    assert.ok(picture.y >= 0 && picture.y + picture.height <= viewport.height, JSON.stringify(picture));
+    assert.ok(field.y >= 0 && field.y + field.height <= viewport.height, JSON.stringify(field));
+    await close();
+  }
+});
+
+test("a button at the picture shows the debug view", async () => {
+  const {page, close} = await open();
+  await page.click("#debug-view");
+  await result(page, "The debug view is on.");
+  await page.waitForSelector("#debug-view[aria-pressed=true]");
+  await page.click("#debug-view");
+  await result(page, "The debug view is off.");
+  await close();
+});
+
+test("snapshots can be downloaded", async () => {
+  const {page, close} = await open();
+  await page.click("#command-snapshot");
+  await result(page, "Saved ");
+  const link = page.locator("#files a").first(), name = await link.innerText();
+  const [download] = await Promise.all([page.waitForEvent("download"), link.click()]);
+  assert.deepStrictEqual(fs.readFileSync(await download.path()), fs.readFileSync(file("out/" + name)));
+  await close();
 });
