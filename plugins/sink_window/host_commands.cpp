@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
+
 namespace sink_window {
 
 using Json = nlohmann::json;
@@ -75,6 +77,8 @@ void HostCommands::poll(Clock::time_point now) {
         try {
             const Json answer = Json::parse(text);
             status_granted_ = answer.at("ok").get<bool>();
+            if (const auto granted = answer.find("granted"); granted != answer.end())
+                granted_ = granted->get<std::set<std::string>>();
             if (status_granted_)
                 take_status(answer.at("status"));
         } catch (const Json::exception &) {
@@ -96,12 +100,34 @@ void HostCommands::take_status(const Json &status) {
     for (const auto &[name, timing] : outputs.items())
         numbers.timings.emplace_back("to " + name, percentiles_of(timing));
     if (stages.contains("latency"))
-        numbers.latency = percentiles_of(stages.at("latency"));
+        numbers.latency_ms = stages.at("latency").at("p50_ms").get<double>();
     for (const Json &target : status.at("targets"))
         numbers.targets += target.at("state") != "lost";
     for (const Json &component : status.at("components"))
         numbers.restarts += component.at("restarts").get<int>();
     numbers_ = numbers;
+    const Json &missing = status.at("missing_target");
+    missing_target_ = missing.is_string() ? missing.get<std::string>() : "";
+    take_problems(status.at("messages"));
+}
+
+// Shows the first new message, because the others are often its consequences, but an error before a warning.
+void HostCommands::take_problems(const Json &messages) {
+    constexpr std::size_t max_problems = 6;
+    const Problem *shown = nullptr;
+    std::vector<Problem> all;
+    all.reserve(messages.size());
+    for (const Json &message : messages) {
+        all.push_back({message.at("component").get<std::string>() + ": " + message.at("text").get<std::string>(),
+                       message.at("severity") == "error"});
+        const auto number = message.at("number").get<std::uint64_t>();
+        if (last_problem_ && number > *last_problem_ && (!shown || (all.back().is_error && !shown->is_error)))
+            shown = &all.back();
+    }
+    if (shown)
+        show_(shown->text, true);
+    last_problem_ = messages.empty() ? 0 : messages.back().at("number").get<std::uint64_t>();
+    problems_.assign(all.end() - static_cast<std::ptrdiff_t>(std::min(all.size(), max_problems)), all.end());
 }
 
 } // namespace sink_window

@@ -14,6 +14,7 @@
 #include <algorithm>
 #include <chrono>
 #include <deque>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -136,6 +137,9 @@ private:
             return commands_.freeze();
         case 'r':
             return commands_.record();
+        case 'l':
+            problems_ = !problems_;
+            break;
         case 'd':
             debug_view_.is_on = !debug_view_.is_on;
             break;
@@ -185,44 +189,55 @@ private:
         double bottom = status_line_ && record_ ? overlay.bar(status(), "h: help") : 0;
         if (message_ && Clock::now() > message_->end)
             message_.reset();
+        if (!commands_.missing_target().empty())
+            bottom += overlay.box(overlay.wrap(commands_.missing_target(), yellow), 0.5, 1, 0, bottom);
         if (message_)
             bottom += overlay.box(overlay.wrap(message_->text, message_->colour), 0.5, 1, 0, bottom);
+        if (problems_)
+            overlay.box(problems(overlay), 0.5, 0.5, 0, bottom);
         if (help_)
             overlay.box(help(), 0.5, 0.5, 0, bottom);
+    }
+
+    std::vector<Row> problems(const Overlay &overlay) const {
+        std::vector<Row> rows;
+        for (const HostCommands::Problem &problem : commands_.problems())
+            std::ranges::copy(overlay.wrap(problem.text, problem.is_error ? red : yellow), std::back_inserter(rows));
+        return rows.empty() ? std::vector<Row>{{"", "no warning and no error", white}} : rows;
     }
 
     std::string status() const {
         const auto &numbers = commands_.numbers();
         std::string text = fmt::format("{:.1f} fps", numbers ? numbers->fps : rate_.per_second());
-        if (numbers && !numbers->latency.empty())
-            text += "   " + numbers->latency;
-        else if (latency_ms_)
-            text += fmt::format("   {:.0f} ms", *latency_ms_);
+        if (const std::optional<double> latency_ms = numbers ? numbers->latency_ms : latency_ms_)
+            text += fmt::format("   latency {:.0f} ms", *latency_ms);
         const auto is_visible = [](const arhost_target &target) { return target.state != ARHOST_TARGET_LOST; };
         text += "   " + count_of(numbers ? numbers->targets
                                          : std::ranges::count_if(elements(record_->targets, record_->target_count),
                                                                  is_visible),
                                  "target");
-        if (numbers)
+        if (numbers && numbers->restarts > 0)
             text += "   " + count_of(numbers->restarts, "restart");
         return text;
     }
 
+    // Lists only what the keys do in this run.
     std::vector<Row> help() const {
-        std::vector<Row> rows = {{"h", "close this help"},
-                                 {"s", "snapshot"},
-                                 {"space", commands_.frozen() ? "continue" : "freeze"},
-                                 {"r", commands_.recording() ? "end the recording" : "record"},
-                                 {"d", "debug view"},
-                                 {"f", "full screen"},
-                                 {"m", "mirror"}};
+        std::vector<Row> rows = {{"h", "close this help"}};
+        const auto add = [&](const char *command, Row row) {
+            if (commands_.grants(command))
+                rows.push_back(std::move(row));
+        };
+        add("snapshot", {"s", "snapshot"});
+        add("freeze", {"space", commands_.frozen() ? "continue" : "freeze"});
+        add("record", {"r", commands_.recording() ? "end the recording" : "record"});
+        add("status", {"l", "warnings and errors"});
+        rows.insert(rows.end(), {{"d", "debug view"}, {"f", "full screen"}, {"m", "mirror"}});
         const std::vector<std::string> &scenes = commands_.scenes();
-        if (scenes.empty())
-            rows.push_back({"1-9", "scenes"});
         for (std::size_t i = 0; i < std::min<std::size_t>(scenes.size(), 9); ++i)
-            rows.push_back(
+            add("load_scene",
                 {std::to_string(i + 1), "scene " + scenes[i], scenes[i] == commands_.scene() ? green : white});
-        rows.push_back({"q", "quit"});
+        rows.push_back({"q", commands_.grants("quit") ? "end the run" : "close the window"});
         return rows;
     }
 
@@ -240,7 +255,7 @@ private:
     std::vector<arhost_expected_marker> expected_;
     Rate rate_;
     std::optional<double> latency_ms_; // time from the capture of a frame to its arrival in this plugin
-    bool help_ = false, mirrored_ = false, stale_ = false;
+    bool help_ = false, problems_ = false, mirrored_ = false, stale_ = false;
     std::optional<Message> message_;
 };
 

@@ -17,7 +17,7 @@ using namespace arhost::test;
 namespace {
 
 // Colours of text.
-constexpr std::array<std::uint8_t, 3> red{80, 96, 255}, blue{255, 160, 90};
+constexpr std::array<std::uint8_t, 3> red{80, 96, 255}, blue{255, 160, 90}, yellow{60, 210, 255}, grey{170, 170, 170};
 
 // Runs arhost with a window on its own X server.
 class WindowRun : public testing::Test {
@@ -29,13 +29,15 @@ protected:
     }
 
     // `granted`: the value of `control`. Frames of source_counter have one colour, which changes from frame to frame.
-    void start(const std::string &granted) {
-        std::string yaml = counting({.mode = "live", .source = "frames: 1000000, width: 640, height: 480"});
+    void start(const std::string &granted, const std::string &size = "width: 640, height: 480",
+               const std::string &record = "{plugin: sink_poses, path: out/take-%02d.jsonl}") {
+        std::string yaml = counting({.mode = "live", .source = "frames: 1000000, " + size});
         const std::string counter = "outputs: [{plugin: sink_counter, path: counted.txt}]";
         yaml.replace(yaml.find(counter), counter.size(),
                      "outputs: [{plugin: sink_window, allow: [display], control: " + granted +
                          "}]\nsnapshot: {plugin: sink_images, path: out/snapshot-%02d.png}\n"
-                         "record: {plugin: sink_poses, path: out/take-%02d.jsonl}\nscenes: [other.yaml]");
+                         "record: " +
+                         record + "\nscenes: [other.yaml]");
         run_.write("run.yaml", yaml);
         run_.write("scene.yaml", small_scene);
         run_.write("other.yaml", small_scene);
@@ -50,7 +52,7 @@ protected:
         };
     }
     Screenshot screen() const { return observer_->screen(); }
-    static bool has_frame(const Screenshot &shot) { return shot.pixel(0, 240)[2] > 0; }
+    static bool has_frame(const Screenshot &shot) { return shot.pixel(0, 100)[2] > 0; }
     // Returns the number of pixels on the screen with this colour of text.
     int count(const std::array<std::uint8_t, 3> &bgr) const {
         const Screenshot shot = screen();
@@ -135,6 +137,44 @@ TEST_F(WindowRun, ACommandThatIsNotGrantedShowsTheReason) {
     EXPECT_TRUE(eventually([this] { return count(red) == 0; })) << "the message disappears";
     observer_->press(XK_2);
     EXPECT_TRUE(eventually([this] { return count(red) > 100; })) << "the names of scenes are unknown";
+    observer_->press(XK_q);
+    EXPECT_EQ(run_.wait(), 0) << run_.output();
+}
+
+TEST_F(WindowRun, TheHelpListsOnlyKeysThatHaveAnEffect) {
+    // Returns the number of yellow pixels, the colour of the keys' names in the help.
+    const auto keys = [&](const std::string &granted) {
+        start(granted);
+        observer_->press(XK_h);
+        int last = -1, now = 0; // until the answer about the grants has arrived
+        EXPECT_TRUE(
+            eventually([&] { return (now = count(yellow)) > 0 && std::exchange(last, now) == now && moves(); }));
+        observer_->press(XK_q);
+        EXPECT_EQ(run_.wait(), 0) << run_.output();
+        return now;
+    };
+    const int few = keys("[quit]"), many = keys(all_commands);
+    EXPECT_GT(few, 0);
+    EXPECT_GT(many, few * 3 / 2);
+}
+
+TEST_F(WindowRun, ShowsAnErrorOfTheRun) {
+    start(all_commands, "width: 640, height: 480", "{plugin: sink_realtime, path: out/take-%02d.txt}");
+    observer_->press(XK_r);
+    ASSERT_TRUE(eventually([this] { return run_.worker("sink_realtime") != 0 && count(red) > 0; })) << "REC is red";
+    constexpr int misbehave_error = 5; // MISBEHAVE_ERROR in plugins/misbehave.h
+    ASSERT_EQ(::sigqueue(run_.worker("sink_realtime"), SIGRTMIN, {.sival_int = misbehave_error}), 0);
+    EXPECT_TRUE(eventually([this] { return count(red) > 300; })) << "the error is longer than REC: " << run_.output();
+    EXPECT_TRUE(eventually([this] { return count(red) == 0; })) << "the message disappears";
+    observer_->press(XK_l);
+    EXPECT_TRUE(eventually([this] { return count(red) > 300; })) << "the list has the error";
+    observer_->press(XK_q);
+    EXPECT_EQ(run_.wait(), 1) << run_.output();
+}
+
+TEST_F(WindowRun, TheStatusLineFitsIntoASmallWindow) {
+    start(all_commands, "width: 320, height: 240");
+    EXPECT_TRUE(eventually([this] { return count(grey) > 0; })) << "the text at the right end has room";
     observer_->press(XK_q);
     EXPECT_EQ(run_.wait(), 0) << run_.output();
 }
