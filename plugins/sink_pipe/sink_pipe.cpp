@@ -2,7 +2,7 @@
 //
 // sink_pipe: writes uncompressed video to a FIFO or to standard output, for other programs.
 #include "libav_common/bgr_converter.hpp"
-#include "pipe_stream.hpp"
+#include "sink_common/pipe_stream.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 
@@ -42,9 +42,9 @@ const Format &format_of(std::string_view name) {
 class PipeSink {
 public:
     PipeSink(const Host &host, const Options &options)
-        : host_(host), stream_(host, options.text("path")), format_(format_of(options.text("format"))),
-          matrix_(options.text("matrix")), writes_overlay_(options.text("content") == "overlay"),
-          reopen_(options.boolean("reopen")) {
+        : host_(host), stream_(host, options.text("path"), PipeStream::Content::binary),
+          format_(format_of(options.text("format"))), matrix_(options.text("matrix")),
+          writes_overlay_(options.text("content") == "overlay"), reopen_(options.boolean("reopen")) {
         if (reopen_ && stream_.is_standard_output())
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                           "reopen: standard output cannot be opened again; name a FIFO as 'path'");

@@ -7,7 +7,10 @@
 
 #include <gmock/gmock.h>
 
+#include <arpa/inet.h>
 #include <future>
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 namespace fs = std::filesystem;
 using namespace arhost::test;
@@ -67,6 +70,72 @@ TEST(PipeRun, StandardOutputHasOnlyTheVideo) {
     }
 }
 
+namespace {
+
+std::string poses_yaml(const std::string &output) {
+    return "version: 1\nsource: {plugin: source_synthetic, options: {width: 160, height: 120, frames: 30}}\n"
+           "outputs: [{plugin: sink_poses, " +
+           output + "}]\n";
+}
+
+void expect_lines_of_all_frames(const std::string &text) {
+    EXPECT_EQ(count_of(text, "\n"), 30u);
+    EXPECT_THAT(text, testing::AllOf(StartsWith("{\"frame\": 0, "), HasSubstr("}\n{\"frame\": 29, "),
+                                     testing::EndsWith("}\n")));
+}
+
+} // namespace
+
+TEST(PosesRun, StandardOutputHasOnlyTheLines) {
+    ArhostRun run(poses_yaml("path: \"-\""));
+    run.start({"--config", "run.yaml"},
+              [] { ::dup2(::open("poses.jsonl", O_CREAT | O_WRONLY | O_CLOEXEC, 0600), STDOUT_FILENO); });
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    expect_lines_of_all_frames(run.read("poses.jsonl"));
+}
+
+TEST(PosesRun, AFifoReceivesTheLines) {
+    ArhostRun run(poses_yaml("path: out/fifo"));
+    const fs::path fifo = make_fifo(run.path("out/fifo"));
+    auto text = std::async(std::launch::async, [&] { return FifoReader(fifo).read_all(); });
+    EXPECT_EQ(run.run(), 0) << run.output();
+    expect_lines_of_all_frames(text.get());
+}
+
+TEST(PosesRun, EachFrameIsADatagram) {
+    const arhost::base::UniqueFd socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    ASSERT_EQ(::bind(socket.get(), reinterpret_cast<const sockaddr *>(&address), size), 0);
+    ASSERT_EQ(::getsockname(socket.get(), reinterpret_cast<sockaddr *>(&address), &size), 0);
+    const std::string options = "options: {udp: \"127.0.0.1:" + std::to_string(ntohs(address.sin_port)) + "\"}";
+    ArhostRun run(poses_yaml("allow: [network], " + options));
+    EXPECT_EQ(run.run(), 0) << run.output();
+    std::string text(1 << 20, '\0');
+    std::size_t used = 0;
+    for (ssize_t got = 0; (got = ::recv(socket.get(), text.data() + used, text.size() - used, MSG_DONTWAIT)) > 0;) {
+        EXPECT_EQ(text[used], '{');
+        used += static_cast<std::size_t>(got);
+        EXPECT_EQ(text[used - 1], '\n');
+    }
+    text.resize(used);
+    expect_lines_of_all_frames(text);
+
+    run.write("run.yaml", poses_yaml(options));
+    EXPECT_EQ(run.run(), 2);
+    EXPECT_THAT(run.messages(), HasSubstr("this output needs 'allow: [network]'"));
+}
+
+TEST(PosesRun, NeedsOneReceiver) {
+    for (const char *output :
+         {"allow: [network]", "path: out/a.jsonl, allow: [network], options: {udp: \"127.0.0.1:9\"}"}) {
+        ArhostRun run(poses_yaml(output));
+        run.expect(2, {"set either 'path' or the option 'udp'"});
+    }
+}
+
 TEST(PipeRun, TheOverlayAloneMatchesTheComposite) {
     ArhostRun run("version: 1\nframes: 3\n"
                   "source: {plugin: source_synthetic, options: {width: 160, height: 120, id: 0, side_mm: 80}}\n"
@@ -111,8 +180,8 @@ TEST(PipeRun, AClosedReaderOfStandardOutputEndsTheRun) {
 
 TEST(PipeRun, OnlyOneOutputMayUseStandardOutputIfItSupportsIt) {
     for (const auto &[outputs, error] :
-         {std::pair{"{plugin: sink_poses, path: \"-\"}",
-                    "run.yaml:3:38: outputs[0].path: sink_poses cannot write to standard output; name a file"},
+         {std::pair{"{plugin: sink_trajectory, path: \"-\"}",
+                    "run.yaml:3:43: outputs[0].path: sink_trajectory cannot write to standard output; name a file"},
           {"{plugin: sink_pipe, path: \"-\"}, {plugin: sink_pipe, path: /dev/stdout}",
            "another output already writes"}}) {
         ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 1}}\noutputs: [" +

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "pipe_stream.hpp"
+#include "sink_common/pipe_stream.hpp"
 
 #include <fcntl.h>
 #include <poll.h>
@@ -64,7 +64,7 @@ void PipeStream::open(bool after_another) {
 }
 
 void PipeStream::open_standard_output() {
-    if (::isatty(STDOUT_FILENO))
+    if (content_ == Content::binary && ::isatty(STDOUT_FILENO))
         throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
                       "path: standard output is a terminal; connect it to a program, as in 'arhost … | ffplay -'");
     fd_ = STDOUT_FILENO;

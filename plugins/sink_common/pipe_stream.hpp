@@ -15,8 +15,10 @@ namespace arhost::pipe {
 
 class PipeStream {
 public:
+    enum class Content { text, binary }; // only text is written to a terminal
     // `path`: the path of an existing FIFO, or "-" for standard output.
-    PipeStream(const Host &host, std::string path) : host_(host), path_(std::move(path)) {}
+    PipeStream(const Host &host, std::string path, Content content)
+        : host_(host), path_(std::move(path)), content_(content) {}
     ~PipeStream() { close(); }
     PipeStream(const PipeStream &) = delete;
     PipeStream &operator=(const PipeStream &) = delete;
@@ -43,6 +45,7 @@ private:
 
     Host host_;
     std::string path_;
+    Content content_;
     int fd_ = -1;
 };
 
