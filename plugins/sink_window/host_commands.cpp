@@ -124,7 +124,7 @@ void HostCommands::take_problems(const Json &messages) {
         if (last_problem_ && number > *last_problem_ && (!shown || (all.back().is_error && !shown->is_error)))
             shown = &all.back();
     }
-    if (shown)
+    if (shown && (shown->is_error || missing_target_.empty())) // the missing target is shown already
         show_(shown->text, true);
     last_problem_ = messages.empty() ? 0 : messages.back().at("number").get<std::uint64_t>();
     problems_.assign(all.end() - static_cast<std::ptrdiff_t>(std::min(all.size(), max_problems)), all.end());
