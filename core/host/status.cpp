@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 
 namespace arhost::host {
 
@@ -111,7 +112,6 @@ Json target_json(const arhost_target &target) {
     return {{"name", target.name},
             {"state", to_text(target)},
             {"distance_mm", std::hypot(target.mt[12], target.mt[13], target.mt[14])},
-            {"mt", target.mt},
             {"reprojection_px", target.reprojection_px}};
 }
 
@@ -126,8 +126,13 @@ Json status_json(const RunParts &parts, const Assembly &assembly, const Outputs 
                                                      tracker->configuration()->targets, parts.context.reactor.now())
                                     : "";
     Json targets = Json::array();
-    for (const arhost_target &target : parts.flow.last_targets())
+    constexpr std::size_t max_poses = 64; // the status must fit into a message to a worker, as must the paths below
+    std::size_t poses = 0;
+    for (const arhost_target &target : parts.flow.last_targets()) {
         targets.push_back(target_json(target));
+        if (is_visible(target) && poses++ < max_poses)
+            targets.back()["mt"] = target.mt;
+    }
     Json stages = Json::object();
     for (const auto &[name, timing] : statistics.stages.recent())
         stages[name] = timing.to_json();
@@ -148,9 +153,12 @@ Json status_json(const RunParts &parts, const Assembly &assembly, const Outputs 
         if (sink->on_demand && sink->component->name() == "record" && !sink->closed)
             recording = sink->path;
     }
+    constexpr std::size_t max_path_bytes = 16 * 1024;
+    std::size_t path_bytes = 0;
     Json files = Json::array();
-    for (const auto &[number, file] : outputs.files())
-        files.push_back({{"number", number}, {"file", file}});
+    for (const auto &[number, file] : std::views::reverse(outputs.files()))
+        if ((path_bytes += file.size()) <= max_path_bytes)
+            files.insert(files.begin(), Json({{"number", number}, {"file", file}}));
     return {{"arhost", ARHOST_VERSION},
             {"mode", parts.live() ? "live" : "lockstep"},
             {"frozen", parts.flow.is_frozen()},
