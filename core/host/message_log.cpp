@@ -8,7 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <ranges>
+#include <vector>
 
 namespace arhost::host {
 
@@ -27,7 +27,8 @@ void MessageLog::add(arhost_severity severity, const std::string &component, con
 Json MessageLog::to_json() const {
     std::vector<Json> newest_first;
     std::size_t size = 0;
-    for (const Message &message : std::views::reverse(messages_)) {
+    for (auto each = messages_.rbegin(); each != messages_.rend(); ++each) {
+        const Message &message = *each;
         using namespace std::chrono;
         const auto ms = duration_cast<milliseconds>(message.time.time_since_epoch()).count() % 1000;
         Json json = {{"number", message.number},
@@ -46,10 +47,10 @@ Json MessageLog::to_json() const {
 }
 
 std::string MessageLog::error_of(const std::string &component, std::uint64_t after, const std::string &known) const {
-    for (const Message &message : std::views::reverse(messages_))
-        if (message.number > after && message.is_error && message.component == component && message.text != known)
-            return message.text;
-    return "";
+    const auto found = std::find_if(messages_.rbegin(), messages_.rend(), [&](const Message &message) {
+        return message.number > after && message.is_error && message.component == component && message.text != known;
+    });
+    return found == messages_.rend() ? "" : found->text;
 }
 
 } // namespace arhost::host

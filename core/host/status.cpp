@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 
 namespace arhost::host {
 
@@ -156,9 +155,9 @@ Json status_json(const RunParts &parts, const Assembly &assembly, const Outputs 
     constexpr std::size_t max_path_bytes = 16 * 1024;
     std::size_t path_bytes = 0;
     Json files = Json::array();
-    for (const auto &[number, file] : std::views::reverse(outputs.files()))
-        if ((path_bytes += file.size()) <= max_path_bytes)
-            files.insert(files.begin(), Json({{"number", number}, {"file", file}}));
+    for (auto each = outputs.files().rbegin(); each != outputs.files().rend(); ++each)
+        if ((path_bytes += each->second.size()) <= max_path_bytes)
+            files.insert(files.begin(), Json({{"number", each->first}, {"file", each->second}}));
     return {{"arhost", ARHOST_VERSION},
             {"mode", parts.live() ? "live" : "lockstep"},
             {"frozen", parts.flow.is_frozen()},
