@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibrate/input.hpp"
 
-#include <arhost/frame.h>
+#include "base/write_all.hpp"
+#include "frames/frame_reader.hpp"
 
 #include <fmt/format.h>
 #include <opencv2/highgui.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 
 #include <csignal>
 #include <cstdio>
@@ -29,62 +28,29 @@ void check_size(const cv::Size &size, const std::string &name) {
         throw std::runtime_error(fmt::format("{}: {} x {} px are too few to calibrate with; use images with at least "
                                              "{} px on each side",
                                              name, size.width, size.height, fewest_pixels));
-    if (std::max(size.width, size.height) > ARHOST_MAX_IMAGE_SIDE)
-        throw std::runtime_error(fmt::format("{}: {} x {} px; arhost supports at most {} px on each side", name,
-                                             size.width, size.height, static_cast<int>(ARHOST_MAX_IMAGE_SIDE)));
 }
 
-// Reads an image and turns it as its metadata requests, as source_file does.
-cv::Mat read_image(const fs::path &file) {
-    std::error_code error;
-    if (!fs::exists(file, error))
-        throw std::runtime_error(fmt::format("{}: there is no such file", file.string()));
-    cv::Mat image;
-    try {
-        image = cv::imread(file, cv::IMREAD_GRAYSCALE);
-    } catch (const cv::Exception &) { // too large for OpenCV
-    }
-    if (image.empty())
-        throw std::runtime_error(
-            fmt::format("{}: OpenCV cannot read this file as an image; use PNG or JPEG", file.string()));
-    check_size(image.size(), file.string());
-    return image;
-}
-
-cv::Mat grey_of(const cv::Mat &frame) {
-    cv::Mat grey = frame;
-    if (frame.channels() == 3)
-        cv::cvtColor(frame, grey, cv::COLOR_BGR2GRAY);
-    return grey;
-}
-
+// The frames of a video or a camera.
 class Frames {
 public:
-    Frames(cv::VideoCapture &capture, std::string name) : capture_(capture), name_(std::move(name)) {}
+    Frames(const Reading &reading, const frames::Input &input, std::string name)
+        : reader_(reading.workers, input, reading.signals), name_(std::move(name)) {}
 
-    // Returns false at the end.
-    bool next(cv::Mat &frame) {
-        if (!capture_.read(frame) || frame.empty())
-            return false;
-        if (frame.depth() != CV_8U || (frame.channels() != 1 && frame.channels() != 3))
-            throw std::runtime_error(name_ + ": its pixel format is not supported; convert it to 8 bits per channel");
-        if (count_ == 0) {
-            check_size(frame.size(), name_);
-            size_ = frame.size();
-        } else if (frame.size() != size_) {
-            throw std::runtime_error(fmt::format("{}: frame {} has {} x {} px, but the first one has {} x {} px",
-                                                 name_, count_ + 1, frame.cols, frame.rows, size_.width,
-                                                 size_.height));
+    // Returns nullopt at the end.
+    std::optional<cv::Mat> next() {
+        std::optional<cv::Mat> frame = reader_.next();
+        if (frame && count_++ == 0) {
+            check_size(frame->size(), name_);
+            size_ = frame->size();
         }
-        ++count_;
-        return true;
+        return frame;
     }
 
     std::size_t count() const { return count_; }
     cv::Size size() const { return size_; }
 
 private:
-    cv::VideoCapture &capture_;
+    frames::FrameReader reader_;
     std::string name_;
     cv::Size size_;
     std::size_t count_ = 0;
@@ -115,19 +81,6 @@ Collector::Verdict offer(Collector &collector, const Board &board, const cv::Mat
     return collector.offer(view, view ? edge_width_px(grey, *view) : 0);
 }
 
-volatile std::sig_atomic_t is_interrupted = 0;
-
-class Interruptible {
-public:
-    Interruptible() : previous_(std::signal(SIGINT, [](int) { is_interrupted = 1; })) {}
-    ~Interruptible() { std::signal(SIGINT, previous_); }
-    Interruptible(const Interruptible &) = delete;
-    Interruptible &operator=(const Interruptible &) = delete;
-
-private:
-    void (*previous_)(int);
-};
-
 constexpr const char *window = "arhost calibrate";
 
 // Shows the frame with the corners of the board, the covered cells and the advice. Returns whether the user wants to
@@ -135,10 +88,7 @@ constexpr const char *window = "arhost calibrate";
 bool show(const cv::Mat &frame, const std::optional<View> &view, const Collector &collector,
           const std::string &advice) {
     cv::Mat picture;
-    if (frame.channels() == 1)
-        cv::cvtColor(frame, picture, cv::COLOR_GRAY2BGR);
-    else
-        frame.copyTo(picture);
+    cv::cvtColor(frame, picture, cv::COLOR_GRAY2BGR);
     const cv::Mat original = picture.clone();
     for (int row = 0; row < Coverage::rows; ++row)
         for (int column = 0; column < Coverage::columns; ++column)
@@ -193,10 +143,13 @@ bool can_open_window() {
 
 } // namespace
 
-Views views_of_images(const std::vector<fs::path> &files, const Board &board) {
+Views views_of_images(const Reading &reading, const std::vector<fs::path> &files, const Board &board) {
     Views found;
+    std::vector<cv::Mat> first_images; // in which to search for other boards, which is slow
     for (const fs::path &file : files) {
-        const cv::Mat image = read_image(file);
+        frames::FrameReader reader(reading.workers, frames::file_input(file), reading.signals);
+        const cv::Mat image = reader.next().value();
+        check_size(image.size(), file.string());
         if (found.image.empty())
             found.image = image.size();
         if (image.size() != found.image)
@@ -205,6 +158,8 @@ Views views_of_images(const std::vector<fs::path> &files, const Board &board) {
                             "camera and size",
                             file.string(), image.cols, image.rows, files.front().string(), found.image.width,
                             found.image.height));
+        if (first_images.size() < 3)
+            first_images.push_back(image.clone());
         if (std::optional<View> view = board.find(image)) {
             view->name = file.filename();
             found.views.push_back(*view);
@@ -212,36 +167,27 @@ Views views_of_images(const std::vector<fs::path> &files, const Board &board) {
             found.without_board.push_back(file.filename());
         }
     }
-    constexpr std::size_t enough = 3; // images; the search for other boards is slow
-    for (std::size_t i = 0; found.views.empty() && found.seen_instead.empty() && i < std::min(files.size(), enough);
-         ++i)
-        found.seen_instead = board.seen_instead(read_image(files[i]));
+    for (std::size_t i = 0; found.views.empty() && found.seen_instead.empty() && i < first_images.size(); ++i)
+        found.seen_instead = board.seen_instead(first_images[i]);
     return found;
 }
 
-Views views_of_video(const fs::path &file, const Board &board, Model model, std::size_t limit) {
-    std::error_code error;
-    if (!fs::exists(file, error))
-        throw std::runtime_error(fmt::format("{}: there is no such file", file.string()));
-    cv::VideoCapture capture(file.string());
-    if (!capture.isOpened())
-        throw std::runtime_error(fmt::format(
-            "{}: OpenCV cannot read this file as a video; convert it, for example to MP4", file.string()));
-    Frames frames(capture, file.string());
+Views views_of_video(const Reading &reading, const fs::path &file, const Board &board, Model model,
+                     std::size_t limit) {
+    Frames frames(reading, frames::file_input(file), file.string());
     Counts counts;
     std::optional<Collector> collector;
-    cv::Mat frame, middle;
-    while (frames.next(frame)) {
-        const cv::Mat grey = grey_of(frame);
+    cv::Mat middle;
+    while (const std::optional<cv::Mat> grey = frames.next()) {
         if (!collector)
             collector.emplace(frames.size(), model, 3 * limit); // the best views are chosen later
         std::optional<View> view;
-        counts.add(offer(*collector, board, grey, frames.count(), view));
+        counts.add(offer(*collector, board, *grey, frames.count(), view));
         if (frames.count() % 100 == 1 && collector->views().empty())
-            middle = grey.clone();
+            middle = grey->clone();
     }
     if (!collector)
-        throw std::runtime_error(fmt::format("{}: the video has no frame that OpenCV can read", file.string()));
+        throw std::runtime_error(fmt::format("{}: the video has no frames", file.string()));
     const std::vector<View> &views = collector->views();
     Views found{frames.size(), {}, {}, counts.summary(file.filename().string(), frames.count()), ""};
     for (const std::size_t index : select(views, frames.size(), collector->lens(), limit))
@@ -251,44 +197,47 @@ Views views_of_video(const fs::path &file, const Board &board, Model model, std:
     return found;
 }
 
-Views views_of_camera(const CameraOptions &camera, const Board &board, Model model, std::size_t limit) {
-    // Before any threads start, because only the calling thread survives a fork.
+Views views_of_camera(const Reading &reading, const CameraOptions &camera, const Board &board, Model model,
+                      std::size_t limit) {
     const bool with_window = camera.with_window && can_open_window();
-    cv::VideoCapture capture(camera.name, camera.name.starts_with("/dev/") ? cv::CAP_V4L2 : cv::CAP_ANY);
-    if (!capture.isOpened())
-        throw std::runtime_error(fmt::format(
-            "{}: the camera cannot be opened; 'arhost devices' lists the cameras and says why", camera.name));
-    capture.set(cv::CAP_PROP_BUFFERSIZE, 1); // otherwise the images are several frames old
-    if (!camera.size.empty()) {
-        capture.set(cv::CAP_PROP_FRAME_WIDTH, camera.size.width);
-        capture.set(cv::CAP_PROP_FRAME_HEIGHT, camera.size.height);
-    }
-    const Interruptible interruptible;
-    Frames frames(capture, camera.name);
+    Frames frames(reading, frames::camera_input(camera.name, camera.size.width, camera.size.height), camera.name);
     Counts counts;
     std::optional<Collector> collector;
-    cv::Mat frame, grey;
+    cv::Mat last;
     std::string last_line;
-    for (bool is_stopped = false; !is_stopped && !is_interrupted && frames.next(frame);) {
+    const auto next = [&]() -> std::optional<cv::Mat> {
+        try {
+            return frames.next();
+        } catch (const base::Interrupted &interrupted) {
+            if (interrupted.signal != SIGINT || !collector)
+                throw;
+            return std::nullopt;
+        }
+    };
+    for (bool is_stopped = false; !is_stopped;) {
+        const std::optional<cv::Mat> grey = next();
+        if (!grey)
+            break;
         if (!camera.size.empty() && frames.size() != camera.size)
             throw std::runtime_error(
                 fmt::format("--size {}x{}: the camera delivers {} x {} px; 'arhost devices' lists "
                             "its sizes",
                             camera.size.width, camera.size.height, frames.size().width, frames.size().height));
-        grey = grey_of(frame);
         if (!collector)
             collector.emplace(frames.size(), model, limit);
         std::optional<View> view;
-        const Collector::Verdict verdict = offer(*collector, board, grey, frames.count(), view);
+        const Collector::Verdict verdict = offer(*collector, board, *grey, frames.count(), view);
         counts.add(verdict);
         const std::string line = fmt::format("{} view{}: {}", collector->views().size(),
                                              collector->views().size() == 1 ? "" : "s", collector->advice());
+        if (collector->views().empty())
+            grey->copyTo(last);
         if (line != last_line) {
             std::printf("%s\n", line.c_str());
             std::fflush(stdout);
             last_line = line;
         }
-        is_stopped = (with_window && show(frame, view, *collector, line)) || collector->is_full();
+        is_stopped = (with_window && show(*grey, view, *collector, line)) || collector->is_full();
         // The calibration may fail or omit views; then more views are needed.
         if (verdict == Collector::Verdict::taken && collector->is_complete()) {
             try {
@@ -304,7 +253,7 @@ Views views_of_camera(const CameraOptions &camera, const Board &board, Model mod
         throw std::runtime_error(fmt::format("{}: the camera delivers no images", camera.name));
     Views found{frames.size(), collector->views(), {}, counts.summary(camera.name, frames.count()), ""};
     if (found.views.empty())
-        found.seen_instead = board.seen_instead(grey);
+        found.seen_instead = board.seen_instead(last);
     return found;
 }
 

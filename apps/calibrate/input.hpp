@@ -4,6 +4,7 @@
 #pragma once
 
 #include "calibrate/collector.hpp"
+#include "plugin_tools/workers.hpp"
 
 #include <filesystem>
 
@@ -17,11 +18,18 @@ struct Views {
     std::string seen_instead;               // see Board; only if there are no views
 };
 
-// These functions throw std::runtime_error, whose message names the file and the problem.
+// The workers that decode, and a signalfd whose signals interrupt the reading.
+struct Reading {
+    plugin_tools::Workers &workers;
+    int signals;
+};
 
-Views views_of_images(const std::vector<std::filesystem::path> &files, const Board &board);
+// These functions throw std::runtime_error, whose message names the file and the problem, or base::Interrupted.
+
+Views views_of_images(const Reading &reading, const std::vector<std::filesystem::path> &files, const Board &board);
 // Takes at most `limit` views.
-Views views_of_video(const std::filesystem::path &file, const Board &board, Model model, std::size_t limit);
+Views views_of_video(const Reading &reading, const std::filesystem::path &file, const Board &board, Model model,
+                     std::size_t limit);
 
 struct CameraOptions {
     std::string name; // device, file or URL
@@ -30,7 +38,8 @@ struct CameraOptions {
 };
 
 // Prints advice to the person who holds the board, until the views are complete or `limit` is reached, or until
-// Ctrl-C or the key q in the window.
-Views views_of_camera(const CameraOptions &camera, const Board &board, Model model, std::size_t limit);
+// Ctrl-C or the key q in the window. SIGTERM and SIGHUP interrupt it.
+Views views_of_camera(const Reading &reading, const CameraOptions &camera, const Board &board, Model model,
+                      std::size_t limit);
 
 } // namespace arhost::calibrate

@@ -88,15 +88,16 @@ void expect_consistent(const Arguments &arguments) {
                fmt::format("--coverage {}: would overwrite an input", arguments.coverage.string()));
 }
 
-Views views_of(const Arguments &arguments, const Board &board, Model model) {
+Views views_of(const Reading &reading, const Arguments &arguments, const Board &board, Model model) {
     if (!arguments.video.empty())
-        return views_of_video(arguments.video, board, model, arguments.max_views);
+        return views_of_video(reading, arguments.video, board, model, arguments.max_views);
     if (!arguments.camera.empty())
-        return views_of_camera({arguments.camera,
+        return views_of_camera(reading,
+                               {arguments.camera,
                                 {static_cast<int>(arguments.size[0]), static_cast<int>(arguments.size[1])},
                                 !arguments.no_window},
                                board, model, arguments.max_views);
-    Views found = views_of_images(arguments.images, board);
+    Views found = views_of_images(reading, arguments.images, board);
     if (found.views.size() > arguments.max_views) {
         std::vector<View> chosen;
         for (const std::size_t index :
@@ -169,13 +170,13 @@ std::string yaml_of(const Views &found, const Calibration &calibration, const Bo
 }
 
 // Returns the text for stdout. Writes no calibration if it throws.
-std::string calibrate(const Arguments &arguments) {
+std::string calibrate(const Arguments &arguments, int signals) {
     const Board board(board_of(arguments));
     expect_consistent(arguments);
     const Model model = arguments.model == "fisheye" ? Model::fisheye : Model::brown;
-    base::AtomicFile output(arguments.output), picture(arguments.coverage);
-
-    const Views found = views_of(arguments, board, model);
+    base::AtomicFile output(arguments.output, signals), picture(arguments.coverage, signals);
+    arhost::plugin_tools::Workers workers;
+    const Views found = views_of({workers, signals}, arguments, board, model);
     if (found.views.empty())
         throw std::runtime_error(fmt::format(
             "{}; expected a {}{}",
@@ -199,7 +200,8 @@ std::string calibrate(const Arguments &arguments) {
                      {cv::IMWRITE_PNG_COMPRESSION, 9});
         picture.write({png.begin(), png.end()});
     }
-    reject(is_wrong, fmt::format("an error of {:.1f} px is too large for any lens; expected a {}, flat and rigid",
+    reject(is_wrong, fmt::format("an error of {:.1f} px is too large for any lens; expected a {}, flat and rigid, in "
+                                 "which the columns and rows are not swapped",
                                  calibration.error_px, board.description()));
     if (is_refused)
         throw std::runtime_error(fmt::format("the views do not determine the lens well: {} (or use "
@@ -225,7 +227,8 @@ int main(int argc, char **argv) {
     Arguments arguments;
     app.option("--images", arguments.images, "Images of the board, 10 or more").type_name("FILE");
     app.option("--video", arguments.video, "Video of the board; the best views are chosen").type_name("FILE");
-    app.option("--camera", arguments.camera, "Camera, such as /dev/video0; prints which view to show next")
+    app.option("--camera", arguments.camera,
+               "Camera, such as /dev/video0 or rtsp://…; prints which view to show next")
         .type_name("DEVICE");
     app.option("--size", arguments.size, "Size of the camera's images in px (default: the camera's)")
         .separator('x')
@@ -263,10 +266,12 @@ int main(int argc, char **argv) {
     if (const auto status = app.parse(argc, argv))
         return base::flush_stdout() ? *status : failed;
     try {
-        std::fputs(calibrate(arguments).c_str(), stdout);
+        std::fputs(calibrate(arguments, base::watch_signals().get()).c_str(), stdout);
         if (!base::flush_stdout())
             throw std::runtime_error("cannot write to standard output");
         return success;
+    } catch (const base::Interrupted &interrupted) {
+        base::end_by_signal(interrupted.signal);
     } catch (const std::exception &error) {
         base::flush_stdout();
         std::fprintf(stderr, "error: %s\n", base::printable(error.what()).c_str());

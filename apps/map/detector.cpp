@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "detector.hpp"
 
+#include "base/text.hpp"
+
 #include <fiducial/april_tags.hpp>
 #include <fiducial/aruco.hpp>
 #include <fiducial/corner_refinement.hpp>
@@ -131,6 +133,28 @@ Detector detector_of(const marker::Family &family, const std::set<int> &ids, con
         throw std::runtime_error("arhost map finds AprilTags and markers of OpenCV, not " + family.name +
                                  "; write the map by hand, as in docs/markers.md");
     return shared(std::make_shared<AprilTags>(*type, ids, camera));
+}
+
+std::string seen_instead(const std::vector<cv::Mat> &grey_images, const arhost_intrinsics &camera) {
+    std::size_t most = 0;
+    std::string best;
+    for (const std::string &name : marker::family_names()) {
+        const marker::Family family = marker::find_family(name);
+        const bool is_known =
+            family.is_dictionary || std::ranges::count(apriltag::family_types, name, &apriltag::FamilyType::name) > 0;
+        if (!is_known || family.count > 10'000) // the decoding tables of large families take seconds
+            continue;
+        const Detector detect = detector_of(family, {}, camera);
+        std::size_t count = 0;
+        for (const cv::Mat &grey : grey_images)
+            count += detect(grey).size();
+        // Of dictionaries that contain each other, the first one is the smallest.
+        if (count > most) {
+            most = count;
+            best = base::count_of(count, "marker") + " of " + name;
+        }
+    }
+    return best;
 }
 
 } // namespace arhost::map

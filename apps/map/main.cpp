@@ -9,13 +9,11 @@
 #include "camera/calibration.hpp"
 #include "command_line/command_line.hpp"
 #include "detector.hpp"
+#include "frames/frame_reader.hpp"
 #include "map_file.hpp"
 
 #include <fmt/format.h>
 #include <opencv2/core/utils/logger.hpp>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 
 #include <algorithm>
 #include <charconv>
@@ -92,39 +90,33 @@ struct Picture {
 // Reads images or a video.
 class Input {
 public:
-    explicit Input(const Arguments &arguments) : arguments_(arguments) {
-        if (arguments.video.empty())
-            return;
-        if (!fs::is_regular_file(arguments.video))
-            throw std::runtime_error(arguments.video + ": there is no such file");
-        if (!video_.open(arguments.video, cv::CAP_FFMPEG))
-            throw std::runtime_error(arguments.video + ": cannot be read as a video");
+    Input(const Arguments &arguments, int signals) : arguments_(arguments), signals_(signals) {
+        if (!arguments.video.empty())
+            open(arguments.video);
     }
+    // The picture is valid until the next call.
     std::optional<Picture> next() {
-        Picture picture;
         if (arguments_.video.empty()) {
             if (at_ == arguments_.images.size())
                 return {};
-            picture.name = arguments_.images[at_++];
-            picture.grey = cv::imread(picture.name, cv::IMREAD_GRAYSCALE);
-            if (picture.grey.empty())
-                throw std::runtime_error(picture.name + ": cannot be read as an image");
-            return picture;
+            const std::string &name = arguments_.images[at_++];
+            open(name);
+            return Picture{name, reader_->next().value()};
         }
-        cv::Mat colour;
+        std::optional<cv::Mat> grey;
         for (unsigned skipped = at_ == 0 ? 1 : arguments_.every; skipped > 0; --skipped, ++at_)
-            if (!video_.grab())
+            if (grey = reader_->next(); !grey)
                 return {};
-        if (!video_.retrieve(colour))
-            return {};
-        picture.name = fmt::format("frame {}", at_ - 1);
-        cv::cvtColor(colour, picture.grey, cv::COLOR_BGR2GRAY);
-        return picture;
+        return Picture{fmt::format("frame {}", at_ - 1), *grey};
     }
 
 private:
+    void open(const std::string &file) { reader_.emplace(workers_, arhost::frames::file_input(file), signals_); }
+
     const Arguments &arguments_;
-    cv::VideoCapture video_;
+    int signals_;
+    arhost::plugin_tools::Workers workers_;
+    std::optional<arhost::frames::FrameReader> reader_;
     std::size_t at_ = 0;
 };
 
@@ -166,13 +158,15 @@ struct Observations {
     std::set<int> unseen;           // markers of --ids that were not seen
 };
 
-Observations observe(const Arguments &arguments, const Family &family, const Sides &sides, Progress &progress) {
+Observations observe(const Arguments &arguments, const Family &family, const Sides &sides, int signals,
+                     Progress &progress) {
     std::set<int> ids;
     if (!arguments.ids.empty())
         for (const int id : arhost::marker::parse_ids(arguments.ids, family))
             ids.insert(id);
-    Input input(arguments);
+    Input input(arguments, signals);
     Observations result{};
+    std::vector<cv::Mat> first_pictures;
     Detector detect;
     while (const auto picture = input.next()) {
         const camera::Size size{static_cast<std::uint32_t>(picture->grey.cols),
@@ -187,6 +181,8 @@ Observations observe(const Arguments &arguments, const Family &family, const Sid
                                                  picture->name, size.width, size.height, result.camera.width,
                                                  result.camera.height));
         }
+        if (first_pictures.size() < 3)
+            first_pictures.push_back(picture->grey.clone());
         Frame &frame = result.frames.emplace_back(Frame{picture->name, detect(picture->grey)});
         for (const Detection &detection : frame.detections) {
             const auto side = sides[detection.id];
@@ -197,13 +193,17 @@ Observations observe(const Arguments &arguments, const Family &family, const Sid
                                 picture->name, detection.id, detection.id));
             result.sides_mm[detection.id] = *side;
         }
-        progress.show(fmt::format("{} frames read, {} markers seen", result.frames.size(), result.sides_mm.size()));
+        progress.show(fmt::format("{} read, {} seen", base::count_of(result.frames.size(), "frame"),
+                                  base::count_of(result.sides_mm.size(), "marker")));
     }
     if (result.frames.empty())
         throw std::runtime_error(arguments.video + ": has no frames");
-    if (result.sides_mm.empty())
-        throw std::runtime_error(
-            fmt::format("none of the {} frames shows a marker of {}", result.frames.size(), family.name));
+    if (result.sides_mm.empty()) {
+        const std::string other = seen_instead(first_pictures, result.camera);
+        throw std::runtime_error(fmt::format("no marker of {} was seen in {}{}", family.name,
+                                             base::count_of(result.frames.size(), "frame"),
+                                             other.empty() ? "" : "; the first ones show " + other));
+    }
     std::ranges::copy_if(ids, std::inserter(result.unseen, result.unseen.end()),
                          [&](int id) { return !result.sides_mm.contains(id); });
     return result;
@@ -240,8 +240,8 @@ void warn_about(const Map &map) {
     for (const LearnedMarker &marker : map.markers) {
         if (marker.misfits >= 3 && 5 * marker.misfits > marker.views + marker.misfits)
             warn(fmt::format(
-                "marker {} is elsewhere in {} of the {} frames that show it: it was moved, or there are two "
-                "of it; the map has the place where most frames show it",
+                "marker {} is elsewhere in {} of the {} frames that show it: it was moved, its side is wrong, or "
+                "there are two of it; the map has the place where most frames show it",
                 marker.id, marker.misfits, marker.views + marker.misfits));
         if (marker.is_ambiguous)
             warn(fmt::format("marker {}: the images permit two tilts; add images of it from nearer or from other "
@@ -269,7 +269,7 @@ void run(const Arguments &arguments, int signals) {
     const Sides sides(arguments, family, settings.layout);
     base::AtomicFile output(arguments.output, signals);
     Progress progress(signals);
-    const Observations seen = observe(arguments, family, sides, progress);
+    const Observations seen = observe(arguments, family, sides, signals, progress);
     settings.sides_mm = seen.sides_mm;
     settings.origin = arguments.origin;
     settings.is_plane = arguments.plane;
@@ -353,12 +353,7 @@ int main(int argc, char **argv) {
         run(arguments, base::watch_signals().get());
         return success;
     } catch (const base::Interrupted &interrupted) {
-        std::signal(interrupted.signal, SIG_DFL);
-        std::raise(interrupted.signal);
-        sigset_t all;
-        ::sigfillset(&all);
-        ::sigprocmask(SIG_UNBLOCK, &all, nullptr);
-        return failed;
+        base::end_by_signal(interrupted.signal);
     } catch (const std::exception &error) {
         std::fprintf(stderr, "error: %s\n", base::printable(error.what()).c_str());
         return failed;

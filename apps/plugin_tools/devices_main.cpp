@@ -6,6 +6,7 @@
 #include "plugin_tools/device_listing.hpp"
 #include "plugin_tools/device_report.hpp"
 #include "plugin_tools/selection.hpp"
+#include "plugin_tools/workers.hpp"
 #include "supervise/probe.hpp"
 
 #include <nlohmann/json.hpp>

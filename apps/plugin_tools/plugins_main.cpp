@@ -4,6 +4,7 @@
 #include "base/program.hpp"
 #include "base/text.hpp"
 #include "plugin_tools/selection.hpp"
+#include "plugin_tools/workers.hpp"
 #include "supervise/probe.hpp"
 
 #include <fmt/format.h>

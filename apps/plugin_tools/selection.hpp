@@ -4,18 +4,13 @@
 #pragma once
 
 #include "command_line/command_line.hpp"
-#include "ipc/reactor.hpp"
 #include "sandbox/sandbox.hpp"
-#include "supervise/launcher.hpp"
-#include "supervise/process.hpp"
 
 #include <filesystem>
 #include <string>
 #include <vector>
 
 namespace arhost::plugin_tools {
-
-std::filesystem::path built_in_plugins(); // folder
 
 class Selection {
 public:
@@ -29,18 +24,6 @@ public:
 private:
     std::vector<std::string> names_;
     std::vector<std::filesystem::path> reads_;
-};
-
-// Starts workers and prints what they log to stderr.
-class Workers {
-public:
-    Workers();
-    supervise::Context &context() { return context_; }
-
-private:
-    supervise::Launcher launcher_;
-    ipc::Reactor reactor_;
-    supervise::Context context_;
 };
 
 } // namespace arhost::plugin_tools

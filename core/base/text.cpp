@@ -41,4 +41,8 @@ std::string printable(std::string_view text, std::size_t max_size) {
     return line;
 }
 
+std::string count_of(std::uint64_t number, std::string_view noun) {
+    return std::to_string(number) + " " + std::string(noun) + (number == 1 ? "" : "s");
+}
+
 } // namespace arhost::base

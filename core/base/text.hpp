@@ -3,6 +3,7 @@
 // Makes untrusted text safe to print.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -17,5 +18,8 @@ std::string valid_utf8(std::string_view text);
 // characters, line breaks, bidirectional marks, U+FFFE and U+FFFF with spaces. Truncates the result to `max_size`
 // bytes and then appends "…".
 std::string printable(std::string_view text, std::size_t max_size = std::string_view::npos);
+
+// Returns a number with a noun: "1 frame", "2 frames".
+std::string count_of(std::uint64_t number, std::string_view noun);
 
 } // namespace arhost::base

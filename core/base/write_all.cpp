@@ -61,4 +61,14 @@ int take_signal(int signals) {
                : 0;
 }
 
+void end_by_signal(int signal) {
+    std::signal(signal, SIG_DFL);
+    std::raise(signal);
+    sigset_t pending;
+    ::sigemptyset(&pending);
+    ::sigaddset(&pending, signal);
+    ::sigprocmask(SIG_UNBLOCK, &pending, nullptr);
+    std::abort(); // the signal has ended the process
+}
+
 } // namespace arhost::base

@@ -31,4 +31,7 @@ UniqueFd watch_signals();
 // Reads the next pending signal from the signalfd `signals`. Returns 0 at once if there is none.
 int take_signal(int signals);
 
+// Ends the process as if `signal` had not been blocked by watch_signals().
+[[noreturn]] void end_by_signal(int signal);
+
 } // namespace arhost::base

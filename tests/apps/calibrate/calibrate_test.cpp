@@ -302,9 +302,9 @@ TEST_F(Calibrate, RejectsInvalidInputWithoutWritingAFile) {
         {images + charuco_board + "--marker 36 --dictionary DICT_5X5_50 " + output,
          "--marker 36: a marker must be smaller than its square of 36 mm"},
         {"--images images/missing.png " + rest, "images/missing.png: there is no such file"},
-        {"--images images/text.png " + rest, "images/text.png: OpenCV cannot read this file as an image"},
-        {"--images images/empty.png " + rest, "images/empty.png: OpenCV cannot read this file as an image"},
-        {"--images images " + rest, "images: OpenCV cannot read this file as an image"},
+        {"--images images/text.png " + rest, "text.png' cannot be read: damaged or unknown image format"},
+        {"--images images/empty.png " + rest, "empty.png' cannot be read: the file is empty"},
+        {"--images images " + rest, "images: is a folder, not a file"},
         {"--images images/tiny.png " + rest, "images/tiny.png: 1 x 1 px are too few to calibrate with"},
         {"--images images/10.png images/small.png " + rest,
          "images/small.png has 600 x 480 px, but images/10.png has 640 x 480 px; all images must be of one camera"},
@@ -313,8 +313,8 @@ TEST_F(Calibrate, RejectsInvalidInputWithoutWritingAFile) {
         {images + rest, "the board was found in 1 view, but a calibration needs at least 3, and a good one 10"},
         {"--images images/10.png images/11.png " + rest, "the board was found in 2 views"},
         {"--video missing.avi " + rest, "missing.avi: there is no such file"},
-        {"--video images/text.png " + rest, "images/text.png: "},
-        {"--camera /dev/video-missing " + rest, "/dev/video-missing: the camera cannot be opened"},
+        {"--video images/text.png " + rest, "text.png' cannot be read: "},
+        {"--camera /dev/video-missing " + rest, "/dev/video-missing"},
     };
     expect_rejected(arhost_calibrate, cases);
 }
