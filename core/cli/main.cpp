@@ -145,6 +145,9 @@ int main(int argc, char **argv) {
     std::string helped;
     add_run_options(app, arguments);
     add_coordinates(app, arguments);
+    CommandLine run_command = app.subcommand("run", "Run a configuration, as without this word");
+    add_run_options(run_command, arguments);
+    add_coordinates(run_command, arguments);
     const CommandLine replay_command = add_replay(app, arguments, replay_arguments);
     const CommandLine latency_command = add_latency(app, arguments);
     const CommandLine check_command = add_check(app, arguments, no_open);

@@ -3,6 +3,7 @@
 
 #include "base/atomic_file.hpp"
 #include "base/program.hpp"
+#include "base/text.hpp"
 #include "base/write_all.hpp"
 #include "cli/output_locks.hpp"
 #include "cli/read_configuration.hpp"
@@ -123,7 +124,7 @@ void log_contract_checks(const contracts::ContractChecks &checks, Console &conso
         if (check.violations > 0)
             console.log(ARHOST_SEVERITY_WARNING, "conform",
                         name + ": contract violated in " + std::to_string(check.violations) + " of " +
-                            std::to_string(check.checked) + " frames");
+                            base::count_of(check.checked, "frame"));
     }
     if (!checks.all().empty())
         console.log(ARHOST_SEVERITY_INFO, "conform",
@@ -146,8 +147,8 @@ void log_counters(const ComponentTotals &totals, Console &console) {
 void log_latencies(const run_config::Configuration &configuration, const Statistics &statistics, Console &console) {
     if (configuration.mode == run_config::Mode::live && statistics.composited > 0)
         console.log(ARHOST_SEVERITY_INFO, "arhost",
-                    fmt::format("{} frames, {:.1f} fps, latency from {}, {}", statistics.composited, statistics.fps(),
-                                statistics.latency_from_capture ? "capture" : "arrival",
+                    fmt::format("{}, {:.1f} fps, latency from {}, {}", base::count_of(statistics.composited, "frame"),
+                                statistics.fps(), statistics.latency_from_capture ? "capture" : "arrival",
                                 percentiles_text(statistics.stages.all(), statistics.latencies.all())));
     if (const auto &stages = statistics.stages.all(); stages.contains("glass_to_glass")) {
         const Timing &timing = stages.at("glass_to_glass");

@@ -10,6 +10,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <iomanip>
+#include <sstream>
 
 namespace arhost::command_line {
 namespace {
@@ -99,16 +101,15 @@ Option Option::separator(char c) {
 Option Option::one_value_each() {
     return Option(option_->allow_extra_args(false));
 }
-Option Option::range(int minimum, int maximum) {
-    return Option(option_->check(CLI::Range(minimum, maximum)));
-}
 Option Option::range(double minimum, double maximum) {
-    // CLI::Range accepts NaN.
-    const auto problem = [](const std::string &text) -> std::string {
+    return Option(option_->check([minimum, maximum](const std::string &text) -> std::string {
         double value = 0;
-        return CLI::detail::lexical_cast(text, value) && std::isnan(value) ? text + " is not a number" : "";
-    };
-    return Option(option_->check(problem)->check(CLI::Range(minimum, maximum)));
+        if (!CLI::detail::lexical_cast(text, value) || std::isnan(value))
+            return text + " is not a number";
+        std::ostringstream range;
+        range << std::setprecision(15) << "must be " << minimum << " to " << maximum << ", but is " << text;
+        return value < minimum || value > maximum ? range.str() : "";
+    }));
 }
 Option Option::one_of(const std::vector<std::string> &choices) {
     return Option(option_->check(CLI::IsMember(choices)));

@@ -27,7 +27,6 @@ public:
     Option default_text(const std::string &text);
     Option separator(char c); // one argument may contain several values, separated by `c`
     Option one_value_each();  // for lists: each occurrence of the option takes one value
-    Option range(int minimum, int maximum);
     Option range(double minimum, double maximum);
     Option one_of(const std::vector<std::string> &choices);
     Option existing_path();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/outcome.hpp"
 
+#include "base/text.hpp"
+
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
@@ -21,7 +23,7 @@ std::string frames_text(const std::map<std::string, std::uint64_t> &frames_of_ma
     most_frequent.resize(std::min<std::size_t>(most_frequent.size(), 5));
     std::string text;
     for (const auto &[frames, name] : most_frequent)
-        text += fmt::format("{}{} ({} {})", text.empty() ? "" : ", ", name, frames, frames == 1 ? "frame" : "frames");
+        text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", name, base::count_of(frames, "frame"));
     return text;
 }
 
@@ -39,19 +41,20 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
     if (configuration.time_codes)
         return statistics.stages.all().contains("glass_to_glass")
                    ? std::nullopt
-                   : std::optional(Problem{"latency", fmt::format("no time code was seen in any of {} frames; point "
-                                                                  "the camera at the output's picture",
-                                                                  statistics.frames_in)});
+                   : std::optional(Problem{"latency", fmt::format("no time code was seen in {}; point the "
+                                                                  "camera at the output's picture",
+                                                                  base::count_of(statistics.frames_in, "frame"))});
     const bool poses_from_tracker = configuration.tracker && !configuration.trajectory;
     if (poses_from_tracker && statistics.tracker_results == 0 && count(statistics.skipped, "tracker") > 0)
         return Problem{"tracker", "it delivered no result: it failed in every frame; see its messages above"};
     if (poses_from_tracker && statistics.tracker_results > 0 && statistics.tracked == 0)
-        return Problem{
-            "tracker",
-            fmt::format("no target was seen in any of {} frames{}; it looked for {}{}{}", statistics.tracker_results,
-                        configuration.raytracer ? ", so no frame has an overlay" : "", describe_targets(targets),
-                        seen_instead(statistics, targets), how_to_compare(targets)),
-            true};
+        return Problem{"tracker",
+                       fmt::format("no target was seen in {}{}; it looked for {}{}{}",
+                                   base::count_of(statistics.tracker_results, "frame"),
+                                   configuration.raytracer ? ", so no frame has an overlay" : "",
+                                   describe_targets(targets), seen_instead(statistics, targets),
+                                   how_to_compare(targets)),
+                       true};
     if (!configuration.raytracer || statistics.composited == 0 || statistics.augmented > 0)
         return std::nullopt;
     if (poses_from_tracker && statistics.tracker_results > 0 && !targets.empty() &&
@@ -67,11 +70,11 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
         return std::nullopt;
     std::string why;
     for (const auto &[stage, frames] : statistics.skipped)
-        why += fmt::format("{}{} frames: {}", why.empty() ? "" : ", ", frames, stage);
+        why += fmt::format("{}{}: {}", why.empty() ? "" : ", ", base::count_of(frames, "frame"), stage);
     return Problem{"raytracer",
-                   fmt::format("none of the {} frames shown has an overlay ({}); raise 'live.max_latency_ms', or "
+                   fmt::format("{} shown, none with an overlay ({}); raise 'live.max_latency_ms', or "
                                "choose fewer samples or a smaller image",
-                               statistics.composited, why.empty() ? "all were late" : why)};
+                               base::count_of(statistics.composited, "frame"), why.empty() ? "all were late" : why)};
 }
 
 std::string unseen_targets(const run_config::Configuration &configuration, const Statistics &statistics,
@@ -83,8 +86,8 @@ std::string unseen_targets(const run_config::Configuration &configuration, const
                          [&](const model::Target &target) { return !statistics.targets.contains(target.name); });
     if (unseen.empty())
         return {};
-    return fmt::format("never seen in {} frames: {}{}", statistics.tracker_results, describe_targets(unseen),
-                       seen_instead(statistics, unseen));
+    return fmt::format("never seen in {}: {}{}", base::count_of(statistics.tracker_results, "frame"),
+                       describe_targets(unseen), seen_instead(statistics, unseen));
 }
 
 std::string looks_for(const Statistics &statistics, const std::vector<model::Target> &targets) {

@@ -99,6 +99,7 @@ ComponentConfiguration parse_component(const yaml::Node &node, const std::string
     component.limits.start = ms_or_default(node, schema_path + ".start_deadline_ms", 1);
     component.limits.stop = ms_or_default(node, schema_path + ".stop_deadline_ms", 1);
     component.limits.start_total = base::Limits::total_factor * component.limits.start;
+    component.limits.frame_total = base::Limits::total_factor * component.limits.frame;
     component.limits.stop_total = base::Limits::total_factor * component.limits.stop;
     component.limits.restart = shared.restart;
     const bool is_output = schema_path == "outputs[]" || schema_path == "snapshot" || schema_path == "record";
@@ -193,13 +194,16 @@ std::filesystem::path find_scene(const yaml::Node &scene, const std::filesystem:
     std::filesystem::path file = scene.input_path();
     if (std::filesystem::is_regular_file(file))
         return file;
+    std::string hint = hint_at_similar_name(file);
     if (const std::string name = scene.text(); name.find_first_of("./") == std::string::npos) {
         const std::filesystem::path prefix = built_in_plugins.parent_path().parent_path().parent_path();
         std::filesystem::path own = prefix / "share/arhost/config/scenes" / (name + ".yaml");
         if (std::filesystem::is_regular_file(own))
             return own;
+        if (hint.empty())
+            hint = hint_at_similar_name(own, ".yaml");
     }
-    scene.fail("there is no scene file '" + file.string() + "'" + hint_at_similar_name(file));
+    scene.fail("there is no scene file '" + file.string() + "'" + hint);
 }
 
 // Parses the source or the trajectory, and the settings for the sequence of frames.

@@ -62,16 +62,12 @@ std::vector<model::OptionValue> resolve_options(const model::PluginDescription &
     std::vector<std::string_view> keys;
     for (const model::OptionDeclaration &declared : plugin.options)
         keys.push_back(declared.key);
-    const bool sets_aside = plugin.kind == ARHOST_KIND_TRACKER || plugin.kind == ARHOST_KIND_RAYTRACER;
-    if (options && sets_aside) {
-        for (const yaml::Node &unknown : options->set_aside_keys(keys))
-            notes.push_back(unknown.where() + ": " + unknown.path() + ": set aside, because " + plugin.id +
-                            " has no such option");
-    } else if (options) {
-        options->allow_keys(keys);
-    }
+    std::vector<yaml::Node> unknown = options ? options->set_aside_keys(keys) : std::vector<yaml::Node>();
     if (path && std::find(keys.begin(), keys.end(), "path") == keys.end())
-        path->fail(plugin.id + " has no option 'path'; remove this key");
+        unknown.push_back(*path);
+    for (const yaml::Node &node : unknown)
+        notes.push_back(node.where() + ": " + node.path() + ": set aside, because " + plugin.id +
+                        " has no such option");
 
     std::vector<model::OptionValue> values;
     for (const model::OptionDeclaration &declared : plugin.options) {
@@ -81,7 +77,7 @@ std::vector<model::OptionValue> resolve_options(const model::PluginDescription &
                 value->fail("the path is also given by the key 'path' next to 'plugin'; remove one of them");
             value = path;
         }
-        if (value && sets_aside && !declared.choices.empty() && value->is_unlike(choices_of(declared))) {
+        if (value && !declared.choices.empty() && value->is_unlike(choices_of(declared))) {
             notes.push_back(value->where() + ": " + value->path() + ": '" + value->text() +
                             "' is set aside, because " + plugin.id + " has no such choice");
             value.reset();

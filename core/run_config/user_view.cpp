@@ -24,9 +24,14 @@ std::set<std::string> names_in(const fs::path &folder, std::error_code &error) {
     return names;
 }
 
-std::string hint(const fs::path &file, const std::set<std::string> &names) {
+std::string hint(const fs::path &file, const std::set<std::string> &names, std::string_view extension = "") {
+    if (file.filename().string().find('*') != std::string::npos)
+        return "; write the number in the names of numbered files as %d, or as %04d if it has leading zeros: "
+               "'frame_%04d.png'";
     const std::vector<std::string_view> candidates(names.begin(), names.end());
-    const std::string near = yaml::nearest(file.filename().string(), candidates);
+    std::string near = yaml::nearest(file.filename().string(), candidates);
+    if (near.ends_with(extension))
+        near.resize(near.size() - extension.size());
     return near.empty() ? "" : "; did you mean '" + near + "'?";
 }
 
@@ -88,6 +93,9 @@ void expect_writable(const yaml::Node &node) {
     fs::path folder = file.parent_path();
     while (folder.has_relative_path() && !fs::exists(folder, error))
         folder = folder.parent_path();
+    if (folder == folder.root_path() && folder != file.parent_path())
+        node.fail("there is no folder '" + (folder / *file.parent_path().relative_path().begin()).string() +
+                  "'; create it, or choose another path"); // as root, a misspelled path would create it
     if (!fs::is_directory(folder, error))
         node.fail("'" + folder.string() + "' is a file, not a folder; choose another path");
     if (::access(folder.c_str(), W_OK | X_OK) != 0)
@@ -95,9 +103,9 @@ void expect_writable(const yaml::Node &node) {
                   "; choose another path");
 }
 
-std::string hint_at_similar_name(const fs::path &file) {
+std::string hint_at_similar_name(const fs::path &file, std::string_view extension) {
     std::error_code ignored;
-    return hint(file, names_in(file.parent_path(), ignored));
+    return hint(file, names_in(file.parent_path(), ignored), extension);
 }
 
 } // namespace arhost::run_config

@@ -17,7 +17,8 @@ void expect_readable(const yaml::Node &node, const sandbox::Policy &policy);
 // Creates and changes nothing. Paths in /dev and /proc are not checked.
 void expect_writable(const yaml::Node &node);
 
-// Returns "; did you mean 'NAME'?" if the folder of `file` contains a similar name, otherwise "".
-std::string hint_at_similar_name(const std::filesystem::path &file);
+// Returns "; did you mean 'NAME'?" if the folder of `file` contains a similar name, otherwise "". Omits `extension`
+// at the end of NAME.
+std::string hint_at_similar_name(const std::filesystem::path &file, std::string_view extension = "");
 
 } // namespace arhost::run_config

@@ -61,6 +61,8 @@ glm::vec3 colour_of(const Node &node, double maximum = 1) {
         node.fail(requirement + ", but is empty; '#' starts a comment, so write '#rrggbb' in quotes");
     if (!node.is_scalar() && !node.is_sequence())
         node.fail(requirement);
+    if (node.is_scalar() && std::isalpha(static_cast<unsigned char>(node.text()[0])))
+        node.fail(requirement + ", but is '" + node.text() + "'");
     glm::dvec3 colour;
     if (node.is_scalar() && node.text().starts_with('#')) {
         const std::string text = node.text();

@@ -604,7 +604,7 @@ TEST(Run, ReportsAMarkerOfASmallFamilyWhenItIsSeenAgain) {
         return run.output();
     };
     EXPECT_THAT(output_of(1, ""),
-                HasSubstr("no target was seen in any of 1 frames; it looked for 'cup' (DICT_4X4_50 4); it saw "
+                HasSubstr("no target was seen in 1 frame; it looked for 'cup' (DICT_4X4_50 4); it saw "
                           "DICT_4X4_50 4 (1 frame) but got no pose: "));
     EXPECT_THAT(output_of(1, "confirm: false, "), Not(HasSubstr("no target")));
     EXPECT_THAT(output_of(2, ""), Not(HasSubstr("no target")));
@@ -691,7 +691,7 @@ TEST(CommandLine, CheckRunsTheFirstFramesOnRequest) {
     EXPECT_FALSE(run.exists("poses.jsonl"));
 
     ArhostRun wrong_id(yaml("5"));
-    wrong_id.expect({"check", "--run", "10", "run.yaml"}, 1, {"no target was seen in any of 10 frames"});
+    wrong_id.expect({"check", "--run", "10", "run.yaml"}, 1, {"no target was seen in 10 frames"});
     EXPECT_THAT(wrong_id.output(), testing::Not(HasSubstr("run.yaml: OK")));
 
     run.expect({"check", "--run", "10", "--no-open", "run.yaml"}, 2, {"--run and --no-open exclude each other"});
@@ -706,7 +706,7 @@ TEST(CommandLine, CheckOpensNothingOnRequest) {
 TEST(Run, FailsIfTheTrackerSeesNoTarget) {
     CountingRun run({.source = "frames: 5", .tracker = "lost_to: 100"});
     const std::string message =
-        "no target was seen in any of 5 frames, so no frame has an overlay; it looked for 'tag36h11-3' (tag36h11 3);";
+        "no target was seen in 5 frames, so no frame has an overlay; it looked for 'tag36h11-3' (tag36h11 3);";
     run.expect(1, {"error: tracker: " + message});
     EXPECT_EQ(counted(run).size(), 5u);
     run.expect({"run.yaml", "--allow-no-target"}, 0, {"warning: tracker: " + message});

@@ -44,7 +44,7 @@ TEST_F(Outcome, ReportsATargetThatWasNeverSeen) {
         ASSERT_TRUE(problem());
         EXPECT_TRUE(problem()->is_missing_target);
         EXPECT_EQ(problem()->component, "tracker");
-        EXPECT_THAT(problem()->text, HasSubstr("no target was seen in any of 30 frames"));
+        EXPECT_THAT(problem()->text, HasSubstr("no target was seen in 30 frames"));
         EXPECT_THAT(problem()->text, HasSubstr("it looked for 'desk' (D 23), 'cup' (D 7);"));
     }
     EXPECT_THAT(problem()->text, HasSubstr("30 frames, so no frame has an overlay; it looked"));
@@ -129,7 +129,7 @@ TEST_F(Outcome, ReportsThatEveryOverlayWasLateInModeLive) {
     configuration->mode = run_config::Mode::live;
     ASSERT_TRUE(problem());
     EXPECT_EQ(problem()->component, "raytracer");
-    EXPECT_THAT(problem()->text, HasSubstr("none of the 30 frames shown has an overlay (27 frames: latency); raise "
+    EXPECT_THAT(problem()->text, HasSubstr("30 frames shown, none with an overlay (27 frames: latency); raise "
                                            "'live.max_latency_ms'"));
     configuration->raytracer.reset();
     EXPECT_FALSE(problem()) << "no overlay was requested";
