@@ -16,12 +16,15 @@ struct RestartLimits {
 };
 
 struct Limits {
-    std::chrono::milliseconds start{10'000}; // restarts with each progress report
-    std::chrono::milliseconds frame{5'000};  // for each command
-    std::chrono::milliseconds stop{30'000};  // restarts with each progress report
-    // Limits of the whole start and the whole stop. Progress reports do not restart them.
-    static constexpr int total_factor = 30; // configurations set this multiple of `start` and `stop`
-    std::chrono::milliseconds start_total{total_factor * start}, stop_total{total_factor * stop};
+    // Each report of progress restarts the first three.
+    std::chrono::milliseconds start{10'000};
+    std::chrono::milliseconds frame{5'000}; // for each command
+    std::chrono::milliseconds stop{30'000};
+    // Limits of the whole start, the whole stop, and a whole command to a tracker or ray tracer. Reports of progress
+    // do not restart them. Sources and sinks wait for others, so their commands have no such limit.
+    static constexpr int total_factor = 30; // configurations set this multiple of the first three
+    std::chrono::milliseconds start_total{total_factor * start}, frame_total{total_factor * frame},
+        stop_total{total_factor * stop};
     RestartLimits restart;
 };
 

@@ -41,7 +41,8 @@ std::optional<camera::Coordinates> coordinates_of(const Arguments &arguments) {
 void lift_deadlines(run_config::Configuration &configuration) {
     for_each_component(configuration, [](run_config::ComponentConfiguration &component) {
         base::Limits &limits = component.limits;
-        limits.start = limits.frame = limits.stop = limits.start_total = limits.stop_total = std::chrono::hours(1000);
+        limits.start = limits.frame = limits.stop = std::chrono::hours(1000);
+        limits.start_total = limits.frame_total = limits.stop_total = std::chrono::hours(1000);
     });
 }
 

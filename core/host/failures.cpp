@@ -20,7 +20,8 @@ void Failures::add_disabled(const std::string &name, const yaml::Node &node, con
     const bool located = reason.starts_with(node.file().string() + ":") || reason.starts_with("--");
     const std::string text = located ? reason : node.where() + ": " + name + ": " + reason;
     if (video_runs())
-        log_(ARHOST_SEVERITY_ERROR, "arhost", text + "; the video continues without it");
+        log_(ARHOST_SEVERITY_ERROR, "arhost",
+             text + (name == "source" ? "; the video ends" : "; the video continues without it"));
     add(text, is_configuration_error, video_runs());
 }
 

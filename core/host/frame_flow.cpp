@@ -271,7 +271,7 @@ std::optional<FrameFlow::Action> FrameFlow::show(const Intakes &intakes) {
     std::unique_ptr<Frame> frame = std::move(ready->second);
     frames_.erase(ready);
     if (settings_.live)
-        drop_overtaken(frame->record.sequence);
+        drop(frames_.begin(), frames_.lower_bound(frame->record.sequence));
     if (!intakes.outputs_are_full)
         return Show{std::move(frame)};
     ++statistics_.dropped["output"];
@@ -303,12 +303,18 @@ bool FrameFlow::is_early(const Frame &frame) {
     return false;
 }
 
-void FrameFlow::drop_overtaken(std::uint64_t shown) {
-    for (auto it = frames_.begin(); it != frames_.end() && it->first < shown;) {
-        it->second->overtaken = it->second->in_worker();
-        statistics_.dropped["late"] += !it->second->in_worker();
-        it = it->second->in_worker() ? std::next(it) : frames_.erase(it);
+// Drops the frames in [first, last). Those in a worker are dropped when it answers.
+void FrameFlow::drop(Frames::iterator first, Frames::iterator last) {
+    while (first != last) {
+        first->second->overtaken = first->second->in_worker();
+        statistics_.dropped["late"] += !first->second->in_worker();
+        first = first->second->in_worker() ? std::next(first) : frames_.erase(first);
     }
+}
+
+void FrameFlow::omit_unfinished() {
+    drop(std::ranges::find_if(frames_, [](const auto &entry) { return entry.second->stage != Frame::Stage::done; }),
+         frames_.end());
 }
 
 const Frame *FrameFlow::find(std::uint64_t sequence) const {

@@ -102,6 +102,7 @@ public:
 
     void on_shown(Frame &frame, Clock::time_point composited);
     void on_interrupted() { interrupted_ = true; } // frames are not delayed any more
+    void omit_unfinished();                        // the oldest unfinished frame and all later ones will not be shown
 
     // ---- state -------------------------------------------------------------------------------------
     void set_rate(double fps) { fps_ = fps; } // frame rate of the source; 0: unknown
@@ -138,6 +139,8 @@ private:
         std::optional<double> mean_s_; // exponential moving average
     };
 
+    using Frames = std::map<std::uint64_t, std::unique_ptr<Frame>>; // by number of the frame in the run
+
     bool no_more_frames() const {
         return input_ended_ || (settings_.max_frames && next_read_ >= settings_.max_frames);
     }
@@ -155,7 +158,7 @@ private:
     bool is_behind() const;
     bool is_early(const Frame &frame);
     void finish(Frame &frame, bool is_shown, Clock::time_point when);
-    void drop_overtaken(std::uint64_t shown);
+    void drop(Frames::iterator first, Frames::iterator last);
 
     const Settings settings_;
     const Clock &clock_;
@@ -166,7 +169,7 @@ private:
     bool paced_ = false, frozen_ = false, input_ended_ = false, interrupted_ = false;
     std::deque<Lease> reads_; // slots of the reads without an answer, oldest first
     std::uint64_t next_read_ = 0;
-    std::map<std::uint64_t, std::unique_ptr<Frame>> frames_; // by number of the frame in the run
+    Frames frames_;
     Pace tracker_pace_, raytracer_pace_;
     struct Paced {
         std::int64_t media_ns;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/run.hpp"
 
+#include "base/text.hpp"
 #include "host/outcome.hpp"
 #include "run_config/access.hpp"
 
@@ -150,13 +151,17 @@ void Run::interrupt() {
     killed_ = parts_.flow.was_interrupted() || phase_ < Phase::running;
     if (!parts_.flow.was_interrupted()) {
         parts_.flow.on_interrupted();
+        constexpr std::chrono::seconds time_to_finish(1);
+        frame_deadline_ = parts_.context.reactor.at(parts_.context.reactor.now() + time_to_finish,
+                                                    [this] { parts_.flow.omit_unfinished(); });
         std::chrono::milliseconds limit{0};
         for (const Component *component : components())
             limit = std::max(limit, component->limits().stop);
         interrupt_deadline_ = parts_.context.reactor.at(parts_.context.reactor.now() + limit, [this, limit] {
             std::string late;
             for (const Component *component : components())
-                if (component->state() != Component::State::stopped)
+                if (phase_ == Phase::stopping ? component->state() != Component::State::stopped
+                                              : component->in_flight() > 0)
                     late += (late.empty() ? "" : ", ") + component->name();
             parts_.failures.add("not stopped within " + std::to_string(limit.count()) +
                                     " ms after the signal (stop_deadline_ms): " + late +
@@ -175,12 +180,12 @@ void Run::report_frame_errors() {
     for (const auto &[error, frames] : parts_.statistics.errors)
         if (frames > 1)
             parts_.context.log(ARHOST_SEVERITY_WARNING, error.first,
-                               fmt::format("{} in {} frames", status_text(error.second), frames));
+                               fmt::format("{} in {}", status_text(error.second), base::count_of(frames, "frame")));
     if (parts_.configuration.mode == run_config::Mode::live)
         return;
     // In mode lockstep, the output must be that of a run without failures.
     for (const auto &[stage, count] : parts_.statistics.skipped)
-        parts_.failures.add(std::to_string(count) + (count == 1 ? " frame has" : " frames have") +
+        parts_.failures.add(base::count_of(count, "frame") + (count == 1 ? " has" : " have") +
                                 " no overlay because the " + stage + " failed; see its messages above",
                             false);
 }
@@ -189,10 +194,10 @@ std::vector<std::string> Run::findings() const {
     std::vector<std::string> lines;
     const arhost_frame_format &format = parts_.video.format;
     if (const Component *source = assembly_.source().component())
-        lines.push_back(
-            fmt::format("source: {}: {} x {} px{}{}", source->description().id, format.width, format.height,
-                        format.fps > 0 ? fmt::format(", {:g} fps", format.fps) : "",
-                        parts_.video.frame_count > 0 ? fmt::format(", {} frames", parts_.video.frame_count) : ""));
+        lines.push_back(fmt::format(
+            "source: {}: {} x {} px{}{}", source->description().id, format.width, format.height,
+            format.fps > 0 ? fmt::format(", {:g} fps", format.fps) : "",
+            parts_.video.frame_count > 0 ? ", " + base::count_of(parts_.video.frame_count, "frame") : ""));
     if (const arhost_intrinsics &camera = parts_.video.intrinsics; camera.width > 0)
         lines.push_back(fmt::format("camera: fx {:g} px, fy {:g} px, cx {:g} px, cy {:g} px", camera.fx, camera.fy,
                                     camera.cx, camera.cy));
@@ -213,16 +218,18 @@ std::vector<std::string> Run::findings() const {
     }
     if (parts_.statistics.frames_in == 0)
         return lines;
-    lines.push_back(fmt::format("{} frames: {} with a target, {} with an overlay", parts_.statistics.composited,
-                                parts_.statistics.tracked, parts_.statistics.augmented));
+    lines.push_back(fmt::format("{}: {} with a target, {} with an overlay",
+                                base::count_of(parts_.statistics.composited, "frame"), parts_.statistics.tracked,
+                                parts_.statistics.augmented));
     for (const Target &target : targets()) {
         const auto seen = parts_.statistics.targets.find(target.name);
         lines.push_back(seen == parts_.statistics.targets.end()
                             ? fmt::format("target {}: not seen", target.name)
-                            : fmt::format("target {}: in {} frames, {:.0f} to {:.0f} px wide, reprojection error "
+                            : fmt::format("target {}: in {}, {:.0f} to {:.0f} px wide, reprojection error "
                                           "{:.2f} px",
-                                          target.name, seen->second.frames, seen->second.smallest_px,
-                                          seen->second.largest_px, seen->second.mean_reprojection_px));
+                                          target.name, base::count_of(seen->second.frames, "frame"),
+                                          seen->second.smallest_px, seen->second.largest_px,
+                                          seen->second.mean_reprojection_px));
     }
     if (const std::string unlisted = unlisted_text(parts_.statistics); !unlisted.empty())
         lines.push_back("markers of no target: " + unlisted);

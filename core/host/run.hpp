@@ -74,7 +74,7 @@ private:
 
     Phase phase_ = Phase::starting_stages;
     bool killed_ = false; // the run must end immediately
-    ipc::Reactor::Registration due_, interrupt_deadline_;
+    ipc::Reactor::Registration due_, frame_deadline_, interrupt_deadline_;
 };
 
 } // namespace arhost::host

@@ -140,7 +140,10 @@ void Source::on_result(const Command &command, const Result &result) {
         return;
     if (result.status < 0) {
         flow.read_again(command.sequence);
-        return component_->end_process(std::string("read failed: ") + status_text(result.status));
+        const std::string reason = std::string("read failed: ") + status_text(result.status);
+        const bool is_final =
+            result.status == ARHOST_STATUS_ERROR_CONFIGURATION || result.status == ARHOST_STATUS_ERROR_UNSUPPORTED;
+        return is_final ? component_->disable(reason + "; see its messages above") : component_->end_process(reason);
     }
     on_frame(std::move(pixels), command, result);
 }

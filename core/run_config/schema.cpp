@@ -50,7 +50,7 @@ constexpr Row component_keys[] = {
     {"environment", list, "", "Additional environment variables that the plugin receives (docs/security.md)."},
     {"memory_mb", integer, "0",
      "Limit of the plugin's private memory, in MiB; 0: three quarters of the machine's memory."},
-    {"deadline_ms", integer, "5000", "Timeout for one frame, in ms."},
+    {"deadline_ms", integer, "5000", "Timeout without progress for one frame, in ms."},
     {"start_deadline_ms", integer, "10000", "Timeout without progress during start, in ms."},
     {"stop_deadline_ms", integer, "30000", "Timeout without progress during shutdown, in ms."}};
 

@@ -28,6 +28,8 @@ bool needs_new_process(arhost_kind kind, arhost_status status) {
            (status == ARHOST_STATUS_ERROR_DEVICE_LOST || status == ARHOST_STATUS_ERROR_OUT_OF_MEMORY);
 }
 
+constexpr const char *in_total = " in total, although it reported progress";
+
 } // namespace
 
 RegionPointer make_host_region(const char *name, const SlotLayout &layout) {
@@ -69,8 +71,8 @@ void Component::spawn() {
         state_ = State::waiting;
         return restart(error.what());
     }
-    set_progress_deadline(limits_.start, "did not start");
-    set_total_deadline(limits_.start_total, "did not start");
+    set_start_deadline();
+    set_deadline(total_deadline_, limits_.start_total, "did not start", in_total);
 }
 
 void Component::stop() {
@@ -104,6 +106,13 @@ void Component::end_process(const std::string &reason) {
         process_->end(reason);
 }
 
+void Component::disable(const std::string &reason) {
+    if (!process_)
+        return;
+    configuration_error_ = reason;
+    process_->kill_now();
+}
+
 // Returns the worker's generation number for this memory.
 std::uint32_t Component::attach(const RegionPointer &input) {
     for (const AttachedInput &attached : attached_inputs_)
@@ -129,18 +138,20 @@ void Component::submit(Command command, const RegionPointer &input, const Region
     command.ticket = next_ticket_++;
     in_flight_.push_back(command);
     if (in_flight_.size() == 1)
-        set_frame_deadline();
+        begin_command();
     process_->submit(command);
 }
 
 void Component::on_message(Message &message) {
     if (is<messages::Progress>(message)) {
         if (state_ == State::starting)
-            set_progress_deadline(limits_.start, "did not start");
+            set_start_deadline();
         else if (stop_sent_)
-            set_progress_deadline(limits_.stop, "did not stop");
-        else if (may_wait() && !call_cancelled_ && !in_flight_.empty())
-            wait();
+            set_stop_deadline();
+        else if (!call_cancelled_ && !in_flight_.empty()) {
+            waits_ = may_wait();
+            set_frame_deadline();
+        }
     } else if (is<messages::Hello>(message) && handshake_ == Handshake::opening) {
         on_hello(message);
     } else if (is<messages::Ready>(message) && handshake_ == Handshake::creating) {
@@ -186,7 +197,7 @@ void Component::on_hello(const Message &message) {
         sandbox_level_ = std::move(hello.sandbox);
         const Create create = callbacks_.hello(description_, candidate_);
         process_->send(create.message, create.fds);
-        set_progress_deadline(limits_.start, "did not start");
+        set_start_deadline();
     } catch (const std::exception &error) {
         configuration_error_ = error.what();
         process_->kill_now();
@@ -238,8 +249,8 @@ void Component::stop_when_idle() {
         return;
     stop_sent_ = true;
     process_->send_ordered(messages::Stop{});
-    set_progress_deadline(limits_.stop, "did not stop");
-    set_total_deadline(limits_.stop_total, "did not stop");
+    set_stop_deadline();
+    set_deadline(total_deadline_, limits_.stop_total, "did not stop", in_total);
 }
 
 void Component::answer(const messages::Answer &answer, std::uint32_t restarts) {
@@ -271,7 +282,7 @@ void Component::on_result(const Result &result) {
     const Command command = in_flight_.front();
     in_flight_.pop_front();
     waits_ = false;
-    set_frame_deadline();
+    begin_command();
     callbacks_.result(command, result);
     // Does not count errors as completed frames, nor results because of which the host terminates the process.
     if (result.status > 0 && process_ && !process_->ending())
@@ -357,7 +368,10 @@ void Component::restart(const std::string &reason) {
     const auto delay = restart_policy_.delay_after_death(std::uniform_real_distribution<double>(0, 1)(jitter_));
     if (!delay)
         return fall_back_or_disable(
-            reason + "; it failed " + std::to_string(restart_policy_.failures()) + " times in a row", false);
+            reason + (restart_policy_.failures() > 1
+                          ? "; it failed " + std::to_string(restart_policy_.failures()) + " times in a row"
+                          : ""),
+            false);
     const std::string wait = delay->count() ? " in " + std::to_string(delay->count()) + " ms" : "";
     budget_.log_death(reason + "; restarting it" + wait);
     ++restarts_;
@@ -414,26 +428,20 @@ Counters Component::counters() const {
     return sum;
 }
 
-void Component::set_progress_deadline(std::chrono::milliseconds limit, const char *what) {
-    deadline_ = context_.reactor.at(context_.reactor.now() + limit, [this, limit, what] {
-        process_->end(std::string(what) + " within " + std::to_string(limit.count()) + " ms");
-    });
+void Component::set_start_deadline() {
+    set_deadline(deadline_, limits_.start, "did not start",
+                 " (start_deadline_ms); it must call host->progress if it needs longer");
 }
 
-void Component::set_total_deadline(std::chrono::milliseconds limit, const char *what) {
-    total_deadline_ = context_.reactor.at(context_.reactor.now() + limit, [this, limit, what] {
-        process_->end(std::string(what) + " within " + std::to_string(limit.count()) +
-                      " ms in total, although it reported progress");
-    });
+void Component::set_stop_deadline() {
+    set_deadline(deadline_, limits_.stop, "did not stop", " (stop_deadline_ms)");
 }
 
-bool Component::may_wait() const {
-    return description_.kind == ARHOST_KIND_SINK ||
-           (description_.kind == ARHOST_KIND_SOURCE && description_.capabilities & ARHOST_CAPABILITY_LIVE);
-}
-
-void Component::wait() {
-    waits_ = true;
+// Sets the deadlines of the oldest command in flight, if any.
+void Component::begin_command() {
+    total_deadline_.cancel();
+    if (!in_flight_.empty() && !may_wait())
+        set_deadline(total_deadline_, limits_.frame_total, "hung: no answer", in_total);
     set_frame_deadline();
 }
 
@@ -441,9 +449,24 @@ void Component::set_frame_deadline() {
     deadline_.cancel();
     if (in_flight_.empty())
         return;
-    deadline_ = context_.reactor.at(context_.reactor.now() + limits_.frame, [this] {
-        process_->end("hung: no answer within " + std::to_string(limits_.frame.count()) + " ms (deadline_ms)");
+    const char *const details = description_.kind == ARHOST_KIND_RAYTRACER
+                                    ? " (deadline_ms); raise it, or lower the samples or the image size"
+                                : may_wait() ? " (deadline_ms); a plugin that waits must call host->progress"
+                                             : " (deadline_ms)";
+    set_deadline(deadline_, limits_.frame, "hung: neither an answer nor progress", details);
+}
+
+void Component::set_deadline(ipc::Reactor::Registration &deadline, std::chrono::milliseconds limit, const char *what,
+                             const char *details) {
+    deadline = context_.reactor.at(context_.reactor.now() + limit, [this, limit, what, details] {
+        process_->end(std::string(what) + " within " + std::to_string(limit.count()) + " ms" + details);
     });
+}
+
+// Whether the component may wait in a command for any time, if it reports progress: a source for a frame, a sink for
+// the receiver of its frames.
+bool Component::may_wait() const {
+    return description_.kind == ARHOST_KIND_SINK || description_.kind == ARHOST_KIND_SOURCE;
 }
 
 } // namespace arhost::supervise

@@ -78,13 +78,15 @@ public:
     // Asks the plugin to return from the current call soon. After this, a call that waits does not extend its
     // deadline.
     void cancel_call();
-    // Whether a live source or a sink has reported progress in the current call. The source then waits for its
-    // camera, or the sink for another program that does not take the frame.
+    // Whether a source or a sink has reported progress in the current call. The source then waits for a frame, or the
+    // sink for another program that does not take the frame.
     bool waits() const { return waits_; }
     // Why a live source has no camera at present; "" if it has one.
     const std::string &missing_device() const { return missing_device_; }
     // Terminates the process, which is then restarted.
     void end_process(const std::string &reason);
+    // Terminates the process, which is not restarted, because it would fail again.
+    void disable(const std::string &reason);
 
     // Whether commands may be submitted. While the process is being terminated, they may not, though results may
     // still arrive.
@@ -140,11 +142,13 @@ private:
     void spawn_after(std::chrono::milliseconds delay);
     void fall_back_or_disable(const std::string &reason, bool is_configuration_error);
     void stopped(arhost_status status, const std::string &text);
-    void set_progress_deadline(std::chrono::milliseconds limit, const char *what);
-    void set_total_deadline(std::chrono::milliseconds limit, const char *what);
-    bool may_wait() const;
-    void wait();
+    void set_start_deadline();
+    void set_stop_deadline();
+    void begin_command();
     void set_frame_deadline();
+    void set_deadline(ipc::Reactor::Registration &deadline, std::chrono::milliseconds limit, const char *what,
+                      const char *details);
+    bool may_wait() const;
 
     Context &context_;
     std::string name_;

@@ -264,7 +264,9 @@ void Process::on_death() {
     death.clean = WIFEXITED(exit.wait_status) && WEXITSTATUS(exit.wait_status) == 0;
     // SYNC with Link::mark: a relaxed load suffices, because the writer has exited.
     const auto call = static_cast<Call>(worker_page_.as<WorkerPage>().call.load(std::memory_order_relaxed));
-    if (WIFSIGNALED(exit.wait_status))
+    if (ending())
+        death.how = std::string("ended by arhost ") + to_text(call);
+    else if (WIFSIGNALED(exit.wait_status))
         death.how = "killed by signal " + std::to_string(WTERMSIG(exit.wait_status)) + " (" +
                     ::strsignal(WTERMSIG(exit.wait_status)) + ") " + to_text(call);
     else

@@ -10,6 +10,7 @@ import importlib.util
 import json
 import os
 import sys
+import time
 import traceback
 
 import numpy as np
@@ -39,6 +40,17 @@ class Host:
 
     def warn(self, text):
         self.log(SEVERITY_WARNING, str(text))
+
+    def wait(self, seconds):
+        """Sleeps and reports progress, so that arhost does not assume a hang. False: cancelled, return soon."""
+        end = time.monotonic() + seconds
+        while not self.cancelled():
+            left = end - time.monotonic()
+            if left <= 0:
+                return True
+            self.progress(-1, "waiting")
+            time.sleep(min(left, 0.1))
+        return False
 
 
 class Fields:

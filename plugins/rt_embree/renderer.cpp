@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer.hpp"
 
+#include "raytracer_common/slow_image.hpp"
 #include "raytracer_common/view.hpp"
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -181,6 +183,8 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
             frame.history[i] = history_.data() + i * tiles.size() * tile_pixels;
     Rectangle drawn{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(), 0, 0};
     std::mutex drawn_mutex;
+    std::atomic<std::size_t> finished = 0;
+    arhost::raytracer_common::SlowImage slow_image(host_);
     threads_.for_each(tiles.size(), [&](std::size_t i, std::size_t thread) {
         const Tile &tile = tiles[i];
         const bool visible = std::any_of(windows.begin(), windows.end(), [&](const Window &window) {
@@ -189,6 +193,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         if (!visible || host_.cancelled())
             return clear(image, tile.pixels);
         const Rectangle part = kernel_.render_tile(frame, tile, *scratch_[thread]);
+        slow_image.report(static_cast<double>(++finished) / static_cast<double>(tiles.size()));
         if (part.x0 < part.x1) {
             std::lock_guard lock(drawn_mutex);
             drawn = united(drawn, part);

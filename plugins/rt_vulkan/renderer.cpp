@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer.hpp"
 
+#include "raytracer_common/slow_image.hpp"
 #include "raytracer_common/view.hpp"
 
 #include <algorithm>
@@ -436,7 +437,9 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
 
 // Traces the image band by band. `commands` run before the first band.
 void Renderer::trace(std::vector<VkCommandBuffer> commands, Target &target) {
+    arhost::raytracer_common::SlowImage slow_image(host_);
     for (Rows rows{}; rows.first < intrinsics_.height; rows.first += rows.count) {
+        slow_image.report(static_cast<double>(rows.first) / intrinsics_.height);
         if (rows.first > 0 && host_.cancelled())
             throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while tracing the image");
         rows.count = std::min(bands_.rows(), intrinsics_.height - rows.first);

@@ -30,8 +30,59 @@ TEST(Deadlines, APluginThatHangsInACallIsEnded) {
     CountingRun run({.source = "frames: 40", .raytracer = "hang_at: 20", .deadline = call_deadline});
     ASSERT_EQ(run.run(), 1) << run.output();
     EXPECT_EQ(expect_all_frames(run, 40), std::set<std::uint64_t>{20});
-    EXPECT_THAT(run.output(), HasSubstr("hung: no answer within " + text_of(call_deadline) + " ms"));
+    EXPECT_THAT(run.output(),
+                HasSubstr("hung: neither an answer nor progress within " + text_of(call_deadline) + " ms"));
     EXPECT_THAT(run.output(), HasSubstr("error: arhost: 1 frame has no overlay because the raytracer failed"));
+}
+
+TEST(Deadlines, ProgressExtendsACallUpToALimit) {
+    CountingRun slow({.source = "frames: 3",
+                      .raytracer = "reports_progress: true, delay_ms: " + text_of(scaled(900ms)),
+                      .deadline = scaled(400ms)});
+    ASSERT_EQ(slow.run(), 0) << slow.output();
+    EXPECT_EQ(slow.stats()["restarts"]["raytracer"], 0);
+    EXPECT_TRUE(expect_all_frames(slow, 3).empty());
+
+    const auto deadline = scaled(100ms);
+    CountingRun endless({.source = "frames: 3",
+                         .raytracer = "reports_progress: true, delay_ms: 600000",
+                         .more = "restart: {quarantine_after: 1}\n",
+                         .deadline = deadline});
+    ASSERT_EQ(endless.run(), 1) << endless.output();
+    EXPECT_THAT(endless.output(), HasSubstr("hung: no answer within " + text_of(30 * deadline) +
+                                            " ms in total, although it reported progress"));
+}
+
+// source_file waits for the time of each frame in mode live.
+TEST(Deadlines, ASourceThatWaitsForItsNextFrameIsNotHung) {
+    ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_file, path: frame.pgm, fps: 0.5, deadline_ms: " +
+                  text_of(scaled(500ms)) +
+                  ", options: {frames: 2}}\noutputs: [{plugin: sink_counter, path: "
+                  "counted.txt}]\nstats: stats.json\n");
+    run.write("frame.pgm", "P5 8 8 255\n" + std::string(64, 'a'));
+    EXPECT_EQ(run.run(), 0) << run.output();
+    EXPECT_EQ(run.stats()["restarts"]["source"], 0);
+}
+
+TEST(Deadlines, ASignalCancelsALongFrame) {
+    CountingRun run({.source = "frames: 100", .raytracer = "delay_from: 2, delay_ms: 600000", .deadline = 600s});
+    run.start();
+    ASSERT_TRUE(run.wait_for_lines(2)) << run.output();
+    send_signal(run.pid(), SIGINT);
+    EXPECT_EQ(run.wait(), 130) << run.output();
+    EXPECT_TRUE(run.exists("counted.txt.done")) << run.output();
+    EXPECT_TRUE(expect_all_frames(run, 2).empty()) << "the frame in progress is omitted";
+}
+
+TEST(Deadlines, AfterASignalTheComponentThatDoesNotStopIsNamed) {
+    CountingRun run({.source = "frames: 100", .raytracer = "hang_at: 2", .deadline = 600s});
+    run.start({"run.yaml", "--set", "source.stop_deadline_ms=" + text_of(scaled(2s)), "--set",
+               "tracker.stop_deadline_ms=1", "--set", "raytracer.stop_deadline_ms=1", "--set",
+               "outputs.0.stop_deadline_ms=1"});
+    ASSERT_TRUE(run.wait_for_lines(2)) << run.output();
+    send_signal(run.pid(), SIGINT);
+    EXPECT_EQ(run.wait(), 1) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("after the signal (stop_deadline_ms): raytracer; "));
 }
 
 TEST(Deadlines, AHungPluginThatIgnoresSigabrtIsKilled) {

@@ -528,6 +528,28 @@ TEST(FrameFlow, DoesNotWaitForAGapInAFilmNorAfterAnInterruption) {
     EXPECT_THAT(bench.go(), ElementsAre("show 2"));
 }
 
+TEST(FrameFlow, OmitsTheUnfinishedFramesOfAnInterruptedRun) {
+    Bench bench(lockstep());
+    arrive(bench, 3);
+    bench.go();
+    for (int i = 0; i < 2; ++i) {
+        bench.tracked();
+        bench.go();
+    }
+    ASSERT_THAT(bench.in_raytracer, ElementsAre(0u, 1u));
+    ASSERT_THAT(bench.in_tracker, ElementsAre(2u));
+    bench.flow.on_input_ended();
+    bench.flow.on_interrupted();
+    bench.rendered();
+    bench.flow.omit_unfinished();
+    EXPECT_THAT(bench.go(), ElementsAre("show 0+")) << "this frame is finished";
+    EXPECT_TRUE(bench.flow.has_only_overtaken());
+    bench.rendered();
+    bench.tracked();
+    EXPECT_TRUE(bench.flow.is_empty());
+    EXPECT_TRUE(bench.statistics.skipped.empty()) << "no frame was shown without its overlay";
+}
+
 // ---- mode live ------------------------------------------------------------------------------------------
 
 TEST(FrameFlow, ReplacesAWaitingFrameByANewerOne) {

@@ -19,7 +19,7 @@ struct arhost_instance {
     int64_t crash_at, hang_at, hang_until, error_at, error_after, error, answer;
     int64_t images; /* rendered so far */
     double delay_ms;
-    int64_t writes_later, device_time_ns;
+    int64_t delay_from, reports_progress, writes_later, device_time_ns;
     uint8_t *last; /* previous image */
 };
 
@@ -38,6 +38,8 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     self->error = arhost_find_option(options, option_count, "error")->integer;
     self->answer = arhost_find_option(options, option_count, "answer")->integer;
     self->delay_ms = arhost_find_option(options, option_count, "delay_ms")->real;
+    self->delay_from = arhost_find_option(options, option_count, "delay_from")->integer;
+    self->reports_progress = arhost_find_option(options, option_count, "reports_progress")->integer;
     self->writes_later = arhost_find_option(options, option_count, "writes_later")->integer;
     self->device_time_ns = arhost_find_option(options, option_count, "device_time_ns")->integer;
     if (arhost_find_option(options, option_count, "reject")->integer) {
@@ -73,6 +75,8 @@ static int wait_or_cancel(const arhost_instance *self) {
         const struct timespec time = {0, (long)(step_ms * 1e6)};
         nanosleep(&time, NULL);
         left_ms -= step_ms;
+        if (self->reports_progress)
+            self->host->progress(self->host, -1, "waiting");
     }
     return left_ms > 0;
 }
@@ -90,7 +94,7 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
     if (misbehave_if_requested() || number == self->error_at ||
         (self->error_after >= 0 && self->images++ >= self->error_after))
         return (arhost_status)self->error;
-    if (wait_or_cancel(self)) {
+    if (number >= self->delay_from && wait_or_cancel(self)) {
         self->host->log(self->host, ARHOST_SEVERITY_INFO, "cancelled while waiting");
         return ARHOST_STATUS_ERROR_CANCELLED;
     }
@@ -131,6 +135,10 @@ static const arhost_option_descriptor options[] = {
      "Status to return for each frame"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_REAL, "delay_ms", "0", 0, 600000, NULL,
      "Delay per frame, in ms"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "delay_from", "0", 0, 0, NULL,
+     "First frame with the delay"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "reports_progress", "false", 0, 0, NULL,
+     "Reports progress during the delay"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "writes_later", "false", 0, 0, NULL,
      "Also writes to the previous image"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "device_time_ns", "0", 0, 0, NULL,

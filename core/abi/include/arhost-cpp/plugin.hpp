@@ -59,15 +59,21 @@ public:
     void error(const std::string &text) const { log(ARHOST_SEVERITY_ERROR, text); }
     void progress(double fraction, const char *what) const { host_->progress(host_, fraction, what); }
     bool cancelled() const { return host_->cancelled(host_) != 0; }
-    // Sleeps until `when`, then returns true. If the host cancels the call, returns false early.
+    // Sleeps until `when`, then returns true. If the host cancels the call, returns false early. Reports progress, so
+    // that the host does not assume a hang.
     bool wait_until(std::chrono::steady_clock::time_point when) const {
-        constexpr auto poll_interval = std::chrono::milliseconds(20);
-        for (;;) {
+        constexpr auto poll_interval = std::chrono::milliseconds(20),
+                       report_interval = std::chrono::milliseconds(200);
+        for (auto report = std::chrono::steady_clock::now() + report_interval;;) {
             const auto now = std::chrono::steady_clock::now();
             if (now >= when)
                 return true;
             if (cancelled())
                 return false;
+            if (now >= report) {
+                progress(-1, "waiting");
+                report = now + report_interval;
+            }
             std::this_thread::sleep_until(std::min(when, now + poll_interval));
         }
     }

@@ -105,11 +105,11 @@ typedef struct arhost_host {
      * keep up. */
     void (*log)(const struct arhost_host *host, arhost_severity severity, const char *text);
 
-    /* [any] Reports progress and restarts the deadline for start-up (`create` and `start`) or for `stop`. Call it at
-     * least every few seconds in these functions. It also restarts the deadline of two calls that may wait: `read` of
-     * a source with ARHOST_CAPABILITY_LIVE while its camera is lost, and `write` of a sink while the receiver, such
-     * as another program, does not take the frame. `fraction`: the completed fraction, 0 to 1, or negative if
-     * unknown. `what`: describes the current step to the user. */
+    /* [any] Reports progress and restarts the deadline of the running call. Call it at least every few seconds in a
+     * function that takes long or waits. The host limits each call to 30 times its deadline, whatever it reports,
+     * except `read` of a source, which may wait for a frame, and `write` of a sink, which may wait for the receiver
+     * of its frames. `fraction`: the completed fraction, 0 to 1, or negative if unknown. `what`: describes the
+     * current step to the user. */
     void (*progress)(const struct arhost_host *host, double fraction, const char *what);
 
     /* [any] Returns non-zero if the running call must return soon, with ARHOST_STATUS_ERROR_CANCELLED. Costs one

@@ -50,8 +50,8 @@ impl Host {
     pub fn warn(&self, text: &str) {
         self.log(ARHOST_SEVERITY_WARNING, text);
     }
-    /// Reports progress (0 to 1) and extends the start-up deadline: call it at least every few seconds in `new` and
-    /// `start`.
+    /// Reports progress (0 to 1) and restarts the deadline of the running call. Call it at least every few seconds in
+    /// a function that takes long or waits.
     pub fn progress(&self, fraction: f64, what: &str) {
         let what = CString::new(what.replace('\0', " ")).unwrap_or_default();
         unsafe {
