@@ -148,7 +148,7 @@ Views views_of_images(const Reading &reading, const std::vector<fs::path> &files
     std::vector<cv::Mat> first_images; // in which to search for other boards, which is slow
     for (const fs::path &file : files) {
         frames::FrameReader reader(reading.workers, frames::file_input(file), reading.signals);
-        const cv::Mat image = reader.next().value();
+        const cv::Mat image = reader.only(file.string());
         check_size(image.size(), file.string());
         if (found.image.empty())
             found.image = image.size();

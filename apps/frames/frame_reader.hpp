@@ -43,6 +43,8 @@ public:
     // Returns the grey pixels of the next frame, or nullopt at the end. They are valid until the next call. All
     // frames have the same size. Throws base::Interrupted, or std::runtime_error if the frames cannot be read.
     std::optional<cv::Mat> next();
+    // Returns the grey pixels of a file that must have exactly one frame. `name` is for the error.
+    cv::Mat only(const std::string &name);
 
 private:
     static constexpr std::uint32_t slot_count = 3; // one for the caller, the others for frames that are being read

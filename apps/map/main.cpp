@@ -101,7 +101,7 @@ public:
                 return {};
             const std::string &name = arguments_.images[at_++];
             open(name);
-            return Picture{name, reader_->next().value()};
+            return Picture{name, reader_->only(name)};
         }
         std::optional<cv::Mat> grey;
         for (unsigned skipped = at_ == 0 ? 1 : arguments_.every; skipped > 0; --skipped, ++at_)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Long live runs: live.py [soak] [swaps] [--quick]
+"""Long live runs: live.py [soak] [swaps] [faults] [--quick]
 
 soak   30 minutes at 30 frames per second, 640x480, scene optix-cs, a window (on Xvfb) and a web page with two viewers.
        Targets: no frame lost, p99 of the latency at most two frame times, and no process that grows: the growth of its
@@ -8,12 +8,16 @@ soak   30 minutes at 30 frames per second, 640x480, scene optix-cs, a window (on
 swaps  tracker and ray tracer are replaced every second for 10 minutes at 30 frames per second; first by arhost's plugins,
        then by plugins whose overlays contain the number of their frame. Targets: no frame lost, no frame without overlay,
        no overlay of another frame, no growth of the host.
+faults 30 minutes at 30 frames per second, 640x480: every 30 seconds, a worker that is chosen at random is killed or
+       stopped. Two viewers, a recording, a session and the poses. Targets: all poses as in an undisturbed run, every
+       output readable, no file or process left, and no gap in the recording longer than the deadline of a hang.
 
 --quick: a minute, as a smoke test. Writes build/live/."""
 import contextlib
 import json
 import os
 import pathlib
+import random
 import shutil
 import signal
 import socket
@@ -257,9 +261,107 @@ stats: stats.json
     check("overlays of another frame", sum(not frame == video == overlay for frame, video, overlay, _ in lines), 0)
 
 
+def pose_by_capture(path):
+    """The poses of the world in a file of sink_poses, by capture time."""
+    poses = {}
+    with open(path, encoding="utf-8") as file:
+        for line in file:
+            record = json.loads(line)
+            found = [target["mt"] for target in record["targets"] if target["state"] == "detected"]
+            if found:
+                poses.setdefault(record["capture_ns"], []).append(found[0])
+    return poses
+
+
+def faults():
+    """Kills and stops of workers during a live run."""
+    seconds, interval, deadline_s = (60, 6, 2) if QUICK else (1800, 30, 2)
+    film_frames = 10 * FPS
+    reference = OUT / "reference"
+    shutil.rmtree(reference, ignore_errors=True)
+    reference.mkdir(parents=True)
+    tracker = "tracker: {plugin: tracker_apriltag, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}"
+    (reference / "film.yaml").write_text(f"""version: 1
+source: {{plugin: source_synthetic, fps: {FPS}, options: {{frames: {film_frames}, width: 640, height: 480}}}}
+outputs: [{{plugin: sink_video, path: film.mkv}}]
+""", encoding="utf-8")
+    (reference / "poses.yaml").write_text(f"""version: 1
+source: {{plugin: source_file, path: film.mkv}}
+camera: {{width: 640, height: 480, fx: 600}}
+{tracker}
+outputs: [{{plugin: sink_poses, path: poses.jsonl}}]
+""", encoding="utf-8")
+    for name in ("film", "poses"):
+        subprocess.run([BUILD / "bin/arhost", f"{name}.yaml"], cwd=reference, check=True, stderr=subprocess.DEVNULL)
+    expected = {at: poses[0] for at, poses in pose_by_capture(reference / "poses.jsonl").items()}
+
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    limits = f"deadline_ms: {1000 * deadline_s}"
+    run = Run("faults", f"""version: 1
+mode: live
+source: {{plugin: source_file, path: ../reference/film.mkv, {limits}, options: {{loop: true}}}}
+camera: {{width: 640, height: 480, fx: 600}}
+{tracker[:-1]}, {limits}}}
+raytracer: {{plugin: rt_embree, scene: demo, {limits}}}
+live: {{target_fps: {FPS}}}
+outputs:
+  - {{plugin: sink_web, allow: [listen], {limits}, options: {{listen: "127.0.0.1:{port}"}}, control: [status]}}
+  - {{plugin: sink_control, allow: [listen], control: [status]}}
+  - {{plugin: sink_video, path: film/recording.mkv, {limits}}}
+  - {{plugin: sink_session, path: session, {limits}}}
+  - {{plugin: sink_poses, path: poses/poses.jsonl, {limits}}}
+stats: stats.json
+""")
+    rng = random.Random(1)
+    victims = [name[:15] for name in ("source_file", "tracker_apriltag", "rt_embree", "sink_web", "sink_video",
+                                      "sink_session", "sink_poses")]
+    while run.command(command="status")["status"]["frames"]["composited"] < FPS:
+        time.sleep(0.1)
+    viewers = [Viewer(port), Viewer(port)]
+    done, begin = [], time.monotonic()
+    for number in range(seconds // interval):
+        time.sleep(max(0, begin + (number + rng.uniform(0.2, 0.6)) * interval - time.monotonic()))
+        run.expect_running()
+        victim, kind = rng.choice(victims), rng.choice([signal.SIGKILL, signal.SIGSTOP])
+        worker = run.processes().get(victim)
+        if worker:
+            os.kill(worker, kind)
+            done.append((victim, kind.name))
+        viewers = [viewer if viewer.is_alive() else Viewer(port) for viewer in viewers]
+        if sys.stderr.isatty():
+            print(f"\r{number + 1} of {seconds // interval} faults", end="", file=sys.stderr, flush=True)
+    time.sleep(interval / 2)
+    load = os.getloadavg()
+    stats = run.end()
+
+    frames = stats["frames"]
+    print(f"\nfaults: {len(done)} in {seconds / 60:.0f} minutes, 640x480 at {FPS} fps, load average {load[0]:.1f}: "
+          f"{frames['in']} frames in, {frames['composited']} composited, {frames['augmented']} with overlay; restarts {stats['restarts']}")
+    seen = pose_by_capture(run.folder / "poses/poses.jsonl")
+    length_ns = round(film_frames * 1e9 / FPS)
+    by_frame = {round(at * FPS / 1e9): pose for at, pose in expected.items()}
+    differences = [max(abs(a - b) for a, b in zip(by_frame[round(at % length_ns * FPS / 1e9) % film_frames], pose))
+                   for at, poses in seen.items() for pose in poses]
+    print(f"  {len(differences)} poses, of which {sum(value == 0 for value in differences)} are identical to those of an undisturbed run")
+    check("largest difference of an element of a pose (mm)", max(differences), 0)
+    times = [float(line) for line in subprocess.run(
+        ["ffprobe", "-v", "error", "-select_streams", "v", "-show_entries", "packet=pts_time", "-of", "csv=p=0",
+         run.folder / "film/recording.mkv"], check=True, capture_output=True, text=True).stdout.replace(",", "").split()]
+    gaps = sorted((b - a for a, b in zip(sorted(times), sorted(times)[1:])), reverse=True)
+    print(f"  the recording has {len(times)} frames; the longest gaps: {', '.join(f'{gap:.2f}' for gap in gaps[:8])} s")
+    check("longest gap in the recording, s", gaps[0], deadline_s + 1)
+    replay = subprocess.run([BUILD / "bin/arhost", "replay", "session", "--frames", "300", "--output", "none"],
+                            cwd=run.folder, capture_output=True, text=True)
+    check("exit status of the session's replay", replay.returncode, 0)
+    left = [str(path.relative_to(run.folder)) for path in run.folder.rglob(".*")]
+    check("hidden files left", len(left), 0)
+    check("processes left", sum(name_of(pid).startswith("arhost") for pid in children(os.getpid())), 0)
+
+
 def main():
     names = [word for word in sys.argv[1:] if word != "--quick"]
-    runs = {"soak": soak, "swaps": swaps}
+    runs = {"soak": soak, "swaps": swaps, "faults": faults}
     if any(name not in runs for name in names):
         raise SystemExit(__doc__)
     for name in names or runs:

@@ -8,6 +8,8 @@
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/sinks/stdout_sinks.h>
 
+#include <cstdlib>
+#include <string_view>
 #include <sys/ioctl.h>
 #include <unistd.h>
 
@@ -22,6 +24,20 @@ std::shared_ptr<spdlog::logger> make_logger(const std::shared_ptr<spdlog::detail
                                                   spdlog::async_overflow_policy::overrun_oldest);
 }
 
+// The conventions of https://no-color.org and https://bixense.com/clicolors.
+spdlog::color_mode color_mode() {
+    const auto value_of = [](const char *name) -> std::string_view {
+        const char *const value = std::getenv(name);
+        return value ? value : "";
+    };
+    const std::string_view forced = value_of("CLICOLOR_FORCE");
+    if (!value_of("NO_COLOR").empty())
+        return spdlog::color_mode::never;
+    if (!forced.empty() && forced != "0")
+        return spdlog::color_mode::always;
+    return value_of("CLICOLOR") == "0" ? spdlog::color_mode::never : spdlog::color_mode::automatic;
+}
+
 } // namespace
 
 Console::Console(bool verbose)
@@ -30,6 +46,7 @@ Console::Console(bool verbose)
       log_(make_logger<spdlog::sinks::stderr_color_sink_st>(thread_)),
       line_(make_logger<spdlog::sinks::stderr_sink_st>(thread_)) {
     log_->set_pattern("%^%l%$: %v");
+    static_cast<spdlog::sinks::ansicolor_stderr_sink_st *>(log_->sinks().front().get())->set_color_mode(color_mode());
     log_->set_level(verbose ? spdlog::level::debug : spdlog::level::info);
     line_->set_formatter(
         std::make_unique<spdlog::pattern_formatter>("%v", spdlog::pattern_time_type::local, std::string()));

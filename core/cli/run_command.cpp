@@ -15,6 +15,8 @@
 
 #include <csignal>
 #include <cstdio>
+#include <ranges>
+#include <set>
 #include <sys/resource.h>
 #include <sys/signalfd.h>
 
@@ -71,6 +73,35 @@ private:
     }
 
     base::AtomicFile stats_, timeline_;
+};
+
+// Removes the folders that a run has created and left empty, for example because an output could not start.
+class NewFolders {
+public:
+    explicit NewFolders(const run_config::Configuration &configuration) {
+        run_config::for_each_component(configuration, [this](const run_config::ComponentConfiguration &component) {
+            std::ranges::for_each(component.policy.writable, [this](const auto &folder) { add(folder); });
+        });
+        for (const auto &file : {configuration.stats, configuration.timeline})
+            if (file)
+                add(file->parent_path());
+    }
+    ~NewFolders() {
+        std::error_code not_empty;
+        for (const std::filesystem::path &folder : missing_ | std::views::reverse)
+            std::filesystem::remove(folder, not_empty);
+    }
+    NewFolders(const NewFolders &) = delete;
+    NewFolders &operator=(const NewFolders &) = delete;
+
+private:
+    void add(std::filesystem::path folder) {
+        std::error_code ignored;
+        for (; folder.has_relative_path() && !std::filesystem::exists(folder, ignored); folder = folder.parent_path())
+            missing_.insert(folder);
+    }
+
+    std::set<std::filesystem::path> missing_; // parents come before their subfolders
 };
 
 // The signals that end a run. A descriptor receives them instead of the process.
@@ -195,6 +226,7 @@ void show_warnings(const run_config::Configuration &configuration, Console &cons
 
 int run(const run_config::Configuration &configuration, const Arguments &arguments, supervise::Starter &launcher) {
     const OutputLocks locks(configuration);
+    const NewFolders new_folders(configuration);
     EndingSignals signals; // before the console's thread starts, because that thread must not receive these signals
     Reports reports(configuration);
     Console console(arguments.verbose);

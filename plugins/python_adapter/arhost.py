@@ -207,7 +207,15 @@ class _Adapter:
             place = [f"{frame.filename}:{frame.lineno}: " for frame in frames[-1:]]
             if isinstance(error, SyntaxError):
                 place = [f"{error.filename}:{error.lineno}: "]
-            return status, f"{''.join(place)}{type(error).__name__}: {error}"
+            hint = ""
+            if isinstance(error, ModuleNotFoundError) and not os.access(sys.path[0], os.R_OK):
+                hint = (f"; if the module is next to the script, add 'reads: [{sys.path[0]}]', because the sandbox "
+                        "shows a plugin only its script")
+            return status, f"{''.join(place)}{type(error).__name__}: {error}{hint}"
+
+    def _place(self, method):
+        code = getattr(getattr(self.plugin, method), "__code__", None)
+        return f"{code.co_filename}:{code.co_firstlineno}: " if code else ""
 
     def _with_memory(self, memory, call):
         """Runs `call`. Warns once if the script keeps arrays that refer to `memory`, which is invalid after the call."""
@@ -240,7 +248,11 @@ class _SourceAdapter(_Adapter):
     def start(self, first_sequence, fps, paced, intrinsics):
         setup = Fields(first_sequence=first_sequence, fps=fps, paced=paced,
                        intrinsics=intrinsics and Fields(_record(intrinsics, INTRINSICS)))
-        result = dict(self.plugin.start(setup))
+        result = self.plugin.start(setup)
+        if not isinstance(result, dict) or not {"width", "height"} <= result.keys():
+            raise Failure(f"{self._place('start')}start returned {result!r}; it must return a dict with 'width' and "
+                          "'height'")
+        result = dict(result)
         self.clock = int(result.pop("clock", CLOCK_MEDIA))
         format = [int(result.pop("pixel_format", PIXEL_FORMAT_RGB8)), int(result.pop("width")),
                   int(result.pop("height")), float(result.pop("fps", fps) or 0),

@@ -11,6 +11,7 @@
 #include <arhost-cpp/plugin.hpp>
 
 #include <cstdio>
+#include <cstdlib>
 #include <dlfcn.h>
 #include <tuple>
 #include <utility>
@@ -184,9 +185,13 @@ void initialise(const std::string &interpreter) {
     PyConfig_SetBytesString(&config, &config.program_name, interpreter.c_str());
     const PyStatus status = Py_InitializeFromConfig(&config);
     PyConfig_Clear(&config);
-    if (PyStatus_Exception(status))
-        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                      std::string("cannot start Python: ") + (status.err_msg ? status.err_msg : "unknown reason"));
+    if (PyStatus_Exception(status)) {
+        const char *const home = std::getenv("PYTHONHOME");
+        throw Failure(
+            ARHOST_STATUS_ERROR_CONFIGURATION,
+            std::string("cannot start Python: ") + (status.err_msg ? status.err_msg : "unknown reason") +
+                (home ? std::string("; unset the environment variable PYTHONHOME, which is '") + home + "'" : ""));
+    }
     PyEval_SaveThread();
 }
 

@@ -53,6 +53,19 @@ const std::vector<Case> cases = {
     {"MissingVideo",
      replaced(good, "source_counter,", "source_file, path: f-001.png,"),
      {"run.yaml:3:", "source.path: there is no file '", "did you mean 'f-0001.png'?"}},
+    {"WildcardAsVideo",
+     replaced(good, "source_counter,", "source_file, path: \"f-*.png\","),
+     {"run.yaml:3:", "source.path: there is no file '", "numbered files as %d, or as %04d"}},
+    {"InstalledScene",
+     replaced(good, "scene.yaml", "dmo"),
+     {"run.yaml:5:", "raytracer.scene: there is no scene file '", "did you mean 'demo'?"}},
+    {"ColourByName",
+     good,
+     {"scene.yaml:3:", "must be '#rrggbb' (sRGB), a number or a list of three", "but is 'red'"},
+     replaced(small_scene, "diffuse: 0.5", "diffuse: red")},
+    {"FolderFarFromAnyOther",
+     replaced(good, "path: counted.txt", "path: /nonexist/x/counted.txt"),
+     {"run.yaml:6:", "outputs[0].path: there is no folder '/nonexist'; create it, or choose another path"}},
     {"SceneBeyondTheLimits",
      good,
      {"scene.yaml:5:3: objects[1]: object 1 'cuboid 1' extends beyond 4e+09 mm"},
@@ -285,6 +298,13 @@ TEST(Check, FailsIfTheSceneLoadsTooSlowly) {
                {"scene.yaml: the scene loader failed: made no progress for 20 ms"});
 }
 
+TEST(BadInput, LeavesNoFolder) {
+    ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 5}}\nstats: out/b/stats.json\n"
+                  "outputs: [{plugin: sink_video, path: out/a/film.mp4, options: {preset: none}}]\n");
+    run.expect(2, {"'none' is not one of ultrafast"});
+    EXPECT_FALSE(run.exists("out"));
+}
+
 // The message is the user's view, and the run neither retries nor repeats it.
 TEST(BadInput, OfAnUnwritableFolderIsReportedOnce) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 5}}\n"
@@ -352,7 +372,8 @@ TEST(BadCommandLine, IsRejected) {
         {{"--config", "run.yaml", "--x1", "1"}, "need --g1"},
         {{"--config", "run.yaml", "--set", "outputs.0.plugin=x"}, "--set: outputs[0].plugin: there is no plugin"},
         {{"--config", "run.yaml", "--g2", "90", "--z2", "1"}, "--g2 sets the second rotation and needs --g1"},
-        {{"--config", "run.yaml", "--frames", "-3"}, "frames"},
+        {{"--config", "run.yaml", "--frames", "-3"}, "frames: must be 0 to 1e+15, but is -3"},
+        {{"run", "none.yaml"}, "none.yaml: cannot be read: No such file or directory"},
         {{"--config", "run.yaml", "--no\033[2J"}, "not expected: --no [2J"},
         {{"--config", "run.yaml", "--set", "outputs.0.path=caf\xe9.txt"}, "not valid UTF-8"}};
     for (const auto &line : lines) {

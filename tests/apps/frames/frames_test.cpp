@@ -90,6 +90,15 @@ TEST_P(EveryReader, FetchesNothingThatAFileNames) {
     }
 }
 
+TEST_P(EveryReader, TakesOneFrameOfEachImage) {
+    std::filesystem::create_symlink("grey.png", folder() / "grey-1.png");
+    std::filesystem::create_symlink("grey.png", folder() / "grey-2.png");
+    EXPECT_EQ(execute(command("--images grey-%d.png")), 2);
+    EXPECT_THAT(printed(), HasSubstr("grey-%d.png: has several frames; read it with --video"));
+    EXPECT_EQ(execute(command("--video grey-%d.png")), 2);
+    EXPECT_THAT(printed(), HasSubstr("2 frames"));
+}
+
 TEST_P(EveryReader, RejectsAPipe) {
     ASSERT_EQ(::mkfifo((folder() / "pipe").c_str(), 0600), 0);
     for (const char *option : {"--video ", "--images "}) {

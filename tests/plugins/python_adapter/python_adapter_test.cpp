@@ -358,7 +358,9 @@ TEST_F(PythonAdapter, UnusableScriptsAreConfigurationErrors) {
     const std::string two = std::string(idle_tracker) + "class U(T): pass\n";
     for (const auto &[script, message] :
          {std::pair<std::string, const char *>{"class T\n", "script.py:1: SyntaxError"},
-          {"import no_such_module\n", "script.py:1: ModuleNotFoundError: No module named 'no_such_module'"},
+          {"import no_such_module\n", "script.py:1: ModuleNotFoundError: No module named 'no_such_module'; if the "
+                                      "module is next to the script, add "
+                                      "'reads: ["},
           {"class T: pass\n", "has no classes with a method 'track'"},
           {two, "has 2 classes with a method 'track'; name one in the option 'class'"},
           {"class T:\n    def track(self): pass\n", "TypeError"}}) {
@@ -380,6 +382,41 @@ TEST_F(PythonAdapter, UnusableScriptsAreConfigurationErrors) {
         EXPECT_EQ(run_script(run, idle_tracker), 2) << run.output();
         EXPECT_THAT(run.output(), HasSubstr(message));
     }
+}
+
+TEST_F(PythonAdapter, ASourceMustReturnItsFormat) {
+    for (const char *returned : {"None", "{'width': 8}"}) {
+        ArhostRun run(chain("source:", "source: {plugin: source_python, options: {script: script.py}}"));
+        EXPECT_EQ(run_script(run, "class S:\n    def __init__(self, host): pass\n    def start(self, setup):\n"
+                                  "        return " +
+                                      std::string(returned) + "\n    def read(self, buffer): return 1\n"),
+                  2);
+        EXPECT_THAT(run.output(), HasSubstr("script.py:3: start returned " + std::string(returned) +
+                                            "; it must return a dict with 'width' and 'height'"));
+        EXPECT_THAT(run.output(), Not(HasSubstr("restarting")));
+    }
+}
+
+TEST_F(PythonAdapter, ASourceMayWaitLongerThanItsDeadline) {
+    ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_python, deadline_ms: 300, options: {script: "
+                  "script.py}}\noutputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n");
+    EXPECT_EQ(run_script(run, "class S:\n    def __init__(self, host): self.host = host\n"
+                              "    def start(self, setup): return {'width': 8, 'height': 8}\n"
+                              "    def read(self, buffer):\n"
+                              "        if buffer.sequence == 2 or not self.host.wait(0.8): return None\n"
+                              "        return 40_000_000 * buffer.sequence\n"),
+              0)
+        << run.output();
+    EXPECT_EQ(run.stats()["restarts"]["source"], 0);
+}
+
+TEST_F(PythonAdapter, NamesAWrongPythonhome) {
+    ArhostRun run(tracker);
+    run.write("scene.yaml", small_scene);
+    run.write("script.py", idle_tracker);
+    run.start({"run.yaml"}, [] { ::setenv("PYTHONHOME", "/nonexistent", 1); });
+    EXPECT_EQ(run.wait(), 2);
+    EXPECT_THAT(run.output(), HasSubstr("unset the environment variable PYTHONHOME, which is '/nonexistent'"));
 }
 
 TEST_F(PythonAdapter, TheRayTracersScriptDeclaresItsCapabilities) {
