@@ -23,30 +23,33 @@ struct ProcessUsage {
     static ProcessUsage now() {
         ::malloc_trim(0); // returns free memory in the arenas of driver threads
         const auto heap = ::mallinfo2();
-        return {descriptors_now(), entries("/proc/self/task"),
+        return {descriptors_now(), number_in("/proc/self/status", "Threads:"),
                 static_cast<long>((heap.uordblks + heap.hblkhd) / 1024), dirty_kib_now()};
     }
-    static long descriptors_now() { return entries("/proc/self/fd"); }
+    static long descriptors_now() { // throws std::system_error
+        namespace fs = std::filesystem;
+        return static_cast<long>(std::distance(fs::directory_iterator("/proc/self/fd"), fs::directory_iterator()));
+    }
 
 private:
-    static long entries(const char *folder) { // throws std::system_error
-        namespace fs = std::filesystem;
-        return static_cast<long>(std::distance(fs::directory_iterator(folder), fs::directory_iterator()));
+    // Returns the number in the line of `file` that begins with `label`.
+    static long number_in(const char *file, const char *label) {
+        std::ifstream lines(file);
+        for (std::string word; lines >> word && word != label;)
+            lines.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
+        long number = 0;
+        if (!(lines >> number))
+            throw std::runtime_error(std::string(file) + " cannot be parsed");
+        return number;
     }
     static long dirty_kib_now() {
-        std::ifstream pages("/proc/self/smaps_rollup"); // exact, unlike statm
-        long kib = 0;
-        if (!pages) { // not in this kernel
+        if (::access("/proc/self/smaps_rollup", F_OK) != 0) { // not in this kernel
             long size = 0, resident = 0;
             if (!(std::ifstream("/proc/self/statm") >> size >> resident))
                 throw std::runtime_error("/proc/self/statm cannot be parsed");
             return resident * (::sysconf(_SC_PAGESIZE) / 1024);
         }
-        for (std::string word; pages >> word && word != "Private_Dirty:";)
-            pages.ignore(std::numeric_limits<std::streamsize>::max(), '\n');
-        if (!(pages >> kib))
-            throw std::runtime_error("/proc/self/smaps_rollup cannot be parsed");
-        return kib;
+        return number_in("/proc/self/smaps_rollup", "Private_Dirty:"); // exact, unlike statm
     }
 };
 

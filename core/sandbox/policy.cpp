@@ -21,8 +21,13 @@ constexpr PathList system_readable = {
     // their settings
     "/etc/ld.so.cache", "/etc/ld.so.conf", "/etc/ld.so.conf.d", "/etc/localtime", "/etc/alternatives", "/etc/fonts",
     "/etc/OpenCL", "/etc/vulkan", "/etc/glvnd", "/etc/drirc", "/etc/python3", "/etc/mime.types",
-    // the process and the machine
-    "/proc/self", "/proc/cpuinfo", "/proc/meminfo", "/proc/stat", "/proc/version", "/proc/filesystems",
+    // the process, by name: net and task, which contains net of each thread, describe the network
+    "/proc/self/attr", "/proc/self/auxv", "/proc/self/cgroup", "/proc/self/cmdline", "/proc/self/comm",
+    "/proc/self/environ", "/proc/self/fd", "/proc/self/fdinfo", "/proc/self/io", "/proc/self/limits",
+    "/proc/self/maps", "/proc/self/numa_maps", "/proc/self/oom_score", "/proc/self/oom_score_adj", "/proc/self/smaps",
+    "/proc/self/smaps_rollup", "/proc/self/stat", "/proc/self/statm", "/proc/self/status",
+    // the machine
+    "/proc/cpuinfo", "/proc/meminfo", "/proc/stat", "/proc/version", "/proc/filesystems",
     "/proc/sys/vm/overcommit_memory", "/proc/sys/vm/max_map_count", "/proc/sys/kernel/osrelease",
     "/sys/devices/system", "/sys/fs/cgroup", "/sys/kernel/mm/transparent_hugepage"};
 constexpr PathList system_devices = {"/dev/null", "/dev/full", "/dev/random", "/dev/urandom"};

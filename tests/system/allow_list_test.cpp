@@ -2,7 +2,7 @@
 //
 // Runs plugins under strace, to find system calls that they need but the sandbox blocks
 // (core/sandbox/system_calls.cpp): a call that the allow list lacks fails with ENOSYS, one of the deny list with
-// EPERM.
+// EPERM. Opening a file of /proc that the sandbox does not grant fails with EACCES.
 #include "arhost_run.hpp"
 #include "camera_server.hpp"
 
@@ -49,7 +49,8 @@ std::set<std::string> blocked_calls(ArhostRun &run) {
     std::istringstream trace(run.read("trace.txt"));
     std::set<std::string> found;
     for (std::string line; std::getline(trace, line);)
-        if (line.find("= -1 ENOSYS") != std::string::npos || line.find("= -1 EPERM") != std::string::npos) {
+        if (const auto has = [&](const char *text) { return line.find(text) != std::string::npos; };
+            has("= -1 ENOSYS") || has("= -1 EPERM") || (has("= -1 EACCES") && has("/proc/"))) {
             const std::string call = line.substr(line.find_first_not_of("0123456789 "));
             if (std::ranges::none_of(harmless, [&](const char *beginning) { return call.starts_with(beginning); }))
                 found.insert(call);

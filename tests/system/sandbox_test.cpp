@@ -103,6 +103,7 @@ public:
         fs::create_symlink(target(), target().string() + ".alias");
         listen(target().string() + ".socket", false);
         listen(target().string() + ".socket", true);
+        ::listen(listening_.emplace_back(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)), 1);
     }
     ~HostileRun() {
         for (const int fd : listening_)

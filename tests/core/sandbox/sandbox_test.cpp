@@ -336,7 +336,11 @@ TEST_F(Sandbox, LandlockAllowsOnlyListedPaths) {
         check.that(::mkdir((inside / "folder").c_str(), 0700) == 0);
         check.that(!opens("/etc/passwd", O_RDONLY));
         check.that(!opens("/proc/1/status", O_RDONLY));
-        check.that(opens("/proc/self/status", O_RDONLY));
+        for (const char *own : {"status", "maps", "smaps_rollup", "stat", "cgroup", "fd"})
+            check.that(opens(fs::path("/proc/self") / own, O_RDONLY));
+        for (const char *of_network : {"net/tcp", "net/unix", "task"})
+            check.that(!opens(fs::path("/proc/self") / of_network, O_RDONLY));
+        check.that(!opens("/proc/thread-self/net/tcp", O_RDONLY));
         check.that(opens("/usr/bin/env", O_RDONLY));
         check.that(opens("/dev/null", O_RDWR));
     }));

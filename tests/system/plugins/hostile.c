@@ -104,6 +104,26 @@ static int opens(const char *file, int flags) {
     return fd >= 0;
 }
 
+static int lists(const char *file, const char *text) {
+    FILE *lines = fopen(file, "r");
+    char line[1024];
+    int found = 0;
+    while (lines && fgets(line, sizeof line, lines))
+        found |= strstr(line, text) != NULL;
+    if (lines)
+        fclose(lines);
+    return found;
+}
+
+/* The test listens on a socket whose name begins like that of the target, and on a TCP port. */
+static void read_network_files(const tracker *self, const char *folder, const char *const what[2]) {
+    char file[96];
+    snprintf(file, sizeof file, "%s/net/unix", folder);
+    report(self, what[0], lists(file, self->target));
+    snprintf(file, sizeof file, "%s/net/tcp", folder);
+    report(self, what[1], lists(file, " 0A ")); /* state: listening */
+}
+
 static void read_files(const tracker *self) {
     char file[64];
     report(self, "a file outside its list", opens(self->target, O_RDONLY));
@@ -119,6 +139,10 @@ static void read_files(const tracker *self) {
     report(self, "the kernel's command line", opens("/proc/cmdline", O_RDONLY));
     report(self, "the kernel's settings", opens("/proc/sys/kernel/hostname", O_RDONLY));
     report(self, "the control group", sees_control_group());
+    read_network_files(self, "/proc/self", (const char *const[]){"the names of sockets", "the connections"});
+    snprintf(file, sizeof file, "/proc/self/task/%d", (int)gettid());
+    read_network_files(self, file,
+                       (const char *const[]){"the names of sockets by a thread", "the connections by a thread"});
 }
 
 /* Names, sizes and attributes of files that the plugin may not read. */
