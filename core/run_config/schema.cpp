@@ -40,7 +40,8 @@ constexpr Row run_keys[] = {
 constexpr Row component_keys[] = {
     {"options", free_map, "", "The plugin's own options; `arhost plugins --options` lists them."},
     {"allow", list, "nothing",
-     "Sandbox permissions: `video`, `usb`, `gpu`, `display`, `network`, `listen`, `processes` (docs/security.md)."},
+     "Sandbox permissions: `video`, `usb`, `gpu`, `display`, `network`, `listen`, `processes`, `jit` "
+     "(docs/security.md)."},
     {"usb", map, "", "The USB device that the plugin may use, and no other (docs/security.md)."},
     {"usb.vendor", text, required, "Vendor ID: four hexadecimal digits, as `lsusb` prints them."},
     {"usb.product", text, required, "Product ID: four hexadecimal digits."},

@@ -125,8 +125,9 @@ Contents contents_of(const Policy &policy) {
         contents.grant(path, of_devices);
     for (const fs::path &path : paths.sockets)
         contents.grant(path, of_writable);
+    const bool may_execute = policy.may_generate_code() || may_start_processes(policy);
     for (const fs::path &path : policy.writable)
-        contents.grant(path, of_writable);
+        contents.grant(path, of_writable | (may_execute ? 0 : MOUNT_ATTR_NOEXEC));
     contents.link("/dev/fd", "/proc/self/fd");
     return contents;
 }

@@ -20,8 +20,8 @@
 namespace arhost::sandbox {
 
 // Permissions beyond the default: the valid values in arhost_descriptor.needs and of the key `allow`.
-constexpr std::array<std::string_view, 7> allowances = {"video",   "usb",    "gpu",      "display",
-                                                        "network", "listen", "processes"};
+constexpr std::array<std::string_view, 8> allowances = {"video",   "usb",    "gpu",       "display",
+                                                        "network", "listen", "processes", "jit"};
 
 enum class Mode {
     standard = 1, // like permissive, but opens only arhost's own plugins if no layer limits which files can be read
@@ -45,7 +45,11 @@ struct Policy {
 
     bool allows(std::string_view what) const { return allow.contains(what); }
     // Whether a plugin that needs `need` (an element of `allowances`) may run.
-    bool meets(std::string_view need) const { return allows(need) || (need == "usb" && !usb_device.empty()); }
+    bool meets(std::string_view need) const {
+        return allows(need) || (need == "usb" && !usb_device.empty()) || (need == "jit" && may_generate_code());
+    }
+    // Whether the plugin may execute memory and files that it can write: drivers compile shaders for the processor.
+    bool may_generate_code() const { return allows("jit") || allows("gpu") || allows("display"); }
 };
 
 // The number of bytes that a process with this policy may use; 0 (only in a build with sanitizers): unlimited.

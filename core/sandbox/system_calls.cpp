@@ -266,6 +266,18 @@ void deny_uncounted_memory(Filter &filter) {
     filter.deny("mmap", {has_bits(3, MAP_GROWSDOWN, MAP_GROWSDOWN)}); // such a mapping would count as stack
 }
 
+// Denies executing memory that the plugin has written, as attacks on a plugin's parsers do. Libraries are not
+// affected, because the dynamic linker maps their code from files.
+void deny_generated_code(Filter &filter) {
+    constexpr std::uint64_t write_execute = PROT_WRITE | PROT_EXEC;
+    const scmp_arg_cmp executable = has_bits(2, PROT_EXEC, PROT_EXEC);
+    filter.deny("mmap", {has_bits(2, write_execute, write_execute)});
+    for (const std::uint64_t kind : {MAP_ANONYMOUS, MAP_SHARED}) // can become writable or is so elsewhere
+        filter.deny("mmap", {executable, has_bits(3, kind, kind)});
+    for (const char *call : {"mprotect", "pkey_mprotect"})
+        filter.deny(call, {executable});
+}
+
 void deny_harmful_calls(const Policy &policy) {
     Filter filter(SCMP_ACT_ALLOW);
     for (const char *call : denied)
@@ -279,6 +291,8 @@ void deny_harmful_calls(const Policy &policy) {
     filter.deny("fcntl", {equals(1, F_SETPIPE_SZ)}); // RLIMIT_DATA does not count pipe buffers
     if (has_memory_limit(policy) && !may_share_memory(policy))
         deny_uncounted_memory(filter);
+    if (!policy.may_generate_code())
+        deny_generated_code(filter);
     filter.load();
 }
 

@@ -86,6 +86,9 @@ const arhost_entry_point &open_library(const std::filesystem::path &file) {
             hint =
                 " (if the sandbox hides the folder of that file, set 'reads: [FOLDER]' in the configuration or pass "
                 "'--reads FOLDER' to plugins and conform)";
+        else if (mentions("Operation not permitted")) // an executable stack, relocations in code, a writable folder
+            hint = " (the sandbox executes no memory and no file that the plugin may write: set 'allow: [jit]', or "
+                   "link with -z noexecstack -z text, and install the library in another folder)";
         else if (std::ranges::any_of(dlopen_memory_errors, mentions))
             hint = " (out of memory: 'memory_mb' may be too small)";
         reject(file, "cannot be loaded: " + reason + hint);

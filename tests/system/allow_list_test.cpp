@@ -129,6 +129,28 @@ TEST(AllowListOfOthers, ContainsTheCallsOfPython) {
     EXPECT_THAT(blocked_calls(run), testing::IsEmpty());
 }
 
+// libffi generates the code of each callback.
+TEST(AllowListOfOthers, ACallbackOfPythonNeedsJit) {
+    for (const bool is_allowed : {false, true}) {
+        ArhostRun run(pipeline_with(std::string("plugin: tracker_python, ") + (is_allowed ? "allow: [jit], " : "") +
+                                    "options: {script: script.py}") +
+                      "restart: {quarantine_after: 1}\n");
+        if (!succeeds(run, "/usr/bin/python3 -c 'import numpy'"))
+            GTEST_SKIP() << "python3-numpy is not installed";
+        run.write("script.py", R"(import ctypes
+class Tracker:
+    def __init__(self, host):
+        self.callback = ctypes.CFUNCTYPE(ctypes.c_int)(lambda: 1)
+        assert self.callback() == 1
+    def start(self, setup):
+        pass
+    def track(self, frame):
+        return []
+)");
+        EXPECT_EQ(run.run({"--config", "run.yaml", "--allow-no-target"}), is_allowed ? 0 : 1) << run.output();
+    }
+}
+
 TEST(AllowListOfOthers, ContainsTheCallsOfRust) {
     REQUIRE_TRACE();
     ArhostRun run(pipeline_with("plugin: ./my_tracker/target/debug/libmy_tracker.so"));

@@ -313,8 +313,8 @@ TEST_P(WithoutSandbox, AttacksSucceed) {
 
 INSTANTIATE_TEST_SUITE_P(Sandbox, WithoutSandbox,
                          testing::Values("read", "write", "metadata", "devices", "environment", "sockets", "system_v",
-                                         "processes", "trace", "signal", "memory", "threads", "disk", "descriptors",
-                                         "exhaust", "kernel", "terminal"),
+                                         "processes", "trace", "signal", "memory", "code", "threads", "disk",
+                                         "descriptors", "exhaust", "kernel", "terminal"),
                          [](const auto &info) { return info.param; });
 
 // ---- docs/security.md: each attack of attacks.hpp ---------------------------------------------------
@@ -442,8 +442,8 @@ TEST_P(AttacksInSettings, AreStopped) {
 INSTANTIATE_TEST_SUITE_P(
     Sandbox, AttacksInSettings,
     testing::Combine(testing::Values("read", "metadata", "write", "devices", "environment", "terminal", "system_v",
-                                     "sockets", "processes", "trace", "signal", "memory", "disk", "descriptors",
-                                     "exhaust", "kernel"),
+                                     "sockets", "processes", "trace", "signal", "memory", "code", "disk",
+                                     "descriptors", "exhaust", "kernel"),
                      testing::ValuesIn(settings)),
     [](const auto &info) { return std::get<0>(info.param) + "_" + std::get<1>(info.param).name; });
 

@@ -323,6 +323,41 @@ TEST_F(Sandbox, NamespacesBlockTheNetworkUnlessAllowed) {
     }));
 }
 
+// A plugin could otherwise write a library and load it.
+TEST_F(Sandbox, FilesThatThePluginCanWriteCannotBeExecuted) {
+    for (const char *allow : {"video", "jit", "gpu", "processes"}) {
+        policy.allow = {allow};
+        EXPECT_CHECKS(in_child([&](Checks &check) {
+            check.needs(has(enter_namespaces(policy), "mount"));
+            const auto executes = [](const fs::path &file) {
+                const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
+                return ::mmap(nullptr, 1, PROT_READ | PROT_EXEC, MAP_PRIVATE, fd, 0) != MAP_FAILED;
+            };
+            check.that(executes(inside / "old") == (std::string(allow) != "video") || under_sanitizer);
+            check.that(executes("/bin/true"));
+        })) << allow;
+    }
+}
+
+TEST_F(Sandbox, OnlyGeneratedCodeNeedsAPermission) {
+    for (const char *allow : {"video", "network", "processes", "jit", "gpu", "display"}) {
+        policy.allow = {allow};
+        EXPECT_CHECKS(in_child([&](Checks &check) {
+            const bool may = policy.allows("jit") || policy.allows("gpu") || policy.allows("display");
+            check.that(policy.meets("jit") == may);
+            check.needs(filters_system_calls(policy));
+            const auto map = [](int protection) {
+                return ::mmap(nullptr, 4096, protection, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+            };
+            void *const data = map(PROT_READ | PROT_WRITE);
+            check.that((map(PROT_WRITE | PROT_EXEC) != MAP_FAILED) == may);
+            check.that((::mprotect(data, 4096, PROT_READ | PROT_EXEC) == 0) == may);
+            check.that(::mprotect(data, 4096, PROT_READ) == 0);
+            std::thread([] {}).join(); // its stack is not executable
+        })) << allow;
+    }
+}
+
 TEST_F(Sandbox, LandlockAllowsOnlyListedPaths) {
     policy.readable = {outside / "old"};
     EXPECT_CHECKS(in_child([&](Checks &check) {

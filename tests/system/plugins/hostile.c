@@ -97,6 +97,20 @@ static int sees_control_group(void) {
     return found;
 }
 
+/* Whether memory that it shares with the host becomes executable. */
+static int executes_shared_memory(void) {
+    FILE *maps = fopen("/proc/self/maps", "r");
+    char line[512];
+    unsigned long begin, end;
+    int found = 0;
+    while (maps && !found && fgets(line, sizeof line, maps))
+        found = strstr(line, "memfd:arhost") && sscanf(line, "%lx-%lx", &begin, &end) == 2 &&
+                mprotect((void *)begin, end - begin, PROT_READ | PROT_EXEC) == 0;
+    if (maps)
+        fclose(maps);
+    return found;
+}
+
 static int opens(const char *file, int flags) {
     const int fd = open(file, flags | O_CLOEXEC, 0600);
     if (fd >= 0)
@@ -280,6 +294,28 @@ static void use_terminal(const tracker *self) {
     report(self, "type", ioctl(terminal, TIOCSTI, "x") == 0);
     report(self, "the foreground group", tcsetpgrp(terminal, getpgrp()) == 0);
     report(self, "another session's group", getsid(0) != getpid() && getpgrp() != getpid());
+}
+
+/* Executes memory that it has written: the last step of an attack through a defect of a parser. */
+static void execute_data(const tracker *self) {
+    enum { read_write = PROT_READ | PROT_WRITE, read_execute = PROT_READ | PROT_EXEC, all = read_write | PROT_EXEC };
+    const size_t page = (size_t)sysconf(_SC_PAGESIZE);
+    void *const code = (void *)((uintptr_t)&execute_data & ~(page - 1));
+    const int library = open("/bin/true", O_RDONLY | O_CLOEXEC);
+    void *const data = mmap(NULL, page, read_write, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    report(self, "writable code", mmap(NULL, page, all, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0) != MAP_FAILED);
+    report(self, "new code", mmap(NULL, page, read_execute, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0) != MAP_FAILED);
+    report(self, "a file's code, writable", mmap(NULL, page, all, MAP_PRIVATE, library, 0) != MAP_FAILED);
+    report(self, "a file's code, shared", mmap(NULL, page, read_execute, MAP_SHARED, library, 0) != MAP_FAILED);
+    report(self, "data", mprotect(data, page, read_execute) == 0);
+    report(self, "data, still writable", mprotect(data, page, all) == 0);
+    report(self, "data, with a key", syscall(SYS_pkey_mprotect, data, page, read_execute, -1) == 0);
+    report(self, "the stack",
+           mprotect((void *)((uintptr_t)&page & ~(page - 1)), page, read_execute | PROT_WRITE) == 0);
+    report(self, "its own code, writable", mprotect(code, page, all) == 0);
+    report(self, "its own code through /proc", opens("/proc/self/mem", O_RDWR));
+    report(self, "all data, by a personality", syscall(SYS_personality, 0x0400000 /* READ_IMPLIES_EXEC */) >= 0);
+    report(self, "the host's memory", executes_shared_memory());
 }
 
 /* Calls that reach the kernel or change the view of the file system. */
@@ -711,6 +747,8 @@ static void attack(const tracker *self) {
         use_terminal(self);
     else if (!strcmp(name, "kernel"))
         enter_kernel(self);
+    else if (!strcmp(name, "code"))
+        execute_data(self);
     else if (!strcmp(name, "exhaust"))
         exhaust_user(self);
     else if (!strcmp(name, "write"))

@@ -224,9 +224,9 @@ typedef struct arhost_descriptor {
     uint32_t option_count;
     const arhost_option_descriptor *options; /* option_count elements; may be NULL if there are none */
     /* Permissions that the plugin needs from the sandbox: a NULL-terminated list; NULL: none. "video" (/dev/video*),
-     * "usb", "gpu", "display" (X or Wayland, and the GPU), "network", "listen" (accept connections on the sockets of
-     * its options), "processes" (fork and exec). The configuration grants permissions (`allow: [video]`). The host
-     * rejects the plugin before `create` if one of its needs is not granted. */
+     * "usb", "gpu", "display" (X or Wayland, and the GPU), "network", "listen" (accept connections on its sockets),
+     * "processes" (fork, exec), "jit" (execute memory that it writes; part of "gpu" and "display"). The configuration
+     * grants them (`allow: [video]`). The host rejects the plugin before `create` if one of its needs is missing. */
     const char *const *needs;
 } arhost_descriptor;
 
