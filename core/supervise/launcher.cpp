@@ -66,12 +66,13 @@ void Launcher::start() {
     socket_ = std::move(host_end);
 }
 
-// Waits for a reply. Sends SIGCONT meanwhile, because a stopped launcher must not block the host.
+// Waits for a reply. Sends SIGCONT first and meanwhile, because a stopped launcher must not block the host.
 std::optional<Reply> Launcher::receive_reply(std::vector<UniqueFd> &fds) {
     const auto deadline = Clock::now() + timeout_;
     pollfd ready{socket_.get(), POLLIN, 0};
     // Polls once more after the deadline, because this process itself may have been stopped.
     for (bool is_late = false;; is_late = Clock::now() > deadline) {
+        ::kill(pid_, SIGCONT);
         const int count = ::poll(&ready, 1, is_late ? 0 : 50);
         if (count > 0)
             break;
@@ -79,7 +80,6 @@ std::optional<Reply> Launcher::receive_reply(std::vector<UniqueFd> &fds) {
             base::throw_errno("poll of the launcher");
         if (is_late)
             return std::nullopt;
-        ::kill(pid_, SIGCONT);
     }
     Reply reply;
     if (!receive_struct(socket_.get(), reply, fds))

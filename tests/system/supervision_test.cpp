@@ -496,6 +496,19 @@ TEST(Supervision, ARunEndsWithItsLastOutput) {
     EXPECT_LT(counted(run).size(), 1000u);
 }
 
+// It has nothing to do until the host needs it.
+TEST(Supervision, AStoppedLauncherAffectsNoWorker) {
+    CountingRun run({.source = "frames: 400, delay_ms: 5"});
+    run.start();
+    run.wait_for_lines(20);
+    const pid_t launcher = run.launcher();
+    send_signal(launcher, SIGSTOP);
+    run.wait_for_lines(100);
+    EXPECT_EQ(status_of(launcher, "State").substr(0, 1), "T");
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    expect_all_frames(run, 400);
+}
+
 TEST(Supervision, AStoppedLauncherIsResumed) {
     CountingRun run({.source = "frames: 600, delay_ms: 5"});
     run.start();
