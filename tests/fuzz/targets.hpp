@@ -22,6 +22,9 @@ struct Target {
 void run_configuration(Bytes); // YAML, including plugin options
 void run_calibration(Bytes);
 void run_trajectory(Bytes);
+void run_map(Bytes);     // of markers
+void run_session(Bytes); // session.json, a NUL, configuration.yaml, a NUL, frames.jsonl
+void run_patt(Bytes);    // a pattern of ARToolKit
 void run_pattern(Bytes); // input: a pattern, a NUL, a file name
 void run_scene(Bytes);
 void run_obj(Bytes);
@@ -32,11 +35,16 @@ void run_ring(Bytes);            // shared memory that a worker writes
 void run_host(Bytes);            // the whole host with misbehaving workers
 void run_uvc_descriptors(Bytes); // of a USB camera
 void run_uvc_payloads(Bytes);    // and its clock
+void run_uvc_frames(Bytes);      // Motion-JPEG
+void run_web(Bytes);             // requests to sink_web
 
 inline constexpr Target targets[] = {
     {"configuration", run_configuration, 8000},
     {"calibration", run_calibration, 15000},
     {"trajectory", run_trajectory, 15000},
+    {"map", run_map, 8000},
+    {"session", run_session, 8000},
+    {"patt", run_patt, 15000},
     {"pattern", run_pattern, 20000},
     {"scene", run_scene, 8000},
     {"obj", run_obj, 15000},
@@ -47,6 +55,8 @@ inline constexpr Target targets[] = {
     {"host", run_host, 1000},
     {"uvc_descriptors", run_uvc_descriptors, 20000},
     {"uvc_payloads", run_uvc_payloads, 20000},
+    {"uvc_frames", run_uvc_frames, 20000},
+    {"web", run_web, 4000},
 };
 
 // Returns the scratch folder of this process. It is in /dev/shm if available.

@@ -7,9 +7,12 @@
 
 #include "camera/calibration.hpp"
 #include "camera/trajectory.hpp"
+#include "cli/session_grants.hpp"
 #include "run_config/configuration.hpp"
+#include "tracker_pattern/pattern.hpp"
 
 #include <arhost-cpp/numbered_name.hpp>
+#include <arhost-cpp/plugin.hpp>
 
 namespace arhost::fuzz {
 namespace {
@@ -62,6 +65,44 @@ void run_configuration(Bytes bytes) {
         for (const auto &output : configuration.outputs)
             run_config::options_for(plugin_of(ARHOST_KIND_SINK), ARHOST_KIND_SINK, output, 0, notes);
     } catch (const yaml::Error &) {
+    }
+}
+
+void run_map(Bytes bytes) {
+    [[maybe_unused]] static const bool made = (make_folder(), true);
+    write_scratch("fuzzed.map.yaml", bytes);
+    try {
+        const auto root = yaml::Node::parse("version: 1\nsource: {plugin: source}\n"
+                                            "tracker: {plugin: tracker, targets: [{map: fuzzed.map.yaml}]}\n"
+                                            "outputs: [{plugin: sink}]\n",
+                                            (scratch() / "run.yaml").string());
+        run_config::parse(root, scratch() / "plugins");
+    } catch (const yaml::Error &) {
+    }
+}
+
+void run_session(Bytes bytes) {
+    std::string rest = text_of(bytes);
+    for (const char *file : {"session.json", "configuration.yaml", "frames.jsonl"}) {
+        const std::string part = rest.substr(0, rest.find('\0'));
+        rest.erase(0, part.size() + 1);
+        write_scratch(std::filesystem::path("session") / file, bytes_of(part));
+    }
+    write_scratch("session/video.mkv", bytes_of(std::string(200, 'v')));
+    try {
+        const cli::Session session = cli::read_session(scratch() / "session");
+        cli::expect_granted(session.configuration, session, {}, true);
+    } catch (const yaml::Error &) {
+    }
+}
+
+void run_patt(Bytes bytes) {
+    try {
+        const tracker_pattern::Pattern pattern(write_scratch("fuzzed.patt", bytes).string());
+        pattern.match(tracker_pattern::Samples::ones(pattern.side(), pattern.side()));
+    } catch (const Failure &failure) {
+        if (failure.status() != ARHOST_STATUS_ERROR_CONFIGURATION)
+            throw;
     }
 }
 

@@ -4,12 +4,15 @@
 #include "input.hpp"
 #include "targets.hpp"
 
+#include "camera_common/jpeg.hpp"
 #include "source_uvc/clock.hpp"
 #include "source_uvc/descriptors.hpp"
 #include "source_uvc/payload.hpp"
 
 #include <algorithm>
+#include <array>
 #include <stdexcept>
+#include <vector>
 
 namespace arhost::fuzz {
 namespace {
@@ -82,6 +85,34 @@ void run_uvc_payloads(Bytes bytes) {
             assembler.lose_packet();
         else
             assembler.add_payload(payload, now_ns);
+    }
+}
+
+// Motion-JPEG: the input as the first picture of a stream, which sets the format, and as a later one of 32 × 24
+// pixels.
+void run_uvc_frames(Bytes bytes) {
+    constexpr std::uint32_t max_pixels = 1 << 20; // source_uvc accepts only the size that it has negotiated
+    JpegDecoder decoder;
+    const auto decode = [&](arhost_frame_format format) {
+        if (!arhost_frame_layout(&format)) // the picture is too wide or too high, which source_uvc checks, too
+            return;
+        std::vector<std::uint8_t> pixels(format.byte_size);
+        std::array<std::uint8_t *, ARHOST_MAX_PLANES> planes{};
+        for (std::uint32_t plane = 0; plane < format.plane_count; ++plane)
+            planes[plane] = pixels.data() + format.offset[plane];
+        std::string fault;
+        require(decoder.decode(bytes, format, planes.data(), fault) || !fault.empty(), "a fault without a reason");
+    };
+    arhost_frame_format first{};
+    if (decoder.describe(bytes, first) && std::uint64_t{first.width} * first.height <= max_pixels)
+        decode(first);
+    for (const arhost_pixel_format pixels :
+         {ARHOST_PIXEL_FORMAT_I420, ARHOST_PIXEL_FORMAT_GREY8, ARHOST_PIXEL_FORMAT_BGR8}) {
+        arhost_frame_format stream{};
+        stream.width = 32;
+        stream.height = 24;
+        stream.pixel_format = pixels;
+        decode(stream);
     }
 }
 
