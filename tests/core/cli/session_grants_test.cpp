@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/session_grants.hpp"
 
+#include "documents.hpp"
 #include "errors.hpp"
 #include "plugin_under_test.hpp"
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cctype>
 #include <fstream>
 
 namespace arhost::cli {
@@ -50,47 +53,72 @@ protected:
     test::ScratchFolder scratch_;
 };
 
+// A request of a session, and the grant that it needs.
+struct Asked {
+    const char *configuration, *grant;
+};
+// Each kind of grant, wherever a session can name it.
+constexpr Asked asked[] = {
+    {"raytracer: {allow: [gpu]}", "gpu"},
+    {"raytracer: {allow: [network, processes]}", "processes"},
+    {"raytracer: {usb: {vendor: 046d, product: 0825}}", "usb"},
+    {"raytracer: {reads: [SECRETS]}", "SECRETS"},
+    {"raytracer: {options: {texture: SECRETS/key}}", "SECRETS/key"},
+    {"raytracer: {options: {interpreter: SECRETS/key}}", "SECRETS/key"},
+    {"raytracer: {options: {file: TAKE/link/key}}", "SECRETS/key"},
+    {"raytracer: {options: {file: TAKE/../secrets/key}}", "SECRETS/key"},
+    {"raytracer: {options: {script: TAKE/code.py}}", "TAKE/code.py"},
+    {"raytracer: {path: SECRETS/key}", "SECRETS/key"},
+    {"raytracer: {path: SECRETS/%04d.png}", "SECRETS"},
+    {"raytracer: {scene: SECRETS/map.yaml}", "SECRETS/map.yaml"},
+    {"scenes: [SECRETS/map.yaml]", "SECRETS/map.yaml"},
+    {"trajectory: SECRETS/key", "SECRETS/key"},
+    {"camera: {file: SECRETS/key}", "SECRETS/key"},
+    {"tracker: {allow: [network]}", "network"},
+    {"tracker: {reads: [SECRETS]}", "SECRETS"},
+    {"tracker: {options: {script: TAKE/code.py}}", "TAKE/code.py"},
+    {"tracker: {targets: [{map: SECRETS/map.yaml}]}", "SECRETS/map.yaml"},
+    {"tracker: {targets: [{pattern: SECRETS/key}]}", "SECRETS/key"},
+    {"tracker: {targets: [{}, {image: SECRETS/1.png}]}", "SECRETS/1.png"},
+    {"alternatives: {raytracer: [{allow: [display]}]}", "display"},
+    {"alternatives: {raytracer: [{reads: [SECRETS]}]}", "SECRETS"},
+    {"alternatives: {tracker: [{}, {options: {file: SECRETS/key}}]}", "SECRETS/key"},
+};
+
+std::string name_of(const Asked &row) {
+    std::string name = std::string(row.configuration) + "_" + row.grant;
+    std::ranges::replace_if(
+        name, [](unsigned char c) { return !std::isalnum(c); }, '_');
+    name.erase(std::unique(name.begin(), name.end(), [](char x, char y) { return x == '_' && y == '_'; }),
+               name.end());
+    return name;
+}
+
 } // namespace
 
-// Each kind of grant, wherever a session can name it.
-TEST_F(SessionGrants, NothingIsGrantedByTheSessionItself) {
-    const struct {
-        std::string configuration, grant;
-    } asked[] = {
-        {"raytracer: {allow: [gpu]}", "gpu"},
-        {"raytracer: {allow: [network, processes]}", "processes"},
-        {"raytracer: {usb: {vendor: 046d, product: 0825}}", "usb"},
-        {"raytracer: {reads: [SECRETS]}", "SECRETS"},
-        {"raytracer: {options: {texture: SECRETS/key}}", "SECRETS/key"},
-        {"raytracer: {options: {interpreter: SECRETS/key}}", "SECRETS/key"},
-        {"raytracer: {options: {file: TAKE/link/key}}", "SECRETS/key"},
-        {"raytracer: {options: {file: TAKE/../secrets/key}}", "SECRETS/key"},
-        {"raytracer: {options: {script: TAKE/code.py}}", "TAKE/code.py"},
-        {"raytracer: {path: SECRETS/key}", "SECRETS/key"},
-        {"raytracer: {path: SECRETS/%04d.png}", "SECRETS"},
-        {"raytracer: {scene: SECRETS/map.yaml}", "SECRETS/map.yaml"},
-        {"scenes: [SECRETS/map.yaml]", "SECRETS/map.yaml"},
-        {"trajectory: SECRETS/key", "SECRETS/key"},
-        {"camera: {file: SECRETS/key}", "SECRETS/key"},
-        {"tracker: {allow: [network]}", "network"},
-        {"tracker: {reads: [SECRETS]}", "SECRETS"},
-        {"tracker: {options: {script: TAKE/code.py}}", "TAKE/code.py"},
-        {"tracker: {targets: [{map: SECRETS/map.yaml}]}", "SECRETS/map.yaml"},
-        {"tracker: {targets: [{pattern: SECRETS/key}]}", "SECRETS/key"},
-        {"tracker: {targets: [{}, {image: SECRETS/1.png}]}", "SECRETS/1.png"},
-        {"alternatives: {raytracer: [{allow: [display]}]}", "display"},
-        {"alternatives: {raytracer: [{reads: [SECRETS]}]}", "SECRETS"},
-        {"alternatives: {tracker: [{}, {options: {file: SECRETS/key}}]}", "SECRETS/key"},
-    };
-    for (const auto &[configuration, grant] : asked) {
-        const std::string error = missing(configuration);
-        EXPECT_THAT(error, HasSubstr("a session grants nothing by itself")) << configuration;
-        EXPECT_THAT(error, HasSubstr(" --allow " + filled(grant))) << configuration;
-        EXPECT_THAT(missing(configuration, {grant == "processes" ? "network" : "video"}),
-                    HasSubstr(" --allow " + filled(grant)))
-            << configuration << ": another grant does not help";
-        EXPECT_EQ(missing(configuration, {"network", grant}), "no error") << configuration;
-    }
+class AskedBySessions : public SessionGrants, public testing::WithParamInterface<Asked> {};
+
+TEST_P(AskedBySessions, IsNotGrantedByTheSessionItself) {
+    const std::string configuration = GetParam().configuration, grant = GetParam().grant;
+    const std::string error = missing(configuration);
+    EXPECT_THAT(error, HasSubstr("a session grants nothing by itself"));
+    EXPECT_THAT(error, HasSubstr(" --allow " + filled(grant)));
+    EXPECT_THAT(missing(configuration, {grant == "processes" ? "network" : "video"}),
+                HasSubstr(" --allow " + filled(grant)))
+        << "another grant does not help";
+    EXPECT_EQ(missing(configuration, {"network", grant}), "no error");
+}
+
+INSTANTIATE_TEST_SUITE_P(SessionGrants, AskedBySessions, testing::ValuesIn(asked),
+                         [](const auto &info) { return name_of(info.param); });
+
+// Prints the table if docs/security.md does not contain it.
+TEST(SecurityDocumentation, ListsWhatSessionsAskFor) {
+    std::string table;
+    for (const Asked &row : asked)
+        table +=
+            std::string("| session | `") + row.configuration + "` | `" + row.grant + "` | `" + name_of(row) + "` |\n";
+    EXPECT_THAT(test::read_document("security.md"), HasSubstr(table));
 }
 
 TEST_F(SessionGrants, AFolderGrantsItsFiles) {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "documents.hpp"
 #include "errors.hpp"
 #include "image_samples.hpp"
 #include "plugin_under_test.hpp"
@@ -252,6 +253,11 @@ TEST(Gltf, ReportsAllFilesItReads) {
 }
 
 // A glTF file may come from somebody else: its buffers and images must not be files of the user.
+// Names of a file outside of the folder of a glTF file.
+constexpr const char *outside_of_the_folder[] = {"../../home/.ssh/id_rsa",  "parts/../../../home/.ssh/id_rsa",
+                                                 "../models-secret.bin",    "file-link.bin",
+                                                 "folder-link/.ssh/id_rsa", "%2e%2e/%2e%2e/home/.ssh/id_rsa"};
+
 TEST(Gltf, ReadsOnlyFilesBelowItsFolderAndThoseTheCallerGrants) {
     namespace fs = std::filesystem;
     const ScratchFolder folder;
@@ -273,8 +279,7 @@ TEST(Gltf, ReadsOnlyFilesBelowItsFolderAndThoseTheCallerGrants) {
     };
     for (const char *inside : {"parts/a.bin", "parts/../parts/a.bin", "inner-link.bin"})
         EXPECT_EQ(error_with(inside), "no error") << inside;
-    for (const char *outside : {"../../home/.ssh/id_rsa", "parts/../../../home/.ssh/id_rsa", "../models-secret.bin",
-                                "file-link.bin", "folder-link/.ssh/id_rsa", "%2e%2e/%2e%2e/home/.ssh/id_rsa"})
+    for (const char *outside : outside_of_the_folder)
         EXPECT_THAT(error_with(outside),
                     testing::AllOf(HasSubstr("a.gltf: refers to '"),
                                    HasSubstr("', which is outside its folder; move that file there, or list it under "
@@ -287,6 +292,15 @@ TEST(Gltf, ReadsOnlyFilesBelowItsFolderAndThoseTheCallerGrants) {
     EXPECT_THAT(
         error_with("parts/a.bin", {}, "reads: [../home]\n"),
         HasSubstr("s.yaml:4:8: reads: a scene grants nothing; list these files under 'reads' of the ray tracer"));
+}
+
+// Prints the table if docs/security.md does not contain it.
+TEST(SecurityDocumentation, ListsTheFilesThatGltfAsksFor) {
+    std::string table;
+    for (const char *outside : outside_of_the_folder)
+        table += std::string("| glTF | `{\"uri\": \"") + outside +
+                 "\"}` | a file outside its folder | `Gltf.ReadsOnlyFilesBelowItsFolderAndThoseTheCallerGrants` |\n";
+    EXPECT_THAT(arhost::test::read_document("security.md"), HasSubstr(table));
 }
 
 TEST(Gltf, ReportsHowItHandlesAlpha) {
