@@ -55,10 +55,14 @@ Layer raise_oom_score() {
 
 Layer set_limits(const Policy &policy) {
     Layer layer{"limits", "", ""};
-    // RLIMIT_DATA counts private writable memory, including thread stacks. RLIMIT_AS would also count reserved
-    // address space.
-    if (has_memory_limit(policy))
+    // RLIMIT_DATA counts private writable memory, including thread stacks. RLIMIT_AS also counts addresses that
+    // allocators and thread libraries only reserve, so it is higher. It limits page tables, which need up to 1/512 of
+    // the addresses.
+    constexpr rlim_t reserved_bytes = rlim_t{64} << 30;
+    if (has_memory_limit(policy)) {
         lower(layer, "memory", RLIMIT_DATA, memory_limit(policy));
+        lower(layer, "addresses", RLIMIT_AS, memory_limit(policy) + reserved_bytes);
+    }
     if (policy.writable.empty() && !policy.standard_output && !may_share_memory(policy))
         lower(layer, "files", RLIMIT_FSIZE, 0); // prevents writes to /tmp even if other layers are missing
     // Half of the usual 1024. All descriptors in unread messages of a user's processes count towards one limit. A

@@ -117,6 +117,7 @@ inline constexpr Attack attacks[] = {
     {"memory", "a stack", by_other_layers},
     {"memory", "shared zeros", by_other_layers},
     {"memory", "a memfd", by_other_layers},
+    {"memory", "page tables", by_other_layers},
     {"code", "writable code", by_other_layers},
     {"code", "new code", by_other_layers},
     {"code", "a file's code, writable", by_other_layers},

@@ -99,9 +99,10 @@ std::string attacked_by(const std::string &attack, const std::string &more = "",
 
 } // namespace
 
-// Page tables are no private memory, so RLIMIT_DATA does not count them.
+// Page tables are no private memory, so RLIMIT_DATA does not count them, and RLIMIT_AS counts those of one process.
 TEST_F(Delegated, GroupLimitsPageTables) {
-    ArhostRun run(attacked_by("page_tables", ", memory_mb: 64", "restart: {quarantine_after: 1}\n"));
+    ArhostRun run(
+        attacked_by("page_tables", ", memory_mb: 64, allow: [processes]", "restart: {quarantine_after: 1}\n"));
     start(run);
     EXPECT_NE(run.wait(), 0);
     EXPECT_THAT(run.output(), HasSubstr("it used more memory than its control group allows"));

@@ -453,6 +453,10 @@ static void fill_memory(const tracker *self) {
     report(self, "shared zeros", fd >= 0 && mmap(NULL, step, PROT_WRITE, MAP_SHARED, fd, 0) != MAP_FAILED);
     fd = memfd_create("hostile", 0);
     report(self, "a memfd", fd >= 0);
+    /* Reading them would need 300 MiB of page tables. */
+    report(self, "page tables",
+           mmap(NULL, (size_t)150 << 30, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0) !=
+               MAP_FAILED);
 }
 
 /* Small stacks, so that the limit of memory does not stop this. */

@@ -81,21 +81,29 @@ static void report(const arhost_instance *self, const char *what, long count) {
     self->host->log(self->host, ARHOST_SEVERITY_INFO, text);
 }
 
-/* Each page table of 4 KiB covers 2 MiB. Reading maps the shared page of zeros, so only the page tables need memory.
- */
+/* Each page table of 4 KiB covers 2 MiB. Reading maps the shared page of zeros, so only the page tables need memory:
+ * 117 MiB in each process, which RLIMIT_AS permits. */
 static void take_page_tables(const arhost_instance *self) {
-    const size_t covered = 2 << 20, count = 100000;
-    volatile const char *bytes = mmap(NULL, covered * count, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    size_t i;
-    if (bytes == MAP_FAILED) {
-        report(self, "page tables", 0);
-        return;
+    const size_t covered = 2 << 20, count = 30000;
+    long processes;
+    for (processes = 0; processes < 4; ++processes) {
+        const pid_t child = fork();
+        volatile const char *bytes;
+        size_t i;
+        if (child > 0)
+            continue;
+        bytes = mmap(NULL, covered * count, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+        if (child < 0 || bytes == MAP_FAILED)
+            break;
+        madvise((void *)bytes, covered * count, MADV_NOHUGEPAGE);
+        for (i = 0; i < count; ++i)
+            (void)bytes[i * covered];
+        for (;;)
+            pause();
     }
-    madvise((void *)bytes, covered * count, MADV_NOHUGEPAGE);
-    for (i = 0; i < count; ++i)
-        (void)bytes[i * covered];
-    report(self, "page tables", (long)count);
-    munmap((void *)bytes, covered * count);
+    while (processes == 4) /* together they need more memory than the group has */
+        pause();
+    report(self, "page tables", processes);
 }
 
 static void *wait_forever(void *nothing) {
