@@ -61,6 +61,8 @@ std::string address_of(MHD_Connection *connection) {
         const auto *v4 = reinterpret_cast<const sockaddr_in *>(info->client_addr);
         return {reinterpret_cast<const char *>(&v4->sin_addr), sizeof v4->sin_addr};
     }
+    if (info->client_addr->sa_family != AF_INET6)
+        return ""; // a Unix socket, whose address is shorter
     const auto *v6 = reinterpret_cast<const sockaddr_in6 *>(info->client_addr);
     return {reinterpret_cast<const char *>(&v6->sin6_addr), IN6_IS_ADDR_V4MAPPED(&v6->sin6_addr) ? 16u : 8u};
 }
