@@ -442,7 +442,7 @@ struct Square {
 // the fit of an edge fails and `max_count` is below max_positions, returns std::nullopt. Otherwise keeps the line
 // that the search found, and marks imprecise corners as doubtful.
 std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &rough_px, const Lens &lens, int cells,
-                                       bool is_subpixel, std::size_t max_count) {
+                                       bool is_subpixel, std::size_t max_count, double &blur_cells) {
     constexpr int max_passes = 8, max_fits = 3;
     constexpr double max_sigma_px = 0.05, max_correlation = 0.5; // noise alone does not make corners doubtful
     constexpr double max_moved_px = 0.2;   // movement by the last fit, which uses the pixels near the previous line
@@ -486,6 +486,7 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
             if (!edge)
                 return std::nullopt;
             fitted[i] = *edge;
+            blur_cells = std::max(i > 0 ? blur_cells : 0, edge->blur_px / square.cells_px[i]);
             strength += slope.on_line;
             margin_px = std::max(margin_px, reach * slope.step_px);
             const bool is_noisy = min_step_px < sharp_step_px && slope.noise > max_noise;
@@ -522,7 +523,8 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
     }
     if (is_misfit && max_count < max_positions)
         return std::nullopt;
-    double variance = 0, blur_cells = 0; // `variance`: of a coordinate; `blur_cells`: at the most blurred edge
+    double variance = 0; // of a coordinate
+    blur_cells = 0;
     for (std::size_t i = 0; i < 4; ++i) {
         const FittedEdge &before = fitted[(i + 3) % 4], &after = fitted[i];
         // An error of one line moves the intersection along the other line.
@@ -546,11 +548,17 @@ std::optional<MeasuredCorners> refined(const Picture &picture, const Corners &ro
 } // namespace
 
 std::optional<MeasuredCorners> refine_edges(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
-                                            const Lens &lens, int cells, bool is_subpixel) {
+                                            const Lens &lens, int cells, bool is_subpixel, double *blur_cells,
+                                            double max_blur_cells) {
     const Picture picture{grey, light_of_code(transfer)};
     // A few positions suffice to locate the pixels for the fit, unless noise must be averaged out.
-    const auto result = refined(picture, rough_px, lens, cells, is_subpixel, few_positions);
-    return result ? result : refined(picture, rough_px, lens, cells, is_subpixel, max_positions);
+    double blur = 0;
+    auto result = refined(picture, rough_px, lens, cells, is_subpixel, few_positions, blur);
+    if (!result && !(blur > max_blur_cells))
+        result = refined(picture, rough_px, lens, cells, is_subpixel, max_positions, blur);
+    if (blur_cells)
+        *blur_cells = blur;
+    return result;
 }
 
 } // namespace arhost::fiducial

@@ -83,12 +83,16 @@ arhost_observation observation_of(std::int32_t id, std::uint32_t family, const M
     seen.hamming = decoding.hamming;
     seen.decision_margin = decoding.decision_margin;
     seen.false_positive_rate = decoding.false_positive_rate;
+    set_corners(seen, corners);
+    return seen;
+}
+
+void set_corners(arhost_observation &seen, const MeasuredCorners &corners) {
     seen.corner_sigma_px = corners.sigma_px;
     for (int i = 0; i < 4; ++i) {
         seen.corners_px[i][0] = corners.corners_px[i].x;
         seen.corners_px[i][1] = corners.corners_px[i].y;
     }
-    return seen;
 }
 
 arhost_observation Family::observation(int id, const MeasuredCorners &corners, const Decoding &decoding) const {

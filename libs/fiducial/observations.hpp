@@ -50,6 +50,9 @@ struct Decoding {
 arhost_observation observation_of(std::int32_t id, std::uint32_t family, const MeasuredCorners &corners,
                                   const Decoding &decoding);
 
+// Replaces the corners of an observation.
+void set_corners(arhost_observation &seen, const MeasuredCorners &corners);
+
 // Returns the grey plane of a frame, without copying it.
 cv::Mat grey_of(const arhost_frame &frame);
 

@@ -42,15 +42,16 @@ constexpr int unknowns = 13; // in the order of the members of Model
 
 // Maps cells to undistorted px.
 Homography px_from_cells(const cv::Vec<double, 8> &corners_px, const Print &print) {
-    const auto first = static_cast<float>(print.margin), last = first + static_cast<float>(print.side());
-    const cv::Point2f square[] = {{first, first}, {last, first}, {last, last}, {first, last}};
-    // Positions are relative to the first corner, so the precision of float suffices.
-    const cv::Point2d origin(corners_px[0], corners_px[1]);
-    cv::Point2f corners[4];
-    for (int i = 0; i < 4; ++i)
-        corners[i] = cv::Point2d(corners_px[2 * i], corners_px[2 * i + 1]) - origin;
-    const Homography relative = cv::getPerspectiveTransform(square, corners);
-    return Homography(1, 0, origin.x, 0, 1, origin.y, 0, 0, 1) * relative;
+    // Heckbert, Fundamentals of Texture Mapping and Image Warping (1989), section 2.2.3: the unit square to a
+    // quadrilateral.
+    const cv::Vec2d a(corners_px[0], corners_px[1]), b(corners_px[2], corners_px[3]), c(corners_px[4], corners_px[5]),
+        d(corners_px[6], corners_px[7]), skew = a - b + c - d, x = b - c, y = d - c;
+    const auto cross = [](const cv::Vec2d &v, const cv::Vec2d &w) { return v[0] * w[1] - v[1] * w[0]; };
+    const double g = cross(skew, y) / cross(x, y), h = cross(x, skew) / cross(x, y);
+    const cv::Vec2d u = b - a + g * b, v = d - a + h * d;
+    const double scale = 1.0 / print.side(), shift = -scale * print.margin;
+    return Homography(u[0], v[0], a[0], u[1], v[1], a[1], g, h, 1) *
+           Homography(scale, 0, shift, 0, scale, shift, 0, 0, 1);
 }
 
 // Pixels with this code or a higher one may be clipped, so their light may be brighter than the code indicates. The
@@ -125,13 +126,21 @@ int samples_per_cell(const Print &print, const cv::Matx22d &covariance_cells2) {
 // interpolation errors depend on it.
 class BlurredPrint {
 public:
-    BlurredPrint(const Print &print, int per_cell) : per_cell_(per_cell) {
+    BlurredPrint(const Print &print, int per_cell, double tolerance) : tolerance(tolerance), per_cell_(per_cell) {
         cv::resize(print.cells, sharp_, {}, per_cell, per_cell, cv::INTER_NEAREST);
         values_.create(sharp_.size());
     }
 
-    // `covariance_cells2`: the covariance of the blur.
+    // The relative difference of the covariance up to which blur() keeps the table; linearize() corrects it to the
+    // first order.
+    double tolerance = 0;
+
+    // Blurs the print, unless it is blurred nearly so. `covariance_cells2`: the covariance of the blur.
     void blur(const cv::Matx22d &covariance_cells2) {
+        if (cv::norm(covariance_cells2 - covariance_cells2_) <= tolerance * cv::norm(covariance_cells2))
+            return;
+        ++blurs_;
+        covariance_cells2_ = covariance_cells2;
         constexpr double cutoff = 3, max_radius = 40; // `cutoff`: standard deviations; `max_radius`: samples
         const cv::Matx22d covariance =
             double(per_cell_ * per_cell_) * covariance_cells2 + 1e-3 * cv::Matx22d::eye(); // in samples; invertible
@@ -150,6 +159,10 @@ public:
         cv::filter2D(sharp_, white_, -1, kernel, {-1, -1}, 0, cv::BORDER_REPLICATE);
         differentiate();
     }
+
+    int blurs() const { return blurs_; } // how often blur() has changed the table
+    // The covariance of the blur of the table.
+    const cv::Matx22d &covariance_cells2() const { return covariance_cells2_; }
 
     // Interpolates bilinearly, and corrects the value by means of the slopes. This reduces the error from second to
     // third order.
@@ -193,6 +206,8 @@ private:
     }
 
     int per_cell_; // samples along each axis
+    int blurs_ = 0;
+    cv::Matx22d covariance_cells2_ = cv::Matx22d::zeros(); // zeros: not blurred yet
     cv::Mat_<float> sharp_, white_;
     cv::Mat_<Sample> values_;
 };
@@ -235,9 +250,9 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
         const cv::Vec2d cell(h[0] / h[2], h[1] / h[2]);
         Whiteness white = blurred.at(cell);
         // A blur obeys the heat equation: the derivative of the whiteness with respect to the variance of the blur is
-        // half of its Laplacian in px. The table assumes a linear map, and an elliptical blur as at the centre of the
-        // print. Three terms correct this to the first order of the perspective:
-        // - The ellipse at this cell differs from that at the centre. The term is half of the difference times the
+        // half of its Laplacian in px. The table assumes a linear map, and an elliptical blur nearly as at the centre
+        // of the print. Three terms correct this to the first order of the perspective:
+        // - The ellipse at this cell differs from that of the table. The term is half of the difference times the
         //   second derivatives.
         // - The map is not linear. The term shifts the whiteness.
         // - The ellipse changes within the blur. The term shifts the spread.
@@ -251,8 +266,9 @@ Fit linearize(std::span<Pixel> pixels, const Print &print, BlurredPrint &blurred
         const cv::Vec2d shift = cells_per_px_here * cv::Vec2d(to_cells(2, 0), to_cells(2, 1)) * (variance_px2 / h[2]);
         const Whiteness shifted = blurred.at(cell - shift);
         white.value =
-            shifted.value + static_cast<float>(variance_px2 * (spread(ellipse_here - ellipse, white) / 2 +
-                                                               spread(ellipse_here, shifted) - spread_here));
+            shifted.value +
+            static_cast<float>(spread(variance_px2 * ellipse_here - blurred.covariance_cells2(), white) / 2 +
+                               variance_px2 * (spread(ellipse_here, shifted) - spread_here));
         const double u = cell[0] / print.cells.cols - 0.5, v = cell[1] / print.cells.rows - 0.5;
         const double illumination = 1 + model.slope[0] * u + model.slope[1] * v;
         const double light = model.black + model.contrast * white.value,
@@ -398,20 +414,25 @@ double equivalent_variance(const cv::Matx<double, 8, 8> &covariance, const Corne
 class PrintFit {
 public:
     // `pixels`: includes outliers. `cells_per_px`: at the centre of the print. `shortest_px`: the shortest side of
-    // the square.
+    // the square. `blur_px`: the initial value.
     PrintFit(const Print &print, const LightOfCode &light_of_code, std::vector<Pixel> pixels,
-             const cv::Vec<double, 8> &corners_px, const cv::Matx22d &cells_per_px, double shortest_px)
-        : print_(print), light_of_code_(light_of_code), all_(std::move(pixels)), pixels_(all_),
-          cells_per_px_(cells_per_px), first_px_(corners_px),
-          shortest_px_(shortest_px), model_{corners_px, first_blur_px, 0, 1, {}} {
-        linearize_model();
-    }
+             const cv::Vec<double, 8> &corners_px, const cv::Matx22d &cells_per_px, double shortest_px,
+             double blur_px)
+        : print_(print), light_of_code_(light_of_code), all_(std::move(pixels)), cells_per_px_(cells_per_px),
+          first_px_(corners_px), shortest_px_(shortest_px),
+          table_blur_px_(blur_px), model_{corners_px, blur_px, 0, 1, {}} {}
 
     // Returns whether the fit has converged to a picture that resembles the pixels. Call only once.
     bool run() {
         constexpr double max_hidden = 0.25, max_left_out = 0.5; // shares of the pixels, at the end and during the fit
         constexpr double least_max_error = 0.05;
         constexpr int max_rounds = 8;
+        // Most of the steps need only some of the pixels, and no exact table.
+        constexpr double tolerance = 0.05;
+        constexpr std::size_t stride = 4, min_pixels = 4 * stride * unknowns;
+        for (std::size_t i = 0; i<all_.size(); i += all_.size()> min_pixels ? stride : 1)
+            pixels_.push_back(all_[i]);
+        linearize_model();
         if (!std::isfinite(fit_.cost))
             return false;
         // First fits the light, which is a linear problem, because the other derivatives depend on it.
@@ -419,12 +440,20 @@ public:
         model_.black += light[0];
         model_.contrast += light[1];
         linearize_model();
+        if (pixels_.size() < all_.size()) {
+            minimize();
+            pixels_ = all_;
+        }
+        blurred_.tolerance = tolerance;
+        linearize_model();
         // A hidden part displaces the first fits, so at first only the largest errors count as outliers.
         double max_error = 0.4;
         std::vector<bool> kept(all_.size(), true);
         for (int round = 0;; ++round) {
             const bool is_converged = minimize();
-            if (!std::isfinite(linearize(all_, print_, blurred_, model_).cost))
+            if (pixels_.size() == all_.size() && has_residuals_)
+                all_.swap(pixels_);
+            else if (!std::isfinite(linearized(all_, model_).cost))
                 return false;
             std::vector<bool> next;
             do
@@ -451,6 +480,7 @@ public:
         return (model_.black + std::max(model_.contrast, 0.0)) *
                (1 + (std::abs(model_.slope[0]) + std::abs(model_.slope[1])) / 2);
     }
+    std::uint64_t work() const { return work_; } // see refine_by_print()
     const cv::Vec<double, 8> &corners_px() const { return model_.corners_px; }
     cv::Matx<double, 8, 8> covariance_px2() const {
         const auto covariance = fit_.normal.inv(cv::DECOMP_CHOLESKY) * (fit_.cost / (fit_.pixels - unknowns));
@@ -458,24 +488,33 @@ public:
     }
 
 private:
-    static constexpr double first_blur_px = 0.7;
+    Fit linearized(std::vector<Pixel> &pixels, const Model &model) {
+        const int blurs = blurred_.blurs();
+        Fit fit = linearize(pixels, print_, blurred_, model);
+        work_ += pixels.size() + work_of_blur * static_cast<std::uint64_t>(blurred_.blurs() - blurs);
+        return fit;
+    }
+    void linearize_model() {
+        fit_ = linearized(pixels_, model_);
+        has_residuals_ = true;
+    }
 
-    void linearize_model() { fit_ = linearize(pixels_, print_, blurred_, model_); }
-
-    BlurredPrint table() const {
-        return {print_,
-                samples_per_cell(print_, table_blur_px_ * table_blur_px_ * cells_per_px_ * cells_per_px_.t())};
+    BlurredPrint table(double tolerance) const {
+        return {print_, samples_per_cell(print_, table_blur_px_ * table_blur_px_ * cells_per_px_ * cells_per_px_.t()),
+                tolerance};
     }
 
     // Returns whether the fit has converged.
     bool minimize() {
         constexpr double converged_px = 0.01;
         constexpr int max_steps = 20;
-        double damping = 1e-3;
+        constexpr double first_damping = 1e-3;
+        double damping = first_damping;
         // `is_limited`: an undamped step would leave the permitted area.
         bool is_converged = false, is_limited = false;
         for (int step = 0; step < max_steps && steps_left_ > 0 && !is_converged; ++step, --steps_left_) {
-            const std::optional<Model> next = step_from_model(damping);
+            double reduction = 0;
+            const std::optional<Model> next = step_from_model(damping, reduction);
             if (!next)
                 return false;
             const double moved_px = std::max(cv::norm(next->corners_px, model_.corners_px, cv::NORM_INF),
@@ -486,9 +525,15 @@ private:
                 continue;
             }
             is_limited &= damping > 1;
-            const Fit candidate = linearize(pixels_, print_, blurred_, *next);
+            if (moved_px < converged_px && damping <= first_damping && !is_limited) {
+                model_ = *next;
+                fit_.cost -= std::min(reduction, fit_.cost / 2);
+                return !renew_table();
+            }
+            const Fit candidate = linearized(pixels_, *next);
             is_limited |= !std::isfinite(candidate.cost);
             const bool is_better = candidate.cost < fit_.cost;
+            has_residuals_ = is_better;
             // Near the minimum, the table's resolution determines whether a small step reduces the cost.
             is_converged = moved_px < converged_px && (is_better || damping <= 1) && !is_limited;
             damping *= is_better ? 0.1 : 10;
@@ -507,7 +552,8 @@ private:
                fit_.cost < (1 - min_resemblance) * sum_of_squared_differences_from_mean(pixels_);
     }
 
-    std::optional<Model> step_from_model(double damping) const {
+    // `reduction`: receives by how much the derivatives predict that the step reduces the cost.
+    std::optional<Model> step_from_model(double damping, double &reduction) const {
         constexpr double min_blur_px = 0.3;
         auto damped = fit_.normal;
         for (int i = 0; i < unknowns; ++i)
@@ -515,6 +561,7 @@ private:
         cv::Vec<double, unknowns> change;
         if (!cv::solve(damped, fit_.gradient, change, cv::DECOMP_CHOLESKY))
             return std::nullopt;
+        reduction = 2 * change.dot(fit_.gradient) - change.dot(fit_.normal * change);
         Model next = model_;
         for (int i = 0; i < 8; ++i)
             next.corners_px[i] += change[i];
@@ -533,10 +580,12 @@ private:
         if (std::max(model_.blur_px, table_blur_px_) <= max_ratio * std::min(model_.blur_px, table_blur_px_))
             return false;
         table_blur_px_ = model_.blur_px;
-        blurred_ = table();
+        blurred_ = table(blurred_.tolerance);
         linearize_model();
         return true;
     }
+
+    static constexpr std::uint64_t work_of_blur = 700;
 
     const Print &print_;
     const LightOfCode &light_of_code_;
@@ -545,10 +594,12 @@ private:
     cv::Vec<double, 8> first_px_;
     double shortest_px_;
     int steps_left_ = 60; // successful fits need fewer steps
-    double table_blur_px_ = first_blur_px;
-    BlurredPrint blurred_ = table();
+    std::uint64_t work_ = 0;
+    double table_blur_px_;
+    BlurredPrint blurred_ = table(0.3);
     Model model_;
     Fit fit_;
+    bool has_residuals_ = false; // whether the residuals in pixels_ are those of model_
 };
 
 // Returns whether white is saturated at most positions beside the edges. Saturation shifts the edges into the black.
@@ -572,8 +623,10 @@ bool is_overexposed(const cv::Mat &grey, const Corners &corners_px, int cells) {
 } // namespace
 
 std::optional<AlignedPrint> align_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &corners_px,
-                                        const Lens &lens, const Print &print) {
+                                        const Lens &lens, const Print &print, double blur_cells,
+                                        std::uint64_t *work) {
     constexpr double min_cell_px = 0.5;
+    constexpr double usual_blur_px = 0.7;
     const auto corners = lens.undistort({corners_px.begin(), corners_px.end()});
     if (!corners || print.margin < 1 || !std::ranges::all_of(corners_px, [&](const cv::Point2d &corner) {
             return std::abs(corner.x) < 2 * grey.cols && std::abs(corner.y) < 2 * grey.rows;
@@ -597,8 +650,12 @@ std::optional<AlignedPrint> align_print(const cv::Mat &grey, arhost_transfer tra
     std::vector<Pixel> pixels = pixels_of(grey, light, corners_px, lens, px_from_cell.inv(), print);
     if (pixels.size() < 4 * unknowns)
         return std::nullopt;
-    PrintFit fit(print, light, std::move(pixels), first_px, px_per_cell.inv(), shortest_px);
-    if (!fit.run())
+    const double blur_px = std::max(blur_cells * shortest_px / print.side(), usual_blur_px);
+    PrintFit fit(print, light, std::move(pixels), first_px, px_per_cell.inv(), shortest_px, blur_px);
+    const bool is_found = fit.run();
+    if (work)
+        *work += fit.work();
+    if (!is_found)
         return std::nullopt;
     std::vector<cv::Point2d> found;
     found.reserve(4);
@@ -619,37 +676,54 @@ std::optional<AlignedPrint> align_print(const cv::Mat &grey, arhost_transfer tra
     return result;
 }
 
-std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
-                                              const Lens &lens, int cells, const std::function<Print()> &print,
-                                              bool is_subpixel) {
+CornersByEdges refine_by_edges(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
+                               const Lens &lens, int cells, bool is_subpixel) {
+    constexpr double max_blur_cells = 0.2;
+    CornersByEdges found;
+    found.edges = refine_edges(grey, transfer, rough_px, lens, cells, is_subpixel, &found.blur_cells, max_blur_cells);
+    const auto &edges = found.edges;
+    found.are_unreliable = !edges || edges->sigma_px == 0 || edges->blur_cells > max_blur_cells;
+    found.are_overexposed = !found.are_unreliable && is_overexposed(grey, edges->corners_px, cells);
+    return found;
+}
+
+std::optional<MeasuredCorners> refine_by_print(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
+                                               const Lens &lens, int cells, const Print &print,
+                                               const CornersByEdges &by_edges, std::uint64_t &work) {
     // `max_sigma_ratio`: sigma of the print divided by sigma of doubtful edges.
-    constexpr double max_blur_cells = 0.2, max_sigma_ratio = 0.1;
+    constexpr double max_sigma_ratio = 0.1;
     constexpr double max_light = 255, max_clipped = 0.05; // `max_clipped`: share of the light of white
     constexpr double max_skew_cells = 0.25;               // maximum for a square in perspective
-    const auto edges = refine_edges(grey, transfer, rough_px, lens, cells, is_subpixel);
-    const bool is_unreliable = !edges || edges->sigma_px == 0 || edges->blur_cells > max_blur_cells;
-    const bool has_bright_edges = !is_unreliable && is_overexposed(grey, edges->corners_px, cells);
-    if (!is_unreliable && !edges->is_doubtful && !has_bright_edges)
-        return edges;
+    const auto &edges = by_edges.edges;
     const auto is_better = [&](const AlignedPrint &found) {
-        return is_unreliable || (has_bright_edges && found.white > (1 + max_clipped) * max_light) ||
+        return by_edges.are_unreliable || (by_edges.are_overexposed && found.white > (1 + max_clipped) * max_light) ||
                (edges->is_doubtful && found.sigma_px < max_sigma_ratio * edges->sigma_px);
     };
-    const Print known = print();
-    if (const auto found = align_print(grey, transfer, edges ? edges->corners_px : rough_px, lens, known))
+    if (const auto found = align_print(grey, transfer, edges ? edges->corners_px : rough_px, lens, print,
+                                       by_edges.blur_cells, &work))
         return is_better(*found) ? *found : *edges;
     // If an object hides a corner, a detector mistakes the end of the object for the corner. The position of the
     // hidden corner is estimated from the other three corners.
     const cv::Point2d skew_px = rough_px[0] - rough_px[1] + rough_px[2] - rough_px[3];
     const double diagonal_px = std::min(cv::norm(rough_px[2] - rough_px[0]), cv::norm(rough_px[3] - rough_px[1]));
-    if ((is_unreliable || edges->is_doubtful) && cv::norm(skew_px) * cells > max_skew_cells * diagonal_px)
+    if ((by_edges.are_unreliable || edges->is_doubtful) && cv::norm(skew_px) * cells > max_skew_cells * diagonal_px)
         for (std::size_t i = 0; i < 4; ++i) {
             Corners corners_px = rough_px;
             corners_px[i] = rough_px[(i + 1) % 4] - rough_px[(i + 2) % 4] + rough_px[(i + 3) % 4];
-            if (const auto found = align_print(grey, transfer, corners_px, lens, known); found && is_better(*found))
+            if (const auto found = align_print(grey, transfer, corners_px, lens, print, 0, &work);
+                found && is_better(*found))
                 return found;
         }
     return edges;
+}
+
+std::optional<MeasuredCorners> refine_corners(const cv::Mat &grey, arhost_transfer transfer, const Corners &rough_px,
+                                              const Lens &lens, int cells, const std::function<Print()> &print,
+                                              bool is_subpixel) {
+    const CornersByEdges by_edges = refine_by_edges(grey, transfer, rough_px, lens, cells, is_subpixel);
+    std::uint64_t work = 0;
+    return by_edges.need_print() ? refine_by_print(grey, transfer, rough_px, lens, cells, print(), by_edges, work)
+                                 : by_edges.edges;
 }
 
 } // namespace arhost::fiducial

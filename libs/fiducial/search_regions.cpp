@@ -59,6 +59,11 @@ cv::Rect region_of(const arhost_expected_marker &expected, double margin, cv::Si
     return {x.begin, y.begin, x.end - x.begin, y.end - y.begin};
 }
 
+double area_px2(const arhost_expected_marker *expected) {
+    const auto &c = expected->corners_px;
+    return ((c[2][0] - c[0][0]) * (c[3][1] - c[1][1]) - (c[2][1] - c[0][1]) * (c[3][0] - c[1][0])) / 2;
+}
+
 // Adds a region. Replaces regions that overlap by the smallest region that contains them.
 void add(std::vector<cv::Rect> &regions, cv::Rect region) {
     const auto overlaps = [&](const cv::Rect &other) { return !(other & region).empty(); };
@@ -70,8 +75,8 @@ void add(std::vector<cv::Rect> &regions, cv::Rect region) {
     regions.push_back(region);
 }
 
-Seen detected(const Detect &detect, const std::vector<cv::Rect> &regions) {
-    Seen seen;
+Seen detected(const Detect &detect, const std::vector<cv::Rect> &regions, const decltype(Seen::wants) &wants = {}) {
+    Seen seen{wants};
     for (const cv::Rect &region : regions)
         detect(region, seen);
     return seen;
@@ -91,9 +96,14 @@ SearchRegions::SearchRegions(const arhost_tracker_setup &setup,
 Verified SearchRegions::verified(const arhost_track_request &request, const Verify &verify) const {
     const auto verify_all = [this, &request, &verify] {
         std::vector<arhost_observation> verified;
-        for (const arhost_expected_marker &expected : elements(request.expected, request.expected_count)) {
-            const Marker &marker = markers_.at(expected.marker);
-            if (const auto one = verify(expected, marker.id, marker.family))
+        const auto all = elements(request.expected, request.expected_count);
+        std::vector<const arhost_expected_marker *> order;
+        for (const arhost_expected_marker &expected : all)
+            order.push_back(&expected);
+        std::ranges::stable_sort(order, std::ranges::greater(), area_px2); // the largest first
+        for (const arhost_expected_marker *expected : order) {
+            const Marker &marker = markers_.at(expected->marker);
+            if (const auto one = verify(*expected, marker.id, marker.family))
                 verified.push_back(*one);
         }
         return verified;
@@ -131,14 +141,15 @@ Seen SearchRegions::search(const arhost_track_request &request, const RegionLimi
         return regions;
     }));
     if (miss_a_target(request, seen.markers)) {
+        const auto is_new = [&](std::int32_t id, std::uint32_t family) {
+            return std::ranges::none_of(seen.markers, [&](const arhost_observation &known) {
+                return known.id == id && known.family == family;
+            });
+        };
         Seen everywhere;
         for (const Pass &pass : passes)
-            everywhere.add(detected(pass.detect, {whole}));
-        std::erase_if(everywhere.markers, [&](const arhost_observation &one) {
-            return std::ranges::any_of(seen.markers, [&](const arhost_observation &known) {
-                return known.id == one.id && known.family == one.family;
-            });
-        });
+            everywhere.add(detected(pass.detect, {whole}, is_new));
+        std::erase_if(everywhere.markers, [&](const arhost_observation &one) { return !is_new(one.id, one.family); });
         seen.add(everywhere);
     }
     if (request.search_everywhere)
@@ -153,6 +164,10 @@ Seen SearchRegions::search(const arhost_track_request &request, const RegionLimi
 template <class RegionsOf>
 Seen SearchRegions::look_closer(std::span<const Pass> passes, const Indices &missed,
                                 const RegionsOf &regions_of) const {
+    const auto is_missed = [&](std::int32_t id, std::uint32_t family) {
+        return std::ranges::any_of(
+            missed, [&](std::uint32_t i) { return markers_[i].id == id && markers_[i].family == family; });
+    };
     Seen closer;
     for (const Pass &pass : passes) {
         Indices wanted;
@@ -161,11 +176,10 @@ Seen SearchRegions::look_closer(std::span<const Pass> passes, const Indices &mis
         });
         if (!wanted.empty())
             for (const CloserLook &look : pass.closer_looks)
-                closer.add(detected(look.detect, regions_of(look, wanted)));
+                closer.add(detected(look.detect, regions_of(look, wanted), is_missed));
     }
     std::erase_if(closer.markers, [&](const arhost_observation &one) {
-        return one.false_positive_rate > max_rate_of_closer_look ||
-               std::ranges::none_of(missed, [&](std::uint32_t marker) { return markers_[marker].is(one); });
+        return one.false_positive_rate > max_rate_of_closer_look || !is_missed(one.id, one.family);
     });
     return closer;
 }

@@ -21,7 +21,9 @@ struct RegionLimits {
 };
 
 struct Seen {
-    std::vector<arhost_observation> markers;
+    // Whether a marker is searched for, by its id and family; a detector omits other listed markers. Empty: all are.
+    std::function<bool(std::int32_t id, std::uint32_t family)> wants = {};
+    std::vector<arhost_observation> markers = {};
     std::size_t candidates = 0; // number of quadrilaterals that were examined, whether markers or not
 
     // Adds the result of another search. Searches mostly examine the same quadrilaterals, so `candidates` becomes the

@@ -2,7 +2,7 @@
 //
 // tracker_apriltag: detects AprilTags with the AprilTag library, version 3.
 #include <fiducial/april_tags.hpp>
-#include <fiducial/corner_refinement.hpp>
+#include <fiducial/frame_refinement.hpp>
 #include <fiducial/marker_search.hpp>
 
 #include <arhost-cpp/plugin.hpp>
@@ -26,6 +26,7 @@ using arhost::Failure;
 using arhost::apriltag::family_types;
 using arhost::apriltag::FamilyType;
 using arhost::fiducial::Family;
+using arhost::fiducial::set_corners;
 using arhost::fiducial::take;
 
 constexpr const char *refinements[] = {"edges", "none", nullptr};
@@ -186,8 +187,12 @@ public:
     }
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
+        // The library takes about 40 ns for each pixel, refinement at most about as long.
+        constexpr double work_per_px = 0.28;
+        const cv::Mat grey = fiducial::grey_of(*request.frame);
+        fiducial::FrameRefinement refinement(grey, request.frame->format->transfer, search_->lens(), work_per_px);
         const auto detection = [&](const Look &look) {
-            return [&, look](const cv::Rect &region, auto &seen) { observe(*request.frame, region, look, seen); };
+            return [&, look](const cv::Rect &region, auto &seen) { observe(grey, region, look, refinement, seen); };
         };
         fiducial::Pass pass{.family = nullptr, .detect = detection({})};
         if (looks_closer_)
@@ -217,13 +222,15 @@ private:
     }
 
     // Adds the tags of a region of the frame to `seen`.
-    void observe(const arhost_frame &frame, const cv::Rect &region, const Look &look, fiducial::Seen &seen) {
-        const cv::Mat grey = fiducial::grey_of(frame);
+    void observe(const cv::Mat &grey, const cv::Rect &region, const Look &look, fiducial::FrameRefinement &refinement,
+                 fiducial::Seen &seen) {
         cv::Mat larger;
         if (look.scale > 1)
             cv::resize(grey(region), larger, {}, look.scale, look.scale, cv::INTER_CUBIC);
         detector_->decode_sharpening = std::max(look.min_sharpening, sharpening_);
         detector_->qtp.max_nmaxima = look.max_maxima;
+        std::vector<std::size_t> refined; // indices in seen.markers
+        std::vector<fiducial::RoughMarker> rough;
         const auto observe_one = [&](const apriltag_detection_t &tag) {
             if (tag.decision_margin < min_margin_)
                 return;
@@ -232,20 +239,27 @@ private:
             fiducial::MeasuredCorners corners{apriltag::corners_of(tag, look.scale)};
             for (cv::Point2d &corner : corners.corners_px)
                 corner += cv::Point2d(region.tl());
-            if (fit_edges_ && one.is_listed)
-                corners = fiducial::refine_corners(
-                              grey, frame.format->transfer, corners.corners_px, search_->lens(),
-                              tag.family->width_at_border, [&] { return apriltag::print_of(*tag.family, tag.id); },
-                              refine_edges_)
-                              .value_or(corners);
             const auto hamming = static_cast<std::uint32_t>(tag.hamming);
-            seen.markers.push_back(one.family.observation(
-                one.part->id(tag.id), corners,
-                {hamming, tag.decision_margin,
-                 fiducial::false_positive_rate(static_cast<int>(tag.family->nbits), hamming)}));
+            const arhost_observation observed =
+                one.family.observation(one.part->id(tag.id), corners,
+                                       {hamming, tag.decision_margin,
+                                        fiducial::false_positive_rate(static_cast<int>(tag.family->nbits), hamming)});
+            if (one.is_listed && seen.wants && !seen.wants(observed.id, observed.family))
+                return;
+            if (fit_edges_ && one.is_listed) {
+                refined.push_back(seen.markers.size());
+                rough.push_back({corners.corners_px, tag.family->width_at_border,
+                                 [tags = tag.family, id = tag.id] { return apriltag::print_of(*tags, id); },
+                                 refine_edges_});
+            }
+            seen.markers.push_back(observed);
         };
         if (apriltag::detect(*detector_, look.scale > 1 ? larger : grey(region), observe_one))
             seen.candidates += detector_->nquads;
+        const auto corners = refinement.refine(rough, threads_);
+        for (std::size_t i = 0; i < refined.size(); ++i)
+            if (corners[i])
+                set_corners(seen.markers[refined[i]], *corners[i]);
     }
 
     // Returns the side of a threshold tile in px of the frame: the library computes its threshold per 4×4 px tile of

@@ -2,7 +2,7 @@
 //
 // tracker_aruco: detects ArUco markers and AprilTags with OpenCV.
 #include <fiducial/aruco.hpp>
-#include <fiducial/corner_refinement.hpp>
+#include <fiducial/frame_refinement.hpp>
 #include <fiducial/marker_search.hpp>
 
 #include <arhost-cpp/plugin.hpp>
@@ -231,17 +231,19 @@ public:
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
         const cv::Mat grey = fiducial::grey_of(*request.frame);
-        const arhost_transfer transfer = request.frame->format->transfer;
+        // OpenCV takes about 10 ns for each pixel, refinement at most about as long.
+        constexpr double work_per_px = 0.12;
+        fiducial::FrameRefinement refinement(grey, request.frame->format->transfer, search_->lens(), work_per_px);
         const fiducial::Verify verify = [&](const arhost_expected_marker &expected, std::int32_t id,
                                             std::uint32_t family) {
-            return verify_one(grey, transfer, expected, id, family);
+            return verify_one(grey, expected, id, family, refinement);
         };
         const auto verified = refine_edges_ ? search_->regions().verified(request, verify) : fiducial::Verified();
         std::vector<fiducial::Pass> passes;
         for (const Detectable &detectable : detectables_) {
             const auto detection = [&](const Look &look) {
                 return [&, look](const cv::Rect &region, auto &seen) {
-                    observe(grey, transfer, region, look, detectable, verified, seen);
+                    observe(grey, region, look, detectable, verified, refinement, seen);
                 };
             };
             fiducial::Pass &pass = passes.emplace_back(fiducial::Pass{&detectable.family, detection({})});
@@ -260,8 +262,9 @@ public:
 
 private:
     // Adds the markers of a dictionary in a region of the frame to `seen`, except the verified ones.
-    void observe(const cv::Mat &grey, arhost_transfer transfer, const cv::Rect &region, const Look &look,
-                 const Detectable &detectable, const fiducial::Verified &verified, fiducial::Seen &seen) const {
+    void observe(const cv::Mat &grey, const cv::Rect &region, const Look &look, const Detectable &detectable,
+                 const fiducial::Verified &verified, fiducial::FrameRefinement &refinement,
+                 fiducial::Seen &seen) const {
         const cv::aruco::Dictionary &table = detectable.dictionary.table;
         cv::aruco::DetectorParameters parameters = detectable.parameters;
         parameters.adaptiveThreshConstant = look.threshold.value_or(parameters.adaptiveThreshConstant);
@@ -275,35 +278,52 @@ private:
         const std::span<const arhost_observation> known = fiducial::markers_of(verified);
         const cv::Point2d half(0.5, 0.5), shift = half - cv::Point2d(centre_shift_px_, centre_shift_px_),
                                           origin = cv::Point2d(region.tl()) - half;
-        std::vector<std::optional<arhost_observation>> observations(found.ids.size());
-        const auto observe_one = [&](int i) {
-            const int id = found.ids[i];
-            const bool is_listed = detectable.family.lists(id);
+        struct Marker {
+            int id;
+            bool is_listed;
             fiducial::MeasuredCorners corners;
-            for (int corner = 0; corner < 4; ++corner) {
-                const cv::Point2d at =
-                    found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner];
-                corners.corners_px[corner] = (at + shift) / look.scale + origin;
-            }
-            if (is_listed) {
-                const arhost_observation rough = detectable.family.observation(id, corners);
-                if (std::ranges::any_of(
-                        known, [&](const arhost_observation &one) { return fiducial::are_of_one_print(one, rough); }))
-                    return;
-            }
-            if (refine_edges_ && is_listed)
-                corners = refined(grey, transfer, detectable.dictionary, id, corners.corners_px).value_or(corners);
-            Corners in_pixels;
-            for (int corner = 0; corner < 4; ++corner)
-                in_pixels[corner] = (corners.corners_px[corner] - origin) * look.scale - half;
-            const Reading reading = aruco::read(pixels, in_pixels, table, id, parameters.markerBorderBits, false);
-            // An unlisted marker with wrong bits or with a high false-positive rate may be clutter.
-            if (is_listed || (reading.wrong_bits == 0 && reading.false_positive_rate < 1))
-                observations[i] = detectable.family.observation(id, corners, decoding_of(reading));
         };
-        cv::parallel_for_({0, static_cast<int>(found.ids.size())}, [&](const cv::Range &range) {
+        std::vector<Marker> markers; // those that are listed begin
+        std::vector<fiducial::RoughMarker> rough;
+        for (const bool is_listed : {true, false})
+            for (std::size_t i = 0; i < found.ids.size(); ++i) {
+                Marker marker{found.ids[i], detectable.family.lists(found.ids[i]), {}};
+                if (marker.is_listed != is_listed)
+                    continue;
+                for (std::size_t corner = 0; corner < 4; ++corner) {
+                    const cv::Point2d at =
+                        found.corners[i][detectable.dictionary.rotated_180 ? (corner + 2) % 4 : corner];
+                    marker.corners.corners_px[corner] = (at + shift) / look.scale + origin;
+                }
+                const arhost_observation seen_roughly = detectable.family.observation(marker.id, marker.corners);
+                const auto is_same = [&](const arhost_observation &one) {
+                    return fiducial::are_of_one_print(one, seen_roughly);
+                };
+                if (is_listed && (std::ranges::any_of(known, is_same) ||
+                                  (seen.wants && !seen.wants(marker.id, seen_roughly.family))))
+                    continue;
+                if (refine_edges_ && is_listed)
+                    rough.push_back(rough_marker(detectable.dictionary, marker.id, marker.corners.corners_px));
+                markers.push_back(marker);
+            }
+        const auto refined = refinement.refine(rough);
+        std::vector<std::optional<arhost_observation>> observations(markers.size());
+        const auto observe_one = [&](std::size_t i) {
+            fiducial::MeasuredCorners &corners = markers[i].corners;
+            if (i < refined.size())
+                corners = refined[i].value_or(corners);
+            Corners in_pixels;
+            for (std::size_t corner = 0; corner < 4; ++corner)
+                in_pixels[corner] = (corners.corners_px[corner] - origin) * look.scale - half;
+            const Reading reading =
+                aruco::read(pixels, in_pixels, table, markers[i].id, parameters.markerBorderBits, false);
+            // An unlisted marker with wrong bits or with a high false-positive rate may be clutter.
+            if (markers[i].is_listed || (reading.wrong_bits == 0 && reading.false_positive_rate < 1))
+                observations[i] = detectable.family.observation(markers[i].id, corners, decoding_of(reading));
+        };
+        cv::parallel_for_({0, static_cast<int>(markers.size())}, [&](const cv::Range &range) {
             for (int i = range.start; i < range.end; ++i)
-                observe_one(i);
+                observe_one(static_cast<std::size_t>(i));
         });
         for (const std::optional<arhost_observation> &one : observations)
             if (one)
@@ -311,9 +331,9 @@ private:
     }
 
     // Reads an expected marker at its expected place, without detection. Returns std::nullopt if this fails.
-    std::optional<arhost_observation> verify_one(const cv::Mat &grey, arhost_transfer transfer,
-                                                 const arhost_expected_marker &expected, std::int32_t id,
-                                                 std::uint32_t family) const {
+    std::optional<arhost_observation> verify_one(const cv::Mat &grey, const arhost_expected_marker &expected,
+                                                 std::int32_t id, std::uint32_t family,
+                                                 fiducial::FrameRefinement &refinement) const {
         const auto found =
             std::ranges::find_if(detectables_, [&](const Detectable &one) { return one.family.lists(id, family); });
         if (found == detectables_.end())
@@ -329,7 +349,8 @@ private:
         if (!std::ranges::all_of(corners, [&](const cv::Point2d &corner) { return frame.contains(corner); }) ||
             !is_there(read_upright(grey, corners, found->dictionary, id)))
             return std::nullopt;
-        const auto measured = refined(grey, transfer, found->dictionary, id, corners);
+        const std::array rough = {rough_marker(found->dictionary, id, corners)};
+        const auto measured = refinement.refine(rough).front();
         if (!measured)
             return std::nullopt;
         const Reading reading = read_upright(grey, measured->corners_px, found->dictionary, id);
@@ -348,11 +369,9 @@ private:
         return {reading.wrong_bits, reading.contrast, reading.false_positive_rate};
     }
 
-    std::optional<fiducial::MeasuredCorners> refined(const cv::Mat &grey, arhost_transfer transfer,
-                                                     const Dictionary &dictionary, int id,
-                                                     const Corners &rough_px) const {
-        return fiducial::refine_corners(grey, transfer, rough_px, search_->lens(), cells_of(dictionary.table),
-                                        [&] { return print_of(dictionary, id); });
+    // The dictionary must outlive the result.
+    fiducial::RoughMarker rough_marker(const Dictionary &dictionary, int id, const Corners &corners_px) const {
+        return {corners_px, cells_of(dictionary.table), [this, &dictionary, id] { return print_of(dictionary, id); }};
     }
 
     fiducial::Print print_of(const Dictionary &dictionary, int id) const {

@@ -221,9 +221,13 @@ class CloserLooks : public Regions {
 protected:
     arhost::fiducial::Seen search() {
         searched_.clear();
+        wanted_.clear();
         const auto look = [&](const std::string &name) {
             return [this, name](const cv::Rect &region, auto &all) {
                 searched_.emplace_back(name, region);
+                for (std::int32_t id = 0; id < 4; ++id)
+                    if (!all.wants || all.wants(id, 0))
+                        wanted_.insert(id);
                 all.markers.insert(all.markers.end(), finds_.begin(), finds_.end());
                 all.candidates += 7;
             };
@@ -242,6 +246,7 @@ protected:
     using Search = std::pair<std::string, cv::Rect>;
 
     std::vector<Search> searched_;
+    std::set<std::int32_t> wanted_;         // by the closer looks, of the first family
     std::vector<arhost_observation> finds_; // the closer looks
     const cv::Rect first_{75, 125, 51, 51}, third_{275, 125, 51, 51};
 };
@@ -252,6 +257,7 @@ TEST_F(CloserLooks, AreTakenWhereMarkersOfMissedTargetsAreExpected) {
     expect(2, 300, 150);
     finds_ = {seen(2), seen(0), seen(9)};
     const auto found = search();
+    EXPECT_THAT(wanted_, ElementsAre(2)) << "others need not be refined again";
     EXPECT_THAT(searched_, testing::IsSupersetOf({Search("fast", third_), Search("slow", third_)}));
     EXPECT_THAT(searched_, testing::Not(testing::Contains(testing::Pair("fast", first_))));
     EXPECT_EQ(found.candidates, 7u) << "the search with most of them";
