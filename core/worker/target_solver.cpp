@@ -166,14 +166,16 @@ std::optional<arhost_expected_marker> TargetSolver::expected(const Marker &marke
     return whole.intersects(region) ? std::optional(expected) : std::nullopt;
 }
 
-// Returns whether a marker is where the motion of its target predicts it. The tolerance is the uncertainty of the
-// prediction, but at most the marker's shortest side.
-bool TargetSolver::is_expected(const arhost_observation &observation, const pose::Motion &motion) const {
+// Returns whether a marker is at the place that a motion gives, within the marker's shortest side. `is_predicted`:
+// the tolerance is also at most the uncertainty of the motion.
+bool TargetSolver::is_near(const arhost_observation &observation, const pose::Motion &motion,
+                           bool is_predicted) const {
     const auto place = expected(*marker_of(observation), motion);
     if (!place)
         return false;
     const ObservedMarker seen = observed(observation, marker_sigma_px);
-    const double tolerance_px = std::min(place->margin_px, shortest_side_px(seen));
+    const double side_px = shortest_side_px(seen),
+                 tolerance_px = is_predicted ? std::min(place->margin_px, side_px) : side_px;
     for (std::size_t i = 0; i < 4; ++i)
         if (!((seen.corners_px[i] - Eigen::Vector2d(place->corners_px[i])).norm() <= tolerance_px))
             return false;
@@ -315,11 +317,21 @@ void TargetSolver::project(const Rigid &pose, arhost_observation &observation) c
 // `predicted`: the motion predicted from memory.track.
 void TargetSolver::add_sighting(Memory &memory, const arhost_observation &seen,
                                 const std::optional<pose::Motion> &predicted) const {
-    if (seen.false_positive_rate > 0 && !(predicted && is_expected(seen, *predicted))) {
-        memory.track = {};
-        memory.log_chance = std::log(marker_counts_[seen.family]);
+    double &chance = memory.log_chance;
+    if (seen.false_positive_rate > 0 && !(predicted && is_near(seen, *predicted, true))) {
+        const double first = std::log(marker_counts_[seen.family]); // without evidence
+        // A step that the motion does not predict halves the evidence, but a confirmed target remains confirmed.
+        const bool is_step =
+            predicted && (is_near(seen, *predicted, false) || is_near(seen, memory.track.branch[0], false));
+        const double left = is_step ? (first + chance) / 2 : first;
+        if (is_step && chance <= confirmed_log_chance) {
+            chance = std::min(left, confirmed_log_chance);
+        } else {
+            memory.track = {};
+            chance = left;
+        }
     }
-    memory.log_chance = std::max(memory.log_chance + std::log(seen.false_positive_rate), certain_log_chance);
+    chance = std::max(chance + std::log(seen.false_positive_rate), certain_log_chance);
 }
 
 void TargetSolver::solve(const Target &target, std::span<arhost_observation> observations, std::int64_t capture_ns,

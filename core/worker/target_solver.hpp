@@ -68,7 +68,7 @@ private:
     Header header_of(const void *state) const;
     Memory memory_of(const void *state, std::size_t target) const;
     std::optional<arhost_expected_marker> expected(const Marker &marker, const pose::Motion &motion) const;
-    bool is_expected(const arhost_observation &observation, const pose::Motion &motion) const;
+    bool is_near(const arhost_observation &observation, const pose::Motion &motion, bool is_predicted) const;
     const Marker *marker_of(const arhost_observation &observation) const;
     pose::ObservedMarker observed(const arhost_observation &observation, double corner_sigma_px) const;
     std::vector<const arhost_observation *> without_copies(std::span<const arhost_observation> observations,

@@ -443,6 +443,42 @@ TEST_F(TargetSolverTest, ReportsAMarkerThatMayBeChanceInTheSecondFrame) {
     EXPECT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED);
 }
 
+TEST_F(TargetSolverTest, AConfirmedMarkerKeepsItsPoseAfterAStepThatItsMotionDoesNotPredict) {
+    for (const double step_px : {4.5, 6.0, 20.0, 40.0}) {
+        SCOPED_TRACE(step_px);
+        is_first = true;
+        for (int frame = 0; frame < 40; ++frame) {
+            // Rests, is pushed, and then shakes.
+            const double steps = frame < 20 ? 0 : frame < 30 ? 1 : frame % 2;
+            arhost_observation seen = doubtful(pose_at({20 + steps * step_px * 900 / pinhole.fx, 10, 900}, 30));
+            if (frame > 5 && frame % 3 == 0)
+                seen.false_positive_rate = 1; // no evidence, but of a confirmed target
+            solve({seen}, frame);
+            if (frame > 1) {
+                ASSERT_EQ(solved[cup].state, ARHOST_TARGET_DETECTED) << frame;
+            }
+        }
+    }
+}
+
+TEST_F(TargetSolverTest, AStepHalvesTheEvidenceOfAMarkerThatIsNotConfirmed) {
+    const auto frames_needed = [&](double step_mm) {
+        arhost_observation seen;
+        is_first = true;
+        solved = {};
+        int frame = 0;
+        for (; frame < 20 && solved[cup].state != ARHOST_TARGET_DETECTED; ++frame) {
+            seen = see(pose_at({20 + (frame >= 4 ? step_mm : 0), 10, 900}, 30), 5);
+            seen.false_positive_rate = 0.1;
+            solve({seen}, frame);
+        }
+        return frame;
+    };
+    const int without = frames_needed(0), with = frames_needed(20), jumped = frames_needed(200);
+    EXPECT_LT(without, with);
+    EXPECT_LT(with, jumped);
+}
+
 TEST_F(TargetSolverTest, ForgetsAMarkerThatMayBeChanceAfterAGap) {
     const arhost_observation seen = doubtful(pose_at({20, 10, 900}, 30));
     solve({seen});
