@@ -4,6 +4,7 @@
 #include "base/atomic_file.hpp"
 #include "base/file_identity.hpp"
 #include "base/listening_socket.hpp"
+#include "base/temporary_folder.hpp"
 #include "base/text.hpp"
 #include "base/write_all.hpp"
 #include "command_line/command_line.hpp"
@@ -213,6 +214,36 @@ std::string family_of(std::span<const Test> tests, RunSettings settings,
     return plugin.capabilities & ARHOST_CAPABILITY_REPORTS_POSES ? "" : drawn_families.front(); // tests report why
 }
 
+// Returns values for the paths that have neither a default nor a value: the first that the plugin accepts. Inputs are
+// pictures, which this function writes to `folder`. Each test has its own folder for outputs.
+Settings default_paths(std::span<const Test> tests, RunSettings settings,
+                       const arhost::model::PluginDescription &plugin, const fs::path &folder) {
+    constexpr int picture_count = 12;
+    const bool is_source = plugin.kind == ARHOST_KIND_SOURCE;
+    const auto start =
+        std::ranges::find(tests, std::string_view(is_source ? "source.start" : "sink.start"), &Test::name);
+    std::vector<std::string> values;
+    if (is_source) {
+        for (int i = 0; i < picture_count; ++i)
+            write_picture(picture_of(i), folder / fmt::format("{:02}.png", i));
+        values = {folder / "%02d.png", folder / "00.png"};
+    } else if (plugin.kind == ARHOST_KIND_SINK) {
+        values = {"out", "out.mp4", "out.jsonl", standard_output};
+        if (plugin.capabilities & ARHOST_CAPABILITY_NUMBERED_FILES)
+            values.insert(values.begin(), "%03d.png");
+    }
+    const arhost_option_type type = is_source ? ARHOST_OPTION_INPUT_PATH : ARHOST_OPTION_OUTPUT_PATH;
+    for (const arhost::model::OptionDeclaration &option : plugin.options)
+        if (option.type == type && !option.default_value && !settings.subject.settings.contains(option.key))
+            for (const std::string &value : values) {
+                settings.subject.settings[option.key] = value;
+                if (const Verdict verdict = run_alone(*start, settings).verdict;
+                    verdict == Verdict::pass || verdict == Verdict::skip)
+                    return {{option.key, value}};
+            }
+    return {}; // tests report that the option has no value, or why it is rejected
+}
+
 // Returns the values of the options of type ARHOST_OPTION_LISTEN: as set, else their defaults. Skips invalid
 // addresses, which tests report.
 Settings addresses_of(const arhost::model::PluginDescription &plugin, const Settings &settings) {
@@ -294,6 +325,11 @@ Report run(RunSettings settings, const std::vector<std::string> &patterns, bool 
         }
     });
     const std::string missing = missing_need(report.results.front(), settings.subject.policy);
+    const base::TemporaryFolder inputs("arhost-conform-inputs");
+    if (missing.empty() && report.plugin &&
+        std::ranges::any_of(selected, [&](const Test &test) { return creates_instances(report.tests, test.name); }))
+        settings.subject.settings.merge(
+            default_paths(report.tests, settings, report.plugin->descriptor, inputs.path()));
     const auto is_of_tracker = [](const Test &test) { return test.kind() == ARHOST_KIND_TRACKER; };
     if (settings.subject.family.empty() && missing.empty() && std::ranges::any_of(selected, is_of_tracker))
         settings.subject.family = family_of(report.tests, settings, report.plugin->descriptor);

@@ -9,7 +9,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <optional>
+#include <random>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -25,7 +27,9 @@ struct Marker {
 };
 struct DrawnFamily {
     std::string_view name;
-    std::vector<Marker> markers; // with the orientation of the AprilTag library, or of OpenCV
+    std::vector<Marker> markers; // with the orientation of the AprilTag library, of OpenCV, or of ARToolKit
+    bool is_of_artoolkit =
+        false; // the rows are those inside the border, whose width is a quarter of the marker's side
 };
 const std::vector<DrawnFamily> families = {
     {"tag36h11",
@@ -43,7 +47,52 @@ const std::vector<DrawnFamily> families = {
       {7, {"#######", "#.#####", "##..###", "#.#...#", "##..#.#", "##.#..#", "#######"}},
       {12, {"#######", "##..#.#", "#.#...#", "#.##.##", "###.#.#", "##...##", "#######"}},
       {2, {"#######", "#.#...#", "#.#..##", "####.##", "#..#..#", "##.####", "#######"}}}},
+    {"artoolkit-5x5-bch-22-7-7",
+     {{31, {"#..##", "###.#", "..##.", ".##.#", "#.#.."}},
+      {7, {"#....", "###.#", ".###.", ".#..#", "##.#."}},
+      {12, {"#...#", "#..#.", "...##", "##...", "##..."}},
+      {2, {"#....", ".#...", "#####", ".#.##", "###.."}}},
+     true},
+    {pattern_family, // in no two orientations, nor mirrored, are these similar
+     {{31, {".##.", "#...", ".##.", ".#.#"}},
+      {7, {"##..", "###.", "....", "##.#"}},
+      {12, {"##.#", "..##", "...#", "#.#."}},
+      {2, {".#..", ".#..", "..##", "####"}}},
+     true},
 };
+constexpr std::array picture_ids = {31, 7, 12, 2};
+
+Print print_of_artoolkit(const Marker &marker) {
+    const auto border = static_cast<std::uint32_t>(marker.rows.size()); // in pixels: half as wide as the cells
+    Print print{marker.id, 4 * border, std::vector<std::uint8_t>(std::size_t{16} * border * border, 0)};
+    for (std::uint32_t y = 0; y < 2 * border; ++y)
+        for (std::uint32_t x = 0; x < 2 * border; ++x)
+            if (marker.rows[y / 2][x / 2] != '#')
+                print.grey[std::size_t{border + y} * print.side + border + x] = 255;
+    return print;
+}
+
+// Writes the picture inside the border as mk_patt does: the planes blue, green and red of four orientations.
+void write_pattern(const Print &print, const std::filesystem::path &file) {
+    constexpr std::uint32_t side = 16;
+    // The print's pixel in the middle of an element.
+    const auto element = [&](std::uint32_t row, std::uint32_t column) {
+        const auto at = [&](std::uint32_t i) { return (print.side * side + print.side * (2 * i + 1)) / (4 * side); };
+        return int{print.grey[std::size_t{at(row)} * print.side + at(column)]};
+    };
+    std::ofstream stream(file);
+    for (int orientation = 0; orientation < 4; ++orientation)
+        for (int plane = 0; plane < 3; ++plane)
+            for (std::uint32_t row = 0; row < side; ++row)
+                for (std::uint32_t column = 0; column < side; ++column) {
+                    std::uint32_t r = row, c = column;
+                    for (int turn = 0; turn < orientation; ++turn)
+                        r = std::exchange(c, side - 1 - r);
+                    stream << element(r, c) << (column + 1 < side ? ' ' : '\n');
+                }
+    if (!stream.flush())
+        throw std::runtime_error("cannot write " + file.string());
+}
 
 Print print_of(const Marker &marker) {
     Print print{marker.id, static_cast<std::uint32_t>(marker.rows.size()), {}};
@@ -175,6 +224,32 @@ struct View {
 
 } // namespace
 
+// Rectangles of random greys, the smaller ones on top.
+Print picture_of(int id) {
+    constexpr std::uint32_t side = 256, count = 200;
+    Print print{id, side, std::vector<std::uint8_t>(std::size_t{side} * side, 128)};
+    std::mt19937 random(static_cast<std::uint32_t>(id));
+    for (std::uint32_t i = 0; i < count; ++i) {
+        const std::uint32_t largest = side >> (1 + 3 * i / count);
+        const auto length = [&] { return largest / 2 + random() % (largest / 2); };
+        const std::uint32_t x0 = random() % side, x1 = std::min<std::uint32_t>(side, x0 + length());
+        const std::uint32_t y0 = random() % side, y1 = std::min<std::uint32_t>(side, y0 + length());
+        const auto grey = static_cast<std::uint8_t>(random());
+        for (std::uint32_t y = y0; y < y1; ++y)
+            std::fill_n(print.grey.begin() + std::size_t{side} * y + x0, x1 - x0, grey);
+    }
+    return print;
+}
+
+void write_picture(const Print &print, const std::filesystem::path &file) {
+    png_image png{};
+    png.version = PNG_IMAGE_VERSION;
+    png.width = png.height = print.side;
+    png.format = PNG_FORMAT_GRAY;
+    if (!png_image_write_to_file(&png, file.c_str(), 0, print.grey.data(), 0, nullptr))
+        throw std::runtime_error("cannot write " + file.string() + ": " + png.message);
+}
+
 Print Print::mirrored() const {
     Print other = *this;
     for (auto row = other.grey.begin(); row != other.grey.end(); row += side)
@@ -184,12 +259,32 @@ Print Print::mirrored() const {
 
 std::vector<Print> prints_of(const PrintFiles &files, std::string_view family) {
     std::vector<Print> prints;
-    if (files.empty())
-        for (const Marker &marker : std::ranges::find(families, family, &DrawnFamily::name)->markers)
-            prints.push_back(print_of(marker));
+    if (files.empty() && family == picture_family)
+        for (const int id : picture_ids)
+            prints.push_back(picture_of(id));
+    else if (files.empty()) {
+        const DrawnFamily &drawn = *std::ranges::find(families, family, &DrawnFamily::name);
+        for (const Marker &marker : drawn.markers)
+            prints.push_back(drawn.is_of_artoolkit ? print_of_artoolkit(marker) : print_of(marker));
+    }
     for (auto file = files.rbegin(); file != files.rend(); ++file)
         prints.push_back(read_print(file->first, file->second));
     return prints;
+}
+
+std::filesystem::path print_file(const std::filesystem::path &folder, const std::string &family, int id,
+                                 const PrintFiles &files) {
+    const bool is_pattern = family == pattern_family;
+    const std::filesystem::path file = folder / (std::to_string(id) + (is_pattern ? ".patt" : ".png"));
+    if (!std::filesystem::exists(file))
+        for (const Print &print : prints_of(files, family))
+            if (print.id == id)
+                (is_pattern ? write_pattern : write_picture)(print, file);
+    return file;
+}
+
+double pattern_ratio_of(std::string_view family) {
+    return family == pattern_family ? 0.5 : 0;
 }
 
 Grey Grey::part(std::uint32_t x0, std::uint32_t y0, std::uint32_t part_width, std::uint32_t part_height) const {

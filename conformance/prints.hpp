@@ -17,6 +17,7 @@
 #include <filesystem>
 #include <map>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -34,12 +35,30 @@ struct Print {
 
 using PrintFiles = std::map<int, std::filesystem::path>; // by id
 
+// The families of ARToolKit's patterns and of pictures, whose prints are defined by files
+// (arhost_marker_config.file).
+inline constexpr std::string_view pattern_family = "pattern", picture_family = "image";
+constexpr bool has_files(std::string_view family) {
+    return family == pattern_family || family == picture_family;
+}
+
 // The families whose markers the suite can draw.
-inline constexpr std::array drawn_families = {"tag36h11", "DICT_6X6_250", "tag25h9"};
+inline constexpr std::array drawn_families = {"tag36h11", "DICT_6X6_250", "tag25h9",
+                                              "pattern",  "image",        "artoolkit-5x5-bch-22-7-7"};
 
 // Returns four markers of one of these families, or the prints in the user's PNG files. Never empty. The ids are not
 // in ascending order, and some ids occur in several families.
 std::vector<Print> prints_of(const PrintFiles &files, std::string_view family = drawn_families.front());
+
+// Returns the file that defines the print of a marker of a family that has_files. Writes it to `folder`, unless
+// prints_of(files, family) has no such marker.
+std::filesystem::path print_file(const std::filesystem::path &folder, const std::string &family, int id,
+                                 const PrintFiles &files);
+double pattern_ratio_of(std::string_view family); // arhost_marker_config.pattern_ratio
+
+// A picture with texture of all sizes, a different one for each id.
+Print picture_of(int id);
+void write_picture(const Print &print, const std::filesystem::path &file); // as PNG
 
 // A greyscale camera image.
 struct Grey {

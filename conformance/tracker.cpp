@@ -80,10 +80,10 @@ arhost_frame SealedFrame::frame(std::uint64_t sequence, std::int64_t capture_ns)
     return frame;
 }
 
-TrackerSetup::TrackerSetup(const arhost_intrinsics &camera, std::vector<std::string> families,
+TrackerSetup::TrackerSetup(const Context &context, const arhost_intrinsics &camera, std::vector<std::string> families,
                            arhost_pixel_format format, std::size_t extra)
-    : camera_(camera), format_(format_of(camera.width, camera.height, format)), families_(std::move(families)),
-      targets_(extra), markers_(extra) {
+    : context_(context), camera_(camera), format_(format_of(camera.width, camera.height, format)),
+      families_(std::move(families)), targets_(extra), markers_(extra) {
     for (const std::string &family : families_)
         family_names_.push_back(family.c_str());
 }
@@ -95,24 +95,27 @@ std::uint32_t TrackerSetup::add_target(const std::string &name, const char *body
 
 void TrackerSetup::add(const Listed &marker) {
     const double h = marker.side_mm / 2;
-    markers_.add({0,
-                  marker.id,
-                  marker.family,
-                  add_target(fmt::format("{}-{}", families_[marker.family], marker.id)),
-                  {{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}},
-                  nullptr,
-                  0});
+    add_marker(marker.id, marker.family, add_target(fmt::format("{}-{}", families_[marker.family], marker.id)),
+               {{{-h, h, 0}, {h, h, 0}, {h, -h, 0}, {-h, -h, 0}}});
+}
+
+void TrackerSetup::add_marker(int id, std::uint32_t family, std::uint32_t target,
+                              const std::array<glm::dvec3, 4> &corners) {
+    arhost_marker_config config{0, id, family, target, {}, nullptr, 0};
+    for (std::size_t i = 0; i < corners.size(); ++i)
+        std::copy_n(&corners[i].x, 3, config.corners_mm[i]);
+    if (const std::string &name = families_[family]; has_files(name)) {
+        const PrintFiles &files = name == context_.family ? context_.prints : PrintFiles();
+        config.file = names_.emplace_back(print_file(context_.library.scratch(), name, id, files)).c_str();
+        config.pattern_ratio = pattern_ratio_of(name);
+    }
+    markers_.add(config);
 }
 
 void TrackerSetup::add_map(std::span<const Placed> markers, const Pose &camera_from_map) {
     const std::uint32_t target = add_target("map");
-    for (const Placed &marker : markers) {
-        arhost_marker_config config{0, marker.print.id, 0, target, {}, nullptr, 0};
-        const auto corners = corners_in(marker, camera_from_map);
-        for (std::size_t i = 0; i < corners.size(); ++i)
-            std::copy_n(&corners[i].x, 3, config.corners_mm[i]);
-        markers_.add(config);
-    }
+    for (const Placed &marker : markers)
+        add_marker(marker.print.id, 0, target, corners_in(marker, camera_from_map));
 }
 
 void TrackerSetup::add_body(const std::string &body) {
@@ -132,7 +135,7 @@ arhost_tracker_setup TrackerSetup::setup() const {
 }
 
 Tracker::Tracker(Context &context, Settings overrides)
-    : library_(context.library), family_(context.family), overrides_(std::move(overrides)),
+    : context_(context), library_(context.library), overrides_(std::move(overrides)),
       functions_(*static_cast<const arhost_tracker *>(context.library.plugin().functions)),
       result_memory_(sizeof(arhost_tracker_result)) {
     create();
@@ -148,7 +151,7 @@ arhost_status Tracker::try_start(const arhost_intrinsics &camera, const std::vec
     camera_ = camera;
     listed_ = listed;
     format_ = pixel_format;
-    TrackerSetup setup(camera, {family_}, pixel_format);
+    TrackerSetup setup(context_, camera, {context_.family}, pixel_format);
     for (const Listed &marker : listed)
         setup.add(marker);
     return start_with(setup);
@@ -307,6 +310,15 @@ std::vector<arhost_observation> Tracker::track_first(const SealedFrame &frame) {
     if (sequence_ > 0)
         start(camera_, listed_, format_);
     return track(frame);
+}
+
+arhost_intrinsics camera_for(const Context &context, std::uint32_t width, std::uint32_t height, double focal) {
+    const std::uint32_t scale = context.family == picture_family ? 4 : 1;
+    return pinhole(scale * width, scale * height, scale * focal);
+}
+
+Grey empty_image(const arhost_intrinsics &camera) {
+    return filled(camera.width, camera.height, [](auto, auto) { return background_code; });
 }
 
 std::vector<Print> prints_of(const Context &context) {

@@ -57,7 +57,8 @@ private:
 // An arhost_tracker_setup with its arrays.
 class TrackerSetup {
 public:
-    TrackerSetup(const arhost_intrinsics &camera, std::vector<std::string> families,
+    // `context` must live as long as this object.
+    TrackerSetup(const Context &context, const arhost_intrinsics &camera, std::vector<std::string> families,
                  arhost_pixel_format format = ARHOST_PIXEL_FORMAT_GREY8, std::size_t extra = 0);
     void add(const Listed &marker);
     void add_map(std::span<const Placed> markers, const Pose &camera_from_map); // of the first family
@@ -66,7 +67,9 @@ public:
 
 private:
     std::uint32_t add_target(const std::string &name, const char *body = nullptr);
+    void add_marker(int id, std::uint32_t family, std::uint32_t target, const std::array<glm::dvec3, 4> &corners);
 
+    const Context &context_;
     arhost_intrinsics camera_;
     arhost_frame_format format_;
     std::vector<std::string> families_;
@@ -131,8 +134,8 @@ private:
     arhost_tracker_result prepare_result();
     std::uint64_t aligned_state_size() const { return (state_size_ + 63) / 64 * 64; }
 
+    const Context &context_;
     PluginLibrary &library_;
-    std::string family_;
     Settings overrides_;
     std::optional<Instance> instance_;
     const arhost_tracker &functions_;
@@ -154,10 +157,16 @@ private:
 
 inline constexpr std::int64_t frame_ns = 33'333'333;
 
+// A camera of the tests. If the prints are pictures, it has four times as many pixels along each side, because a
+// tracker needs more pixels to recognise a picture than to read a marker.
+arhost_intrinsics camera_for(const Context &context, std::uint32_t width, std::uint32_t height, double focal);
+
 // A wide-angle camera. Its frames with one byte per pixel fill whole memory pages.
-inline arhost_intrinsics wide_camera() {
-    return pinhole(320, 256, 300);
+inline arhost_intrinsics wide_camera(const Context &context) {
+    return camera_for(context, 320, 256, 300);
 }
+
+Grey empty_image(const arhost_intrinsics &camera);
 
 // The markers to draw for the tracker. Throws Skip if it detects no markers.
 std::vector<Print> prints_of(const Context &context);

@@ -17,7 +17,7 @@ namespace {
 // Starts the tracker with the body and a target of another kind, if it detects markers.
 TrackerSetup setup_of(const Context &context, const std::string &body) {
     const bool has_markers = !context.family.empty();
-    TrackerSetup setup(wide_camera(),
+    TrackerSetup setup(context, wide_camera(context),
                        has_markers ? std::vector<std::string>{context.family} : std::vector<std::string>{});
     if (has_markers)
         setup.add({prints_of(context).front().id, 80});
@@ -26,12 +26,13 @@ TrackerSetup setup_of(const Context &context, const std::string &body) {
 }
 
 struct Started {
-    explicit Started(Context &context) : tracker(context) {
+    explicit Started(Context &context) : tracker(context), image(empty_image(wide_camera(context))) {
         const TrackerSetup setup = setup_of(context, context.body);
         tracker.instance().expect_ok("start", tracker.start_with(setup));
         body_target = setup.setup().target_count - 1;
     }
     Tracker tracker;
+    Grey image;
     std::uint32_t body_target; // index of the only target with a body
 };
 
@@ -46,16 +47,15 @@ void start(Context &context) {
 }
 
 // Calls `check(number)` after each of up to `frames` frames until it returns true.
-template <class Check> void track_frames(Tracker &tracker, int frames, Check &&check) {
-    const Grey image = filled(320, 256, [](auto, auto) { return background_code; });
-    for (int number = 0; number < frames && !check(tracker.track(image), number); ++number)
+template <class Check> void track_frames(Started &started, int frames, Check &&check) {
+    for (int number = 0; number < frames && !check(started.tracker.track(started.image), number); ++number)
         std::this_thread::sleep_for(std::chrono::nanoseconds(frame_ns)); // its data may come at this rate
 }
 
 void track(Context &context) {
     Started started(context);
     bool reported = false;
-    track_frames(started.tracker, 60, [&](const auto &, int) { return reported = !started.tracker.poses().empty(); });
+    track_frames(started, 60, [&](const auto &, int) { return reported = !started.tracker.poses().empty(); });
     if (!reported)
         throw Failure(fmt::format("it reports no pose of the body '{}' in 60 frames of 1/30 s", context.body));
 }
@@ -110,7 +110,7 @@ std::string problem_with(const arhost_body_pose &pose, const Started &started) {
 
 void pose(Context &context) {
     Started started(context);
-    track_frames(started.tracker, 10, [&](const auto &, int number) {
+    track_frames(started, 10, [&](const auto &, int number) {
         std::set<std::uint32_t> targets;
         for (const arhost_body_pose &one : started.tracker.poses()) {
             if (const std::string problem = problem_with(one, started); !problem.empty())

@@ -16,7 +16,8 @@ constexpr double side_mm = 80;
 // Tracks the first print, seen by one camera at many poses.
 class Studio {
 public:
-    explicit Studio(Context &context, const arhost_intrinsics &camera = wide_camera())
+    explicit Studio(Context &context) : Studio(context, wide_camera(context)) {}
+    Studio(Context &context, const arhost_intrinsics &camera)
         : camera_(camera), print_(prints_of(context).front()), tracker_(context) {
         tracker_.start(camera, {{print_.id, side_mm}});
     }
@@ -136,25 +137,28 @@ void intrinsics(Context &context) {
     const auto expect_accurate_with = [&](const arhost_intrinsics &camera, const Pose &at, const std::string &where) {
         expect_accurate(Studio(context, camera).shoot(at, where), bound_px, where);
     };
-    for (const auto &[fx, fy] : {std::pair{330.0, 290.0}, {280.0, 320.0}}) {
-        arhost_intrinsics camera = wide_camera();
-        camera.fx = fx;
-        camera.fy = fy;
-        expect_accurate_with(camera, tilted({0, 0, -240}, 15, 90, 25), fmt::format("with fx = {}, fy = {}", fx, fy));
+    const arhost_intrinsics wide = wide_camera(context);
+    for (const auto &[x_factor, y_factor] : {std::pair{1.1, 0.97}, {0.93, 1.07}}) {
+        arhost_intrinsics camera = wide;
+        camera.fx *= x_factor;
+        camera.fy *= y_factor;
+        expect_accurate_with(camera, tilted({0, 0, -240}, 15, 90, 25),
+                             fmt::format("with fx = {:.0f}, fy = {:.0f}", camera.fx, camera.fy));
     }
-    arhost_intrinsics camera = wide_camera();
-    camera.cx += 70;
-    camera.cy -= 45;
-    expect_accurate_with(camera, tilted({-40, -20, -250}, 30, 70), "with cx = 229.5 and cy = 82.5");
+    arhost_intrinsics camera = wide;
+    camera.cx += 0.22 * wide.width;
+    camera.cy -= 0.18 * wide.height;
+    expect_accurate_with(camera, tilted({-40, -20, -250}, 30, 70),
+                         fmt::format("with cx = {:.1f} and cy = {:.1f}", camera.cx, camera.cy));
     // A crop of an image equals the image of a camera for that crop.
-    constexpr std::uint32_t x0 = 90, y0 = 60;
-    arhost_intrinsics part = wide_camera();
-    part.width = 192;
-    part.height = 160;
+    const std::uint32_t x0 = wide.width * 9 / 32, y0 = wide.height * 15 / 64;
+    arhost_intrinsics part = wide;
+    part.width = wide.width * 3 / 5;
+    part.height = wide.height * 5 / 8;
     part.cx -= x0;
     part.cy -= y0;
     const Placed marker{prints_of(context).front(), side_mm, tilted({25, -10, -260}, 30, 160)};
-    const Grey cropped = draw(wide_camera(), marker).part(x0, y0, part.width, part.height);
+    const Grey cropped = draw(wide, marker).part(x0, y0, part.width, part.height);
     Tracker tracker(context);
     tracker.start(part, {{marker.print.id, side_mm}});
     expect_found(tracker, part, marker, cropped, {2, 0.01},
@@ -167,8 +171,9 @@ void through_lens(Context &context, const arhost_intrinsics &camera, const std::
         studio.expect_found(tilted(at, 25, 50, 10), {1.5, 0.01}, "with " + lens);
 }
 
-arhost_intrinsics with_lens(arhost_distortion model, std::initializer_list<double> coefficients) {
-    arhost_intrinsics camera = wide_camera();
+arhost_intrinsics with_lens(const Context &context, arhost_distortion model,
+                            std::initializer_list<double> coefficients) {
+    arhost_intrinsics camera = wide_camera(context);
     camera.distortion = model;
     camera.coefficient_count = static_cast<std::uint32_t>(coefficients.size());
     std::ranges::copy(coefficients, camera.coefficients);
@@ -176,13 +181,13 @@ arhost_intrinsics with_lens(arhost_distortion model, std::initializer_list<doubl
 }
 
 void lens(Context &context) {
-    through_lens(context, with_lens(ARHOST_DISTORTION_BROWN, {-0.28, 0.09, 0.015, -0.02}), "Brown's model");
-    through_lens(context, with_lens(ARHOST_DISTORTION_BROWN, {0.2, -0.1, 0, 0, 0.05, 0.5, -0.1, 0.02}),
+    through_lens(context, with_lens(context, ARHOST_DISTORTION_BROWN, {-0.28, 0.09, 0.015, -0.02}), "Brown's model");
+    through_lens(context, with_lens(context, ARHOST_DISTORTION_BROWN, {0.2, -0.1, 0, 0, 0.05, 0.5, -0.1, 0.02}),
                  "Brown's model with 8 coefficients");
 }
 
 void fisheye(Context &context) {
-    const arhost_intrinsics camera = with_lens(ARHOST_DISTORTION_FISHEYE, {0.15, -0.08, 0.03, -0.01});
+    const arhost_intrinsics camera = with_lens(context, ARHOST_DISTORTION_FISHEYE, {0.15, -0.08, 0.03, -0.01});
     const Print print = prints_of(context).front();
     const arhost_status status = Tracker(context).try_start(camera, {{print.id, side_mm}});
     if (status == ARHOST_STATUS_ERROR_UNSUPPORTED || status == ARHOST_STATUS_ERROR_CONFIGURATION) {
@@ -201,8 +206,8 @@ void map(Context &context) {
         const double x = i % 2 ? 60 : -50, y = i / 2 ? -60 : 45, turn = 90.0 * static_cast<double>(i);
         markers.push_back({prints[i], 60 + 5.0 * static_cast<double>(i), at * pose({x, y, 0}, 0, 0, turn)});
     }
-    const Grey image = draw(wide_camera(), markers);
-    TrackerSetup setup(wide_camera(), {context.family});
+    const Grey image = draw(wide_camera(context), markers);
+    TrackerSetup setup(context, wide_camera(context), {context.family});
     setup.add_map(markers, at);
     Tracker tracker(context);
     const std::string where = fmt::format("with a map of {} markers", markers.size());
@@ -215,9 +220,9 @@ void map(Context &context) {
         if (const auto seen = std::ranges::find(found, marker.print.id, &arhost_observation::id); seen != found.end())
             observed.push_back({*seen, marker});
     }
-    expect_all(found, wide_camera(), expected, where, image);
-    expect_pose(solve(wide_camera(), observed, at, where, image), at, {0.5, 0.003}, where + ", the corners put it",
-                image);
+    expect_all(found, wide_camera(context), expected, where, image);
+    expect_pose(solve(wide_camera(context), observed, at, where, image), at, {0.5, 0.003},
+                where + ", the corners put it", image);
 }
 
 // If a prerequisite fails, the other tests of corners and poses fail for the same reason.

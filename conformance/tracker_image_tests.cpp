@@ -37,11 +37,12 @@ Grey noisy(const Grey &image, double sigma, Context &context) {
 template <class Change> void expect_found_in(Context &context, const std::string &where, Change &&change) {
     const Print print = prints_of(context).front();
     Tracker tracker(context);
-    tracker.start(wide_camera(), {{print.id, side_mm}});
+    tracker.start(wide_camera(context), {{print.id, side_mm}});
     for (const Pose &at : {tilted({0, 0, -230}, 30, 20, 0), tilted({35, -20, -270}, 40, 140, 100),
                            tilted({-40, 25, -250}, 25, 260, 200)}) {
         const Placed marker{print, side_mm, at};
-        expect_found(tracker, wide_camera(), marker, change(draw(wide_camera(), marker)), roughly, where);
+        expect_found(tracker, wide_camera(context), marker, change(draw(wide_camera(context), marker)), roughly,
+                     where);
     }
 }
 
@@ -74,10 +75,10 @@ void exposure(Context &context) {
 void occlusion(Context &context) {
     const Print print = prints_of(context).front();
     const Placed marker{print, side_mm, tilted({5, 5, -230}, 30, 40, 20)};
-    const Grey whole = draw(wide_camera(), marker);
-    const auto hidden = corners_of(wide_camera(), marker);
+    const Grey whole = draw(wide_camera(context), marker);
+    const auto hidden = corners_of(wide_camera(context), marker);
     Tracker tracker(context);
-    tracker.start(wide_camera(), {{print.id, side_mm}});
+    tracker.start(wide_camera(context), {{print.id, side_mm}});
     for (std::size_t corner = 0; corner < hidden.size(); ++corner)
         for (const double radius : {5.0, 14.0, 30.0})
             for (const int code : {ink_code, background_code, paper_code}) {
@@ -87,7 +88,7 @@ void occlusion(Context &context) {
                     return glm::distance(glm::dvec2(x, y), hidden[corner]) < radius ? code : whole.at(x, y);
                 });
                 for (const arhost_observation &found : tracker.track_first(image))
-                    expect_corners(found, wide_camera(), marker, {5, 0.03}, where, image);
+                    expect_corners(found, wide_camera(context), marker, {5, 0.03}, where, image);
             }
 }
 
@@ -95,7 +96,7 @@ void recall(Context &context) {
     constexpr int count = 20, min_found = 19;
     const Print print = prints_of(context).front();
     Tracker tracker(context);
-    tracker.start(wide_camera(), {{print.id, side_mm}});
+    tracker.start(wide_camera(context), {{print.id, side_mm}});
     int found = 0;
     std::optional<Grey> missed;
     for (int i = 0; i < count; ++i) {
@@ -104,7 +105,7 @@ void recall(Context &context) {
                                 -distance);
         const Placed marker{print, side_mm,
                             tilted(centre, context.uniform(0, 50), context.uniform(0, 360), context.uniform(0, 360))};
-        const Grey image = draw(wide_camera(), marker);
+        const Grey image = draw(wide_camera(context), marker);
         const std::vector<arhost_observation> markers = tracker.track_first(image);
         if (markers.empty()) {
             missed = image;
@@ -112,7 +113,8 @@ void recall(Context &context) {
         }
         ++found;
         const std::string where = fmt::format("in view {} at a distance of {:.0f} mm", i + 1, distance);
-        expect_corners(expect_one(markers, print.id, where, image), wide_camera(), marker, {180, 0.1}, where, image);
+        expect_corners(expect_one(markers, print.id, where, image), wide_camera(context), marker, {180, 0.1}, where,
+                       image);
     }
     context.note = fmt::format("{} of {} found", found, count);
     if (found < min_found)
@@ -127,15 +129,15 @@ void recall(Context &context) {
 void follows(Context &context) {
     const Print print = prints_of(context).front();
     Tracker tracker(context);
-    tracker.start(wide_camera(), {{print.id, side_mm}});
+    tracker.start(wide_camera(context), {{print.id, side_mm}});
     const auto expect_at = [&](const Pose &where, const std::string &when) {
         const Placed marker{print, side_mm, where};
-        const Grey image = draw(wide_camera(), marker);
-        expect_corners(expect_one(tracker.track(image), marker.print.id, when, image), wide_camera(), marker, roughly,
-                       when, image);
+        const Grey image = draw(wide_camera(context), marker);
+        expect_corners(expect_one(tracker.track(image), marker.print.id, when, image), wide_camera(context), marker,
+                       roughly, when, image);
     };
     const Pose here = tilted({10, -5, -260}, 25, 40, 15), there = tilted({-60, 40, -320}, 45, 200, 120);
-    const Grey empty = filled(320, 256, [](auto, auto) { return background_code; });
+    const Grey empty = empty_image(wide_camera(context));
     for (int i = 0; i < 5; ++i)
         expect_at(tilted({10 + 2 * i, -5, -260 - i}, 25, 40, 15 + i), "while it moves slowly");
     expect_at(there, "after a jump");
@@ -174,7 +176,7 @@ struct Group {
 
 void several(Context &context) {
     const Group group(context);
-    const Grey image = draw(wide_camera(), group.markers);
+    const Grey image = draw(wide_camera(context), group.markers);
     Tracker tracker(context);
     for (const bool reversed : {false, true}) {
         std::vector<Listed> list;
@@ -182,8 +184,8 @@ void several(Context &context) {
             list.push_back({marker.print.id, marker.side_mm});
         if (reversed)
             std::ranges::reverse(list);
-        tracker.start(wide_camera(), list);
-        expect_all(tracker.track_first(image), wide_camera(), group.expected(), "with several markers in view",
+        tracker.start(wide_camera(context), list);
+        expect_all(tracker.track_first(image), wide_camera(context), group.expected(), "with several markers in view",
                    image);
     }
 }
@@ -191,15 +193,14 @@ void several(Context &context) {
 // Of those expected, each must be found; others may be found too.
 void expected_places(Context &context) {
     const Group group(context);
-    const Grey image = draw(wide_camera(), group.markers),
-               empty = filled(320, 256, [](auto, auto) { return background_code; });
+    const Grey image = draw(wide_camera(context), group.markers), empty = empty_image(wide_camera(context));
     Tracker tracker(context);
     std::vector<Listed> list;
     std::vector<Tracker::Expected> expected, outside;
     for (const Placed &marker : group.markers) {
         const auto index = static_cast<std::uint32_t>(list.size());
         list.push_back({marker.print.id, marker.side_mm});
-        Corners near = corners_of(wide_camera(), marker), far = near;
+        Corners near = corners_of(wide_camera(context), marker), far = near;
         for (std::size_t i = 0; i < 4; ++i) {
             near[i] += glm::dvec2(5, -4);
             far[i] += glm::dvec2(index % 2 == 0 ? -1000 : 1e9, 0);
@@ -207,9 +208,9 @@ void expected_places(Context &context) {
         expected.push_back({index, near, 8});
         outside.push_back({index, far, 8});
     }
-    tracker.start(wide_camera(), list);
+    tracker.start(wide_camera(context), list);
     tracker.expect(expected);
-    expect_all(tracker.track_first(image), wide_camera(), group.expected(),
+    expect_all(tracker.track_first(image), wide_camera(context), group.expected(),
                "with markers that are up to 7 px from the expected places", image);
     expect_none(tracker.track_first(empty), "with markers that are expected but not there", empty);
 
@@ -220,30 +221,30 @@ void expected_places(Context &context) {
         for (std::size_t i = all.size(); i-- > markers.size();)
             if (std::ranges::count(found, all[i].marker.print.id, &arhost_observation::id) == 0)
                 all.erase(all.begin() + static_cast<std::ptrdiff_t>(i));
-        expect_all(found, wide_camera(), all, where, image);
+        expect_all(found, wide_camera(context), all, where, image);
     };
     expect_at_least({expected[0]}, "with one of several markers expected");
     expect_at_least({expected[0], expected[1]}, "with two of several markers expected");
     tracker.expect(outside);
     (void)tracker.track_first(image);
     tracker.search_everywhere();
-    expect_all(tracker.track_first(image), wide_camera(), group.expected(), "after frames with expected markers",
-               image);
+    expect_all(tracker.track_first(image), wide_camera(context), group.expected(),
+               "after frames with expected markers", image);
 }
 
 void unlisted(Context &context) {
     const Group group(context);
-    const Grey image = draw(wide_camera(), group.markers);
+    const Grey image = draw(wide_camera(context), group.markers);
     const Placed &listed = group.markers[1];
     Tracker tracker(context);
-    tracker.start(wide_camera(), {{listed.print.id, listed.side_mm}});
+    tracker.start(wide_camera(context), {{listed.print.id, listed.side_mm}});
     const std::vector<arhost_observation> found = tracker.track_first(image);
     std::vector<InFamily> expected = group.expected(); // in which those that it leaves out are not expected
     std::erase_if(expected, [&](const InFamily &one) {
         return one.marker.print.id != listed.print.id &&
                std::ranges::count(found, one.marker.print.id, &arhost_observation::id) == 0;
     });
-    expect_all(found, wide_camera(), expected, "with unlisted markers in view", image);
+    expect_all(found, wide_camera(context), expected, "with unlisted markers in view", image);
 }
 
 // Markers of two families, some with the same id.
@@ -256,8 +257,9 @@ void families(Context &context) {
         for (const bool swapped : {false, true}) {
             std::vector<Placed> markers;
             std::vector<InFamily> expected;
-            TrackerSetup setup(wide_camera(), swapped ? std::vector<std::string>{other, context.family}
-                                                      : std::vector<std::string>{context.family, other});
+            TrackerSetup setup(context, wide_camera(context),
+                               swapped ? std::vector<std::string>{other, context.family}
+                                       : std::vector<std::string>{context.family, other});
             for (std::size_t i = 0; i < std::size(places); ++i) {
                 const Print &print = prints[i / 2][i % 2 ? 1 : i]; // 31 and 7 of the one, 12 and 7 of the other
                 markers.push_back({print, 60, tilted(places[i], 25, 80.0 * static_cast<double>(i), 10)});
@@ -270,8 +272,8 @@ void families(Context &context) {
             if (status == ARHOST_STATUS_ERROR_CONFIGURATION)
                 return false;
             tracker.instance().expect_ok((where + ", start").c_str(), status);
-            const Grey image = draw(wide_camera(), markers);
-            expect_all(tracker.track(image), wide_camera(), expected, where, image);
+            const Grey image = draw(wide_camera(context), markers);
+            expect_all(tracker.track(image), wide_camera(context), expected, where, image);
         }
         context.note = fmt::format("with {} and {}", context.family, other);
         return true;
@@ -285,19 +287,21 @@ void copies(Context &context) {
     const Print print = prints_of(context).front();
     const Placed twice[] = {{print, 60, tilted({-55, 10, -250}, 20, 40)},
                             {print, 60, tilted({60, -10, -260}, 25, 120)}};
-    const Grey image = draw(wide_camera(), twice);
+    const Grey image = draw(wide_camera(context), twice);
     Tracker tracker(context);
-    tracker.start(wide_camera(), {{print.id, 60}});
+    tracker.start(wide_camera(context), {{print.id, 60}});
     const InFamily expected[] = {{twice[0]}, {twice[1]}};
-    expect_all(tracker.track_first(image), wide_camera(), expected, "with two copies of a print in view", image);
+    expect_all(tracker.track_first(image), wide_camera(context), expected, "with two copies of a print in view",
+               image);
 }
 
 void mirrored(Context &context) {
     const std::vector<Print> prints = prints_of(context);
     Tracker tracker(context);
-    tracker.start(wide_camera(), listed(prints));
+    tracker.start(wide_camera(context), listed(prints));
     for (const Print &print : prints) {
-        const Grey image = draw(wide_camera(), Placed{print.mirrored(), side_mm, tilted({0, 0, -230}, 25, 60)});
+        const Grey image =
+            draw(wide_camera(context), Placed{print.mirrored(), side_mm, tilted({0, 0, -230}, 25, 60)});
         expect_none(tracker.track_first(image), "for a mirrored print", image);
     }
 }
@@ -307,9 +311,10 @@ void mirrored(Context &context) {
 void no_marker(Context &context) {
     const std::vector<Print> prints = prints_of(context);
     Tracker tracker(context);
-    tracker.start(wide_camera(), listed(prints));
+    const arhost_intrinsics camera = pinhole(320, 256, 300);
+    tracker.start(camera, listed(prints));
     const auto expect_nothing = [&](const std::string &content, const auto &code) {
-        const Grey image = filled(320, 256, code);
+        const Grey image = filled(camera.width, camera.height, code);
         expect_none(tracker.track_first(image), "in " + content, image);
     };
     for (const int grey : {0, 255, 128})
@@ -324,7 +329,7 @@ void no_marker(Context &context) {
         const bool outer = x > 90 && x < 210 && y > 60 && y<180, inner = x> 105 && x < 195 && y > 75 && y < 165;
         return outer && !inner ? ink_code : paper_code;
     });
-    Grey clutter = filled(320, 256, [](auto, auto) { return background_code; });
+    Grey clutter = empty_image(camera);
     for (int i = 0; i < 60; ++i) {
         const auto x0 = static_cast<std::uint32_t>(context.uniform(0, 280)),
                    y0 = static_cast<std::uint32_t>(context.uniform(0, 220));
@@ -364,7 +369,7 @@ void sizes(Context &context) {
 
 void stride(Context &context) {
     // Rows of 331 px are 384 bytes apart.
-    const arhost_intrinsics camera = pinhole(331, 247, 300);
+    const arhost_intrinsics camera = camera_for(context, 331, 247, 300);
     const Placed marker{prints_of(context).front(), side_mm, tilted({15, 10, -240}, 30, 70, 30)};
     const Grey image = draw(camera, marker);
     Tracker tracker(context);
@@ -384,14 +389,14 @@ void formats(Context &context) {
                                                                     {"NV12", ARHOST_PIXEL_FORMAT_NV12},
                                                                     {"I420", ARHOST_PIXEL_FORMAT_I420}};
     const Placed marker{prints_of(context).front(), side_mm, tilted({15, 10, -240}, 30, 70, 30)};
-    const Grey image = draw(wide_camera(), marker);
+    const Grey image = draw(wide_camera(context), marker);
     for (const auto &[name, format] : formats) {
         Tracker tracker(context);
-        tracker.start(wide_camera(), {{marker.print.id, side_mm}}, format);
+        tracker.start(wide_camera(context), {{marker.print.id, side_mm}}, format);
         const std::string where = fmt::format("in a frame of {}", name);
         const arhost_observation found =
             expect_one(tracker.track_first(SealedFrame(image, format)), marker.print.id, where, image);
-        expect_corners(found, wide_camera(), marker, roughly, where, image);
+        expect_corners(found, wide_camera(context), marker, roughly, where, image);
     }
 }
 

@@ -24,11 +24,13 @@ Placed first_print(Context &context, const Pose &at = tilted({10, -5, -260}, 25,
 // A tracker started with the first print.
 struct Started {
     explicit Started(Context &context, Settings overrides = {})
-        : marker(first_print(context)), tracker(context, std::move(overrides)) {
-        tracker.start(wide_camera(), {{marker.print.id, side_mm}});
+        : camera(wide_camera(context)), marker(first_print(context)), tracker(context, std::move(overrides)) {
+        tracker.start(camera, {{marker.print.id, side_mm}});
     }
-    Grey at(const Pose &where) const { return draw(wide_camera(), Placed{marker.print, side_mm, where}); }
+    Grey at(const Pose &where) const { return draw(camera, Placed{marker.print, side_mm, where}); }
+    Grey without_print() const { return empty_image(camera); }
 
+    arhost_intrinsics camera;
     Placed marker;
     Tracker tracker;
 };
@@ -55,7 +57,7 @@ void unknown_id(Context &context) {
     Tracker tracker(context);
     for (const int id : {-1, std::numeric_limits<int>::max()})
         expect_rejected(fmt::format("marker {}, which is not in its family", id),
-                        tracker.try_start(wide_camera(), {{id, side_mm}}));
+                        tracker.try_start(wide_camera(context), {{id, side_mm}}));
 }
 
 void unknown_family(Context &context) {
@@ -63,7 +65,7 @@ void unknown_family(Context &context) {
     Tracker tracker(context);
     for (const std::vector<std::string> &families :
          {std::vector<std::string>{"tag99h99"}, {""}, {context.family, "tag99h99"}}) {
-        TrackerSetup setup(wide_camera(), families);
+        TrackerSetup setup(context, wide_camera(context), families);
         for (std::uint32_t i = 0; i < families.size(); ++i)
             setup.add({id, side_mm, i});
         expect_rejected(fmt::format("the unknown family '{}'", families.back()), tracker.start_with(setup));
@@ -79,8 +81,8 @@ void unusable_lens(Context &context) {
             throw Failure(fmt::format("with {}, start returned {}; expected CONFIGURATION or UNSUPPORTED",
                                       description, status_name(status)));
     };
-    const auto lens = [](arhost_distortion model, std::uint32_t count) {
-        arhost_intrinsics camera = wide_camera();
+    const auto lens = [&](arhost_distortion model, std::uint32_t count) {
+        arhost_intrinsics camera = wide_camera(context);
         camera.distortion = model;
         camera.coefficient_count = count;
         return camera;
@@ -97,7 +99,7 @@ void cancelled(Context &context) {
     expect_ok_or_cancelled("track", running.tracker.try_track(frame, 0, 0));
     Tracker starting(context);
     starting.instance().host().cancel();
-    expect_ok_or_cancelled("start", starting.try_start(wide_camera(), {{running.marker.print.id, side_mm}}));
+    expect_ok_or_cancelled("start", starting.try_start(wide_camera(context), {{running.marker.print.id, side_mm}}));
 }
 
 // ---- Restarts --------------------------------------------------------------------------------------
@@ -106,7 +108,7 @@ void start_again(Context &context) {
     Started started(context);
     started.tracker.track(started.at(started.marker.camera_from_marker));
     const Placed marker{prints_of(context).back(), side_mm / 2, tilted({-12, 8, -150}, 30, 100)};
-    const arhost_intrinsics camera = pinhole(240, 200, 250);
+    const arhost_intrinsics camera = camera_for(context, 240, 200, 250);
     const Grey image = draw(camera, marker);
     started.tracker.start(camera, {{marker.print.id, marker.side_mm}});
     expect_one(started.tracker.track(image), marker.print.id, "after a restart with another camera and marker",
@@ -115,7 +117,7 @@ void start_again(Context &context) {
 
 void leaks(Context &context) {
     const Placed marker = first_print(context);
-    const arhost_intrinsics camera = pinhole(192, 160, 180);
+    const arhost_intrinsics camera = camera_for(context, 192, 160, 180);
     const Grey image = draw(camera, marker);
     Tracker tracker(context);
     expect_no_leak([&](int frames) {
@@ -133,16 +135,16 @@ void longer_structs(Context &context) {
         throw Skip("the test needs two prints");
     const Placed markers[] = {{prints[1], 60, tilted({-55, 10, -250}, 20, 40)},
                               {prints[0], 60, tilted({60, -10, -260}, 25, 120)}};
-    const Grey image = draw(wide_camera(), markers);
+    const Grey image = draw(wide_camera(context), markers);
     const auto found_with = [&](std::size_t more) {
-        TrackerSetup setup(wide_camera(), {context.family}, ARHOST_PIXEL_FORMAT_GREY8, more);
+        TrackerSetup setup(context, wide_camera(context), {context.family}, ARHOST_PIXEL_FORMAT_GREY8, more);
         for (const Placed &marker : markers)
             setup.add({marker.print.id, marker.side_mm});
         Tracker tracker(context);
         tracker.instance().expect_ok("start", tracker.start_with(setup, more));
         std::vector<Tracker::Expected> expected;
         for (std::uint32_t i = 0; i < 2; ++i)
-            expected.push_back({i, corners_of(wide_camera(), markers[i]), 8});
+            expected.push_back({i, corners_of(wide_camera(context), markers[i]), 8});
         tracker.expect(expected);
         std::vector<arhost_observation> found = tracker.track(image);
         for (arhost_observation &one : found)
@@ -165,14 +167,10 @@ void expect_same(std::span<const arhost_observation> actual, std::span<const arh
         throw Failure(fmt::format("{}, the same frame {}", where, text));
 }
 
-Grey without_print() {
-    return filled(320, 256, [](auto, auto) { return background_code; });
-}
-
 void deterministic(Context &context) {
     Started one(context), other(context);
     const Grey here = one.at(one.marker.camera_from_marker), elsewhere = one.at(tilted({-15, 20, -280}, 30, 70, 30));
-    const Grey empty_frame = without_print();
+    const Grey empty_frame = one.without_print();
     std::vector<arhost_observation> before;
     int number = 0;
     for (const Grey *image : {&here, &here, &here, &elsewhere, &empty_frame, &here}) {
@@ -204,7 +202,7 @@ void frames_before(Context &context) {
         return;
     }
     const Grey here = started.at(started.marker.camera_from_marker),
-               there = started.at(tilted({-60, 40, -320}, 45, 200, 120)), empty = without_print();
+               there = started.at(tilted({-60, 40, -320}, 45, 200, 120)), empty = started.without_print();
     int number = 0;
     for (const Grey *image : {&here, &there, &empty, &empty, &here}) {
         const std::vector<arhost_observation> found = started.tracker.track(*image);
@@ -217,7 +215,7 @@ void frames_before(Context &context) {
 void state(Context &context) {
     Started started(context);
     const Grey here = started.at(started.marker.camera_from_marker),
-               near = started.at(tilted({-15, 20, -280}, 30, 70, 30)), empty = without_print();
+               near = started.at(tilted({-15, 20, -280}, 30, 70, 30)), empty = started.without_print();
     std::vector<std::byte> before;
     int number = 0;
     for (const Grey *image : {&here, &near, &here, &empty, &empty, &near, &here}) {
@@ -332,7 +330,8 @@ constexpr Test tests[] = {
     {"tracker.start-again", "After a stop, another instance starts with another camera and marker.", gate, 30s,
      start_again},
     {"tracker.leaks", "Frames, starts and stops leak no descriptors, threads or memory.", gate, 60s, leaks},
-    {"tracker.unknown-id", "A marker id that is not in its family is rejected with CONFIGURATION.", gate, 20s,
+    {"tracker.unknown-id",
+     "A marker id that is not in its family, or whose file is missing, is rejected with CONFIGURATION.", gate, 20s,
      unknown_id},
     {"tracker.unknown-family", "A family that it does not know is rejected with CONFIGURATION.", gate, 20s,
      unknown_family},

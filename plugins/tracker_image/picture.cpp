@@ -184,20 +184,47 @@ std::vector<cv::Point2f> Picture::own_corners() const {
     return {{-0.5F, -0.5F}, {right, -0.5F}, {right, bottom}, {-0.5F, bottom}};
 }
 
-std::optional<Picture::Place> Picture::find(const cv::Mat &frame, const Camera &camera,
-                                            const Features &features) const {
-    if (features.points.size() < 2)
-        return std::nullopt;
-    std::vector<std::vector<cv::DMatch>> matches;
-    cv::BFMatcher(cv::NORM_HAMMING).knnMatch(features_.descriptors, features.descriptors, matches, 2);
-    std::vector<cv::Point2f> on_picture, in_frame;
-    for (const auto &match : matches)
-        if (match.size() == 2 && match[0].distance < match_ratio * match[1].distance) {
-            on_picture.push_back(features_.points[static_cast<std::size_t>(match[0].queryIdx)].pt);
-            in_frame.push_back(features.points[static_cast<std::size_t>(match[0].trainIdx)].pt);
+std::vector<Picture::Place> Picture::find(const cv::Mat &frame, const Camera &camera,
+                                          const Features &features) const {
+    std::vector<Place> places;
+    if (features.points.empty())
+        return places;
+    const auto is_in_a_place = [&](const cv::Point2f &point) {
+        return std::ranges::any_of(places, [&](const Place &place) {
+            const std::vector<cv::Point2f> outline(place.corners_px.begin(), place.corners_px.end());
+            return cv::pointPolygonTest(outline, point, false) >= 0;
+        });
+    };
+    // The features of one copy are those of the frame that resemble the picture's most. If there are several copies,
+    // each feature of the picture has several such features, of which none is distinctive; so each feature of the
+    // frame is then matched with those of the picture.
+    for (const bool from_frame : {false, true}) {
+        const Features &query = from_frame ? features : features_, &train = from_frame ? features_ : features;
+        std::vector<std::vector<cv::DMatch>> matches;
+        cv::BFMatcher(cv::NORM_HAMMING).knnMatch(query.descriptors, train.descriptors, matches, 2);
+        std::erase_if(matches, [](const auto &match) {
+            return match.size() < 2 || match[0].distance >= match_ratio * match[1].distance;
+        });
+        for (bool is_found = true; is_found;) {
+            std::vector<cv::Point2f> on_picture, in_frame;
+            for (const auto &match : matches) {
+                const cv::Point2f asked = query.points[static_cast<std::size_t>(match[0].queryIdx)].pt,
+                                  answer = train.points[static_cast<std::size_t>(match[0].trainIdx)].pt;
+                if (!is_in_a_place(from_frame ? asked : answer)) {
+                    on_picture.push_back(from_frame ? answer : asked);
+                    in_frame.push_back(from_frame ? asked : answer);
+                }
+            }
+            const auto found = fit(camera, on_picture, in_frame, find_tolerance_px);
+            const auto place = found ? align(frame, camera, found->undistorted_from_picture) : std::nullopt;
+            is_found = place && std::ranges::none_of(places, [&](const Place &other) {
+                           return cv::norm(other.corners_px[0] - place->corners_px[0]) < find_tolerance_px;
+                       });
+            if (is_found)
+                places.push_back(*place);
         }
-    const auto found = fit(camera, on_picture, in_frame, find_tolerance_px);
-    return found ? align(frame, camera, found->undistorted_from_picture) : std::nullopt;
+    }
+    return places;
 }
 
 std::optional<Picture::Place> Picture::align(const cv::Mat &frame, const Camera &camera,

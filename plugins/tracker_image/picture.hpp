@@ -53,8 +53,8 @@ public:
         std::size_t inliers;                 // points of the picture that were found at this place
         double inlier_share;                 // inliers divided by the number of points that should be visible
     };
-    // `features`: must be the features of `frame`.
-    std::optional<Place> find(const cv::Mat &frame, const Camera &camera, const Features &features) const;
+    // Returns the places of all copies of the picture. `features`: must be the features of `frame`.
+    std::vector<Place> find(const cv::Mat &frame, const Camera &camera, const Features &features) const;
     // `corners_px`: expected positions of the corners, clockwise from the top left one.
     std::optional<Place> align(const cv::Mat &frame, const Camera &camera,
                                const std::vector<cv::Point2d> &corners_px) const;

@@ -78,8 +78,8 @@ public:
             const Features features = features_of(grey);
             for (std::size_t i = 0; i < shown_.size(); ++i)
                 if (!is_found[i] && (searches_all || is_missed[i]))
-                    if (const auto place = shown_[i].picture.find(grey, *camera_, features))
-                        seen.push_back(observation_of(shown_[i], *place));
+                    for (const Picture::Place &place : shown_[i].picture.find(grey, *camera_, features))
+                        seen.push_back(observation_of(shown_[i], place));
         }
         fiducial::report(std::move(seen), observations);
     }

@@ -173,8 +173,13 @@ private:
                 continue;
             // The search for an edge must not reach the picture inside the border.
             const int cells = static_cast<int>(std::ceil(2 / (1 - best.ratio)));
-            auto corners = fiducial::refine_edges(grey, frame.format->transfer, corners_px, search_->lens(), cells)
-                               .value_or(fiducial::MeasuredCorners{corners_px});
+            const auto measured =
+                fiducial::refine_edges(grey, frame.format->transfer, corners_px, search_->lens(), cells);
+            // Without straight edges, a corner may be that of an object that hides the print's corner.
+            constexpr double min_correlation_without_edges = 0.9;
+            if (!measured && best.correlation < min_correlation_without_edges)
+                continue;
+            fiducial::MeasuredCorners corners = measured.value_or(fiducial::MeasuredCorners{corners_px});
             // If the marker is rotated clockwise in the image, its first corner comes later in the list.
             std::rotate(corners.corners_px.begin(), corners.corners_px.begin() + best.quarter_turns,
                         corners.corners_px.end());

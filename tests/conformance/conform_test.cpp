@@ -127,11 +127,20 @@ const Case cases[] = {
          {"with a marker of DICT_6X6_250"}),
     Case("DrawsTheFamilyThatTheTrackerKnows", "tracker_apriltag --only tracker.start", 0,
          {"with a marker of tag36h11"}),
+    Case("DrawsPatterns", "tracker_pattern --only tracker.start,tracker.track", 0, {"with a marker of pattern"}),
+    Case("DrawsMatrixCodes", "tracker_pattern --family artoolkit-5x5-bch-22-7-7 --only tracker.start,tracker.corners",
+         0, {"with a marker of artoolkit-5x5-bch-22-7-7"}),
+    Case("DrawsPictures", "tracker_image --only tracker.start,tracker.copies", 0, {"with a marker of image"}),
+    Case("GivesASourceAnInput", "source_file --only source.start,source.read", 0, {"pass     source.read"}),
+    Case("GivesASinkOfNumberedFilesAnOutput", "sink_images --only sink.start,sink.files", 0, {"pass     sink.files"}),
+    Case("GivesASinkAnOutputWhoseNameItAccepts", "sink_video --only sink.start,sink.files", 0,
+         {"pass     sink.files"}),
+    Case("GivesASinkStandardOutput", "sink_pipe --only sink.start", 0, {"pass     sink.start"}),
     Case("FailsIfTheTrackerDoesNotKnowTheFamily", "tracker_apriltag --family DICT_6X6_250 --only tracker.start", 1,
          {" --seed 1 --family DICT_6X6_250"}),
     Case("FailsIfTheSuiteDoesNotDrawTheFamily", "tracker_apriltag --family tag16h5 --only tracker.start", 2,
-         {"--family tag16h5: the suite draws only tag36h11, DICT_6X6_250, tag25h9; give pictures of the markers: "
-          "--print ID=FILE"}),
+         {"--family tag16h5: the suite draws only tag36h11, DICT_6X6_250, tag25h9, pattern, image, "
+          "artoolkit-5x5-bch-22-7-7; give pictures of the markers: --print ID=FILE"}),
     Case("FailsIfAPrintHasNoId", "tracker_apriltag --print one=tag.png", 2, {"--print one=tag.png: must be ID=FILE"}),
     Case("FailsIfAPrintCannotBeRead", "tracker_apriltag --print 1=none.png --only tracker.track", 2, {"none.png"}),
     Case(
