@@ -102,6 +102,8 @@ Layer enter_landlock(const Policy &policy) {
         rules.allow(path, access::device);
     for (const fs::path &path : policy.writable)
         rules.allow(path, access::write | execute);
+    if (!policy.scratch.empty())
+        rules.allow(policy.scratch, access::write | execute);
     if (policy.allows("video"))
         rules.allow("/dev", access::read_folder); // to enumerate cameras
     if (!policy.usb_device.empty())

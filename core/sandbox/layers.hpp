@@ -68,6 +68,10 @@ Layer raise_oom_score();                     // the OOM killer kills workers fir
 Layer report_control_group();                // arhost-launcher has created it
 Layer enter_namespaces(const Policy &policy);
 void enter_root(const Policy &policy, Layer &layer, bool has_control_group_namespace); // part of enter_namespaces
+// The scratch folder (Policy::scratch).
+constexpr std::uint64_t scratch_bytes = 64 << 20; // also the maximum size of a file in it
+bool mount_scratch(const std::filesystem::path &folder, bool may_execute);
+void point_to_scratch(const Policy &policy); // by environment variables; must run after all other layers
 Layer set_limits(const Policy &policy);
 Layer drop_capabilities();
 Layer enter_landlock(const Policy &policy); // this layer and the next one require no_new_privs

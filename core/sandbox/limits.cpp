@@ -63,8 +63,9 @@ Layer set_limits(const Policy &policy) {
         lower(layer, "memory", RLIMIT_DATA, memory_limit(policy));
         lower(layer, "addresses", RLIMIT_AS, memory_limit(policy) + reserved_bytes);
     }
+    // Prevents writes to /tmp even if other layers are missing.
     if (policy.writable.empty() && !policy.standard_output && !may_share_memory(policy))
-        lower(layer, "files", RLIMIT_FSIZE, 0); // prevents writes to /tmp even if other layers are missing
+        lower(layer, "files", RLIMIT_FSIZE, policy.scratch.empty() ? 0 : scratch_bytes);
     // Half of the usual 1024. All descriptors in unread messages of a user's processes count towards one limit. A
     // plugin must not reach this limit, because the host and the scene loader also need descriptors.
     lower(layer, "descriptors", RLIMIT_NOFILE, policy.makes_shared_memory ? 1024 : 512);

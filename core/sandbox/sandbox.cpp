@@ -71,11 +71,15 @@ Level enter(Policy policy) {
     level.push_back(raise_oom_score());
     level.push_back(report_control_group());
     level.push_back(enter_namespaces(policy));
+    if (!level.back().confines_files) // without a mount namespace, nothing would limit and delete the folder's files
+        policy.scratch.clear();
     level.push_back(set_limits(policy));
     level.push_back(drop_capabilities());
     level.push_back(set_no_new_privileges());
     level.push_back(enter_landlock(policy));
     level.push_back(filter_system_calls(policy));
+    if (!policy.scratch.empty())
+        point_to_scratch(policy);
     if (policy.mode == Mode::strict && !complete(level))
         throw std::runtime_error("sandbox: " + to_text(level) +
                                  "; 'sandbox: strict' requires all layers: fix this or set 'permissive'");
@@ -89,6 +93,7 @@ Level enter_for(const std::filesystem::path &plugin, Policy policy) {
     policy.readable.push_back(plugin);
     policy.readable.push_back(own_folder);
     add_shader_cache(policy, plugin);
+    policy.scratch = "/arhost-scratch"; // in the sandbox's own root folder, so other paths cannot contain it
     Level level = enter(policy);
     if (policy.mode == Mode::standard && !is_own && std::ranges::none_of(level, &Layer::confines_files))
         throw std::runtime_error("sandbox: " + to_text(level) +

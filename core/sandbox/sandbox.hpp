@@ -38,6 +38,7 @@ struct Policy {
     std::vector<std::filesystem::path> writable{}; // folders; created if missing
     base::UsbIdentity usb_device{};   // the only USB device that may be used, unless `allow` has "usb"; empty: none
     std::filesystem::path usb_node{}; // node of usb_device; set by enter()
+    std::filesystem::path scratch{};  // the plugin's private folder; set by enter_for(); empty: none
     std::set<std::string, std::less<>> environment{}; // variables to keep in addition to the standard ones
     std::uint64_t memory_bytes = 0;   // limit of private memory; 0: three quarters of the memory of the machine
     bool makes_shared_memory = false; // set for the scene loader; such memory does not count towards memory_bytes

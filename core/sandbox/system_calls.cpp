@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Two seccomp filters (libseccomp), of which the stricter result counts. The first denies system calls and arguments
-// that could harm others, with EPERM. The second allows only the calls that plugins and their libraries need; others
-// fail with ENOSYS, so that libraries use older calls instead.
+// that could harm others, with EPERM. The second allows only the calls that plugins and their libraries need. Others
+// fail with EPERM if every kernel has them, otherwise with ENOSYS, so that libraries use older calls instead.
 #include "sandbox/layers.hpp"
 
 #include <fcntl.h>
 #include <memory>
 #include <sched.h>
 #include <seccomp.h>
+#include <set>
+#include <string_view>
 #include <sys/ioctl.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
@@ -105,6 +107,17 @@ constexpr CallsOf allowed_by[] = {
     {"listen", {"accept", "accept4"}},
     {"processes", {"execve", "execveat", "fork", "setpgid", "setsid", "vfork", "wait4", "waitid"}},
 };
+
+// Calls that fail with EPERM unless they are allowed. Every kernel has them, so libraries take ENOSYS for a defect,
+// but handle a missing permission. Not included: epoll, without which libraries fall back to poll, and flock. For
+// flock, libraries take other errors than ENOSYS for a lock that another process holds, and wait for it.
+constexpr const char *refused[] = {"accept", "accept4", "bind", "connect", "fallocate", "fdatasync", "fsync",
+                                   "ftruncate", "link", "linkat", "listen", "mkdir", "mkdirat", "mlockall",
+                                   "munlockall", "personality", "rename", "renameat", "rmdir", "sync", "syncfs",
+                                   "unlink", "unlinkat", "utimensat", "wait4", "waitid",
+                                   // the user and the machine
+                                   "capset", "setfsgid", "setfsuid", "setgid", "setgroups", "setregid", "setresgid",
+                                   "setresuid", "setreuid", "setuid"};
 
 // Allowed with `network`, `listen` and `processes`; without epoll, libraries fall back to poll. Reason: the kernel
 // counts epoll watches per user. Watches on shared files also slow down the host, because the kernel calls or frees
@@ -298,19 +311,20 @@ void deny_harmful_calls(const Policy &policy) {
 
 // Does not apply to GPU drivers, whose needs vary, nor to sanitizers.
 void allow_needed_calls(const Policy &policy) {
-    Filter filter(SCMP_ACT_ERRNO(ENOSYS));
-    for (const char *call : allowed)
-        filter.allow(call);
-    if (!policy.writable.empty() || policy.makes_shared_memory)
-        for (const char *call : allowed_to_writers)
-            filter.allow(call);
+    std::set<std::string_view> needed(std::begin(allowed), std::end(allowed));
+    if (!policy.writable.empty() || !policy.scratch.empty() || policy.makes_shared_memory)
+        needed.insert(std::begin(allowed_to_writers), std::end(allowed_to_writers));
     for (const CallsOf &added : allowed_by)
         if (policy.allows(added.allowance))
-            for (const char *call : added.calls)
-                filter.allow(call);
+            needed.insert(added.calls.begin(), added.calls.end());
     if (policy.allows("network") || policy.allows("listen") || policy.allows("processes"))
-        for (const char *call : epoll_calls)
-            filter.allow(call);
+        needed.insert(std::begin(epoll_calls), std::end(epoll_calls));
+    Filter filter(SCMP_ACT_ERRNO(ENOSYS));
+    for (const std::string_view call : needed)
+        filter.allow(call.data());
+    for (const char *call : refused)
+        if (!needed.contains(call))
+            filter.deny(call);
     filter.load();
 }
 

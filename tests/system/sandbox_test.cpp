@@ -91,7 +91,8 @@ public:
               "version: 1\nsource: {plugin: source_counter, options: {frames: 60, delay_ms: 1}}\n"
               "tracker: {plugin: hostile, targets: [{marker: 3, family: tag36h11, side_mm: 80}], deadline_ms: 2000, "
               "environment: "
-              "[HOSTILE_HOST, HOSTILE_FOLDER, HOSTILE_SHM, HOSTILE_QUEUE, HOSTILE_SEMAPHORES, HOSTILE_TERMINAL], "
+              "[HOSTILE_HOST, HOSTILE_FOLDER, HOSTILE_HOME, HOSTILE_SHM, HOSTILE_QUEUE, HOSTILE_SEMAPHORES, "
+              "HOSTILE_TERMINAL], "
               "options: {attack: " +
               attack + "}" + more +
               "}\nraytracer: {plugin: rt_counter, scene: scene.yaml}\n"
@@ -126,6 +127,8 @@ public:
             for (const char *secret : {"HOSTILE_SECRET", "VK_TOKEN", "LD_ACCESS_TOKEN"})
                 ::setenv(secret, "sesame", 1);
             ::setenv("HOSTILE_FOLDER", elsewhere_.path().c_str(), 1);
+            if (const char *home = std::getenv("HOME"))
+                ::setenv("HOSTILE_HOME", home, 1);
             terminal_.control_this_session();
             prepare();
         });

@@ -390,6 +390,71 @@ TEST_F(Sandbox, LandlockBlocksMakingLinksAndPipes) {
     }));
 }
 
+TEST_F(Sandbox, APluginHasAPrivateScratchFolderOfLimitedSize) {
+    policy = {.mode = Mode::permissive};
+    ::signal(SIGXFSZ, SIG_IGN);
+    const auto fills = [](const fs::path &file) { // writes the maximum size of a file
+        const std::vector<char> block(1 << 20);
+        const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+        std::uint64_t size = 0;
+        for (ssize_t count = 1; count > 0 && size <= scratch_bytes;
+             size += count > 0 ? static_cast<std::uint64_t>(count) : 0)
+            count = ::write(fd, block.data(), block.size());
+        ::close(fd);
+        return size >= scratch_bytes;
+    };
+    for (const uid_t user : {0u, 65534u})
+        for (int start = 0; start < 2; ++start) // the second one finds nothing of the first one
+            EXPECT_CHECKS(in_child([&](Checks &check) {
+                ::setenv("HOME", scratch.path().c_str(), 1);
+                check.needs(user == ::geteuid() ||
+                            (::setuid(user) == 0 && ::prctl(PR_SET_DUMPABLE, 1, 0, 0, 0) == 0));
+                const Level level = enter_for("/usr/lib/none.so", policy);
+                check.needs(std::ranges::any_of(level, [](const Layer &layer) { return has(layer, "mount"); }));
+                const char *folder_name = ::getenv("TMPDIR");
+                check.that(folder_name != nullptr);
+                const fs::path folder = folder_name ? folder_name : "/none";
+                for (const char *variable : {"HOME", "XDG_CACHE_HOME", "MPLCONFIGDIR", "NUMBA_CACHE_DIR"})
+                    check.that(::getenv(variable) && ::getenv(variable) == folder);
+                check.that(::getenv("PYTHONUSERBASE") == scratch.path().string() + "/.local");
+                check.that(fs::is_empty(folder));
+                check.that(::mkdir((folder / "cache").c_str(), 0700) == 0);
+                check.that(opens(folder / "cache" / "new", O_RDWR | O_CREAT | O_EXCL));
+                check.that(opens(folder, O_RDWR | O_TMPFILE));
+                check.that(::rename((folder / "cache" / "new").c_str(), (folder / "old").c_str()) == 0);
+                check.that(::unlink((folder / "old").c_str()) == 0);
+                check.that(!opens(folder / ".." / "new", O_RDWR | O_CREAT));
+                check.that(fills(folder / "large"));
+                check.that(!fills(folder / "another") && errno == ENOSPC);
+            }));
+    EXPECT_FALSE(fs::exists("/arhost-scratch"));
+}
+
+TEST_F(Sandbox, TheSceneLoaderHasNoScratchFolder) {
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        ::unsetenv("TMPDIR");
+        enter(policy);
+        check.that(!::getenv("TMPDIR"));
+        check.that(!fs::exists("/arhost-scratch"));
+    }));
+}
+
+TEST_F(Sandbox, SystemCallsThatEveryKernelHasFailWithEperm) {
+    policy.writable.clear();
+    EXPECT_CHECKS(in_child([&](Checks &check) {
+        check.needs(!under_sanitizer && filters_system_calls(policy));
+        const auto is_refused = [](long result) { return result != 0 && errno == EPERM; };
+        check.that(is_refused(::mkdir((inside / "new").c_str(), 0700)));
+        check.that(is_refused(::unlink((inside / "old").c_str())));
+        check.that(is_refused(::rename((inside / "old").c_str(), (inside / "new").c_str())));
+        check.that(is_refused(::link((inside / "old").c_str(), (inside / "new").c_str())));
+        check.that(is_refused(::listen(0, 1)));
+        check.that(is_refused(::setuid(::getuid())));
+        check.that(::syscall(SYS_epoll_create1, 0) != 0 && errno == ENOSYS); // libraries use poll instead
+        check.that(::syscall(462 /* mseal */, 0, 0, 0) != 0 && errno == ENOSYS);
+    }));
+}
+
 TEST_F(Sandbox, SystemCallsCannotAffectOtherProcesses) {
     EXPECT_CHECKS(in_child([&](Checks &check) {
         check.needs(filters_system_calls(policy));

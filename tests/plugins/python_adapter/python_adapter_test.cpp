@@ -305,6 +305,35 @@ TEST_F(PythonAdapter, UsesThePackagesOfAVirtualEnvironment) {
     EXPECT_THAT(run.output(), HasSubstr("answer 42"));
 }
 
+// The script writes files like tempfile, matplotlib, numba and torch.
+TEST_F(PythonAdapter, LibrariesFindTheirFoldersForTemporaryFilesAndCaches) {
+    ArhostRun run(tracker);
+    EXPECT_EQ(run_script(run, R"(
+import os, pathlib, tempfile
+class T:
+    def __init__(self, host):
+        if not os.path.exists("/arhost-scratch"):
+            host.info("no mount namespace")
+            return
+        with tempfile.NamedTemporaryFile("w+") as file, tempfile.TemporaryFile() as other:
+            file.write("text")
+        with tempfile.TemporaryDirectory() as folder:
+            open(os.path.join(folder, "a"), "w").close()
+        for variable in ("XDG_CACHE_HOME", "MPLCONFIGDIR", "NUMBA_CACHE_DIR"):
+            cache = pathlib.Path(os.environ[variable]) / variable / "cache"
+            cache.mkdir(parents=True)
+            (cache / "new").write_text("text")
+            os.replace(cache / "new", cache / "old")
+        (pathlib.Path.home() / ".name").touch()
+        host.info("all written")
+    def start(self, setup): pass
+    def track(self, frame): return []
+)"),
+              0)
+        << run.output();
+    EXPECT_THAT(run.output(), testing::AnyOf(HasSubstr("all written"), HasSubstr("no mount namespace")));
+}
+
 TEST_F(PythonAdapter, ThreadsOfAScriptRunBetweenItsCalls) {
     ArhostRun run(chain("tracker:", "tracker: {plugin: tracker_python, options: {script: script.py}, "
                                     "targets: [{marker: 3, family: tag36h11, side_mm: 80}]}") +

@@ -515,7 +515,7 @@ static void exhaust_user(const tracker *self) {
 
 static void fill_disk(const tracker *self) {
     const char *const folders[][2] = {{"the working folder", "."},
-                                      {"the home folder", getenv("HOME") ? getenv("HOME") : "."},
+                                      {"the home folder", getenv("HOSTILE_HOME") ? getenv("HOSTILE_HOME") : "."},
                                       {"/tmp", "/tmp"},
                                       {"/var/tmp", "/var/tmp"},
                                       {"/dev/shm", "/dev/shm"},
