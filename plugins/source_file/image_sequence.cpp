@@ -2,6 +2,7 @@
 #include "image_sequence.hpp"
 
 #include "folder.hpp"
+#include "webp_orientation.hpp"
 
 #include <arhost-cpp/numbered_name.hpp>
 
@@ -28,6 +29,8 @@ cv::Mat read_image(const fs::path &file, int flags) {
     arhost_status status = ARHOST_STATUS_ERROR_CONFIGURATION; // a restart does not help
     try {
         image = cv::imread(file.string(), flags);
+        if (const int orientation = webp_orientation(file); orientation != 1)
+            image = oriented(image, orientation);
     } catch (const cv::Exception &error) {
         reason = error.err;
     }

@@ -90,7 +90,6 @@ std::optional<bool> is_short_matroska(const std::filesystem::path &file) {
 
 Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &log)
     : name_("the video " + quoted(file)), host_(host), log_(log),
-      packet_(libav::allocated<libav::PacketPointer>(av_packet_alloc())),
       frame_(libav::allocated<libav::FramePointer>(av_frame_alloc())) {
     const auto rejection = [&](const std::string &why) {
         if (host_.cancelled())
@@ -107,6 +106,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
         throw std::bad_alloc();
     context->interrupt_callback = {[](void *self) -> int { return static_cast<Decoder *>(self)->host_.cancelled(); },
                                    this};
+    libav::PacketReader::keep_time_stamps(*context);
     AVDictionary *options = nullptr; // restricts playlists to local files
     av_dict_set(&options, "protocol_whitelist", "file", 0);
     // "file:" prevents libav from parsing the path as a URL. avformat_open_input frees the context if it fails.
@@ -125,6 +125,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     for (unsigned i = 0; i < context->nb_streams; ++i)
         if (context->streams[i] != stream_)
             context->streams[i]->discard = AVDISCARD_ALL;
+    packets_.attach(*context, *stream_);
 
     const AVCodec *decoder = avcodec_find_decoder(stream_->codecpar->codec_id);
     if (!decoder)
@@ -143,6 +144,7 @@ Decoder::Decoder(const std::filesystem::path &file, const Host &host, LibavLog &
     const AVRational rate = av_guess_frame_rate(context, stream_, nullptr);
     fps_ = rate.num > 0 && rate.den > 0 ? av_q2d(rate) : 30.0;
     period_ns_ = std::llround(1e9 / fps_);
+    clock_ = libav::FilmClock(period_ns_);
 
     const arhost_status first = next();
     if (first == ARHOST_STATUS_ERROR_CANCELLED)
@@ -182,8 +184,7 @@ arhost_status Decoder::feed() {
         return ARHOST_STATUS_ERROR_CANCELLED;
     if (const std::string fault = log_.take_reason(); !fault.empty())
         decoder_fault_ = fault;
-    av_packet_unref(packet_.get());
-    const int read = checked(av_read_frame(file_.get(), packet_.get()));
+    const int read = checked(packets_.read());
     if (read == AVERROR_EXIT && host_.cancelled())
         return ARHOST_STATUS_ERROR_CANCELLED;
     if (read < 0) {
@@ -193,35 +194,31 @@ arhost_status Decoder::feed() {
         checked(avcodec_send_packet(codec_.get(), nullptr));
         return ARHOST_STATUS_OK;
     }
-    if (packet_->stream_index != stream_->index)
-        return ARHOST_STATUS_OK;
     // Drops a truncated packet. Its picture would be partly grey, but not marked as damaged.
-    if (packet_->flags & AV_PKT_FLAG_CORRUPT) {
+    if (packets_.packet().flags & AV_PKT_FLAG_CORRUPT) {
         lost_data_ = true;
         return ARHOST_STATUS_OK;
     }
-    ++packets_;
-    if (checked(avcodec_send_packet(codec_.get(), packet_.get())) < 0)
+    ++packet_count_;
+    if (checked(avcodec_send_packet(codec_.get(), &packets_.packet())) < 0)
         lost_data_ = true;
     return ARHOST_STATUS_OK;
 }
 
 void Decoder::take_time() {
     const std::int64_t pts = frame_->best_effort_timestamp;
-    if (count_ == 1) {
+    if (count_ == 1)
         first_pts_ = pts;
-        return;
-    }
-    const std::int64_t time = pts == AV_NOPTS_VALUE || first_pts_ == AV_NOPTS_VALUE
-                                  ? media_ns_ + period_ns_
-                                  : av_rescale_q(pts - first_pts_, stream_->time_base, {1, 1'000'000'000});
-    media_ns_ = std::max(time, media_ns_);
+    const bool has_stamp = pts != AV_NOPTS_VALUE && first_pts_ != AV_NOPTS_VALUE;
+    clock_.next_ns(has_stamp ? std::optional(av_rescale_q(pts - first_pts_, stream_->time_base, {1, 1'000'000'000}))
+                             : std::nullopt,
+                   (file_->iformat->flags & AVFMT_TS_DISCONT) != 0);
 }
 
 void Decoder::finish() {
     ended_ = true;
     const std::uint64_t declared = declared_count();
-    const bool has_all = is_short_ ? !*is_short_ : packets_ >= declared;
+    const bool has_all = is_short_ ? !*is_short_ : packet_count_ >= declared;
     if (!lost_data_ && read_error_ == 0 && end_fault_.empty() && has_all)
         return;
     truncation_ = name_ + " is truncated: it ends after frame " + std::to_string(count_ - 1);

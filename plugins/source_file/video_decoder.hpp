@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "libav_common/film_clock.hpp"
 #include "libav_common/log.hpp"
 #include "libav_common/picture_converter.hpp"
 #include "reader.hpp"
@@ -25,8 +26,8 @@ public:
     const AVFrame &picture() const { return *frame_; }
     std::uint64_t index() const { return count_ - 1; } // index of the current picture, from 0
     std::uint64_t count() const { return count_; }     // number of pictures decoded so far
-    std::int64_t media_ns() const { return media_ns_; }
-    std::int64_t end_ns() const { return media_ns_ + period_ns_; }
+    std::int64_t media_ns() const { return clock_.time_ns(); }
+    std::int64_t end_ns() const { return media_ns() + period_ns_; }
     bool ended() const { return ended_; }
 
     double fps() const { return fps_; }
@@ -48,12 +49,13 @@ private:
     libav::InputPointer file_;
     AVStream *stream_ = nullptr; // owned by file_
     libav::CodecPointer codec_;
-    libav::PacketPointer packet_;
+    libav::PacketReader packets_;
     libav::FramePointer frame_;
     double fps_ = 0;
     std::int64_t period_ns_ = 0;
-    std::uint64_t count_ = 0, packets_ = 0;
-    std::int64_t first_pts_ = AV_NOPTS_VALUE, media_ns_ = 0;
+    std::uint64_t count_ = 0, packet_count_ = 0;
+    std::int64_t first_pts_ = AV_NOPTS_VALUE;
+    libav::FilmClock clock_;
     bool lost_data_ = false; // data was lost or damaged since the previous picture
     bool ended_ = false;
     // Whether the file is shorter than its header declares; nullopt for a container that does not declare its size.

@@ -4,6 +4,8 @@
 #include "stream_url.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 #include <string_view>
 #include <utility>
 
@@ -53,7 +55,6 @@ std::int64_t monotonic_ns() {
 NetworkStream::NetworkStream(const StreamSettings &settings, LibavLog &log, std::stop_token stop)
     : name_("the stream '" + without_credentials(settings.url) + "'"), timeout_(settings.timeout),
       verifies_tls_(settings.verifies_tls), log_(log), stop_(std::move(stop)), deadline_(Clock::now() + timeout_),
-      packet_(libav::allocated<libav::PacketPointer>(av_packet_alloc())),
       picture_(libav::allocated<libav::FramePointer>(av_frame_alloc())) {
     log_.take_reason();
     open(settings);
@@ -78,6 +79,7 @@ void NetworkStream::open(const StreamSettings &settings) {
         av_dict_set(options, "tls_verify", self.verifies_tls_ ? "1" : "0", 0);
         return self.open_io_(opener, io, url, flags, options);
     };
+    libav::PacketReader::keep_time_stamps(*context);
     Dictionary options;
     options.set("protocol_whitelist", protocols_for(settings.url));
     options.set("format_whitelist", containers);
@@ -110,6 +112,7 @@ void NetworkStream::open(const StreamSettings &settings) {
     for (unsigned i = 0; i < context->nb_streams; ++i)
         if (context->streams[i] != track_)
             context->streams[i]->discard = AVDISCARD_ALL;
+    packets_.attach(*context, *track_);
 
     const std::string_view container = context->iformat->name;
     const bool is_hls = container == "hls", is_file = context->pb && avio_size(context->pb) > 0;
@@ -135,6 +138,7 @@ void NetworkStream::open_decoder() {
     codec_->thread_count = static_cast<int>(std::clamp(std::thread::hardware_concurrency(), 1U, 4U));
     if (const int ready = checked(avcodec_open2(codec_.get(), decoder, nullptr)); ready < 0)
         throw failure(ready);
+    clock_ = libav::FilmClock(std::llround(1e9 / (fps() > 0 ? fps() : 30)));
 }
 
 bool NetworkStream::next() {
@@ -143,6 +147,11 @@ bool NetworkStream::next() {
     for (;;) {
         const int received = checked(avcodec_receive_frame(codec_.get(), picture_.get()));
         if (received == 0) {
+            const auto stamp = stamp_ns();
+            if (stamp)
+                sender_ns_ = clock_.next_ns(stamp, (input_->iformat->flags & AVFMT_TS_DISCONT) != 0);
+            else
+                sender_ns_.reset();
             if (!(picture_->flags & AV_FRAME_FLAG_CORRUPT) && !picture_->decode_error_flags)
                 return true;
             ++damaged_;
@@ -158,37 +167,77 @@ bool NetworkStream::next() {
     }
 }
 
+int NetworkStream::read_packet() {
+    if (!finds_boundaries_) {
+        const int read = packets_.read();
+        if (read != AVERROR_INVALIDDATA || input_->iformat->name != std::string_view("mpjpeg"))
+            return read;
+        finds_boundaries_ = true; // libav finds no boundary where a picture should end by its Content-Length
+    }
+    return read_to_boundary(packets_.packet());
+}
+
+// Reads a picture of Motion-JPEG from its first bytes to the boundary after it, which begins with "--" on a new line.
+int NetworkStream::read_to_boundary(AVPacket &packet) {
+    constexpr std::string_view start_of_image = "\xff\xd8\xff", end_of_image = "\xff\xd9", boundary = "--";
+    constexpr std::size_t max_picture_bytes = 64 << 20;
+    for (;;) {
+        const std::size_t start = unparsed_.find(start_of_image);
+        unparsed_.erase(
+            0, start != std::string::npos ? start : unparsed_.size() - std::min<std::size_t>(unparsed_.size(), 2));
+        for (std::size_t end = unparsed_.find(end_of_image); end != std::string::npos;
+             end = unparsed_.find(end_of_image, end + 1)) {
+            const std::size_t size = end + end_of_image.size(), next = unparsed_.find_first_not_of("\r\n", size);
+            if (next == std::string::npos || unparsed_.compare(next, boundary.size(), boundary) != 0)
+                continue;
+            av_packet_unref(&packet);
+            if (const int made = av_new_packet(&packet, static_cast<int>(size)); made < 0)
+                return made;
+            packet.stream_index = track_->index;
+            packet.flags |= AV_PKT_FLAG_KEY;
+            std::memcpy(packet.data, unparsed_.data(), size);
+            unparsed_.erase(0, next);
+            return 0;
+        }
+        unsigned char bytes[16384];
+        const int count = avio_read_partial(input_->pb, bytes, sizeof bytes);
+        if (count <= 0)
+            return count < 0 ? count : AVERROR_EOF;
+        unparsed_.append(reinterpret_cast<const char *>(bytes), static_cast<std::size_t>(count));
+        if (unparsed_.size() > max_picture_bytes)
+            return AVERROR_INVALIDDATA;
+    }
+}
+
 bool NetworkStream::feed() {
     if (stop_.stop_requested() || Clock::now() > deadline_)
         throw failure(AVERROR_EXIT);
-    av_packet_unref(packet_.get());
-    const int read = checked(av_read_frame(input_.get(), packet_.get()));
+    const int read = checked(read_packet());
     if (read == AVERROR_EOF && (!input_->pb || !input_->pb->error))
         return false;
     if (read < 0)
         throw failure(read == AVERROR_EOF ? input_->pb->error : read);
-    if (packet_->stream_index != track_->index)
-        return true;
+    AVPacket &packet = packets_.packet();
     arrival_ns_ = monotonic_ns();
     std::size_t size = 0;
-    const auto *data = av_packet_get_side_data(packet_.get(), AV_PKT_DATA_PRFT, &size);
-    if (data && size >= sizeof(AVProducerReferenceTime) && packet_->pts != AV_NOPTS_VALUE)
+    const auto *data = av_packet_get_side_data(&packet, AV_PKT_DATA_PRFT, &size);
+    if (data && size >= sizeof(AVProducerReferenceTime) && packet.pts != AV_NOPTS_VALUE)
         utc_offset_ns_ = reinterpret_cast<const AVProducerReferenceTime *>(data)->wallclock * 1000 -
-                         av_rescale_q(packet_->pts, track_->time_base, nanoseconds);
-    const int sent = packet_->flags & AV_PKT_FLAG_CORRUPT ? AVERROR_INVALIDDATA
-                                                          : checked(avcodec_send_packet(codec_.get(), packet_.get()));
+                         av_rescale_q(packet.pts, track_->time_base, nanoseconds);
+    const int sent = packet.flags & AV_PKT_FLAG_CORRUPT ? AVERROR_INVALIDDATA
+                                                        : checked(avcodec_send_packet(codec_.get(), &packet));
     damaged_ += sent < 0;
     return true;
 }
 
-std::optional<std::int64_t> NetworkStream::sender_ns() const {
+std::optional<std::int64_t> NetworkStream::stamp_ns() const {
     if (!timed_ || picture_->best_effort_timestamp == AV_NOPTS_VALUE)
         return std::nullopt;
     return av_rescale_q(picture_->best_effort_timestamp, track_->time_base, nanoseconds);
 }
 
 std::optional<std::int64_t> NetworkStream::sender_utc_ns() const {
-    const auto time_ns = sender_ns();
+    const auto time_ns = stamp_ns();
     return time_ns && utc_offset_ns_ ? std::optional(*time_ns + *utc_offset_ns_) : std::nullopt;
 }
 

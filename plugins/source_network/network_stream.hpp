@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "libav_common/film_clock.hpp"
 #include "libav_common/log.hpp"
 
 #include <arhost-cpp/plugin.hpp>
@@ -37,8 +38,9 @@ public:
 
     const AVFrame &picture() const { return *picture_; }
     std::int64_t arrival_ns() const { return arrival_ns_; } // arrival of the picture's last data, CLOCK_MONOTONIC
-    // The picture's time stamp, with an arbitrary epoch; nullopt if it has none.
-    std::optional<std::int64_t> sender_ns() const;
+    // The picture's time by the sender's clock, with an arbitrary epoch; nullopt if it has no time stamp. It is
+    // continuous where the time stamps jump.
+    std::optional<std::int64_t> sender_ns() const { return sender_ns_; }
     // The picture's time by the sender's wall clock (UTC), computed from RTCP sender reports; nullopt if no report
     // has arrived.
     std::optional<std::int64_t> sender_utc_ns() const;
@@ -53,6 +55,9 @@ private:
     void open(const StreamSettings &settings);
     void open_decoder();
     bool feed(); // returns false at the end of the data
+    int read_packet();
+    int read_to_boundary(AVPacket &packet);
+    std::optional<std::int64_t> stamp_ns() const;
     Failure failure(int code);
 
     std::string name_; // name for messages, without credentials
@@ -66,10 +71,14 @@ private:
     libav::InputPointer input_;
     AVStream *track_ = nullptr; // owned by input_
     libav::CodecPointer codec_;
-    libav::PacketPointer packet_;
+    libav::PacketReader packets_;
     libav::FramePointer picture_;
+    bool finds_boundaries_ = false; // of Motion-JPEG, because the lengths that the camera sends are wrong
+    std::string unparsed_;          // data after the last picture found by its boundary
     bool timed_ = false, ahead_of_time_ = false, ends_ = false;
     std::int64_t arrival_ns_ = 0;
+    libav::FilmClock clock_;
+    std::optional<std::int64_t> sender_ns_;
     std::optional<std::int64_t> utc_offset_ns_; // UTC minus time stamp
     std::uint32_t damaged_ = 0;
 };

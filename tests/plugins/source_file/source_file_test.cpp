@@ -292,6 +292,44 @@ TEST_F(SingleImage, ConvertsSixteenBitsToEightAndDropsAlpha) {
     EXPECT_EQ(source.read(0).bytes, bytes_of(colour));
 }
 
+// OpenCV ignores this orientation. The test adds it to a file without metadata (WebP Container Specification).
+TEST_F(SingleImage, AppliesTheExifOrientationOfWebP) {
+    const auto number = [](std::uint32_t value, int size) {
+        std::string bytes;
+        for (int i = 0; i < size; ++i)
+            bytes += static_cast<char>(value >> 8 * i);
+        return bytes;
+    };
+    const auto chunk = [&](const std::string &name, const std::string &content) {
+        return name + number(static_cast<std::uint32_t>(content.size()), 4) + content +
+               std::string(content.size() % 2, '\0');
+    };
+    const cv::Mat upright = colourful(6, 4);
+    for (int orientation = 1; orientation <= 8; ++orientation) {
+        // The stored image, from the upright one: the inverse of what the orientation demands.
+        cv::Mat stored = upright.clone();
+        if (orientation == 2 || orientation == 7 || orientation == 3 || orientation == 6)
+            cv::flip(stored, stored, orientation == 3 || orientation == 7 ? -1 : 1);
+        if (orientation == 4 || orientation == 8)
+            cv::flip(stored, stored, 0);
+        if (orientation >= 5)
+            cv::transpose(stored, stored);
+        std::vector<uchar> encoded;
+        cv::imencode(".webp", stored, encoded, {cv::IMWRITE_WEBP_QUALITY, 101}); // lossless
+        const std::string exif = std::string("II*\0", 4) + number(8, 4) + number(1, 2) + number(0x112, 2) +
+                                 number(3, 2) + number(1, 4) + number(static_cast<std::uint32_t>(orientation), 4) +
+                                 number(0, 4);
+        const std::string extended = number(8, 4) + number(static_cast<std::uint32_t>(stored.cols - 1), 3) +
+                                     number(static_cast<std::uint32_t>(stored.rows - 1), 3); // 8: has Exif
+        const std::string content =
+            "WEBP" + chunk("VP8X", extended) + std::string(encoded.begin() + 12, encoded.end()) + chunk("EXIF", exif);
+        std::ofstream(path("a.webp"), std::ios::binary) << chunk("RIFF", content);
+        SourceUnderTest source("source_file");
+        ASSERT_EQ(source.start(file("a.webp")), ARHOST_STATUS_OK) << source.log();
+        EXPECT_EQ(source.read(0).bytes, bytes_of(upright)) << "orientation " << orientation;
+    }
+}
+
 // ---- Unreadable input ------------------------------------------------------------------------------
 
 TEST_F(Rejection, NamesAMissingFileAndListsTheFolder) {
@@ -560,6 +598,36 @@ TEST_F(Video, KeepsVariableRateTimesUnlessARateIsConfigured) {
     ASSERT_EQ(source.start(video.options(), at_rate(10)), ARHOST_STATUS_OK);
     EXPECT_EQ(source.format().fps, 10.0);
     EXPECT_EQ(source.read(4).info.capture_ns, 400'000'000);
+}
+
+// The second film begins at another time, and the counters of its packets do not continue those of the first one.
+TEST_F(Video, TimeContinuesWhereTwoFilmsAreJoined) {
+    struct Join {
+        const char *codec, *first_s, *second_s;
+    };
+    for (const auto &[codec, first_s, second_s] :
+         {Join{h264, "0", "0"}, Join{h264, "100", "5"}, Join{h264, "5", "100"},
+          Join{"-c:v mpeg2video -bf 0", "100", "5"}}) {
+        const auto film = [&, encoder = codec](const char *start_s) {
+            return VideoFile("film.ts", std::string(encoder) + " -output_ts_offset " + start_s);
+        };
+        const VideoFile first = film(first_s), second = film(second_s);
+        const fs::path joined = first.folder() / "joined.ts";
+        std::ofstream(joined, std::ios::binary) << std::ifstream(first.file(), std::ios::binary).rdbuf()
+                                                << std::ifstream(second.file(), std::ios::binary).rdbuf();
+        SourceUnderTest source("source_file", {{"path", joined.string()}});
+        const std::vector<SourceFrame> frames = source.read_all();
+        const std::string where = std::string(codec) + ", " + first_s + " s and " + second_s + " s";
+        EXPECT_EQ(frames.back().status, ARHOST_STATUS_END) << where;
+        ASSERT_EQ(frames.size(), 81u) << where; // and the end
+        for (std::size_t n = 1; n < 80; ++n) {
+            const std::int64_t step_ns = frames[n].info.capture_ns - frames[n - 1].info.capture_ns;
+            EXPECT_GT(step_ns, 0) << where << ", frame " << n;
+            EXPECT_LE(step_ns, 80'000'000) << where << ", frame " << n;
+        }
+        EXPECT_NEAR(static_cast<double>(frames[79].info.capture_ns), 79 * 4e7, 4e7) << where;
+        EXPECT_EQ(source.log(ARHOST_SEVERITY_WARNING), "") << where;
+    }
 }
 
 TEST_F(Video, DeliversASingleFrame) {

@@ -52,12 +52,13 @@ class Camera(http.server.BaseHTTPRequestHandler):
         self.end_headers()
         self.wfile.write(body)
 
-    def stream(self, parts):
+    def stream(self, parts, excess=0):
+        """`excess`: what Content-Length adds to the true length."""
         self.send_response(200)
         self.send_header("Content-Type", "multipart/x-mixed-replace; boundary=frame")
         self.end_headers()
         for part in parts:
-            head = f"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {len(part)}\r\n\r\n"
+            head = f"--frame\r\nContent-Type: image/jpeg\r\nContent-Length: {len(part) + excess}\r\n\r\n"
             self.wfile.write(head.encode() + part + b"\r\n")
             self.wfile.flush()
             time.sleep(1 / RATE)
@@ -69,6 +70,12 @@ class Camera(http.server.BaseHTTPRequestHandler):
         """Every second picture lacks its second half."""
         halved = [p if i % 2 == 0 else p[: len(p) // 2] for i, p in enumerate(self.server.pictures)]
         self.stream(itertools.cycle(halved))
+
+    def send_short_lengths(self):
+        self.stream(itertools.cycle(self.server.pictures), -200)
+
+    def send_long_lengths(self):
+        self.stream(itertools.cycle(self.server.pictures), 30)
 
     def send_broken(self):
         """No picture is complete."""
@@ -82,6 +89,10 @@ class Camera(http.server.BaseHTTPRequestHandler):
     def send_grows(self):
         """The size of the pictures changes."""
         self.stream(itertools.chain(self.server.pictures, itertools.repeat((self.server.folder / "large").read_bytes())))
+
+    def send_joined_ts(self):
+        """Two joined videos. The time stamps and counters of the second one begin again."""
+        self.send_bytes(2 * (self.server.folder / "hls0.ts").read_bytes())
 
     def send_silent(self):
         time.sleep(3600)

@@ -210,6 +210,18 @@ TEST_F(Http, TruncatedPicturesAreSkippedAndCounted) {
                 AllOf(HasSubstr("no intact picture has arrived for 1000 ms (timeout_ms)"), HasSubstr("damaged")));
 }
 
+TEST_F(Http, PicturesWithWrongLengthsAreFoundByTheirBoundaries) {
+    for (const char *path : {"short_lengths", "long_lengths"}) {
+        start({{"url", url(path)}}, {});
+        source_.read(0);
+        for (std::uint64_t n = 1; n < 20; ++n)
+            EXPECT_NE(number_of(source_.read_frame(n), source_), -1) << path << ", frame " << n;
+        EXPECT_LE(source_.plugin().counters().at("damaged"), 1u) << path;
+        EXPECT_EQ(warnings(), "") << path << ": the connection must not be lost";
+        source_.stop();
+    }
+}
+
 TEST_F(Http, ErrorsNameTheCause) {
     EXPECT_THAT(error_of({{"url", url("none", user_and_password)}}), HasSubstr("404 Not Found"));
     EXPECT_THAT(error_of({{"url", url("private/mjpeg", "camera:wrong")}}), HasSubstr("401 Unauthorized"));
@@ -288,6 +300,21 @@ TEST_F(Hls, FollowsALiveStream) {
     start({{"url", url("live.m3u8")}});
     expect_pictures(source_, 75);
     EXPECT_EQ(source_.log(ARHOST_SEVERITY_WARNING), "");
+}
+
+TEST_F(Hls, LosesNoPictureWhereTwoFilmsAreJoined) {
+    const auto pictures = [&](const char *path) {
+        start({{"url", url(path)}}, {});
+        std::vector<SourceFrame> frames = source_.read_all();
+        EXPECT_EQ(frames.back().status, ARHOST_STATUS_END);
+        frames.pop_back();
+        return frames;
+    };
+    const std::size_t one = pictures("hls0.ts").size();
+    const std::vector<SourceFrame> both = pictures("joined.ts");
+    EXPECT_EQ(both.size(), 2 * one);
+    for (const SourceFrame &frame : both)
+        EXPECT_EQ(frame.info.skipped, 0u);
 }
 
 // The sandbox would block the file as well; this test runs without it.
