@@ -23,9 +23,7 @@ constexpr std::uint64_t file_limit = std::uint64_t(4) << 30; // for a .gltf, a .
 // Limits the size of accessors without a buffer view, whose elements are all 0.
 constexpr std::size_t empty_accessor_limit = 10'000'000;
 constexpr double min_scale = 1e-6; // a scale of 0 hides objects, but has no inverse
-// Extensions that are accepted even if the file requires them: they can be ignored, or need no special support.
-constexpr std::string_view harmless_extensions[] = {"KHR_mesh_quantization", "KHR_texture_transform",
-                                                    "KHR_lights_punctual"};
+constexpr std::string_view supported_extension = "KHR_mesh_quantization"; // the only one
 
 // Keeps the encoded image. It is decoded later, when a material refers to it.
 bool keep_image_bytes(tinygltf::Image *image, int, std::string *, std::string *, int, int, const unsigned char *bytes,
@@ -74,9 +72,28 @@ std::uint32_t number_at(std::string_view bytes, std::size_t offset) { // little-
     return number;
 }
 
+std::string printable(std::string text) {
+    for (char &c : text)
+        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
+            c = '?';
+    return text.substr(0, 200);
+}
+
+// Returns the content of a .gltf or .glb file, without bytes after the length that a .glb declares.
+std::string_view content_of(const MeshFile &text) {
+    constexpr std::size_t header = 12, length_at = 8;
+    const std::string_view all = text.view();
+    if (!all.starts_with("glTF") || all.size() < header)
+        return all;
+    const std::size_t length = number_at(all, length_at);
+    if (length > all.size())
+        text.fail("is truncated: it has " + std::to_string(all.size()) + " of " + std::to_string(length) + " bytes");
+    return all.substr(0, std::max(length, header));
+}
+
 // Returns the JSON of a .gltf or .glb file. Throws if a chunk of a .glb extends past the end of the file.
 std::string_view json_of(const MeshFile &text) {
-    const std::string_view all = text.view();
+    const std::string_view all = content_of(text);
     if (!all.starts_with("glTF"))
         return all;
     constexpr std::size_t header = 12, chunk_header = 8;
@@ -121,6 +138,9 @@ void check_structure(const MeshFile &text) {
     const Json version = asset.is_object() ? asset.value("version", Json()) : Json();
     if (!version.is_string() || !version.get<std::string>().starts_with("2."))
         text.fail("is not glTF 2: its asset.version must be \"2.0\"");
+    if (const Json needed = asset.value("minVersion", Json("2.0")); needed != Json("2.0"))
+        text.fail("its asset.minVersion is " + printable(needed.dump()) +
+                  ", but arhost reads glTF 2.0; export it as glTF 2.0");
     for (const Json &accessor : list("accessors"))
         number(accessor, "byteOffset");
     const Json buffers = list("buffers"), views = list("bufferViews");
@@ -145,7 +165,7 @@ tinygltf::Model parse(const std::filesystem::path &file, std::span<const std::fi
     parser.SetFsCallbacks({is_file, tinygltf::ExpandFilePath, read_file, tinygltf::WriteWholeFile, &resources});
     tinygltf::Model model;
     std::string error, warning;
-    const auto size = static_cast<unsigned int>(text.view().size());
+    const auto size = static_cast<unsigned int>(content_of(text).size());
     const bool good =
         text.view().starts_with("glTF")
             ? parser.LoadBinaryFromMemory(&model, &error, &warning,
@@ -320,13 +340,6 @@ template <class Vector> std::vector<Vector> vectors(const std::vector<float> &fl
     return result;
 }
 
-std::string printable(std::string text) {
-    for (char &c : text)
-        if (static_cast<unsigned char>(c) < 0x20 || c == 0x7f)
-            c = '?';
-    return text.substr(0, 200);
-}
-
 class GltfLoader {
 public:
     GltfLoader(ArenaBuilder &builder, Textures &textures, const std::filesystem::path &file,
@@ -376,13 +389,12 @@ private:
     void check_extensions() const {
         std::string ignored;
         for (const std::string &extension : model_.extensionsUsed)
-            if (extension != "KHR_mesh_quantization")
+            if (extension != supported_extension)
                 ignored += (ignored.empty() ? "" : ", ") + extension;
-        for (const std::string &extension : model_.extensionsRequired)
-            if (std::ranges::find(harmless_extensions, extension) == std::end(harmless_extensions) &&
-                !extension.starts_with("KHR_materials_"))
-                accessors_.fail("requires the unsupported extension '" + printable(extension) +
-                                "'; export it without this extension");
+        for (std::size_t i = 0; i < model_.extensionsRequired.size(); ++i)
+            if (const std::string &extension = model_.extensionsRequired[i]; extension != supported_extension)
+                accessors_.fail("extensionsRequired[" + std::to_string(i) + "] requires the unsupported extension '" +
+                                printable(extension) + "'; export it without this extension");
         if (!ignored.empty())
             reporter_.info(name_ + ": unsupported extensions are ignored: " + printable(ignored));
     }

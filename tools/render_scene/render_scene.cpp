@@ -72,7 +72,9 @@ cv::Mat over_checkerboard(const cv::Mat &rgba) {
 cv::Mat render(const std::string &file, View view, double time_s, const RayTracer &ray_tracer,
                const std::string &output) {
     arhost::scene::LoadCallbacks callbacks;
-    callbacks.warning = [](const std::string &text) { std::fprintf(stderr, "%s\n", base::printable(text).c_str()); };
+    callbacks.info = callbacks.warning = [](const std::string &text) {
+        std::fprintf(stderr, "%s\n", base::printable(text).c_str());
+    };
     callbacks.reads = [&, of_output = base::identity_of(output)](const std::filesystem::path &read) {
         if (const auto [path, node] = base::identity_of(read); path == of_output.path || node == of_output.node)
             throw std::runtime_error(output + ": the scene reads this file; choose another output file");

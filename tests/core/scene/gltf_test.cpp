@@ -171,6 +171,22 @@ TEST(Gltf, ReadsBinaryFiles) {
     EXPECT_THAT(vertex(loaded.arena, 1), ElementsAre(1, 0, 0));
 }
 
+TEST(Gltf, IgnoresBytesAfterTheLengthOfABinaryFile) {
+    const Loaded loaded = load(triangle().binary() + "more", "", "y-up", "a.glb");
+    EXPECT_THAT(vertex(loaded.arena, 1), ElementsAre(1, 0, 0));
+    EXPECT_THROW(load(triangle().binary().substr(0, 400), "", "y-up", "a.glb"), std::exception);
+}
+
+TEST(Gltf, NamesUnsupportedExtensionsThatItDoesNotRequire) {
+    Gltf gltf = triangle();
+    gltf.more = R"(, "extensionsUsed": ["KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_sheen"])";
+    EXPECT_THAT(load(gltf.text()).info,
+                testing::Contains(
+                    HasSubstr("unsupported extensions are ignored: KHR_texture_transform, KHR_materials_sheen")));
+    gltf.more = R"(, "extensionsRequired": ["KHR_mesh_quantization"])";
+    EXPECT_NO_THROW(load(gltf.text()));
+}
+
 TEST(Gltf, UsesAMaterialOfTheScene) {
     const Loaded loaded = load(triangle().text(), ", material: grey, role: occluder");
     EXPECT_EQ(material(loaded.arena, object(loaded.arena).material).model, ARHOST_MATERIAL_MIRROR);
@@ -440,8 +456,15 @@ TEST(Gltf, ErrorsNameTheProblem) {
     std::string old = triangle().text();
     replace(old, "\"2.0\"", "\"1.0\"");
     EXPECT_THAT(error_of(old), HasSubstr("is not glTF 2: its asset.version must be"));
-    EXPECT_THAT(error_after([](Gltf &g) { g.more += R"(, "extensionsRequired": ["KHR_draco_mesh_compression"])"; }),
-                HasSubstr("requires the unsupported extension 'KHR_draco_mesh_compression'"));
+    std::string newer = triangle().text();
+    replace(newer, "\"version\": \"2.0\"", "\"version\": \"2.1\", \"minVersion\": \"2.1\"");
+    EXPECT_THAT(error_of(newer), HasSubstr("its asset.minVersion is \"2.1\", but arhost reads glTF 2.0"));
+    for (const std::string extension :
+         {"KHR_draco_mesh_compression", "KHR_texture_transform", "KHR_lights_punctual", "KHR_materials_transmission"})
+        EXPECT_THAT(error_after([&](Gltf &g) {
+                        g.more += R"(, "extensionsRequired": ["KHR_mesh_quantization", ")" + extension + "\"]";
+                    }),
+                    HasSubstr("extensionsRequired[1] requires the unsupported extension '" + extension + "'"));
     // The loader must detect these errors before tinygltf reads out of bounds or recurses without limit.
     EXPECT_THAT(
         error_after([&](Gltf &g) { replace(g.views, "\"byteOffset\": 0", "\"byteOffset\": 18446744073709551615"); }),
