@@ -3,6 +3,8 @@
 
 #include <csignal>
 #include <cstring>
+#include <fcntl.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -201,14 +203,21 @@ void Process::receive_results() {
     }
 }
 
-// Reads at most 16 KiB per 10 ms. If a worker prints more, its writes block until the pipe has room.
+// Logs at most 16 KiB per 10 ms. Discards what a worker prints beyond that, because its writes would otherwise block
+// until the pipe has room, which would delay its frames.
 void Process::watch_output() {
+    using std::chrono::milliseconds;
     output_watch_ = context_.reactor.watch(spawned_.output.get(), [this] {
-        read_output(16 << 10);
+        const auto now = context_.reactor.now();
+        if (now >= next_output_) {
+            read_output(16 << 10);
+            next_output_ = now + milliseconds(10);
+        }
         if (!output_watch_.active())
             return;
+        const bool is_flood = discard_flood();
         output_watch_.cancel();
-        output_pause_ = context_.reactor.at(context_.reactor.now() + std::chrono::milliseconds(10), [this] {
+        output_pause_ = context_.reactor.at(is_flood ? now + milliseconds(1) : next_output_, [this] {
             try {
                 watch_output();
             } catch (const std::system_error &error) { // the user's limit of epoll watches is reached
@@ -216,6 +225,27 @@ void Process::watch_output() {
             }
         });
     });
+}
+
+// If more than half of the pipe's original size is unread, discards all of it and returns true. A larger pipe lets a
+// worker that floods it continue until the next call. Moving pages to /dev/null copies nothing.
+bool Process::discard_flood() {
+    constexpr int flood_bytes = 32 << 10, larger_pipe_bytes = 1 << 20;
+    int unread = 0;
+    if (::ioctl(spawned_.output.get(), FIONREAD, &unread) != 0 || unread < flood_bytes)
+        return false;
+    if (!null_) {
+        null_.reset(::open("/dev/null", O_WRONLY | O_CLOEXEC));
+        (void)::fcntl(spawned_.output.get(), F_SETPIPE_SZ, larger_pipe_bytes); // fails at the user's limit
+        budget_.log(ARHOST_SEVERITY_WARNING,
+                    "it prints more than arhost logs, 1.6 MB/s; arhost discards the rest. Let it print less, for "
+                    "example once per second instead of in each frame");
+    }
+    const ssize_t count =
+        ::splice(spawned_.output.get(), nullptr, null_.get(), nullptr, larger_pipe_bytes, SPLICE_F_NONBLOCK);
+    discarded_bytes_ += count > 0 ? static_cast<std::uint64_t>(count) : 0;
+    partial_line_.clear();
+    return count > 0;
 }
 
 void Process::read_output(std::size_t max_bytes) {
@@ -255,6 +285,9 @@ void Process::on_death() {
         read_output(1 << 20);
     if (!partial_line_.empty())
         append_to_tail(partial_line_);
+    if (discarded_bytes_ > 0)
+        budget_.log(ARHOST_SEVERITY_INFO,
+                    "discarded " + std::to_string(discarded_bytes_ / 1'000'000) + " MB of what it printed");
     print_held_error();
     const Exit exit = context_.launcher.wait_exit(spawned_.pid);
     Death death;

@@ -88,6 +88,7 @@ private:
     void on_doorbell();
     void watch_output();
     void read_output(std::size_t max_bytes);
+    bool discard_flood();
     void on_death();
     void receive_results();
     void log(arhost_severity severity, const std::string &text);
@@ -107,6 +108,9 @@ private:
     std::optional<std::string> held_error_;
     bool ready_ = false;
     std::deque<std::string> tail_;
+    ipc::Reactor::Clock::time_point next_output_{}; // when output may be logged again
+    base::UniqueFd null_;                           // where a flood of output goes; opened when needed
+    std::uint64_t discarded_bytes_ = 0;
     std::uint64_t rings_ = 0, results_received_ = 0;
     ipc::Reactor::Registration channel_watch_, doorbell_watch_, output_watch_, output_pause_, death_watch_,
         kill_deadline_;

@@ -7,6 +7,7 @@
 #include <poll.h>
 #include <stdexcept>
 #include <unistd.h>
+#include <utility>
 
 namespace arhost::worker {
 
@@ -44,6 +45,7 @@ void Link::send_json(const Json &body, std::initializer_list<int> fds) const {
 
 void Link::log(arhost_severity severity, const std::string &text) const {
     constexpr std::size_t max_cost = 100'000, cost_per_line = 500;
+    bool is_flood = false;
     {
         const std::lock_guard lock(rates_->mutex);
         if (const auto now = Clock::now(); now >= rates_->log_second_ends) {
@@ -52,10 +54,17 @@ void Link::log(arhost_severity severity, const std::string &text) const {
         }
         std::size_t &cost = rates_->log_costs[severity >= ARHOST_SEVERITY_WARNING];
         cost += std::clamp(text.size(), cost_per_line, messages::max_text);
-        if (cost > max_cost)
+        is_flood = cost > max_cost;
+        if (is_flood && std::exchange(rates_->log_flood_reported, true))
             return;
     }
-    channel_.send(encode(messages::Log{severity, text}), {}, false);
+    channel_.send(encode(is_flood
+                             ? messages::Log{ARHOST_SEVERITY_WARNING,
+                                             "it logs more than 200 lines or 100 kB per second; arhost drops the "
+                                             "rest. Let it log or print less, for example once per second "
+                                             "instead of in each frame"}
+                             : messages::Log{severity, text}),
+                  {}, false);
 }
 
 void Link::progress(double fraction, const char *what) const {

@@ -77,6 +77,7 @@ private:
     struct Rates {
         std::mutex mutex; // any thread of the plugin may log
         std::chrono::steady_clock::time_point log_second_ends{}, next_progress{};
+        bool log_flood_reported = false;
         std::size_t log_costs[2] = {}; // costs of the lines in the current second; [1]: warnings and errors
     };
     std::unique_ptr<Rates> rates_ = std::make_unique<Rates>();

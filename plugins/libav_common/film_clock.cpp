@@ -23,7 +23,8 @@ std::int64_t FilmClock::next_ns(std::optional<std::int64_t> stamp_ns, bool has_j
     if (stamp_ns && !offset_ns_)
         offset_ns_ = is_first_ ? 0 : expected_ns - *stamp_ns;
     const std::int64_t found_ns = stamp_ns ? *stamp_ns + *offset_ns_ : expected_ns;
-    const bool is_back = found_ns < time_ns_ - 2 * period_ns_; // wrong by less: the stamps of the pictures are not in order
+    const bool is_back =
+        found_ns < time_ns_ - 2 * period_ns_; // wrong by less: the stamps of the pictures are not in order
     if (!is_first_ && (is_back || (has_jumps && found_ns > time_ns_ + longest_gap_ns))) {
         offset_ns_ = expected_ns - *stamp_ns;
         return time_ns_ = expected_ns;

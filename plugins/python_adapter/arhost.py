@@ -7,6 +7,7 @@ Pixels are numpy views of arhost's memory, valid until the method that received 
 and the C headers.
 """
 import importlib.util
+import io
 import json
 import os
 import sys
@@ -51,6 +52,27 @@ class Host:
             self.progress(-1, "waiting")
             time.sleep(min(left, 0.1))
         return False
+
+
+class _PrintedLines(io.TextIOBase):
+    """Logs the lines that the script prints. The log is limited, so printing never blocks."""
+
+    def __init__(self, log):
+        self.log, self.line = log, ""
+
+    def writable(self):
+        return True
+
+    def write(self, text):
+        *lines, self.line = (self.line + text).split("\n")
+        for line in lines:
+            if line:
+                self.log(SEVERITY_INFO, line)
+        self.line = self.line[:4000]  # the maximum of the log
+        return len(text)
+
+    def flush(self):
+        pass  # the line is not complete
 
 
 class Fields:
@@ -154,6 +176,7 @@ class _Adapter:
     def __init__(self, log, progress, cancelled):
         self.host = Host(log, progress, cancelled)
         self.warned = False
+        sys.stdout = _PrintedLines(log)
 
     # Report a configuration error: if the script fails to load now, it would also fail on every retry.
     @_reporting(STATUS_ERROR_CONFIGURATION)

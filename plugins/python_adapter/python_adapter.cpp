@@ -10,9 +10,12 @@
 
 #include <arhost-cpp/plugin.hpp>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <dlfcn.h>
+#include <fstream>
+#include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -127,10 +130,10 @@ template <class Plane> Object views_of_planes(const arhost_frame_format &format,
     return tuple_of(std::move(views));
 }
 
-// ---- functions that the script can call; `self` is a capsule that holds the Host ----
+// ---- functions that the script can call; `self` is a capsule that holds the arhost_host, which outlives them ----
 
-const Host &host_of(PyObject *self) {
-    return *static_cast<const Host *>(PyCapsule_GetPointer(self, nullptr));
+Host host_of(PyObject *self) {
+    return Host(static_cast<const arhost_host *>(PyCapsule_GetPointer(self, nullptr)));
 }
 PyObject *py_log(PyObject *self, PyObject *arguments) {
     int severity = 0;
@@ -168,7 +171,28 @@ public:
     ProcessLock &operator=(const ProcessLock &) = delete;
 };
 
+// Rejects a file that is not the program of CPython. Nothing executes the file: it only tells where the packages are,
+// so Python would start without them.
+void expect_python(const std::string &interpreter) {
+    constexpr std::string_view main_function = "Py_BytesMain"; // the program calls it, or contains it
+    std::ifstream file(interpreter, std::ios::binary);
+    std::string chunk(1 << 20, '\0'), bytes;
+    bool is_python = false;
+    while (file && !is_python) {
+        file.read(chunk.data(), static_cast<std::streamsize>(chunk.size()));
+        bytes.append(chunk, 0, static_cast<std::size_t>(file.gcount()));
+        is_python = bytes.find(main_function) != std::string::npos;
+        bytes.erase(0, bytes.size() - std::min(bytes.size(), main_function.size() - 1));
+    }
+    if (!is_python)
+        throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                      "the option 'interpreter' names '" + interpreter +
+                          "', which is not a readable program of CPython; set it to the python of a virtual "
+                          "environment (bin/python), or omit it");
+}
+
 void initialise(const std::string &interpreter) {
+    expect_python(interpreter);
     const ProcessLock lock;
     if (Py_IsInitialized())
         return;
@@ -227,7 +251,7 @@ public:
         initialise(interpreter);
         const GilLock lock;
         const Object module = import_arhost(interpreter);
-        const Object capsule = checked(PyCapsule_New(&host_, nullptr, nullptr));
+        const Object capsule = checked(PyCapsule_New(const_cast<arhost_host *>(host_.get()), nullptr, nullptr));
         Object functions[3];
         for (int i = 0; i < 3; ++i)
             functions[i] = checked(PyCFunction_New(&callbacks[i], capsule.get()));

@@ -734,6 +734,19 @@ TEST(Sandbox, OneBudgetLimitsTheLinesOfAWorker) {
     }
 }
 
+// The tracker prints 32 MiB in one frame, which has a deadline of 2 s.
+TEST(Sandbox, AFloodOfOutputIsDiscardedWithOneWarningAndDelaysNoFrame) {
+    HostileRun run("output");
+    run.start_it();
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    const std::string output = run.output(), warning = "prints more than arhost logs";
+    EXPECT_THAT(output, ContainsRegex("warning: tracker: it " + warning + ".*print less"));
+    EXPECT_EQ(output.find(warning), output.rfind(warning));
+    EXPECT_THAT(output, ContainsRegex("tracker: discarded 3[0-9] MB of what it printed"));
+    EXPECT_EQ(run.stats()["restarts"]["tracker"], 0);
+    expect_complete_video(run);
+}
+
 // Each process of the plugin sends a message of an unknown type, whose name has 120 KB.
 TEST(Sandbox, DeathsDoNotLogLongTextsOfTheWorker) {
     HostileRun run("huge_type");

@@ -305,6 +305,35 @@ TEST_F(PythonAdapter, UsesThePackagesOfAVirtualEnvironment) {
     EXPECT_THAT(run.output(), HasSubstr("answer 42"));
 }
 
+TEST_F(PythonAdapter, AnInterpreterThatIsNoPythonIsRejected) {
+    for (const char *interpreter : {"/bin/true", "script.py"}) {
+        ArhostRun run(chain("tracker:", std::string("tracker: {plugin: tracker_python, options: {script: script.py, "
+                                                    "interpreter: ") +
+                                            interpreter +
+                                            "}, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}"));
+        EXPECT_EQ(run_script(run, idle_tracker), 2) << run.output();
+        EXPECT_THAT(run.output(), HasSubstr("the option 'interpreter' names '"));
+        EXPECT_THAT(run.output(), HasSubstr("which is not a readable program of CPython"));
+    }
+}
+
+TEST_F(PythonAdapter, PrintedLinesAreLoggedAndAFloodOfThemDelaysNoFrame) {
+    ArhostRun run(tracker);
+    run.write("scene.yaml", small_scene);
+    run.write("script.py", "class T:\n"
+                           "    def __init__(self, host): print('made', 1, end='!\\n')\n"
+                           "    def start(self, setup): pass\n"
+                           "    def track(self, frame):\n"
+                           "        for i in range(20000): print(i, 'x' * 1000)\n"
+                           "        return []\n");
+    EXPECT_EQ(run.run({"--config", "run.yaml", "--allow-no-target"}), 0) << run.output(); // without --verbose
+    const std::string output = run.output(), warning = "it logs more than 200 lines";
+    EXPECT_THAT(output, HasSubstr("tracker: made 1!\n"));
+    EXPECT_THAT(output, HasSubstr("warning: tracker: " + warning));
+    EXPECT_EQ(output.find(warning), output.rfind(warning));
+    EXPECT_EQ(run.stats()["restarts"]["tracker"], 0);
+}
+
 // The script writes files like tempfile, matplotlib, numba and torch.
 TEST_F(PythonAdapter, LibrariesFindTheirFoldersForTemporaryFilesAndCaches) {
     ArhostRun run(tracker);

@@ -714,6 +714,16 @@ static void print_lines(void) {
     fflush(stdout);
 }
 
+static void flood_output(void) {
+    static char text[1 << 20];
+    int i;
+    memset(text, 'x', sizeof text);
+    text[sizeof text - 1] = '\n';
+    for (i = 0; i < 32; ++i)
+        fwrite(text, 1, sizeof text, stdout);
+    fflush(stdout);
+}
+
 /* Repeats the first message of the worker, so that the host sets up the plugin again. */
 static void say_hello(void) {
     say_text("{\"type\": \"hello\", \"sandbox\": \"\", \"descriptor\": {\"kind\": 2, \"id\": \"hostile\", "
@@ -826,6 +836,8 @@ static void attack(const tracker *self) {
         send_small_messages();
     } else if (!strcmp(name, "lines")) {
         print_lines();
+    } else if (!strcmp(name, "output")) {
+        flood_output();
     } else if (!strcmp(name, "pipe")) {
         report(self, "a pipe", mkfifo("stats.json", 0600) == 0 && mkfifo("times.csv", 0600) == 0);
     }
