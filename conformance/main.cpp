@@ -214,8 +214,8 @@ std::string family_of(std::span<const Test> tests, RunSettings settings,
     return plugin.capabilities & ARHOST_CAPABILITY_REPORTS_POSES ? "" : drawn_families.front(); // tests report why
 }
 
-// Returns values for the paths that have neither a default nor a value: the first that the plugin accepts. Inputs are
-// pictures, which this function writes to `folder`. Each test has its own folder for outputs.
+// Returns a value for a path that has neither a value nor a default that the plugin accepts: the first that it does.
+// Inputs are pictures, which this function writes to `folder`. Each test has its own folder for outputs.
 Settings default_paths(std::span<const Test> tests, RunSettings settings,
                        const arhost::model::PluginDescription &plugin, const fs::path &folder) {
     constexpr int picture_count = 12;
@@ -233,14 +233,20 @@ Settings default_paths(std::span<const Test> tests, RunSettings settings,
             values.insert(values.begin(), "%03d.png");
     }
     const arhost_option_type type = is_source ? ARHOST_OPTION_INPUT_PATH : ARHOST_OPTION_OUTPUT_PATH;
-    for (const arhost::model::OptionDeclaration &option : plugin.options)
-        if (option.type == type && !option.default_value && !settings.subject.settings.contains(option.key))
-            for (const std::string &value : values) {
-                settings.subject.settings[option.key] = value;
-                if (const Verdict verdict = run_alone(*start, settings).verdict;
-                    verdict == Verdict::pass || verdict == Verdict::skip)
-                    return {{option.key, value}};
-            }
+    const auto is_accepted = [&] {
+        const Verdict verdict = run_alone(*start, settings).verdict;
+        return verdict == Verdict::pass || verdict == Verdict::skip;
+    };
+    for (const arhost::model::OptionDeclaration &option : plugin.options) {
+        if (option.type != type || settings.subject.settings.contains(option.key) ||
+            !option.default_value.value_or("").empty() || (option.default_value && is_accepted()))
+            continue;
+        for (const std::string &value : values) {
+            settings.subject.settings[option.key] = value;
+            if (is_accepted())
+                return {{option.key, value}};
+        }
+    }
     return {}; // tests report that the option has no value, or why it is rejected
 }
 
