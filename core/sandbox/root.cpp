@@ -206,7 +206,7 @@ void enter_root(const Policy &policy, Layer &layer, bool has_control_group_names
     if (!mount_own_processes(in_staging("/proc")))
         missing("/proc/self");
     if (!policy.scratch.empty() &&
-        !mount_scratch(in_staging(policy.scratch), policy.may_generate_code() || policy.allows("processes")))
+        !mount_scratch(in_staging(policy.scratch), policy.may_generate_code() || may_start_processes(policy)))
         missing(policy.scratch);
     if (has_control_group_namespace) // otherwise this would change options of the existing mount
         mount_own_control_groups(in_staging(control_groups));
