@@ -28,9 +28,13 @@ int kill_orphans(const std::set<pid_t> &kept) {
     return count;
 }
 
-void end_orphans(const std::set<pid_t> &kept) {
-    for (int i = 0; i < 500 && kill_orphans(kept) > 0; ++i)
+bool end_orphans(const std::set<pid_t> &kept) {
+    for (int i = 0; i < 500; ++i) {
+        if (kill_orphans(kept) == 0)
+            return true;
         ::usleep(1000);
+    }
+    return false;
 }
 
 } // namespace arhost::base

@@ -17,7 +17,7 @@ std::set<pid_t> children();
 int kill_orphans(const std::set<pid_t> &kept);
 
 // Calls kill_orphans until no orphan is left, but for at most half a second, because a process may hang in the
-// kernel.
-void end_orphans(const std::set<pid_t> &kept);
+// kernel. Returns whether none is left.
+bool end_orphans(const std::set<pid_t> &kept);
 
 } // namespace arhost::base

@@ -79,6 +79,19 @@ std::string printable(std::string text) {
     return text.substr(0, 200);
 }
 
+// Returns what to change if tinygltf's `error` names a file that it could not find.
+std::string hint_at_uri(std::string_view error) {
+    constexpr std::string_view not_found = "File not found : ";
+    const std::size_t at = error.find(not_found);
+    const std::string_view uri = at == std::string_view::npos ? "" : error.substr(at + not_found.size());
+    if (uri.substr(0, uri.find('\n')).find("://") != std::string_view::npos)
+        return "; arhost downloads nothing: place the file next to the glTF file and write its relative path as "
+               "'uri'";
+    if (uri.starts_with('/'))
+        return "; write a path relative to the glTF file as 'uri'";
+    return "";
+}
+
 // Returns the content of a .gltf or .glb file, without bytes after the length that a .glb declares.
 std::string_view content_of(const MeshFile &text) {
     constexpr std::size_t header = 12, length_at = 8;
@@ -180,7 +193,7 @@ tinygltf::Model parse(const std::filesystem::path &file, std::span<const std::fi
         return lines.substr(0, 500);
     };
     if (!good)
-        text.fail("cannot be loaded as glTF 2.0: " + on_one_line(error));
+        text.fail("cannot be loaded as glTF 2.0: " + on_one_line(error) + hint_at_uri(error));
     if (!warning.empty())
         reporter.info(text.name() + ": " + on_one_line(warning));
     return model;

@@ -30,6 +30,8 @@ Kind kind_of(const std::filesystem::path &file) {
         return Kind::Obj;
     if (extension == ".ply")
         return Kind::Ply;
+    if (extension == ".gltf" || extension == ".glb")
+        throw MeshError(file.string() + ": is a glTF file; name it with the key 'gltf' instead of 'mesh'");
     throw MeshError(
         file.string() + ": " +
         (extension.empty() ? "the file name has no extension" : "the format '" + extension + "' is unsupported") +

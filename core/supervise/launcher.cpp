@@ -102,7 +102,7 @@ void Launcher::discard() {
     socket_.reset();
     is_lost_ = true;
     alive_.clear();
-    base::end_orphans(unrelated_children_); // kills the processes that its workers have forked
+    has_orphans_ = !base::end_orphans(unrelated_children_); // kills the processes that its workers have forked
 }
 
 Launcher::~Launcher() {
@@ -127,6 +127,11 @@ Spawned Launcher::spawn(const std::filesystem::path &program, Isolation isolatio
         throw std::runtime_error("the path of arhost-worker is too long");
     std::strcpy(request.program, program.c_str());
 
+    if (has_orphans_) {
+        std::set<pid_t> kept = unrelated_children_;
+        kept.insert(pid_);
+        has_orphans_ = base::kill_orphans(kept) > 0;
+    }
     for (int attempts = 0; attempts < max_attempts; ++attempts) {
         if (is_lost_)
             log(ARHOST_SEVERITY_WARNING, "arhost",

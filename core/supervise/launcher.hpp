@@ -77,8 +77,9 @@ private:
     std::set<pid_t> unrelated_children_; // children that existed before; they are not workers
     base::UniqueFd socket_;              // empty if no launcher is running
     pid_t pid_ = 0;
-    bool is_lost_ = false;  // the launcher was discarded and is not yet replaced
-    std::set<pid_t> alive_; // workers of the current launcher
+    bool is_lost_ = false;     // the launcher was discarded and is not yet replaced
+    bool has_orphans_ = false; // processes of a discarded launcher have not ended yet
+    std::set<pid_t> alive_;    // workers of the current launcher
     std::deque<Exit> exits_;
 };
 

@@ -25,7 +25,7 @@ std::string size_text(const cv::Mat &image) {
 // Reads an image. Converts 16 bits to 8, drops alpha, and applies the Exif orientation.
 cv::Mat read_image(const fs::path &file, int flags) {
     cv::Mat image;
-    std::string reason = "damaged or unknown image format";
+    std::string reason = "damaged or unknown image format (animated WebP and floating-point TIFF are not supported)";
     arhost_status status = ARHOST_STATUS_ERROR_CONFIGURATION; // a restart does not help
     try {
         image = cv::imread(file.string(), flags);

@@ -268,7 +268,9 @@ Failure NetworkStream::failure(int code) {
     else if (code == AVERROR_HTTP_OTHER_4XX)
         why += "; it may have no video";
     else if (code == AVERROR_INVALIDDATA || code == AVERROR(EINVAL))
-        why += "; it is no video that arhost plays (RTSP, Motion-JPEG, HLS, MPEG-TS, MP4, Matroska, FLV)";
+        why += "; it is no video that arhost plays (RTSP, Motion-JPEG, HLS, MPEG-TS, MP4, Matroska, FLV), but "
+               "perhaps a web page or a single "
+               "picture; use the address of the stream";
     return {ARHOST_STATUS_ERROR_CONFIGURATION, name_ + " cannot be received: " + why};
 }
 

@@ -408,6 +408,11 @@ TEST(Gltf, CombinesItsAnimationWithAMotion) {
 TEST(Gltf, ErrorsNameTheProblem) {
     EXPECT_THAT(error_of("{"), HasSubstr("s.yaml:5:12: objects[0].gltf: "));
     EXPECT_THAT(error_of("{"), HasSubstr("cannot be loaded as glTF 2.0: "));
+    const auto with_uri = [](const std::string &uri) {
+        return R"({"asset": {"version": "2.0"}, "buffers": [{"byteLength": 36, "uri": ")" + uri + R"("}]})";
+    };
+    EXPECT_THAT(error_of(with_uri("/nonexistent/a.bin")), HasSubstr("write a path relative to the glTF file"));
+    EXPECT_THAT(error_of(with_uri("https://example.org/a.bin")), HasSubstr("arhost downloads nothing"));
     EXPECT_THAT(error_of("glTF\2"), HasSubstr("cannot be loaded as glTF 2.0: "));
     EXPECT_THAT(error_of(skinned().text(), ", animation: jump"), HasSubstr("objects[0].animation: "));
     EXPECT_THAT(error_of(skinned().text(), ", animation: jump"),

@@ -384,6 +384,7 @@ TEST(MeshFile, IsRejectedIfItExpandsToAHundredTimesItsSize) {
 }
 
 TEST(MeshFile, IsRejectedIfTheFormatIsUnsupported) {
+    EXPECT_EQ(error_of("a.glb", "glTF"), " is a glTF file; name it with the key 'gltf' instead of 'mesh'");
     EXPECT_EQ(error_of("a.stl", "solid x\n"), " the format '.stl' is unsupported; convert the mesh to .obj or "
                                               ".ply (optionally compressed: .obj.gz, .ply.gz)");
     EXPECT_THAT(error_of("mesh", "v 0 0 0\n"), HasSubstr(" the file name has no extension"));
