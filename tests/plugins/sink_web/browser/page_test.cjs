@@ -231,7 +231,17 @@ test("a lost connection disables the controls until it is back", async () => {
   own.process.kill("SIGCONT");
   await eventually(page, isState, "running");
   assert.ok(await page.locator("#command-freeze").isEnabled());
+  await eventually(page, () => document.getElementById("picture").src.includes("/stream.mjpg"));
   await moves(page);
+  own.process.kill("SIGINT");
+  await eventually(page, isState, "ended");
+  await own.stop();
+});
+
+test("a run that is killed is a lost connection", async () => {
+  const own = await new Run().start();
+  const {page} = await open({}, own.url);
+  await eventually(page, isState, "running");
   own.process.kill("SIGKILL");
   await eventually(page, isState, "no connection");
   await own.stop();
@@ -327,8 +337,8 @@ test("snapshots can be downloaded", async () => {
   const {page, close} = await open();
   await page.click("#command-snapshot");
   await result(page, "Saved ");
-  const link = page.locator("#files a").first(), name = await link.innerText();
-  const [download] = await Promise.all([page.waitForEvent("download"), link.click()]);
+  const name = await page.locator("#files a").first().innerText();
+  const [download] = await Promise.all([page.waitForEvent("download"), page.locator("#files a", {hasText: name}).click()]);
   assert.deepStrictEqual(fs.readFileSync(await download.path()), fs.readFileSync(file("out/" + name)));
   await close();
 });
