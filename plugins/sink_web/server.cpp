@@ -21,6 +21,8 @@ namespace {
 
 constexpr unsigned max_connections = 128, max_connections_per_address = 64;
 constexpr std::size_t max_viewers = 48, max_viewers_per_address = 24;
+constexpr std::size_t max_downloads = 16;
+constexpr std::ptrdiff_t max_downloads_per_address = 4;
 constexpr std::size_t connection_memory = 16384, stream_block = 65536; // bytes
 constexpr unsigned inactivity_s = 30;
 constexpr auto request_time = std::chrono::seconds(10), response_time = std::chrono::seconds(60),
@@ -79,6 +81,11 @@ std::string error_text(const std::string &error) {
     return "{\"ok\":false,\"error\":\"" + error + "\"}\n";
 }
 
+// The host's answers begin with the member "ok".
+bool has_succeeded(std::string_view answer) {
+    return answer.starts_with("{\"ok\":true");
+}
+
 } // namespace
 
 struct Server::Request {
@@ -110,6 +117,7 @@ struct Server::Viewer {
 struct Server::Download {
     Server *server;
     MHD_Connection *connection;
+    std::string address; // of the client (address_of)
     RunFile file;
 };
 
@@ -186,6 +194,8 @@ struct Server::Callbacks {
 
     static void free_download(void *download) noexcept {
         const std::unique_ptr<Download> self(static_cast<Download *>(download));
+        const std::lock_guard lock(self->server->mutex_);
+        self->server->downloads_.erase(self.get());
     }
 
     static void free_viewer(void *viewer) noexcept {
@@ -389,8 +399,7 @@ bool Server::respond_with_answer(const Request &request) {
         return respond(request, MHD_HTTP_OK, "text/plain; version=0.0.4; charset=utf-8",
                        metrics(request.answer, own));
     }
-    // The host's answers begin with the member "ok".
-    const bool is_ok = request.answer.starts_with("{\"ok\":true");
+    const bool is_ok = has_succeeded(request.answer);
     const unsigned failed =
         request.path == "/api/status" ? MHD_HTTP_SERVICE_UNAVAILABLE : MHD_HTTP_UNPROCESSABLE_CONTENT;
     return respond(request, is_ok ? MHD_HTTP_OK : failed, "application/json", request.answer);
@@ -429,21 +438,31 @@ bool Server::respond_with_snapshot(const Request &request) {
 
 // The number in the request selects a file of the host's list, so the client cannot name any other file.
 bool Server::respond_with_file(const Request &request) {
+    if (!has_succeeded(request.answer)) {
+        // Only if `status` is not granted, the host lists what is.
+        const bool is_granted = request.answer.find("\"granted\":") == std::string::npos;
+        return respond(request, is_granted ? MHD_HTTP_SERVICE_UNAVAILABLE : MHD_HTTP_FORBIDDEN, "application/json",
+                       request.answer);
+    }
     const auto path = path_of_file(request.answer, request.path.substr(files_path.size()));
     if (!path)
         return refuse(request, MHD_HTTP_NOT_FOUND, "the run has not written a file with this number");
     std::unique_ptr<Download> download;
     try {
-        download.reset(new Download{this, request.connection, RunFile(*path)});
+        download.reset(new Download{this, request.connection, address_of(request.connection), RunFile(*path)});
     } catch (const std::exception &) {
         return refuse(request, MHD_HTTP_FORBIDDEN,
                       "this output cannot read the file: list its folder in the key 'reads' of the output sink_web");
     }
+    if (!admit(*download))
+        return refuse(request, MHD_HTTP_SERVICE_UNAVAILABLE, "there are too many downloads; retry later");
     const std::uint64_t size = download->file.size();
     MHD_Response *response = MHD_create_response_from_callback(size, stream_block, Callbacks::read_file,
                                                                download.get(), Callbacks::free_download);
-    if (!response)
+    if (!response) {
+        Callbacks::free_download(download.release());
         return false;
+    }
     download.release(); // NOLINT(bugprone-unused-return-value): the response owns it
     MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, "application/octet-stream");
     MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_DISPOSITION, disposition_of(*path).c_str());
@@ -512,6 +531,14 @@ bool Server::admit(Viewer &viewer) {
     }
     viewers_.insert(&viewer);
     return true;
+}
+
+// Registers a download. Returns false if there are too many.
+bool Server::admit(Download &download) {
+    const std::lock_guard lock(mutex_);
+    const auto same = std::ranges::count(downloads_, download.address, &Download::address);
+    return downloads_.size() < max_downloads && same < max_downloads_per_address &&
+           downloads_.insert(&download).second;
 }
 
 // Sets what the viewer receives next, unless it must wait for that.

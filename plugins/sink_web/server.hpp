@@ -64,6 +64,7 @@ private:
     bool respond_with_events(const Request &request);
     bool respond_to_viewer(const Request &request, std::unique_ptr<Viewer> viewer, const std::string &type);
     bool admit(Viewer &viewer);
+    bool admit(Download &download);
     bool respond(const Request &request, unsigned status, const char *type, std::string_view body,
                  const std::string &nonce = "");
     bool refuse(const Request &request, unsigned status, const std::string &error);
@@ -81,6 +82,7 @@ private:
     bool is_stopping_ = false, is_status_pending_ = false;
     std::map<MHD_Connection *, Connection> connections_;
     std::set<Viewer *> viewers_;
+    std::set<Download *> downloads_;
     std::set<SharedRequest> suspended_, waiting_for_status_;
     std::size_t unsent_answers_ = 0;   // answers to requests that were suspended
     std::condition_variable was_sent_; // an answer, or the end of a stream

@@ -255,6 +255,31 @@ TEST(SinkWeb, SendsOnlyFilesThatTheRunHasWrittenAndThatItMayRead) {
     }
 }
 
+TEST(SinkWeb, SlowDownloadsLeaveConnectionsToOthers) {
+    std::string text = yaml("[quit, snapshot, status]", "listen: \"127.0.0.1:0\"") +
+                       "snapshot: {plugin: sink_images, path: out/s-%02d.png}\n";
+    const std::string allow = "allow: [listen]";
+    text.replace(text.find(allow), allow.size(), allow + ", reads: [out]");
+    WebRun run(WebRun::Configuration{text});
+    ASSERT_EQ(run.post(R"({"command":"snapshot"})").status, 200);
+    std::filesystem::resize_file(run.path("out/s-01.png"), 1 << 26); // more than the sockets buffer
+    std::vector<HttpClient> downloads;
+    const auto status_of_download = [&](std::uint32_t from) {
+        HttpClient &client = downloads.emplace_back(run.port(), 4096, from);
+        client.send("GET /files/1 HTTP/1.1\r\nHost: localhost\r\n\r\n");
+        return client.receive_to("\r\n\r\n").substr(9, 3);
+    };
+    for (const std::uint32_t from : {2u, 3u, 4u, 5u}) {
+        for (int i = 0; i < 4; ++i)
+            ASSERT_EQ(status_of_download(from), "200") << from << " " << i;
+        EXPECT_EQ(status_of_download(from), "503") << "4 downloads per address";
+    }
+    EXPECT_EQ(status_of_download(6), "503") << "16 downloads";
+    downloads.clear();
+    run.wait_for([&] { return status_of_download(6) == "200"; });
+    run.expect_quit();
+}
+
 TEST(SinkWeb, EncodesNothingWithoutViewers) {
     WebRun run;
     const auto count = [&](const std::string &name) {
@@ -273,6 +298,9 @@ TEST(SinkWeb, ExecutesOnlyGrantedCommands) {
     EXPECT_EQ(freeze.status, 422);
     EXPECT_THAT(freeze.body, HasSubstr("does not grant 'freeze'"));
     EXPECT_EQ(run.get("/api/status").status, 503);
+    const HttpAnswer file = run.get("/files/1");
+    EXPECT_EQ(file.status, 403) << "the numbers of files are in the status";
+    EXPECT_THAT(file.body, HasSubstr("does not grant 'status'"));
     EXPECT_THAT(run.get("/metrics").body, HasSubstr("arhost_web_frames_total"));
     EXPECT_EQ(run.post("[]").status, 400);
     EXPECT_EQ(run.post("").status, 400);
