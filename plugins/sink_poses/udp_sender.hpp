@@ -3,6 +3,7 @@
 
 #include <arhost-cpp/plugin.hpp>
 
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -21,9 +22,9 @@ public:
 
 private:
     Host host_;
-    std::string receiver_;
+    std::string receiver_, address_; // as configured; numeric
     int fd_ = -1;
-    bool has_warned_ = false;
+    std::set<int> reported_errors_; // of send
 };
 
 } // namespace arhost::poses

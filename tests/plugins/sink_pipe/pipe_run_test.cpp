@@ -123,9 +123,11 @@ TEST(PosesRun, EachFrameIsADatagram) {
     text.resize(used);
     expect_lines_of_all_frames(text);
 
-    run.write("run.yaml", poses_yaml(options));
-    EXPECT_EQ(run.run(), 2);
-    EXPECT_THAT(run.messages(), HasSubstr("this output needs 'allow: [network]'"));
+    for (const std::string receiver : {"127.0.0.1:9", "localhost:9"}) {
+        run.write("run.yaml", poses_yaml("options: {udp: \"" + receiver + "\"}"));
+        EXPECT_EQ(run.run(), 2);
+        EXPECT_THAT(run.messages(), HasSubstr("this output needs 'allow: [network]'")) << receiver;
+    }
 }
 
 TEST(PosesRun, NeedsOneReceiver) {

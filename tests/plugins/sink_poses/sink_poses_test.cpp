@@ -5,10 +5,15 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include <arpa/inet.h>
 #include <cstdio>
+#include <dlfcn.h>
 #include <limits>
+#include <netdb.h>
 #include <numbers>
 #include <sstream>
+#include <sys/socket.h>
+#include <unistd.h>
 
 using namespace arhost::test;
 using Json = nlohmann::ordered_json;
@@ -16,6 +21,9 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 namespace {
+
+constexpr std::pair<std::string_view, int> unknown_names[] = {{"unreachable.example", EAI_AGAIN},
+                                                              {"mistyped.example", EAI_NONAME}};
 
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinity = std::numeric_limits<double>::infinity();
@@ -103,10 +111,27 @@ protected:
     ScratchFolder folder_;
 };
 
+// Starts the sink with this receiver. Returns its log.
+std::string log_of_start(const std::string &receiver, arhost_status expected) {
+    SinkUnderTest s("sink_poses", {{"udp", receiver}});
+    EXPECT_EQ(s.start(8, 8), expected) << receiver;
+    return s.log();
+}
+
 INSTANTIATE_TEST_SUITE_P(SinkPoses, LogSink, testing::Values(LogSinkCase{"poses", "sink_poses", full_record}),
                          [](const auto &info) { return info.param.name; });
 
 } // namespace
+
+// Replaces libc's function, so that the names' errors do not depend on the machine's name server.
+extern "C" [[gnu::visibility("default")]] int getaddrinfo(const char *name, const char *service,
+                                                          const addrinfo *hints, addrinfo **found) {
+    for (const auto &[unknown, error] : unknown_names)
+        if (name && name == unknown)
+            return error;
+    static const auto original = reinterpret_cast<decltype(&getaddrinfo)>(::dlsym(RTLD_NEXT, "getaddrinfo"));
+    return original(name, service, hints, found);
+}
 
 TEST_F(SinkPoses, WritesAFrameWithoutTargetsAsDocumented) {
     EXPECT_EQ(
@@ -293,6 +318,33 @@ TEST_F(SinkPoses, AFolderAsPathIsRejected) {
     SinkUnderTest s("sink_poses", {{"path", folder_.path().string()}});
     EXPECT_EQ(s.start(8, 8), ARHOST_STATUS_ERROR_CONFIGURATION);
     EXPECT_THAT(s.log(), HasSubstr("add a file name"));
+}
+
+TEST_F(SinkPoses, ANameThatCannotBeResolvedNowIsTriedAgainByTheHost) {
+    for (const auto &[name, status] : {std::pair{"unreachable.example", ARHOST_STATUS_ERROR_IO},
+                                       {"mistyped.example", ARHOST_STATUS_ERROR_CONFIGURATION}})
+        EXPECT_THAT(log_of_start(name + std::string(":9000"), status),
+                    AllOf(HasSubstr(name), Not(HasSubstr("network"))));
+}
+
+TEST_F(SinkPoses, AReceiverThatDoesNotListenGivesOneWarningWithItsAddress) {
+    const int socket = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0); // bound: no other program listens there
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    ASSERT_EQ(::bind(socket, reinterpret_cast<const sockaddr *>(&address), size), 0);
+    ASSERT_EQ(::getsockname(socket, reinterpret_cast<sockaddr *>(&address), &size), 0);
+    // Connected to itself, it receives no datagrams of others, which are thus refused.
+    ASSERT_EQ(::connect(socket, reinterpret_cast<const sockaddr *>(&address), size), 0);
+    const std::string receiver = "127.0.0.1:" + std::to_string(ntohs(address.sin_port));
+    SinkUnderTest s("sink_poses", {{"udp", receiver}});
+    ASSERT_EQ(s.start(8, 8), ARHOST_STATUS_OK);
+    ASSERT_EQ(s.write(0, 10), ARHOST_STATUS_OK);
+    const std::string log = s.log(), warning = "4 no program receives datagrams at " + receiver;
+    EXPECT_THAT(log, HasSubstr(warning));
+    EXPECT_EQ(log.find(warning), log.rfind(warning));
+    ::close(socket);
 }
 
 TEST_F(SinkPoses, TheReadmeExampleHasTheSameKeys) {
