@@ -40,8 +40,8 @@ public:
             const int nowhere = open("/dev/null", O_WRONLY);
             dup2(nowhere, STDERR_FILENO);
             // With -displayfd, Xvfb chooses a free display number and writes it to the pipe when it is ready.
-            execl(xvfb_path, "Xvfb", "-displayfd", number_fd.c_str(), "-screen", "0", screen.c_str(), "-nolisten",
-                  "tcp", has_opengl ? "+extension" : "-extension", "GLX", nullptr);
+            execl(xvfb_path, "Xvfb", "-displayfd", number_fd.c_str(), "-screen", "0", screen.c_str(), "-noreset",
+                  "-nolisten", "tcp", has_opengl ? "+extension" : "-extension", "GLX", nullptr);
             _exit(127);
         }
         ::close(ends[1]);
