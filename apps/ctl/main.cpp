@@ -80,10 +80,6 @@ std::string number(const Json &value, int digits) {
     return text;
 }
 
-std::string count(std::uint64_t number, const std::string &noun) {
-    return std::to_string(number) + " " + noun + (number == 1 ? "" : "s");
-}
-
 // Prints what a user asks first: whether all components run, how fast, what the tracker sees, and what went wrong.
 void print_status(const Json &status) {
     const Json &frames = status.at("frames"), &scene = status.at("scene"), &recording = status.at("recording");
@@ -98,10 +94,10 @@ void print_status(const Json &status) {
                 status.at("latency").at("from").get<std::string>();
     print(rate);
     std::string dropped;
-    for (const auto &[cause, number] : frames.at("dropped").items())
-        if (number != 0)
-            dropped += (dropped.empty() ? ", dropped: " : ", ") + cause + " " + number.dump();
-    print(count(frames.at("composited"), "frame") + ": " + frames.at("tracked").dump() + " with a target, " +
+    for (const auto &[cause, frame_count] : frames.at("dropped").items())
+        if (frame_count != 0)
+            dropped += (dropped.empty() ? ", dropped: " : ", ") + cause + " " + frame_count.dump();
+    print(base::count_of(frames.at("composited"), "frame") + ": " + frames.at("tracked").dump() + " with a target, " +
           frames.at("augmented").dump() + " with an overlay" + dropped);
     for (const Json &target : status.at("targets"))
         print("target " + target.at("name").get<std::string>() + ": " + target.at("state").get<std::string>() +
@@ -115,7 +111,7 @@ void print_status(const Json &status) {
         const std::uint64_t restarts = component.at("restarts");
         print(component.at("name").get<std::string>() + ": " + component.at("plugin").get<std::string>() + " " +
               component.at("version").get<std::string>() + ", " + component.at("state").get<std::string>() +
-              (restarts > 0 ? ", " + count(restarts, "restart") : ""));
+              (restarts > 0 ? ", " + base::count_of(restarts, "restart") : ""));
     }
     for (const Json &message : status.at("messages"))
         print(message.at("time").get<std::string>() + " " + message.at("severity").get<std::string>() + ": " +
