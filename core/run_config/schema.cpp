@@ -150,7 +150,8 @@ constexpr Row coordinates_keys[] = {
 
 constexpr Row output_keys[] = {
     {"path", output_path, "",
-     "Output file, for plugins that write files; its folder becomes writable. `-`: standard output (`sink_pipe`)."},
+     "Output file, for plugins that write files; its folder becomes writable. `-`: standard output (`sink_pipe`, "
+     "`sink_poses`)."},
     {"control", list, "nothing",
      "Commands that the output may send (docs/control.md): `quit`, `freeze`, `snapshot`, `record`, `load_scene`, "
      "`swap`, `set`, `status`."}};
