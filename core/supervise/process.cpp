@@ -227,25 +227,30 @@ void Process::watch_output() {
     });
 }
 
-// If more than half of the pipe's original size is unread, discards all of it and returns true. A larger pipe lets a
-// worker that floods it continue until the next call. Moving pages to /dev/null copies nothing.
+// If more than half of the pipe's original size is unread, discards it except for its end, which may tell why the
+// worker crashes, and returns true. A larger pipe lets a worker that floods it continue until the next call. Moving
+// pages to /dev/null copies nothing.
 bool Process::discard_flood() {
-    constexpr int flood_bytes = 32 << 10, larger_pipe_bytes = 1 << 20;
+    constexpr int flood_bytes = 32 << 10, kept_bytes = 4096, larger_pipe_bytes = 1 << 20;
     int unread = 0;
     if (::ioctl(spawned_.output.get(), FIONREAD, &unread) != 0 || unread < flood_bytes)
         return false;
     if (!null_) {
         null_.reset(::open("/dev/null", O_WRONLY | O_CLOEXEC));
+        if (!null_)
+            return false; // too many open files: the pipe remains full, so the worker waits
         (void)::fcntl(spawned_.output.get(), F_SETPIPE_SZ, larger_pipe_bytes); // fails at the user's limit
         budget_.log(ARHOST_SEVERITY_WARNING,
                     "it prints more than arhost logs, 1.6 MB/s; arhost discards the rest. Let it print less, for "
                     "example once per second instead of in each frame");
     }
-    const ssize_t count =
-        ::splice(spawned_.output.get(), nullptr, null_.get(), nullptr, larger_pipe_bytes, SPLICE_F_NONBLOCK);
-    discarded_bytes_ += count > 0 ? static_cast<std::uint64_t>(count) : 0;
+    const ssize_t count = ::splice(spawned_.output.get(), nullptr, null_.get(), nullptr,
+                                   static_cast<std::size_t>(unread - kept_bytes), SPLICE_F_NONBLOCK);
+    if (count <= 0)
+        return false;
+    discarded_bytes_ += static_cast<std::uint64_t>(count);
     partial_line_.clear();
-    return count > 0;
+    return true;
 }
 
 void Process::read_output(std::size_t max_bytes) {

@@ -724,6 +724,22 @@ static void flood_output(void) {
     fflush(stdout);
 }
 
+/* Fills the pipe to the host at once, and aborts when the host has read or discarded everything. */
+static void print_burst(void) {
+    static char text[60 << 10];
+    int unread = 1;
+    memset(text, 'x', sizeof text);
+    for (size_t i = 99; i < sizeof text; i += 100)
+        text[i] = '\n';
+    strcpy(text + sizeof text - 25, "\nthe reason of the crash");
+    text[sizeof text - 1] = '\n';
+    if (write(1, text, sizeof text) != (ssize_t)sizeof text)
+        return;
+    while (ioctl(1, FIONREAD, &unread) == 0 && unread > 0)
+        usleep(1000);
+    abort();
+}
+
 /* Repeats the first message of the worker, so that the host sets up the plugin again. */
 static void say_hello(void) {
     say_text("{\"type\": \"hello\", \"sandbox\": \"\", \"descriptor\": {\"kind\": 2, \"id\": \"hostile\", "
@@ -838,6 +854,8 @@ static void attack(const tracker *self) {
         print_lines();
     } else if (!strcmp(name, "output")) {
         flood_output();
+    } else if (!strcmp(name, "burst")) {
+        print_burst();
     } else if (!strcmp(name, "pipe")) {
         report(self, "a pipe", mkfifo("stats.json", 0600) == 0 && mkfifo("times.csv", 0600) == 0);
     }
