@@ -2,6 +2,7 @@
 #include "libav_common/film_clock.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <utility>
 
 namespace arhost::libav {
@@ -21,14 +22,18 @@ std::int64_t FilmClock::next_ns(std::optional<std::int64_t> stamp_ns, bool has_j
     constexpr std::int64_t longest_gap_ns = longest_gap_s * 1'000'000'000;
     const std::int64_t expected_ns = time_ns_ + (is_first_ ? 0 : period_ns_);
     if (stamp_ns && !offset_ns_)
-        offset_ns_ = is_first_ ? 0 : expected_ns - *stamp_ns;
-    const std::int64_t found_ns = stamp_ns ? *stamp_ns + *offset_ns_ : expected_ns;
-    const bool is_back =
-        found_ns < time_ns_ - 2 * period_ns_; // wrong by less: the stamps of the pictures are not in order
-    if (!is_first_ && (is_back || (has_jumps && found_ns > time_ns_ + longest_gap_ns))) {
-        offset_ns_ = expected_ns - *stamp_ns;
-        return time_ns_ = expected_ns;
+        offset_ns_ = expected_ns - (is_first_ ? 0 : *stamp_ns);
+    if (stamp_ns && has_jumps && !is_first_) {
+        const auto error_ns = [&](std::int64_t offset_ns) { return std::abs(*stamp_ns + offset_ns - expected_ns); };
+        const auto before_jump_ns = std::exchange(offset_before_jump_ns_, std::nullopt);
+        if (before_jump_ns && error_ns(*before_jump_ns) < error_ns(*offset_ns_))
+            offset_ns_ = before_jump_ns; // only the last time stamp was wrong
+        const std::int64_t step_ns = *stamp_ns + *offset_ns_ - time_ns_;
+        // A smaller step back is no jump: the time stamps of the pictures are not in order.
+        if (step_ns < -2 * period_ns_ || step_ns > longest_gap_ns)
+            offset_before_jump_ns_ = std::exchange(offset_ns_, expected_ns - *stamp_ns);
     }
+    const std::int64_t found_ns = stamp_ns ? *stamp_ns + *offset_ns_ : expected_ns;
     return time_ns_ = std::exchange(is_first_, false) ? found_ns : std::max(found_ns, time_ns_);
 }
 

@@ -18,13 +18,15 @@ public:
     // `period_ns`: the time from one picture to the next; used where the time stamps do not tell it.
     explicit FilmClock(std::int64_t period_ns = 0) : period_ns_(period_ns) {}
 
-    // `has_jumps`: whether the container allows jumps (AVFMT_TS_DISCONT). Only then, a long step forwards is one.
+    // `has_jumps`: whether the container allows jumps (AVFMT_TS_DISCONT). Otherwise, a step back is a wrong time
+    // stamp, and a long step forwards is a long picture.
     std::int64_t next_ns(std::optional<std::int64_t> stamp_ns, bool has_jumps);
     std::int64_t time_ns() const { return time_ns_; } // of the last picture; the first one's is its time stamp, or 0
 
 private:
     std::int64_t period_ns_, time_ns_ = 0;
-    std::optional<std::int64_t> offset_ns_; // time minus time stamp; nullopt before the first time stamp
+    std::optional<std::int64_t> offset_ns_;             // time minus time stamp; nullopt before the first time stamp
+    std::optional<std::int64_t> offset_before_jump_ns_; // if the last time stamp jumped, which may have been an error
     bool is_first_ = true;
 };
 

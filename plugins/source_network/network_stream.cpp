@@ -147,11 +147,9 @@ bool NetworkStream::next() {
     for (;;) {
         const int received = checked(avcodec_receive_frame(codec_.get(), picture_.get()));
         if (received == 0) {
-            const auto stamp = stamp_ns();
-            if (stamp)
-                sender_ns_ = clock_.next_ns(stamp, (input_->iformat->flags & AVFMT_TS_DISCONT) != 0);
-            else
-                sender_ns_.reset();
+            sender_ns_ = stamp_ns();
+            if (sender_ns_ && input_->iformat->flags & AVFMT_TS_DISCONT)
+                sender_ns_ = clock_.next_ns(sender_ns_, true);
             if (!(picture_->flags & AV_FRAME_FLAG_CORRUPT) && !picture_->decode_error_flags)
                 return true;
             ++damaged_;
