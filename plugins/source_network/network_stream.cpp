@@ -175,34 +175,24 @@ int NetworkStream::read_packet() {
     return read_to_boundary(packets_.packet());
 }
 
-// Reads a picture of Motion-JPEG from its first bytes to the boundary after it, which begins with "--" on a new line.
 int NetworkStream::read_to_boundary(AVPacket &packet) {
-    constexpr std::string_view start_of_image = "\xff\xd8\xff", end_of_image = "\xff\xd9", boundary = "--";
     constexpr std::size_t max_picture_bytes = 64 << 20;
     for (;;) {
-        const std::size_t start = unparsed_.find(start_of_image);
-        unparsed_.erase(
-            0, start != std::string::npos ? start : unparsed_.size() - std::min<std::size_t>(unparsed_.size(), 2));
-        for (std::size_t end = unparsed_.find(end_of_image); end != std::string::npos;
-             end = unparsed_.find(end_of_image, end + 1)) {
-            const std::size_t size = end + end_of_image.size(), next = unparsed_.find_first_not_of("\r\n", size);
-            if (next == std::string::npos || unparsed_.compare(next, boundary.size(), boundary) != 0)
-                continue;
+        if (const auto picture = pictures_.next()) {
             av_packet_unref(&packet);
-            if (const int made = av_new_packet(&packet, static_cast<int>(size)); made < 0)
+            if (const int made = av_new_packet(&packet, static_cast<int>(picture->size())); made < 0)
                 return made;
             packet.stream_index = track_->index;
             packet.flags |= AV_PKT_FLAG_KEY;
-            std::memcpy(packet.data, unparsed_.data(), size);
-            unparsed_.erase(0, next);
+            std::memcpy(packet.data, picture->data(), picture->size());
             return 0;
         }
-        unsigned char bytes[16384];
-        const int count = avio_read_partial(input_->pb, bytes, sizeof bytes);
+        char bytes[16384];
+        const int count = avio_read_partial(input_->pb, reinterpret_cast<unsigned char *>(bytes), sizeof bytes);
         if (count <= 0)
             return count < 0 ? count : AVERROR_EOF;
-        unparsed_.append(reinterpret_cast<const char *>(bytes), static_cast<std::size_t>(count));
-        if (unparsed_.size() > max_picture_bytes)
+        pictures_.append({bytes, static_cast<std::size_t>(count)});
+        if (pictures_.size() > max_picture_bytes)
             return AVERROR_INVALIDDATA;
     }
 }

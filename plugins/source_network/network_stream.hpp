@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include "jpeg_splitter.hpp"
 #include "libav_common/film_clock.hpp"
 #include "libav_common/log.hpp"
 
@@ -74,7 +75,7 @@ private:
     libav::PacketReader packets_;
     libav::FramePointer picture_;
     bool finds_boundaries_ = false; // of Motion-JPEG, because the lengths that the camera sends are wrong
-    std::string unparsed_;          // data after the last picture found by its boundary
+    JpegSplitter pictures_;
     bool timed_ = false, ahead_of_time_ = false, ends_ = false;
     std::int64_t arrival_ns_ = 0;
     libav::FilmClock clock_;

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "failure_of.hpp"
+#include "jpeg_splitter.hpp"
 #include "sender_clock.hpp"
 #include "stream_url.hpp"
 
 #include <gmock/gmock.h>
 
 #include <random>
+#include <vector>
 
 namespace {
 
 using arhost::check_url;
+using arhost::JpegSplitter;
 using arhost::SenderClock;
 using arhost::without_credentials;
 
@@ -78,6 +81,24 @@ TEST(SenderClock, UsesTheArrivalIfThereAreNoTimeStamps) {
     SenderClock clock;
     EXPECT_EQ(clock.capture_ns(std::nullopt, 5), 5);
     EXPECT_EQ(clock.capture_ns(std::nullopt, 9), 9);
+}
+
+TEST(JpegSplitter, FindsPicturesHoweverTheirBytesArrive) {
+    const std::string first = "\xff\xd8\xff" + std::string(300, 'a') + "\xff\xd9\r\n-no boundary\xff\xff\xd9",
+                      second = "\xff\xd8\xff\xd9";
+    const std::string stream = "--frame\r\nContent-Length: 7\r\n\r\n\xff" + first + "\r\n--frame\r\n\r\n" + second +
+                               "\n--frame\r\n\r\n\xff\xd8";
+    for (const std::size_t size : {std::size_t(1), std::size_t(2), std::size_t(7), stream.size()}) {
+        JpegSplitter splitter;
+        std::vector<std::string> found;
+        for (std::size_t begin = 0; begin < stream.size(); begin += size) {
+            splitter.append(std::string_view(stream).substr(begin, size));
+            while (const auto picture = splitter.next())
+                found.push_back(*picture);
+        }
+        EXPECT_EQ(found, (std::vector{first, second})) << size << " bytes at a time";
+        EXPECT_EQ(splitter.size(), 2u) << size << " bytes at a time";
+    }
 }
 
 TEST(Url, IsAcceptedWithCredentialsPortAndQuery) {
