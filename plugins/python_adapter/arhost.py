@@ -54,14 +54,13 @@ class Host:
         return False
 
 
-class _PrintedLines(io.TextIOBase):
-    """Logs the lines that the script prints. The log is limited, so printing never blocks."""
+class _PrintedLines(io.TextIOWrapper):
+    """Standard output of the script, whose text is logged by line. The log is limited, so printing never blocks.
+    What is written to `buffer` or `fileno()` is logged like the output of a program."""
 
     def __init__(self, log):
+        super().__init__(io.FileIO(1, "w", closefd=False), "utf-8", write_through=True)
         self.log, self.line = log, ""
-
-    def writable(self):
-        return True
 
     def write(self, text):
         *lines, self.line = (self.line + text).split("\n")
@@ -70,9 +69,6 @@ class _PrintedLines(io.TextIOBase):
                 self.log(SEVERITY_INFO, line)
         self.line = self.line[:4000]  # the maximum of the log
         return len(text)
-
-    def flush(self):
-        pass  # the line is not complete
 
 
 class Fields:
@@ -176,7 +172,11 @@ class _Adapter:
     def __init__(self, log, progress, cancelled):
         self.host = Host(log, progress, cancelled)
         self.warned = False
-        sys.stdout = _PrintedLines(log)
+        self.stdout = sys.stdout = _PrintedLines(log)
+
+    def end(self):
+        if sys.stdout is self.stdout:
+            sys.stdout = sys.__stdout__
 
     # Report a configuration error: if the script fails to load now, it would also fail on every retry.
     @_reporting(STATUS_ERROR_CONFIGURATION)

@@ -15,6 +15,7 @@
 #include <cstdlib>
 #include <dlfcn.h>
 #include <fstream>
+#include <optional>
 #include <string_view>
 #include <tuple>
 #include <utility>
@@ -130,17 +131,23 @@ template <class Plane> Object views_of_planes(const arhost_frame_format &format,
     return tuple_of(std::move(views));
 }
 
-// ---- functions that the script can call; `self` is a capsule that holds the arhost_host, which outlives them ----
+// ---- functions that the script can call; `self` is a capsule that holds the arhost_host ----
 
-Host host_of(PyObject *self) {
-    return Host(static_cast<const arhost_host *>(PyCapsule_GetPointer(self, nullptr)));
+constexpr const char *host_name = "arhost_host"; // of the capsule, until the instance ends
+
+// Returns nullopt if the instance has ended, which threads of the script may outlive.
+std::optional<Host> host_of(PyObject *self) {
+    if (!PyCapsule_IsValid(self, host_name))
+        return std::nullopt;
+    return Host(static_cast<const arhost_host *>(PyCapsule_GetPointer(self, host_name)));
 }
 PyObject *py_log(PyObject *self, PyObject *arguments) {
     int severity = 0;
     const char *text = nullptr;
     if (!PyArg_ParseTuple(arguments, "is", &severity, &text))
         return nullptr;
-    host_of(self).log(severity, text);
+    if (const auto host = host_of(self))
+        host->log(severity, text);
     Py_RETURN_NONE;
 }
 PyObject *py_progress(PyObject *self, PyObject *arguments) {
@@ -148,11 +155,13 @@ PyObject *py_progress(PyObject *self, PyObject *arguments) {
     const char *what = "";
     if (!PyArg_ParseTuple(arguments, "d|s", &fraction, &what))
         return nullptr;
-    host_of(self).progress(fraction, what);
+    if (const auto host = host_of(self))
+        host->progress(fraction, what);
     Py_RETURN_NONE;
 }
 PyObject *py_cancelled(PyObject *self, PyObject *) {
-    return PyBool_FromLong(host_of(self).cancelled());
+    const auto host = host_of(self);
+    return PyBool_FromLong(!host || host->cancelled());
 }
 PyMethodDef callbacks[] = {{"log", py_log, METH_VARARGS, "log(severity, text)"},
                            {"progress", py_progress, METH_VARARGS, "progress(fraction, what)"},
@@ -251,13 +260,13 @@ public:
         initialise(interpreter);
         const GilLock lock;
         const Object module = import_arhost(interpreter);
-        const Object capsule = checked(PyCapsule_New(const_cast<arhost_host *>(host_.get()), nullptr, nullptr));
-        Object functions[3];
-        for (int i = 0; i < 3; ++i)
-            functions[i] = checked(PyCFunction_New(&callbacks[i], capsule.get()));
-        adapter_ = checked(PyObject_CallMethod(module.get(), ADAPTER, "OOO", functions[0].get(), functions[1].get(),
-                                               functions[2].get()));
         try {
+            capsule_ = checked(PyCapsule_New(const_cast<arhost_host *>(host_.get()), host_name, nullptr));
+            Object functions[3];
+            for (int i = 0; i < 3; ++i)
+                functions[i] = checked(PyCFunction_New(&callbacks[i], capsule_.get()));
+            adapter_ = checked(PyObject_CallMethod(module.get(), ADAPTER, "OOO", functions[0].get(),
+                                                   functions[1].get(), functions[2].get()));
             if (call("load", "sss", options.text("script").c_str(), options.text("class").c_str(),
                      options.text("arguments").c_str())
                     .value.get() == Py_True)
@@ -267,7 +276,7 @@ public:
                 static_cast<std::uint32_t>(PyLong_AsUnsignedLongMask(call("capabilities", "").value.get()));
 #endif
         } catch (...) {
-            adapter_ = Object(); // destruction requires the GIL
+            end();
             throw;
         }
     }
@@ -275,7 +284,7 @@ public:
         if (lister_ == this)
             lister_ = nullptr;
         const GilLock lock;
-        adapter_ = Object();
+        end();
     }
     PythonAdapter(const PythonAdapter &) = delete;
     PythonAdapter &operator=(const PythonAdapter &) = delete;
@@ -445,6 +454,17 @@ private:
         });
     }
 
+    // The GIL must be held. Threads of the script may continue; they can no longer call the host.
+    void end() {
+        if (adapter_)
+            const Object ignored = PyObject_CallMethod(adapter_.get(), "end", nullptr);
+        adapter_ = Object();
+        if (capsule_)
+            PyCapsule_SetName(capsule_.get(), nullptr);
+        capsule_ = Object();
+        PyErr_Clear();
+    }
+
     // Calls a method of the adapter; throws if it reports an error.
     template <class... Arguments> Answer call(const char *method, const char *format, Arguments... arguments) {
         const Object pair = checked(PyObject_CallMethod(adapter_.get(), method, format, arguments...));
@@ -468,7 +488,7 @@ private:
     Host host_;
     std::string path_;
     std::uint64_t state_size_ = 0; // size of a tracker's state
-    Object adapter_;
+    Object capsule_, adapter_;
 #if defined(KIND_RAYTRACER)
     std::uint32_t capabilities_ = 0;
 #endif

@@ -334,6 +334,43 @@ TEST_F(PythonAdapter, PrintedLinesAreLoggedAndAFloodOfThemDelaysNoFrame) {
     EXPECT_EQ(run.stats()["restarts"]["tracker"], 0);
 }
 
+TEST_F(PythonAdapter, StandardOutputAcceptsBytesAndHasADescriptor) {
+    ArhostRun run(tracker);
+    EXPECT_EQ(run_script(run, std::string("import faulthandler, os, sys\n"
+                                          "sys.stdout.buffer.write(b'from the buffer\\n')\n"
+                                          "os.write(sys.stdout.fileno(), b'from the descriptor\\n')\n"
+                                          "faulthandler.enable(sys.stdout)\n") +
+                                  idle_tracker),
+              0)
+        << run.output();
+    for (const char *line : {"from the buffer", "from the descriptor"})
+        EXPECT_THAT(run.output(), HasSubstr(std::string("tracker: ") + line + "\n"));
+}
+
+TEST_F(PythonAdapter, ThreadsOfTheScriptMayOutliveTheInstance) {
+    ArhostRun run(tracker); // only for its folder
+    run.write("script.py", "import sys, threading, time\n"
+                           "class S:\n"
+                           "    def __init__(self, host, path):\n"
+                           "        def watch():\n"
+                           "            while not host.cancelled(): time.sleep(0.001)\n"
+                           "            host.info('not logged')\n"
+                           "            printed.write('not logged\\n')\n"
+                           "            with open(path, 'w') as file: file.write(str(sys.stdout is sys.__stdout__))\n"
+                           "        printed = sys.stdout\n"
+                           "        threading.Thread(target=watch, daemon=True).start()\n"
+                           "    def start(self, setup): pass\n"
+                           "    def read(self, buffer): pass\n");
+    PluginUnderTest plugin("source_python");
+    ASSERT_EQ(plugin.create({{"script", run.path("script.py")},
+                             {"arguments", "{\"path\": \"" + run.path("ended.txt").string() + "\"}"}}),
+              ARHOST_STATUS_OK)
+        << plugin.log();
+    plugin.destroy();
+    EXPECT_TRUE(eventually([&] { return run.read("ended.txt") == "True"; }));
+    EXPECT_EQ(plugin.log(), "");
+}
+
 // The script writes files like tempfile, matplotlib, numba and torch.
 TEST_F(PythonAdapter, LibrariesFindTheirFoldersForTemporaryFilesAndCaches) {
     ArhostRun run(tracker);
@@ -456,13 +493,18 @@ TEST_F(PythonAdapter, ASourceMustReturnItsFormat) {
 }
 
 TEST_F(PythonAdapter, ASourceMayWaitLongerThanItsDeadline) {
-    ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_python, deadline_ms: 300, options: {script: "
-                  "script.py}}\noutputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n");
+    const auto deadline = scaled(std::chrono::milliseconds(300));
+    ArhostRun run(
+        "version: 1\nmode: live\nsource: {plugin: source_python, deadline_ms: " + std::to_string(deadline.count()) +
+        ", options: {script: "
+        "script.py}}\noutputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n");
     EXPECT_EQ(run_script(run, "class S:\n    def __init__(self, host): self.host = host\n"
                               "    def start(self, setup): return {'width': 8, 'height': 8}\n"
                               "    def read(self, buffer):\n"
-                              "        if buffer.sequence == 2 or not self.host.wait(0.8): return None\n"
-                              "        return 40_000_000 * buffer.sequence\n"),
+                              "        if buffer.sequence == 2 or not self.host.wait(" +
+                                  std::to_string(3 * std::chrono::duration<double>(deadline).count()) +
+                                  "): return None\n"
+                                  "        return 40_000_000 * buffer.sequence\n"),
               0)
         << run.output();
     EXPECT_EQ(run.stats()["restarts"]["source"], 0);
