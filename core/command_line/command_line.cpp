@@ -106,9 +106,11 @@ Option Option::range(double minimum, double maximum) {
         double value = 0;
         if (!CLI::detail::lexical_cast(text, value) || std::isnan(value))
             return text + " is not a number";
+        if (value >= minimum && value <= maximum)
+            return "";
         std::ostringstream range;
-        range << std::setprecision(15) << "must be " << minimum << " to " << maximum << ", but is " << text;
-        return value < minimum || value > maximum ? range.str() : "";
+        range << std::setprecision(16) << "must be " << minimum << " to " << maximum << ", but is " << text;
+        return range.str();
     }));
 }
 Option Option::one_of(const std::vector<std::string> &choices) {

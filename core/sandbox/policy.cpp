@@ -21,7 +21,7 @@ constexpr PathList system_readable = {
     // their settings
     "/etc/ld.so.cache", "/etc/ld.so.conf", "/etc/ld.so.conf.d", "/etc/localtime", "/etc/alternatives", "/etc/fonts",
     "/etc/OpenCL", "/etc/vulkan", "/etc/glvnd", "/etc/drirc", "/etc/python3", "/etc/mime.types",
-    // the process, by name: net and task, which contains net of each thread, describe the network
+    // the process, without net and task, because they describe the network (task contains net of each thread)
     "/proc/self/attr", "/proc/self/auxv", "/proc/self/cgroup", "/proc/self/cmdline", "/proc/self/comm",
     "/proc/self/environ", "/proc/self/fd", "/proc/self/fdinfo", "/proc/self/io", "/proc/self/limits",
     "/proc/self/maps", "/proc/self/numa_maps", "/proc/self/oom_score", "/proc/self/oom_score_adj", "/proc/self/smaps",

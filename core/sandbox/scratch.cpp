@@ -24,7 +24,7 @@ void point_to_scratch(const Policy &policy) {
         if (!policy.environment.contains(variable))
             ::setenv(variable, value.c_str(), 1);
     };
-    // Files that are found by the home folder of the user.
+    // Libraries look for these files in the user's home folder, but HOME is set to another folder below.
     if (const char *home = std::getenv("HOME")) {
         if (!std::getenv("PYTHONUSERBASE")) // may be granted with `reads`
             set("PYTHONUSERBASE", std::string(home) + "/.local");

@@ -60,9 +60,9 @@ void Link::log(arhost_severity severity, const std::string &text) const {
     }
     channel_.send(encode(is_flood
                              ? messages::Log{ARHOST_SEVERITY_WARNING,
-                                             "it logs more than 200 lines or 100 kB per second; arhost drops the "
-                                             "rest. Let it log or print less, for example once per second "
-                                             "instead of in each frame"}
+                                             "it logs more than 200 lines or 100 kB per second (warnings and errors "
+                                             "count apart from other lines); arhost drops the rest. Let it log or "
+                                             "print less, for example once per second instead of in each frame"}
                              : messages::Log{severity, text}),
                   {}, false);
 }

@@ -24,12 +24,10 @@ namespace arhost::fiducial {
 //   border and the margin, each one cell wide, are uniform.
 // - `is_subpixel`: whether the rough corners are accurate to a fraction of a pixel. If they are, the function returns
 //   them when noise or blur hides the edges.
-// - `blur_cells`: if not null, receives the standard deviation of the blur at the most blurred edge, in cells, also
-// if
-//   the function returns std::nullopt; 0 if no edge was found.
+// - `blur_cells`: if not null, receives the standard deviation of the blur at the most blurred edge, in cells,
+//   also if the function returns std::nullopt; 0 if no edge was found.
 // - `max_blur_cells`: if the blur is greater, the function does not search edges again, at more positions, that it
-// has
-//   not found well.
+//   has not found well.
 // The standard deviation of the corners is computed from the residuals of the fits. Returns std::nullopt if the
 // function does not find four edges that fit the image at least as well as the rough edges; the rough corners are
 // then the best estimate.

@@ -372,7 +372,7 @@ TEST(BadCommandLine, IsRejected) {
         {{"--config", "run.yaml", "--x1", "1"}, "need --g1"},
         {{"--config", "run.yaml", "--set", "outputs.0.plugin=x"}, "--set: outputs[0].plugin: there is no plugin"},
         {{"--config", "run.yaml", "--g2", "90", "--z2", "1"}, "--g2 sets the second rotation and needs --g1"},
-        {{"--config", "run.yaml", "--frames", "-3"}, "frames: must be 0 to 1e+15, but is -3"},
+        {{"--config", "run.yaml", "--frames", "-3"}, "frames: must be 0 to 1000000000000000, but is -3"},
         {{"run", "none.yaml"}, "none.yaml: cannot be read: No such file or directory"},
         {{"--config", "run.yaml", "--no\033[2J"}, "not expected: --no [2J"},
         {{"--config", "run.yaml", "--set", "outputs.0.path=caf\xe9.txt"}, "not valid UTF-8"}};
