@@ -22,8 +22,9 @@ std::string quoted(const std::string &text) {
 }
 
 run_config::Configuration configuration_of(const Input &input) {
-    std::string text = "version: 1\nrestart: {quarantine_after: 1}\nsource:\n  plugin: " + input.plugin +
-                       "\n  allow: " + nlohmann::json(input.allow).dump() + "\n  options:\n";
+    std::string text =
+        "version: 1\nrestart: {quarantine_after: 1, proven_after_frames: 1000000000}\nsource:\n  plugin: " +
+        input.plugin + "\n  allow: " + nlohmann::json(input.allow).dump() + "\n  options:\n";
     for (const auto &[key, value] : input.options)
         text += "    " + key + ": " + value + "\n";
     return run_config::parse(yaml::Node::parse(text, input.plugin), plugin_tools::built_in_plugins());
@@ -91,9 +92,13 @@ supervise::Component::Create FrameReader::on_hello(const model::PluginDescriptio
 ipc::SlotLayout FrameReader::on_ready(const ipc::messages::Ready &ready) {
     if (!ready.format)
         throw ipc::ProtocolViolation("the source's 'ready' lacks the frame format");
-    if (format_.width > 0 && (ready.format->width != format_.width || ready.format->height != format_.height))
-        throw std::runtime_error("the size of the frames differs after the restart");
-    format_ = *ready.format;
+    const arhost_frame_format &format = *ready.format;
+    // Frames of the previous process, which have its layout, may still be waiting.
+    if (format_.width > 0 && (format.pixel_format != format_.pixel_format || format.width != format_.width ||
+                              format.height != format_.height || format.yuv_range != format_.yuv_range ||
+                              format.has_depth != format_.has_depth))
+        throw std::runtime_error("the frame format differs after the restart");
+    format_ = format;
     return {format_.byte_size, slot_count};
 }
 
@@ -101,7 +106,7 @@ void FrameReader::on_result(const ipc::Command &command, const ipc::Result &resu
     if (result.status >= ARHOST_STATUS_END)
         ended_ = true;
     else if (result.status < 0)
-        component_.end_process(std::string("read failed: ") + model::status_text(result.status));
+        component_.disable(std::string("a frame cannot be read: ") + model::status_text(result.status));
     else if (!ended_)
         arrived_.push_back({component_.output(), command.slot});
 }

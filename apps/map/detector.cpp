@@ -135,7 +135,8 @@ Detector detector_of(const marker::Family &family, const std::set<int> &ids, con
     return shared(std::make_shared<AprilTags>(*type, ids, camera));
 }
 
-std::string seen_instead(const std::vector<cv::Mat> &grey_images, const arhost_intrinsics &camera) {
+std::string seen_instead(const std::vector<cv::Mat> &grey_images, const arhost_intrinsics &camera,
+                         const std::function<void()> &poll) {
     std::size_t most = 0;
     std::string best;
     for (const std::string &name : marker::family_names()) {
@@ -145,6 +146,7 @@ std::string seen_instead(const std::vector<cv::Mat> &grey_images, const arhost_i
         if (!is_known || family.count > 10'000) // the decoding tables of large families take seconds
             continue;
         const Detector detect = detector_of(family, {}, camera);
+        poll();
         std::size_t count = 0;
         for (const cv::Mat &grey : grey_images)
             count += detect(grey).size();

@@ -199,7 +199,9 @@ Observations observe(const Arguments &arguments, const Family &family, const Sid
     if (result.frames.empty())
         throw std::runtime_error(arguments.video + ": has no frames");
     if (result.sides_mm.empty()) {
-        const std::string other = seen_instead(first_pictures, result.camera);
+        const std::string other =
+            seen_instead(first_pictures, result.camera, [&] { progress.show("searching for other families"); });
+        progress.clear();
         throw std::runtime_error(fmt::format("no marker of {} was seen in {}{}", family.name,
                                              base::count_of(result.frames.size(), "frame"),
                                              other.empty() ? "" : "; the first ones show " + other));

@@ -75,7 +75,7 @@ private:
     base::AtomicFile stats_, timeline_;
 };
 
-// Removes the folders that a run has created and left empty, for example because an output could not start.
+// The folders that a run creates.
 class NewFolders {
 public:
     explicit NewFolders(const run_config::Configuration &configuration) {
@@ -86,13 +86,11 @@ public:
             if (file)
                 add(file->parent_path());
     }
-    ~NewFolders() {
+    void remove_empty() const {
         std::error_code not_empty;
         for (const std::filesystem::path &folder : missing_ | std::views::reverse)
             std::filesystem::remove(folder, not_empty);
     }
-    NewFolders(const NewFolders &) = delete;
-    NewFolders &operator=(const NewFolders &) = delete;
 
 private:
     void add(std::filesystem::path folder) {
@@ -255,8 +253,12 @@ int run(const run_config::Configuration &configuration, const Arguments &argumen
     signals.release(); // a stopped terminal may block the last log lines
     if (!written)
         return base::failed;
+    if (!completed && run.failures().is_configuration_error()) {
+        new_folders.remove_empty();
+        return base::invalid_input;
+    }
     if (!completed)
-        return run.failures().is_configuration_error() ? base::invalid_input : base::failed;
+        return base::failed;
     if (signals.arrived())
         return base::interrupted;
     return is_good ? base::success : base::failed;

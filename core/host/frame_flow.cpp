@@ -313,6 +313,7 @@ void FrameFlow::drop(Frames::iterator first, Frames::iterator last) {
 }
 
 void FrameFlow::omit_unfinished() {
+    omits_unfinished_ = true;
     drop(std::ranges::find_if(frames_, [](const auto &entry) { return entry.second->stage != Frame::Stage::done; }),
          frames_.end());
 }

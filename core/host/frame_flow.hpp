@@ -113,7 +113,7 @@ public:
     std::uint64_t next_read() const { return next_read_; } // number of the next frame of the source
     bool input_has_ended() const { return input_ended_; }
     bool was_interrupted() const { return interrupted_; }
-    bool discards_arrivals() const { return settings_.live && input_ended_ && interrupted_; }
+    bool discards_arrivals() const { return omits_unfinished_ || (settings_.live && input_ended_ && interrupted_); }
     bool expects_more_frames() const { return !no_more_frames() || !reads_.empty(); }
     bool is_empty() const { return frames_.empty(); }
     const Frame *find(std::uint64_t sequence) const; // nullptr if there is no such frame
@@ -166,7 +166,7 @@ private:
     Statistics &statistics_;
 
     double fps_ = 0;
-    bool paced_ = false, frozen_ = false, input_ended_ = false, interrupted_ = false;
+    bool paced_ = false, frozen_ = false, input_ended_ = false, interrupted_ = false, omits_unfinished_ = false;
     std::deque<Lease> reads_; // slots of the reads without an answer, oldest first
     std::uint64_t next_read_ = 0;
     Frames frames_;

@@ -265,7 +265,7 @@ void Outputs::end_sink(SinkQueue &sink) {
 }
 
 void Outputs::conclude(SinkQueue &sink, std::string error) {
-    if (sink.awaits_its_frame())
+    if (error.empty() && sink.awaits_its_frame())
         error = "the run ended before the next frame";
     else if (error.empty() && !sink.failure.empty())
         error = sink.failure;
@@ -276,6 +276,9 @@ void Outputs::conclude(SinkQueue &sink, std::string error) {
                 parts_.messages.error_of(sink.component->name(), sink.first_message, sink.failure);
             !reason.empty())
             error = reason;
+    if (!sink.on_demand && error.empty() && !sink.has_written() && parts_.statistics.composited > 0 &&
+        !parts_.flow.was_interrupted() && run_config::path_of(sink.configuration->node))
+        parts_.failures.add(sink.component->name() + ": no frame arrived, so no file was written", false);
     if (sink.on_demand && !sink.done && !sink.is_single && !error.empty())
         failed_recording_ = "the recording '" + sink.path + "' failed: " + error;
     if (sink.on_demand && !sink.path.empty() && error.empty()) {
@@ -328,17 +331,21 @@ void Outputs::take_snapshot(const control::Done &done) {
 }
 
 void Outputs::set_recording(std::optional<bool> on, const control::Done &done) {
-    const auto active = std::ranges::find_if(sinks_, [](const auto &sink) {
-        return sink->on_demand && sink->component->name() == "record" && !sink->ending;
-    });
-    const bool is_recording = active != sinks_.end() && !(*active)->closed;
-    if (on.value_or(!is_recording)) {
-        if (is_recording)
+    const auto recording = [this](bool closed) { // `closed`: one that has failed, but has not ended yet
+        return std::ranges::find_if(sinks_, [closed](const auto &sink) {
+            return sink->on_demand && sink->component->name() == "record" && !sink->ending && sink->closed == closed;
+        });
+    };
+    auto active = recording(false);
+    if (on.value_or(active == sinks_.end())) {
+        if (active != sinks_.end())
             throw control::Error("a recording is already in progress");
         failed_recording_.clear();
         start_output(*parts_.configuration.record, "record", done);
         return;
     }
+    if (active == sinks_.end())
+        active = recording(true);
     if (active == sinks_.end())
         throw control::Error(failed_recording_.empty() ? "there is no recording to stop"
                                                        : std::exchange(failed_recording_, ""));

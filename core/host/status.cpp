@@ -120,7 +120,7 @@ Json status_json(const RunParts &parts, const Assembly &assembly, const Outputs 
     const Statistics &statistics = parts.statistics;
     const run_config::Configuration &latest = *assembly.latest();
     const Tracker *const tracker = assembly.tracker();
-    const std::string missing = tracker
+    const std::string missing = tracker && tracker->running() && !parts.flow.is_frozen()
                                     ? missing_target(parts.configuration, statistics,
                                                      tracker->configuration()->targets, parts.context.reactor.now())
                                     : "";

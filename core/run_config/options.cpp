@@ -62,6 +62,8 @@ std::vector<model::OptionValue> resolve_options(const model::PluginDescription &
     std::vector<std::string_view> keys;
     for (const model::OptionDeclaration &declared : plugin.options)
         keys.push_back(declared.key);
+    if (options && std::ranges::count(plugin.needs, "listen"))
+        options->allow_keys(keys); // a misspelled option must not make a server accessible
     std::vector<yaml::Node> unknown = options ? options->set_aside_keys(keys) : std::vector<yaml::Node>();
     if (path && std::find(keys.begin(), keys.end(), "path") == keys.end())
         unknown.push_back(*path);

@@ -18,7 +18,8 @@ model::OptionValue value_of(const model::OptionDeclaration &declared, const yaml
 // map of the configured options, if any. `path` is the component's key `path:`, which sets the option of the same
 // name. Throws yaml::Error for unknown keys, wrong types, values out of range, and missing required options. The
 // error for a missing option has the position of `owner`. Unknown options and choices, and an unknown `path`, may be
-// left over from another plugin. They only add a note, unless they resemble a known option or choice.
+// left over from another plugin. They only add a note, unless they resemble a known option or choice, or the
+// plugin accepts connections.
 std::vector<model::OptionValue> resolve_options(const model::PluginDescription &plugin,
                                                 const std::optional<yaml::Node> &options,
                                                 const std::optional<yaml::Node> &path, const yaml::Node &owner,

@@ -61,7 +61,8 @@ Layer set_limits(const Policy &policy) {
     constexpr rlim_t reserved_bytes = rlim_t{64} << 30;
     if (has_memory_limit(policy)) {
         lower(layer, "memory", RLIMIT_DATA, memory_limit(policy));
-        lower(layer, "addresses", RLIMIT_AS, memory_limit(policy) + reserved_bytes);
+        if (!policy.allows("display")) // a window loads GPU drivers, which reserve large regions
+            lower(layer, "addresses", RLIMIT_AS, memory_limit(policy) + reserved_bytes);
     }
     // Prevents writes to /tmp even if other layers are missing.
     if (policy.writable.empty() && !policy.standard_output && !may_share_memory(policy))

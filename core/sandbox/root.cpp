@@ -63,7 +63,8 @@ public:
             return; // the new root has its own
         if (fs::exists(real, ignored))
             if (const auto [entry, is_new] = attributes_.emplace(real, attributes); !is_new)
-                entry->second &= attributes;
+                // Writable if one of the grants permits it, and then not executable if one of them forbids it.
+                entry->second = (entry->second & attributes) | ((entry->second | attributes) & MOUNT_ATTR_NOEXEC);
     }
     void link(const fs::path &path, const fs::path &target) { links_.emplace(path, target); }
     const std::map<fs::path, fs::path> &links() const { return links_; }

@@ -149,7 +149,7 @@ void Component::on_message(Message &message) {
         else if (stop_sent_)
             set_stop_deadline();
         else if (!call_cancelled_ && !in_flight_.empty()) {
-            waits_ = may_wait();
+            waits_ = description_.kind == ARHOST_KIND_SINK;
             set_frame_deadline();
         }
     } else if (is<messages::Hello>(message) && handshake_ == Handshake::opening) {

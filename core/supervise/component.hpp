@@ -78,8 +78,8 @@ public:
     // Asks the plugin to return from the current call soon. After this, a call that waits does not extend its
     // deadline.
     void cancel_call();
-    // Whether a source or a sink has reported progress in the current call. The source then waits for a frame, or the
-    // sink for another program that does not take the frame.
+    // Whether a sink has reported progress in the current call. It then waits for another program that does not take
+    // the frame.
     bool waits() const { return waits_; }
     // Why a live source has no camera at present; "" if it has one.
     const std::string &missing_device() const { return missing_device_; }

@@ -129,10 +129,8 @@ public:
         kept_.reset();
         files::remove_file(kept_path_);
         if (!pattern_ && (may_be_older_ || !fs::exists(path_)))
-            throw Failure(
-                ARHOST_STATUS_ERROR_IO,
-                "'" + path_.string() + "' was not written: " +
-                    (frame_ < 0 ? "there was no frame" : "the run ended before frame " + std::to_string(frame_)));
+            host_.warn("'" + path_.string() + "' was not written: " +
+                       (frame_ < 0 ? "there was no frame" : "the run ended before frame " + std::to_string(frame_)));
     }
 
 private:

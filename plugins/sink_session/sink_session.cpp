@@ -86,8 +86,7 @@ public:
 
     void stop() {
         if (!video_->is_open())
-            throw Failure(ARHOST_STATUS_ERROR_IO,
-                          "'" + folder_.string() + "' was not written, because there were no frames");
+            return host_.warn("'" + folder_.string() + "' was not written, because there were no frames");
         if (is_complete_)
             log_.append("{\"end\": true}\n"); // a log without this line was interrupted
     }

@@ -104,7 +104,7 @@ public:
         if (failed_)
             return files::remove_file(segment_of(path_, first_).path);
         if (!writer_)
-            throw without_frames();
+            return host_.warn("'" + path_.string() + "' was not written, because there were no frames");
         writer_.reset();
         encoder_.reset();
         const std::vector<Segment> segments = find_segments(path_);
@@ -177,10 +177,6 @@ private:
         writer_.emplace(segment_of(path_, first_).path, encoder_->context());
     }
 
-    Failure without_frames() const {
-        return {ARHOST_STATUS_ERROR_IO, "'" + path_.string() + "' was not written, because there were no frames"};
-    }
-
     void finish(const std::vector<Segment> &segments) {
         try {
             const std::int64_t frames = join(
@@ -188,8 +184,8 @@ private:
                 [&](double fraction) { host_.progress(fraction, "finishing the video"); },
                 [&](const std::string &text) { host_.warn(text); });
             if (frames == 0)
-                throw without_frames();
-            if (std::error_code error; fs::rename(partial_, path_, error), error)
+                host_.warn("'" + path_.string() + "' was not written, because there were no frames");
+            else if (std::error_code error; fs::rename(partial_, path_, error), error)
                 throw files::io_failure("cannot write", path_, error.value());
         } catch (const Failure &failure) {
             files::remove_file(partial_);

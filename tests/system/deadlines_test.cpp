@@ -147,15 +147,17 @@ TEST(Deadlines, AnOutputThatHangsInStopIsEndedAndOthersFinish) {
 }
 
 // After the signal, the source may no longer extend deadline_ms, so the outputs are completed.
-TEST(Deadlines, OneSignalEndsARunWhoseLiveSourceWaitsForever) {
-    ArhostRun run(
-        "version: 1\nmode: live\nsource: {plugin: source_waiting_live, deadline_ms: " + text_of(scaled(400ms)) +
-        ", options: {wait_ms: -1}}\noutputs: [{plugin: sink_counter, path: out/counted.txt}]\n");
-    run.start();
-    ASSERT_TRUE(run.wait_for_output("waits for a frame")) << run.output();
-    send_signal(run.pid(), SIGTERM);
-    EXPECT_EQ(run.wait(), 130) << run.output();
-    EXPECT_TRUE(run.exists("out/counted.txt.done"));
+TEST(Deadlines, OneSignalEndsARunWhoseSourceWaitsForever) {
+    for (const char *plugin : {"source_waiting_live", "source_waiting"}) {
+        ArhostRun run("version: 1\nmode: live\nsource: {plugin: " + std::string(plugin) +
+                      ", deadline_ms: " + text_of(scaled(400ms)) +
+                      ", options: {wait_ms: -1}}\noutputs: [{plugin: sink_counter, path: out/counted.txt}]\n");
+        run.start();
+        ASSERT_TRUE(run.wait_for_output("waits for a frame")) << run.output();
+        send_signal(run.pid(), SIGTERM);
+        EXPECT_EQ(run.wait(), 130) << run.output();
+        EXPECT_TRUE(run.exists("out/counted.txt.done"));
+    }
 }
 
 TEST(Deadlines, TheVideoContinuesDuringTheBackOff) {
