@@ -231,10 +231,18 @@ class _Adapter:
             if isinstance(error, SyntaxError):
                 place = [f"{error.filename}:{error.lineno}: "]
             hint = ""
-            if isinstance(error, ModuleNotFoundError) and not os.access(sys.path[0], os.R_OK):
+            if isinstance(error, ModuleNotFoundError) and self._is_hidden(sys.path[0]):
                 hint = (f"; if the module is next to the script, add 'reads: [{sys.path[0]}]', because the sandbox "
                         "shows a plugin only its script")
             return status, f"{''.join(place)}{type(error).__name__}: {error}{hint}"
+
+    @staticmethod
+    def _is_hidden(folder):
+        """Whether the sandbox shows only the script in this folder."""
+        try:
+            return len(os.listdir(folder)) == 1
+        except OSError:
+            return True
 
     def _place(self, method):
         code = getattr(getattr(self.plugin, method), "__code__", None)
