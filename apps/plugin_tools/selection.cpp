@@ -25,9 +25,13 @@ std::vector<std::filesystem::path> Selection::files() const {
         return path.all();
     std::vector<std::filesystem::path> files;
     try {
-        for (const std::string &name : names_)
-            files.push_back(std::filesystem::is_regular_file(name) ? std::filesystem::absolute(name)
-                                                                   : path.find(name));
+        for (const std::string &name : names_) { // or a path, as in configurations
+            std::error_code ignored;
+            const bool is_path = name.find('/') != std::string::npos || name.ends_with(".so");
+            files.push_back(is_path && std::filesystem::is_regular_file(name, ignored)
+                                ? std::filesystem::absolute(name)
+                                : path.find(name));
+        }
     } catch (const std::runtime_error &error) {
         throw base::InvalidInput(error.what());
     }

@@ -394,6 +394,7 @@ TEST(CommandLine, PrintsVersionHelpAndPlugins) {
     EXPECT_THAT(run.output(), HasSubstr("third                The third of three (default 'c')"));
     EXPECT_EQ(run.run({"plugins", "--options", "rt_counter"}), 0) << run.output();
     EXPECT_THAT(run.output(), AllOf(HasSubstr("delay_ms"), Not(HasSubstr("tracker"))));
+    EXPECT_EQ(run.run({"plugins", arhost::test::test_plugin_directory() + "/rt_counter.so"}), 0) << run.output();
     run.expect({"plugins", "rt_counted"}, 2, {"there is no plugin 'rt_counted'"});
     EXPECT_EQ(run.run({}), 2);
     EXPECT_EQ(run.run({"--nonsense"}), 2);
