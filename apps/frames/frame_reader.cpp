@@ -78,7 +78,12 @@ supervise::Component::Callbacks FrameReader::callbacks() {
         if (!unanswered.empty())
             next_sequence_ = unanswered.front().sequence;
     };
-    callbacks.disabled = [this](const std::string &reason, bool) { failure_ = reason; };
+    callbacks.disabled = [this](const std::string &reason, bool) {
+        // Omits the place in the configuration, which the user has not written.
+        constexpr std::string_view place = ": source.options.";
+        const std::size_t at = reason.find(place), end = reason.find(": ", at == std::string::npos ? at : at + 1);
+        failure_ = end == std::string::npos ? reason : reason.substr(end + 2);
+    };
     return callbacks;
 }
 

@@ -137,7 +137,7 @@ Detector detector_of(const marker::Family &family, const std::set<int> &ids, con
 
 std::string seen_instead(const std::vector<cv::Mat> &grey_images, const arhost_intrinsics &camera,
                          const std::function<void()> &poll) {
-    std::size_t most = 0;
+    std::set<int> best_ids;
     std::string best;
     for (const std::string &name : marker::family_names()) {
         const marker::Family family = marker::find_family(name);
@@ -145,15 +145,16 @@ std::string seen_instead(const std::vector<cv::Mat> &grey_images, const arhost_i
             family.is_dictionary || std::ranges::count(apriltag::family_types, name, &apriltag::FamilyType::name) > 0;
         if (!is_known || family.count > 10'000) // the decoding tables of large families take seconds
             continue;
-        const Detector detect = detector_of(family, {}, camera);
         poll();
-        std::size_t count = 0;
+        const Detector detect = detector_of(family, {}, camera);
+        std::set<int> ids;
         for (const cv::Mat &grey : grey_images)
-            count += detect(grey).size();
+            for (const Detection &detection : detect(grey))
+                ids.insert(detection.id);
         // Of dictionaries that contain each other, the first one is the smallest.
-        if (count > most) {
-            most = count;
-            best = base::count_of(count, "marker") + " of " + name;
+        if (ids.size() > best_ids.size()) {
+            best_ids = ids;
+            best = base::count_of(ids.size(), "marker") + " of " + name + ", such as " + std::to_string(*ids.begin());
         }
     }
     return best;

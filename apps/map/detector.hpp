@@ -24,8 +24,8 @@ using Detector = std::function<std::vector<Detection>(const cv::Mat &grey)>;
 // `ids`: the markers to find; empty: all of the family.
 Detector detector_of(const marker::Family &family, const std::set<int> &ids, const arhost_intrinsics &camera);
 
-// Returns, for images without a marker of the expected family, which family they show: "3 markers of tag25h9"; "" if
-// none. The search takes seconds; `poll` is called meanwhile and may throw.
+// Returns, for images without a marker of the expected family, which family they show: "3 markers of tag25h9, such as
+// 7"; "" if none. The search takes seconds; `poll` is called meanwhile and may throw.
 std::string seen_instead(const std::vector<cv::Mat> &grey_images, const arhost_intrinsics &camera,
                          const std::function<void()> &poll);
 

@@ -202,7 +202,7 @@ Observations observe(const Arguments &arguments, const Family &family, const Sid
         const std::string other =
             seen_instead(first_pictures, result.camera, [&] { progress.show("searching for other families"); });
         progress.clear();
-        throw std::runtime_error(fmt::format("no marker of {} was seen in {}{}", family.name,
+        throw std::runtime_error(fmt::format("none of the {} markers to find was seen in {}{}", family.name,
                                              base::count_of(result.frames.size(), "frame"),
                                              other.empty() ? "" : "; the first ones show " + other));
     }

@@ -41,6 +41,27 @@ bool creates_files(const yaml::Node &path) {
     return !run_config::is_standard_output(path) && type != fs::file_type::fifo && type != fs::file_type::character;
 }
 
+fs::path lock_of(const fs::path &file) {
+    return base::runtime_folder() / fmt::format("output-{:016x}", std::hash<std::string>()(file.string()));
+}
+
+[[noreturn]] void fail(const yaml::Node &path, const fs::path &file, const base::UniqueFd &lock) {
+    char owner[512];
+    const ssize_t size = ::pread(lock.get(), owner, sizeof owner, 0);
+    path.fail("'" + base::printable(file.string()) + "' is being written by another run (" +
+              base::printable(std::string(owner, size > 0 ? static_cast<std::size_t>(size) : 0)) +
+              "); end that run, or choose another path");
+}
+
+// Throws if another run writes a folder that contains `file`, such as a session.
+void expect_free_folders(const yaml::Node &path, const fs::path &file) {
+    for (fs::path folder = file.parent_path(); folder.has_relative_path(); folder = folder.parent_path()) {
+        const base::UniqueFd lock(::open(lock_of(folder).c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
+        if (lock && ::flock(lock.get(), LOCK_SH | LOCK_NB) != 0)
+            fail(path, folder, lock);
+    }
+}
+
 } // namespace
 
 OutputLocks::OutputLocks(const run_config::Configuration &configuration) {
@@ -49,27 +70,26 @@ OutputLocks::OutputLocks(const run_config::Configuration &configuration) {
     } catch (const std::runtime_error &) {
         return; // a run must not fail because of a foreign folder
     }
-    for (const run_config::ComponentConfiguration &output : configuration.outputs) {
-        const auto path = run_config::path_of(output.node);
-        if (!path || !creates_files(*path))
+    const std::string owner = fmt::format("process {}, {}", ::getpid(), configuration.node.file().string());
+    std::vector<yaml::Node> paths;
+    for (const run_config::ComponentConfiguration &output : configuration.outputs)
+        if (const auto path = run_config::path_of(output.node))
+            paths.push_back(*path);
+    for (const run_config::OutputFile &report : configuration.report_files())
+        paths.push_back(report.path);
+    for (const yaml::Node &path : paths) {
+        if (!creates_files(path))
             continue;
-        const std::string file = base::real_path(path->output_path()).string();
-        const fs::path name = base::runtime_folder() / fmt::format("output-{:016x}", std::hash<std::string>()(file));
+        const fs::path file = base::real_path(path.output_path());
+        expect_free_folders(path, file);
         bool is_taken = false;
-        base::UniqueFd lock = take(name, is_taken);
-        if (!lock)
-            continue;
-        if (is_taken) {
-            char owner[512];
-            const ssize_t size = ::pread(lock.get(), owner, sizeof owner, 0);
-            path->fail("'" + base::printable(file) + "' is being written by another run (" +
-                       base::printable(std::string(owner, size > 0 ? static_cast<std::size_t>(size) : 0)) +
-                       "); end that run, or choose another path");
-        }
-        const std::string owner = fmt::format("process {}, {}", ::getpid(), configuration.node.file().string());
-        if (::ftruncate(lock.get(), 0) == 0)
+        base::UniqueFd lock = take(lock_of(file), is_taken);
+        if (is_taken)
+            fail(path, file, lock);
+        if (lock && ::ftruncate(lock.get(), 0) == 0)
             (void)::pwrite(lock.get(), owner.data(), owner.size(), 0);
-        locks_.push_back({name, std::move(lock)});
+        if (lock)
+            locks_.push_back({lock_of(file), std::move(lock)});
     }
 }
 

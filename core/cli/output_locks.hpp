@@ -11,10 +11,10 @@
 
 namespace arhost::cli {
 
-// Locks the files of the outputs while it exists, for this user's runs on this machine. The locks are files in
-// base::runtime_folder(); the kernel releases them when the process ends. Throws yaml::Error at the output whose file
-// another run has locked; its message names that run. Outputs to standard output, FIFOs and devices are not locked,
-// nor is anything if the folder cannot be used.
+// Locks the files of the outputs, of the statistics and of the timeline while it exists, for this user's runs on this
+// machine. The locks are files in base::runtime_folder(); the kernel releases them when the process ends. Throws
+// yaml::Error at the output whose file another run has locked; its message names that run. Outputs to standard
+// output, FIFOs and devices are not locked, nor is anything if the folder cannot be used.
 class OutputLocks {
 public:
     explicit OutputLocks(const run_config::Configuration &configuration);

@@ -69,7 +69,7 @@ glm::vec3 colour_of(const Node &node, double maximum = 1) {
         unsigned value = 0;
         const auto [end, error] = std::from_chars(text.data() + 1, text.data() + text.size(), value, 16);
         if (text.size() != 7 || error != std::errc() || end != text.data() + 7)
-            node.fail(requirement + ", is '" + text + "'");
+            node.fail(requirement + ", but is '" + text + "'");
         for (int i = 0; i < 3; ++i)
             colour[i] = linear_from_srgb((value >> (16 - 8 * i) & 0xff) / 255.0);
     } else {

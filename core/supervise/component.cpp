@@ -30,6 +30,18 @@ bool needs_new_process(arhost_kind kind, arhost_status status) {
 
 constexpr const char *in_total = " in total, although it reported progress";
 
+// Returns what a user can change if a call takes too long.
+const char *remedy_for(arhost_kind kind) {
+    switch (kind) {
+    case ARHOST_KIND_RAYTRACER:
+        return " (deadline_ms); raise it, or lower the samples or the image size";
+    case ARHOST_KIND_TRACKER:
+        return " (deadline_ms)";
+    default:
+        return " (deadline_ms); a plugin that waits must report progress (in Python, host.wait)";
+    }
+}
+
 } // namespace
 
 RegionPointer make_host_region(const char *name, const SlotLayout &layout) {
@@ -441,7 +453,8 @@ void Component::set_stop_deadline() {
 void Component::begin_command() {
     total_deadline_.cancel();
     if (!in_flight_.empty() && !may_wait())
-        set_deadline(total_deadline_, limits_.frame_total, "hung: no answer", in_total);
+        set_deadline(total_deadline_, limits_.frame_total, "too slow: no answer",
+                     std::string(in_total) + ", 30 times the limit without progress" + remedy_for(description_.kind));
     set_frame_deadline();
 }
 
@@ -449,15 +462,11 @@ void Component::set_frame_deadline() {
     deadline_.cancel();
     if (in_flight_.empty())
         return;
-    const char *const details = description_.kind == ARHOST_KIND_RAYTRACER
-                                    ? " (deadline_ms); raise it, or lower the samples or the image size"
-                                : may_wait() ? " (deadline_ms); a plugin that waits must call host->progress"
-                                             : " (deadline_ms)";
-    set_deadline(deadline_, limits_.frame, "hung: neither an answer nor progress", details);
+    set_deadline(deadline_, limits_.frame, "hung: neither an answer nor progress", remedy_for(description_.kind));
 }
 
 void Component::set_deadline(ipc::Reactor::Registration &deadline, std::chrono::milliseconds limit, const char *what,
-                             const char *details) {
+                             const std::string &details) {
     deadline = context_.reactor.at(context_.reactor.now() + limit, [this, limit, what, details] {
         process_->end(std::string(what) + " within " + std::to_string(limit.count()) + " ms" + details);
     });

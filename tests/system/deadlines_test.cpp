@@ -49,7 +49,7 @@ TEST(Deadlines, ProgressExtendsACallUpToALimit) {
                          .more = "restart: {quarantine_after: 1}\n",
                          .deadline = deadline});
     ASSERT_EQ(endless.run(), 1) << endless.output();
-    EXPECT_THAT(endless.output(), HasSubstr("hung: no answer within " + text_of(30 * deadline) +
+    EXPECT_THAT(endless.output(), HasSubstr("too slow: no answer within " + text_of(30 * deadline) +
                                             " ms in total, although it reported progress"));
 }
 

@@ -168,6 +168,11 @@ TEST(Run, RefusesAnOutputThatAnotherRunWrites) {
                       "outputs[0].path: '" + first.path("counted.txt").string() +
                           "' is being written by another run (process " + std::to_string(first.pid()) + ", ",
                       "run.yaml); end that run, or choose another path"});
+    const std::string file = first.path("counted.txt").string();
+    second.expect({"run.yaml", "--set", "outputs.0.path=own.txt", "--set", "stats=" + file}, 2,
+                  {"stats: '" + file + "' is being written by another run"});
+    second.expect({"run.yaml", "--set", "outputs.0.path=" + file + "/part.txt"}, 2, // as in a session's folder
+                  {"outputs[0].path: '" + file + "' is being written by another run"});
     const auto lines = first.lines();
     EXPECT_TRUE(first.wait_for_lines(lines + 5)) << "the first run continues";
     send_signal(first.pid(), SIGKILL);

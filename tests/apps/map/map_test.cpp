@@ -241,7 +241,8 @@ TEST_F(MapProgram, RejectsInvalidArgumentsWithoutWritingAFile) {
         {photos + camera + "--side 900=40 " + out, "tag36h11 has the ids 0 to 586, not 900"},
         {photos + camera + side + "--ids 3-1 " + out, "the range 3-1 ends before it begins"},
         {photos + camera + side + "--ids 100-120 " + out,
-         "no marker of tag36h11 was seen in 3 frames; the first ones show "},
+         "none of the tag36h11 markers to find was seen in 3 frames; the first ones show 6 markers of tag36h11, such "
+         "as 0"},
         {photos + camera + side + "--ids 1 " + out, "a map needs at least two markers in the same frames"},
         {photos + camera + side + "--ids 0-5,50-53,60 " + out, "not seen: 50-53, 60 (--skip-unconnected leaves"},
         {photos + camera + side + "--origin 77 " + out, "marker 77 cannot be the origin"},
@@ -259,7 +260,7 @@ TEST_F(MapProgram, RejectsInvalidArgumentsWithoutWritingAFile) {
          "small.png: is 160×120 px, but the images before it are 640×480"},
         {photos + " text.png" + camera + side + out, "text.png' cannot be read: damaged or unknown image format"},
         {photos + " missing.png" + camera + side + out, "missing.png: there is no such file"},
-        {"--images empty.png" + camera + side + out, "no marker of tag36h11 was seen in 1 frame\n"},
+        {"--images empty.png" + camera + side + out, "none of the tag36h11 markers to find was seen in 1 frame\n"},
         {"--images photo-00.png photo-01.png" + camera + side + out, "marker 0 was seen in only 2 frames"},
         {"--video text.avi" + camera + side + out, "text.avi' cannot be read: Invalid data"},
         {"--video missing.avi" + camera + side + out, "missing.avi: there is no such file"},
