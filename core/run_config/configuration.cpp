@@ -326,6 +326,7 @@ void register_outputs(Configuration &configuration, const std::filesystem::path 
         const auto path = path_of(output->node);
         if (!path)
             continue;
+        expect_folder_near_another(*path);
         configuration.files.write(*path);
         const std::filesystem::path &plugin = output->plugins.front();
         if (configuration.sandbox == sandbox::Mode::none || plugin.parent_path() == built_in_plugins)

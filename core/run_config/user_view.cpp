@@ -93,14 +93,22 @@ void expect_writable(const yaml::Node &node) {
     fs::path folder = file.parent_path();
     while (folder.has_relative_path() && !fs::exists(folder, error))
         folder = folder.parent_path();
-    if (folder == folder.root_path() && folder != file.parent_path())
-        node.fail("there is no folder '" + (folder / *file.parent_path().relative_path().begin()).string() +
-                  "'; create it, or choose another path"); // as root, a misspelled path would create it
     if (!fs::is_directory(folder, error))
         node.fail("'" + folder.string() + "' is a file, not a folder; choose another path");
     if (::access(folder.c_str(), W_OK | X_OK) != 0)
         node.fail("no file can be created in the folder '" + folder.string() + "': " + std::strerror(errno) +
                   "; choose another path");
+}
+
+void expect_folder_near_another(const yaml::Node &node) {
+    if (is_standard_output(node))
+        return;
+    const fs::path folder = base::real_path(node.output_path()).parent_path(), relative = folder.relative_path();
+    if (relative.empty())
+        return;
+    const fs::path first = folder.root_path() / *relative.begin();
+    if (std::error_code ignored; !fs::exists(first, ignored))
+        node.fail("there is no folder '" + first.string() + "'; create it, or choose another path");
 }
 
 std::string hint_at_similar_name(const fs::path &file, std::string_view extension) {

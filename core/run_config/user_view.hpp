@@ -17,6 +17,10 @@ void expect_readable(const yaml::Node &node, const sandbox::Policy &policy);
 // Creates and changes nothing. Paths in /dev and /proc are not checked.
 void expect_writable(const yaml::Node &node);
 
+// Throws yaml::Error if the output file at `node` needs a new folder in '/': as root, a misspelled path would create
+// it.
+void expect_folder_near_another(const yaml::Node &node);
+
 // Returns "; did you mean 'NAME'?" if the folder of `file` contains a similar name, otherwise "". Omits `extension`
 // at the end of NAME.
 std::string hint_at_similar_name(const std::filesystem::path &file, std::string_view extension = "");

@@ -300,8 +300,8 @@ TEST(Check, FailsIfTheSceneLoadsTooSlowly) {
 
 TEST(BadInput, LeavesNoFolder) {
     ArhostRun run("version: 1\nsource: {plugin: source_counter, options: {frames: 5}}\nstats: out/b/stats.json\n"
-                  "outputs: [{plugin: sink_video, path: out/a/film.mp4, options: {preset: none}}]\n");
-    run.expect(2, {"'none' is not one of ultrafast"});
+                  "outputs: [{plugin: sink_video, path: out/a/film.mp4, options: {crf: 99}}]\n");
+    run.expect(2, {"outputs[0].options.crf: must be "});
     EXPECT_FALSE(run.exists("out"));
 }
 
