@@ -159,7 +159,7 @@ cv::Mat FrameReader::only(const std::string &name) {
     const std::optional<cv::Mat> first = next();
     if (!first)
         throw std::runtime_error(name + ": has no frame");
-    const cv::Mat image = first->clone();
+    cv::Mat image = first->clone();
     if (next())
         throw std::runtime_error(name + ": has several frames; read it with --video");
     return image;

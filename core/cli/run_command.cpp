@@ -13,9 +13,9 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/fmt/fmt.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
-#include <ranges>
 #include <set>
 #include <sys/resource.h>
 #include <sys/signalfd.h>
@@ -88,8 +88,8 @@ public:
     }
     void remove_empty() const {
         std::error_code not_empty;
-        for (const std::filesystem::path &folder : missing_ | std::views::reverse)
-            std::filesystem::remove(folder, not_empty);
+        std::for_each(missing_.rbegin(), missing_.rend(),
+                      [&](const std::filesystem::path &folder) { std::filesystem::remove(folder, not_empty); });
     }
 
 private:
