@@ -228,7 +228,7 @@ int main(int argc, char **argv) {
     app.option("--images", arguments.images, "Images of the board, 10 or more").type_name("FILE");
     app.option("--video", arguments.video, "Video of the board; the best views are chosen").type_name("FILE");
     app.option("--camera", arguments.camera,
-               "Camera, such as /dev/video0 or rtsp://…; prints which view to show next")
+               "Camera, such as /dev/video0 or rtsp://HOST/1; prints which view to show next")
         .type_name("DEVICE");
     app.option("--size", arguments.size, "Size of the camera's images in px (default: the camera's)")
         .separator('x')

@@ -23,7 +23,7 @@ std::string quoted(const std::string &text) {
 
 run_config::Configuration configuration_of(const Input &input) {
     std::string text =
-        "version: 1\nrestart: {quarantine_after: 1, proven_after_frames: 1000000000}\nsource:\n  plugin: " +
+        "version: 1\nrestart: {quarantine_after: 1, proven_after_frames: 1000000}\nsource:\n  plugin: " +
         input.plugin + "\n  allow: " + nlohmann::json(input.allow).dump() + "\n  options:\n";
     for (const auto &[key, value] : input.options)
         text += "    " + key + ": " + value + "\n";

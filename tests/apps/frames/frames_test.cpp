@@ -115,10 +115,12 @@ TEST_P(EveryReader, EndsOnSignalsAndLeavesNoFile) {
     for (const int signal : {SIGINT, SIGTERM}) {
         // The temporary output exists as soon as the program watches signals. A shell ignores SIGINT in the
         // background.
-        EXPECT_EQ(execute("{ env --default-signal=INT " + command(images) +
-                          " & } ; until ls out.yaml.*.tmp; do sleep 0.01; kill -0 $! || exit 1; done; kill -" +
-                          std::to_string(signal) + " $!; wait $!"),
-                  128 + signal)
+        EXPECT_EQ(
+            execute(
+                "{ env --default-signal=INT " + command(images) +
+                " & } ; until ls out.yaml.*.tmp > /dev/null 2>&1; do sleep 0.01; kill -0 $! || exit 1; done; kill -" +
+                std::to_string(signal) + " $!; wait $!"),
+            128 + signal)
             << printed();
         EXPECT_EQ(files(), before);
     }
