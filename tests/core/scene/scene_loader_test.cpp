@@ -357,7 +357,7 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
          "5:24: materials.red.diffuse: unknown key; known keys: model, reflectivity"},
         {start + "  red: {model: diffuse, diffuse: '#ff00'}\n",
          "5:34: materials.red.diffuse: must be '#rrggbb' (sRGB), a number or a list of three (linear light, 0 to 1), "
-         "is '#ff00'"},
+         "but is '#ff00'"},
         {start + "  red: {model: diffuse, diffuse: '#gg0000'}\n", HasSubstr("is '#gg0000'")},
         {start + "  red:\n    model: diffuse\n    diffuse: #ff0000\n",
          HasSubstr("but is empty; '#' starts a comment, so write '#rrggbb' in quotes")},
