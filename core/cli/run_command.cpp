@@ -86,11 +86,16 @@ public:
             if (file)
                 add(file->parent_path());
     }
-    void remove_empty() const {
+    ~NewFolders() {
+        if (!removes_empty_)
+            return;
         std::error_code not_empty;
         std::for_each(missing_.rbegin(), missing_.rend(),
                       [&](const std::filesystem::path &folder) { std::filesystem::remove(folder, not_empty); });
     }
+    NewFolders(const NewFolders &) = delete;
+    NewFolders &operator=(const NewFolders &) = delete;
+    void remove_empty() { removes_empty_ = true; } // in the destructor, when there are no temporary files any more
 
 private:
     void add(std::filesystem::path folder) {
@@ -99,6 +104,7 @@ private:
             missing_.insert(folder);
     }
 
+    bool removes_empty_ = false;
     std::set<std::filesystem::path> missing_; // parents come before their subfolders
 };
 
@@ -224,7 +230,7 @@ void show_warnings(const run_config::Configuration &configuration, Console &cons
 
 int run(const run_config::Configuration &configuration, const Arguments &arguments, supervise::Starter &launcher) {
     const OutputLocks locks(configuration);
-    const NewFolders new_folders(configuration);
+    NewFolders new_folders(configuration);
     EndingSignals signals; // before the console's thread starts, because that thread must not receive these signals
     Reports reports(configuration);
     Console console(arguments.verbose);

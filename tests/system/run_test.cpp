@@ -546,7 +546,7 @@ TEST(CommandLine, HasAManPageForEachProgram) {
     EXPECT_EQ(run_shell(run, "zcat '" + (pages / "arhost.1.gz").string() + "'"), 0);
     for (const char *part :
          {"\n.SH SYNOPSIS\n\\fBarhost\\fR [\\fIOPTIONS\\fR] [\\fIFILE\\fR]\n", "\n.SS arhost check\n",
-          "\\fB\\-\\-no\\-open\\fR\n", "one of: replay, latency, check", "See arhost\\-new\\-plugin(1)."})
+          "\\fB\\-\\-no\\-open\\fR\n", "one of: run, replay, latency, check", "See arhost\\-new\\-plugin(1)."})
         EXPECT_THAT(run.read("output.txt"), HasSubstr(part));
 }
 
