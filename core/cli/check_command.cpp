@@ -28,7 +28,8 @@ namespace fs = std::filesystem;
 // that are ignored; otherwise the run warns of them.
 std::vector<model::PluginDescription> check_plugins(const run_config::Configuration &configuration,
                                                     supervise::Context &context, bool logs_notes) {
-    const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind) {
+    const auto check_component = [&](const run_config::ComponentConfiguration &component, arhost_kind kind,
+                                     bool is_started_by_run = true) {
         std::vector<model::PluginDescription> plugins;
         for (std::size_t i = 0; i < component.plugins.size(); ++i) {
             const supervise::ProbeResult result = probe(context, component.plugins[i], component.policy);
@@ -38,7 +39,7 @@ std::vector<model::PluginDescription> check_plugins(const run_config::Configurat
             std::vector<std::string> notes;
             run_config::options_for(plugins.back(), kind, component, i, notes);
             for (const std::string &note : notes)
-                if (logs_notes)
+                if (logs_notes || !is_started_by_run)
                     context.log(ARHOST_SEVERITY_WARNING, plugins.back().id, note);
         }
         return plugins;
@@ -52,7 +53,7 @@ std::vector<model::PluginDescription> check_plugins(const run_config::Configurat
         std::ranges::move(check_component(raytracer, ARHOST_KIND_RAYTRACER), std::back_inserter(raytracers));
     for (const auto *output : {&configuration.snapshot, &configuration.record})
         if (*output)
-            check_component(**output, ARHOST_KIND_SINK);
+            check_component(**output, ARHOST_KIND_SINK, false);
     std::vector<run_config::OutputFile> files = configuration.report_files();
     for (const run_config::ComponentConfiguration &output : configuration.outputs) {
         const model::PluginDescription plugin = check_component(output, ARHOST_KIND_SINK).back();

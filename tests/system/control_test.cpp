@@ -648,7 +648,8 @@ TEST(Control, CheckCoversAlternativesAndOutputsOfCommands) {
     for (const auto &[yaml, message] :
          {std::pair<std::string, const char *>{"alternatives: {tracker: [{name: a, plugin: rt_counter}]}\n",
                                                "'rt_counter' is a raytracer, not a tracker"},
-          {"record: {plugin: sink_null, options: {nothing: 1}}\n", "record.options.nothing: unknown key"}}) {
+          {"record: {plugin: sink_counter, path: r-%d.txt, options: {hang_in_stop: 7}}\n",
+           "record.options.hang_in_stop: must be true or false"}}) {
         ArhostRun run(base + yaml);
         EXPECT_EQ(run.run({"check", "run.yaml"}), 2);
         EXPECT_THAT(run.messages(), HasSubstr(message));
