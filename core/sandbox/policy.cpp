@@ -100,6 +100,8 @@ void append_display(Paths &paths) {
 Paths paths_of(const Policy &policy) {
     Paths paths;
     append(paths.readable, system_readable);
+    if (under_sanitizer) // LeakSanitizer stops all threads at the end
+        append(paths.readable, {"/proc/self/task"});
     append(paths.devices, system_devices);
     if (may_share_memory(policy)) // RLIMIT_DATA does not count shared mappings of this device
         append(paths.devices, {"/dev/zero"});
