@@ -378,9 +378,10 @@ TEST_F(Sandbox, LandlockAllowsOnlyListedPaths) {
         check.that(!opens("/proc/1/status", O_RDONLY));
         for (const char *own : {"status", "maps", "smaps_rollup", "stat", "cgroup", "fd"})
             check.that(opens(fs::path("/proc/self") / own, O_RDONLY));
-        for (const char *of_network : {"net/tcp", "net/unix", "task"})
+        for (const char *of_network : {"net/tcp", "net/unix"})
             check.that(!opens(fs::path("/proc/self") / of_network, O_RDONLY));
-        check.that(!opens("/proc/thread-self/net/tcp", O_RDONLY));
+        check.that(!opens("/proc/self/task", O_RDONLY) || under_sanitizer);
+        check.that(!opens("/proc/thread-self/net/tcp", O_RDONLY) || under_sanitizer);
         check.that(opens("/usr/bin/env", O_RDONLY));
         check.that(opens("/dev/null", O_RDWR));
     }));
