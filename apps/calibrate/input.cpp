@@ -159,7 +159,7 @@ Views views_of_images(const Reading &reading, const std::vector<fs::path> &files
                             file.string(), image.cols, image.rows, files.front().string(), found.image.width,
                             found.image.height));
         if (first_images.size() < 3)
-            first_images.push_back(image.clone());
+            first_images.push_back(image);
         if (std::optional<View> view = board.find(image)) {
             view->name = file.filename();
             found.views.push_back(*view);

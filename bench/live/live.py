@@ -126,6 +126,11 @@ class Viewer(threading.Thread):
             tail = data[-2:]
 
 
+def free_port():
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        return free.getsockname()[1]
+
+
 def growth_kib(samples, seconds):
     """Growth over the last `seconds`, from a linear fit, and the fit's uncertainty (two standard errors), in KiB."""
     last = [(at, kib) for at, kib in samples if at >= samples[-1][0] - seconds]
@@ -157,8 +162,7 @@ def x_server():
 
 def soak():
     seconds, settled = (60, 40) if QUICK else (1800, 1200)
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
+    port = free_port()
     configuration = f"""version: 1
 mode: live
 source: {{plugin: source_synthetic, fps: {FPS}, options: {{frames: 0, id: 0, side_mm: 80, width: 640, height: 480}}}}
@@ -295,8 +299,7 @@ outputs: [{{plugin: sink_poses, path: poses.jsonl}}]
         subprocess.run([BUILD / "bin/arhost", f"{name}.yaml"], cwd=reference, check=True, stderr=subprocess.DEVNULL)
     expected = {at: poses[0] for at, poses in pose_by_capture(reference / "poses.jsonl").items()}
 
-    with socket.create_server(("127.0.0.1", 0)) as free:
-        port = free.getsockname()[1]
+    port = free_port()
     limits = f"deadline_ms: {1000 * deadline_s}"
     run = Run("faults", f"""version: 1
 mode: live
@@ -345,10 +348,10 @@ stats: stats.json
                    for at, poses in seen.items() for pose in poses]
     print(f"  {len(differences)} poses, of which {sum(value == 0 for value in differences)} are identical to those of an undisturbed run")
     check("largest difference of an element of a pose (mm)", max(differences), 0)
-    times = [float(line) for line in subprocess.run(
+    times = sorted(float(line) for line in subprocess.run(
         ["ffprobe", "-v", "error", "-select_streams", "v", "-show_entries", "packet=pts_time", "-of", "csv=p=0",
-         run.folder / "film/recording.mkv"], check=True, capture_output=True, text=True).stdout.replace(",", "").split()]
-    gaps = sorted((b - a for a, b in zip(sorted(times), sorted(times)[1:])), reverse=True)
+         run.folder / "film/recording.mkv"], check=True, capture_output=True, text=True).stdout.replace(",", "").split())
+    gaps = sorted((b - a for a, b in zip(times, times[1:])), reverse=True)
     print(f"  the recording has {len(times)} frames; the longest gaps: {', '.join(f'{gap:.2f}' for gap in gaps[:8])} s")
     check("longest gap in the recording, s", gaps[0], deadline_s + 1)
     replay = subprocess.run([BUILD / "bin/arhost", "replay", "session", "--frames", "300", "--output", "none"],

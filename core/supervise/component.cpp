@@ -454,7 +454,8 @@ void Component::begin_command() {
     total_deadline_.cancel();
     if (!in_flight_.empty() && !may_wait())
         set_deadline(total_deadline_, limits_.frame_total, "too slow: no answer",
-                     std::string(in_total) + ", 30 times the limit without progress" + remedy_for(description_.kind));
+                     " in total, although it reported progress, 30 times the limit without progress",
+                     remedy_for(description_.kind));
     set_frame_deadline();
 }
 
@@ -462,13 +463,13 @@ void Component::set_frame_deadline() {
     deadline_.cancel();
     if (in_flight_.empty())
         return;
-    set_deadline(deadline_, limits_.frame, "hung: neither an answer nor progress", remedy_for(description_.kind));
+    set_deadline(deadline_, limits_.frame, "hung: neither an answer nor progress", "", remedy_for(description_.kind));
 }
 
 void Component::set_deadline(ipc::Reactor::Registration &deadline, std::chrono::milliseconds limit, const char *what,
-                             const std::string &details) {
-    deadline = context_.reactor.at(context_.reactor.now() + limit, [this, limit, what, details] {
-        process_->end(std::string(what) + " within " + std::to_string(limit.count()) + " ms" + details);
+                             const char *details, const char *remedy) {
+    deadline = context_.reactor.at(context_.reactor.now() + limit, [this, limit, what, details, remedy] {
+        process_->end(std::string(what) + " within " + std::to_string(limit.count()) + " ms" + details + remedy);
     });
 }
 

@@ -147,7 +147,7 @@ private:
     void begin_command();
     void set_frame_deadline();
     void set_deadline(ipc::Reactor::Registration &deadline, std::chrono::milliseconds limit, const char *what,
-                      const std::string &details);
+                      const char *details, const char *remedy = ""); // constants: set for each frame
     bool may_wait() const;
 
     Context &context_;
