@@ -48,16 +48,21 @@ private:
     std::array<Step, count> nodes_; // slopes are per interval
 };
 
-struct Pixel : EdgePixel {
-    // Residual of the light, and the light's derivative with respect to the offset.
-    double residual = 0, by_offset = 0;
-};
-
 struct Model {
     double offset_px = 0, turn = 0, blur_px = 0; // the edge is at offset_px + turn * along_px
     double before = 0, contrast = 0;
 };
 constexpr int unknowns = 5; // in the order of the members of Model
+
+struct Pixel : EdgePixel {
+    // Residual of the light, and the light's derivatives with respect to members of Model.
+    double residual = 0, by_offset = 0, by_blur = 0, by_contrast = 0;
+
+    std::array<double, unknowns> derivatives() const {
+        return {by_offset, by_offset * along_px, by_blur, 1, by_contrast};
+    }
+};
+
 constexpr double min_blur_px = 0.25;
 using Normal = cv::Matx<double, unknowns, unknowns>;
 using Vector = cv::Vec<double, unknowns>;
@@ -71,27 +76,36 @@ struct Linearized {
 // Sets the residuals and derivatives of the pixels.
 Linearized linearize(std::span<Pixel> pixels, const Model &model) {
     static const BlurredStep step;
-    Linearized sum;
+    // The sums of the products of derivatives, the upper triangle row by row. They are local to stay in registers: the
+    // compiler must assume that a result in memory may be one of the pixels.
+    std::array<double, unknowns *(unknowns + 1) / 2> products{};
+    std::array<double, unknowns> gradient{};
+    double cost = 0;
     const double per_px = 1 / model.blur_px;
     for (Pixel &pixel : pixels) {
         const double z = (pixel.across_px - model.offset_px - model.turn * pixel.along_px) * per_px;
         const auto [value, slope] = step.at(z);
-        pixel.residual = pixel.light - model.before - model.contrast * value;
+        const double residual = pixel.light - model.before - model.contrast * value;
+        pixel.residual = residual;
         pixel.by_offset = -model.contrast * per_px * slope;
-        const std::array<double, unknowns> j = {pixel.by_offset, pixel.by_offset * pixel.along_px,
-                                                pixel.by_offset * z, 1, value};
+        pixel.by_blur = pixel.by_offset * z;
+        pixel.by_contrast = value;
+        const std::array<double, unknowns> j = pixel.derivatives();
+        std::size_t next = 0;
 #pragma GCC unroll 5
-        for (int a = 0; a < unknowns; ++a) {
-            sum.gradient[a] += j[a] * pixel.residual;
+        for (std::size_t a = 0; a < unknowns; ++a) {
+            gradient[a] += j[a] * residual;
 #pragma GCC unroll 5
-            for (int b = a; b < unknowns; ++b)
-                sum.normal(a, b) += j[a] * j[b];
+            for (std::size_t b = a; b < unknowns; ++b)
+                products[next++] += j[a] * j[b];
         }
-        sum.cost += pixel.residual * pixel.residual;
+        cost += residual * residual;
     }
+    Linearized sum{{}, Vector(gradient.data()), cost};
+    std::size_t next = 0;
     for (int a = 0; a < unknowns; ++a)
-        for (int b = 0; b < a; ++b)
-            sum.normal(a, b) = sum.normal(b, a);
+        for (int b = a; b < unknowns; ++b)
+            sum.normal(a, b) = sum.normal(b, a) = products[next++];
     return sum;
 }
 
@@ -215,15 +229,32 @@ LightLine light_line(std::span<const Pixel> pixels, const Model &model, double s
 // The lines of the areas before and after the edge.
 using LightLines = std::array<LightLine, 2>;
 
-// Removes the changes along the edge from the light of the pixels, so that both areas have the light of the model.
+// Returns the light of the pixel without the changes along the edge, so that both areas have the light of the model.
 // Values between the lights of the two areas stay between them. Works for factors (uneven illumination) and for added
 // light (glare).
-void remove(const LightLines &lines, const Model &model, std::span<Pixel> pixels) {
-    for (Pixel &pixel : pixels) {
-        const double before = lines[0].at(pixel.along_px), after = lines[1].at(pixel.along_px);
-        pixel.light =
-            model.before + (pixel.light - model.before - before) * model.contrast / (model.contrast + after - before);
+double light_without(const LightLines &lines, const Model &model, const Pixel &pixel) {
+    const double before = lines[0].at(pixel.along_px), after = lines[1].at(pixel.along_px);
+    return model.before + (pixel.light - model.before - before) * model.contrast / (model.contrast + after - before);
+}
+
+// Returns by how much the unknowns change if `lines` are removed. `inverse`: the inverse of JᵀJ. The derivatives of the
+// pixels must be those of `model`.
+Vector change_without(const LightLines &lines, const Model &model, std::span<const Pixel> pixels,
+                      const Normal &inverse) {
+    Vector gradient;
+    for (const Pixel &pixel : pixels) {
+        const double change = light_without(lines, model, pixel) - pixel.light;
+        const auto derivatives = pixel.derivatives();
+        for (int i = 0; i < unknowns; ++i)
+            gradient[i] += derivatives[static_cast<std::size_t>(i)] * change;
     }
+    return inverse * gradient;
+}
+
+// Solves normal · change = gradient. In contrast to cv::solve(), allocates no memory.
+bool solve(Normal normal, const Vector &gradient, Vector &change) {
+    change = gradient;
+    return cv::Cholesky(normal.val, unknowns * sizeof(double), unknowns, change.val, sizeof(double), 1);
 }
 
 // Minimizes the squared residuals by the method of Levenberg and Marquardt. Damping is necessary for edges that are
@@ -240,7 +271,7 @@ bool minimize(std::span<Pixel> pixels, double half_length_px, double max_blur_px
         for (int i = 0; i < unknowns; ++i)
             damped(i, i) *= 1 + damping;
         Vector change;
-        if (!cv::solve(damped, sum.gradient, change, cv::DECOMP_CHOLESKY))
+        if (!solve(damped, sum.gradient, change))
             return false;
         const double blur_px = std::clamp(model.blur_px + change[2], min_blur_px, max_blur_px);
         if (const double limited = blur_px - model.blur_px; limited != change[2]) { // solve for the other unknowns
@@ -250,7 +281,7 @@ bool minimize(std::span<Pixel> pixels, double half_length_px, double max_blur_px
                 damped(i, 2) = damped(2, i) = i == 2 ? 1 : 0;
             }
             gradient[2] = limited;
-            if (!cv::solve(damped, gradient, change, cv::DECOMP_CHOLESKY))
+            if (!solve(damped, gradient, change))
                 return false;
         }
         const Model next{model.offset_px + change[0], model.turn + change[1], model.blur_px + change[2],
@@ -285,17 +316,16 @@ bool minimize(std::span<Pixel> pixels, double half_length_px, double max_blur_px
 
 struct Fit {
     Model model;
-    Normal covariance;
-    double correlation; // see BlurredEdge
-    LightLines lines;   // changes along the edge that are still in the light
+    Linearized sum;
+    std::vector<Pixel> pixels; // without outliers
+    bool is_blur_limited;
+    LightLines lines; // changes along the edge that are still in the light
 };
 
-// Fits the model that fit_blurred_edge() describes. `are_lines_removed`: whether remove() has been called for the
-// pixels, with the lines of an earlier fit.
-std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, double blur_px,
-                             bool are_lines_removed) {
-    constexpr double max_blur_ratio = 2,
-                     min_variance = 1e-20; // greater than 0; variance of the light, relative to the squared contrast
+// Fits the model that fit_blurred_edge() describes. `earlier`: the fit whose lines have been removed from the pixels, or
+// null.
+std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, double blur_px, const Fit *earlier) {
+    constexpr double max_blur_ratio = 2;
     // A column can be an outlier only if its error, relative to the contrast, exceeds `min_first_error` before the
     // fit or `min_error` after it. Smaller errors are normal, because a lens does not blur exactly as the model does.
     constexpr double min_first_error = 0.4, min_error = 0.06;
@@ -304,47 +334,53 @@ std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, d
     if (pixels.size() < min_pixels)
         return std::nullopt;
     const double max_blur_px = std::max(max_blur_ratio * blur_px, min_blur_px);
-    Model model = first_model(pixels, blur_px);
+    Model model = earlier ? earlier->model : first_model(pixels, blur_px);
     Linearized sum = linearize(pixels, model);
     if (remove_outliers(pixels, min_first_error * model.contrast))
         sum = linearize(pixels, model);
     for (int round = 0; round < max_rounds && pixels.size() >= min_pixels; ++round) {
         if (!minimize(pixels, half_length_px, max_blur_px, model, sum))
             return std::nullopt;
-        if (remove_outliers(pixels, min_error * model.contrast)) {
-            sum = linearize(pixels, model);
-            continue;
+        if (!remove_outliers(pixels, min_error * model.contrast)) {
+            const LightLines lines = {light_line(pixels, model, -1), light_line(pixels, model, 1)};
+            return Fit{model, sum, std::move(pixels), model.blur_px <= min_blur_px || model.blur_px >= max_blur_px,
+                       lines};
         }
-        const double variance = std::max(sum.cost / static_cast<double>(pixels.size() - unknowns),
-                                         min_variance * model.contrast * model.contrast);
-        if (model.blur_px <= min_blur_px || model.blur_px >= max_blur_px) // the limit fixed the blur
-            for (int i = 0; i < unknowns; ++i)
-                sum.normal(i, 2) = sum.normal(2, i) = i == 2 ? 1 : 0;
-        const Normal inverse = sum.normal.inv(cv::DECOMP_CHOLESKY);
-        Contributions columns = contributions(pixels);
-        // The residuals in `pixels` may be those of a slightly different model, see minimize().
-        if (columns.variance_ratio() > 1) {
-            linearize(pixels, model);
-            columns = contributions(pixels);
-        }
-        Fit fit{model,
-                columns.variance_ratio() * variance * inverse,
-                columns.correlation,
-                {light_line(pixels, model, -1), light_line(pixels, model, 1)}};
-        if (are_lines_removed) { // the errors of the removed slopes move the edge
-            const Vector gradient = linearize(pixels, model).gradient;
-            for (const std::size_t side : {0U, 1U}) {
-                LightLines error;
-                error[side].slope_per_px = std::sqrt(fit.lines[side].slope_variance);
-                std::vector<Pixel> moved = pixels;
-                remove(error, model, moved);
-                const Vector change = inverse * (linearize(moved, model).gradient - gradient);
-                fit.covariance += change * change.t();
-            }
-        }
-        return fit;
+        sum = linearize(pixels, model);
     }
     return std::nullopt;
+}
+
+// Returns the edge of a fit, with its uncertainty. `are_lines_removed`: whether the lines of an earlier fit have been
+// removed from the pixels.
+BlurredEdge edge_of(Fit &fit, bool are_lines_removed) {
+    constexpr double min_variance = 1e-20; // greater than 0; variance of the light, relative to the squared contrast
+    const Model &model = fit.model;
+    const double variance = std::max(fit.sum.cost / static_cast<double>(fit.pixels.size() - unknowns),
+                                     min_variance * model.contrast * model.contrast);
+    if (fit.is_blur_limited)
+        for (int i = 0; i < unknowns; ++i)
+            fit.sum.normal(i, 2) = fit.sum.normal(2, i) = i == 2 ? 1 : 0;
+    const Normal inverse = fit.sum.normal.inv(cv::DECOMP_CHOLESKY);
+    Contributions columns = contributions(fit.pixels);
+    // The residuals may be those of a slightly different model, see minimize().
+    if (columns.variance_ratio() > 1) {
+        linearize(fit.pixels, model);
+        columns = contributions(fit.pixels);
+    }
+    Normal covariance = columns.variance_ratio() * variance * inverse;
+    if (are_lines_removed) // their errors move the edge
+        for (const std::size_t side : {0U, 1U}) {
+            LightLines error;
+            error[side].slope_per_px = std::sqrt(fit.lines[side].slope_variance);
+            const Vector change = change_without(error, model, fit.pixels, inverse);
+            covariance += change * change.t();
+        }
+    const double pivot_px = -covariance(0, 1) / covariance(1, 1);
+    return {pivot_px,         model.offset_px + model.turn * pivot_px,
+            model.turn,       covariance(0, 0) + pivot_px * covariance(0, 1),
+            covariance(1, 1), model.blur_px,
+            columns.correlation};
 }
 
 } // namespace
@@ -359,27 +395,21 @@ std::optional<BlurredEdge> fit_blurred_edge(std::span<const EdgePixel> edge_pixe
         pixels.push_back({pixel});
         half_length_px = std::max(half_length_px, std::abs(pixel.along_px));
     }
-    bool is_uneven = false;
+    std::optional<Fit> fit;
     for (int i = 0; i < max_fits; ++i) {
-        const std::optional<Fit> fit = fit_model(pixels, half_length_px, blur_px, is_uneven);
+        fit = fit_model(pixels, half_length_px, blur_px, fit ? &*fit : nullptr);
         if (!fit)
             return std::nullopt;
         const Model &model = fit->model;
         const double light = std::max(model.before, model.before + model.contrast);
         const auto is_clear = [&](const LightLine &line) { return line.is_clear(half_length_px, light); };
-        if (std::ranges::none_of(fit->lines, is_clear)) {
-            const Normal &covariance = fit->covariance;
-            const double pivot_px = -covariance(0, 1) / covariance(1, 1);
-            return BlurredEdge{pivot_px,         model.offset_px + model.turn * pivot_px,
-                               model.turn,       covariance(0, 0) + pivot_px * covariance(0, 1),
-                               covariance(1, 1), model.blur_px,
-                               fit->correlation};
-        }
+        if (std::ranges::none_of(fit->lines, is_clear))
+            return edge_of(*fit, i > 0);
         const double change = fit->lines[1].slope_per_px - fit->lines[0].slope_per_px; // relative to the contrast
         if (!(std::abs(change) * half_length_px < max_change * std::abs(model.contrast)))
             return std::nullopt;
-        is_uneven = true;
-        remove(fit->lines, model, pixels);
+        for (Pixel &pixel : pixels)
+            pixel.light = light_without(fit->lines, model, pixel);
     }
     return std::nullopt;
 }

@@ -81,9 +81,15 @@ double rise_across(const Picture &picture, const Edge &edge, double distance_px)
     return sum;
 }
 
-cv::Mat_<float> mean_of_rows(const cv::Mat_<float> &rises) {
-    cv::Mat_<float> mean;
-    cv::reduce(rises, mean, 0, cv::REDUCE_AVG);
+using MeanRises = std::array<float, 2 * search + 1>; // over all positions, one for each offset
+
+MeanRises mean_of_rows(const cv::Mat_<float> &rises) {
+    MeanRises mean{};
+    for (int row = 0; row < rises.rows; ++row)
+        for (std::size_t i = 0; i < mean.size(); ++i)
+            mean[i] += rises(row, static_cast<int>(i));
+    for (float &rise : mean)
+        rise /= static_cast<float>(rises.rows);
     return mean;
 }
 
@@ -125,13 +131,16 @@ Slope find_slope(const Picture &picture, const Edge &edge, double min_step_px, d
     Slope slope{{}, min_step_px};
     for (;; slope.step_px = std::min(2 * slope.step_px, max_step_px)) {
         slope.rises = rises(picture, edge, slope.step_px, sign);
-        const cv::Mat_<float> mean = mean_of_rows(slope.rises);
+        const MeanRises mean = mean_of_rows(slope.rises);
         if (slope.step_px == min_step_px)
-            slope.on_line = mean(0, search);
+            slope.on_line = mean[search];
         slope.peak = *std::max_element(mean.begin(), mean.end());
         slope.at_rim = std::max(*std::max_element(mean.begin(), mean.begin() + rim),
                                 *std::max_element(mean.end() - rim, mean.end()));
-        slope.width_px = cv::sum(cv::max(mean, 0))[0] / slope.peak * slope.step_px;
+        double sum = 0;
+        for (const float rise : mean)
+            sum += std::max(rise, 0.0F);
+        slope.width_px = sum / slope.peak * slope.step_px;
         if (slope.at_rim < contained * slope.peak || slope.step_px >= max_step_px)
             return slope;
     }
