@@ -4,6 +4,7 @@
 #include "base/atomic_file.hpp"
 #include "base/file_identity.hpp"
 #include "base/listening_socket.hpp"
+#include "base/program.hpp"
 #include "base/temporary_folder.hpp"
 #include "base/text.hpp"
 #include "base/write_all.hpp"
@@ -19,10 +20,13 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <fcntl.h>
 #include <fnmatch.h>
 #include <poll.h>
 #include <set>
+#include <spawn.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <thread>
 
 namespace {
@@ -214,6 +218,39 @@ std::string family_of(std::span<const Test> tests, RunSettings settings,
     return plugin.capabilities & ARHOST_CAPABILITY_REPORTS_POSES ? "" : drawn_families.front(); // tests report why
 }
 
+// The plugins that run a class of a Python script, and the kinds of `arhost new-plugin`.
+struct Adapter {
+    const char *plugin, *kind;
+};
+constexpr Adapter adapters[] = {
+    {"source_python", "source"}, {"tracker_python", "tracker"}, {"rt_python", "raytracer"}, {"sink_python", "sink"}};
+// The tests that a new tracker fails because it lacks a detector (sdk/templates/tracker/ABOUT.md).
+constexpr std::string_view detector_tests[] = {
+    "tracker.unknown-id", "tracker.unknown-family", "tracker.unusable-lens", "tracker.corner-order",
+    "tracker.mirrored",   "tracker.no-marker",      "tracker.sizes"};
+
+// Returns a script for an adapter that has none: a new plugin of its kind, which this function creates in `folder`.
+Settings default_script(const Subject &subject, const fs::path &folder) {
+    const auto adapter = std::ranges::find(adapters, subject.plugin.stem().string(), &Adapter::plugin);
+    if (adapter == std::end(adapters) || subject.settings.contains("script"))
+        return {};
+    const std::string program = base::own_folder() / "arhost-new-plugin";
+    const char *const arguments[] = {program.c_str(), adapter->kind, "new_plugin",   "--language",
+                                     "python",        "--into",      folder.c_str(), nullptr};
+    posix_spawn_file_actions_t actions;
+    ::posix_spawn_file_actions_init(&actions);
+    ::posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+    pid_t child = -1;
+    int status = -1;
+    const int error =
+        ::posix_spawn(&child, program.c_str(), &actions, nullptr, const_cast<char *const *>(arguments), environ);
+    ::posix_spawn_file_actions_destroy(&actions);
+    if (error != 0 || ::waitpid(child, &status, 0) != child || status != 0)
+        throw std::runtime_error(fmt::format("{} has created no plugin to test {} with; give --set script=FILE",
+                                             program, adapter->plugin));
+    return {{"script", folder / "new_plugin/new_plugin.py"}};
+}
+
 // Returns a value for a path that has neither a value nor a default that the plugin accepts: the first that it does.
 // Inputs are pictures, which this function writes to `folder`. Each test has its own folder for outputs.
 Settings default_paths(std::span<const Test> tests, RunSettings settings,
@@ -275,11 +312,11 @@ fs::path adapter_of(const RunSettings &settings) {
     std::vector<std::string> found;
     std::set<std::string> reasons;
     RunSettings candidate = settings;
-    for (const char *name : {"source_python", "tracker_python", "rt_python", "sink_python"}) {
-        candidate.subject.plugin = find_plugin(name);
+    for (const Adapter &adapter : adapters) {
+        candidate.subject.plugin = find_plugin(adapter.plugin);
         const Result result = run_alone(*create, candidate);
         if (result.verdict == Verdict::pass)
-            found.emplace_back(name);
+            found.emplace_back(adapter.plugin);
         else
             reasons.insert(result.message);
     }
@@ -332,16 +369,23 @@ Report run(RunSettings settings, const std::vector<std::string> &patterns, bool 
     });
     const std::string missing = missing_need(report.results.front(), settings.subject.policy);
     const base::TemporaryFolder inputs("arhost-conform-inputs");
+    bool is_new_script = false;
     if (missing.empty() && report.plugin &&
-        std::ranges::any_of(selected, [&](const Test &test) { return creates_instances(report.tests, test.name); }))
+        std::ranges::any_of(selected, [&](const Test &test) { return creates_instances(report.tests, test.name); })) {
+        Settings script = default_script(settings.subject, inputs.path());
+        is_new_script = !script.empty();
+        settings.subject.settings.merge(script);
         settings.subject.settings.merge(
             default_paths(report.tests, settings, report.plugin->descriptor, inputs.path()));
+    }
     const auto is_of_tracker = [](const Test &test) { return test.kind() == ARHOST_KIND_TRACKER; };
     if (settings.subject.family.empty() && missing.empty() && std::ranges::any_of(selected, is_of_tracker))
         settings.subject.family = family_of(report.tests, settings, report.plugin->descriptor);
     for (const Test &test : selected)
         if (!missing.empty() && creates_instances(report.tests, test.name))
             set_result(test, Verdict::skip, missing);
+        else if (is_new_script && std::ranges::count(detector_tests, test.name))
+            set_result(test, Verdict::skip, "the new plugin has no detector; give --set script=FILE");
         else if (test.name == std::string_view("raytracer.reference"))
             if (const std::string problem = reference_problem(report.tests, settings); !problem.empty())
                 set_result(test, Verdict::error, problem);

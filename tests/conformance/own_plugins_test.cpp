@@ -73,6 +73,8 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(OwnPlugin{"AprilTag", "tracker_apriltag", {}}, OwnPlugin{"Pictures", "tracker_image", {}},
                     OwnPlugin{"FilePicture", "source_file", {"path=in/00.png"}},
                     OwnPlugin{"FileLoop", "source_file", {"path=in/a.mp4", "loop=true", "frames=30"}},
+                    OwnPlugin{"PythonSource", "source_python", {}}, OwnPlugin{"PythonTracker", "tracker_python", {}},
+                    OwnPlugin{"PythonRaytracer", "rt_python", {}}, OwnPlugin{"PythonSink", "sink_python", {}},
                     OwnPlugin{"LastImage", "sink_images", {"path=last.jpg"}},
                     OwnPlugin{"Mpeg4", "sink_video", {"path=video.mkv", "codec=mpeg4"}},
                     OwnPlugin{"SessionH264", "sink_session", {"path=session", "codec=h264"}},
