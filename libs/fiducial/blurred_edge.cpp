@@ -76,8 +76,8 @@ struct Linearized {
 // Sets the residuals and derivatives of the pixels.
 Linearized linearize(std::span<Pixel> pixels, const Model &model) {
     static const BlurredStep step;
-    // The sums of the products of derivatives, the upper triangle row by row. They are local to stay in registers: the
-    // compiler must assume that a result in memory may be one of the pixels.
+    // The sums of the products of derivatives, the upper triangle row by row. They are local to stay in registers:
+    // the compiler must assume that a result in memory may be one of the pixels.
     std::array<double, unknowns *(unknowns + 1) / 2> products{};
     std::array<double, unknowns> gradient{};
     double cost = 0;
@@ -237,8 +237,8 @@ double light_without(const LightLines &lines, const Model &model, const Pixel &p
     return model.before + (pixel.light - model.before - before) * model.contrast / (model.contrast + after - before);
 }
 
-// Returns by how much the unknowns change if `lines` are removed. `inverse`: the inverse of JᵀJ. The derivatives of the
-// pixels must be those of `model`.
+// Returns by how much the unknowns change if `lines` are removed. `inverse`: the inverse of JᵀJ. The derivatives of
+// the pixels must be those of `model`.
 Vector change_without(const LightLines &lines, const Model &model, std::span<const Pixel> pixels,
                       const Normal &inverse) {
     Vector gradient;
@@ -322,8 +322,8 @@ struct Fit {
     LightLines lines; // changes along the edge that are still in the light
 };
 
-// Fits the model that fit_blurred_edge() describes. `earlier`: the fit whose lines have been removed from the pixels, or
-// null.
+// Fits the model that fit_blurred_edge() describes. `earlier`: the fit whose lines have been removed from the pixels,
+// or null.
 std::optional<Fit> fit_model(std::vector<Pixel> pixels, double half_length_px, double blur_px, const Fit *earlier) {
     constexpr double max_blur_ratio = 2;
     // A column can be an outlier only if its error, relative to the contrast, exceeds `min_first_error` before the
@@ -377,9 +377,9 @@ BlurredEdge edge_of(Fit &fit, bool are_lines_removed) {
             covariance += change * change.t();
         }
     const double pivot_px = -covariance(0, 1) / covariance(1, 1);
-    return {pivot_px,         model.offset_px + model.turn * pivot_px,
-            model.turn,       covariance(0, 0) + pivot_px * covariance(0, 1),
-            covariance(1, 1), model.blur_px,
+    return {pivot_px,           model.offset_px + model.turn * pivot_px,
+            model.turn,         covariance(0, 0) + pivot_px * covariance(0, 1),
+            covariance(1, 1),   model.blur_px,
             columns.correlation};
 }
 

@@ -1,0 +1,154 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""How far a picture with virtual objects is from the truth: tools/bench truth [--quick] [--moving]. Method:
+bench/truth/README.md.
+
+Renders rooms with Blender Cycles, without virtual objects (plate) and with them (truth), lets arhost add the objects to
+the plate, and prints the differences. --quick: one view, 32 samples. --moving: also renders the moving camera's frames.
+Pictures are kept in build/truth; what exists is not rendered again. Needs about two hours on two cores."""
+import gzip
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+here = os.path.dirname(os.path.abspath(__file__))
+root = os.path.dirname(os.path.dirname(here))
+sys.path.insert(0, os.path.join(root, "bench", "peers"))
+import peers  # noqa: E402
+
+PACKAGES = {"bpy": "5.0.1", "pillow": "13.0.0", "flip-evaluator": "1.7", "scikit-image": "0.26.0"}
+QUICK = "--quick" in sys.argv
+SAMPLES = 32 if QUICK else 256
+FOLDER = os.path.join(root, "build", "truth-quick" if QUICK else "truth")
+BIN = os.path.join(root, "build", "release", "bin")
+if os.path.realpath(sys.prefix) != os.path.realpath(peers.venv):
+    peers.install(PACKAGES)
+    os.execv(peers.venv_python, [peers.venv_python, *sys.argv])
+
+import numpy as np  # noqa: E402
+from PIL import Image  # noqa: E402
+
+import measure  # noqa: E402
+import rooms  # noqa: E402
+import scenes  # noqa: E402
+
+VIEWS = range(1 if QUICK else len(rooms.VIEWS))
+
+
+def render(jobs):
+    wanted = []
+    for job in jobs:
+        name, picture, view = job.split("/")
+        if not os.path.exists(os.path.join(FOLDER, name, f"{picture}-{view}.npy")):
+            wanted.append(job)
+    if wanted:
+        print(f"Cycles renders {len(wanted)} pictures with {SAMPLES} samples", flush=True)
+        process = subprocess.Popen([sys.executable, os.path.join(here, "render.py"), FOLDER, str(SAMPLES), *wanted],
+                                   stdout=subprocess.PIPE, text=True)
+        for line in process.stdout:
+            if " of " in line and "/" in line and line[0].isdigit():
+                print("  " + line, end="", flush=True)
+        if process.wait() != 0:
+            raise SystemExit("truth: Blender failed")
+
+
+def prepare():
+    """Writes the marker's picture and the bunny."""
+    os.makedirs(FOLDER, exist_ok=True)
+    marker = os.path.join(FOLDER, "marker.png")
+    if not os.path.exists(marker):
+        sheet, side = os.path.join(FOLDER, "sheet.png"), rooms.MARKER_SIDE_MM
+        subprocess.run([os.path.join(BIN, "arhost"), "marker", "tag36h11:0", "--side", str(side), "--paper", "130x150",
+                        "--margin", "4", "--dpi", "254", "-o", sheet], check=True, stdout=subprocess.DEVNULL)
+        page = np.asarray(Image.open(sheet).convert("L"))
+        top = int((page < 128).any(1).argmax())  # 10 px per mm; the marker's upper edge
+        left = int((page[top] < 128).argmax())
+        Image.fromarray(page[top:top + 10 * side, left:left + 10 * side]).save(marker)
+    bunny = os.path.join(root, "..", "shared", "data", "meshes", "bunny_69451.ply.gz")
+    mesh = os.path.join(FOLDER, "bunny.ply")
+    if not os.path.exists(bunny):
+        print("skipped: the bunny, because ../shared/data is missing")
+    elif not os.path.exists(mesh):
+        with gzip.open(bunny) as packed, open(mesh, "wb") as out:
+            shutil.copyfileobj(packed, out)
+
+
+def load(room, picture, view):
+    return np.load(os.path.join(FOLDER, room.name, f"{picture}-{view}.npy"))
+
+
+def write_trajectory(file, views):
+    cameras = rooms.cameras()
+    header = {"format": "arhost-trajectory", "version": 1, "unit": "mm", "clock": "media", "fps": 25,
+              "camera": {"width": rooms.WIDTH, "height": rooms.HEIGHT, "fx": rooms.FOCAL_PX, "fy": rooms.FOCAL_PX,
+                         "cx": (rooms.WIDTH - 1) / 2, "cy": (rooms.HEIGHT - 1) / 2}}
+    with open(file, "w", encoding="utf-8") as out:
+        out.write(json.dumps(header) + "\n")
+        for view in views:
+            camera = cameras[view]
+            out.write(json.dumps({"frame": view, "capture_ns": view * 40_000_000, "eye": camera.eye, "look_at": camera.look_at,
+                                  "up": camera.up}) + "\n")
+
+
+def augmented(room, rig, light):
+    """arhost's pictures, as codes, by view."""
+    folder = os.path.join(FOLDER, room.name, rig)
+    shutil.rmtree(folder, ignore_errors=True)
+    os.makedirs(folder)
+    scenes.write_hdr(load(room, "probe", 0), os.path.join(folder, "environment.hdr"))
+    bunny = os.path.join(FOLDER, "bunny.obj")
+    with open(os.path.join(folder, "scene.yaml"), "w", encoding="utf-8") as out:
+        out.write(scenes.scene(light, bunny if os.path.exists(bunny) else None))
+    write_trajectory(os.path.join(folder, "cameras.jsonl"), VIEWS)
+    for view in VIEWS:
+        Image.fromarray(measure.photo(load(room, "plate", view), room.name, view)).save(os.path.join(folder, f"plate-{view}.png"))
+    with open(os.path.join(folder, "run.yaml"), "w", encoding="utf-8") as out:
+        out.write("version: 1\nsource: {plugin: source_file, path: plate-%d.png, fps: 25}\ntrajectory: cameras.jsonl\n"
+                  "raytracer: {plugin: rt_embree, scene: scene.yaml, deadline_ms: 100000, "
+                  "options: {samples: 64, light_samples: 64}}\n"
+                  "outputs: [{plugin: sink_images, path: out-%d.png}]\n")
+    ran = subprocess.run([os.path.join(BIN, "arhost"), "run.yaml"], cwd=folder, stderr=subprocess.PIPE, text=True, check=False)
+    if ran.returncode != 0:
+        raise SystemExit(ran.stderr)
+    return [np.asarray(Image.open(os.path.join(folder, f"out-{view}.png")).convert("RGB")) for view in VIEWS]
+
+
+def rows_of(room):
+    """The pictures of each row of the table, as codes, by view."""
+    plates = [load(room, "plate", view) for view in VIEWS]
+    photos = [measure.photo(plate, room.name, view) for view, plate in zip(VIEWS, plates)]
+    catchers = []
+    for view, plate in zip(VIEWS, plates):
+        catcher = load(room, "catcher", view)
+        catchers.append(measure.photo(catcher[..., :3] + (1 - catcher[..., 3:]) * plate[..., :3], room.name, view))
+    return {"nothing": photos, "demo lamp": augmented(room, "demo", scenes.demo_light()),
+            "known light": augmented(room, "known", scenes.known_light(room)), "Blender's catcher": catchers,
+            "floor": [measure.photo(load(room, "again", view), room.name, view) for view in VIEWS]}
+
+
+def main():
+    prepare()
+    jobs = [f"{room.name}/probe/0" for room in rooms.ROOMS]
+    for view in VIEWS:
+        jobs += [f"{room.name}/{picture}/{view}" for room in rooms.ROOMS for picture in ("plate", "truth", "catcher", "again")]
+    render(jobs)
+    if "--moving" in sys.argv:
+        render([f"{room.name}/{picture}/m{frame}" for frame in range(rooms.MOVING_FRAMES) for room in rooms.ROOMS
+                for picture in ("plate", "truth")])
+    results = {}
+    for room in rooms.ROOMS:
+        rows = rows_of(room)
+        truths = [measure.photo(load(room, "truth", view), room.name, view) for view in VIEWS]
+        areas = [measure.areas(load(room, "plate", view), load(room, "truth", view),
+                               np.load(os.path.join(FOLDER, room.name, f"labels-{view}.npz"))) for view in VIEWS]
+        results[room.name] = {name: measure.compare(pictures, truths, areas) for name, pictures in rows.items()}
+        sheet = [np.concatenate([pictures[0] for pictures in [*rows.values()][:-1]] + [truths[0]], 1)]
+        Image.fromarray(np.concatenate(sheet, 0)).save(os.path.join(FOLDER, f"{room.name}.png"))
+    with open(os.path.join(FOLDER, "truth.json"), "w", encoding="utf-8") as out:
+        json.dump(results, out, indent=1)
+    measure.print_tables(results)
+
+
+main()
