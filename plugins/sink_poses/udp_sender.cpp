@@ -6,6 +6,8 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
+#include <cstdint>
 #include <cstring>
 #include <memory>
 
@@ -15,6 +17,13 @@ namespace {
 struct FreeAddresses {
     void operator()(addrinfo *addresses) const { ::freeaddrinfo(addresses); }
 };
+
+bool is_port(std::string_view text) {
+    std::uint16_t port = 0;
+    const char *const end = text.data() + text.size();
+    const auto [last, error] = std::from_chars(text.data(), end, port);
+    return error == std::errc() && last == end && port > 0;
+}
 
 Failure failure(const std::string &why, arhost_status status = ARHOST_STATUS_ERROR_CONFIGURATION) {
     return Failure(status, "udp: " + why);
@@ -45,6 +54,8 @@ UdpSender::UdpSender(const Host &host, const std::string &receiver) : host_(host
         name = name.substr(1, name.size() - 2);
     if (colon == std::string::npos || name.empty())
         throw failure("'" + receiver + "' must be HOST:PORT, as in 127.0.0.1:9000");
+    if (const std::string_view port = std::string_view(receiver).substr(colon + 1); !is_port(port))
+        throw failure("'" + receiver + "': the port '" + std::string(port) + "' must be a number from 1 to 65535");
     ::close(open_socket(AF_INET)); // without the permission, names would seem to be unreachable
     addrinfo hints{}, *found = nullptr;
     hints.ai_socktype = SOCK_DGRAM;

@@ -7,9 +7,27 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <charconv>
+#include <cstdint>
 #include <string_view>
 
 namespace arhost {
+namespace {
+
+// `url`: without its scheme. Libav ends the authority at the first slash, even if that belongs to a password.
+bool has_valid_port(std::string_view url) {
+    std::string_view host = url.substr(0, url.find_first_of("/?#"));
+    host.remove_prefix(host.rfind('@') + 1); // npos + 1 is 0
+    const std::size_t colon = host.rfind(':');
+    if (colon == std::string_view::npos || host.ends_with(']'))
+        return true;
+    std::uint16_t port = 0;
+    const char *const end = host.data() + host.size();
+    const auto [last, error] = std::from_chars(host.data() + colon + 1, end, port);
+    return error == std::errc() && last == end && port > 0;
+}
+
+} // namespace
 
 void check_url(const std::string &url) {
     constexpr std::size_t max_length = 2000; // far below the maximum line length of LibavLog
@@ -30,6 +48,8 @@ void check_url(const std::string &url) {
         throw rejection("contains a blank, quote, bracket, control or non-ASCII character; write it as %20, %27 …");
     if (url.find_first_of("/?#", scheme->size()) == scheme->size() || url.size() == scheme->size())
         throw rejection("names no host");
+    if (!has_valid_port(std::string_view(url).substr(scheme->size())))
+        throw rejection("the port must be a number from 1 to 65535; write a slash in a password as %2F");
 }
 
 std::string without_credentials(const std::string &text) {

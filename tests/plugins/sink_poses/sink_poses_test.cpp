@@ -320,6 +320,13 @@ TEST_F(SinkPoses, AFolderAsPathIsRejected) {
     EXPECT_THAT(s.log(), HasSubstr("add a file name"));
 }
 
+TEST_F(SinkPoses, AReceiverNeedsAPort) {
+    for (const std::string port : {"", "0", "65536", "-1", "9000x", "http"})
+        EXPECT_THAT(log_of_start("127.0.0.1:" + port, ARHOST_STATUS_ERROR_CONFIGURATION),
+                    HasSubstr("the port '" + port + "' must be a number from 1 to 65535"));
+    EXPECT_THAT(log_of_start("127.0.0.1", ARHOST_STATUS_ERROR_CONFIGURATION), HasSubstr("must be HOST:PORT"));
+}
+
 TEST_F(SinkPoses, ANameThatCannotBeResolvedNowIsTriedAgainByTheHost) {
     for (const auto &[name, status] : {std::pair{"unreachable.example", ARHOST_STATUS_ERROR_IO},
                                        {"mistyped.example", ARHOST_STATUS_ERROR_CONFIGURATION}})

@@ -102,8 +102,8 @@ TEST(JpegSplitter, FindsPicturesHoweverTheirBytesArrive) {
 }
 
 TEST(Url, IsAcceptedWithCredentialsPortAndQuery) {
-    for (const char *url :
-         {"rtsp://camera/", "rtsp://u:p%40@10.0.0.7:8554/live?channel=1", "https://host", "http://[::1]:80/a.m3u8#x"})
+    for (const char *url : {"rtsp://camera/", "rtsp://u:p%40@10.0.0.7:8554/live?channel=1", "https://host",
+                            "http://[::1]:80/a.m3u8#x", "http://u:p@[::1]/?a=b:0"})
         EXPECT_EQ(rejection_of(url), "") << url;
 }
 
@@ -115,6 +115,11 @@ TEST(Url, IsRejectedWithoutBeingShown) {
     for (const char *url : {"http://u:secret@host/a b", "http://u:secret@host/\r\nX: y", "http://u:sec'ret@host/",
                             "http://u:secret@host/ä"})
         EXPECT_THAT(rejection_of(url), testing::AllOf(HasSubstr("write it as %20"), Not(HasSubstr("secret")))) << url;
+    for (const char *url : {"rtsp://host:0", "http://u:secret@host:65536/", "http://host:/", "http://[::1]:x/",
+                            "rtsp://u:secret/q@host:554"})
+        EXPECT_EQ(rejection_of(url),
+                  "url: the port must be a number from 1 to 65535; write a slash in a password as %2F")
+            << url;
     EXPECT_EQ(rejection_of("http:///path"), "url: names no host");
     EXPECT_EQ(rejection_of("http://"), "url: names no host");
     EXPECT_EQ(rejection_of("http://h/" + std::string(3000, 'x')), "url: is longer than 2000 characters");
