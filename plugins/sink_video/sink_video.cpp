@@ -115,31 +115,33 @@ public:
     }
 
 private:
-    // Makes a video of the segments that an earlier run has left, because it was killed or the disk was full. Drops a
-    // single frame: this run wrote it, if it was killed before the host received the answer.
+    // Makes a video of the segments that an earlier recording, of this run or another, has left, because it was
+    // killed or the disk was full. Drops a single frame: this run wrote it, if it was killed before the host received
+    // the answer.
     void recover() {
         const std::vector<Segment> segments = find_segments(path_);
         if (segments.empty())
             return;
+        const std::string interrupted = "an earlier recording of '" + path_.string() + "' was interrupted";
         std::int64_t frames = 0;
         try {
             frames = join(
                 segments, partial_, format_, settings_.fps,
-                [&](double fraction) { host_.progress(fraction, "recovering the video of an earlier run"); },
+                [&](double fraction) { host_.progress(fraction, "recovering an interrupted video"); },
                 [&](const std::string &text) { host_.warn(text); });
             if (frames > 1) {
                 const fs::path recovered = free_sibling();
                 if (std::error_code error; fs::rename(partial_, recovered, error), error)
                     throw files::io_failure("cannot write", recovered, error.value());
-                host_.warn("an earlier run was interrupted while it wrote '" + path_.string() + "'; its " +
-                           std::to_string(frames) + " frames are now in '" + recovered.string() + "'");
+                host_.warn(interrupted + "; its " + std::to_string(frames) + " frames are now in '" +
+                           recovered.string() + "'");
             }
         } catch (const Failure &failure) {
             files::remove_file(partial_);
-            throw Failure(failure.status(),
-                          std::string(failure.what()) + "; an earlier run was interrupted while it wrote '" +
-                              path_.string() + "': move its frames, '" +
-                              files::hidden_sibling(path_, ".from*.mkv").string() + "', to another folder");
+            // Whatever the status is: the host must not retry.
+            throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
+                          interrupted + ", and its frames cannot be recovered: " + failure.what() + "; or move '" +
+                              files::hidden_sibling(path_, ".from*.mkv").string() + "' to another folder");
         }
         files::remove_file(partial_);
         for (const Segment &segment : segments)

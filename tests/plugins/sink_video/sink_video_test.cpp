@@ -359,21 +359,24 @@ TEST_F(SinkVideo, AFreshStartRecoversTheFramesOfAnEarlierRun) {
     std::ofstream(path("demo.recovered-1.mp4")) << "an earlier one";
     SinkUnderTest s = sink();
     s.run(width, height, 0, 3);
-    EXPECT_THAT(s.log(), HasSubstr("4 an earlier run was interrupted while it wrote '" + path().string() +
-                                   "'; its 9 frames are now in '" + path("demo.recovered-2.mp4").string() + "'"));
+    EXPECT_THAT(s.log(), HasSubstr("4 an earlier recording of '" + path().string() +
+                                   "' was interrupted; its 9 frames are now in '" +
+                                   path("demo.recovered-2.mp4").string() + "'"));
     EXPECT_EQ(read_video(path()).numbers(), numbers(0, 3));
     EXPECT_EQ(read_video(path("demo.recovered-2.mp4")).numbers(), numbers(0, 9));
     EXPECT_THAT(names(), UnorderedElementsAre(".demo.mp4.from7.txt", "demo.mp4", "demo.recovered-1.mp4",
                                               "demo.recovered-2.mp4"));
 }
 
-TEST_F(SinkVideo, FramesThatCannotBeRecoveredStay) {
+TEST_F(SinkVideo, FramesThatCannotBeRecoveredStayAndTheHostDoesNotRetry) {
     run_and_die(0, 5);
     const FileSizeLimit limit(100);
     SinkUnderTest s = sink();
-    EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_IO);
-    EXPECT_THAT(s.log(),
-                HasSubstr("move its frames, '" + path(".demo.mp4.from*.mkv").string() + "', to another folder"));
+    EXPECT_EQ(s.start(width, height), ARHOST_STATUS_ERROR_CONFIGURATION);
+    EXPECT_THAT(s.log(), HasSubstr("an earlier recording of '" + path().string() +
+                                   "' was interrupted, and its frames cannot be recovered: cannot write '" +
+                                   path(".demo.mp4.partial").string() + "': File too large"));
+    EXPECT_THAT(s.log(), HasSubstr("; or move '" + path(".demo.mp4.from*.mkv").string() + "' to another folder"));
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv"));
 }
 
