@@ -117,10 +117,18 @@ std::string with_own_folders(std::string text, const Folders &folders) {
     return text;
 }
 
+// Returns whether an output writes frames to standard output.
+bool writes_to_standard_output(const run_config::Configuration &configuration) {
+    return std::ranges::any_of(configuration.outputs, [](const run_config::ComponentConfiguration &output) {
+        const auto path = run_config::path_of(output.node);
+        return path && run_config::is_standard_output(*path);
+    });
+}
+
 // Starts all components once, without restarts, and prints what they report. The outputs may write only to a
 // temporary folder; messages name the configured folders instead. Returns the exit status.
-int check_by_opening(run_config::Configuration configuration, const Arguments &arguments,
-                     supervise::Context context) {
+int check_by_opening(run_config::Configuration configuration, const Arguments &arguments, supervise::Context context,
+                     std::FILE *report) {
     const base::TemporaryFolder scratch("arhost-check");
     for_each_component(configuration, [](run_config::ComponentConfiguration &component) {
         component.limits.restart.quarantine_after = 1;
@@ -141,7 +149,7 @@ int check_by_opening(run_config::Configuration configuration, const Arguments &a
         throw std::runtime_error(reason);
     }
     for (const std::string &line : run.findings())
-        std::printf("%s\n", base::printable(line).c_str());
+        std::fprintf(report, "%s\n", base::printable(line).c_str());
     const auto problem = problem_with_run(configuration, run.statistics(), run.targets());
     if (problem)
         context.log(ARHOST_SEVERITY_ERROR, problem->component, problem->text);
@@ -161,13 +169,14 @@ int check(const Arguments &arguments, bool open, supervise::Starter &launcher) {
     ipc::Reactor reactor;
     supervise::Context context = make_context(reactor, launcher, console);
     const std::vector<model::PluginDescription> raytracers = check_plugins(configuration, context, !open);
+    std::FILE *const report = arguments.frames && writes_to_standard_output(configuration) ? stderr : stdout;
     if (open) {
-        if (const int status = check_by_opening(configuration, arguments, context); status != base::success)
+        if (const int status = check_by_opening(configuration, arguments, context, report); status != base::success)
             return status;
     } else if (configuration.raytracer) {
         check_scene(configuration, context, raytracers);
     }
-    std::printf("%s: OK\n", base::printable(arguments.file).c_str());
+    std::fprintf(report, "%s: OK\n", base::printable(arguments.file).c_str());
     return base::success;
 }
 

@@ -703,6 +703,16 @@ TEST(CommandLine, CheckRunsTheFirstFramesOnRequest) {
     run.expect({"check", "--run", "10", "--no-open", "run.yaml"}, 2, {"--run and --no-open exclude each other"});
 }
 
+TEST(CommandLine, CheckKeepsItsReportApartFromAnOutputToStandardOutput) {
+    ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 0}}\n"
+                  "outputs: [{plugin: sink_poses, path: \"-\"}]\n");
+    run.start({"check", "--run", "2", "run.yaml"},
+              [] { ::dup2(::open("poses.jsonl", O_CREAT | O_WRONLY, 0644), STDOUT_FILENO); });
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    EXPECT_THAT(run.output(), HasSubstr("\nrun.yaml: OK\n"));
+    EXPECT_EQ(run.lines("poses.jsonl"), 2u) << run.read("poses.jsonl");
+}
+
 TEST(CommandLine, CheckOpensNothingOnRequest) {
     ArhostRun run("version: 1\nsource: {plugin: source_v4l2, allow: [video], options: {device: /dev/video-none}}\n");
     run.expect({"check", "run.yaml"}, 2, {"/dev/video-none"});
