@@ -267,9 +267,7 @@ int main(int argc, char **argv) {
         return base::flush_stdout() ? *status : failed;
     try {
         std::fputs(calibrate(arguments, base::watch_signals().get()).c_str(), stdout);
-        if (!base::flush_stdout())
-            throw std::runtime_error("cannot write to standard output");
-        return success;
+        return base::flush_stdout() ? success : failed;
     } catch (const base::Interrupted &interrupted) {
         base::end_by_signal(interrupted.signal);
     } catch (const std::exception &error) {

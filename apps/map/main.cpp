@@ -301,8 +301,6 @@ void run(const Arguments &arguments, int signals) {
                                         map.origin);
     output.write(map_text(map.markers, family, fmt::format("# {}\n# Frame: {}.\n", summary, frame)));
     std::printf("%s: %s\n%s", base::printable(arguments.output).c_str(), summary.c_str(), table_of(map).c_str());
-    if (!base::flush_stdout())
-        throw std::runtime_error("cannot write to standard output");
 }
 
 } // namespace
@@ -353,7 +351,7 @@ int main(int argc, char **argv) {
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT); // the messages below name the file
     try {
         run(arguments, base::watch_signals().get());
-        return success;
+        return base::flush_stdout() ? success : failed;
     } catch (const base::Interrupted &interrupted) {
         base::end_by_signal(interrupted.signal);
     } catch (const std::exception &error) {

@@ -251,9 +251,7 @@ int main(int argc, char **argv) {
         const Result result = draw(arguments);
         write(result.files);
         std::printf("%s\n", base::printable(result.summary).c_str());
-        if (!base::flush_stdout())
-            throw std::runtime_error("cannot write to standard output");
-        return success;
+        return base::flush_stdout() ? success : failed;
     } catch (const std::exception &error) {
         std::fprintf(stderr, "error: %s\n", base::printable(error.what()).c_str());
         return failed;

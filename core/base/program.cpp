@@ -8,14 +8,15 @@
 #include <cstdio>
 #include <fcntl.h>
 #include <unistd.h>
+#include <utility>
 
 namespace arhost::base {
 
 void prepare_process() {
-    int fd = ::open("/dev/null", O_RDWR);
-    while (fd >= 0 && fd <= 2)
-        fd = ::open("/dev/null", O_RDWR);
-    ::close(fd);
+    // open() returns the lowest free descriptor.
+    for (const auto &[stream, file] : {std::pair{0, "/dev/null"}, {1, "/dev/full"}, {2, "/dev/null"}})
+        if (::fcntl(stream, F_GETFD) < 0)
+            (void)::open(file, O_RDWR);
     std::signal(SIGPIPE, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN);
     std::signal(SIGCHLD, SIG_DFL); // waitpid() fails if SIGCHLD is ignored
@@ -29,7 +30,7 @@ int print_error(const std::string &why, ExitStatus status) {
 int exit_status_of(const std::function<int()> &command) {
     try {
         const int status = command();
-        return flush_stdout() ? status : print_error("cannot write to standard output", failed);
+        return flush_stdout() ? status : failed;
     } catch (const InvalidInput &error) {
         return print_error(error.what(), invalid_input);
     } catch (const std::filesystem::filesystem_error

@@ -18,8 +18,8 @@ struct InvalidInput : std::runtime_error {
 };
 
 // Establishes a known state, independent of the parent process. Reopens standard streams that are closed, so that no
-// socket gets descriptor 0, 1 or 2, and resets the signal handling. Ignores SIGPIPE and SIGXFSZ, so that the failing
-// system calls return an error instead.
+// socket gets descriptor 0, 1 or 2; printing to a standard output that was closed fails. Resets the signal handling.
+// Ignores SIGPIPE and SIGXFSZ, so that the failing system calls return an error instead.
 void prepare_process();
 
 // Prints the error as a single line, even if a file name in it contains a line break. Returns `status`.

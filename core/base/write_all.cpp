@@ -38,7 +38,13 @@ void write_all(int fd, std::string_view bytes, int signals) {
 }
 
 bool flush_stdout() {
-    return std::fflush(stdout) == 0 && !std::ferror(stdout);
+    if (std::fflush(stdout) == 0 && !std::ferror(stdout))
+        return true;
+    pollfd out{STDOUT_FILENO, POLLOUT, 0};
+    if (::poll(&out, 1, 0) > 0 && out.revents & POLLERR)
+        end_by_signal(SIGPIPE);
+    std::fputs("error: cannot write to standard output\n", stderr);
+    return false;
 }
 
 UniqueFd watch_signals() {

@@ -21,7 +21,8 @@ struct Interrupted : std::runtime_error {
 // std::system_error.
 void write_all(int fd, std::string_view bytes, int signals = -1);
 
-// Flushes stdout. Returns false if any output was lost, for example because the disk is full.
+// Flushes stdout. If any output was lost, for example because the disk is full, prints an error and returns false. If
+// the reader has closed the pipe, ends the process without a message, as SIGPIPE would.
 bool flush_stdout();
 
 // Blocks SIGINT, SIGTERM and SIGHUP, except those that the parent process ignores (nohup), and returns a signalfd for

@@ -381,13 +381,37 @@ TEST(BadCommandLine, IsRejected) {
     }
 }
 
-TEST(FullDisk, FailsIfStandardOutputCannotBeWritten) {
+TEST(StandardOutput, ThatCannotBeWrittenIsReportedOnce) {
     ArhostRun run(good);
     run.write("scene.yaml", small_scene);
-    for (const std::vector<std::string> &arguments :
-         {std::vector<std::string>{"schema"}, {"plugins"}, {"check", "run.yaml"}}) {
-        run.start(arguments, [] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); });
-        EXPECT_EQ(run.wait(), 1);
-        EXPECT_THAT(run.output(), HasSubstr("cannot write to standard output"));
+    struct {
+        std::vector<std::string> arguments;
+        int status;
+    } const commands[] = {{{"schema"}, 1},
+                          {{"plugins"}, 1},
+                          {{"check", "run.yaml", "--set", "outputs.0.path=out/counted.txt"}, 1},
+                          {{"help"}, 1},
+                          {{"marker", "--help"}, 2}};
+    for (const auto &command : commands)
+        for (void (*prepare)() :
+             {+[] { ::dup2(::open("/dev/full", O_WRONLY), STDOUT_FILENO); }, +[] { ::close(STDOUT_FILENO); }}) {
+            run.start(command.arguments, prepare);
+            EXPECT_EQ(run.wait(), command.status) << command.arguments.front();
+            EXPECT_EQ(run.messages(), "error: cannot write to standard output\n") << command.arguments.front();
+        }
+}
+
+TEST(StandardOutput, ThatIsABrokenPipeEndsACommandQuietly) {
+    ArhostRun run;
+    for (const std::vector<std::string> &arguments : {std::vector<std::string>{"schema"}, {"marker", "--help"}}) {
+        run.start(arguments, [] {
+            int ends[2];
+            if (::pipe(ends) != 0)
+                ::_exit(126);
+            ::dup2(ends[1], STDOUT_FILENO);
+            ::close(ends[0]);
+        });
+        EXPECT_EQ(run.wait(), 128 + SIGPIPE);
+        EXPECT_EQ(run.output(), "");
     }
 }
