@@ -55,19 +55,22 @@ class Host:
 
 
 class _PrintedLines(io.TextIOWrapper):
-    """Standard output of the script, whose text is logged by line. The log is limited, so printing never blocks.
-    What is written to `buffer` or `fileno()` is logged like the output of a program."""
+    """Standard output of the script, whose text is logged by line; a longer line than the log takes, in parts. The log
+    is limited, so printing never blocks. What is written to `buffer` or `fileno()` is logged like the output of a
+    program."""
 
     def __init__(self, log):
         super().__init__(io.FileIO(1, "w", closefd=False), "utf-8", write_through=True)
         self.log, self.line = log, ""
 
     def write(self, text):
-        *lines, self.line = (self.line + text).split("\n")
+        *lines, rest = (self.line + text).split("\n")
+        full = len(rest) // 4000 * 4000
+        lines += [rest[begin:begin + 4000] for begin in range(0, full, 4000)]
+        self.line = rest[full:]
         for line in lines:
             if line:
                 self.log(SEVERITY_INFO, line)
-        self.line = self.line[:4000]  # the maximum of the log
         return len(text)
 
 
