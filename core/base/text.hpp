@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Makes untrusted text safe to print.
+// Makes untrusted text safe to print, and composes messages.
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -21,5 +22,8 @@ std::string printable(std::string_view text, std::size_t max_size = std::string_
 
 // Returns a number with a noun: "1 frame", "2 frames".
 std::string count_of(std::uint64_t number, std::string_view noun);
+
+// Returns the candidate that is most similar to `word` ("dictionary" for "dictionry"), or "" if none is similar.
+std::string nearest(std::string_view word, std::span<const std::string_view> candidates);
 
 } // namespace arhost::base

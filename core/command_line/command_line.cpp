@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "command_line/command_line.hpp"
 
+#include "base/program.hpp"
 #include "base/text.hpp"
 #include "command_line/description.hpp"
 
@@ -189,6 +190,14 @@ std::optional<int> CommandLine::parse(int argc, char **argv) {
         std::printf("%s\n", nlohmann::json(program).dump().c_str());
         return 0;
     }
+    // A misspelt subcommand would be taken for a file.
+    const std::vector<std::string> names = subcommands();
+    const std::vector<std::string_view> candidates(names.begin(), names.end());
+    const std::string first = argc > 1 ? argv[1] : "", near = base::nearest(first, candidates);
+    std::error_code ignored;
+    if (!first.starts_with('-') && !near.empty() && near != first && !std::filesystem::exists(first, ignored))
+        return base::print_error("there is no command or file '" + first + "'; did you mean '" + near + "'?",
+                                 base::invalid_input);
     try {
         app_->parse(argc, argv);
         return std::nullopt;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "run_config/plugin_path.hpp"
 
+#include "base/text.hpp"
+
 #include <algorithm>
 #include <cstdlib>
 #include <map>
@@ -47,7 +49,7 @@ fs::path PluginPath::find(const std::string &name) const {
     std::transform(files.begin(), files.end(), known.begin(),
                    [](const fs::path &file) { return file.stem().string(); });
     const std::vector<std::string_view> candidates(known.begin(), known.end());
-    const std::string near = yaml::nearest(name, candidates);
+    const std::string near = base::nearest(name, candidates);
     std::string folders;
     for (const fs::path &folder : folders_)
         folders += (folders.empty() ? "" : ", ") + folder.string();

@@ -2,6 +2,7 @@
 #include "run_config/user_view.hpp"
 
 #include "base/file_identity.hpp"
+#include "base/text.hpp"
 #include "run_config/access.hpp"
 
 #include <arhost-cpp/numbered_name.hpp>
@@ -29,7 +30,7 @@ std::string hint(const fs::path &file, const std::set<std::string> &names, std::
         return "; write the number in the names of numbered files as %d, or as %04d if it has leading zeros: "
                "'frame_%04d.png'";
     const std::vector<std::string_view> candidates(names.begin(), names.end());
-    std::string near = yaml::nearest(file.filename().string(), candidates);
+    std::string near = base::nearest(file.filename().string(), candidates);
     if (near.ends_with(extension))
         near.resize(near.size() - extension.size());
     return near.empty() ? "" : "; did you mean '" + near + "'?";

@@ -31,26 +31,6 @@ std::string child_path(const std::string &parent, std::string_view key) {
     return parent.empty() ? std::string(key) : parent + "." + std::string(key);
 }
 
-char lower(char c) {
-    return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-}
-
-// Ignores the case of letters.
-std::size_t edit_distance(std::string_view a, std::string_view b) {
-    std::vector<std::size_t> row(b.size() + 1);
-    for (std::size_t j = 0; j <= b.size(); ++j)
-        row[j] = j;
-    for (std::size_t i = 1; i <= a.size(); ++i) {
-        std::size_t diagonal = row[0]++;
-        for (std::size_t j = 1; j <= b.size(); ++j) {
-            const std::size_t substituted = diagonal + (lower(a[i - 1]) != lower(b[j - 1]));
-            diagonal = row[j];
-            row[j] = std::min({row[j] + 1, row[j - 1] + 1, substituted});
-        }
-    }
-    return row.back();
-}
-
 // Returns whether a key path is `ancestor` or below it.
 bool is_at_or_below(const std::string &path, const std::string &ancestor) {
     return path.starts_with(ancestor) &&
@@ -199,17 +179,6 @@ YAML::Node read(std::string text) {
 }
 
 } // namespace
-
-std::string nearest(std::string_view word, std::span<const std::string_view> candidates) {
-    std::string_view best;
-    std::size_t best_distance = std::max<std::size_t>(2, word.size() / 3) + 1;
-    for (const std::string_view candidate : candidates)
-        if (const std::size_t distance = edit_distance(word, candidate); distance < best_distance) {
-            best = candidate;
-            best_distance = distance;
-        }
-    return std::string(best);
-}
 
 std::string read_file(const std::filesystem::path &file) {
     std::error_code ignored;
@@ -361,7 +330,7 @@ std::vector<Node> Node::set_aside_keys(std::span<const std::string_view> keys) c
             at_key.fail("duplicate key; keep one of them");
         if (std::ranges::find(keys, std::string_view(key)) != keys.end())
             continue;
-        const std::string hint = hint_for_missing_space(key), near = nearest(key, keys);
+        const std::string hint = hint_for_missing_space(key), near = base::nearest(key, keys);
         if (!hint.empty() || !near.empty())
             at_key.fail("unknown key" + (!hint.empty() ? hint : "; did you mean '" + near + "'?"));
         if (at_key.is_overridden())
@@ -478,7 +447,7 @@ std::string Node::text() const {
 std::string Node::choice(std::span<const std::string_view> choices) const {
     std::string value = text();
     if (std::find(choices.begin(), choices.end(), value) == choices.end()) {
-        const std::string near = nearest(value, choices);
+        const std::string near = base::nearest(value, choices);
         fail(in_quotes(value) + " is not one of " + listed(choices) +
              (near.empty() ? "" : "; did you mean '" + near + "'?"));
     }
@@ -486,7 +455,7 @@ std::string Node::choice(std::span<const std::string_view> choices) const {
 }
 
 bool Node::is_unlike(std::span<const std::string_view> choices) const {
-    return !is_overridden() && nearest(text(), choices).empty();
+    return !is_overridden() && base::nearest(text(), choices).empty();
 }
 
 std::vector<double> Node::reals() const {

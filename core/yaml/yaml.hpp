@@ -153,7 +153,4 @@ private:
     std::shared_ptr<Document> document_;
 };
 
-// Returns the candidate that is most similar to `word` ("dictionary" for "dictionry"), or "" if none is similar.
-std::string nearest(std::string_view word, std::span<const std::string_view> candidates);
-
 } // namespace arhost::yaml

@@ -414,6 +414,16 @@ TEST(CommandLine, TakesTheConfigurationAsArgument) {
     run.expect({"run.yaml", "other.yaml"}, 2, {"not expected: other.yaml"});
 }
 
+TEST(CommandLine, SuggestsACommandForAMisspeltOne) {
+    CountingRun run({.source = "frames: 3"});
+    for (const std::vector<std::string> &arguments : {std::vector<std::string>{"chek", "run.yaml"}, {"chek"}}) {
+        EXPECT_EQ(run.run(arguments), 2);
+        EXPECT_EQ(run.output(), "error: there is no command or file 'chek'; did you mean 'check'?\n");
+    }
+    std::filesystem::rename(run.path("run.yaml"), run.path("chek"));
+    EXPECT_EQ(run.run({"chek"}), 0) << run.output();
+}
+
 TEST(CommandLine, HelpDescribesCommands) {
     ArhostRun run;
     run.expect({"-V"}, 0, {"arhost 0."});
