@@ -334,6 +334,7 @@ void FrameFlow::on_shown(Frame &frame, Clock::time_point composited) {
 
 void FrameFlow::finish(Frame &frame, bool is_shown, Clock::time_point when) {
     statistics_.composited += is_shown;
+    statistics_.tracked += is_shown && std::ranges::any_of(frame.targets, is_visible);
     statistics_.augmented += is_shown && frame.has_overlay();
     statistics_.last_frame = when;
     const Clock::duration latency = when - frame.captured;

@@ -47,7 +47,7 @@ std::optional<Problem> problem_with_run(const run_config::Configuration &configu
     const bool poses_from_tracker = configuration.tracker && !configuration.trajectory;
     if (poses_from_tracker && statistics.tracker_results == 0 && count(statistics.skipped, "tracker") > 0)
         return Problem{"tracker", "it delivered no result: it failed in every frame; see its messages above"};
-    if (poses_from_tracker && statistics.tracker_results > 0 && statistics.tracked == 0)
+    if (poses_from_tracker && statistics.tracker_results > 0 && statistics.targets.empty())
         return Problem{"tracker",
                        fmt::format("no target was seen in {}{}; it looked for {}{}{}",
                                    base::count_of(statistics.tracker_results, "frame"),

@@ -14,7 +14,6 @@ constexpr std::chrono::seconds max_time_without_target{5}; // in mode live, from
 } // namespace
 
 void count_targets(const Frame &frame, Statistics &statistics) {
-    statistics.tracked += std::ranges::any_of(frame.targets, is_visible);
     statistics.search.add(frame.record.search);
     const std::span observations(frame.observations);
     for (const arhost_target &target : frame.targets)

@@ -84,9 +84,8 @@ struct Statistics {
     static constexpr std::size_t max_marker_names = 64, max_hints = 4;
     std::uint64_t frames_in = 0;                     // frames received from the source
     std::uint64_t tracker_results = 0;               // frames for which the tracker delivered a result in time
-    std::uint64_t tracked = 0;                       // frames with at least one detected target
-    std::uint64_t augmented = 0;                     // frames composited with an overlay
-    std::uint64_t composited = 0;                    // frames sent to the outputs, augmented or not
+    std::uint64_t composited = 0;                    // frames sent to the outputs
+    std::uint64_t tracked = 0, augmented = 0;        // those of them with a visible target; with an overlay
     std::map<std::string, TargetStatistics> targets; // by name of the target
     SearchStatistics search;
     std::map<std::string, std::uint64_t> unlisted;    // frames with a marker that no target lists, by name

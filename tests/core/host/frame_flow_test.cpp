@@ -687,6 +687,21 @@ TEST(FrameFlow, DropsAFrameIfAllOutputsAreFull) {
     EXPECT_EQ(bench.statistics.composited, 0u);
 }
 
+TEST(FrameFlow, CountsATargetOnlyInFramesThatAreShown) {
+    Bench bench(live());
+    for (const bool is_shown : {false, true}) {
+        bench.outputs_are_full = !is_shown;
+        arrive(bench, 1);
+        bench.go();
+        bench.tracked();
+        bench.go();
+        bench.rendered();
+        bench.go();
+        EXPECT_EQ(bench.statistics.composited, is_shown);
+        EXPECT_EQ(bench.statistics.tracked, is_shown);
+    }
+}
+
 TEST(FrameFlow, ReadsAgainOnceADroppedFrameHasFreedItsSlot) {
     Bench bench(live());
     bench.source_slots = std::make_shared<SlotPool>(std::size_t{1});

@@ -18,7 +18,7 @@ struct Outcome : testing::Test {
         configuration->raytracer =
             run_config::RaytracerConfiguration{{node, {}, {}, {}, {}, {}, false}, "scene.yaml", node};
         statistics.frames_in = statistics.composited = statistics.tracker_results = 30;
-        statistics.tracked = statistics.augmented = 20;
+        statistics.augmented = 20;
     }
     std::optional<Problem> problem() const {
         return problem_with_run(*configuration, statistics, configuration->tracker->targets);
@@ -30,15 +30,16 @@ struct Outcome : testing::Test {
 } // namespace
 
 TEST_F(Outcome, IsGoodIfSomeFramesHaveAnOverlay) {
+    statistics.targets["desk"].frames = 20;
     EXPECT_FALSE(problem());
-    statistics.tracked = statistics.augmented = 1;
+    statistics.augmented = 1;
     EXPECT_FALSE(problem());
     configuration->mode = run_config::Mode::live;
     EXPECT_FALSE(problem());
 }
 
 TEST_F(Outcome, ReportsATargetThatWasNeverSeen) {
-    statistics.tracked = statistics.augmented = 0;
+    statistics.augmented = 0;
     for (const auto mode : {run_config::Mode::lockstep, run_config::Mode::live}) {
         configuration->mode = mode;
         ASSERT_TRUE(problem());
@@ -59,12 +60,12 @@ TEST_F(Outcome, ReportsATargetThatWasNeverSeen) {
 }
 
 TEST_F(Outcome, ReportsATrackerThatFailsInEveryFrame) {
-    statistics.tracked = statistics.augmented = statistics.tracker_results = 0;
+    statistics.augmented = statistics.tracker_results = 0;
     statistics.skipped["tracker"] = 30;
     ASSERT_TRUE(problem());
     EXPECT_FALSE(problem()->is_missing_target);
     EXPECT_THAT(problem()->text, HasSubstr("failed in every frame"));
-    statistics.tracker_results = statistics.tracked = statistics.augmented = 1;
+    statistics.tracker_results = statistics.targets["desk"].frames = statistics.augmented = 1;
     EXPECT_FALSE(problem());
 }
 
@@ -136,7 +137,7 @@ TEST_F(Outcome, ReportsThatEveryOverlayWasLateInModeLive) {
 }
 
 TEST_F(Outcome, NamesTheMarkersThatWereSeenInsteadOfATarget) {
-    statistics.tracked = statistics.augmented = 0;
+    statistics.augmented = 0;
     statistics.unlisted = {{"D 5", 1}, {"D 24", 29}};
     ASSERT_TRUE(problem());
     EXPECT_THAT(problem()->text, HasSubstr("'cup' (D 7); it saw D 24 (29 frames), D 5 (1 frame); compare"));
