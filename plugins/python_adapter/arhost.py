@@ -231,13 +231,14 @@ class _Adapter:
             for line in "".join(trace.format()).splitlines():
                 self.host.warn(line)
             place = [f"{frame.filename}:{frame.lineno}: " for frame in frames[-1:]]
-            if isinstance(error, SyntaxError):
-                place = [f"{error.filename}:{error.lineno}: "]
+            text = str(error)
+            if isinstance(error, SyntaxError) and error.filename:
+                place, text = [f"{error.filename}:{error.lineno}: "], error.msg  # str(error) repeats the place
             hint = ""
             if isinstance(error, ModuleNotFoundError) and self._is_hidden(sys.path[0]):
                 hint = (f"; if the module is next to the script, add 'reads: [{sys.path[0]}]', because the sandbox "
                         "shows a plugin only its script")
-            return status, f"{''.join(place)}{type(error).__name__}: {error}{hint}"
+            return status, f"{''.join(place)}{type(error).__name__}: {text}{hint}"
 
     @staticmethod
     def _is_hidden(folder):

@@ -456,7 +456,7 @@ TEST_F(PythonAdapter, WarnsIfAScriptKeepsAnArray) {
 TEST_F(PythonAdapter, UnusableScriptsAreConfigurationErrors) {
     const std::string two = std::string(idle_tracker) + "class U(T): pass\n";
     for (const auto &[script, message] :
-         {std::pair<std::string, const char *>{"class T\n", "script.py:1: SyntaxError"},
+         {std::pair<std::string, const char *>{")\n", "script.py:1: SyntaxError: unmatched ')'\n"},
           {"import no_such_module\n", "script.py:1: ModuleNotFoundError: No module named 'no_such_module'; if the "
                                       "module is next to the script, add "
                                       "'reads: ["},
