@@ -16,14 +16,19 @@ using supervise::Component;
 
 namespace {
 
+template <class Choice> std::string list_of(const std::vector<Choice> &choices) {
+    std::string names;
+    for (const Choice &choice : choices)
+        names += (names.empty() ? "" : ", ") + choice.name;
+    return names;
+}
+
 // Returns the element of `choices` with this name. Throws control::Error, which lists the names.
 template <class Choice> const Choice &find_choice(const std::vector<Choice> &choices, const std::string &name) {
     const auto found = std::ranges::find(choices, name, &Choice::name);
     if (found != choices.end())
         return *found;
-    std::string names;
-    for (const Choice &choice : choices)
-        names += (names.empty() ? "choose one of: " : ", ") + choice.name;
+    const std::string names = choices.empty() ? "" : "choose one of: " + list_of(choices);
     if (name.empty())
         throw control::Error(names.empty() ? "there is nothing to choose from" : names);
     throw control::Error("there is no '" + base::printable(name, 100) + "'" + (names.empty() ? "" : "; " + names));
@@ -75,9 +80,16 @@ void Commands::execute(const control::Swap &swap, const control::Done &done) {
     if (swap.component == "tracker") {
         expect_no_swap(assembly_.swaps_tracker(), "tracker");
         assembly_.swap_tracker(assembly_.shared(find_choice(choices.trackers, swap.plugin)), done);
-    } else {
+    } else if (swap.component == "raytracer") {
         expect_no_swap(assembly_.swaps_raytracer(), "ray tracer");
         assembly_.swap_raytracer(assembly_.shared(find_choice(choices.raytracers, swap.plugin)), done);
+    } else {
+        std::string swappable;
+        for (const auto &[component, names] :
+             {std::pair{"tracker", list_of(choices.trackers)}, {"raytracer", list_of(choices.raytracers)}})
+            if (!names.empty())
+                swappable += (swappable.empty() ? "" : ", ") + std::string(component) + " (" + names + ")";
+        throw control::Error("choose a component and its new plugin: " + swappable);
     }
 }
 

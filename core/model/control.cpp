@@ -63,13 +63,6 @@ private:
     std::vector<std::string> read_;
 };
 
-std::string parse_component(Members &members) {
-    std::string component = members.text("component");
-    if (component != "tracker" && component != "raytracer")
-        throw Error("'component' must be 'tracker' or 'raytracer'");
-    return component;
-}
-
 Command parse_members(const std::string &name, Members &members, const std::set<std::string, std::less<>> &granted) {
     if (name == "quit")
         return Quit{};
@@ -82,7 +75,7 @@ Command parse_members(const std::string &name, Members &members, const std::set<
     if (name == "load_scene")
         return LoadScene{members.text_or_missing("scene")};
     if (name == "swap") {
-        const std::string component = parse_component(members);
+        const std::string component = members.text_or_missing("component");
         return Swap{component, members.text_or_missing("plugin")};
     }
     if (name == "set") {

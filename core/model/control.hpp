@@ -29,7 +29,7 @@ struct LoadScene {
     std::string scene; // "": missing, the answer lists the names
 };
 struct Swap {
-    std::string component; // "tracker" or "raytracer"
+    std::string component; // "tracker" or "raytracer"; others, and "": the answer lists both with their alternatives
     std::string plugin;    // name of an alternative; "": missing, the answer lists the names
 };
 struct Set {

@@ -490,11 +490,12 @@ TEST(Control, RejectsWhatTheConfigurationDoesNotGrantOrList) {
     EXPECT_THAT(run.error_of({{"command", "load_scene"}, {"scene", "/etc/passwd"}}),
                 HasSubstr("there is no '/etc/passwd'; choose one of: scene, other"));
     EXPECT_THAT(run.error_of(swap("tracker", "../evil.so")), HasSubstr("choose one of: tracker_counter, second"));
-    EXPECT_THAT(run.error_of(swap("source", "second")), HasSubstr("must be 'tracker' or 'raytracer'"));
+    EXPECT_THAT(run.error_of(swap("source", "second")),
+                HasSubstr("choose a component and its new plugin: tracker ("));
     Json with_path = swap("tracker", "second");
     with_path["allow"] = {"network"};
     EXPECT_THAT(run.error_of(with_path), HasSubstr("unknown member 'allow'"));
-    EXPECT_THAT(run.error_of({{"command", "swap"}}), HasSubstr("'component' is missing"));
+    EXPECT_THAT(run.error_of({{"command", "swap"}, {"component", 3}}), HasSubstr("'component' must be a string"));
     EXPECT_THAT(run.error_of({{"command", 3}}), HasSubstr("'command' must be a string"));
     run.send("[1, 2]\n");
     EXPECT_THAT(run.receive()["error"], HasSubstr("must be a JSON object"));
@@ -507,6 +508,9 @@ TEST(Control, RejectsWhatTheConfigurationDoesNotGrantOrList) {
 TEST(Control, ListsTheChoicesIfTheNameIsMissing) {
     ControlledRun run(controlled("lockstep"));
     run.start_and_connect();
+    EXPECT_EQ(run.error_of({{"command", "swap"}}),
+              "choose a component and its new plugin: tracker (tracker_counter, second, broken), raytracer "
+              "(rt_counter, second, broken)");
     EXPECT_EQ(run.error_of({{"command", "swap"}, {"component", "raytracer"}}),
               "choose one of: rt_counter, second, broken");
     EXPECT_EQ(run.error_of({{"command", "load_scene"}}), "choose one of: scene, other");
