@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibrate/calibration.hpp"
 
+#include "base/text.hpp"
+
 #include <fmt/format.h>
 #include <opencv2/calib3d.hpp>
 
@@ -211,8 +213,8 @@ Lens assumed_lens(const cv::Size &image) {
 Calibration calibrate(std::span<const View> views, const cv::Size &image, Model model) {
     if (views.size() < fewest_views)
         throw std::runtime_error(
-            fmt::format("the board was found in {} view{}, but a calibration needs at least {}, and a good one 10",
-                        views.size(), views.size() == 1 ? "" : "s", fewest_views));
+            fmt::format("the board was found in {}, but a calibration needs at least {}, and a good one 10",
+                        base::count_of(views.size(), "view"), fewest_views));
     Calibration calibration{image, {}, {}, 0, {}, {}};
     std::vector<std::size_t> indices(views.size());
     std::iota(indices.begin(), indices.end(), std::size_t{0});

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibrate/coverage.hpp"
 
+#include "base/text.hpp"
+
 #include <fmt/format.h>
 #include <opencv2/imgproc.hpp>
 
@@ -77,8 +79,7 @@ std::vector<std::string> Coverage::missing() const {
     check(&Tilt::about_vertical_degrees, "vertical", "left", "right");
     check(&Tilt::about_horizontal_degrees, "horizontal", "upper", "lower");
     if (views_ < views_wanted)
-        instructions.push_back(fmt::format("take {} more view{}, with other tilts", views_wanted - views_,
-                                           views_wanted - views_ == 1 ? "" : "s"));
+        instructions.push_back("take " + base::count_of(views_wanted - views_, "more view") + ", with other tilts");
     return instructions;
 }
 

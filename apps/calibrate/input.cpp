@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibrate/input.hpp"
 
+#include "base/text.hpp"
 #include "base/write_all.hpp"
 #include "frames/frame_reader.hpp"
 
@@ -63,10 +64,10 @@ public:
     std::string summary(const std::string &name, std::size_t frames) const {
         using enum Collector::Verdict;
         const auto count = [&](Collector::Verdict verdict) { return counts_[static_cast<std::size_t>(verdict)]; };
-        return fmt::format("{}: {} frames, {} views taken; {} frames without the board, {} in motion, {} blurred, {} "
-                           "without a new position or tilt",
-                           name, frames, count(taken), count(no_board), count(moving), count(blurred),
-                           count(similar));
+        return fmt::format("{}: {}, {} taken; {} without the board, {} in motion, {} blurred, {} without a new "
+                           "position or tilt",
+                           name, base::count_of(frames, "frame"), base::count_of(count(taken), "view"),
+                           base::count_of(count(no_board), "frame"), count(moving), count(blurred), count(similar));
     }
 
 private:
@@ -228,8 +229,7 @@ Views views_of_camera(const Reading &reading, const CameraOptions &camera, const
         std::optional<View> view;
         const Collector::Verdict verdict = offer(*collector, board, *grey, frames.count(), view);
         counts.add(verdict);
-        const std::string line = fmt::format("{} view{}: {}", collector->views().size(),
-                                             collector->views().size() == 1 ? "" : "s", collector->advice());
+        const std::string line = base::count_of(collector->views().size(), "view") + ": " + collector->advice();
         if (collector->views().empty())
             grey->copyTo(last);
         if (line != last_line) {

@@ -132,8 +132,7 @@ std::string report(const Views &found, const Calibration &calibration, const Cov
         line("{:<{}}  {:7}  {:8.2f}  left out: the error is far above the other views'",
              found.views[dropped.index].name, width, found.views[dropped.index].image_px.size(), dropped.error_px);
     if (left_out > 0)
-        line("{} corner{} left out: the error is far above that of other corners", left_out,
-             left_out == 1 ? "" : "s");
+        line("{} left out: the error is far above that of other corners", base::count_of(left_out, "corner"));
     const auto &matrix = calibration.lens.matrix;
     const auto &deviations = calibration.deviations_px;
     line("RMS error: {:.3f} px ({} corners of {} views)", calibration.error_px, corners, calibration.used.size());

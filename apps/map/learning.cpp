@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "learning.hpp"
 
+#include "base/text.hpp"
+
 #include <ceres/ceres.h>
 #include <fmt/format.h>
 
@@ -265,9 +267,7 @@ private:
                 continue;
             const std::size_t shared =
                 shared_frames(marker, [&](std::size_t other) { return group_.empty() || group_.contains(other); });
-            const auto frames = [](std::size_t count) {
-                return fmt::format("only {} frame{}", count, count == 1 ? "" : "s");
-            };
+            const auto frames = [](std::size_t count) { return "only " + base::count_of(count, "frame"); };
             refused.push_back(
                 {markers_[marker].id,
                  seen < min_views ? fmt::format("was seen in {}; at least {} are needed", frames(seen), min_views)

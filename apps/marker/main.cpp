@@ -179,8 +179,9 @@ Result draw(const Arguments &arguments) {
     }
     if (!arguments.map.empty())
         files.push_back({arguments.map, map_of(items.front(), family)});
-    return {files, fmt::format("{}: {} page{} of {} x {} mm; print at 100 %", arguments.output, count,
-                               count == 1 ? "" : "s", mm_text(document.width_mm), mm_text(document.height_mm))};
+    return {files,
+            fmt::format("{}: {} of {} x {} mm; print at 100 %", arguments.output, base::count_of(count, "page"),
+                        mm_text(document.width_mm), mm_text(document.height_mm))};
 }
 
 // Writes all files. If this fails, removes the files that it has written, and throws.
