@@ -48,44 +48,25 @@ std::string problem_with(const std::vector<Anchor> &anchors, const run_config::T
 SceneLoading::SceneLoading(supervise::Context &context, const std::filesystem::path &scene,
                            const sandbox::Policy &raytracer, const base::Limits &limits, run_config::FilesInUse files,
                            Callbacks callbacks)
-    : context_(context), callbacks_(std::move(callbacks)), files_(std::move(files)), scene_(scene.string()),
-      timeout_(limits.start), budget_(context.log, "scene") {
-    supervise::Process::Callbacks process_callbacks;
-    process_callbacks.message = [this](Message &message) { on_message(message); };
-    process_callbacks.result = [](const Result &) {};
-    process_callbacks.died = [this](const supervise::Death &death) { on_died(death); };
-    process_ = std::make_unique<supervise::Process>(
-        context, budget_, std::move(process_callbacks),
-        messages::Load{scene_, {raytracer.readable.begin(), raytracer.readable.end()}}, policy_of(raytracer.mode));
-    restart_deadline();
-    total_deadline_ = context_.reactor.at(context_.reactor.now() + limits.start_total, [this, limits] {
-        process_->end("took longer than " + std::to_string(limits.start_total.count()) +
-                      " ms, the limit in total (30 times raytracer.start_deadline_ms)");
-    });
-}
+    : callbacks_(std::move(callbacks)), files_(std::move(files)), scene_(scene.string()),
+      loading_(context, {scene, "scene", "scene loader", limits, "raytracer.start_deadline_ms"},
+               messages::Load{scene_, {raytracer.readable.begin(), raytracer.readable.end()}},
+               policy_of(raytracer.mode),
+               {[this](const Message &message) { on_message(message); },
+                [this](SharedMemory arena, std::span<const std::byte> bytes) { on_loaded(std::move(arena), bytes); },
+                [this](const std::string &reason) {
+                    const Callbacks failing = std::move(callbacks_); // may destroy this object
+                    failing.failed(reason, Callbacks::Files(files_read_));
+                }}) {}
 
-void SceneLoading::on_message(Message &message) {
-    restart_deadline();
-    if (is<messages::Failed>(message)) {
-        fail(parse<messages::Failed>(message).text);
-    } else if (is<messages::Loaded>(message) && message.fds.size() == 1) {
-        arena_ = std::move(message.fds[0]);
-    } else if (is<messages::Reads>(message)) {
+void SceneLoading::on_message(const Message &message) {
+    if (is<messages::Reads>(message)) {
         const auto reads = parse<messages::Reads>(message);
         check_read({reads.path, reads.node});
     } else if (is<messages::AnchorOrigin>(message)) {
         if (anchor_origins_.size() < ARHOST_MAX_TARGETS)
             anchor_origins_.push_back(base::printable(parse<messages::AnchorOrigin>(message).text));
-    } else if (is<messages::Progress>(message)) {
-        budget_.log(ARHOST_SEVERITY_DEBUG, parse<messages::Progress>(message).what);
     }
-}
-
-void SceneLoading::restart_deadline() {
-    deadline_ = context_.reactor.at(context_.reactor.now() + timeout_, [this] {
-        process_->end("made no progress for " + std::to_string(timeout_.count()) +
-                      " ms (raytracer.start_deadline_ms)");
-    });
 }
 
 void SceneLoading::check_read(const base::FileIdentity &file) {
@@ -94,14 +75,8 @@ void SceneLoading::check_read(const base::FileIdentity &file) {
     try {
         files_.check_read(file);
     } catch (const yaml::Error &error) {
-        fail(error.what());
-        process_->end("no longer needed");
+        loading_.fail(error.what());
     }
-}
-
-void SceneLoading::fail(const std::string &reason) {
-    if (failure_.empty()) // keep the first reason, as later failures may only be its consequences
-        failure_ = reason;
 }
 
 // The arena is valid.
@@ -115,25 +90,17 @@ std::vector<Anchor> SceneLoading::anchors_of(const arhost_scene &scene) const {
     return all;
 }
 
-void SceneLoading::on_died(const supervise::Death &death) {
-    deadline_.cancel();
-    total_deadline_.cancel();
+void SceneLoading::on_loaded(SharedMemory arena, std::span<const std::byte> bytes) {
+    // The callbacks may destroy this object.
     const Callbacks callbacks = std::move(callbacks_);
-    const std::set<std::filesystem::path> files = std::move(files_read_);
-    if (!failure_.empty() || !death.clean || !arena_)
-        return callbacks.failed(
-            failure_.empty() ? scene_ + ": the scene loader failed: " + death.how : std::string(failure_), files);
+    const Callbacks::Files files = std::move(files_read_);
+    const std::string scene = scene_;
+    if (const std::string fault = scene::validate(bytes); !fault.empty())
+        return callbacks.failed(scene + ": the loaded scene is invalid, which is a bug in arhost: " + fault, files);
     try {
-        // The loader has exited, so no writable mapping of the arena should exist. adopt_and_freeze throws if one
-        // does.
-        SharedMemory arena = SharedMemory::adopt_and_freeze(std::move(arena_));
-        const Mapping mapping = arena.map(Access::read_only);
-        if (const std::string fault = scene::validate(mapping.bytes()); !fault.empty())
-            return callbacks.failed(scene_ + ": the loaded scene is invalid, which is a bug in arhost: " + fault,
-                                    files);
-        callbacks.loaded(std::move(arena), anchors_of(mapping.as<const arhost_scene>()), files);
+        callbacks.loaded(std::move(arena), anchors_of(*reinterpret_cast<const arhost_scene *>(bytes.data())), files);
     } catch (const std::exception &error) {
-        callbacks.failed(std::string("the scene loader's memory cannot be used: ") + error.what(), files);
+        callbacks.failed(scene + ": the loaded scene cannot be used: " + error.what(), files);
     }
 }
 

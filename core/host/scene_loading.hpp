@@ -7,15 +7,17 @@
 #include "base/limits.hpp"
 #include "run_config/configuration.hpp"
 #include "sandbox/sandbox.hpp"
-#include "supervise/process.hpp"
+#include "supervise/loading.hpp"
 
 #include <arhost/scene.h>
 
+#include <cstddef>
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <set>
+#include <span>
 #include <string>
+#include <vector>
 
 namespace arhost::host {
 
@@ -46,24 +48,17 @@ public:
                  const base::Limits &limits, run_config::FilesInUse files, Callbacks callbacks);
 
 private:
-    void restart_deadline();
-    void on_message(ipc::Message &message);
+    void on_message(const ipc::Message &message);
     void check_read(const base::FileIdentity &file);
-    void fail(const std::string &reason);
     std::vector<Anchor> anchors_of(const arhost_scene &scene) const;
-    void on_died(const supervise::Death &death);
+    void on_loaded(ipc::SharedMemory arena, std::span<const std::byte> bytes);
 
-    supervise::Context &context_;
     Callbacks callbacks_;
     run_config::FilesInUse files_;
     std::set<std::filesystem::path> files_read_;
     std::vector<std::string> anchor_origins_; // from the loader
-    std::string scene_, failure_;
-    base::UniqueFd arena_;
-    std::chrono::milliseconds timeout_;
-    supervise::WorkerBudget budget_;
-    ipc::Reactor::Registration deadline_, total_deadline_;
-    std::unique_ptr<supervise::Process> process_;
+    std::string scene_;
+    supervise::Loading loading_;
 };
 
 } // namespace arhost::host

@@ -41,7 +41,7 @@ struct Policy {
     std::filesystem::path scratch{};  // the plugin's private folder; set by enter_for(); empty: none
     std::set<std::string, std::less<>> environment{}; // variables to keep in addition to the standard ones
     std::uint64_t memory_bytes = 0;   // limit of private memory; 0: three quarters of the memory of the machine
-    bool makes_shared_memory = false; // set for the scene loader; such memory does not count towards memory_bytes
+    bool makes_shared_memory = false; // set for supervise::Loading; such memory does not count towards memory_bytes
     bool standard_output = false;     // the worker writes to the standard output of the host
 
     bool allows(std::string_view what) const { return allow.contains(what); }

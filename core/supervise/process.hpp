@@ -48,8 +48,8 @@ public:
         std::function<void(const Death &)> died;
     };
 
-    // Starts a worker with `policy` and sends it the pages with `first`, a messages::Open or messages::Load, whose
-    // policy it sets. `budget` must outlive the Process.
+    // Starts a worker with `policy` and sends it the pages with `first`, a messages::Open, messages::Load or
+    // messages::ReadLog, whose policy it sets. `budget` must outlive the Process.
     template <class T>
     Process(Context &context, WorkerBudget &budget, Callbacks callbacks, T first, const sandbox::Policy &policy)
         : Process(context, budget, std::move(callbacks), with_policy(first, policy), isolation_of(policy)) {}

@@ -2,13 +2,13 @@
 //
 // The tests send the messages that a compromised scene loader could send.
 #include "host/scene_loading.hpp"
+
+#include "fake_worker.hpp"
 #include "plugin_under_test.hpp"
 
 #include <gmock/gmock.h>
 
 #include <fstream>
-#include <sys/eventfd.h>
-#include <unistd.h>
 
 using namespace arhost;
 using namespace arhost::ipc;
@@ -16,23 +16,6 @@ using testing::HasSubstr;
 namespace fs = std::filesystem;
 
 namespace {
-
-struct FakeLoader final : supervise::Starter {
-    Channel channel;
-    base::UniqueFd death;
-
-    supervise::Spawned spawn(const fs::path &, supervise::Isolation, const supervise::LogFunction &) override {
-        supervise::Spawned spawned;
-        std::tie(spawned.channel, channel) = Channel::make_pair();
-        spawned.doorbell = make_doorbell().host;
-        spawned.output = base::UniqueFd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)); // never becomes readable
-        spawned.pidfd = base::UniqueFd(::eventfd(0, EFD_CLOEXEC)); // not a pidfd, so sending signals to it fails
-        spawned.pid = 1 << 22;                                     // greater than any pid that Linux assigns
-        death = base::UniqueFd(::dup(spawned.pidfd.get()));
-        return spawned;
-    }
-    supervise::Exit wait_exit(pid_t pid) override { return {pid, 0, 0}; }
-};
 
 struct SceneLoadingTest : testing::Test {
     const sandbox::Policy raytracer{.mode = sandbox::Mode::permissive};
@@ -49,7 +32,7 @@ struct SceneLoadingTest : testing::Test {
                                     [&](const std::string &reason, const auto &) { failure = reason; }});
         for (const Json &message : messages)
             loader.channel.send(message);
-        ::eventfd_write(loader.death.get(), 1);
+        loader.die();
         while (failure.empty())
             reactor.run_once();
         return failure;
@@ -61,7 +44,7 @@ struct SceneLoadingTest : testing::Test {
     arhost::test::ScratchFolder scratch;
     const fs::path folder = fs::canonical(scratch.path());
     Reactor reactor;
-    FakeLoader loader;
+    arhost::test::FakeWorker loader;
     supervise::Context context{reactor, loader, "", [](arhost_severity, const std::string &, const std::string &) {}};
 };
 
@@ -93,7 +76,7 @@ TEST_F(SceneLoadingTest, EndsALoaderThatReportsProgressForever) {
     Reactor::Registration next;
     const std::function<void()> report = [&] {
         if (!loader.channel.send(progress, {}, false)) // the host has ended the loader
-            ::eventfd_write(loader.death.get(), 1);
+            loader.die();
         next = reactor.at(Reactor::Clock::now() + std::chrono::milliseconds(1), report);
     };
     report();
