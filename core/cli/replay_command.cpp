@@ -153,7 +153,8 @@ std::vector<std::string> warnings_of(const Session &session) {
 
 // Returns a configuration that plays the video of a session in the pipeline of the recorded run, or in that of
 // `arguments.file`.
-run_config::Configuration session_configuration(const Arguments &arguments, const ReplayArguments &replay) {
+run_config::Configuration session_configuration(const Arguments &arguments, const ReplayArguments &replay,
+                                                supervise::Starter &launcher) {
     if (replay.with_pipeline || replay.width || replay.height)
         throw yaml::Error("--with-pipeline, --width and --height are for trajectories; remove them");
     Session session = read_session(replay.session);
@@ -176,6 +177,12 @@ run_config::Configuration session_configuration(const Arguments &arguments, cons
         throw yaml::Error("--allow grants what a recorded configuration asks for; with --config, use 'allow' and "
                           "'reads' in that file");
     run_config::Configuration configuration = parse_configuration(root, arguments);
+    {
+        Console console(arguments.verbose);
+        ipc::Reactor reactor;
+        supervise::Context context = make_context(reactor, launcher, console);
+        read_log(session, context, configuration.sandbox);
+    }
     if (session.recording.repeats_decisions) {
         choose_recorded(configuration, session.description);
         configuration.tracker.reset(); // its results are in the log
@@ -258,7 +265,7 @@ int replay(const Arguments &arguments, const ReplayArguments &replay, supervise:
                               ? "name the folder of a session, or a trajectory with --trajectory FILE"
                               : "a session and --trajectory exclude each other; remove one of them");
     return run(replay.session.empty() ? trajectory_configuration(arguments, replay)
-                                      : session_configuration(arguments, replay),
+                                      : session_configuration(arguments, replay, launcher),
                arguments, launcher);
 }
 

@@ -6,7 +6,7 @@
 #include "host/quality.hpp"
 #include "host/slots.hpp"
 #include "host/statistics.hpp"
-#include "run_config/recording.hpp"
+#include "session/log.hpp"
 
 #include <arhost/sink.h>
 
@@ -38,8 +38,8 @@ struct Frame {
 
     Stage stage = Stage::to_track;
     bool overtaken = false; // mode live: a newer frame was shown, so this frame is dropped when its worker returns it
-    const run_config::RecordedFrame *recorded = nullptr; // record of this frame in the session that is replayed
-    bool held = false;                                   // uses the camera of an earlier frame
+    const session::RecordedFrame *recorded = nullptr; // record of this frame in the session that is replayed
+    bool held = false;                                // uses the camera of an earlier frame
     std::uint32_t attempts = 0; // how often the worker died while processing this frame in the current stage
     Lease pixels;               // slot in the source's memory
     Lease result;               // slot in the tracker's memory, while tracking

@@ -11,6 +11,7 @@
 
 #include "base/clock.hpp"
 #include "host/frame.hpp"
+#include "run_config/recording.hpp"
 
 #include <deque>
 #include <map>
@@ -121,7 +122,7 @@ public:
     bool repeats_decisions(const Frame &frame) const {
         return frame.recorded && settings_.recording->repeats_decisions;
     }
-    const run_config::RecordedFrame *recorded(std::uint64_t sequence) const {
+    const session::RecordedFrame *recorded(std::uint64_t sequence) const {
         return settings_.recording ? &settings_.recording->frames[sequence] : nullptr;
     }
     const std::vector<arhost_target> &last_targets() const { return last_targets_; } // in the last shown frame

@@ -151,7 +151,7 @@ void Source::on_result(const Command &command, const Result &result) {
 void Source::on_frame(Lease pixels, const Command &command, const Result &result) {
     FrameFlow &flow = parts_.flow;
     Statistics &statistics = parts_.statistics;
-    const run_config::RecordedFrame *const recorded = flow.recorded(command.sequence);
+    const session::RecordedFrame *const recorded = flow.recorded(command.sequence);
     auto frame = std::make_unique<Frame>(recorded ? recorded->number : command.sequence);
     const std::int64_t arrival_ns = parts_.now_ns();
     if (const char *problem = accept_frame_info(result.frame, last_capture_ns_, arrival_ns, frame->record)) {
@@ -182,7 +182,7 @@ void Source::on_frame(Lease pixels, const Command &command, const Result &result
 // recorded decisions, also copies the recorded results of the tracker, because they may depend on frames that the
 // recorded run dropped.
 void Source::repeat_record(Frame &frame) const {
-    const run_config::RecordedFrame &recorded = *frame.recorded;
+    const session::RecordedFrame &recorded = *frame.recorded;
     frame.record.clock = recorded.clock;
     frame.record.capture_ns = recorded.capture_ns;
     frame.record.has_truth = recorded.truth.has_value();

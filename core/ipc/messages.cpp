@@ -209,6 +209,7 @@ template <class T> T parse(const Message &message) {
 
 ARHOST_MESSAGE(Open, plugin, sandbox)
 ARHOST_MESSAGE(Load, scene, readable, sandbox)
+ARHOST_MESSAGE(ReadLog, file, video_bytes, sandbox)
 ARHOST_CONVERTED(ListDevices)
 ARHOST_CONVERTED(Create)
 ARHOST_MESSAGE(Attach, is_output, generation, layout)

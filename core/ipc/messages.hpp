@@ -60,6 +60,14 @@ struct Load {
     Json sandbox{};                      // sandbox::Policy
 };
 
+// The first message to a worker that reads the log of a session.
+struct ReadLog {
+    static constexpr const char *type = "read-log";
+    std::string file;
+    std::uint64_t video_bytes = 0; // size of the video; later frames are omitted
+    Json sandbox{};                // sandbox::Policy
+};
+
 // May be sent after Hello and before Create, any number of times. The worker answers with Devices, in
 // one or more parts, or with Failed.
 struct ListDevices {
@@ -242,7 +250,8 @@ struct AnchorOrigin {
     std::string text;
 };
 
-// The scene is loaded. The descriptor of its arena accompanies this message.
+// The scene is loaded, or the log is read. The descriptor of the memory that contains the arena or the packed log
+// (session/log.hpp) accompanies this message.
 struct Loaded {
     static constexpr const char *type = "loaded";
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// arhost-worker: runs one plugin or loads one scene. The launcher starts it with the control channel as descriptor 3
-// and the doorbell as descriptor 4.
+// arhost-worker: runs one plugin, loads one scene, or reads the log of one session. The launcher starts it with the
+// control channel as descriptor 3 and the doorbell as descriptor 4.
 #include "worker/session.hpp"
 
 #include <cstdio>

@@ -3,12 +3,28 @@
 
 #include "base/file_identity.hpp"
 #include "scene/scene_loader.hpp"
+#include "session/log_reader.hpp"
 
 #include <arhost/plugin.h>
 
 #include <cstdlib>
+#include <functional>
+#include <new>
+#include <span>
 
 namespace arhost::worker {
+namespace {
+
+// Sends memory of `size` bytes that `write` has filled.
+void send_memory(const Link &link, const char *name, std::size_t size,
+                 const std::function<void(std::span<std::byte>)> &write) {
+    const ipc::SharedMemory memory = ipc::SharedMemory::create(name, size);
+    // The mapping ends with this statement, because the host can freeze memory only if no writable mapping exists.
+    write(memory.map(ipc::Access::read_write).bytes());
+    link.send(ipc::messages::Loaded{}, {memory.fd()});
+}
+
+} // namespace
 
 int load_scene(Link &link, const ipc::messages::Load &load) {
     scene::LoadCallbacks callbacks;
@@ -22,17 +38,26 @@ int load_scene(Link &link, const ipc::messages::Load &load) {
     scene::ArenaBuilder builder =
         scene::load_scene(load.scene, callbacks, {load.readable.begin(), load.readable.end()});
     const scene::Origins origins = builder.origins();
-    const ipc::SharedMemory memory = ipc::SharedMemory::create("arhost-scene", builder.byte_size());
-    {
-        const ipc::Mapping mapping = memory.map(ipc::Access::read_write);
-        std::move(builder).write(mapping.bytes());
+    send_memory(link, "arhost-scene", builder.byte_size(), [&](std::span<std::byte> memory) {
+        std::move(builder).write(memory);
         // The host validates the arena, too, but does not know which part of the scene file an element comes from.
-        if (const auto fault = scene::find_fault(mapping.bytes()))
+        if (const auto fault = scene::find_fault(memory))
             throw yaml::Error(origins.message(*fault));
-    } // unmaps the memory, because the host can freeze it only if no writable mapping exists
-    for (const std::string &origin : origins.all(scene::Table::anchors))
-        link.send(ipc::messages::AnchorOrigin{origin});
-    link.send(ipc::messages::Loaded{}, {memory.fd()});
+        for (const std::string &origin : origins.all(scene::Table::anchors))
+            link.send(ipc::messages::AnchorOrigin{origin});
+    });
+    return EXIT_SUCCESS;
+}
+
+int read_log(Link &link, const ipc::messages::ReadLog &request) {
+    try {
+        const session::Log log =
+            session::read_log(request.file, request.video_bytes, [&] { link.progress(0, "reads the log"); });
+        send_memory(link, "arhost-session-log", session::packed_size(log),
+                    [&](std::span<std::byte> memory) { session::pack(log, memory); });
+    } catch (const std::bad_alloc &) {
+        throw std::runtime_error(request.file + ": needs more memory than a worker may use");
+    }
     return EXIT_SUCCESS;
 }
 

@@ -306,8 +306,13 @@ int serve(Link &link) {
         log_level(link, sandbox::enter(sandbox::policy_from_json(load.sandbox)));
         return load_scene(link, load);
     }
+    if (is<messages::ReadLog>(first)) {
+        const auto request = parse<messages::ReadLog>(first);
+        log_level(link, sandbox::enter(sandbox::policy_from_json(request.sandbox)));
+        return read_log(link, request);
+    }
     if (!is<messages::Open>(first))
-        throw ProtocolViolation("the host's first message is not 'open' or 'load'");
+        throw ProtocolViolation("the host's first message is not 'open', 'load' or 'read-log'");
     link.map_pages(first);
     return serve_plugin(link, parse<messages::Open>(first));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The main function of a worker: opens and serves one plugin, or loads one scene.
+// The main function of a worker: opens and serves one plugin, loads one scene, or reads one log.
 #pragma once
 
 #include "worker/link.hpp"

@@ -22,10 +22,11 @@ struct Target {
 void run_configuration(Bytes); // YAML, including plugin options
 void run_calibration(Bytes);
 void run_trajectory(Bytes);
-void run_map(Bytes);     // of markers
-void run_session(Bytes); // session.json, a NUL, configuration.yaml, a NUL, frames.jsonl
-void run_patt(Bytes);    // a pattern of ARToolKit
-void run_pattern(Bytes); // input: a pattern, a NUL, a file name
+void run_map(Bytes);         // of markers
+void run_session(Bytes);     // session.json, a NUL, configuration.yaml, a NUL, frames.jsonl
+void run_session_log(Bytes); // a log as the worker that has read it passes it to the host
+void run_patt(Bytes);        // a pattern of ARToolKit
+void run_pattern(Bytes);     // input: a pattern, a NUL, a file name
 void run_scene(Bytes);
 void run_obj(Bytes);
 void run_ply(Bytes);
@@ -44,6 +45,7 @@ inline constexpr Target targets[] = {
     {"trajectory", run_trajectory, 15000},
     {"map", run_map, 8000},
     {"session", run_session, 8000},
+    {"session_log", run_session_log, 8000},
     {"patt", run_patt, 15000},
     {"pattern", run_pattern, 20000},
     {"scene", run_scene, 8000},

@@ -2,6 +2,7 @@
 //
 // Targets for files written by users or other programs. For errors in them, only exceptions of type Error are
 // allowed.
+#include "../core/session/log_samples.hpp"
 #include "input.hpp"
 #include "targets.hpp"
 
@@ -9,6 +10,7 @@
 #include "camera/trajectory.hpp"
 #include "cli/session_grants.hpp"
 #include "run_config/configuration.hpp"
+#include "session/log_reader.hpp"
 #include "tracker_pattern/pattern.hpp"
 
 #include <arhost-cpp/numbered_name.hpp>
@@ -35,6 +37,12 @@ model::PluginDescription plugin_of(arhost_kind kind) {
                       {"name", ARHOST_OPTION_TEXT, "a", 0, 0, {"a", "b"}, ""},
                       {"path", ARHOST_OPTION_OUTPUT_PATH, "", 0, 0, {}, ""}};
     return plugin;
+}
+
+std::vector<std::byte> packed(const session::Log &log) {
+    std::vector<std::byte> memory(packed_size(log));
+    pack(log, memory);
+    return memory;
 }
 
 // Creates the files that configurations refer to.
@@ -93,6 +101,30 @@ void run_session(Bytes bytes) {
         const cli::Session session = cli::read_session(scratch() / "session");
         cli::expect_granted(session.configuration, session, {}, true);
     } catch (const yaml::Error &) {
+    }
+    std::optional<session::Log> log;
+    try {
+        log = session::read_log(scratch() / "session/frames.jsonl", 200, [] {});
+    } catch (const yaml::Error &) {
+    }
+    if (log)
+        session::unpack(packed(*log)); // the host accepts every log that the worker accepts
+}
+
+void run_session_log(Bytes bytes) {
+    Input input(bytes);
+    std::vector<std::byte> memory = packed(session::test::full_log());
+    input.corrupt(memory);
+    const std::size_t cut = input.number<std::uint16_t>() % memory.size();
+    try {
+        const session::Log log = session::unpack(std::span(memory).first(memory.size() - cut));
+        if (const auto again = packed(log); again != packed(session::unpack(again)))
+            throw std::logic_error("a packed log changes when it is packed again");
+        for (const session::RecordedFrame &frame : log.frames)
+            for (const arhost_target &target : frame.targets)
+                if (target.first_observation + std::uint64_t{target.observation_count} > frame.observations.size())
+                    throw std::logic_error("observations are out of range");
+    } catch (const std::runtime_error &) {
     }
 }
 

@@ -36,26 +36,38 @@ std::string obstacle() {
 #endif
 }
 
-// Returns the calls that failed with ENOSYS or EPERM in a run of run.yaml, with their arguments.
-std::set<std::string> blocked_calls(ArhostRun &run) {
-    run.start({}, [] {
+// Runs `arhost ARGUMENTS`, which must succeed, and returns the lines of its trace. `calls`: an expression of strace.
+std::vector<std::string> trace_of(ArhostRun &run, const char *calls, const std::vector<std::string> &arguments) {
+    run.start({}, [&] {
         ::setenv("ARHOST_PLUGIN_PATH", arhost::test::test_plugin_directory().c_str(), 1);
-        ::execlp("strace", "strace", "-f", "-qq", "-o", "trace.txt", "-e", "status=failed",
-                 (arhost::test::build_directory() + "/bin/arhost").c_str(), "--config", "run.yaml",
-                 "--allow-no-target", nullptr);
+        const std::string arhost = arhost::test::build_directory() + "/bin/arhost";
+        std::vector<const char *> argv = {"strace", "-f", "-qq", "-o", "trace.txt", "-e", calls, arhost.c_str()};
+        for (const std::string &argument : arguments)
+            argv.push_back(argument.c_str());
+        argv.push_back(nullptr);
+        ::execvp("strace", const_cast<char *const *>(argv.data()));
         ::_exit(127);
     });
     EXPECT_EQ(run.wait(), 0) << run.output();
     std::istringstream trace(run.read("trace.txt"));
-    std::set<std::string> found;
+    std::vector<std::string> lines;
     for (std::string line; std::getline(trace, line);)
+        lines.push_back(line);
+    EXPECT_FALSE(lines.empty());
+    return lines;
+}
+
+// Returns the calls that failed with ENOSYS or EPERM in a run, with their arguments.
+std::set<std::string> blocked_calls(ArhostRun &run, const std::vector<std::string> &arguments = {
+                                                        "--config", "run.yaml", "--allow-no-target"}) {
+    std::set<std::string> found;
+    for (const std::string &line : trace_of(run, "status=failed", arguments))
         if (const auto has = [&](const char *text) { return line.find(text) != std::string::npos; };
             has("= -1 ENOSYS") || has("= -1 EPERM") || (has("= -1 EACCES") && has("/proc/"))) {
             const std::string call = line.substr(line.find_first_not_of("0123456789 "));
             if (std::ranges::none_of(harmless, [&](const char *beginning) { return call.starts_with(beginning); }))
                 found.insert(call);
         }
-    EXPECT_TRUE(fs::file_size(run.path("trace.txt")) > 0);
     return found;
 }
 
@@ -119,6 +131,37 @@ INSTANTIATE_TEST_SUITE_P(
                         "outputs: [{plugin: sink_images, path: out/frame-%04d.png}, "
                         "{plugin: sink_trajectory, path: out/path.txt}]\n"}),
     [](const auto &info) { return info.param.name; });
+
+// Records a session.
+class ReplayUnderTrace : public testing::Test {
+protected:
+    void SetUp() override {
+        REQUIRE_TRACE();
+        ASSERT_EQ(run_.run(), 0) << run_.output();
+    }
+    ArhostRun run_{"version: 1\nframes: 3\nsource: {plugin: source_synthetic, options: {width: 160, height: 120}}\n"
+                   "outputs: [{plugin: sink_session, path: take}]\n"};
+};
+
+TEST_F(ReplayUnderTrace, MakesOnlyAllowedCalls) {
+    EXPECT_THAT(blocked_calls(run_, {"replay", "take"}), testing::IsEmpty());
+}
+
+TEST_F(ReplayUnderTrace, OnlyASandboxedWorkerOpensTheLog) {
+    std::set<std::string> sandboxed; // processes with a list of allowed system calls
+    int opened = 0;
+    for (const std::string &line : trace_of(run_, "open,openat,openat2,seccomp", {"replay", "take"})) {
+        const std::string process = line.substr(0, line.find(' '));
+        const auto has = [&](const char *text) { return line.find(text) != std::string::npos; };
+        if (has("seccomp(SECCOMP_SET_MODE_FILTER"))
+            sandboxed.insert(process);
+        if (!has("frames.jsonl\"") || has("O_PATH") || has("O_CREAT")) // the sandbox opens or creates the path
+            continue;
+        ++opened;
+        EXPECT_TRUE(sandboxed.contains(process)) << line;
+    }
+    EXPECT_EQ(opened, 1);
+}
 
 TEST(AllowListOfOthers, ContainsTheCallsOfPython) {
     REQUIRE_TRACE();

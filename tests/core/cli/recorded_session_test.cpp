@@ -1,19 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "cli/recorded_session.hpp"
 
+#include "directories.hpp"
 #include "errors.hpp"
+#include "fake_worker.hpp"
 #include "host/documents.hpp"
+#include "ipc/messages.hpp"
+#include "manual_clock.hpp"
 #include "plugin_under_test.hpp"
 
 #include <gmock/gmock.h>
 
+#include <csignal>
 #include <fstream>
 
 namespace arhost::cli {
 namespace {
 
 using host::fingerprint_of;
-using run_config::RecordedFrame;
+using session::RecordedFrame;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -51,21 +56,32 @@ protected:
     void write(const std::string &name, const std::string &text) const {
         std::ofstream(folder() / name, std::ios::binary | std::ios::trunc) << text;
     }
+    // Reads the session with its log.
+    Session read(supervise::Context &context) const {
+        Session session = read_session(folder());
+        read_log(session, context, sandbox::Mode::permissive);
+        return session;
+    }
+    Session read() { return read(context_); }
     // Returns the error without the folder.
-    std::string error() const {
-        return test::without_folder(test::error_of([&] { (void)read_session(folder()); }), folder());
+    std::string error() {
+        return test::without_folder(test::error_of([&] { (void)read(); }), folder());
     }
     // Returns the error without the name of the file.
-    std::string error_of_log(const std::string &log) const {
+    std::string error_of_log(const std::string &log) {
         write("frames.jsonl", log);
         return test::after("frames.jsonl:", error());
     }
 
     test::ScratchFolder scratch_;
+    ipc::Reactor reactor_;
+    supervise::Launcher launcher_{test::build_directory() + "/bin/arhost-launcher"};
+    supervise::Context context_{reactor_, launcher_, test::build_directory() + "/bin/arhost-worker",
+                                [](arhost_severity, const std::string &, const std::string &) {}};
 };
 
 TEST_F(SessionFolder, HasTheFactsOfEachFrame) {
-    const Session session = read_session(folder());
+    const Session session = read();
     EXPECT_EQ(session.warning, "");
     ASSERT_EQ(session.recording.frames.size(), 2u);
     const RecordedFrame &plain = session.recording.frames[0], &full = session.recording.frames[1];
@@ -112,11 +128,11 @@ TEST_F(SessionFolder, ARecordingWithoutTheNoiseOfCornersIsAccepted) {
     const std::string member = R"("corner_sigma_px": 0.05, )";
     without.erase(without.find(member), member.size());
     write("frames.jsonl", line(0) + line(1, without) + end);
-    EXPECT_EQ(read_session(folder()).recording.frames[1].observations.at(0).corner_sigma_px, 0);
+    EXPECT_EQ(read().recording.frames[1].observations.at(0).corner_sigma_px, 0);
 }
 
 TEST_F(SessionFolder, PathsHaveTheMeaningOfTheRecordedRun) {
-    const Session session = read_session(folder());
+    const Session session = read();
     EXPECT_EQ(session.configuration.require("plugin_path").items()[0].input_path(), "/lab/plugins");
     EXPECT_EQ(session.configuration.require("raytracer").require("scene").input_path(), "/cwd/a.yaml");
 }
@@ -124,7 +140,7 @@ TEST_F(SessionFolder, PathsHaveTheMeaningOfTheRecordedRun) {
 TEST_F(SessionFolder, FramesThatTheVideoLacksAreLeftOut) {
     write("frames.jsonl", line(0) + line(1) + line(2) + line(3) + end);
     write("video.mkv", std::string(299, 'v'));
-    const Session session = read_session(folder());
+    const Session session = read();
     EXPECT_EQ(session.recording.frames.size(), 2u);
     EXPECT_THAT(session.warning,
                 HasSubstr("video.mkv: ends after frame 1: the last 2 frames of frames.jsonl are missing"));
@@ -133,7 +149,7 @@ TEST_F(SessionFolder, FramesThatTheVideoLacksAreLeftOut) {
 TEST_F(SessionFolder, AnInterruptedRecordingEndsAtItsLastCompleteLine) {
     for (const std::string cut : {"", "{\"frame\": 2, \"capture", "{\"frame\": 2}"}) {
         write("frames.jsonl", line(0) + line(1) + cut);
-        const Session session = read_session(folder());
+        const Session session = read();
         EXPECT_EQ(session.recording.frames.size(), 2u);
         EXPECT_THAT(session.warning, HasSubstr("take: the recording was interrupted; it ends after frame 1, and"));
     }
@@ -213,6 +229,75 @@ TEST_F(SessionFolder, ChangedSceneFilesAreNamed) {
     EXPECT_THAT(read_session(folder()).changed_scene_files()[0], HasSubstr("scene.yaml' has changed since"));
     std::filesystem::remove(scene);
     EXPECT_THAT(read_session(folder()).changed_scene_files()[0], HasSubstr("scene.yaml' of the recording cannot be"));
+}
+
+// A worker that reads the log of the session and is compromised.
+class CompromisedReader : public SessionFolder {
+protected:
+    // Returns the error after the worker has done `action` and exited.
+    std::string error_after(const std::function<void()> &action) {
+        worker_.on_spawn = [this, action] {
+            action();
+            worker_.die();
+        };
+        return test::without_folder(test::error_of([&] { (void)read(compromised_); }), folder());
+    }
+    void send_memory(std::string_view content) {
+        const auto memory = ipc::SharedMemory::create("log", content.size());
+        std::ranges::copy(std::as_bytes(std::span(content)), memory.map(ipc::Access::read_write).bytes().begin());
+        worker_.channel.send(ipc::encode(ipc::messages::Loaded{}), {memory.fd()});
+    }
+    ipc::Message received() const {
+        ipc::Message message;
+        EXPECT_EQ(worker_.channel.receive(message, 0), ipc::ReceiveState::message);
+        return message;
+    }
+
+    test::ManualClock clock_;
+    ipc::Reactor clocked_{clock_};
+    test::FakeWorker worker_;
+    supervise::Context compromised_{clocked_, worker_, "",
+                                    [](arhost_severity, const std::string &, const std::string &) {}};
+};
+
+TEST_F(CompromisedReader, MayReadOnlyTheLog) {
+    EXPECT_THAT(error_after([] {}), StartsWith("frames.jsonl: the reader of the log failed: exited with status 0"));
+    const auto policy = sandbox::policy_from_json(ipc::parse<ipc::messages::ReadLog>(received()).sandbox);
+    EXPECT_THAT(policy.readable, testing::ElementsAre(folder() / "frames.jsonl"));
+    EXPECT_TRUE(policy.writable.empty() && policy.allow.empty() && policy.environment.empty());
+    EXPECT_EQ(policy.memory_bytes, 0u) << "has the default limit";
+}
+
+TEST_F(CompromisedReader, ItsDeathIsReportedWithTheLog) {
+    worker_.wait_status = SIGSEGV;
+    EXPECT_THAT(error_after([] {}), StartsWith("frames.jsonl: the reader of the log failed: killed by signal 11"));
+}
+
+TEST_F(CompromisedReader, ItsHangIsReportedWithTheLog) {
+    ipc::Reactor::Registration hang_up, time_passes;
+    worker_.on_spawn = [&] {
+        hang_up = clocked_.watch(worker_.channel.fd(), [&] {
+            ipc::Message message;
+            if (worker_.channel.receive(message, 0) == ipc::ReceiveState::closed) // the host has ended the worker
+                worker_.die();
+        });
+        time_passes = clocked_.at(clocked_.now(), [&] { clock_.advance(std::chrono::seconds(10)); });
+    };
+    EXPECT_THAT(test::without_folder(test::error_of([&] { (void)read(compromised_); }), folder()),
+                StartsWith("frames.jsonl: the reader of the log failed: made no progress for 10000 ms; "));
+}
+
+TEST_F(CompromisedReader, ItsResultIsValidated) {
+    const std::string what = "frames.jsonl: the reader of the log has returned an invalid result: ";
+    EXPECT_EQ(error_after([&] { send_memory("x"); }), what + "it ends in the middle of a frame");
+    EXPECT_EQ(error_after([&] { send_memory(std::string(200, '\0')); }),
+              what + "its frame 0 is invalid: clock: is out of range");
+    EXPECT_EQ(error_after([&] { send_memory(std::string(1 << 20, '\0')); }), what + "it is too large for this file");
+    EXPECT_THAT(error_after([&] {
+                    const base::UniqueFd pipe(::eventfd(0, EFD_CLOEXEC));
+                    worker_.channel.send(ipc::encode(ipc::messages::Loaded{}), {pipe.get()});
+                }),
+                StartsWith("frames.jsonl: the reader of the log has returned memory that cannot be used: "));
 }
 
 TEST(Fingerprint, IsThatOfRegularFilesOnly) {
