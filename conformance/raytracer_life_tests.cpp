@@ -104,6 +104,26 @@ void cancel_while_rendering(Context &context) {
                            [&] { return tracer.try_render(from_front(large), picture, info); });
 }
 
+// ---- Quality ---------------------------------------------------------------------------------------
+
+void max_samples(Context &context) {
+    Tracer tracer(context, still_life());
+    const Picture whole = tracer.render(still_life_camera());
+    const std::uint32_t own = tracer.info().samples;
+    if (own == 0)
+        throw Skip("it ignores max_samples: render reports 0 samples");
+    for (const std::uint32_t limit : {std::uint32_t{1}, own, own + 1}) {
+        tracer.limit_samples(limit);
+        const Picture picture = tracer.render(still_life_camera());
+        const std::uint32_t samples = tracer.info().samples;
+        if (samples < 1 || samples > limit)
+            throw Failure(fmt::format("with max_samples {}, render reports {} samples; expected 1 to {}", limit, samples,
+                                      limit));
+        if (limit >= own)
+            expect_alike(picture, whole, "with a max_samples that is not less than its own number, the image differs", 0);
+    }
+}
+
 // ---- Unusual scenes --------------------------------------------------------------------------------
 
 // Expects that only a sphere of this radius, at the image's centre, is visible.
@@ -166,6 +186,10 @@ constexpr Test tests[] = {
     {"raytracer.cancel-while-rendering",
      "When cancelled during a large image, render returns within 2 s; not checked on GPUs.", "raytracer.cancelled",
      30s, cancel_while_rendering},
+    {"raytracer.max-samples",
+     "A ray tracer that reports `samples` takes at most `max_samples`, and as many as it would otherwise take if that "
+     "is fewer.",
+     "raytracer.deterministic", 20s, max_samples},
     {"raytracer.degenerate", "Degenerate triangles do not affect the image.", "raytracer.render", 20s, degenerate},
     {"raytracer.far-away", "Scaling scene and camera from 0.2 m to 1 km does not change the image.",
      "raytracer.render", 20s, far_away},

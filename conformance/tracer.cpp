@@ -91,7 +91,7 @@ void Tracer::change_scene(scene::ArenaBuilder builder) {
 
 arhost_status Tracer::try_render(const arhost_camera &camera, Picture &picture, arhost_render_info &info,
                                  const arhost_motion *motion) {
-    const arhost_render_request request{sizeof request, 0, 0, 0, camera, motion};
+    const arhost_render_request request{sizeof request, max_samples_, 0, 0, camera, motion};
     slot_ = picture; // keeps its address, because the size is the same
     const arhost_image image = slot_->image();
     info = {};

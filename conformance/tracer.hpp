@@ -50,6 +50,8 @@ public:
     arhost_status try_render(const arhost_camera &camera, Picture &picture, arhost_render_info &info,
                              const arhost_motion *motion = nullptr);
 
+    // Of later requests; 0: no limit.
+    void limit_samples(std::uint32_t max_samples) { max_samples_ = max_samples; }
     // Starts if necessary. Throws Failure unless it succeeds.
     Picture render(const arhost_camera &camera, const arhost_motion *motion = nullptr, std::uint8_t fill = 0);
 
@@ -64,6 +66,7 @@ private:
     std::optional<arhost_intrinsics> started_;
     std::optional<Picture> slot_; // the same memory for all images from start to stop
     arhost_render_info info_{};
+    std::uint32_t max_samples_ = 0;
     std::chrono::nanoseconds duration_{};
 };
 

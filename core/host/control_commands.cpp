@@ -139,8 +139,8 @@ void Commands::execute(const control::Set &set, const control::Done &done) {
         if (error.empty()) {
             parts_.options.change(component, value);
             Raytracer *const raytracer = assembly_.raytracer();
-            if (raytracer && &raytracer->component() == &component && value.key == "samples")
-                raytracer->on_samples_changed();
+            if (raytracer && &raytracer->component() == &component)
+                raytracer->on_option_changed();
         }
         done(error, {});
     });

@@ -13,7 +13,7 @@ namespace arhost::host {
 // The quality of one image.
 struct Quality {
     double scale = 1;          // size of the image relative to the frame
-    std::uint32_t samples = 0; // option `samples` of the ray tracer; 0: there is no such option, or it is not adapted
+    std::uint32_t samples = 0; // maximum number per pixel; 0: no limit
     bool operator==(const Quality &) const = default;
 };
 

@@ -80,12 +80,12 @@ void Raytracer::render(Frame &frame) {
         frame.quality = {frame.recorded->scale, frame.recorded->samples};
     else
         frame.quality = quality_ ? quality_->current() : Quality();
-    request_samples(frame.quality.samples);
     Command command{};
     command.kind = CommandKind::render;
     command.slot = frame.overlay.index();
     command.sequence = frame.record.sequence;
     command.time_s = 1e-9 * static_cast<double>(frame.record.capture_ns);
+    command.max_samples = frame.quality.samples;
     command.camera = frame.record.camera;
     if (frame.quality.scale < 1) {
         const auto [width, height] = overlay_size(parts_.video.format, frame.quality);
@@ -121,8 +121,10 @@ void Raytracer::on_result(const Command &command, const Result &result) {
     if (device.count())
         statistics.stages.add("device", device);
     if (const Frame *frame = parts_.flow.find(command.sequence); frame && quality_) {
-        if (result.status >= 0)
+        if (result.status >= 0) {
+            learn_samples(frame->quality, result.render.samples);
             statistics.quality_changes += quality_->add(frame->quality, busy, parts_.context.reactor.now());
+        }
         statistics.quality = quality_->current();
     }
     Frame *const frame = accept(command, result);
@@ -132,7 +134,7 @@ void Raytracer::on_result(const Command &command, const Result &result) {
     frame->times.raytracer = busy;
     frame->times.device = device;
     frame->record.overlay_scale = frame->quality.scale < 1 ? frame->quality.scale : 0;
-    frame->record.overlay_samples = frame->quality.samples;
+    frame->record.overlay_samples = quality_ || frame->quality.samples > 0 ? result.render.samples : 0;
     parts_.flow.on_rendered(*frame, busy);
     if (auto &checks = scene_->overlay_checks; checks && frame->quality.scale == 1) {
         const arhost_frame_format &format = parts_.video.format;
@@ -144,53 +146,39 @@ void Raytracer::on_result(const Command &command, const Result &result) {
 
 // Begins to adapt the quality of images to `live.target_fps`, unless a controller with the same limits exists.
 void Raytracer::start_quality() {
-    samples_in_use_ = 0; // a new worker has the configured number
     const run_config::Configuration &run = parts_.configuration;
     if (!parts_.live() || run.target_fps == 0)
         return;
     const PluginDescription &plugin = component().description();
+    if (std::exchange(adapted_plugin_, plugin.id) != plugin.id)
+        full_samples_.reset();
     const auto supports = [&](std::uint32_t capability) { return (plugin.capabilities & capability) != 0; };
     QualityController::Limits limits{.target_fps = run.target_fps};
     // If the worker warps the images because the plugin does not support lenses, they must have full size.
     if (supports(ARHOST_CAPABILITY_SCALED_IMAGES) &&
         (supports(ARHOST_CAPABILITY_LENS_DISTORTION) || parts_.video.intrinsics.distortion == ARHOST_DISTORTION_NONE))
         limits.min_scale = run.min_scale;
-    const ComponentOptions::InUse *const options = parts_.options.of(component());
-    const OptionValue *const samples = options ? options->find("samples") : nullptr;
-    if (samples && samples->type == ARHOST_OPTION_INTEGER && samples->integer > 0 &&
-        std::ranges::count(plugin.changeable, "samples"))
-        limits.max_samples = static_cast<std::uint32_t>(samples->integer);
+    limits.max_samples = full_samples_.value_or(0);
     limits.min_samples = std::min(run.min_samples, limits.max_samples);
-    samples_in_use_ = limits.max_samples;
-    if (quality_ && quality_->limits() == limits)
-        return;
-    quality_.emplace(limits);
-    if (quality_->is_lowest() && limits.min_samples == 0 && run.min_scale < 1)
-        component().log(ARHOST_SEVERITY_WARNING, plugin.id + " can render neither smaller images nor fewer samples; "
-                                                             "'live.target_fps' has no effect");
+    if (!quality_ || quality_->limits() != limits)
+        quality_.emplace(limits);
 }
 
-void Raytracer::on_samples_changed() {
-    start_quality();     // the new value is the upper limit
-    samples_in_use_ = 0; // unknown, because a reduction may have been requested after the new value was
+// Learns the number of samples of an image that was requested without a limit. `samples`: arhost_render_info.
+void Raytracer::learn_samples(const Quality &requested, std::uint32_t samples) {
+    if (full_samples_ || requested.samples > 0)
+        return;
+    full_samples_ = samples;
+    start_quality();
+    if (quality_->is_lowest() && samples == 0 && parts_.configuration.min_scale < 1)
+        component().log(ARHOST_SEVERITY_WARNING,
+                        component().description().id + " can render neither smaller images nor fewer samples; "
+                                                       "'live.target_fps' has no effect");
 }
 
-// Requests this number of samples for all later images; 0: no change.
-void Raytracer::request_samples(std::uint32_t samples) {
-    if (samples == 0 || samples == samples_in_use_)
-        return;
-    const std::uint32_t previous = std::exchange(samples_in_use_, samples);
-    OptionValue value;
-    value.key = "samples";
-    value.type = ARHOST_OPTION_INTEGER;
-    value.integer = samples;
-    // If the worker dies before it answers, start_quality() is called for the next worker.
-    component().set_option(value, [this, previous](const std::string &error) {
-        if (!error.empty() && parts_.configuration.recording)
-            component().log(ARHOST_SEVERITY_WARNING, "the recorded number of samples cannot be set: " + error);
-        if (!error.empty())
-            samples_in_use_ = previous; // requested again with the next image
-    });
+void Raytracer::on_option_changed() {
+    full_samples_.reset(); // the next image is requested without a limit
+    start_quality();
 }
 
 } // namespace arhost::host

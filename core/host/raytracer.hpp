@@ -34,7 +34,7 @@ public:
     void render(Frame &frame);
     // Makes this stage the current one. `previous`: the stage that it replaces, or null.
     void take_over(const Raytracer *previous);
-    void on_samples_changed(); // to be called when the command `set` has changed the number of samples
+    void on_option_changed(); // to be called when the command `set` has changed an option of the plugin
 
     const Configuration &configuration() const { return configuration_; }
     const std::shared_ptr<LoadedScene> &scene() const { return scene_; }
@@ -46,14 +46,16 @@ private:
     void on_result(const ipc::Command &command, const ipc::Result &result) override;
     void on_disabled(const std::string &reason, bool is_configuration_error) override;
     void start_quality();
-    void request_samples(std::uint32_t samples);
+    void learn_samples(const Quality &requested, std::uint32_t samples);
     void write_anchors(const Frame &frame) const;
 
     const Configuration configuration_;
     const std::shared_ptr<LoadedScene> scene_;
     std::shared_ptr<SlotPool> anchor_slots_;   // slots for AnchorPose; null if the scene has no anchors
     std::optional<QualityController> quality_; // only with `live.target_fps`
-    std::uint32_t samples_in_use_ = 0;         // value of the option in the current worker
+    std::string adapted_plugin_;               // the plugin whose quality is adapted
+    // Samples per pixel without a limit; 0: the plugin does not say; empty: no image has been rendered without a limit.
+    std::optional<std::uint32_t> full_samples_;
 };
 
 } // namespace arhost::host

@@ -38,6 +38,8 @@ struct Command {
     arhost_clock clock;
     std::uint32_t state_is_of_solver_only; // non-zero: another plugin wrote the plugin's part of the state
     double time_s;
+    std::uint32_t max_samples; // render: as in arhost_render_request
+    std::uint32_t reserved;
     arhost_camera camera;
 };
 

@@ -328,6 +328,7 @@ public:
         require(output.size() >= std::uint64_t(image.stride) * image.height, "the image slots are too small");
         arhost_render_request request{};
         request.struct_size = sizeof request;
+        request.max_samples = command.max_samples;
         request.sequence = command.sequence;
         request.time_s = command.time_s;
         request.camera = command.camera;

@@ -374,16 +374,16 @@ class _RaytracerAdapter(_Adapter):
                                  intrinsics=Fields(_record(intrinsics, INTRINSICS))))
         return STATUS_OK
 
-    def render(self, sequence, time_s, camera, moved, deformed, pixels, height, width, stride):
+    def render(self, max_samples, sequence, time_s, camera, moved, deformed, pixels, height, width, stride):
         def render():
             request = Fields(
-                sequence=sequence, time_s=time_s, camera=Fields(_record(camera, CAMERA)),
+                max_samples=max_samples, samples=0, sequence=sequence, time_s=time_s, camera=Fields(_record(camera, CAMERA)),
                 moved=np.ndarray(len(moved) // MOVED_OBJECT.itemsize, MOVED_OBJECT, moved),
                 deformed=[Fields(object=index, is_visible=bool(is_visible), positions=_vectors(positions),
                                  normals=normals and _vectors(normals))
                           for index, is_visible, positions, normals in deformed])
             region = self.plugin.render(request, _pixels(pixels, height, width, 4, stride))
-            return STATUS_OK, None if region is None else tuple(int(side) for side in region)
+            return STATUS_OK, (int(request.samples), None if region is None else tuple(int(side) for side in region))
 
         memory = [pixels, moved] + [view for _, _, p, n in deformed for view in (p, n) if view]
         return self._with_memory(memory, render)

@@ -391,14 +391,16 @@ MOVED_OBJECT = _struct(56,
     ("world_from_object", ("f4", (12,)), 8))
 
 # arhost/raytracer.h
-RENDER_INFO = _struct(32,
+RENDER_INFO = _struct(40,
     ("struct_size", "u4", 0),
     ("has_region", "i4", 4),
     ("region_x", "u4", 8),
     ("region_y", "u4", 12),
     ("region_width", "u4", 16),
     ("region_height", "u4", 20),
-    ("device_time_ns", "u8", 24))
+    ("device_time_ns", "u8", 24),
+    ("samples", "u4", 32),
+    ("reserved", "u4", 36))
 
 # arhost/sink.h
 OVERLAY_RENDERED = 1

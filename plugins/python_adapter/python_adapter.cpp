@@ -394,7 +394,7 @@ public:
                               geometry.normals ? view(geometry.normals, size).release() : Py_NewRef(Py_None))));
         }
         const Answer answer =
-            call("render", "KdNNNNIII", static_cast<unsigned long long>(request.sequence), request.time_s,
+            call("render", "IKdNNNNIII", request.max_samples, static_cast<unsigned long long>(request.sequence), request.time_s,
                  view_of(&request.camera).release(),
                  view(motion ? motion->moved : nullptr, motion ? motion->moved_count * sizeof *motion->moved : 0)
                      .release(),
@@ -403,9 +403,11 @@ public:
                       PyBUF_WRITE)
                      .release(),
                  image.height, image.width, image.stride);
-        if (answer.value.get() != Py_None) {
+        PyObject *region = nullptr; // borrowed
+        require(PyArg_ParseTuple(answer.value.get(), "IO", &info.samples, &region));
+        if (region != Py_None) {
             info.has_region = 1;
-            require(PyArg_ParseTuple(answer.value.get(), "IIII", &info.region_x, &info.region_y, &info.region_width,
+            require(PyArg_ParseTuple(region, "IIII", &info.region_x, &info.region_y, &info.region_width,
                                      &info.region_height));
         }
     }

@@ -3,10 +3,18 @@
 // Sample positions in a pixel. They are the same in every pixel, and in all ray tracers of arhost.
 #pragma once
 
+#include <arhost/raytracer.h>
+
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
 namespace arhost::raytracer_common {
+
+// Returns the number of samples per pixel for this request; `samples`: the plugin's own.
+inline std::uint32_t limited(std::uint32_t samples, const arhost_render_request &request) {
+    return request.max_samples > 0 ? std::min(samples, request.max_samples) : samples;
+}
 
 // A sample's offset from the pixel's centre, in px, from −½ to ½.
 struct Sample {

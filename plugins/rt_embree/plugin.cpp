@@ -32,6 +32,8 @@ public:
     }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
+        const std::uint32_t samples = arhost::raytracer_common::limited(settings_.samples, request);
+        renderer_->set_samples(samples);
         const Rectangle drawn = renderer_->render(request.camera, image, request.motion);
         info.has_region = 1;
         if (drawn.x0 < drawn.x1) {
@@ -40,12 +42,14 @@ public:
             info.region_width = static_cast<std::uint32_t>(drawn.x1 - drawn.x0);
             info.region_height = static_cast<std::uint32_t>(drawn.y1 - drawn.y0);
         }
+        if (info.struct_size >= sizeof info) // an older host's struct lacks the field
+            info.samples = samples;
     }
 
     static constexpr const char *changeable[] = {"samples", "light_samples", nullptr};
     void set(const arhost::Options &changed) {
         if (changed.contains("samples"))
-            renderer_->set_samples(static_cast<std::uint32_t>(changed.integer("samples")));
+            settings_.samples = static_cast<std::uint32_t>(changed.integer("samples"));
         else
             renderer_->set_light_samples(static_cast<std::int32_t>(changed.integer("light_samples")));
     }

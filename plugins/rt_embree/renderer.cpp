@@ -122,6 +122,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
 }
 
 void Renderer::set_samples(std::uint32_t samples) {
+    if (samples == samples_per_frame_)
+        return;
     if (samples > 1 && !ray_table_.rays().has_derivatives)
         ray_table_ = RayTable(intrinsics_, true, threads_);
     samples_per_frame_ = samples;

@@ -85,20 +85,24 @@ public:
     }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
+        const std::uint32_t samples = arhost::raytracer_common::limited(settings_.samples, request);
+        renderer_->set_samples(samples);
         const Rectangle drawn = renderer_->render(request.camera, image, request.motion);
         info.has_region = 1;
         info.region_x = drawn.x;
         info.region_y = drawn.y;
         info.region_width = drawn.width;
         info.region_height = drawn.height;
-        if (info.struct_size >= sizeof info) // an older host's struct lacks the field
+        if (info.struct_size >= sizeof info) { // an older host's struct lacks fields
             info.device_time_ns = renderer_->last_gpu_ns();
+            info.samples = samples;
+        }
     }
 
     static constexpr const char *changeable[] = {"samples", "light_samples", nullptr};
     void set(const arhost::Options &changed) {
         if (changed.contains("samples"))
-            renderer_->set_samples(static_cast<std::uint32_t>(changed.integer("samples")));
+            settings_.samples = static_cast<std::uint32_t>(changed.integer("samples"));
         else
             renderer_->set_light_samples(static_cast<std::uint32_t>(changed.integer("light_samples")));
     }

@@ -135,6 +135,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
 }
 
 void Renderer::set_samples(std::uint32_t samples) {
+    if (samples == settings_.samples)
+        return;
     if (samples > 1 && !frame_.has_slopes) {
         make_rays(true);
         write_descriptor_set();

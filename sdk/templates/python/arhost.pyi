@@ -427,6 +427,8 @@ class RenderInfo:
     region_width: int
     region_height: int
     device_time_ns: int
+    samples: int
+    reserved: int
 
 # arhost/sink.h
 OVERLAY_RENDERED: int
@@ -535,6 +537,8 @@ class Deformed(Protocol):
     normals: Optional[np.ndarray]
 
 class RenderRequest(Protocol):
+    max_samples: int
+    samples: int
     sequence: int
     time_s: float
     camera: Camera

@@ -401,15 +401,16 @@ STRUCT(arhost_raytracer_setup, 32,
        FIELD(intrinsics, 24, 8))
 
 STRUCT(arhost_render_request, 264,
-       FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(sequence, 8, 8) FIELD(time_s, 16, 8)
+       FIELD(struct_size, 0, 4) FIELD(max_samples, 4, 4) FIELD(sequence, 8, 8) FIELD(time_s, 16, 8)
        FIELD(camera, 24, 232) FIELD(motion, 256, 8))
 
 STRUCT(arhost_image, 24,
        FIELD(struct_size, 0, 4) FIELD(stride, 4, 4) FIELD(width, 8, 4) FIELD(height, 12, 4) FIELD(rgba, 16, 8))
 
-STRUCT(arhost_render_info, 32,
+STRUCT(arhost_render_info, 40,
        FIELD(struct_size, 0, 4) FIELD(has_region, 4, 4) FIELD(region_x, 8, 4) FIELD(region_y, 12, 4)
-       FIELD(region_width, 16, 4) FIELD(region_height, 20, 4) FIELD(device_time_ns, 24, 8))
+       FIELD(region_width, 16, 4) FIELD(region_height, 20, 4) FIELD(device_time_ns, 24, 8) FIELD(samples, 32, 4)
+       FIELD(reserved, 36, 4))
 
 STRUCT(arhost_raytracer, 40,
        FIELD(struct_size, 0, 4) FIELD(start, 8, 8) FIELD(render, 16, 8) FIELD(stop, 24, 8) FIELD(capabilities, 32, 8))

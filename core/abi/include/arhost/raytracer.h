@@ -26,7 +26,8 @@ typedef struct arhost_raytracer_setup {
 
 typedef struct arhost_render_request {
     uint32_t struct_size;
-    uint32_t reserved; /* 0 */
+    uint32_t max_samples; /* the host limits the samples per pixel in order to keep the frame rate; 0: no limit. See
+                             `samples` of arhost_render_info */
     uint64_t sequence; /* number of the video frame; use it to seed random numbers */
     double time_s;     /* scene time, s */
     arhost_camera camera;
@@ -56,6 +57,9 @@ typedef struct arhost_render_info {
     /* Region, px. Outside it, alpha must be 0; the host skips these pixels. Width 0: the whole image is empty. */
     uint32_t region_x, region_y, region_width, region_height;
     uint64_t device_time_ns; /* device (GPU) time from the image's first command to its last; 0: not measured */
+    uint32_t samples;  /* samples per pixel of this image: at most max_samples, if that is not 0. 0: this ray tracer
+                          ignores max_samples */
+    uint32_t reserved; /* leave 0 */
 } arhost_render_info;
 
 typedef struct arhost_raytracer {

@@ -870,7 +870,7 @@ unsafe impl Sync for arhost_raytracer_setup {} // a plugin's statics are immutab
 #[derive(Clone, Copy)]
 pub struct arhost_render_request {
     pub struct_size: u32,
-    pub reserved: u32,
+    pub max_samples: u32,
     pub sequence: u64,
     pub time_s: f64,
     pub camera: arhost_camera,
@@ -899,8 +899,10 @@ pub struct arhost_render_info {
     pub region_width: u32,
     pub region_height: u32,
     pub device_time_ns: u64,
+    pub samples: u32,
+    pub reserved: u32,
 }
-const _: () = assert!(size_of::<arhost_render_info>() == 32);
+const _: () = assert!(size_of::<arhost_render_info>() == 40);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_raytracer {
