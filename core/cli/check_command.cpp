@@ -14,7 +14,10 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <fcntl.h>
+#include <list>
 #include <sys/stat.h>
+#include <unistd.h>
 
 namespace arhost::cli {
 
@@ -110,6 +113,30 @@ Folders redirect_outputs(run_config::Configuration &configuration, const fs::pat
     return folders;
 }
 
+// Reads and discards what an output writes to a FIFO, which nobody else can open.
+struct Drain {
+    base::UniqueFd reader;
+    ipc::Reactor::Registration watch;
+};
+
+std::list<Drain> drain_fifos(const Folders &folders, ipc::Reactor &reactor) {
+    std::list<Drain> drains;
+    for (const auto &[folder, own] : folders)
+        for (const fs::directory_entry &entry : fs::directory_iterator(folder)) {
+            if (!entry.is_fifo())
+                continue;
+            Drain &drain = drains.emplace_back();
+            drain.reader = base::UniqueFd(::open(entry.path().c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC));
+            if (drain.reader)
+                drain.watch = reactor.watch(drain.reader.get(), [&drain] {
+                    char discarded[65536];
+                    if (::read(drain.reader.get(), discarded, sizeof discarded) == 0) // the writer has closed it
+                        drain.watch.cancel();
+                });
+        }
+    return drains;
+}
+
 std::string with_own_folders(std::string text, const Folders &folders) {
     for (const auto &[temporary, own] : folders)
         for (std::size_t at = 0; (at = text.find(temporary, at)) != std::string::npos; at += own.size())
@@ -134,6 +161,7 @@ int check_by_opening(run_config::Configuration configuration, const Arguments &a
         component.limits.restart.quarantine_after = 1;
     });
     const Folders folders = redirect_outputs(configuration, scratch.path());
+    const std::list<Drain> drains = drain_fifos(folders, context.reactor);
     context.log = [&folders, log = context.log](arhost_severity severity, const std::string &component,
                                                 const std::string &text) {
         log(severity, component, with_own_folders(text, folders));

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <sys/stat.h>
 
 using namespace arhost::test;
 using testing::HasSubstr;
@@ -721,6 +722,13 @@ TEST(CommandLine, CheckKeepsItsReportApartFromAnOutputToStandardOutput) {
     EXPECT_EQ(run.wait(), 0) << run.output();
     EXPECT_THAT(run.output(), HasSubstr("\nrun.yaml: OK\n"));
     EXPECT_EQ(run.lines("poses.jsonl"), 2u) << run.read("poses.jsonl");
+}
+
+TEST(CommandLine, CheckReadsWhatAnOutputWritesToAFifo) {
+    ArhostRun run("version: 1\nsource: {plugin: source_synthetic, options: {frames: 0}}\n"
+                  "outputs: [{plugin: sink_poses, path: poses.fifo}]\n");
+    ASSERT_EQ(::mkfifo(run.path("poses.fifo").c_str(), 0600), 0);
+    EXPECT_EQ(run.run({"check", "--run", "2", "run.yaml"}), 0) << run.output();
 }
 
 TEST(CommandLine, CheckOpensNothingOnRequest) {
