@@ -4,6 +4,7 @@
 // links no OpenCV.
 #include "base/atomic_file.hpp"
 #include "base/file_identity.hpp"
+#include "base/program.hpp"
 #include "base/text.hpp"
 #include "base/write_all.hpp"
 #include "calibrate/input.hpp"
@@ -17,7 +18,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 
 namespace {
@@ -216,8 +216,7 @@ std::string calibrate(const Arguments &arguments, int signals) {
 } // namespace
 
 int main(int argc, char **argv) {
-    std::signal(SIGPIPE, SIG_IGN); // a closed pipe or a full disk is an error, not a signal
-    std::signal(SIGXFSZ, SIG_IGN);
+    arhost::base::prepare_process();
     cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
     arhost::command_line::CommandLine app("Calibrates a camera with a board, and writes YAML for camera.file. See "
                                           "docs/calibration.md.\n"

@@ -3,6 +3,7 @@
 // arhost-map learns maps of markers from images (docs/maps.md). `arhost map` runs it, because the host itself links
 // neither OpenCV nor Ceres.
 #include "base/atomic_file.hpp"
+#include "base/program.hpp"
 #include "base/text.hpp"
 #include "base/unique_fd.hpp"
 #include "base/write_all.hpp"
@@ -17,7 +18,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iterator>
@@ -306,8 +306,7 @@ void run(const Arguments &arguments, int signals) {
 } // namespace
 
 int main(int argc, char **argv) {
-    std::signal(SIGPIPE, SIG_IGN); // a closed pipe or a full disk is an error, not a signal
-    std::signal(SIGXFSZ, SIG_IGN);
+    arhost::base::prepare_process();
     arhost::command_line::CommandLine app(
         "Learns where markers are relative to each other, from images of a calibrated camera, and "
         "writes a map. See docs/maps.md.\n"

@@ -4,6 +4,7 @@
 // links no OpenCV and draws nothing.
 #include "base/atomic_file.hpp"
 #include "base/file_identity.hpp"
+#include "base/program.hpp"
 #include "base/text.hpp"
 #include "base/write_all.hpp"
 #include "command_line/command_line.hpp"
@@ -15,7 +16,6 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <functional>
@@ -206,8 +206,7 @@ void write(const std::vector<File> &files) {
 } // namespace
 
 int main(int argc, char **argv) {
-    std::signal(SIGPIPE, SIG_IGN); // a closed pipe or a full disk is an error, not a signal
-    std::signal(SIGXFSZ, SIG_IGN);
+    arhost::base::prepare_process();
     arhost::command_line::CommandLine app(
         fmt::format("Prints markers and boards in their true size. See docs/markers.md.\n"
                     "Families and dictionaries: {}.\n"
