@@ -107,21 +107,25 @@ void cancel_while_rendering(Context &context) {
 // ---- Quality ---------------------------------------------------------------------------------------
 
 void max_samples(Context &context) {
-    Tracer tracer(context, still_life());
+    Tracer tracer(context, still_life(), many_samples(context));
     const Picture whole = tracer.render(still_life_camera());
-    const std::uint32_t own = tracer.info().samples;
-    if (own == 0)
-        throw Skip("it ignores max_samples: render reports 0 samples");
-    for (const std::uint32_t limit : {std::uint32_t{1}, own, own + 1}) {
+    const std::uint32_t full = tracer.info().full_samples;
+    if (full == 0)
+        throw Skip("it ignores max_samples: its full_samples is 0");
+    const auto render = [&](std::uint32_t limit) {
         tracer.limit_samples(limit);
-        const Picture picture = tracer.render(still_life_camera());
-        const std::uint32_t samples = tracer.info().samples;
-        if (samples < 1 || samples > limit)
-            throw Failure(fmt::format("with max_samples {}, render reports {} samples; expected 1 to {}", limit, samples,
-                                      limit));
-        if (limit >= own)
-            expect_alike(picture, whole, "with a max_samples that is not less than its own number, the image differs", 0);
-    }
+        Picture picture = tracer.render(still_life_camera());
+        if (const std::uint32_t now = tracer.info().full_samples; now != full)
+            throw Failure(
+                fmt::format("with max_samples {}, full_samples is {}; without a limit, it was {}", limit, now, full));
+        return picture;
+    };
+    if (full > 1 && !first_difference(render(1), whole, 0))
+        throw Failure(fmt::format("its full_samples is {}, but an image with max_samples 1 is the same", full));
+    for (const std::uint32_t limit : {full, std::max(full, full + 1), 0u})
+        expect_alike(render(limit), whole,
+                     fmt::format("with max_samples {} instead of 0, the image differs, although full_samples is {}",
+                                 limit, full));
 }
 
 // ---- Unusual scenes --------------------------------------------------------------------------------
@@ -187,8 +191,7 @@ constexpr Test tests[] = {
      "When cancelled during a large image, render returns within 2 s; not checked on GPUs.", "raytracer.cancelled",
      30s, cancel_while_rendering},
     {"raytracer.max-samples",
-     "A ray tracer that reports `samples` takes at most `max_samples`, and as many as it would otherwise take if that "
-     "is fewer.",
+     "With `max_samples`, an image takes the smaller of this number and `full_samples`, which does not depend on it.",
      "raytracer.deterministic", 20s, max_samples},
     {"raytracer.degenerate", "Degenerate triangles do not affect the image.", "raytracer.render", 20s, degenerate},
     {"raytracer.far-away", "Scaling scene and camera from 0.2 m to 1 km does not change the image.",

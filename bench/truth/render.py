@@ -428,9 +428,9 @@ def main():
         moving = view.startswith("m")
         set_camera(rooms.cameras(moving)[int(view.lstrip("m"))], picture == "probe")
         set_quality(samples, 1 if picture == "again" else 0)
-        render(os.path.join(folder, name, f"{picture}-{view}"))
-        if picture == "truth":
+        if picture == "truth": # before the picture, which tells that the job is done
             write_labels(os.path.join(folder, name, f"labels-{view}.npz"))
+        render(os.path.join(folder, name, f"{picture}-{view}"))
         print(f"{number + 1} of {len(jobs)}: {job}", flush=True)
 
 

@@ -15,8 +15,8 @@ namespace arhost::base {
 void prepare_process() {
     // open() returns the lowest free descriptor.
     for (const auto &[stream, file] : {std::pair{0, "/dev/null"}, {1, "/dev/full"}, {2, "/dev/null"}})
-        if (::fcntl(stream, F_GETFD) < 0)
-            (void)::open(file, O_RDWR);
+        if (::fcntl(stream, F_GETFD) < 0 && ::open(file, O_RDWR) < 0) // a minimal /dev may lack /dev/full
+            (void)::open("/dev/null", O_RDWR);
     std::signal(SIGPIPE, SIG_IGN);
     std::signal(SIGXFSZ, SIG_IGN);
     std::signal(SIGCHLD, SIG_DFL); // waitpid() fails if SIGCHLD is ignored

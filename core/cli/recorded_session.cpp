@@ -49,7 +49,7 @@ Session read_session(const fs::path &path) {
     return {folder, root, yaml::Node::load_copy(configuration, origin), {}, ""};
 }
 
-void read_log(Session &session, supervise::Context &context, sandbox::Mode mode) {
+void read_log(Session &session, supervise::Context &context, sandbox::Mode mode, const base::Limits &limits) {
     const fs::path file = session.folder / log_file;
     std::error_code error;
     const std::uint64_t video_bytes = fs::file_size(session.video(), error);
@@ -58,14 +58,15 @@ void read_log(Session &session, supervise::Context &context, sandbox::Mode mode)
     std::optional<session::Log> log;
     std::string failure;
     const supervise::Loading loading(
-        context, {file, "session", "reader of the log"}, ipc::messages::ReadLog{file, video_bytes},
+        context, {file, "session", "reader of the log", limits}, ipc::messages::ReadLog{file, video_bytes},
         {.mode = mode, .readable = {file}, .makes_shared_memory = true},
         {[](const ipc::Message &) {},
          [&](const ipc::SharedMemory &, std::span<const std::byte> bytes) {
              try {
-                 if (bytes.size() > session::max_expansion * fs::file_size(file))
+                 const std::uint64_t log_bytes = fs::file_size(file);
+                 if (bytes.size() > session::max_expansion * log_bytes)
                      throw std::runtime_error("it is too large for this file");
-                 log = session::unpack(bytes);
+                 log = session::unpack(bytes, log_bytes / session::min_line_bytes);
              } catch (const std::exception &invalid) {
                  failure =
                      file.string() + ": the reader of the log has returned an invalid result: " + invalid.what();

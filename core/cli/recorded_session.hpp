@@ -33,6 +33,6 @@ Session read_session(const std::filesystem::path &folder);
 // Reads the log in a worker with a sandbox of this mode. Omits frames at the end that are incomplete in the video or
 // in the log, with a warning. If anything else is damaged, or if the worker fails, throws yaml::Error, whose message
 // names the log and, if possible, the line.
-void read_log(Session &session, supervise::Context &context, sandbox::Mode mode);
+void read_log(Session &session, supervise::Context &context, sandbox::Mode mode, const base::Limits &limits);
 
 } // namespace arhost::cli

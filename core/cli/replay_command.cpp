@@ -181,7 +181,7 @@ run_config::Configuration session_configuration(const Arguments &arguments, cons
         Console console(arguments.verbose);
         ipc::Reactor reactor;
         supervise::Context context = make_context(reactor, launcher, console);
-        read_log(session, context, configuration.sandbox);
+        read_log(session, context, configuration.sandbox, configuration.source->limits);
     }
     if (session.recording.repeats_decisions) {
         choose_recorded(configuration, session.description);

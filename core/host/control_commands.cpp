@@ -89,7 +89,11 @@ void Commands::execute(const control::Swap &swap, const control::Done &done) {
              {std::pair{"tracker", list_of(choices.trackers)}, {"raytracer", list_of(choices.raytracers)}})
             if (!names.empty())
                 swappable += (swappable.empty() ? "" : ", ") + std::string(component) + " (" + names + ")";
-        throw control::Error("choose a component and its new plugin: " + swappable);
+        if (swappable.empty())
+            throw control::Error("this run has neither a tracker nor a ray tracer to swap");
+        throw control::Error(
+            (swap.component.empty() ? "" : "'" + base::printable(swap.component, 100) + "' cannot be swapped; ") +
+            "choose a component and its new plugin: " + swappable);
     }
 }
 
@@ -136,12 +140,8 @@ void Commands::execute(const control::Set &set, const control::Done &done) {
         throw control::Error(error.what());
     }
     component.set_option(value, [this, value, done, &component](const std::string &error) {
-        if (error.empty()) {
+        if (error.empty())
             parts_.options.change(component, value);
-            Raytracer *const raytracer = assembly_.raytracer();
-            if (raytracer && &raytracer->component() == &component)
-                raytracer->on_option_changed();
-        }
         done(error, {});
     });
 }

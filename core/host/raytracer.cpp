@@ -122,7 +122,7 @@ void Raytracer::on_result(const Command &command, const Result &result) {
         statistics.stages.add("device", device);
     if (const Frame *frame = parts_.flow.find(command.sequence); frame && quality_) {
         if (result.status >= 0) {
-            learn_samples(frame->quality, result.render.samples);
+            set_full_samples(result.render.full_samples);
             statistics.quality_changes += quality_->add(frame->quality, busy, parts_.context.reactor.now());
         }
         statistics.quality = quality_->current();
@@ -134,7 +134,7 @@ void Raytracer::on_result(const Command &command, const Result &result) {
     frame->times.raytracer = busy;
     frame->times.device = device;
     frame->record.overlay_scale = frame->quality.scale < 1 ? frame->quality.scale : 0;
-    frame->record.overlay_samples = quality_ || frame->quality.samples > 0 ? result.render.samples : 0;
+    frame->record.overlay_samples = std::min(frame->quality.samples, result.render.full_samples);
     parts_.flow.on_rendered(*frame, busy);
     if (auto &checks = scene_->overlay_checks; checks && frame->quality.scale == 1) {
         const arhost_frame_format &format = parts_.video.format;
@@ -164,21 +164,17 @@ void Raytracer::start_quality() {
         quality_.emplace(limits);
 }
 
-// Learns the number of samples of an image that was requested without a limit. `samples`: arhost_render_info.
-void Raytracer::learn_samples(const Quality &requested, std::uint32_t samples) {
-    if (full_samples_ || requested.samples > 0)
+// `full_samples`: as in arhost_render_info. The first image of a plugin tells it, and an option may change it.
+void Raytracer::set_full_samples(std::uint32_t full_samples) {
+    const bool is_first = !full_samples_;
+    if (full_samples_ == full_samples)
         return;
-    full_samples_ = samples;
+    full_samples_ = full_samples;
     start_quality();
-    if (quality_->is_lowest() && samples == 0 && parts_.configuration.min_scale < 1)
-        component().log(ARHOST_SEVERITY_WARNING,
-                        component().description().id + " can render neither smaller images nor fewer samples; "
-                                                       "'live.target_fps' has no effect");
-}
-
-void Raytracer::on_option_changed() {
-    full_samples_.reset(); // the next image is requested without a limit
-    start_quality();
+    if (is_first && full_samples == 0 && quality_->is_lowest() && parts_.configuration.min_scale < 1)
+        component().log(ARHOST_SEVERITY_WARNING, component().description().id +
+                                                     " can render neither smaller images nor fewer samples; "
+                                                     "'live.target_fps' has no effect");
 }
 
 } // namespace arhost::host

@@ -34,7 +34,6 @@ public:
     void render(Frame &frame);
     // Makes this stage the current one. `previous`: the stage that it replaces, or null.
     void take_over(const Raytracer *previous);
-    void on_option_changed(); // to be called when the command `set` has changed an option of the plugin
 
     const Configuration &configuration() const { return configuration_; }
     const std::shared_ptr<LoadedScene> &scene() const { return scene_; }
@@ -46,7 +45,7 @@ private:
     void on_result(const ipc::Command &command, const ipc::Result &result) override;
     void on_disabled(const std::string &reason, bool is_configuration_error) override;
     void start_quality();
-    void learn_samples(const Quality &requested, std::uint32_t samples);
+    void set_full_samples(std::uint32_t full_samples);
     void write_anchors(const Frame &frame) const;
 
     const Configuration configuration_;
@@ -54,8 +53,8 @@ private:
     std::shared_ptr<SlotPool> anchor_slots_;   // slots for AnchorPose; null if the scene has no anchors
     std::optional<QualityController> quality_; // only with `live.target_fps`
     std::string adapted_plugin_;               // the plugin whose quality is adapted
-    // Samples per pixel without a limit; 0: the plugin does not say; empty: no image has been rendered without a limit.
-    std::optional<std::uint32_t> full_samples_;
+    std::optional<std::uint32_t>
+        full_samples_; // of that plugin, as in arhost_render_info; empty before the first image
 };
 
 } // namespace arhost::host

@@ -194,6 +194,8 @@ std::string problem_with(const RecordedFrame &frame, const RecordedFrame *before
     }
     if (frame.truth && !(base::is_utf8(frame.truth->first) && all_finite({frame.truth->second})))
         return "truth: is not UTF-8, or has a number that is not finite";
+    if (frame.search.candidate_count < -1 || frame.search.missed_count > frame.search.expected_count)
+        return "search: has a count that is out of range";
     if (before && frame.number <= before->number)
         return "frame: must be greater than in the line before, " + std::to_string(before->number);
     if (before && frame.capture_ns < before->capture_ns)
@@ -209,7 +211,7 @@ void pack(const Log &log, std::span<std::byte> memory) {
     write(log, memory.data());
 }
 
-Log unpack(std::span<const std::byte> memory) {
+Log unpack(std::span<const std::byte> memory, std::uint64_t max_frames) {
     Reader reader(memory);
     Log log;
     std::uint8_t is_complete = 0;
@@ -217,6 +219,8 @@ Log unpack(std::span<const std::byte> memory) {
     reader(is_complete);
     log.is_complete = is_complete != 0;
     do {
+        if (log.frames.size() == max_frames)
+            throw std::runtime_error("it has more frames than a log of this size can have");
         RecordedFrame frame{};
         transfer(reader, frame);
         for (arhost_target &target : frame.targets)

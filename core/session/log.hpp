@@ -11,6 +11,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -50,7 +51,9 @@ std::size_t packed_size(const Log &log);
 // `memory` has packed_size(log) bytes.
 void pack(const Log &log, std::span<std::byte> memory);
 // Reads a packed log from memory that does not change. Throws std::runtime_error if it is not the packed form of a
-// log without problems.
-Log unpack(std::span<const std::byte> memory);
+// log without problems, or has more than `max_frames`.
+Log unpack(std::span<const std::byte> memory, std::uint64_t max_frames = std::numeric_limits<std::uint64_t>::max());
+// The record of a frame has more bytes in the log.
+constexpr std::size_t min_line_bytes = 80;
 
 } // namespace arhost::session

@@ -238,7 +238,7 @@ double light_without(const LightLines &lines, const Model &model, const Pixel &p
 }
 
 // Returns by how much the unknowns change if `lines` are removed. `inverse`: the inverse of JᵀJ. The derivatives of
-// the pixels must be those of `model`.
+// the pixels may be those of a slightly different model, see minimize().
 Vector change_without(const LightLines &lines, const Model &model, std::span<const Pixel> pixels,
                       const Normal &inverse) {
     Vector gradient;

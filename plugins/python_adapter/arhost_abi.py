@@ -399,7 +399,7 @@ RENDER_INFO = _struct(40,
     ("region_width", "u4", 16),
     ("region_height", "u4", 20),
     ("device_time_ns", "u8", 24),
-    ("samples", "u4", 32),
+    ("full_samples", "u4", 32),
     ("reserved", "u4", 36))
 
 # arhost/sink.h

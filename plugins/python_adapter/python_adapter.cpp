@@ -394,8 +394,8 @@ public:
                               geometry.normals ? view(geometry.normals, size).release() : Py_NewRef(Py_None))));
         }
         const Answer answer =
-            call("render", "IKdNNNNIII", request.max_samples, static_cast<unsigned long long>(request.sequence), request.time_s,
-                 view_of(&request.camera).release(),
+            call("render", "IKdNNNNIII", request.max_samples, static_cast<unsigned long long>(request.sequence),
+                 request.time_s, view_of(&request.camera).release(),
                  view(motion ? motion->moved : nullptr, motion ? motion->moved_count * sizeof *motion->moved : 0)
                      .release(),
                  tuple_of(std::move(deformed)).release(),
@@ -403,8 +403,11 @@ public:
                       PyBUF_WRITE)
                      .release(),
                  image.height, image.width, image.stride);
+        std::uint32_t full_samples = 0;
         PyObject *region = nullptr; // borrowed
-        require(PyArg_ParseTuple(answer.value.get(), "IO", &info.samples, &region));
+        require(PyArg_ParseTuple(answer.value.get(), "IO", &full_samples, &region));
+        if (info.struct_size >= sizeof info) // an older host's struct lacks the field
+            info.full_samples = full_samples;
         if (region != Py_None) {
             info.has_region = 1;
             require(PyArg_ParseTuple(region, "IIII", &info.region_x, &info.region_y, &info.region_width,

@@ -11,9 +11,9 @@
 
 namespace arhost::raytracer_common {
 
-// Returns the number of samples per pixel for this request; `samples`: the plugin's own.
-inline std::uint32_t limited(std::uint32_t samples, const arhost_render_request &request) {
-    return request.max_samples > 0 ? std::min(samples, request.max_samples) : samples;
+// Returns the number of samples per pixel for this request.
+inline std::uint32_t limited(std::uint32_t full_samples, const arhost_render_request &request) {
+    return request.max_samples > 0 ? std::min(full_samples, request.max_samples) : full_samples;
 }
 
 // A sample's offset from the pixel's centre, in px, from −½ to ½.

@@ -32,8 +32,7 @@ public:
     }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
-        const std::uint32_t samples = arhost::raytracer_common::limited(settings_.samples, request);
-        renderer_->set_samples(samples);
+        renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request));
         const Rectangle drawn = renderer_->render(request.camera, image, request.motion);
         info.has_region = 1;
         if (drawn.x0 < drawn.x1) {
@@ -43,7 +42,7 @@ public:
             info.region_height = static_cast<std::uint32_t>(drawn.y1 - drawn.y0);
         }
         if (info.struct_size >= sizeof info) // an older host's struct lacks the field
-            info.samples = samples;
+            info.full_samples = settings_.samples;
     }
 
     static constexpr const char *changeable[] = {"samples", "light_samples", nullptr};

@@ -85,8 +85,7 @@ public:
     }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
-        const std::uint32_t samples = arhost::raytracer_common::limited(settings_.samples, request);
-        renderer_->set_samples(samples);
+        renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request));
         const Rectangle drawn = renderer_->render(request.camera, image, request.motion);
         info.has_region = 1;
         info.region_x = drawn.x;
@@ -95,7 +94,7 @@ public:
         info.region_height = drawn.height;
         if (info.struct_size >= sizeof info) { // an older host's struct lacks fields
             info.device_time_ns = renderer_->last_gpu_ns();
-            info.samples = samples;
+            info.full_samples = settings_.samples;
         }
     }
 

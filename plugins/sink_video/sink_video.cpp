@@ -140,8 +140,9 @@ private:
             files::remove_file(partial_);
             // Whatever the status is: the host must not retry.
             throw Failure(ARHOST_STATUS_ERROR_CONFIGURATION,
-                          interrupted + ", and its frames cannot be recovered: " + failure.what() + "; or move '" +
-                              files::hidden_sibling(path_, ".from*.mkv").string() + "' to another folder");
+                          interrupted + ", and its frames cannot be recovered: " + failure.what() +
+                              "; correct that, or move '" + files::hidden_sibling(path_, ".from*.mkv").string() +
+                              "' to another folder");
         }
         files::remove_file(partial_);
         for (const Segment &segment : segments)

@@ -107,8 +107,12 @@ void run_session(Bytes bytes) {
         log = session::read_log(scratch() / "session/frames.jsonl", 200, [] {});
     } catch (const yaml::Error &) {
     }
-    if (log)
-        session::unpack(packed(*log)); // the host accepts every log that the worker accepts
+    if (log) { // the host accepts every log that the worker accepts
+        const std::uint64_t bytes = std::filesystem::file_size(scratch() / "session/frames.jsonl");
+        if (packed_size(*log) > session::max_expansion * bytes)
+            throw std::logic_error("the packed log is larger than the host accepts");
+        session::unpack(packed(*log), bytes / session::min_line_bytes);
+    }
 }
 
 void run_session_log(Bytes bytes) {

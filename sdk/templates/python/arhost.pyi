@@ -427,7 +427,7 @@ class RenderInfo:
     region_width: int
     region_height: int
     device_time_ns: int
-    samples: int
+    full_samples: int
     reserved: int
 
 # arhost/sink.h
@@ -538,7 +538,7 @@ class Deformed(Protocol):
 
 class RenderRequest(Protocol):
     max_samples: int
-    samples: int
+    full_samples: int
     sequence: int
     time_s: float
     camera: Camera

@@ -54,6 +54,7 @@ struct Wrong {
     const arhost_host *host = nullptr;
     bool was_started = false, is_tiny = false;
     unsigned users = 0;
+    std::uint32_t max_samples = 0;        // of an earlier request
     std::int64_t threads = 0;             // the option
     std::vector<std::uint8_t> last;       // image
     SceneCopy scene{nullptr, &std::free}; // modified
@@ -471,6 +472,8 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
     modified.camera = modify(request->camera);
     if (has("ignores_max_samples"))
         modified.max_samples = 0;
+    if (has("keeps_max_samples"))
+        modified.max_samples = self.max_samples = request->max_samples ? request->max_samples : self.max_samples;
     if (has("near_clip_at_1_mm") && is_near(self, modified.camera))
         modified.camera.eye[2] -= 1; // the camera looks along −z
     const arhost_moved_object nowhere{0, 1, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};

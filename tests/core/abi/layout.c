@@ -409,7 +409,7 @@ STRUCT(arhost_image, 24,
 
 STRUCT(arhost_render_info, 40,
        FIELD(struct_size, 0, 4) FIELD(has_region, 4, 4) FIELD(region_x, 8, 4) FIELD(region_y, 12, 4)
-       FIELD(region_width, 16, 4) FIELD(region_height, 20, 4) FIELD(device_time_ns, 24, 8) FIELD(samples, 32, 4)
+       FIELD(region_width, 16, 4) FIELD(region_height, 20, 4) FIELD(device_time_ns, 24, 8) FIELD(full_samples, 32, 4)
        FIELD(reserved, 36, 4))
 
 STRUCT(arhost_raytracer, 40,

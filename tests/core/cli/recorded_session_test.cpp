@@ -59,7 +59,7 @@ protected:
     // Reads the session with its log.
     Session read(supervise::Context &context) const {
         Session session = read_session(folder());
-        read_log(session, context, sandbox::Mode::permissive);
+        read_log(session, context, sandbox::Mode::permissive, {});
         return session;
     }
     Session read() { return read(context_); }

@@ -376,7 +376,8 @@ TEST_F(SinkVideo, FramesThatCannotBeRecoveredStayAndTheHostDoesNotRetry) {
     EXPECT_THAT(s.log(), HasSubstr("an earlier recording of '" + path().string() +
                                    "' was interrupted, and its frames cannot be recovered: cannot write '" +
                                    path(".demo.mp4.partial").string() + "': File too large"));
-    EXPECT_THAT(s.log(), HasSubstr("; or move '" + path(".demo.mp4.from*.mkv").string() + "' to another folder"));
+    EXPECT_THAT(s.log(), HasSubstr("; correct that, or move '" + path(".demo.mp4.from*.mkv").string() +
+                                   "' to another folder"));
     EXPECT_THAT(names(), ElementsAre(".demo.mp4.from0.mkv"));
 }
 

@@ -26,10 +26,10 @@ typedef struct arhost_raytracer_setup {
 
 typedef struct arhost_render_request {
     uint32_t struct_size;
-    uint32_t max_samples; /* the host limits the samples per pixel in order to keep the frame rate; 0: no limit. See
-                             `samples` of arhost_render_info */
-    uint64_t sequence; /* number of the video frame; use it to seed random numbers */
-    double time_s;     /* scene time, s */
+    uint32_t max_samples; /* limit of the samples per pixel of this image, which the host sets in order to keep the
+                             frame rate; 0: no limit. See `full_samples` of arhost_render_info */
+    uint64_t sequence;    /* number of the video frame; use it to seed random numbers */
+    double time_s;        /* scene time, s */
     arhost_camera camera;
     const arhost_motion *motion; /* NULL if no object moves or deforms */
 } arhost_render_request;
@@ -57,9 +57,11 @@ typedef struct arhost_render_info {
     /* Region, px. Outside it, alpha must be 0; the host skips these pixels. Width 0: the whole image is empty. */
     uint32_t region_x, region_y, region_width, region_height;
     uint64_t device_time_ns; /* device (GPU) time from the image's first command to its last; 0: not measured */
-    uint32_t samples;  /* samples per pixel of this image: at most max_samples, if that is not 0. 0: this ray tracer
-                          ignores max_samples */
-    uint32_t reserved; /* leave 0 */
+    uint32_t full_samples;   /* samples per pixel that an image without a limit would take, whatever the limit of this
+                                one and even if it is empty; without samples accumulated from earlier images. An image
+                                with a limit takes the smaller of this number and max_samples. It may change only with
+                                an option. 0: this ray tracer ignores max_samples */
+    uint32_t reserved;       /* leave 0 */
 } arhost_render_info;
 
 typedef struct arhost_raytracer {

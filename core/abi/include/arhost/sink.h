@@ -62,7 +62,7 @@ typedef struct arhost_record {
     arhost_camera camera;
     /* The quality to which the host has adapted the overlay (`live.target_fps`). */
     double overlay_scale;     /* size of the rendered image relative to the frame; 0: as large as the frame */
-    uint32_t overlay_samples; /* samples per pixel; 0: as configured */
+    uint32_t overlay_samples; /* samples per pixel, if they are adapted; 0: they are not */
     uint32_t observation_count;
     /* The targets that have been seen so far, in the order of the configuration. */
     const arhost_target *targets;

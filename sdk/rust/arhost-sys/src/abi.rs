@@ -899,7 +899,7 @@ pub struct arhost_render_info {
     pub region_width: u32,
     pub region_height: u32,
     pub device_time_ns: u64,
-    pub samples: u32,
+    pub full_samples: u32,
     pub reserved: u32,
 }
 const _: () = assert!(size_of::<arhost_render_info>() == 40);
