@@ -192,7 +192,7 @@ constexpr Test tests[] = {
      30s, cancel_while_rendering},
     {"raytracer.max-samples",
      "With `max_samples`, an image takes the smaller of this number and `full_samples`, which does not depend on it.",
-     "raytracer.deterministic", 20s, max_samples},
+     "raytracer.render", 20s, max_samples},
     {"raytracer.degenerate", "Degenerate triangles do not affect the image.", "raytracer.render", 20s, degenerate},
     {"raytracer.far-away", "Scaling scene and camera from 0.2 m to 1 km does not change the image.",
      "raytracer.render", 20s, far_away},

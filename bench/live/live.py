@@ -271,12 +271,12 @@ def longest_pause(run, seconds):
     """The longest time without a further composited frame during the next `seconds`, or until one has come since."""
     begin = last = time.monotonic()
     frames, longest = -1, 0
-    while (now := time.monotonic()) < begin + seconds or last < begin + seconds:
+    while (now := time.monotonic()) < begin + seconds or last < begin + seconds and now < begin + 60:
         composited = run.command(command="status")["status"]["frames"]["composited"]
         if composited != frames:
             frames, longest, last = composited, max(longest, now - last), now
         time.sleep(0.01)
-    return longest
+    return longest if last >= begin + seconds else now - last
 
 
 def pose_by_capture(path):
@@ -369,7 +369,7 @@ stats: stats.json
             if pauses:
                 print(f"    {kind} of {victim}: {', '.join(f'{pause:.2f}' for pause in pauses)}")
     check("longest time without frames, s", max(pause for _, _, pause in done), deadline_s + 2.5)
-    # What may come while sink_video is stopped and starts again.
+    # The frames that may come while sink_video is stopped and starts again.
     allowed = FPS * sum((deadline_s if kind == "SIGSTOP" else 0) + 1 for name, kind, _ in done if name == "sink_video")
     recorded = int(subprocess.run(
         ["ffprobe", "-v", "error", "-select_streams", "v", "-count_packets", "-show_entries", "stream=nb_read_packets",

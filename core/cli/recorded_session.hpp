@@ -3,6 +3,7 @@
 // Reads the sessions that the plugin sink_session records (docs/sessions.md).
 #pragma once
 
+#include "base/limits.hpp"
 #include "run_config/recording.hpp"
 #include "sandbox/sandbox.hpp"
 #include "supervise/process.hpp"

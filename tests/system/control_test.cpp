@@ -455,6 +455,29 @@ TEST(Control, ChangesAnOptionAlsoForARestartedPlugin) {
     EXPECT_EQ(run.quit(), 0) << run.output();
 }
 
+TEST(Control, AdaptedSamplesFollowTheOption) {
+    ControlledRun run(
+        "version: 1\nmode: live\nsource: {plugin: source_synthetic, fps: 10, options: {frames: 0, id: 0, "
+        "side_mm: 80, width: 320, height: 240}}\n"
+        "tracker: {plugin: tracker_aruco, targets: [{marker: 0, family: tag36h11, side_mm: 80}]}\n"
+        "raytracer: {plugin: rt_embree, scene: scene.yaml, options: {samples: 2}}\n"
+        "live: {target_fps: 0.1}\n"
+        "outputs: [{plugin: sink_control, allow: [listen], control: [quit, set, status]}]\n");
+    run.start_and_connect();
+    const auto becomes = [&](int samples) {
+        return run.eventually([&] {
+            const Json quality = run.succeed({{"command", "status"}})["status"]["quality"];
+            return quality.is_object() && quality.value("samples", 0) == samples;
+        });
+    };
+    EXPECT_TRUE(becomes(2));
+    for (const int samples : {4, 1}) {
+        run.succeed({{"command", "set"}, {"component", "raytracer"}, {"option", "samples"}, {"value", samples}});
+        EXPECT_TRUE(becomes(samples)) << samples;
+    }
+    EXPECT_EQ(run.quit(), 0) << run.output();
+}
+
 // The camera is unplugged at the third frame and does not come back.
 TEST(Control, TheStatusSaysWhichCameraIsMissing) {
     ControlledRun run("version: 1\nmode: live\nrestart: {first_delay_ms: 1}\nsource: {plugin: source_waiting_live, "

@@ -242,7 +242,7 @@ TEST(RegionOf, IsTheWholeImageUnlessTheRayTracerReportsOne) {
     const Region whole = region_of(info, 640, 480);
     EXPECT_EQ(whole.width, 640u);
     EXPECT_EQ(whole.height, 480u);
-    info = {sizeof info, 1, 5, 6, 7, 8, 0};
+    info = {sizeof info, 1, 5, 6, 7, 8, 0, 0, 0};
     const Region reported = region_of(info, 640, 480);
     EXPECT_EQ(reported.x, 5u);
     EXPECT_EQ(reported.y, 6u);
@@ -257,7 +257,7 @@ TEST(RegionOf, IsClippedToTheImage) {
                                                       {0x80000000, 3, 5, 5},
                                                       {640, 0, 1, 1},
                                                       {3, 0xffffffff, 2, 2}})) {
-        const arhost_render_info info{sizeof info, 1, x, y, width, height, 0};
+        const arhost_render_info info{sizeof info, 1, x, y, width, height, 0, 0, 0};
         const Region region = region_of(info, 640, 480);
         EXPECT_LE(std::uint64_t{region.x} + region.width, 640u);
         EXPECT_LE(std::uint64_t{region.y} + region.height, 480u);

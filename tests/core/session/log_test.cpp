@@ -67,6 +67,19 @@ TEST(PackedLog, IsRejectedIfItEndsWithinAFrame) {
     }
 }
 
+TEST(PackedLog, HasNoMoreFramesThanItsLogCanHave) {
+    const std::vector<std::byte> memory = packed(full_log());
+    EXPECT_EQ(unpack(memory, 2).frames.size(), 2u);
+    EXPECT_EQ(arhost::test::error_of<std::runtime_error>([&] { (void)unpack(memory, 1); }),
+              "it has more frames than a log of this size can have");
+}
+
+TEST(PackedLog, CountsOfTheSearchAreChecked) {
+    const std::string message = "its frame 6 is invalid: search: has a count that is out of range";
+    EXPECT_EQ(rejection([](Log &log) { log.frames[1].search.candidate_count = -2; }), message);
+    EXPECT_EQ(rejection([](Log &log) { log.frames[1].search.missed_count = 1000; }), message);
+}
+
 TEST(PackedLog, CountsAreChecked) {
     EXPECT_EQ(rejection([](Log &log) { log.frames[1].targets.resize(ARHOST_MAX_TARGETS + 1); }),
               "it has an array of 1025 elements; the maximum is 1024");

@@ -95,11 +95,11 @@ TEST(LensWarp, ReadsOnlyTheRegionEvenIfItExceedsTheImage) {
     LensWarp warp(lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}));
     fill(warp.pinhole_image());
     const LensImage none;
-    arhost_render_info region{sizeof region, 1, 10, 10, 0, 0, 0};
+    arhost_render_info region{sizeof region, 1, 10, 10, 0, 0, 0, 0, 0};
     warp.warp(region, none.image);
     for (std::uint32_t i = 0; i < width * height; ++i)
         ASSERT_EQ(none.at(i % width, i / width)[3], 0);
-    region = {sizeof region, 1, 300, 200, 4'000'000'000u, 4'000'000'000u, 0};
+    region = {sizeof region, 1, 300, 200, 4'000'000'000u, 4'000'000'000u, 0, 0, 0};
     warp.warp(region, none.image); // AddressSanitizer detects reads outside the image
 }
 

@@ -338,6 +338,39 @@ TEST_F(PythonAdapter, PrintedLinesAreLoggedAndAFloodOfThemDelaysNoFrame) {
     }
 }
 
+TEST_F(PythonAdapter, PrintedLinesOfAnyLengthAreLoggedInParts) {
+    ArhostRun run(tracker);
+    EXPECT_EQ(run_script(run, "print('é' * 2500 + 'end')\nprint('x' * 5000, end='')\n" + std::string(idle_tracker)),
+              0)
+        << run.output();
+    const std::string output = run.output();
+    EXPECT_EQ(std::ranges::count(output, 'x') >= 5000, true) << output;
+    EXPECT_THAT(output, HasSubstr("éend\n"));
+    EXPECT_THAT(output, Not(HasSubstr("truncated")));
+}
+
+TEST_F(PythonAdapter, ARaytracerCanObeyTheLimitOfSamples) {
+    ArhostRun run("version: 1\nmode: live\nsource: {plugin: source_counter, fps: 30, options: {frames: 60}}\n"
+                  "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"
+                  "raytracer: {plugin: rt_python, options: {script: script.py}, scene: scene.yaml}\n"
+                  "live: {target_fps: 10000, min_samples: 2, max_latency_ms: 60000}\noutputs: [{plugin: sink_null}]\n"
+                  "stats: stats.json\n");
+    EXPECT_EQ(run_script(run, "class R:\n"
+                              "    def __init__(self, host): self.host, self.seen = host, set()\n"
+                              "    def start(self, setup): pass\n"
+                              "    def render(self, request, image):\n"
+                              "        request.full_samples = 8\n"
+                              "        image[...] = 0\n"
+                              "        if request.max_samples not in self.seen:\n"
+                              "            self.seen.add(request.max_samples)\n"
+                              "            self.host.info(f'at most {request.max_samples}')\n"),
+              0)
+        << run.output();
+    for (const char *limit : {"at most 0\n", "at most 8\n", "at most 2\n"})
+        EXPECT_THAT(run.output(), HasSubstr(limit));
+    EXPECT_EQ(run.stats()["quality"]["samples"], 2);
+}
+
 TEST_F(PythonAdapter, StandardOutputAcceptsBytesAndHasADescriptor) {
     ArhostRun run(tracker);
     EXPECT_EQ(run_script(run, std::string("import faulthandler, os, sys\n"

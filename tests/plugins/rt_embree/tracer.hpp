@@ -102,7 +102,7 @@ public:
     }
 
     std::uint32_t width, height;
-    arhost_render_info info{sizeof(arhost_render_info), 0, 0, 0, 0, 0, 0};
+    arhost_render_info info{sizeof(arhost_render_info), 0, 0, 0, 0, 0, 0, 0, 0};
 
 private:
     std::uint32_t stride_;

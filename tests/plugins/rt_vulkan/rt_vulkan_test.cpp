@@ -226,7 +226,7 @@ TEST_P(EachPath, ReportsTheDeviceTimeIfTheStructHasTheField) {
     }
     constexpr std::uint64_t untouched = 7;
     Picture picture(small);
-    picture.info = {offsetof(arhost_render_info, device_time_ns), 0, 0, 0, 0, 0, untouched};
+    picture.info = {offsetof(arhost_render_info, device_time_ns), 0, 0, 0, 0, 0, untouched, untouched, 0};
     ASSERT_EQ(tracer.try_render_at(1.5, moving_camera(), picture), ARHOST_STATUS_OK);
     EXPECT_EQ(picture.info.device_time_ns, untouched) << "an older host's struct lacks the field";
     EXPECT_TRUE(picture.info.has_region);
