@@ -122,7 +122,7 @@ void max_samples(Context &context) {
     };
     if (full > 1 && !first_difference(render(1), whole, 0))
         throw Failure(fmt::format("its full_samples is {}, but an image with max_samples 1 is the same", full));
-    for (const std::uint32_t limit : {full, std::max(full, full + 1), 0u})
+    for (const std::uint32_t limit : {0u, full, std::max(full, full + 1)})
         expect_alike(render(limit), whole,
                      fmt::format("with max_samples {} instead of 0, the image differs, although full_samples is {}",
                                  limit, full));
