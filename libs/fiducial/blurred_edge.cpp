@@ -361,6 +361,11 @@ BlurredEdge edge_of(Fit &fit, bool are_lines_removed) {
     if (fit.is_blur_limited)
         for (int i = 0; i < unknowns; ++i)
             fit.sum.normal(i, 2) = fit.sum.normal(2, i) = i == 2 ? 1 : 0;
+    // If an edge is parallel to the rows of pixels, few different distances from it determine the blur, the light and
+    // the offset, and the matrix may be singular. This adds so little that it only matters then.
+    constexpr double min_eigenvalue = 1e-9; // relative
+    for (int i = 0; i < unknowns; ++i)
+        fit.sum.normal(i, i) *= 1 + min_eigenvalue;
     const Normal inverse = fit.sum.normal.inv(cv::DECOMP_CHOLESKY);
     Contributions columns = contributions(fit.pixels);
     // The residuals may be those of a slightly different model, see minimize().

@@ -92,6 +92,23 @@ TEST(BlurredEdge, IsWhereThePixelsShowItIfItNearlyFollowsTheirRows) {
         }
 }
 
+// Three distances from the edge do not determine its offset, its blur and both lights.
+TEST(BlurredEdge, IsFiniteIfPixelsHaveFewDistances) {
+    for (const double first_px : {-1.2, -1.13, -1.05, -0.95})
+        for (const double blur_px : {0.3, 0.34, 0.4}) {
+            const Edge edge{0, 0, blur_px, 0, 255};
+            std::vector<EdgePixel> pixels;
+            for (int column = 0; column < 470; ++column)
+                for (int i = 0; i < 3; ++i)
+                    pixels.push_back({column - 235.0, first_px + i, edge.light(0, first_px + i), column});
+            const auto found = fit_blurred_edge(pixels, blur_px);
+            ASSERT_TRUE(found);
+            EXPECT_NEAR(at_px(*found, 0), 0, 0.3) << first_px << ", " << blur_px;
+            EXPECT_GE(found->offset_variance, 0);
+            EXPECT_TRUE(std::isfinite(found->offset_variance) && std::isfinite(found->turn_variance));
+        }
+}
+
 TEST(BlurredEdge, TellsItsVariance) {
     constexpr int count = 400;
     const Edge edge;
