@@ -87,10 +87,10 @@ std::string problem_with_address(const std::string &address) {
     if (is_name(address) || address.starts_with('/'))
         return "";
     const auto parts = split(address);
-    return parts && resolve(*parts) ? ""
-                                    : "must be a name, the absolute path of a Unix socket, or ADDRESS:PORT with a "
-                                      "port from 0 to 65535, as "
-                                      "in 127.0.0.1:8080";
+    if (parts && resolve(*parts))
+        return "";
+    return "must be a name, the absolute path of a Unix socket, or ADDRESS:PORT with a port from 0 to 65535, as in "
+           "127.0.0.1:8080";
 }
 
 ListeningSocket::ListeningSocket(const std::string &address) : address_(address) {

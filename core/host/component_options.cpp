@@ -7,11 +7,6 @@ namespace arhost::host {
 
 using namespace model;
 
-const OptionValue *ComponentOptions::InUse::find(std::string_view key) const {
-    const auto found = std::ranges::find(values, key, &OptionValue::key);
-    return found == values.end() ? nullptr : &*found;
-}
-
 std::vector<OptionValue> ComponentOptions::choose(const supervise::Component &component, arhost_kind kind,
                                                   const run_config::ComponentConfiguration &configuration,
                                                   std::size_t candidate) {
@@ -28,7 +23,7 @@ std::vector<OptionValue> ComponentOptions::choose(const supervise::Component &co
         in_use.changed.clear();
     for (OptionValue &value : values)
         if (in_use.changed.contains(value.key))
-            value = *in_use.find(value.key);
+            value = *std::ranges::find(in_use.values, value.key, &OptionValue::key);
     in_use.values = values;
     return values;
 }

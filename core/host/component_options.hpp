@@ -19,7 +19,6 @@ public:
         std::string path; // configuration path of the component
         std::vector<model::OptionValue> values;
         std::set<std::string> changed; // keys of the changed options
-        const model::OptionValue *find(std::string_view key) const;
     };
 
     explicit ComponentOptions(const supervise::LogFunction &log) : log_(log) {}

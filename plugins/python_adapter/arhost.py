@@ -55,11 +55,10 @@ class Host:
 
 
 class _PrintedLines(io.TextIOWrapper):
-    """Standard output of the script, whose text is logged by line; a longer line than the log takes, in parts. The log
-    is limited, so printing never blocks. A part of `max_length` characters fits into a message. What is written to `buffer` or `fileno()` is logged like the output of a
-    program."""
+    """Standard output of the script, whose text is logged by line, and long lines in parts. The log is limited, so
+    printing never blocks. What is written to `buffer` or `fileno()` is logged like the output of a program."""
 
-    max_length = 1000
+    max_length = 1000  # so many characters fit into a message
 
     def __init__(self, log):
         super().__init__(io.FileIO(1, "w", closefd=False), "utf-8", write_through=True)
@@ -378,7 +377,8 @@ class _RaytracerAdapter(_Adapter):
     def render(self, max_samples, sequence, time_s, camera, moved, deformed, pixels, height, width, stride):
         def render():
             request = Fields(
-                max_samples=max_samples, full_samples=0, sequence=sequence, time_s=time_s, camera=Fields(_record(camera, CAMERA)),
+                max_samples=max_samples, full_samples=0, sequence=sequence, time_s=time_s,
+                camera=Fields(_record(camera, CAMERA)),
                 moved=np.ndarray(len(moved) // MOVED_OBJECT.itemsize, MOVED_OBJECT, moved),
                 deformed=[Fields(object=index, is_visible=bool(is_visible), positions=_vectors(positions),
                                  normals=normals and _vectors(normals))
@@ -386,7 +386,8 @@ class _RaytracerAdapter(_Adapter):
             region = self.plugin.render(request, _pixels(pixels, height, width, 4, stride))
             if not 0 <= request.full_samples < 1 << 32:
                 raise ValueError(f"full_samples is {request.full_samples}; it must be 0 to 4294967295")
-            return STATUS_OK, (int(request.full_samples), None if region is None else tuple(int(side) for side in region))
+            return STATUS_OK, (int(request.full_samples),
+                               None if region is None else tuple(int(side) for side in region))
 
         memory = [pixels, moved] + [view for _, _, p, n in deformed for view in (p, n) if view]
         return self._with_memory(memory, render)
