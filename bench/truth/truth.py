@@ -5,7 +5,7 @@ bench/truth/README.md.
 
 Renders rooms with Blender Cycles, without virtual objects (plate) and with them (truth), lets arhost add the objects to
 the plate, and prints the differences. --quick: one view, 32 samples. --moving: also renders the moving camera's frames.
-Pictures are kept in build/truth; what exists is not rendered again. Needs about two hours on two cores."""
+Pictures are kept in build/truth; what exists is not rendered again. The first run takes hours on two cores."""
 import gzip
 import json
 import os
@@ -144,8 +144,8 @@ def main():
         areas = [measure.areas(load(room, "plate", view), load(room, "truth", view),
                                np.load(os.path.join(FOLDER, room.name, f"labels-{view}.npz"))) for view in VIEWS]
         results[room.name] = {name: measure.compare(pictures, truths, areas) for name, pictures in rows.items()}
-        sheet = [np.concatenate([pictures[0] for pictures in [*rows.values()][:-1]] + [truths[0]], 1)]
-        Image.fromarray(np.concatenate(sheet, 0)).save(os.path.join(FOLDER, f"{room.name}.png"))
+        sheet = [pictures[0] for name, pictures in rows.items() if name != "floor"] + [truths[0]]
+        Image.fromarray(np.concatenate(sheet, 1)).save(os.path.join(FOLDER, f"{room.name}.png"))
     with open(os.path.join(FOLDER, "truth.json"), "w", encoding="utf-8") as out:
         json.dump(results, out, indent=1)
     measure.print_tables(results)
