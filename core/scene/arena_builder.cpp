@@ -155,7 +155,7 @@ arhost_light make_light(arhost_light_type type) {
     light.direction[2] = -1;
     copy(glm::vec3(1), light.intensity);
     light.axis_u[0] = light.axis_v[1] = 0.5f;
-    light.radius = 0.5f;
+    light.radius = type == ARHOST_LIGHT_SPHERE ? 0.5f : 0;
     light.cosine_inner = light.cosine_outer = 0;
     return light;
 }
@@ -304,6 +304,7 @@ void ArenaBuilder::write(std::span<std::byte> arena) && {
     scene.shadow_alpha_translucent = settings.shadow_alpha_translucent;
     scene.coloured_shadows = settings.coloured_shadows;
     scene.duration_s = settings.duration_s;
+    scene.integrator = settings.integrator;
 
     Writer writer(arena.data()); // must visit the buffers in the same order as byte_size
     scene.materials = writer.put(materials_);

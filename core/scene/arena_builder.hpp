@@ -97,6 +97,7 @@ struct Settings {
     float shadow_alpha_opaque = 0.6f, shadow_alpha_translucent = 0.3f;
     bool coloured_shadows = false;
     float duration_s = 0;
+    arhost_integrator integrator = ARHOST_INTEGRATOR_WHITTED;
 };
 
 // The tables of an arena, and the scene as a whole.

@@ -92,11 +92,32 @@ void set(float (&to)[3], const glm::vec3 &from) {
 }
 
 constexpr double light_limit = 1e6;
+constexpr std::uint32_t default_path_depth = 8; // later bounces add less than a code to the rooms of tools/bench truth
+
+// Version 2 changed the defaults: scenes of version 1 keep their pictures.
+arhost_integrator integrator_of(const Node &root) {
+    const Node version_node = root.require("version");
+    const std::int64_t version = version_node.integer();
+    if (version != 1 && version != 2)
+        version_node.fail("must be 1 or 2");
+    const auto node = root.find("integrator");
+    if (!node)
+        return version == 1 ? ARHOST_INTEGRATOR_WHITTED : ARHOST_INTEGRATOR_PATH;
+    if (version == 1)
+        node->fail("needs 'version: 2'");
+    return node->choice({"path", "whitted"}) == "path" ? ARHOST_INTEGRATOR_PATH : ARHOST_INTEGRATOR_WHITTED;
+}
 
 Settings settings_of(const Node &root) {
     Settings settings;
-    if (root.require("version").integer() != 1)
-        root.require("version").fail("must be 1");
+    settings.integrator = integrator_of(root);
+    if (settings.integrator == ARHOST_INTEGRATOR_PATH) {
+        for (const char *key : {"ambient", "shadow_alpha", "coloured_shadows"})
+            if (const auto node = root.find(key))
+                node->fail("only applies to 'integrator: whitted'; the path integrator computes this light");
+        settings.max_depth = default_path_depth;
+        settings.ambient = settings.background = glm::vec3(0);
+    }
     settings.axes = root.require("axes").choice({"z-up", "y-up"}) == "z-up" ? ARHOST_AXES_Z_UP : ARHOST_AXES_Y_UP;
     if (const auto node = root.find("max_depth"))
         settings.max_depth = static_cast<std::uint32_t>(node->integer(0, max_depth_limit));
@@ -342,7 +363,10 @@ arhost_light light_of(const Node &node, arhost_axes axes) {
         node.allow_keys({"type", "position", "intensity", "falloff", "radius"});
         light.radius = static_cast<float>(length_of(node.require("radius")));
     } else if (type == "spot") {
-        node.allow_keys({"type", "position", "intensity", "falloff", "direction", "inner_degrees", "outer_degrees"});
+        node.allow_keys({"type", "position", "intensity", "falloff", "direction", "inner_degrees", "outer_degrees",
+                         "radius"});
+        if (const auto radius = node.find("radius"))
+            light.radius = static_cast<float>(length_of(*radius));
         set(light.direction, direction_of(node.require("direction")));
         const double outer = node.require("outer_degrees").real(0, 180);
         const auto inner = node.find("inner_degrees");
@@ -572,8 +596,8 @@ public:
     }
 
     ArenaBuilder load() {
-        root_.allow_keys({"version", "axes", "max_depth", "ambient", "background", "shadow_alpha", "coloured_shadows",
-                          "environment", "materials", "lights", "objects", "reads"});
+        root_.allow_keys({"version", "integrator", "axes", "max_depth", "ambient", "background", "shadow_alpha",
+                          "coloured_shadows", "environment", "materials", "lights", "objects", "reads"});
         if (const auto reads = root_.find("reads"))
             reads->fail("a scene grants nothing; list these files under 'reads' of the ray tracer, in the "
                         "configuration, and remove this key");

@@ -147,6 +147,8 @@ private:
         unused_bytes_ = scene_->byte_size - sizeof(arhost_scene);
         if (scene_->axes != ARHOST_AXES_Z_UP && scene_->axes != ARHOST_AXES_Y_UP)
             fail("its value of 'axes' is unknown");
+        if (scene_->integrator != ARHOST_INTEGRATOR_WHITTED && scene_->integrator != ARHOST_INTEGRATOR_PATH)
+            fail("its value of 'integrator' is unknown");
         if (scene_->max_depth > max_depth_limit)
             fail("max_depth is " + std::to_string(scene_->max_depth) + ", more than " +
                  std::to_string(max_depth_limit));

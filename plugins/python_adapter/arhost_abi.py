@@ -57,6 +57,8 @@ CAPABILITY_OVERLAY_INPUT = 16384
 CAPABILITY_SCALED_IMAGES = 32768
 CAPABILITY_RUN_DESCRIPTION = 65536
 CAPABILITY_REPORTS_POSES = 131072
+CAPABILITY_LINEAR_IMAGES = 262144
+CAPABILITY_VIDEO = 524288
 OFFER = _struct(12,
     ("struct_size", "u4", 0),
     ("oldest_abi_version", "u4", 4),
@@ -225,7 +227,7 @@ EXPECTED_MARKER = _struct(80,
 
 # arhost/scene.h
 SCENE_MAGIC = 0x435354534f485241
-SCENE_VERSION = 3
+SCENE_VERSION = 4
 NONE = 0xffffffff
 BUFFER = _struct(16,
     ("offset", "u8", 0),
@@ -357,7 +359,9 @@ ENVIRONMENT = _struct(80,
     ("environment_from_world", ("f4", (9,)), 8),
     ("rows", BUFFER, 48),
     ("columns", BUFFER, 64))
-SCENE = _struct(336,
+INTEGRATOR_WHITTED = 1
+INTEGRATOR_PATH = 2
+SCENE = _struct(344,
     ("magic", "u8", 0),
     ("version", "u4", 8),
     ("struct_size", "u4", 12),
@@ -372,17 +376,19 @@ SCENE = _struct(336,
     ("shadow_alpha_translucent", "f4", 84),
     ("coloured_shadows", "u4", 88),
     ("duration_s", "f4", 92),
-    ("environment", ENVIRONMENT, 96),
-    ("geometries", BUFFER, 176),
-    ("textures", BUFFER, 192),
-    ("materials", BUFFER, 208),
-    ("objects", BUFFER, 224),
-    ("lights", BUFFER, 240),
-    ("nodes", BUFFER, 256),
-    ("channels", BUFFER, 272),
-    ("skins", BUFFER, 288),
-    ("names", BUFFER, 304),
-    ("anchors", BUFFER, 320))
+    ("integrator", "i4", 96),
+    ("reserved", "u4", 100),
+    ("environment", ENVIRONMENT, 104),
+    ("geometries", BUFFER, 184),
+    ("textures", BUFFER, 200),
+    ("materials", BUFFER, 216),
+    ("objects", BUFFER, 232),
+    ("lights", BUFFER, 248),
+    ("nodes", BUFFER, 264),
+    ("channels", BUFFER, 280),
+    ("skins", BUFFER, 296),
+    ("names", BUFFER, 312),
+    ("anchors", BUFFER, 328))
 
 # arhost/motion.h
 MOVED_OBJECT = _struct(56,
@@ -391,6 +397,10 @@ MOVED_OBJECT = _struct(56,
     ("world_from_object", ("f4", (12,)), 8))
 
 # arhost/raytracer.h
+IMAGE_FORM_STRAIGHT = 1
+IMAGE_FORM_LINEAR = 2
+COMPOSITING_SRGB = 1
+COMPOSITING_LINEAR = 2
 RENDER_INFO = _struct(40,
     ("struct_size", "u4", 0),
     ("has_region", "i4", 4),

@@ -58,6 +58,8 @@ CAPABILITY_OVERLAY_INPUT: int
 CAPABILITY_SCALED_IMAGES: int
 CAPABILITY_RUN_DESCRIPTION: int
 CAPABILITY_REPORTS_POSES: int
+CAPABILITY_LINEAR_IMAGES: int
+CAPABILITY_VIDEO: int
 OFFER: np.dtype[np.void]
 class Offer:
     struct_size: int
@@ -381,6 +383,8 @@ class Environment:
     environment_from_world: np.ndarray
     rows: Buffer
     columns: Buffer
+INTEGRATOR_WHITTED: int
+INTEGRATOR_PATH: int
 SCENE: np.dtype[np.void]
 class Scene:
     magic: int
@@ -397,6 +401,8 @@ class Scene:
     shadow_alpha_translucent: float
     coloured_shadows: int
     duration_s: float
+    integrator: int
+    reserved: int
     environment: Environment
     geometries: np.ndarray
     textures: np.ndarray
@@ -418,6 +424,10 @@ class MovedObject:
     world_from_object: np.ndarray
 
 # arhost/raytracer.h
+IMAGE_FORM_STRAIGHT: int
+IMAGE_FORM_LINEAR: int
+COMPOSITING_SRGB: int
+COMPOSITING_LINEAR: int
 RENDER_INFO: np.dtype[np.void]
 class RenderInfo:
     struct_size: int

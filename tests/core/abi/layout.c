@@ -83,6 +83,8 @@ VALUE(ARHOST_CAPABILITY_OVERLAY_INPUT, 16384);
 VALUE(ARHOST_CAPABILITY_SCALED_IMAGES, 32768);
 VALUE(ARHOST_CAPABILITY_RUN_DESCRIPTION, 65536);
 VALUE(ARHOST_CAPABILITY_REPORTS_POSES, 131072);
+VALUE(ARHOST_CAPABILITY_LINEAR_IMAGES, 262144);
+VALUE(ARHOST_CAPABILITY_VIDEO, 524288);
 
 STRUCT(arhost_descriptor, 80,
        FIELD(struct_size, 0, 4) FIELD(kind, 4, 4) FIELD(id, 8, 8) FIELD(name, 16, 8) FIELD(version, 24, 8)
@@ -286,7 +288,7 @@ STRUCT(arhost_tracker, 48,
 
 /* arhost/scene.h */
 VALUE(ARHOST_SCENE_MAGIC, 0x435354534f485241);
-VALUE(ARHOST_SCENE_VERSION, 3);
+VALUE(ARHOST_SCENE_VERSION, 4);
 VALUE(ARHOST_NONE, 0xffffffff);
 
 STRUCT(arhost_buffer, 16,
@@ -371,15 +373,17 @@ STRUCT(arhost_light, 80,
 STRUCT(arhost_environment, 80,
        FIELD(texture, 0, 4) FIELD(intensity, 4, 4) FIELD(environment_from_world, 8, 36) FIELD(rows, 48, 16)
        FIELD(columns, 64, 16))
+VALUE(ARHOST_INTEGRATOR_WHITTED, 1);
+VALUE(ARHOST_INTEGRATOR_PATH, 2);
 
-STRUCT(arhost_scene, 336,
+STRUCT(arhost_scene, 344,
        FIELD(magic, 0, 8) FIELD(version, 8, 4) FIELD(struct_size, 12, 4) FIELD(byte_size, 16, 8) FIELD(axes, 24, 4)
        FIELD(max_depth, 28, 4) FIELD(ambient, 32, 12) FIELD(background, 44, 12) FIELD(bounds_min, 56, 12)
        FIELD(bounds_max, 68, 12) FIELD(shadow_alpha_opaque, 80, 4) FIELD(shadow_alpha_translucent, 84, 4)
-       FIELD(coloured_shadows, 88, 4) FIELD(duration_s, 92, 4) FIELD(environment, 96, 80) FIELD(geometries, 176, 16)
-       FIELD(textures, 192, 16) FIELD(materials, 208, 16) FIELD(objects, 224, 16) FIELD(lights, 240, 16)
-       FIELD(nodes, 256, 16) FIELD(channels, 272, 16) FIELD(skins, 288, 16) FIELD(names, 304, 16)
-       FIELD(anchors, 320, 16))
+       FIELD(coloured_shadows, 88, 4) FIELD(duration_s, 92, 4) FIELD(integrator, 96, 4) FIELD(reserved, 100, 4)
+       FIELD(environment, 104, 80) FIELD(geometries, 184, 16) FIELD(textures, 200, 16) FIELD(materials, 216, 16)
+       FIELD(objects, 232, 16) FIELD(lights, 248, 16) FIELD(nodes, 264, 16) FIELD(channels, 280, 16)
+       FIELD(skins, 296, 16) FIELD(names, 312, 16) FIELD(anchors, 328, 16))
 
 /* arhost/motion.h */
 
@@ -395,17 +399,22 @@ STRUCT(arhost_motion, 32,
        FIELD(deformed_count, 24, 4) FIELD(reserved, 28, 4))
 
 /* arhost/raytracer.h */
+VALUE(ARHOST_IMAGE_FORM_STRAIGHT, 1);
+VALUE(ARHOST_IMAGE_FORM_LINEAR, 2);
+VALUE(ARHOST_COMPOSITING_SRGB, 1);
+VALUE(ARHOST_COMPOSITING_LINEAR, 2);
 
-STRUCT(arhost_raytracer_setup, 32,
-       FIELD(struct_size, 0, 4) FIELD(width, 4, 4) FIELD(height, 8, 4) FIELD(reserved, 12, 4) FIELD(scene, 16, 8)
-       FIELD(intrinsics, 24, 8))
+STRUCT(arhost_raytracer_setup, 48,
+       FIELD(struct_size, 0, 4) FIELD(width, 4, 4) FIELD(height, 8, 4) FIELD(form, 12, 4) FIELD(scene, 16, 8)
+       FIELD(intrinsics, 24, 8) FIELD(compositing, 32, 4) FIELD(reserved, 36, 4) FIELD(video_format, 40, 8))
 
-STRUCT(arhost_render_request, 264,
+STRUCT(arhost_render_request, 272,
        FIELD(struct_size, 0, 4) FIELD(max_samples, 4, 4) FIELD(sequence, 8, 8) FIELD(time_s, 16, 8)
-       FIELD(camera, 24, 232) FIELD(motion, 256, 8))
+       FIELD(camera, 24, 232) FIELD(motion, 256, 8) FIELD(video, 264, 8))
 
-STRUCT(arhost_image, 24,
-       FIELD(struct_size, 0, 4) FIELD(stride, 4, 4) FIELD(width, 8, 4) FIELD(height, 12, 4) FIELD(rgba, 16, 8))
+STRUCT(arhost_image, 32,
+       FIELD(struct_size, 0, 4) FIELD(stride, 4, 4) FIELD(width, 8, 4) FIELD(height, 12, 4) FIELD(rgba, 16, 8)
+       FIELD(linear, 24, 8))
 
 STRUCT(arhost_render_info, 40,
        FIELD(struct_size, 0, 4) FIELD(has_region, 4, 4) FIELD(region_x, 8, 4) FIELD(region_y, 12, 4)

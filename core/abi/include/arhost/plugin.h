@@ -206,7 +206,9 @@ enum {
      * (arhost/shading/lens.hpp). */
     ARHOST_CAPABILITY_SCALED_IMAGES = 1 << 15,
     ARHOST_CAPABILITY_RUN_DESCRIPTION = 1 << 16, /* sink: reads arhost_sink_setup.run_description */
-    ARHOST_CAPABILITY_REPORTS_POSES = 1 << 17    /* tracker: reports the poses of bodies (arhost_body_pose) */
+    ARHOST_CAPABILITY_REPORTS_POSES = 1 << 17,   /* tracker: reports the poses of bodies (arhost_body_pose) */
+    ARHOST_CAPABILITY_LINEAR_IMAGES = 1 << 18,   /* raytracer: can write images of ARHOST_IMAGE_FORM_LINEAR */
+    ARHOST_CAPABILITY_VIDEO = 1 << 19            /* raytracer: reads arhost_render_request.video */
 };
 
 /* Describes the plugin. Static storage: valid as long as the library is loaded. Each string may have up to 4,096

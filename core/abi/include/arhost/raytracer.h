@@ -6,6 +6,7 @@
 #define ARHOST_RAYTRACER_H
 
 #include "camera.h"
+#include "frame.h"
 #include "motion.h"
 #include "plugin.h"
 #include "scene.h"
@@ -14,14 +15,33 @@
 extern "C" {
 #endif
 
+/* What the pixels of an image are. */
+typedef int32_t arhost_image_form;
+enum {
+    ARHOST_IMAGE_FORM_STRAIGHT = 1, /* arhost_image.rgba: colour and alpha, 8 bits each */
+    /* arhost_image.linear: added light and transmittance, both per channel. Only with
+     * ARHOST_CAPABILITY_LINEAR_IMAGES */
+    ARHOST_IMAGE_FORM_LINEAR = 2
+};
+
+/* The space in which the host blends a straight image with the video. Linear images always add linear light. */
+typedef int32_t arhost_compositing;
+enum {
+    ARHOST_COMPOSITING_SRGB = 1,  /* sRGB codes */
+    ARHOST_COMPOSITING_LINEAR = 2 /* linear light: an alpha of 0.3 removes 30 % of the video's light */
+};
+
 typedef struct arhost_raytracer_setup {
     uint32_t struct_size;
     uint32_t width, height;    /* size of the images, px; with ARHOST_CAPABILITY_SCALED_IMAGES, the maximum size (see
                                   arhost_image) */
-    uint32_t reserved;         /* 0 */
+    arhost_image_form form;    /* of every image until `stop` */
     const arhost_scene *scene; /* read-only, valid until `stop`; validated by the host */
     const arhost_intrinsics *intrinsics; /* the same in every request, except with ARHOST_CAPABILITY_SCALED_IMAGES;
                                             precompute ray tables here */
+    arhost_compositing compositing;
+    uint32_t reserved; /* 0 */
+    const arhost_frame_format *video_format; /* of every arhost_render_request.video; NULL: there is no video */
 } arhost_raytracer_setup;
 
 typedef struct arhost_render_request {
@@ -32,21 +52,34 @@ typedef struct arhost_render_request {
     double time_s;        /* scene time, s */
     arhost_camera camera;
     const arhost_motion *motion; /* NULL if no object moves or deforms */
+    /* The frame under the overlay, without virtual objects, for mirrors, glass and the light that real surfaces
+     * reflect. Its codes are sRGB (`transfer` of its format), its intrinsics those of the setup. Only with
+     * ARHOST_CAPABILITY_VIDEO; else NULL. Also NULL if the worker warps the image (ARHOST_CAPABILITY_LENS_DISTORTION)
+     */
+    const arhost_frame *video;
 } arhost_render_request;
 
-/* The image to write: R, G, B, A bytes, straight (not premultiplied) alpha, sRGB-encoded, top row first. Alpha is
- * exactly 0 where the primary ray hits nothing (the colour is then ignored) and 255 on virtual objects. Samples of a
+/* The image to write, top row first. Write every pixel and nothing else; leave the bytes after the last row unchanged.
+ * The pixels are aligned to a 4,096-byte page and their last page is fully mapped, so a GPU can import the memory.
+ * Between `start` and `stop`, the pointer has at most 8 different values. Near clip: 1e-4 × scene extent.
+ *
+ * ARHOST_IMAGE_FORM_STRAIGHT: R, G, B, A bytes, straight (not premultiplied) alpha, sRGB-encoded. Alpha is exactly 0 where the primary ray hits nothing (the colour is then ignored) and 255 on virtual objects. Samples of a
  * pixel are averaged in linear light and then encoded. Samples brighter than white count in full, up to a bound of at
  * least 100 times white. Samples of virtual objects and samples of shadows are averaged separately; the two averages
- * are blended in sRGB, weighted by their shares of the alpha. Near clip: 1e-4 × scene extent. Write every pixel and
- * nothing else. `rgba` is aligned to a 4,096-byte page and its last page is fully mapped, so a GPU can import the
- * memory; leave the bytes after the last row unchanged. Between `start` and `stop`, the pointer `rgba` has at most 8
- * different values. */
+ * are blended in sRGB, weighted by their shares of the alpha.
+ *
+ * ARHOST_IMAGE_FORM_LINEAR: eight half-precision floats (IEEE 754 binary16) per pixel: added light R, G, B, 0, then
+ * transmittance R, G, B, 0. The host shows added + transmittance · video in each channel, where the video is linear
+ * light from 0 to 1. A pixel that virtual objects do not affect is exactly (0, 0, 0, 0; 1, 1, 1, 0). On virtual
+ * objects, the transmittance is 0, at their edges the share of the pixel that they leave free. On a catcher, it is
+ * the light that arrives with the virtual objects divided by the light that arrives without them; it exceeds 1 where
+ * they reflect light onto the catcher. All values are finite and not negative. */
 typedef struct arhost_image {
     uint32_t struct_size;
     uint32_t stride; /* bytes per row, a multiple of 64 */
     uint32_t width, height;
-    uint8_t *rgba;
+    uint8_t *rgba;    /* NULL unless the form is ARHOST_IMAGE_FORM_STRAIGHT */
+    uint16_t *linear; /* NULL unless the form is ARHOST_IMAGE_FORM_LINEAR */
 } arhost_image;
 
 /* Optional results of `render`. The worker sets all fields except struct_size to 0; leave fields that do not apply at
@@ -54,7 +87,7 @@ typedef struct arhost_image {
 typedef struct arhost_render_info {
     uint32_t struct_size;
     int32_t has_region; /* non-zero: the following four fields are set; 0: the region is the whole image */
-    /* Region, px. Outside it, alpha must be 0; the host skips these pixels. Width 0: the whole image is empty. */
+    /* Region, px. Outside it, virtual objects affect no pixel; the host skips these pixels. Width 0: the whole image is empty. */
     uint32_t region_x, region_y, region_width, region_height;
     uint64_t device_time_ns; /* device (GPU) time from the image's first command to its last; 0: not measured */
     uint32_t full_samples;   /* samples per pixel that an image without a limit would take, whatever the limit of this

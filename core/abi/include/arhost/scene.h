@@ -20,7 +20,7 @@ extern "C" {
 #endif
 
 #define ARHOST_SCENE_MAGIC 0x435354534f485241ull /* "ARHOSTSC" */
-#define ARHOST_SCENE_VERSION 3u
+#define ARHOST_SCENE_VERSION 4u
 #define ARHOST_NONE 0xffffffffu
 
 /* An array in the arena: `count` elements, `stride` bytes apart. If `count` is 0, the array is absent. */
@@ -232,7 +232,7 @@ typedef struct arhost_light {
     float direction[3];         /* unit length, pointing away from the light */
     float intensity[3];         /* linear RGB; see arhost_falloff */
     float axis_u[3], axis_v[3]; /* mm; half sides, perpendicular to each other and to `direction` */
-    float radius;               /* mm */
+    float radius;               /* mm; of a sphere, or of the sphere that a spot light shines from (0: a point) */
     /* Cosines of the half angles of a spot light: full intensity inside the inner cone, 0 outside the outer cone,
      * smooth in between; cosine_inner >= cosine_outer. */
     float cosine_inner, cosine_outer;
@@ -249,6 +249,18 @@ typedef struct arhost_environment {
     arhost_buffer rows;    /* marginal CDF: one value per row of the texture */
     arhost_buffer columns; /* conditional CDFs: for each row, one value per column */
 } arhost_environment;
+
+/* How light is transported. Ray tracers that know only one way use it for every scene. */
+typedef int32_t arhost_integrator;
+enum {
+    /* Direct light, mirrors and glass, and a constant ambient light. Shadows on catchers have the alphas of
+     * `shadow_alpha_opaque` and `shadow_alpha_translucent`. */
+    ARHOST_INTEGRATOR_WHITTED = 1,
+    /* All paths of at most `max_depth` bounces: light that surfaces reflect onto each other, emissive surfaces as
+     * light sources. `background` is the radiance of an environment of one colour. Ignores `ambient` and the constants
+     * of shadows. Catchers show the change of their light (ARHOST_IMAGE_FORM_LINEAR). */
+    ARHOST_INTEGRATOR_PATH = 2
+};
 
 /* The header at the start of the arena. */
 typedef struct arhost_scene {
@@ -267,6 +279,8 @@ typedef struct arhost_scene {
     float shadow_alpha_opaque, shadow_alpha_translucent;
     uint32_t coloured_shadows; /* non-zero: glass casts coloured shadows on catchers */
     float duration_s;          /* period of the repeating animation, s; 0: no animation */
+    arhost_integrator integrator;
+    uint32_t reserved; /* 0 */
     arhost_environment environment;
     arhost_buffer geometries; /* arhost_geometry, stride sizeof */
     arhost_buffer textures;   /* arhost_texture */

@@ -104,6 +104,8 @@ pub const ARHOST_CAPABILITY_OVERLAY_INPUT: u32 = 16384;
 pub const ARHOST_CAPABILITY_SCALED_IMAGES: u32 = 32768;
 pub const ARHOST_CAPABILITY_RUN_DESCRIPTION: u32 = 65536;
 pub const ARHOST_CAPABILITY_REPORTS_POSES: u32 = 131072;
+pub const ARHOST_CAPABILITY_LINEAR_IMAGES: u32 = 262144;
+pub const ARHOST_CAPABILITY_VIDEO: u32 = 524288;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_descriptor {
@@ -600,7 +602,7 @@ unsafe impl Sync for arhost_tracker {} // a plugin's statics are immutable
 // ---- arhost/scene.h ----
 
 pub const ARHOST_SCENE_MAGIC: u64 = 0x435354534f485241;
-pub const ARHOST_SCENE_VERSION: u32 = 3;
+pub const ARHOST_SCENE_VERSION: u32 = 4;
 pub const ARHOST_NONE: u32 = 0xffffffff;
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -786,6 +788,9 @@ pub struct arhost_environment {
     pub columns: arhost_buffer,
 }
 const _: () = assert!(size_of::<arhost_environment>() == 80);
+pub type arhost_integrator = i32;
+pub const ARHOST_INTEGRATOR_WHITTED: arhost_integrator = 1;
+pub const ARHOST_INTEGRATOR_PATH: arhost_integrator = 2;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_scene {
@@ -803,6 +808,8 @@ pub struct arhost_scene {
     pub shadow_alpha_translucent: f32,
     pub coloured_shadows: u32,
     pub duration_s: f32,
+    pub integrator: arhost_integrator,
+    pub reserved: u32,
     pub environment: arhost_environment,
     pub geometries: arhost_buffer,
     pub textures: arhost_buffer,
@@ -815,7 +822,7 @@ pub struct arhost_scene {
     pub names: arhost_buffer,
     pub anchors: arhost_buffer,
 }
-const _: () = assert!(size_of::<arhost_scene>() == 336);
+const _: () = assert!(size_of::<arhost_scene>() == 344);
 
 // ---- arhost/motion.h ----
 
@@ -854,17 +861,26 @@ unsafe impl Sync for arhost_motion {} // a plugin's statics are immutable
 
 // ---- arhost/raytracer.h ----
 
+pub type arhost_image_form = i32;
+pub const ARHOST_IMAGE_FORM_STRAIGHT: arhost_image_form = 1;
+pub const ARHOST_IMAGE_FORM_LINEAR: arhost_image_form = 2;
+pub type arhost_compositing = i32;
+pub const ARHOST_COMPOSITING_SRGB: arhost_compositing = 1;
+pub const ARHOST_COMPOSITING_LINEAR: arhost_compositing = 2;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_raytracer_setup {
     pub struct_size: u32,
     pub width: u32,
     pub height: u32,
-    pub reserved: u32,
+    pub form: arhost_image_form,
     pub scene: *const arhost_scene,
     pub intrinsics: *const arhost_intrinsics,
+    pub compositing: arhost_compositing,
+    pub reserved: u32,
+    pub video_format: *const arhost_frame_format,
 }
-const _: () = assert!(size_of::<arhost_raytracer_setup>() == 32);
+const _: () = assert!(size_of::<arhost_raytracer_setup>() == 48);
 unsafe impl Sync for arhost_raytracer_setup {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -875,8 +891,9 @@ pub struct arhost_render_request {
     pub time_s: f64,
     pub camera: arhost_camera,
     pub motion: *const arhost_motion,
+    pub video: *const arhost_frame,
 }
-const _: () = assert!(size_of::<arhost_render_request>() == 264);
+const _: () = assert!(size_of::<arhost_render_request>() == 272);
 unsafe impl Sync for arhost_render_request {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -886,8 +903,9 @@ pub struct arhost_image {
     pub width: u32,
     pub height: u32,
     pub rgba: *mut u8,
+    pub linear: *mut u16,
 }
-const _: () = assert!(size_of::<arhost_image>() == 24);
+const _: () = assert!(size_of::<arhost_image>() == 32);
 unsafe impl Sync for arhost_image {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
