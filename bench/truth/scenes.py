@@ -30,8 +30,10 @@ def lamp(lamp):
     share = 1 / math.pi if lamp.kind == "rectangle" else 1 / (4 * math.pi)
     intensity = numbers([1e6 * lamp.power * share / math.pi * each for each in lamp.colour])
     text = f"type: {lamp.kind}, position: {numbers(lamp.position)}, intensity: {intensity}, falloff: inverse-square"
+    if lamp.kind != "rectangle":
+        text += f", radius: {lamp.radius}"
     if lamp.kind == "sphere":
-        return f"{{{text}, radius: {lamp.radius}}}"
+        return f"{{{text}}}"
     aim = np.array(lamp.target, float) - lamp.position
     text += f", direction: {numbers(aim / np.linalg.norm(aim))}"
     if lamp.kind == "rectangle":
@@ -59,21 +61,22 @@ def scene(light, bunny):
     """The virtual objects on a table, in `light`: lines of YAML."""
     size, centre = rooms.TABLE_SIZE, rooms.TABLE_CENTRE
     table = f"{{name: table, plane: {{size: {numbers(size)}, centre: {numbers((*centre, 0))}}}, material: table, role: catcher}}"
-    return "\n".join(["version: 1", "axes: z-up", "max_depth: 16", *light, "materials:", "  table: {model: diffuse, diffuse: 0.33}",
+    return "\n".join(["axes: z-up", "max_depth: 16", *light, "materials:", "  table: {model: diffuse, diffuse: 0.33}",
                       *(f"  {name}: {material(spec)}" for name, spec in rooms.MATERIALS.items()), "objects:",
                       *("  - " + each for each in [table, *objects(bunny)])]) + "\n"
 
 
 def demo_light():
     """That of config/scenes/demo.yaml."""
-    return ["ambient: 0.28", "background: '#c9d6e4'", "lights:",
+    return ["version: 1", "ambient: 0.28", "background: '#c9d6e4'", "lights:",
             "  - {type: rectangle, position: [-640, 702, 710], direction: [0.674, -0.739, 0], size: [800, 940], "
             "intensity: [1.25, 1.3, 1.38]}"]
 
 
-def known_light(room):
+def known_light(room, integrator):
     lights = ["lights:", *("  - " + lamp(each) for each in room.lamps)] if room.lamps else []
-    return ["environment: {image: environment.hdr}", "shadow_alpha: {opaque: 1, translucent: 0.5}", "coloured_shadows: true", *lights]
+    shadows = ["shadow_alpha: {opaque: 1, translucent: 0.5}", "coloured_shadows: true"] if integrator == "whitted" else []
+    return ["version: 2", f"integrator: {integrator}", "environment: {image: environment.hdr}", *shadows, *lights]
 
 
 def write_hdr(pixels, file):

@@ -107,7 +107,7 @@ def augmented(room, rig, light):
     with open(os.path.join(folder, "run.yaml"), "w", encoding="utf-8") as out:
         out.write("version: 1\nsource: {plugin: source_file, path: plate-%d.png, fps: 25}\ntrajectory: cameras.jsonl\n"
                   "raytracer: {plugin: rt_embree, scene: scene.yaml, deadline_ms: 100000, "
-                  "options: {samples: 16, light_samples: 16}}\n"
+                  "options: {samples: 256, light_samples: 4}}\n"
                   "outputs: [{plugin: sink_images, path: out-%d.png}]\n")
     ran = subprocess.run([os.path.join(BIN, "arhost"), "run.yaml"], cwd=folder, stderr=subprocess.PIPE, text=True, check=False)
     if ran.returncode != 0:
@@ -124,7 +124,8 @@ def rows_of(room):
         catcher = load(room, "catcher", view)
         catchers.append(measure.photo(catcher[..., :3] + (1 - catcher[..., 3:]) * plate[..., :3], room.name, view))
     return {"nothing": photos, "demo lamp": augmented(room, "demo", scenes.demo_light()),
-            "known light": augmented(room, "known", scenes.known_light(room)), "Blender's catcher": catchers,
+            "whitted": augmented(room, "whitted", scenes.known_light(room, "whitted")),
+            "known light": augmented(room, "known", scenes.known_light(room, "path")), "Blender's catcher": catchers,
             "floor": [measure.photo(load(room, "again", view), room.name, view) for view in VIEWS]}
 
 

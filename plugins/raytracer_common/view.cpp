@@ -63,9 +63,11 @@ void check_setup(const arhost_raytracer_setup &setup) {
 void check_render(const arhost_camera &camera, const arhost_image &image, const arhost_intrinsics &intrinsics) {
     if (!same(camera.intrinsics, intrinsics))
         reject("the camera's intrinsics differ from the intrinsics passed to start");
-    if (image.width != intrinsics.width || image.height != intrinsics.height || !image.rgba ||
-        image.stride < 4 * image.width)
-        reject("the image buffer must have the size passed to start and a stride of at least 4 bytes per pixel");
+    const std::uint32_t pixel_bytes = image.linear ? 16 : 4;
+    if (image.width != intrinsics.width || image.height != intrinsics.height || !image.rgba == !image.linear ||
+        image.stride < pixel_bytes * image.width)
+        reject("the image buffer must have the form and size passed to start and a stride of at least 4 bytes per "
+               "pixel, or 16 if it is linear");
 }
 
 bool same_view(const arhost_camera &a, const arhost_camera &b) {

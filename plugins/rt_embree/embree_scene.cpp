@@ -157,7 +157,7 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     for (std::uint32_t number = 0; number < from.size(); ++number) {
         const arhost_object &object = from[number];
         objects_.push_back(make_object(arena, object));
-        placements_.push_back({local_box(arena, object), {}});
+        placements_.push_back({local_box(arena, object), {}, true});
         visible_boxes_.push_back(empty_box());
         place_object(number, object.world_from_object);
         view_.has_catchers |= object.role == ARHOST_ROLE_CATCHER;
@@ -198,7 +198,8 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     view_.lights = lights.data();
     view_.light_count = arena.lights.count;
     view_.has_area_lights = std::any_of(lights.begin(), lights.end(), [](const arhost_light &light) {
-        return light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE;
+        return light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE ||
+               (light.type == ARHOST_LIGHT_SPOT && light.radius > 0);
     });
     view_.max_depth = arena.max_depth;
     copy3(arena.ambient, view_.ambient);
@@ -274,8 +275,25 @@ void EmbreeScene::deform(const arhost_deformed_geometry &deformed) {
 void EmbreeScene::show(std::uint32_t object, RTCGeometry instance, bool is_visible) {
     rtcSetGeometryMask(instance, is_visible ? mask_of(objects_[object]) : 0);
     rtcCommitGeometry(instance);
+    placements_[object].is_visible = is_visible;
     if (!is_visible)
         visible_boxes_[object] = empty_box();
+}
+
+std::vector<arhost::raytracer_common::PlacedObject> EmbreeScene::placed_objects() const {
+    const auto from = elements<arhost_object>(arena_, arena_.objects);
+    std::vector<arhost::raytracer_common::PlacedObject> placed;
+    for (std::uint32_t i = 0; i < from.size(); ++i)
+        placed.push_back({placements_[i].world_from_object.data(), from[i].deforms ? objects_[i].positions : nullptr,
+                          placements_[i].is_visible});
+    return placed;
+}
+
+void EmbreeScene::set_emitters(std::span<const arhost::raytracer_common::Emitter> emitters) {
+    for (std::size_t i = 0; i < emitters.size(); ++i) {
+        objects_[i].emitter_density = emitters[i].density;
+        objects_[i].ball_radius = emitters[i].ball_radius;
+    }
 }
 
 void EmbreeScene::place_object(std::uint32_t object, const float *world_from_object) {
@@ -285,10 +303,11 @@ void EmbreeScene::place_object(std::uint32_t object, const float *world_from_obj
 }
 
 void EmbreeScene::update_bounds(std::uint32_t object) {
-    const auto &[local, world_from_object] = placements_[object];
-    object_extent(local.min, local.max, world_from_object.data(), objects_[object].extent);
+    const Placement &placement = placements_[object];
+    const float *world_from_object = placement.world_from_object.data();
+    object_extent(placement.local.min, placement.local.max, world_from_object, objects_[object].extent);
     if (objects_[object].role != ARHOST_ROLE_OCCLUDER)
-        visible_boxes_[object] = transformed(local, world_from_object.data());
+        visible_boxes_[object] = transformed(placement.local, world_from_object);
 }
 
 SceneHandle EmbreeScene::new_scene(RTCSceneFlags flags) const {

@@ -6,6 +6,7 @@
 
 #include "bvh_quality.hpp"
 #include "hit_filter.hpp"
+#include "raytracer_common/light_sources.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 #include <arhost/motion.h>
@@ -13,6 +14,7 @@
 #include <array>
 #include <map>
 #include <memory>
+#include <span>
 #include <type_traits>
 #include <vector>
 
@@ -43,6 +45,8 @@ public:
     // Updates the transforms of moved objects and the deformed meshes. `motion` must stay valid until the next call
     // or until this object is no longer used.
     void move(const arhost_motion &motion);
+    std::vector<arhost::raytracer_common::PlacedObject> placed_objects() const; // valid until the next move()
+    void set_emitters(std::span<const arhost::raytracer_common::Emitter> emitters); // one per object
     std::uint64_t rebuilds() const { return rebuilds_; } // number of full rebuilds of deforming objects' BVHs so far
 
 private:
@@ -81,6 +85,7 @@ private:
     struct Placement {
         Box local;
         std::array<float, 12> world_from_object;
+        bool is_visible = true;
     };
     void place_object(std::uint32_t object, const float *world_from_object);
     void update_bounds(std::uint32_t object);

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "embree.hpp"
+#include "raytracer_common/source_record.hpp"
 #include "raytracer_common/samples.hpp"
 
 #include <arhost/scene.h>
@@ -38,6 +39,9 @@ struct Object {
     const float *positions; // vertex positions
     const float *normals;   // NULL if flat-shaded or a sphere
     const float *texcoords; // NULL if absent
+    // Light samples of the path integrator: their expected number per unit of the emissive mesh's area (1/mm²), or on a
+    // ball; 0 if the object is not sampled as a light source. Radius of the ball in world space, mm; 0: a mesh.
+    float emitter_density, ball_radius;
     std::uint32_t position_stride, normal_stride, index_stride, texcoord_stride;
 };
 
@@ -65,6 +69,7 @@ enum SumRow : int {
     // colour channel. Otherwise, the rows are the part that opaque objects hide, the part that translucent objects
     // hide, and 0.
     hidden_row,
+    change_row = hidden_row, // path integrator: three rows, the change of a catcher's light relative to its light
     sum_rows = hidden_row + 3
 };
 
@@ -105,6 +110,29 @@ struct Rays {
     std::int32_t block_size() const { return 16 * dimensions * (has_derivatives ? 3 : 1); }
 };
 
+// The video under the overlay, undistorted coordinates to pixels as in arhost/camera.h.
+struct Video {
+    Texture image; // sRGB codes; `texels` is NULL if there is no video
+    float fx, fy, cx, cy;
+    arhost_distortion distortion;
+    float coefficients[ARHOST_MAX_DISTORTION];
+    float max_radius_squared; // of (x/z, y/z) in the picture; the lens model is not valid beyond
+};
+
+// What the path integrator needs in addition to the scene.
+struct PathScene {
+    const float *sources;    // source_count records (raytracer_common/source_record.hpp)
+    const float *cumulative; // cumulative chances of the sources
+    std::int32_t source_count;
+    const float *lamp_chances; // of each lamp of the scene
+    float environment_chance;
+    Texture irradiance;   // irradiance of the environment, divided by π, of surfaces that face a direction (RGBA32F)
+    const float *spheres; // centre and radius of spheres that contain all virtual objects, mm
+    std::int32_t sphere_count;
+    float max_radiance; // bound of each sample
+    Video video;
+};
+
 struct Camera {
     float eye[3];
     float world_from_camera[9]; // column-major
@@ -121,8 +149,11 @@ struct Frame {
     float *history[sum_rows];
     std::int32_t light_samples; // samples per shaded point of each area light, the environment and the background
     bool single_path;           // glass spawns one random ray instead of two
-    std::uint8_t *rgba;
+    std::uint8_t *rgba;         // NULL if the image is linear (arhost_image)
     std::uint32_t stride;
+    std::uint16_t *linear;
+    std::uint32_t first_random; // offset into the random sequences of the path integrator
+    PathScene path;
 };
 
 struct Rectangle {
@@ -150,7 +181,9 @@ struct RayQueue {
 
 // A thread's working memory for one tile. The arrays have one value per pixel, in the order of Rays::blocks.
 struct Scratch {
-    float *radiance[3];   // linear radiance of the current sample
+    // Linear radiance of the current sample. Path integrator: then, from index tile_pixels on, the change of a
+    // catcher's light.
+    float *radiance[3];
     float *sum[sum_rows]; // sums over all samples
     RayQueue *queues;     // one queue per depth, from 0 to Scene::max_depth
 };
@@ -160,18 +193,21 @@ struct Scratch {
 using RenderTile = Rectangle (*)(const Frame &frame, const Tile &tile, Scratch &scratch);
 
 struct Kernel {
-    RenderTile render_tile;
+    RenderTile render_tile, render_path_tile;
     const char *name;
 };
 
 namespace base {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
+Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 }
 namespace avx2 {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
+Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 }
 namespace avx512 {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
+Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 }
 
 } // namespace rt_embree

@@ -5,6 +5,7 @@
 
 #include <arhost-cpp/plugin.hpp>
 
+#include <limits>
 #include <optional>
 
 namespace rt_embree {
@@ -19,6 +20,10 @@ public:
         settings_.light_samples = static_cast<std::int32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
         settings_.single_path = options.text("glass") == "path";
+        if (const double bound = options.real("max_radiance"); bound > 0)
+            settings_.max_radiance = static_cast<float>(bound);
+        else
+            settings_.max_radiance = std::numeric_limits<float>::infinity();
         settings_.instruction_set = options.text("instruction_set");
         choose_kernel(settings_.instruction_set); // throws now rather than in start() if unsupported
     }
@@ -33,7 +38,9 @@ public:
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
         renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request));
-        const Rectangle drawn = renderer_->render(request.camera, image, request.motion);
+        const bool has_video = request.struct_size >= sizeof request; // an older host's struct lacks the field
+        const Rectangle drawn = renderer_->render(request.camera, image, request.motion,
+                                                  has_video ? request.video : nullptr, request.sequence);
         info.has_region = 1;
         if (drawn.x0 < drawn.x1) {
             info.region_x = static_cast<std::uint32_t>(drawn.x0);
@@ -76,6 +83,10 @@ constexpr arhost_option_descriptor options[] = {
                    "Rays traced at glass; 'tree': both the reflected and the refracted ray; 'path': one of them, "
                    "chosen at random.",
                    0, 0, glass),
+    arhost::option(ARHOST_OPTION_REAL, "max_radiance", "100",
+                   "Path integrator: bound of each sample's radiance, in multiples of white, so that single bright "
+                   "paths make no fireflies; 0: none.",
+                   0, 1e6),
     arhost::option(ARHOST_OPTION_INTEGER, "threads", "0", "Render threads; 0: one per processor.", 0, 256),
     arhost::option(ARHOST_OPTION_BOOL, "robust", "false",
                    "Prevent rays from passing between triangles that share an edge (watertight); about 10 % slower."),
@@ -93,7 +104,8 @@ constexpr arhost_descriptor descriptor = {
     .licence = "Apache-2.0",
     .description = "CPU ray tracer that traces packets of 16 rays with Intel Embree.",
     .capabilities =
-        ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE | ARHOST_CAPABILITY_SCALED_IMAGES,
+        ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE | ARHOST_CAPABILITY_SCALED_IMAGES |
+        ARHOST_CAPABILITY_LINEAR_IMAGES | ARHOST_CAPABILITY_VIDEO,
     .option_count = std::size(options),
     .options = options,
     .needs = nullptr,

@@ -57,10 +57,20 @@ Camera camera_of(const Pose &pose) {
     return camera;
 }
 
+// A pixel of a linear image that virtual objects do not affect.
+constexpr std::uint16_t half_of_one = 0x3c00;
+constexpr std::uint16_t untouched[8] = {0, 0, 0, 0, half_of_one, half_of_one, half_of_one, 0};
+
 void clear(const arhost_image &image, const Rectangle &pixels) {
     for (std::int32_t y = pixels.y0; y < pixels.y1; ++y)
-        std::memset(image.rgba + std::size_t{image.stride} * y + std::size_t{4} * pixels.x0, 0,
-                    std::size_t{4} * (pixels.x1 - pixels.x0));
+        if (image.linear)
+            for (std::int32_t x = pixels.x0; x < pixels.x1; ++x)
+                std::memcpy(reinterpret_cast<std::byte *>(image.linear) + std::size_t{image.stride} * y +
+                                sizeof untouched * x,
+                            untouched, sizeof untouched);
+        else
+            std::memset(image.rgba + std::size_t{image.stride} * y + std::size_t{4} * pixels.x0, 0,
+                        std::size_t{4} * (pixels.x1 - pixels.x0));
 }
 
 Rectangle united(const Rectangle &a, const Rectangle &b) {
@@ -74,14 +84,14 @@ Kernel choose_kernel(const std::string &instruction_set) {
 #if defined(ARHOST_HAS_AVX512)
     if (requested("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
-        return {avx512::render_tile, "avx512"};
+        return {avx512::render_tile, avx512::render_path_tile, "avx512"};
 #endif
 #if defined(__x86_64__)
     if (requested("avx2") && __builtin_cpu_supports("avx2"))
-        return {avx2::render_tile, "avx2"};
+        return {avx2::render_tile, avx2::render_path_tile, "avx2"};
 #endif
     if (requested("base"))
-        return {base::render_tile, "base"};
+        return {base::render_tile, base::render_path_tile, "base"};
     throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                   "option 'instruction_set': this processor or this build of rt_embree does not support '" +
                       instruction_set + "'; use 'auto'");
@@ -92,13 +102,13 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
     // fewer than three packets (trace_queued_rays() in scatter.inl). Whole packets are read even from partly filled
     // queues, so each row needs space for one more packet.
     constexpr std::int32_t packet = 16, first_capacity = 2 * tile_pixels + packet, capacity = 4 * packet;
-    constexpr int pixel_rows = 3 + sum_rows;
+    constexpr int pixel_rows = 2 * 3 + sum_rows;
     storage_.resize(std::size_t{pixel_rows} * tile_pixels +
                     std::size_t{RayQueue::rows} * (first_capacity + std::size_t{max_depth} * capacity));
     float *next = storage_.data();
     const auto take = [&](std::int32_t count) { return std::exchange(next, next + count); };
     for (float *&row : scratch_.radiance)
-        row = take(tile_pixels);
+        row = take(2 * tile_pixels);
     for (float *&row : scratch_.sum)
         row = take(tile_pixels);
     for (std::uint32_t depth = 0; depth <= max_depth; ++depth) {
@@ -111,10 +121,18 @@ ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host)
     : host_(host), full_intrinsics_((arhost::raytracer_common::check_setup(setup), *setup.intrinsics)),
       intrinsics_(full_intrinsics_), kernel_(choose_kernel(settings.instruction_set)), threads_(settings.threads),
-      ray_table_(intrinsics_, settings.samples > 1 || settings.accumulate, threads_),
+      ray_table_(intrinsics_,
+                 settings.samples > 1 || settings.accumulate || setup.scene->integrator == ARHOST_INTEGRATOR_PATH,
+                 threads_),
       samples_per_frame_(settings.samples), samples_(arhost::raytracer_common::sample_positions(settings.samples)),
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
-      single_path_(settings.single_path) {
+      single_path_(settings.single_path), max_radiance_(settings.max_radiance),
+      max_radius_squared_(arhost::raytracer_common::max_radius_squared(full_intrinsics_)) {
+    if (setup.scene->integrator == ARHOST_INTEGRATOR_PATH) {
+        lights_.emplace(*setup.scene);
+        irradiance_ = arhost::raytracer_common::environment_irradiance(*setup.scene);
+        place_lights();
+    }
     for (unsigned i = 0; i < threads_.thread_count(); ++i)
         scratch_.emplace_back(setup.scene->max_depth);
     if (settings.accumulate)
@@ -149,12 +167,58 @@ void Renderer::set_size(const arhost_camera &camera) {
     history_camera_.reset();
 }
 
-Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
+void Renderer::place_lights() {
+    lights_->place(scene_.placed_objects());
+    scene_.set_emitters(lights_->emitters());
+}
+
+PathScene Renderer::path_scene() const {
+    PathScene path{};
+    if (!lights_)
+        return path;
+    path.sources = lights_->records().data();
+    path.cumulative = lights_->cumulative().data();
+    path.source_count = static_cast<std::int32_t>(lights_->cumulative().size());
+    path.lamp_chances = lights_->lamp_chances().data();
+    path.environment_chance = lights_->environment_chance();
+    path.irradiance = {irradiance_.data(),
+                       arhost::raytracer_common::irradiance_width,
+                       arhost::raytracer_common::irradiance_height,
+                       ARHOST_TEXEL_RGBA32F,
+                       ARHOST_WRAP_REPEAT,
+                       ARHOST_WRAP_CLAMP};
+    path.spheres = lights_->spheres().data()->data();
+    path.sphere_count = static_cast<std::int32_t>(lights_->spheres().size());
+    path.max_radiance = max_radiance_;
+    if (!has_video_)
+        return path;
+    const arhost_intrinsics &of = full_intrinsics_;
+    path.video.image = {video_.texels(),      static_cast<std::int32_t>(of.width), static_cast<std::int32_t>(of.height),
+                        ARHOST_TEXEL_SRGB8, ARHOST_WRAP_CLAMP,                   ARHOST_WRAP_CLAMP};
+    path.video.fx = static_cast<float>(of.fx);
+    path.video.fy = static_cast<float>(of.fy);
+    path.video.cx = static_cast<float>(of.cx);
+    path.video.cy = static_cast<float>(of.cy);
+    path.video.distortion = of.distortion;
+    std::copy_n(of.coefficients, of.coefficient_count, path.video.coefficients);
+    path.video.max_radius_squared = max_radius_squared_;
+    return path;
+}
+
+Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion,
+                           const arhost_frame *video, std::uint64_t sequence) {
     set_size(camera);
     arhost::raytracer_common::check_render(camera, image, intrinsics_);
     const Pose pose(camera);
-    if (motion)
+    if (motion) {
         scene_.move(*motion);
+        if (lights_)
+            place_lights();
+    }
+    has_video_ = lights_ && video && video->format->width == full_intrinsics_.width &&
+                 video->format->height == full_intrinsics_.height;
+    if (has_video_)
+        video_.set(*video);
 
     std::vector<Window> windows;
     for (const Box &box : scene_.visible_boxes())
@@ -169,6 +233,12 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
             history_samples_,
             history_samples_ < arhost::raytracer_common::max_accumulated_samples ? samples_per_frame_ : 0);
     }
+    // The random numbers of successive frames continue one sequence.
+    std::uint32_t first_random = history_samples_;
+    if (lights_ && history_.empty()) {
+        first_random = static_cast<std::uint32_t>(sequence) * samples_per_frame_;
+        samples_ = arhost::raytracer_common::sample_positions(first_random % (1u << 16), samples_per_frame_);
+    }
     Frame frame{scene_.view(),
                 ray_table_.rays(),
                 camera_of(pose),
@@ -179,10 +249,14 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                 light_samples_,
                 single_path_,
                 image.rgba,
-                image.stride};
+                image.stride,
+                image.linear,
+                first_random,
+                path_scene()};
     if (!history_.empty())
         for (std::size_t i = 0; i < sum_rows; ++i)
             frame.history[i] = history_.data() + i * tiles.size() * tile_pixels;
+    const RenderTile render_tile = lights_ ? kernel_.render_path_tile : kernel_.render_tile;
     Rectangle drawn{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(), 0, 0};
     std::mutex drawn_mutex;
     std::atomic<std::size_t> finished = 0;
@@ -194,7 +268,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         });
         if (!visible || host_.cancelled())
             return clear(image, tile.pixels);
-        const Rectangle part = kernel_.render_tile(frame, tile, *scratch_[thread]);
+        const Rectangle part = render_tile(frame, tile, *scratch_[thread]);
         slow_image.report(static_cast<double>(++finished) / static_cast<double>(tiles.size()));
         if (part.x0 < part.x1) {
             std::lock_guard lock(drawn_mutex);

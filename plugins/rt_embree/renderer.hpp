@@ -4,6 +4,7 @@
 #pragma once
 
 #include "embree_scene.hpp"
+#include "raytracer_common/video.hpp"
 #include "ray_table.hpp"
 #include "thread_pool.hpp"
 
@@ -22,6 +23,7 @@ struct Settings {
     std::int32_t light_samples = 4; // per shaded point and area light, environment or background
     bool accumulate = false;        // average over frames while the camera and scene are static
     bool single_path = false;       // glass spawns one random ray instead of two
+    float max_radiance = 100;       // path integrator: bound of each sample; infinity: none
     std::string instruction_set = "auto";
 };
 
@@ -41,9 +43,11 @@ class Renderer {
 public:
     Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host);
 
-    // Returns a rectangle that contains all pixels with non-zero alpha; if there are none, it has x1 <= x0. `motion`
-    // is NULL if nothing has moved since the last call.
-    Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr);
+    // Returns a rectangle that contains all pixels that virtual objects affect; if there are none, it has x1 <= x0.
+    // `motion` is NULL if nothing has moved since the last call, `video` if the frame under the overlay is unknown.
+    // `sequence`: number of the frame, for the random numbers of the path integrator.
+    Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr,
+                     const arhost_frame *video = nullptr, std::uint64_t sequence = 0);
     const EmbreeScene &scene() const { return scene_; }
     // Both functions change the images of later calls as if the renderer had been created with the new setting.
     void set_samples(std::uint32_t samples);
@@ -54,6 +58,8 @@ public:
 
 private:
     void set_size(const arhost_camera &camera);
+    void place_lights();
+    PathScene path_scene() const;
 
     arhost::Host host_;
     const arhost_intrinsics full_intrinsics_; // the intrinsics passed to start
@@ -67,6 +73,14 @@ private:
     std::vector<ScratchMemory> scratch_; // one per thread
     std::int32_t light_samples_;
     bool single_path_;
+
+    // The path integrator; empty with another integrator.
+    std::optional<arhost::raytracer_common::LightSources> lights_;
+    std::vector<float> irradiance_; // of the environment
+    float max_radiance_;
+    arhost::raytracer_common::VideoImage video_;
+    bool has_video_ = false; // of the current frame
+    float max_radius_squared_;
 
     // State of the option `accumulate`.
     std::vector<float> history_;                  // sums of the samples so far; empty if the option is off

@@ -9,51 +9,28 @@ namespace rt_embree::ARHOST_ISA {
 namespace {
 
 // Included inside the namespace so that each instruction set has its own copy of the functions.
-#include "scatter.inl"
-
-constexpr int block = 4; // side of a block, px
-
-ARHOST_INLINE void add_to_sum(Scratch &scratch, int row, int first_pixel, Float more) {
-    float *to = scratch.sum[row] + first_pixel;
-    store(to, load(to) + more);
-}
+#include "primary.inl"
 
 // Traces the primary rays of a block and shades their hits. Returns whether any of the pixels can have radiance.
-// Catchers do not hide the virtual objects behind them; occluders hide everything.
-ARHOST_INLINE bool primary(Work &work, int first_pixel, Vec3 direction, Bool active) {
-    const Scene &scene = work.frame.scene;
-    const Vec3 eye = splat(work.frame.camera.eye);
+ARHOST_INLINE bool trace_primary_and_shade(Work &work, int first_pixel, Vec3 direction, Bool active) {
     const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0, Float(0.0f)};
-    RTCRayHit16 rays;
-    set_ray(rays.ray, eye, direction, Float(far_away), Int(virtual_masks | occluder_mask));
-    const Bool hit = trace(scene, scene.root, make_query(Coherence::coherent), rays, active);
-    Bool occluded = bool_of(false);
-    if (scene.has_occluders)
-        for_each_object(scene, rays.hit, hit, [&](const Object &object, Bool here) {
-            if (object.role == ARHOST_ROLE_OCCLUDER)
-                occluded = occluded | here;
-        });
-    const Bool is_virtual = hit & ~occluded, rest = active & ~is_virtual;
-    if (scene.has_catchers && any(rest)) {
-        RTCRayHit16 to_catcher;
-        set_ray(to_catcher.ray, eye, direction, select(hit, load(rays.ray.tfar), Float(far_away)), Int(catcher_mask));
-        const Bool caught = trace(scene, scene.catchers, make_query(Coherence::coherent, true), to_catcher, rest);
-        if (any(caught)) {
-            const CatcherLight light = catcher_light(work.frame, to_catcher, caught, random_of(work, paths));
-            const Vec3 hidden = select(caught, light.hidden, black());
-            add_to_sum(work.scratch, caught_row, first_pixel, select(caught, Float(1.0f), Float(0.0f)));
-            add_to_sum(work.scratch, irradiance_row, first_pixel, select(caught, light.irradiance, Float(0.0f)));
-            add_to_sum(work.scratch, hidden_row, first_pixel, hidden.x);
-            add_to_sum(work.scratch, hidden_row + 1, first_pixel, hidden.y);
-            add_to_sum(work.scratch, hidden_row + 2, first_pixel, hidden.z);
-        }
+    const PrimaryHits hits = trace_primary(work.frame.scene, splat(work.frame.camera.eye), direction, active);
+    if (any(hits.caught)) {
+        const CatcherLight light =
+            catcher_light(work.frame, hits.catcher_rays, hits.caught, random_of(work, paths));
+        const Vec3 hidden = select(hits.caught, light.hidden, black());
+        add_to_sum(work.scratch, caught_row, first_pixel, select(hits.caught, Float(1.0f), Float(0.0f)));
+        add_to_sum(work.scratch, irradiance_row, first_pixel, select(hits.caught, light.irradiance, Float(0.0f)));
+        add_to_sum(work.scratch, hidden_row, first_pixel, hidden.x);
+        add_to_sum(work.scratch, hidden_row + 1, first_pixel, hidden.y);
+        add_to_sum(work.scratch, hidden_row + 2, first_pixel, hidden.z);
     }
-    if (!any(is_virtual))
+    if (!any(hits.is_virtual))
         return false;
     for (float *plane : work.scratch.radiance)
         store(plane + first_pixel, Float(0.0f));
-    add_to_sum(work.scratch, coverage_row, first_pixel, select(is_virtual, Float(1.0f), Float(0.0f)));
-    shade(work, rays, is_virtual, paths);
+    add_to_sum(work.scratch, coverage_row, first_pixel, select(hits.is_virtual, Float(1.0f), Float(0.0f)));
+    shade(work, hits.rays, hits.is_virtual, paths);
     return true;
 }
 
@@ -85,7 +62,7 @@ ARHOST_INLINE Int rgba8(Int r, Int g, Int b, Int a) {
 
 // Adds the radiance of the current sample to the pixels' sums. Radiance is averaged in linear light and encoded only
 // once. sRGB codes are not linear and limited to 1, so averaging them would darken noise and highlights.
-ARHOST_INLINE void accumulate(Scratch &scratch, int first_pixel) {
+ARHOST_INLINE void accumulate_radiance(Scratch &scratch, int first_pixel) {
     for (int i = 0; i < 3; ++i)
         add_to_sum(scratch, light_row + i, first_pixel, bounded_radiance(load(scratch.radiance[i] + first_pixel)));
 }
@@ -188,10 +165,46 @@ template <class Use> ARHOST_INLINE void for_each_block(const Rectangle &all, Use
             use(index, x, y, all.x1 - x < block ? all.x1 - x : block, all.y1 - y < block ? all.y1 - y : block);
 }
 
-} // namespace
+#include "path.inl"
 
-Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
-    const Int column = lane_numbers() & Int(3), row = lane_numbers() >> Int(2);
+struct Whitted {
+    static ARHOST_INLINE bool primary(Work &work, int first_pixel, Vec3 direction, Bool active) {
+        return trace_primary_and_shade(work, first_pixel, direction, active);
+    }
+    static ARHOST_INLINE void trace_packet(Work &work, std::uint32_t depth) { trace_queued_packet(work, depth); }
+    static ARHOST_INLINE void accumulate(const Frame &, Scratch &scratch, int first_pixel) {
+        accumulate_radiance(scratch, first_pixel);
+    }
+    static ARHOST_INLINE bool write(const Frame &frame, const Scratch &scratch, int first_pixel, std::uint32_t count,
+                                    int x, int y, int width, int height) {
+        const Int pixels = mean(frame, scratch, first_pixel, count);
+        write_block(frame, x, y, width, height, pixels);
+        return any((pixels >> Int(24)) != Int(0)); // lanes outside the image have alpha 0
+    }
+};
+
+struct Path {
+    static ARHOST_INLINE bool primary(Work &work, int first_pixel, Vec3 direction, Bool active) {
+        return primary_path(work, first_pixel, direction, active);
+    }
+    static ARHOST_INLINE void trace_packet(Work &work, std::uint32_t depth) { trace_path_packet(work, depth); }
+    static ARHOST_INLINE void accumulate(const Frame &frame, Scratch &scratch, int first_pixel) {
+        accumulate_path(frame, scratch, first_pixel);
+    }
+    static ARHOST_INLINE bool write(const Frame &frame, const Scratch &scratch, int first_pixel, std::uint32_t count,
+                                    int x, int y, int width, int height) {
+        const LinearBlock linear = linear_mean(frame, scratch, first_pixel, count);
+        if (frame.linear)
+            return write_linear(frame, x, y, width, height, linear);
+        const Int pixels = straight_of(frame, linear);
+        write_block(frame, x, y, width, height, pixels);
+        return any((pixels >> Int(24)) != Int(0));
+    }
+};
+
+// Integrator::primary traces the primary rays of a block, and returns whether `accumulate` is to be called for it.
+// Integrator::write writes a block of the image, and returns whether virtual objects affect it.
+template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, const Tile &tile, Scratch &scratch) {
     const Rectangle &all = tile.pixels;
     Rectangle drawn{all.x1, all.y1, all.x0, all.y0};
     const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();
@@ -201,28 +214,25 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
         __builtin_memset(scratch.sum[i], 0, tile_pixels * sizeof(float));
 
     for (std::int32_t i = 0; i < frame.sample_count; ++i) {
-        work.sample = frame.first_sample + static_cast<std::uint32_t>(i);
+        work.sample = frame.first_random + static_cast<std::uint32_t>(i);
         for_each_block(all, [&](int number, int, int, int width, int height) {
-            const int first_pixel = number * lanes;
             const Vec3 direction = direction_in_world(frame, rays + number * frame.rays.block_size(), i);
-            const Bool inside = (column < Int(width)) & (row < Int(height)) &
-                                (direction.x == direction.x); // false if NaN: the pixel has no ray
-            has_light[number] = primary(work, first_pixel, direction, inside);
+            const Bool inside =
+                inside_block(width, height) & (direction.x == direction.x); // false if NaN: the pixel has no ray
+            has_light[number] = Integrator::primary(work, number * lanes, direction, inside);
         });
-        trace_queued_rays(work);
+        trace_queued_rays(work, [](Work &of, std::uint32_t depth) { Integrator::trace_packet(of, depth); });
         for_each_block(all, [&](int number, int, int, int, int) {
             if (has_light[number])
-                accumulate(scratch, number * lanes);
+                Integrator::accumulate(frame, scratch, number * lanes);
         });
     }
+    const std::uint32_t count = frame.first_sample + static_cast<std::uint32_t>(frame.sample_count);
     for_each_block(all, [&](int number, int x, int y, int width, int height) {
         const int first_pixel = number * lanes;
         if (frame.history[0])
             add_history(frame, scratch, tile.first_block * lanes, first_pixel);
-        const Int pixels =
-            mean(frame, scratch, first_pixel, frame.first_sample + static_cast<std::uint32_t>(frame.sample_count));
-        write_block(frame, x, y, width, height, pixels);
-        if (any((pixels >> Int(24)) != Int(0))) { // lanes outside the image have alpha 0
+        if (Integrator::write(frame, scratch, first_pixel, count, x, y, width, height)) {
             drawn.x0 = x < drawn.x0 ? x : drawn.x0;
             drawn.y0 = y < drawn.y0 ? y : drawn.y0;
             drawn.x1 = x + width > drawn.x1 ? x + width : drawn.x1;
@@ -230,6 +240,16 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
         }
     });
     return drawn;
+}
+
+} // namespace
+
+Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
+    return render<Whitted>(frame, tile, scratch);
+}
+
+Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch) {
+    return render<Path>(frame, tile, scratch);
 }
 
 } // namespace rt_embree::ARHOST_ISA

@@ -35,11 +35,18 @@ ARHOST_INLINE LightSample make_light_sample(const Surface &s, Vec3 to_light, flo
 }
 
 ARHOST_INLINE bool is_area_light(const arhost_light &light) {
-    return light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE;
+    return light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE ||
+           (light.type == ARHOST_LIGHT_SPOT && light.radius > 0);
 }
 
 ARHOST_INLINE Float falloff_of(const arhost_light &light, Vec3 to_light) {
     return point_light_falloff(bool_of(light.falloff == ARHOST_FALLOFF_INVERSE_SQUARE), dot(to_light, to_light));
+}
+
+// `to_light`: unit vector.
+ARHOST_INLINE Float spot_share(const arhost_light &light, Vec3 to_light) {
+    return spot_attenuation(dot(splat(light.direction), -to_light), Float(light.cosine_inner),
+                            Float(light.cosine_outer));
 }
 
 // The irradiance of a LightSample, and the density per steradian of one sample.
@@ -51,7 +58,7 @@ ARHOST_INLINE Arriving arriving_from_point(const arhost_light &light, Vec3 to_ce
     const auto squared = [](const float *a) { return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]; };
     const Vec3 direction = normalize(to_point);
     const Float distance_squared = dot(to_point, to_point), falloff = falloff_of(light, to_point);
-    if (light.type == ARHOST_LIGHT_SPHERE) {
+    if (light.type != ARHOST_LIGHT_RECTANGLE) {
         const float area = 3.14159265f * light.radius * light.radius;
         return {falloff, density_over_area(distance_squared, Float(area), dot(normalize(to_centre), direction))};
     }
@@ -65,23 +72,22 @@ ARHOST_INLINE LightSample sample_light(const arhost_light &light, const Surface 
     if (light.type == ARHOST_LIGHT_DIRECTIONAL)
         return make_light_sample(s, -splat(light.direction), far_away, splat(light.intensity));
     const Vec3 to_centre = splat(light.position) - s.position;
+    LightSample sample;
     if (is_area_light(light)) {
         const Vec3 to_point =
-            light.type == ARHOST_LIGHT_SPHERE
-                ? vector_to_disc(to_centre, Float(light.radius), uv.u, uv.v)
-                : vector_to_rectangle(to_centre, splat(light.axis_u), splat(light.axis_v), uv.u, uv.v);
+            light.type == ARHOST_LIGHT_RECTANGLE
+                ? vector_to_rectangle(to_centre, splat(light.axis_u), splat(light.axis_v), uv.u, uv.v)
+                : vector_to_disc(to_centre, Float(light.radius), uv.u, uv.v);
         const Arriving arriving = arriving_from_point(light, to_centre, to_point);
-        LightSample sample = make_light_sample(s, to_point, 1, splat(light.intensity));
+        sample = make_light_sample(s, to_point, 1, splat(light.intensity));
         sample.irradiance = arriving.irradiance;
         sample.sampling_density = arriving.density * Float(static_cast<float>(count));
-        return sample;
+    } else {
+        sample = make_light_sample(s, to_centre, 1, splat(light.intensity));
+        sample.irradiance = falloff_of(light, to_centre);
     }
-    LightSample sample = make_light_sample(s, to_centre, 1, splat(light.intensity));
-    sample.irradiance = falloff_of(light, to_centre);
     if (light.type == ARHOST_LIGHT_SPOT)
-        sample.irradiance =
-            sample.irradiance * spot_attenuation(dot(splat(light.direction), -sample.direction),
-                                                 Float(light.cosine_inner), Float(light.cosine_outer));
+        sample.irradiance = sample.irradiance * spot_share(light, sample.direction);
     return sample;
 }
 
@@ -89,23 +95,27 @@ ARHOST_INLINE LightSample sample_light(const arhost_light &light, const Surface 
 // do not hide each other or anything else. `inverse_density`: see RayQueue. After a reflection off a rough surface,
 // mirrors and glass on the path are ignored in the weight, as if the lamp were seen directly. Otherwise, the few
 // random rays that find a small lamp along such a path would cause bright spots.
+// `samples_of(i)`: the expected number of light samples of lamp i.
+template <class SamplesOf>
 ARHOST_INLINE Vec3 arriving_from_area_lights(const Frame &frame, Vec3 origin, Vec3 direction, Float t_far,
-                                             Float inverse_density) {
+                                             Float inverse_density, SamplesOf samples_of) {
     Vec3 sum = black();
     for (std::uint32_t i = 0; i < frame.scene.light_count; ++i) {
         const arhost_light &light = frame.scene.lights[i];
         if (!is_area_light(light))
             continue;
         const Vec3 to_centre = splat(light.position) - origin;
-        const Float t = light.type == ARHOST_LIGHT_SPHERE
-                            ? distance_to_disc(to_centre, Float(light.radius), direction)
-                            : distance_to_rectangle(to_centre, splat(light.direction), splat(light.axis_u),
-                                                    splat(light.axis_v), direction);
+        const Float t = light.type == ARHOST_LIGHT_RECTANGLE
+                            ? distance_to_rectangle(to_centre, splat(light.direction), splat(light.axis_u),
+                                                    splat(light.axis_v), direction)
+                            : distance_to_disc(to_centre, Float(light.radius), direction);
         const Bool arrives = (t > Float(0.0f)) & (t < t_far);
         if (!any(arrives))
             continue;
-        const Arriving arriving = arriving_from_point(light, to_centre, direction * t);
-        const Float sampled = arriving.density * Float(static_cast<float>(frame.light_samples));
+        Arriving arriving = arriving_from_point(light, to_centre, direction * t);
+        if (light.type == ARHOST_LIGHT_SPOT)
+            arriving.irradiance = arriving.irradiance * spot_share(light, direction);
+        const Float sampled = arriving.density * Float(samples_of(i));
         const Float radiance = arriving.irradiance * arriving.density * Float(3.14159265f) *
                                balance_weight_of_ray(sampled, abs(inverse_density));
         sum = sum + splat(light.intensity) * select(arrives, radiance, Float(0.0f));
@@ -121,32 +131,33 @@ struct Visibility {
 };
 
 // Returns the transmittance of the glass between `origin` and a light source. `to_light`: vector from `origin` to the
-// sampled point. Sets `is_tinted` for lanes with glass in between.
-ARHOST_INLINE Vec3 glass_tint(const Scene &scene, Vec3 origin, Vec3 to_light, const LightSample &sample, Bool active,
-                              Bool &is_tinted) {
+// sampled point; `direction`: unit vector along it; `t_far`: as in LightSample. Sets `is_tinted` for lanes with glass
+// in between.
+// `transmittance_of(material, cosine)`: of a surface of glass.
+template <class TransmittanceOf>
+ARHOST_INLINE Vec3 glass_tint(const Scene &scene, Vec3 origin, Vec3 to_light, Vec3 direction, Float t_far, Bool active,
+                              Bool &is_tinted, TransmittanceOf transmittance_of) {
     constexpr int max_surfaces =
         64; // ignores further surfaces: rays may alternate endlessly between coincident faces
     Vec3 tint = white(), start = origin, remaining = to_light;
     for (int i = 0; i < max_surfaces && any(active); ++i) {
         RTCRayHit16 rays;
-        set_ray(rays.ray, start, remaining, Float(sample.t_far), Int(glass_mask));
+        set_ray(rays.ray, start, remaining, t_far, Int(glass_mask));
         active = trace(scene, scene.root, make_query(Coherence::incoherent), rays, active);
         if (!any(active))
             break;
         is_tinted = is_tinted | active;
         const Surface s = surface_at(scene, rays, active);
-        const Float cosine = abs(dot(s.normal, sample.direction));
+        const Float cosine = abs(dot(s.normal, direction));
         const Float inside = select(s.back_face, s.distance, Float(0.0f)); // mm
         for_each_object(scene, rays.hit, active, [&](const Object &object, Bool here) {
             const arhost_material &glass = *object.material;
             tint = select(here,
-                          tint * glass_shadow(splat(glass.shadow_attenuation), cosine) *
-                              bouguer(splat(glass.extinction), inside),
+                          tint * transmittance_of(glass, cosine) * bouguer(splat(glass.extinction), inside),
                           tint);
         });
         const Vec3 next = s.position - s.geometric_normal * s.offset;
-        if (sample.t_far < far_away)
-            remaining = remaining - (next - start);
+        remaining = remaining - select(t_far < Float(far_away), next - start, black());
         start = next;
         active = active & (largest(tint) > Float(1e-3f));
     }
@@ -165,7 +176,11 @@ ARHOST_INLINE Visibility visibility_of(const Scene &scene, const LightSample &sa
     visibility.is_tinted = bool_of(false);
     visibility.tint = white();
     if (scene.has_glass && any(visibility.unoccluded))
-        visibility.tint = glass_tint(scene, origin, to_light, sample, visibility.unoccluded, visibility.is_tinted);
+        visibility.tint = glass_tint(scene, origin, to_light, sample.direction, Float(sample.t_far),
+                                     visibility.unoccluded, visibility.is_tinted,
+                                     [](const arhost_material &glass, Float cosine) __attribute__((always_inline)) {
+                                         return glass_shadow(splat(glass.shadow_attenuation), cosine);
+                                     });
     return visibility;
 }
 

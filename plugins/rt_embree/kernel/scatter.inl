@@ -208,8 +208,15 @@ ARHOST_INLINE void shade(Work &work, const RTCRayHit16 &rays, Bool active, const
     });
 }
 
-// Removes the newest rays, at most 16, from the queue of `depth`, traces them and shades their hits.
-ARHOST_INLINE void trace_queued_packet(Work &work, std::uint32_t depth) {
+// Rays removed from a queue.
+struct QueuedRays {
+    Paths paths;
+    Vec3 origin, direction;
+    Bool active;
+};
+
+// Removes the newest rays, at most 16, from the queue of `depth`.
+ARHOST_INLINE QueuedRays take_packet(Work &work, std::uint32_t depth) {
     RayQueue &queue = work.scratch.queues[depth];
     const std::int32_t first = queue.count > lanes ? queue.count - lanes : 0;
     const Bool active = lane_numbers() < Int(queue.count - first);
@@ -217,20 +224,30 @@ ARHOST_INLINE void trace_queued_packet(Work &work, std::uint32_t depth) {
         return load(queue.values + i * queue.capacity + first);
     };
     const Float inverse_density = select(active, row(9), Float(0.0f));
-    const Paths paths{
-        select(active, bits_of(row(10)), Int(0)), 0, {row(6), row(7), row(8)}, depth + 1, inverse_density};
-    const Vec3 origin{row(0), row(1), row(2)}, direction{row(3), row(4), row(5)};
-    RTCRayHit16 rays;
-    set_ray(rays.ray, origin, direction, Float(far_away), Int(all_masks));
     queue.count = first;
-    const Bool hit = trace(work.frame.scene, work.frame.scene.root, make_query(Coherence::incoherent), rays, active);
-    const Bool missed = active & ~hit;
+    return {{select(active, bits_of(row(10)), Int(0)), 0, {row(6), row(7), row(8)}, depth + 1, inverse_density},
+            {row(0), row(1), row(2)},
+            {row(3), row(4), row(5)},
+            active};
+}
+
+// Traces rays of the queue of `depth` and shades their hits.
+ARHOST_INLINE void trace_queued_packet(Work &work, std::uint32_t depth) {
+    const QueuedRays next = take_packet(work, depth);
+    const Paths &paths = next.paths;
+    RTCRayHit16 rays;
+    set_ray(rays.ray, next.origin, next.direction, Float(far_away), Int(all_masks));
+    const Bool hit =
+        trace(work.frame.scene, work.frame.scene.root, make_query(Coherence::incoherent), rays, next.active);
+    const Bool missed = next.active & ~hit;
     if (any(missed))
-        add_radiance(work, paths, arriving_from_environment(work.frame, direction, inverse_density), missed);
+        add_radiance(work, paths, arriving_from_environment(work.frame, next.direction, paths.inverse_density),
+                     missed);
     if (work.frame.scene.has_area_lights) {
-        const Vec3 light =
-            arriving_from_area_lights(work.frame, origin, direction, load(rays.ray.tfar), inverse_density);
-        const Bool lit = active & (largest(light) > Float(0.0f));
+        const Vec3 light = arriving_from_area_lights(
+            work.frame, next.origin, next.direction, load(rays.ray.tfar), paths.inverse_density,
+            [&](std::uint32_t) { return static_cast<float>(work.frame.light_samples); });
+        const Bool lit = next.active & (largest(light) > Float(0.0f));
         if (any(lit))
             add_radiance(work, paths, light, lit);
     }
@@ -241,7 +258,7 @@ ARHOST_INLINE void trace_queued_packet(Work &work, std::uint32_t depth) {
 // Traces packets until all queues are empty. Picks the deepest queue that holds a full packet. This keeps every queue
 // except the first below three packets. If no queue holds a full packet, picks the shallowest non-empty queue,
 // because its secondary rays may fill the deeper queues.
-ARHOST_INLINE void trace_queued_rays(Work &work) {
+template <class TracePacket> ARHOST_INLINE void trace_queued_rays(Work &work, TracePacket trace_packet) {
     RayQueue *queues = work.scratch.queues;
     for (;;) {
         std::uint32_t chosen = work.deepest + 1;
@@ -255,6 +272,6 @@ ARHOST_INLINE void trace_queued_rays(Work &work) {
         }
         if (chosen > work.deepest)
             return;
-        trace_queued_packet(work, chosen);
+        trace_packet(work, chosen);
     }
 }

@@ -65,6 +65,17 @@ ARHOST_LEAF Float glass_reflected_fraction(Bool from_inside, Float cosine, Float
                   glass_reflectance(select(from_inside, refracted, cosine), exponent, minimum, maximum));
 }
 
+// Fresnel's reflectance of a dielectric for unpolarized light; 1 for total internal reflection. `cosine`: of the angle of
+// incidence; `refracted_squared`: squared cosine of the angle of refraction; `ratio`: as in refracted_cosine_squared
+// (Fresnel 1823; M. Pharr et al., Physically Based Rendering, 4th edition, section 9.3.5).
+ARHOST_LEAF Float dielectric_reflectance(Float cosine, Float refracted_squared, Float ratio) {
+    Float refracted = sqrt(max(refracted_squared, Float(0.0)));
+    Float parallel = (cosine - ratio * refracted) / max(cosine + ratio * refracted, Float(1e-6));
+    Float perpendicular = (ratio * cosine - refracted) / max(ratio * cosine + refracted, Float(1e-6));
+    Float mean = Float(0.5) * (parallel * parallel + perpendicular * perpendicular);
+    return select(refracted_squared < Float(0.0), Float(1.0), mean);
+}
+
 // Bouguer–Lambert–Beer law: transmittance exp(−extinction · distance); `extinction` in 1/mm, `distance` in mm
 // (Bouguer, Essai d'optique sur la gradation de la lumière, 1729; Lambert 1760, Beer 1852).
 ARHOST_LEAF Vec3 bouguer(Vec3 extinction, Float distance) {

@@ -26,6 +26,23 @@ ARHOST_LEAF Vec3 hemisphere_direction(Vec3 normal, Float u, Float v) {
            normal * cosine;
 }
 
+// Samples a direction of the hemisphere around `normal` with a density proportional to the cosine: cosine / π.
+ARHOST_LEAF Vec3 cosine_direction(Vec3 normal, Float u, Float v) {
+    Float sine = sqrt(u);
+    Float cosine = sqrt(max(Float(1.0) - u, Float(0.0)));
+    return tangent_axis(normal) * (sine * cosine_of_turn(v)) + bitangent_axis(normal) * (sine * sine_of_turn(v)) +
+           normal * cosine;
+}
+
+// Samples a direction of the cone around `axis` uniformly. `slope`: 1 − cosine of the half angle; the density is
+// 1 / (2π · slope).
+ARHOST_LEAF Vec3 cone_direction(Vec3 axis, Float slope, Float u, Float v) {
+    Float below = u * slope;
+    Float sine = sqrt(max(below * (Float(2.0) - below), Float(0.0)));
+    return tangent_axis(axis) * (sine * cosine_of_turn(v)) + bitangent_axis(axis) * (sine * sine_of_turn(v)) +
+           axis * (Float(1.0) - below);
+}
+
 // Samples the normal of a GGX microfacet that is visible from `to_eye`, in coordinates with the surface normal along
 // z (Dupuy and Benyoub, Sampling Visible GGX Normals with Spherical Caps, CGF 42(8), 2023, listing 1).
 ARHOST_LEAF Vec3 ggx_visible_normal(Vec3 to_eye, Float alpha, Float u, Float v) {

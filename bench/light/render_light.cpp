@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Renders a scene with rt_embree's path integrator for `tools/bench light`:
+//   render-light SCENE OUT WIDTH HEIGHT FOCAL_PX EYE_X EYE_Y EYE_Z AT_X AT_Y AT_Z UP_X UP_Y UP_Z SAMPLES FRAMES [KEY=VALUE...]
+// renders FRAMES images of SAMPLES samples with successive frame numbers, writes their mean to OUT as six floats per
+// pixel (added light and transmittance), and prints the CPU time of all images as JSON. Keys: light_samples,
+// max_radiance (0: no bound), threads.
+#include "bunny.hpp"
+#include "renderer.hpp"
+#include "scene/scene_loader.hpp"
+
+#include <bit>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <exception>
+#include <fstream>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace {
+
+float float_of_half(std::uint16_t half) {
+    const int exponent = half >> 10 & 31, mantissa = half & 1023;
+    return exponent == 0 ? std::ldexp(static_cast<float>(mantissa), -24)
+                         : std::ldexp(static_cast<float>(mantissa + 1024), exponent - 25);
+}
+
+void run(int argc, char **argv) {
+    if (argc < 17)
+        throw std::runtime_error("usage: render-light SCENE OUT WIDTH HEIGHT FOCAL EYE AT UP SAMPLES FRAMES [KEY=VALUE...]");
+    const auto number = [&](int i) { return std::strtod(argv[i], nullptr); };
+    const auto width = static_cast<std::uint32_t>(number(3)), height = static_cast<std::uint32_t>(number(4));
+    const arhost_intrinsics intrinsics{sizeof(arhost_intrinsics),
+                                       width,
+                                       height,
+                                       ARHOST_DISTORTION_NONE,
+                                       number(5),
+                                       number(5),
+                                       (width - 1) / 2.0,
+                                       (height - 1) / 2.0,
+                                       0,
+                                       0,
+                                       {}};
+    const arhost_camera camera{sizeof(arhost_camera),
+                               0,
+                               {number(6), number(7), number(8)},
+                               {number(9), number(10), number(11)},
+                               {number(12), number(13), number(14)},
+                               intrinsics};
+    rt_embree::Settings settings;
+    settings.samples = static_cast<std::uint32_t>(number(15));
+    const auto frames = static_cast<int>(number(16));
+    for (int i = 17; i < argc; ++i) {
+        const std::string argument = argv[i];
+        const std::size_t equals = argument.find('=');
+        const std::string key = argument.substr(0, equals);
+        const double value = std::strtod(argument.c_str() + equals + 1, nullptr);
+        if (key == "light_samples")
+            settings.light_samples = static_cast<std::int32_t>(value);
+        else if (key == "max_radiance")
+            settings.max_radiance = value > 0 ? static_cast<float>(value) : std::numeric_limits<float>::infinity();
+        else if (key == "threads")
+            settings.threads = static_cast<unsigned>(value);
+        else
+            throw std::runtime_error("unknown key " + key);
+    }
+    const arhost::scene::Arena arena = arhost::scene::load_scene(argv[1]).build();
+    const arhost_host host = arhost::bench::printing_host("render-light");
+    arhost_raytracer_setup setup{};
+    setup.struct_size = sizeof setup;
+    setup.width = width;
+    setup.height = height;
+    setup.form = ARHOST_IMAGE_FORM_LINEAR;
+    setup.scene = &arena.scene();
+    setup.intrinsics = &intrinsics;
+    setup.compositing = ARHOST_COMPOSITING_LINEAR;
+    rt_embree::Renderer renderer(setup, settings, arhost::Host(&host));
+    std::vector<std::uint16_t> pixels(std::size_t{8} * width * height);
+    const arhost_image image{sizeof(arhost_image), 16 * width, width, height, nullptr, pixels.data()};
+    std::vector<double> sums(std::size_t{6} * width * height);
+    const std::clock_t start = std::clock();
+    for (int frame = 0; frame < frames; ++frame) {
+        renderer.render(camera, image, nullptr, nullptr, static_cast<std::uint64_t>(frame));
+        for (std::size_t i = 0; i < std::size_t{width} * height; ++i)
+            for (std::size_t c = 0; c < 6; ++c)
+                sums[6 * i + c] += float_of_half(pixels[8 * i + c + (c >= 3)]);
+    }
+    const double seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+    std::vector<float> means(sums.size());
+    for (std::size_t i = 0; i < sums.size(); ++i)
+        means[i] = static_cast<float>(sums[i] / frames);
+    std::ofstream out(argv[2], std::ios::binary);
+    out.write(reinterpret_cast<const char *>(means.data()), static_cast<std::streamsize>(means.size() * sizeof(float)));
+    if (!out.flush())
+        throw std::runtime_error(std::string("cannot write ") + argv[2]);
+    std::printf(R"({"cpu_s": %.6f, "kernel": "%s"})"
+                "\n",
+                seconds, renderer.kernel_name());
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+    try {
+        run(argc, argv);
+    } catch (const std::exception &error) {
+        std::fprintf(stderr, "render-light: %s\n", error.what());
+        return 1;
+    }
+}

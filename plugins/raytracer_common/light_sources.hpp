@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Light sources that path tracing samples: lamps, emissive surfaces and the environment.
+#pragma once
+
+#include "raytracer_common/source_record.hpp"
+
+#include <arhost/motion.h>
+#include <arhost/scene.h>
+#include <arhost/shading/scalar.hpp>
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace arhost::raytracer_common {
+
+// Where an object is, and the shape of a deforming one.
+struct PlacedObject {
+    const float *world_from_object; // column-major 3×4
+    const float *positions;         // three floats per vertex, tightly packed; NULL: those of the arena
+    bool is_visible;
+};
+
+// What a light sample has to know about an emissive object that scattered rays hit.
+struct Emitter {
+    float density = 0;     // chance of a light sample per mm² of the mesh, or that of the ball; 0: it is not sampled
+    float ball_radius = 0; // world space, mm; 0: a mesh
+};
+
+class LightSources {
+public:
+    explicit LightSources(const arhost_scene &arena);
+
+    // Finds the emissive surfaces of objects that have moved. One element per object of the scene.
+    void place(std::span<const PlacedObject> objects);
+
+    std::span<const float> records() const { return records_; } // source_rows floats each
+    std::span<const float> cumulative() const { return cumulative_; }
+    std::span<const float> lamp_chances() const { return lamp_chances_; }
+    float environment_chance() const { return environment_chance_; }
+    std::span<const Emitter> emitters() const { return emitters_; } // one per object
+    // Spheres that contain the visible virtual objects, at most max_spheres.
+    static constexpr std::size_t max_spheres = 16;
+    std::span<const std::array<float, 4>> spheres() const { return spheres_; } // centre and radius, mm
+
+private:
+    void bound(std::span<const PlacedObject> objects);
+    float *add_record(float type);
+    void add_emitter(std::uint32_t object, const PlacedObject &placed);
+    void choose(const std::vector<std::uint32_t> &object_of, shading::Vec3 middle, double extent);
+    std::size_t lamp_count() const { return arena_.lights.count; }
+
+    const arhost_scene &arena_;
+    float environment_radiance_ = 0; // mean over all directions
+    std::vector<float> records_, cumulative_, lamp_chances_;
+    std::vector<Emitter> emitters_;
+    float environment_chance_ = 0;
+    std::vector<std::array<float, 4>> spheres_;
+};
+
+// The irradiance of the scene's environment, divided by π, of surfaces that face each direction: RGBA floats in
+// equirectangular projection, in the axes of the environment. Empty without an environment.
+inline constexpr std::uint32_t irradiance_width = 64, irradiance_height = 32;
+std::vector<float> environment_irradiance(const arhost_scene &arena);
+
+} // namespace arhost::raytracer_common

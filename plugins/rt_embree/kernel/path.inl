@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The path integrator: next-event estimation, scattered rays, and multiple importance sampling of both (Veach, Robust
+// Monte Carlo Methods for Light Transport Simulation, 1997). A path that starts at a virtual object collects radiance;
+// one that starts at a catcher collects the change of its light, relative to the light without virtual objects
+// (Debevec, Rendering Synthetic Objects into Real Scenes, SIGGRAPH 1998; residual path integrals, arXiv 2406.16302).
+#pragma once
+#include "path_catcher.inl"
+
+// Paths of fewer bounces are not ended at random.
+constexpr std::uint32_t first_roulette_depth = 2;
+
+// Ends paths at random, so that those that go on have about the same throughput.
+ARHOST_INLINE Bool survive(const Work &work, const Paths &paths, Vec3 &throughput, Bool active) {
+    active = active & (largest(throughput) > Float(min_throughput));
+    if (paths.depth < first_roulette_depth || !any(active))
+        return active;
+    const Float chance = min(max(largest(throughput), Float(0.05f)), Float(1.0f));
+    throughput = throughput * (Float(1.0f) / chance);
+    return active & (path_pair(work, paths, roulette_dimension, 0, 1).u < chance);
+}
+
+// A mirror's reflection is not random, and no light sample follows it: its rays see lamps with full weight.
+ARHOST_INLINE void reflect_path(Work &work, const Paths &paths, const Surface &s, Vec3 direction, Vec3 throughput,
+                                Bool active) {
+    active = survive(work, paths, throughput, active);
+    if (any(active))
+        enqueue(work, paths, s.position + s.geometric_normal * s.offset, reflected(s, direction), throughput, active,
+                Float(0.0f));
+}
+
+// Queues a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly.
+ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &paths, const Surface &s, Vec3 direction,
+                                         const arhost_material &glass, Float choice, Bool active) {
+    const Vec3 transmittance = select(s.back_face, bouguer(splat(glass.extinction), s.distance), white());
+    const Float ratio = select(s.back_face, Float(glass.index), Float(1 / glass.index));
+    Refraction refraction = refraction_at(direction, s.normal, ratio);
+    const Bool wrong_side =
+        (dot(refraction.direction, s.geometric_normal) > Float(0.0f)) & (refraction.cosine_squared > Float(0.0f));
+    if (any(active & wrong_side))
+        refraction = refraction_at(direction, select(wrong_side, s.geometric_normal, s.normal), ratio);
+    const Float reflectance = dielectric_reflectance(refraction.cosine, refraction.cosine_squared, ratio);
+    const bool splits = paths.depth == 0;
+    const Bool chosen = choice < reflectance;
+    const Vec3 arriving = paths.throughput * transmittance;
+    Vec3 by_reflection = arriving * splat(glass.reflectivity), by_refraction = arriving * splat(glass.refraction);
+    Bool reflects = active & chosen, refracts = active & ~chosen;
+    if (splits) {
+        by_reflection = by_reflection * reflectance;
+        by_refraction = by_refraction * (Float(1.0f) - reflectance);
+        reflects = active;
+        refracts = active & (refraction.cosine_squared >= Float(0.0f));
+    }
+    reflects = survive(work, paths, by_reflection, reflects);
+    if (any(reflects))
+        enqueue(work, paths, s.position + s.geometric_normal * s.offset, reflected(s, direction), by_reflection,
+                reflects);
+    refracts = survive(work, paths, by_refraction, refracts);
+    if (any(refracts))
+        enqueue(work, paths, s.position - s.geometric_normal * s.offset, refraction.direction, by_refraction, refracts);
+}
+
+// Queues one ray for each lane, scattered by the surface.
+ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit16 &rays, const Surface &s,
+                                Vec3 direction, Bool active) {
+    const Vec3 to_eye = -direction;
+    const Pair choice = path_pair(work, paths, choice_dimension, 0, 1);
+    Float mirror_chance(0.0f);
+    Vec3 mirror_reflectance = black();
+    Bool opaque = active;
+    for_each_object(work.frame.scene, rays.hit, active, [&](const Object &object, Bool here) {
+        const arhost_material &material = *object.material;
+        if (material.model == ARHOST_MATERIAL_GLASS) {
+            scatter_path_in_glass(work, paths, s, direction, material, choice.v, here);
+            opaque = opaque & ~here;
+        } else if (material.model == ARHOST_MATERIAL_MIRROR) {
+            mirror_reflectance = select(here, splat(material.reflectivity), mirror_reflectance);
+            mirror_chance = select(here, Float(1.0f), mirror_chance);
+        } else if (material.model == ARHOST_MATERIAL_METAL) {
+            const Vec3 reflectance = schlick(splat(material.reflectivity), -dot(direction, s.normal));
+            const Float mirror = luminance(reflectance);
+            mirror_reflectance = select(here, reflectance, mirror_reflectance);
+            mirror_chance = select(here, mirror / max(mirror + luminance(s.diffuse), Float(1e-6f)), mirror_chance);
+        }
+    });
+    if (!any(opaque))
+        return;
+    const Bool mirrors = opaque & (choice.v < mirror_chance);
+    if (any(mirrors))
+        reflect_path(work, paths, s, direction,
+                     paths.throughput * mirror_reflectance * (Float(1.0f) / max(mirror_chance, Float(1e-6f))), mirrors);
+    Bool scatters = opaque & ~mirrors & s.is_lit;
+    if (!any(scatters))
+        return;
+    const Float chance = specular_chance(s, to_eye);
+    const Bool specular = choice.u < chance;
+    const Pair uv = path_pair(work, paths, scatter_dimension, 0, 1);
+    Vec3 out = cosine_direction(s.normal, uv.u, uv.v);
+    if (s.any_rough && any(specular & scatters))
+        out = select(specular, mirror_direction(direction, ggx_half_vector(s.normal, to_eye, s.alpha, uv.u, uv.v)), out);
+    const Float cosine = dot(out, s.normal);
+    const Float density = scattering_density(s, to_eye, out, chance);
+    Vec3 throughput = paths.throughput * scattering(s, to_eye, out, false) *
+                      (Float(0.318309886f) / max(density * (Float(1.0f) - mirror_chance), Float(1e-20f)));
+    scatters = scatters & (cosine > Float(0.0f)) & (dot(out, s.geometric_normal) > Float(0.0f)) &
+               (density > Float(0.0f));
+    scatters = survive(work, paths, throughput, scatters);
+    if (any(scatters))
+        enqueue(work, paths, s.position + s.geometric_normal * s.offset, out, throughput, scatters,
+                Float(1.0f) / max(density, Float(1e-30f)));
+}
+
+// Adds the light that the hit surfaces send towards the rays' origins, and queues the rays that they scatter.
+ARHOST_INLINE void shade_path(Work &work, const RTCRayHit16 &rays, Bool active, const Paths &paths) {
+    const Scene &scene = work.frame.scene;
+    const Surface s = surface_at(scene, rays, active);
+    const Vec3 direction = normalize(direction_of(rays.ray));
+    if (paths.depth > 0 && any(active & s.is_real)) {
+        if (paths.depth == 1) // the light of a catcher changes only where it sees a virtual object
+            active = active & ~(s.is_real & changes_catcher(paths));
+        active = active & ~add_filmed(work, s, paths, active & s.is_real);
+        if (!any(active))
+            return;
+    }
+    const Bool emits = active & (largest(s.emission) > Float(0.0f));
+    if (any(emits)) {
+        const Float inverse_density = abs(paths.inverse_density);
+        Vec3 emission = s.emission;
+        if (paths.depth > 0)
+            emission = emission * balance_weight_of_ray(density_of_emitter(work, paths, rays, s, direction, emits),
+                                                        inverse_density);
+        add_radiance(work, paths, emission, emits);
+    }
+    const bool scatters = paths.depth < scene.max_depth;
+    const Bool lit = active & s.is_lit;
+    if (any(lit))
+        add_radiance(work, paths, sampled_light(work, paths, s, -direction, scatters, lit), lit);
+    if (scatters)
+        scatter_path(work, paths, rays, s, direction, active);
+}
+
+// Removes the newest rays, at most 16, from the queue of `depth`, traces them and shades their hits.
+ARHOST_INLINE void trace_path_packet(Work &work, std::uint32_t depth) {
+    const Scene &scene = work.frame.scene;
+    const QueuedRays next = take_packet(work, depth);
+    RTCRayHit16 rays;
+    set_ray(rays.ray, next.origin, next.direction, Float(far_away), Int(all_masks));
+    const Bool hit = trace(scene, scene.root, make_query(Coherence::incoherent), rays, next.active);
+    const Bool of_catcher = depth == 0 ? changes_catcher(next.paths) : bool_of(false);
+    const Bool missed = next.active & ~hit & ~of_catcher;
+    if (any(missed))
+        add_radiance(work, next.paths, environment_towards(work, next.paths, next.direction, missed),
+                     missed);
+    if (scene.has_area_lights) {
+        const Vec3 light = lamps_towards(work, next.paths, next.origin, next.direction, load(rays.ray.tfar));
+        const Bool lit = next.active & ~of_catcher & (largest(light) > Float(0.0f));
+        if (any(lit))
+            add_radiance(work, next.paths, light, lit);
+    }
+    if (any(hit))
+        shade_path(work, rays, hit, next.paths);
+}
+
+// Traces the primary rays of a block and shades their hits. Returns whether any pixel can be affected.
+ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, Bool active) {
+    const Scene &scene = work.frame.scene;
+    const Vec3 eye = splat(work.frame.camera.eye);
+    for (float *plane : work.scratch.radiance) {
+        store(plane + first_pixel, Float(0.0f));
+        store(plane + tile_pixels + first_pixel, Float(0.0f));
+    }
+    const PrimaryHits hits = trace_primary(scene, eye, direction, active);
+    const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0, Float(0.0f)};
+    if (any(hits.caught)) {
+        Paths of_catcher = paths;
+        of_catcher.pixel = paths.pixel + Int(tile_pixels);
+        of_catcher.first_pixel = first_pixel + tile_pixels;
+        change_catcher(work, of_catcher, hits.catcher_rays, hits.caught);
+    }
+    if (!any(hits.is_virtual))
+        return any(hits.caught);
+    add_to_sum(work.scratch, coverage_row, first_pixel, select(hits.is_virtual, Float(1.0f), Float(0.0f)));
+    shade_path(work, hits.rays, hits.is_virtual, paths);
+    return true;
+}
+
+// Adds the radiance of the current sample and the change of the catchers to the pixels' sums. The bound keeps a single
+// random ray that hits a tiny, very bright light from dominating the pixel.
+ARHOST_INLINE void accumulate_path(const Frame &frame, Scratch &scratch, int first_pixel) {
+    const Float bound(frame.path.max_radiance);
+    for (int i = 0; i < 3; ++i) {
+        const float *radiance = scratch.radiance[i] + first_pixel;
+        add_to_sum(scratch, light_row + i, first_pixel, min(max(load(radiance), Float(0.0f)), bound));
+        if (frame.scene.has_catchers)
+            add_to_sum(scratch, change_row + i, first_pixel, min(max(load(radiance + tile_pixels), -bound), bound));
+    }
+}
+
+// Returns the bits of a half-precision float, rounded to nearest, ties to even. `a`: 0 to 65504.
+ARHOST_INLINE Int half_of(Float a) {
+    const Int bits = bits_of(a), odd = shift_right_unsigned(bits, 13) & Int(1);
+    const Int normal = shift_right_unsigned(bits + Int(0xfff) + odd, 13) - Int(112 << 10);
+    // Adding ½ shifts the bits of a subnormal half to the end of the mantissa.
+    const Int subnormal = bits_of(a + Float(0.5f)) - Int(126 << 23);
+    return select(a < Float(0x1p-14f), subnormal, normal);
+}
+
+// The overlay of a block: added light and transmittance.
+struct LinearBlock {
+    Vec3 added, transmittance;
+};
+
+ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch, int first_pixel,
+                                      std::uint32_t count) {
+    const Float share(1.0f / static_cast<float>(count));
+    const auto mean = [&](int row) __attribute__((always_inline)) {
+        return load(scratch.sum[row] + first_pixel) * share;
+    };
+    const Float uncovered = Float(1.0f) - mean(coverage_row);
+    LinearBlock linear{{mean(light_row), mean(light_row + 1), mean(light_row + 2)},
+                       {uncovered, uncovered, uncovered}};
+    if (frame.scene.has_catchers)
+        linear.transmittance = linear.transmittance +
+                               Vec3{mean(change_row), mean(change_row + 1), mean(change_row + 2)};
+    const auto bounded = [](Float a) __attribute__((always_inline)) {
+        return min(max(a, Float(0.0f)), Float(65504.0f));
+    };
+    linear.added = {bounded(linear.added.x), bounded(linear.added.y), bounded(linear.added.z)};
+    linear.transmittance = {bounded(linear.transmittance.x), bounded(linear.transmittance.y),
+                            bounded(linear.transmittance.z)};
+    return linear;
+}
+
+// Writes a block of the image. Returns whether virtual objects affect any of its pixels.
+ARHOST_INLINE bool write_linear(const Frame &frame, int x, int y, int width, int height, const LinearBlock &block_of) {
+    alignas(64) int halves[6][lanes];
+    const Float values[] = {block_of.added.x,         block_of.added.y,         block_of.added.z,
+                            block_of.transmittance.x, block_of.transmittance.y, block_of.transmittance.z};
+    Bool affected = bool_of(false);
+    for (int i = 0; i < 6; ++i) {
+        const Int bits = half_of(values[i]);
+        affected = affected | (bits != Int(i < 3 ? 0 : 0x3c00));
+        store(halves[i], bits);
+    }
+    for (int row = 0; row < height; ++row) {
+        auto *to = reinterpret_cast<std::uint16_t *>(reinterpret_cast<std::uint8_t *>(frame.linear) +
+                                                     std::size_t{frame.stride} * (y + row)) +
+                   std::size_t{8} * x;
+        for (int column = 0; column < width; ++column, to += 8)
+            for (int i = 0; i < 3; ++i) {
+                to[i] = static_cast<std::uint16_t>(halves[i][block * row + column]);
+                to[4 + i] = static_cast<std::uint16_t>(halves[3 + i][block * row + column]);
+                to[3] = to[7] = 0;
+            }
+    }
+    return any(affected & inside_block(width, height));
+}
+
+ARHOST_INLINE Int straight_of(const Frame &frame, const LinearBlock &linear) {
+    const Float alpha = overlay_alpha(linear.transmittance);
+    const Vec3 colour = linear.added * (Float(1.0f) / max(alpha, Float(1e-6f)));
+    const arhost::shading::Srgb8Table &table = *frame.scene.srgb8;
+    return rgba8(srgb8(table, colour.x), srgb8(table, colour.y), srgb8(table, colour.z), to_int(code_8bit(alpha)));
+}

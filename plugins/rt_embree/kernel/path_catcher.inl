@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Real surfaces: how virtual objects change the light of catchers, and what the video shows of them.
+#pragma once
+#include "path_lights.inl"
+
+// Paths that change a catcher have the pixel number of the change, which follows all radiances.
+ARHOST_INLINE Bool changes_catcher(const Paths &paths) {
+    return paths.pixel >= Int(tile_pixels);
+}
+
+// Returns whether a ray can meet a virtual object. `end`: in lengths of `to`.
+ARHOST_INLINE Bool can_meet_virtual(const PathScene &path, Vec3 origin, Vec3 to, Float end) {
+    const Float scale = Float(1.0f) / max(dot(to, to), Float(1e-30f));
+    Bool meets = bool_of(false);
+    for (std::int32_t i = 0; i < path.sphere_count; ++i) {
+        const float *sphere = path.spheres + 4 * i;
+        const Vec3 to_centre = splat(sphere) - origin;
+        const Float nearest = min(max(dot(to_centre, to) * scale, Float(0.0f)), min(end, Float(1e18f)));
+        const Vec3 miss = to_centre - to * nearest;
+        meets = meets | (dot(miss, miss) < Float(sphere[3] * sphere[3]));
+    }
+    return meets;
+}
+
+// The directions in which a catcher may see a virtual object are sampled by the bounding spheres: uniformly in the
+// cone of a sphere, or in the whole hemisphere if the sphere is close.
+struct SphereCone {
+    Vec3 axis;      // unit vector to the centre
+    Float share;    // about the form factor of the sphere, an upper bound
+    Float cosine;   // of the half angle; valid unless `is_wide`
+    Float slope;    // 1 − cosine
+    Bool is_wide;
+};
+ARHOST_INLINE SphereCone cone_of(const float *sphere, const Surface &s) {
+    const Vec3 to_centre = splat(sphere) - s.position;
+    const Float squared = max(dot(to_centre, to_centre), Float(1e-20f));
+    const Float sine_squared = min(Float(sphere[3] * sphere[3]) / squared, Float(1.0f));
+    const Vec3 axis = to_centre * (Float(1.0f) / sqrt(squared));
+    const Float cosine = sqrt(max(Float(1.0f) - sine_squared, Float(0.0f)));
+    const Float height = min(max(dot(axis, s.normal) + sqrt(sine_squared), Float(0.0f)), Float(1.0f));
+    return {axis, sine_squared * height, cosine, sine_squared / (Float(1.0f) + cosine), sine_squared > Float(0.5f)};
+}
+
+struct Bounce {
+    Vec3 direction;
+    Float density; // expected number of rays per steradian; 0: no ray
+};
+
+// Density per steradian of sample_virtual() in a direction, before the roulette.
+ARHOST_INLINE Float virtual_density(const PathScene &path, const Surface &s, Vec3 direction, Float total) {
+    Float density(0.0f);
+    const Float by_cosine = max(dot(direction, s.normal), Float(0.0f)) * Float(0.318309886f);
+    for (std::int32_t i = 0; i < path.sphere_count; ++i) {
+        const SphereCone cone = cone_of(path.spheres + 4 * i, s);
+        const Bool inside = dot(direction, cone.axis) >= cone.cosine;
+        const Float in_cone = select(inside, Float(0.159154943f) / max(cone.slope, Float(1e-12f)), Float(0.0f));
+        density = density + cone.share * select(cone.is_wide, by_cosine, in_cone);
+    }
+    return density / max(total, Float(1e-20f));
+}
+
+// Chance of a ray from a catcher towards the virtual objects, from the sum of their form factors. Effects below 1/512
+// of the light are cut.
+ARHOST_INLINE Float bounce_chance(Float form_factors) {
+    return select(form_factors < Float(1.0f / 512), Float(0.0f),
+                  min(max(form_factors * Float(3.0f), Float(0.02f)), Float(1.0f)));
+}
+
+ARHOST_INLINE Float form_factors_of(const PathScene &path, const Surface &s) {
+    Float total(0.0f);
+    for (std::int32_t i = 0; i < path.sphere_count; ++i)
+        total = total + cone_of(path.spheres + 4 * i, s).share;
+    return total;
+}
+
+ARHOST_INLINE Bounce sample_virtual(const Work &work, const Paths &paths, const Surface &s, Float total) {
+    const PathScene &path = work.frame.path;
+    const Float chance = bounce_chance(total);
+    const Pair choice = path_pair(work, paths, choice_dimension, 0, 1);
+    const Bool active = choice.u < chance;
+    if (!any(active))
+        return {s.normal, Float(0.0f)};
+    const Pair uv = path_pair(work, paths, scatter_dimension, 0, 1);
+    Vec3 direction = cosine_direction(s.normal, uv.u, uv.v);
+    Float remaining = choice.v * total;
+    Bool searching = active;
+    for (std::int32_t i = 0; i < path.sphere_count; ++i) {
+        const SphereCone cone = cone_of(path.spheres + 4 * i, s);
+        const Bool here = searching & (remaining < cone.share) & ~cone.is_wide;
+        searching = searching & (remaining >= cone.share);
+        remaining = remaining - cone.share;
+        if (any(here))
+            direction = select(here, cone_direction(cone.axis, cone.slope, uv.u, uv.v), direction);
+    }
+    const Float density = virtual_density(path, s, direction, total) * chance;
+    return {direction, select(active & (dot(direction, s.geometric_normal) > Float(0.0f)) &
+                                  (dot(direction, s.normal) > Float(0.0f)),
+                              density, Float(0.0f))};
+}
+
+// Returns the part of a lamp's or the environment's sample that virtual objects hide from a real surface. Rays from the
+// surface through glass may find the same lamp; `density_of(direction)`: their density per steradian.
+template <class DensityOf>
+ARHOST_INLINE Vec3 hidden_part(const Work &work, const Surface &s, const SourceSample &sample, Bool active,
+                               DensityOf density_of) {
+    active = active & can_meet_virtual(work.frame.path, s.position, sample.to_light, sample.t_far);
+    if (!any(active))
+        return black();
+    const PathVisibility visibility = path_visibility(work.frame.scene, s, sample, active);
+    Vec3 visible = visibility.transmittance;
+    if (any(visibility.is_tinted))
+        visible = visible * select(visibility.is_tinted,
+                                   balance_weight(sample.density, density_of(sample.direction)), Float(1.0f));
+    return select(active, white() - visible, black());
+}
+
+// Adds the change of a catcher's light, relative to its light without virtual objects: minus the light that they
+// hide, plus the light that they send.
+ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHit16 &rays, Bool active) {
+    const Frame &frame = work.frame;
+    const Surface s = surface_at(frame.scene, rays, active);
+    const Vec3 before = irradiance_without_objects(frame, s);
+    const auto inverse = [](Float a) __attribute__((always_inline)) {
+        return select(a > Float(0.0f), Float(1.0f) / max(a, Float(1e-30f)), Float(0.0f));
+    };
+    Paths relative = paths;
+    relative.throughput = {inverse(before.x), inverse(before.y), inverse(before.z)};
+    const bool bounces = frame.scene.max_depth > 0;
+    const Float form_factors = form_factors_of(frame.path, s);
+    const auto bounce_density = [&](Vec3 direction) __attribute__((always_inline)) {
+        return bounces ? virtual_density(frame.path, s, direction, form_factors) * bounce_chance(form_factors)
+                       : Float(0.0f);
+    };
+    Vec3 change = black();
+    const int count = frame.light_samples;
+    for (int i = 0; i < count; ++i) {
+        const SourceSample sample = sample_source(work, paths, s, i, count);
+        const Float cosine = lambert(s.normal, sample.direction);
+        const Bool facing = active & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
+        const Bool real = facing & ~sample.is_virtual, emitter = facing & sample.is_virtual;
+        if (any(real))
+            change = change - hidden_part(work, s, sample, real, bounce_density) * sample.light * cosine;
+        if (any(emitter)) {
+            const PathVisibility visibility = path_visibility(frame.scene, s, sample, emitter);
+            const Float weight = balance_weight(sample.density, bounce_density(sample.direction));
+            change = change + select(emitter, visibility.transmittance * sample.light * (cosine * weight), black());
+        }
+    }
+    add_radiance(work, relative, change, active);
+    if (!bounces)
+        return;
+    const Bounce bounce = sample_virtual(work, paths, s, form_factors);
+    const Bool sends = active & (bounce.density > Float(0.0f));
+    if (!any(sends))
+        return;
+    const Float cosine = dot(bounce.direction, s.normal);
+    enqueue(work, relative, s.position + s.geometric_normal * s.offset, bounce.direction,
+            relative.throughput * (cosine * Float(0.318309886f) / max(bounce.density, Float(1e-20f))), sends,
+            Float(1.0f) / max(bounce.density, Float(1e-30f)));
+}
+
+// The light of the video in some direction.
+struct Filmed {
+    Bool inside; // the video shows this direction
+    Vec3 light;
+};
+// `to_point`: from the camera's eye, in world axes.
+ARHOST_INLINE Filmed filmed_towards(const Frame &frame, Vec3 to_point) {
+    const Video &video = frame.path.video;
+    const float *m = frame.camera.world_from_camera;
+    const Vec3 p{dot(splat(m), to_point), dot(splat(m + 3), to_point), dot(splat(m + 6), to_point)};
+    const Float depth = max(p.z, Float(1e-6f));
+    Vec3 at = vec3(p.x / depth, p.y / depth, Float(1.0f));
+    const float *k = video.coefficients;
+    const Bool in_front = (p.z > Float(1e-6f)) & (at.x * at.x + at.y * at.y < Float(video.max_radius_squared));
+    if (video.distortion == ARHOST_DISTORTION_BROWN)
+        at = brown_conrady({k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7], k[8], k[9], k[10], k[11]}, at);
+    else if (video.distortion == ARHOST_DISTORTION_FISHEYE)
+        at = kannala_brandt({k[0], k[1], k[2], k[3]}, at);
+    // Pixel centres are at integers, texel centres at halves.
+    const Float x = at.x * Float(video.fx) + Float(video.cx + 0.5f), y = at.y * Float(video.fy) + Float(video.cy + 0.5f);
+    const Float width(static_cast<float>(video.image.width)), height(static_cast<float>(video.image.height));
+    const Bool inside =
+        in_front & (x > Float(0.0f)) & (x < width) & (y > Float(0.0f)) & (y < height);
+    if (!any(inside))
+        return {inside, black()};
+    return {inside, sample_texture(frame.scene, video.image, x / width, y / height).colour};
+}
+
+// Adds the light of real surfaces that the video shows, with the shadows of virtual objects on them. Returns the lanes
+// whose light it has added.
+ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, Bool active) {
+    const Frame &frame = work.frame;
+    if (!frame.path.video.image.texels || !any(active))
+        return bool_of(false);
+    const Vec3 eye = splat(frame.camera.eye), to_point = s.position - eye;
+    const Filmed filmed = filmed_towards(frame, to_point);
+    active = active & filmed.inside;
+    if (!any(active))
+        return active;
+    if (frame.scene.has_occluders) { // the video shows a nearer real surface
+        RTCRay16 ray;
+        const Float end = Float(1.0f) - s.offset * Float(4.0f) / max(length(to_point), Float(1e-20f));
+        set_ray(ray, eye, to_point, end, Int(catcher_mask | occluder_mask));
+        active = active & ~blocked(frame.scene, ray, active);
+        if (!any(active))
+            return active;
+    }
+    const Vec3 before = irradiance_without_objects(frame, s);
+    const SourceSample sample = sample_source(work, paths, s, 0, 1);
+    const Float cosine = lambert(s.normal, sample.direction);
+    const Bool facing =
+        active & ~sample.is_virtual & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
+    Vec3 remaining = white();
+    if (any(facing)) {
+        const Vec3 hidden =
+            hidden_part(work, s, sample, facing, [](Vec3) { return Float(0.0f); }) * sample.light * cosine;
+        const auto part = [](Float a, Float whole) __attribute__((always_inline)) {
+            return Float(1.0f) - select(whole > Float(0.0f), a / max(whole, Float(1e-30f)), Float(0.0f));
+        };
+        remaining = {part(hidden.x, before.x), part(hidden.y, before.y), part(hidden.z, before.z)};
+    }
+    add_radiance(work, paths, filmed.light * remaining, active);
+    return active;
+}
+
+// Returns the light that rays receive that hit no surface: the environment or the background. Rays that only mirrors
+// and glass have scattered see the video where it shows the environment, which is nearer than infinity there.
+ARHOST_INLINE Vec3 environment_towards(const Work &work, const Paths &paths, Vec3 direction, Bool active) {
+    const Frame &frame = work.frame;
+    Vec3 light = environment_light(frame, direction);
+    const Bool is_specular = active & (paths.inverse_density == Float(0.0f)) & ~changes_catcher(paths);
+    if (frame.path.video.image.texels && any(is_specular)) {
+        const Filmed filmed = filmed_towards(frame, direction);
+        Bool seen = is_specular & filmed.inside & (largest(filmed.light) < Float(0.95f)); // the video is not saturated
+        if (any(seen)) {
+            RTCRay16 ray;
+            set_ray(ray, splat(frame.camera.eye), direction, Float(far_away), Int(catcher_mask | occluder_mask));
+            seen = seen & ~blocked(frame.scene, ray, seen);
+            light = select(seen, filmed.light, light);
+        }
+    }
+    const Bool weighted = paths.inverse_density > Float(0.0f); // light samples do not follow mirrors and glass
+    if (!any(active & weighted))
+        return light;
+    const Float density = environment_source_density(frame, direction) *
+                          Float(static_cast<float>(source_samples(frame, paths.depth - 1)));
+    return light * select(weighted, balance_weight_of_ray(density, paths.inverse_density), Float(1.0f));
+}

@@ -1,0 +1,304 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Light sources of the path integrator: lamps, emissive surfaces and the environment. A light sample chooses one of
+// them at random, in proportion to the light that it sends to the middle of the scene.
+#pragma once
+#include "path_random.inl"
+#include "scatter.inl"
+
+using namespace arhost::raytracer_common; // SourceRow, SourceType
+
+// Number of light samples at a vertex of a path.
+ARHOST_INLINE int source_samples(const Frame &frame, std::uint32_t depth) {
+    return depth == 0 ? frame.light_samples : 1;
+}
+
+struct SourceSample {
+    Vec3 to_light;  // vector from the surface to the sampled point; of unit length if the light is infinitely far
+    Float t_far;    // end of the shadow ray in lengths of `to_light`
+    Vec3 direction; // unit vector in the direction of `to_light`
+    Vec3 light;     // irradiance at perpendicular incidence, divided by π and by the number of samples
+    Float density;  // expected number of samples per steradian; 0 if scattered rays cannot hit the light source
+    Bool is_virtual, is_environment;
+};
+
+ARHOST_INLINE Vec3 environment_light(const Frame &frame, Vec3 direction) {
+    const Environment &environment = frame.scene.environment;
+    if (!environment.image)
+        return splat(frame.scene.background);
+    const Vec3 d = transform(environment.environment_from_world, direction);
+    return sample_texture(frame.scene, *environment.image, equirectangular_u(d), equirectangular_v(d)).colour *
+           Float(environment.intensity);
+}
+
+// Expected number of samples of the environment per steradian in a direction, of one light sample.
+ARHOST_INLINE Float environment_source_density(const Frame &frame, Vec3 direction) {
+    const Environment &environment = frame.scene.environment;
+    const Float chance = frame.path.environment_chance;
+    if (!environment.image)
+        return hemisphere_density() * chance;
+    const Texture &image = *environment.image;
+    const Vec3 d = transform(environment.environment_from_world, direction);
+    const Float u = equirectangular_u(d), v = equirectangular_v(d);
+    const auto texel = [](Float at, std::int32_t size) __attribute__((always_inline)) {
+        return to_int(min(max(at * Float(static_cast<float>(size)), Float(0.0f)), Float(static_cast<float>(size - 1))));
+    };
+    const Int row = texel(v, image.height), first = row * Int(image.width);
+    return chance * environment_density(image, step_of_sums(environment.rows, Int(0), row).v,
+                                        step_of_sums(environment.columns, first, texel(u, image.width)).v, v);
+}
+
+// Returns light sample `index` of `count`. The samples are spread evenly over the light sources.
+ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, const Surface &s, int index, int count) {
+    const Frame &frame = work.frame;
+    const PathScene &path = frame.path;
+    SourceSample sample{s.normal, Float(1.0f), s.normal, black(), Float(0.0f), bool_of(false), bool_of(false)};
+    if (path.source_count == 0)
+        return sample;
+    const Pair uv = path_pair(work, paths, light_dimension, index, count);
+    Int source(0);
+    if (path.source_count > 1) {
+        const Float chosen = (path_pair(work, paths, source_dimension, index, count).u + Float(static_cast<float>(index))) *
+                             Float(1.0f / static_cast<float>(count));
+        source = search(path.cumulative, Int(0), path.source_count, chosen);
+    }
+    const Int first = source * Int(source_rows);
+    const auto field = [&](int row) __attribute__((always_inline)) { return gather(path.sources + row, first); };
+    const auto vector = [&](int row) __attribute__((always_inline)) {
+        return Vec3{field(row), field(row + 1), field(row + 2)};
+    };
+    const Int type = to_int(field(type_row));
+    const Float chance = field(chance_row) * Float(static_cast<float>(count)), share = Float(1.0f) / chance;
+    const Vec3 to_centre = vector(position_row) - s.position, intensity = vector(intensity_row);
+    const Bool inverse_square = field(falloff_row) > Float(0.5f);
+    const auto is = [&](int wanted) __attribute__((always_inline)) { return type == Int(wanted); };
+    const auto emitted = [&](Float density) __attribute__((always_inline)) { // of sources of known radiance
+        return intensity * (irradiance_of_density(density) * share);
+    };
+
+    if (const Bool directional = is(ARHOST_LIGHT_DIRECTIONAL); any(directional)) {
+        sample.to_light = select(directional, -vector(direction_row), sample.to_light);
+        sample.t_far = select(directional, Float(far_away), sample.t_far);
+        sample.light = select(directional, intensity * share, sample.light);
+    }
+    const Bool spot = is(ARHOST_LIGHT_SPOT);
+    if (const Bool round = is(ARHOST_LIGHT_POINT) | is(ARHOST_LIGHT_SPHERE) | spot; any(round)) {
+        const Float radius = field(radius_row);
+        const Bool extended = radius > Float(0.0f);
+        const Vec3 to_point = select(extended, vector_to_disc(to_centre, radius, uv.u, uv.v), to_centre);
+        const Float squared = dot(to_point, to_point), cosine = dot(normalize(to_centre), normalize(to_point));
+        Float light = point_light_falloff(inverse_square, squared) * share;
+        if (any(spot))
+            light = select(spot,
+                           light * spot_attenuation(-dot(vector(direction_row), normalize(to_point)),
+                                                    field(cosine_inner_row), field(cosine_outer_row)),
+                           light);
+        sample.to_light = select(round, to_point, sample.to_light);
+        sample.light = select(round, intensity * light, sample.light);
+        sample.density = select(round & extended, density_over_area(squared, field(area_row), cosine), sample.density);
+    }
+    if (const Bool rectangle = is(ARHOST_LIGHT_RECTANGLE); any(rectangle)) {
+        const Vec3 to_point = vector_to_rectangle(to_centre, vector(axis_u_row), vector(axis_v_row), uv.u, uv.v);
+        const Float squared = dot(to_point, to_point), cosine = lambert(vector(direction_row), -normalize(to_point));
+        sample.to_light = select(rectangle, to_point, sample.to_light);
+        sample.light = select(rectangle, intensity * (point_light_falloff(inverse_square, squared) * cosine * share),
+                              sample.light);
+        sample.density = select(rectangle, density_over_area(squared, field(area_row), cosine), sample.density);
+    }
+    constexpr float before_surface = 0.999f; // the shadow ray ends before the emissive surface itself
+    if (const Bool triangle = is(triangle_source); any(triangle)) {
+        const Vec3 edge_1 = vector(axis_u_row), edge_2 = vector(axis_v_row);
+        const Float along = sqrt(uv.u); // uniform over the triangle
+        const Vec3 to_point = to_centre + edge_1 * (along * (Float(1.0f) - uv.v)) + edge_2 * (along * uv.v);
+        const Float squared = dot(to_point, to_point),
+                    cosine = abs(dot(normalize(cross(edge_1, edge_2)), normalize(to_point)));
+        const Float density = density_over_area(squared, field(area_row), cosine);
+        sample.to_light = select(triangle, to_point, sample.to_light);
+        sample.light = select(triangle, emitted(density), sample.light);
+        sample.density = select(triangle, density, sample.density);
+        sample.t_far = select(triangle, Float(before_surface), sample.t_far);
+        sample.is_virtual = triangle;
+    }
+    if (const Bool ball = is(ball_source); any(ball)) {
+        const Float radius = field(radius_row), squared = dot(to_centre, to_centre);
+        const Float sine_squared = radius * radius / max(squared, Float(1e-20f));
+        const Bool outside = ball & (sine_squared < Float(0.9999f));
+        const Float cosine_limit = sqrt(max(Float(1.0f) - sine_squared, Float(0.0f)));
+        const Float slope = sine_squared / (Float(1.0f) + cosine_limit);
+        const Vec3 direction = cone_direction(normalize(to_centre), slope, uv.u, uv.v);
+        const Float along = dot(direction, to_centre),
+                    half = sqrt(max(radius * radius - (squared - along * along), Float(0.0f)));
+        const Float density = Float(0.159154943f) / max(slope, Float(1e-12f));
+        sample.to_light = select(outside, direction * (along - half), sample.to_light);
+        sample.light = select(outside, emitted(density), sample.light);
+        sample.density = select(outside, density, sample.density);
+        sample.t_far = select(outside, Float(before_surface), sample.t_far);
+        sample.is_virtual = sample.is_virtual | ball;
+    }
+    if (const Bool environment = is(environment_source); any(environment)) {
+        LightSample of_environment;
+        if (frame.scene.environment.image)
+            of_environment = sample_environment(frame.scene, s, uv, 1);
+        else
+            of_environment = sample_background(frame.scene, s, uv, 1);
+        sample.to_light = select(environment, of_environment.to_light, sample.to_light);
+        sample.light = select(environment, of_environment.intensity * (of_environment.irradiance * share), sample.light);
+        sample.density = select(environment, of_environment.sampling_density, sample.density);
+        sample.t_far = select(environment, Float(far_away), sample.t_far);
+        sample.is_environment = environment;
+    }
+    sample.density = sample.density * chance;
+    sample.direction = normalize(sample.to_light);
+    return sample;
+}
+
+struct PathVisibility {
+    Vec3 transmittance; // 0 if an opaque object is in between
+    Bool is_tinted;     // glass is in between
+};
+
+// Light of the environment that passes through glass is found by refracted rays, so glass hides it here. That of lamps
+// and emissive surfaces passes straight through glass. Real surfaces cast no shadow on each other.
+ARHOST_INLINE PathVisibility path_visibility(const Scene &scene, const Surface &s, const SourceSample &sample,
+                                             Bool active) {
+    const Bool is_finite = sample.t_far < Float(far_away);
+    const Vec3 above = s.lift + s.geometric_normal * s.offset, origin = s.position + above;
+    const Vec3 to_light = sample.to_light - select(is_finite, above, black());
+    RTCRay16 rays;
+    set_ray(rays, origin, to_light, sample.t_far,
+            select(s.is_real, Int(opaque_mask), Int(opaque_mask | catcher_mask | occluder_mask)) |
+                select(sample.is_environment, Int(glass_mask), Int(0)));
+    const Bool unoccluded = active & ~blocked(scene, rays, active);
+    const Bool through_glass = unoccluded & ~sample.is_environment;
+    Vec3 tint = white();
+    Bool is_tinted = bool_of(false);
+    if (scene.has_glass && any(through_glass))
+        tint = glass_tint(scene, origin, to_light, sample.direction, sample.t_far, through_glass, is_tinted,
+                          [](const arhost_material &glass, Float cosine) __attribute__((always_inline)) {
+                              const Float ratio(1 / glass.index);
+                              return splat(glass.refraction) *
+                                     (Float(1.0f) - dielectric_reflectance(
+                                                        cosine, refracted_cosine_squared(cosine, ratio), ratio));
+                          });
+    return {select(unoccluded, tint, black()), is_tinted};
+}
+
+// The chance that a lit surface scatters a ray by its specular lobe.
+ARHOST_INLINE Float specular_chance(const Surface &s, Vec3 to_eye) {
+    if (!s.any_rough)
+        return Float(0.0f);
+    const Float specular = luminance(schlick(s.specular, dot(s.normal, to_eye))), diffuse = luminance(s.diffuse);
+    const Float chance = specular / max(specular + diffuse, Float(1e-6f));
+    const Float bounded = min(max(chance, Float(0.1f)), Float(0.9f));
+    return select(s.is_rough, select(diffuse > Float(0.0f), bounded, Float(1.0f)), Float(0.0f));
+}
+
+// Returns π · BSDF · cosine of a lit surface. `with_phong`: including the highlights of SPECULAR and METAL, which only
+// light samples see.
+ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light, bool with_phong) {
+    const Float cosine = lambert(s.normal, to_light);
+    Vec3 scattered = s.diffuse * cosine;
+    if (with_phong && s.any_specular)
+        scattered =
+            scattered + select(s.is_rough, black(), s.specular * phong(s.normal, to_light, to_eye, s.exponent));
+    if (s.any_rough) {
+        const Vec3 half_vector = normalize(to_light + to_eye);
+        const Vec3 fresnel = schlick(s.specular, dot(to_eye, half_vector));
+        const Float lobe = ggx_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+        scattered = select(s.is_rough, s.diffuse * (white() - fresnel) * cosine + fresnel * lobe, scattered);
+    }
+    return scattered;
+}
+
+// Density per steradian of the rays that a lit surface scatters.
+ARHOST_INLINE Float scattering_density(const Surface &s, Vec3 to_eye, Vec3 to_light, Float chance) {
+    Float density = lambert(s.normal, to_light) * Float(0.318309886f) * (Float(1.0f) - chance);
+    if (s.any_rough)
+        density = density + select(s.is_rough,
+                                   chance * ggx_reflection_density(dot(s.normal, to_eye),
+                                                                   dot(s.normal, normalize(to_light + to_eye)), s.alpha),
+                                   Float(0.0f));
+    return select(dot(to_light, s.geometric_normal) > Float(0.0f), density, Float(0.0f));
+}
+
+// Returns the light of sampled light sources that the surfaces reflect. `scatters`: whether scattered rays follow.
+ARHOST_INLINE Vec3 sampled_light(const Work &work, const Paths &paths, const Surface &s, Vec3 to_eye, bool scatters,
+                                 Bool active) {
+    const Scene &scene = work.frame.scene;
+    const Float chance = specular_chance(s, to_eye);
+    const int count = source_samples(work.frame, paths.depth);
+    Vec3 sum = black();
+    for (int i = 0; i < count; ++i) {
+        const SourceSample sample = sample_source(work, paths, s, i, count);
+        const Bool facing =
+            active & (dot(s.normal, sample.direction) > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
+        if (!any(facing))
+            continue;
+        const PathVisibility visibility = path_visibility(scene, s, sample, facing);
+        Float weight(1.0f);
+        if (scatters)
+            weight = balance_weight(sample.density, scattering_density(s, to_eye, sample.direction, chance));
+        sum = sum + select(facing,
+                           scattering(s, to_eye, sample.direction, true) * visibility.transmittance * sample.light *
+                               weight,
+                           black());
+    }
+    return sum;
+}
+
+// Expected number of light samples per steradian, at the previous vertex of the paths, of the emissive surfaces hit.
+ARHOST_INLINE Float density_of_emitter(const Work &work, const Paths &paths, const RTCRayHit16 &rays, const Surface &s,
+                                       Vec3 direction, Bool active) {
+    Float density(0.0f);
+    for_each_object(work.frame.scene, rays.hit, active, [&](const Object &object, Bool here) {
+        if (object.emitter_density <= 0)
+            return;
+        const Float per_source(object.emitter_density);
+        if (object.ball_radius > 0) {
+            const Float radius(object.ball_radius);
+            const Vec3 to_centre = direction * s.distance + select(s.back_face, s.geometric_normal, -s.geometric_normal) * radius;
+            const Float sine_squared = radius * radius / max(dot(to_centre, to_centre), Float(1e-20f));
+            const Float slope =
+                sine_squared / (Float(1.0f) + sqrt(max(Float(1.0f) - sine_squared, Float(0.0f))));
+            density = select(here & (sine_squared < Float(0.9999f)),
+                             per_source * Float(0.159154943f) / max(slope, Float(1e-12f)), density);
+        } else {
+            const Float cosine = abs(dot(s.geometric_normal, direction));
+            density = select(here, per_source * density_over_area(s.distance * s.distance, Float(1.0f), cosine), density);
+        }
+    });
+    return density * Float(static_cast<float>(source_samples(work.frame, paths.depth - 1)));
+}
+
+// Returns the light that rays receive from area lamps before `t_far`, where they hit a surface.
+ARHOST_INLINE Vec3 lamps_towards(const Work &work, const Paths &paths, Vec3 origin, Vec3 direction, Float t_far) {
+    const float samples = static_cast<float>(source_samples(work.frame, paths.depth - 1));
+    return arriving_from_area_lights(work.frame, origin, direction, t_far, paths.inverse_density,
+                                     [&](std::uint32_t lamp) { return samples * work.frame.path.lamp_chances[lamp]; });
+}
+
+// Returns the irradiance of a real surface without virtual objects, divided by π: the irradiance map of the
+// environment, and a regular grid of points on each lamp.
+ARHOST_INLINE Vec3 irradiance_without_objects(const Frame &frame, const Surface &s) {
+    const Scene &scene = frame.scene;
+    Vec3 sum = splat(scene.background);
+    if (scene.environment.image) {
+        const Vec3 d = transform(scene.environment.environment_from_world, s.normal);
+        sum = sample_texture(scene, frame.path.irradiance, equirectangular_u(d), equirectangular_v(d)).colour;
+    }
+    for (std::uint32_t i = 0; i < scene.light_count; ++i) {
+        const arhost_light &light = scene.lights[i];
+        const int side = is_area_light(light) ? 4 : 1;
+        Float irradiance(0.0f);
+        for (int u = 0; u < side; ++u)
+            for (int v = 0; v < side; ++v) {
+                const auto middle = [&](int at) __attribute__((always_inline)) {
+                    return Float((static_cast<float>(at) + 0.5f) / static_cast<float>(side));
+                };
+                const LightSample sample = sample_light(light, s, {middle(u), middle(v)}, 1);
+                irradiance = irradiance + sample.irradiance * sample.cosine;
+            }
+        sum = sum + splat(light.intensity) * (irradiance * Float(1.0f / static_cast<float>(side * side)));
+    }
+    return sum;
+}

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// What the primary rays of a block of 4×4 pixels hit, and sums over the samples of a pixel.
+#pragma once
+#include "scatter.inl"
+
+constexpr int block = 4; // side of a block, px
+
+ARHOST_INLINE void add_to_sum(Scratch &scratch, int row, int first_pixel, Float more) {
+    float *to = scratch.sum[row] + first_pixel;
+    store(to, load(to) + more);
+}
+
+// Returns the lanes of a block whose pixels are inside the image.
+ARHOST_INLINE Bool inside_block(int width, int height) {
+    return ((lane_numbers() & Int(block - 1)) < Int(width)) & ((lane_numbers() >> Int(2)) < Int(height));
+}
+
+struct PrimaryHits {
+    RTCRayHit16 rays, catcher_rays;
+    Bool is_virtual; // `rays` hit a virtual object
+    Bool caught;     // `catcher_rays` hit a catcher that no virtual object or occluder hides
+};
+
+// Catchers do not hide the virtual objects behind them; occluders hide everything.
+ARHOST_INLINE PrimaryHits trace_primary(const Scene &scene, Vec3 eye, Vec3 direction, Bool active) {
+    PrimaryHits hits;
+    set_ray(hits.rays.ray, eye, direction, Float(far_away), Int(virtual_masks | occluder_mask));
+    const Bool hit = trace(scene, scene.root, make_query(Coherence::coherent), hits.rays, active);
+    Bool occluded = bool_of(false);
+    if (scene.has_occluders)
+        for_each_object(scene, hits.rays.hit, hit, [&](const Object &object, Bool here) {
+            if (object.role == ARHOST_ROLE_OCCLUDER)
+                occluded = occluded | here;
+        });
+    hits.is_virtual = hit & ~occluded;
+    hits.caught = bool_of(false);
+    const Bool rest = active & ~hits.is_virtual;
+    if (scene.has_catchers && any(rest)) {
+        set_ray(hits.catcher_rays.ray, eye, direction, select(hit, load(hits.rays.ray.tfar), Float(far_away)),
+                Int(catcher_mask));
+        hits.caught = trace(scene, scene.catchers, make_query(Coherence::coherent, true), hits.catcher_rays, rest);
+    }
+    return hits;
+}
