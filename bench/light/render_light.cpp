@@ -4,7 +4,7 @@
 //   render-light SCENE OUT WIDTH HEIGHT FOCAL_PX EYE_X EYE_Y EYE_Z AT_X AT_Y AT_Z UP_X UP_Y UP_Z SAMPLES FRAMES [KEY=VALUE...]
 // renders FRAMES images of SAMPLES samples with successive frame numbers, writes their mean to OUT as six floats per
 // pixel (added light and transmittance), and prints the CPU time of all images as JSON. Keys: light_samples,
-// max_radiance (0: no bound), threads.
+// max_radiance (0: no bound), threads, video (a file of R, G, B bytes: the picture under the overlay).
 #include "bunny.hpp"
 #include "renderer.hpp"
 #include "scene/scene_loader.hpp"
@@ -50,6 +50,14 @@ void run(int argc, char **argv) {
                                {number(9), number(10), number(11)},
                                {number(12), number(13), number(14)},
                                intrinsics};
+    arhost_frame_format format{};
+    format.struct_size = sizeof format;
+    format.pixel_format = ARHOST_PIXEL_FORMAT_RGB8;
+    format.width = width;
+    format.height = height;
+    format.stride[0] = 3 * width;
+    std::vector<std::uint8_t> video(std::size_t{3} * width * height);
+    bool has_video = false;
     rt_embree::Settings settings;
     settings.samples = static_cast<std::uint32_t>(number(15));
     const auto frames = static_cast<int>(number(16));
@@ -57,6 +65,14 @@ void run(int argc, char **argv) {
         const std::string argument = argv[i];
         const std::size_t equals = argument.find('=');
         const std::string key = argument.substr(0, equals);
+        if (key == "video") {
+            std::ifstream in(argument.substr(equals + 1), std::ios::binary);
+            in.read(reinterpret_cast<char *>(video.data()), static_cast<std::streamsize>(video.size()));
+            if (!in)
+                throw std::runtime_error("cannot read " + argument);
+            has_video = true;
+            continue;
+        }
         const double value = std::strtod(argument.c_str() + equals + 1, nullptr);
         if (key == "light_samples")
             settings.light_samples = static_cast<std::int32_t>(value);
@@ -80,10 +96,15 @@ void run(int argc, char **argv) {
     rt_embree::Renderer renderer(setup, settings, arhost::Host(&host));
     std::vector<std::uint16_t> pixels(std::size_t{8} * width * height);
     const arhost_image image{sizeof(arhost_image), 16 * width, width, height, nullptr, pixels.data()};
+    arhost_frame frame_of_video{};
+    frame_of_video.struct_size = sizeof frame_of_video;
+    frame_of_video.format = &format;
+    frame_of_video.plane[0] = video.data();
     std::vector<double> sums(std::size_t{6} * width * height);
     const std::clock_t start = std::clock();
     for (int frame = 0; frame < frames; ++frame) {
-        renderer.render(camera, image, nullptr, nullptr, static_cast<std::uint64_t>(frame));
+        renderer.render(camera, image, nullptr, has_video ? &frame_of_video : nullptr,
+                        static_cast<std::uint64_t>(frame));
         for (std::size_t i = 0; i < std::size_t{width} * height; ++i)
             for (std::size_t c = 0; c < 6; ++c)
                 sums[6 * i + c] += float_of_half(pixels[8 * i + c + (c >= 3)]);
