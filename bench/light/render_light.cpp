@@ -4,7 +4,7 @@
 //   render-light SCENE OUT WIDTH HEIGHT FOCAL_PX EYE_X EYE_Y EYE_Z AT_X AT_Y AT_Z UP_X UP_Y UP_Z SAMPLES FRAMES [KEY=VALUE...]
 // renders FRAMES images of SAMPLES samples with successive frame numbers, writes their mean to OUT as six floats per
 // pixel (added light and transmittance), and prints the CPU time of all images as JSON. Keys: light_samples,
-// max_radiance (0: no bound), threads, video (a file of R, G, B bytes: the picture under the overlay).
+// max_radiance (0: no bound), photons, threads, video (a file of R, G, B bytes: the picture under the overlay).
 #include "bunny.hpp"
 #include "renderer.hpp"
 #include "scene/scene_loader.hpp"
@@ -78,6 +78,8 @@ void run(int argc, char **argv) {
             settings.light_samples = static_cast<std::int32_t>(value);
         else if (key == "max_radiance")
             settings.max_radiance = value > 0 ? static_cast<float>(value) : std::numeric_limits<float>::infinity();
+        else if (key == "photons")
+            settings.photons = static_cast<std::uint32_t>(value);
         else if (key == "threads")
             settings.threads = static_cast<unsigned>(value);
         else

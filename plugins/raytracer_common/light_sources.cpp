@@ -56,6 +56,11 @@ void for_each_point(const arhost_scene &arena, std::uint32_t number, const Place
     }
 }
 
+bool is_specular(const arhost_material &material) {
+    return material.model == ARHOST_MATERIAL_MIRROR || material.model == ARHOST_MATERIAL_METAL ||
+           material.model == ARHOST_MATERIAL_GLASS;
+}
+
 struct Bounds {
     Vec3 low{std::numeric_limits<double>::max(), std::numeric_limits<double>::max(),
              std::numeric_limits<double>::max()};
@@ -110,12 +115,15 @@ LightSources::LightSources(const arhost_scene &arena) : arena_(arena) {
 
 // One sphere for each object. If there are too many, the two that lie next to each other along the longest axis and
 // have the smallest common sphere are merged.
-void LightSources::bound(std::span<const PlacedObject> placed) {
+std::vector<std::array<float, 4>> LightSources::bounds_of(std::span<const PlacedObject> placed,
+                                                          bool only_specular) const {
     std::vector<Sphere> spheres;
     Bounds all;
+    const auto materials = elements<arhost_material>(arena_, arena_.materials);
     const auto objects = elements<arhost_object>(arena_, arena_.objects);
     for (std::uint32_t i = 0; i < objects.size(); ++i) {
-        if (objects[i].role != ARHOST_ROLE_VIRTUAL || !placed[i].is_visible)
+        if (objects[i].role != ARHOST_ROLE_VIRTUAL || !placed[i].is_visible ||
+            (only_specular && !is_specular(materials[objects[i].material])))
             continue;
         Bounds box;
         for_each_point(
@@ -156,13 +164,14 @@ void LightSources::bound(std::span<const PlacedObject> placed) {
             spheres.erase(spheres.begin() + static_cast<std::ptrdiff_t>(best) + 1);
         }
     }
-    spheres_.clear();
+    std::vector<std::array<float, 4>> bounds;
     for (const Sphere &sphere : spheres) {
         std::array<float, 4> to{};
         write(sphere.centre, to.data());
         to[3] = static_cast<float>(sphere.radius * 1.0001);
-        spheres_.push_back(to);
+        bounds.push_back(to);
     }
+    return bounds;
 }
 
 // Returns a new record; its rows are 0, except the type.
@@ -218,7 +227,8 @@ void LightSources::add_emitter(std::uint32_t number, const PlacedObject &placed)
 }
 
 void LightSources::place(std::span<const PlacedObject> placed) {
-    bound(placed);
+    spheres_ = bounds_of(placed, false);
+    specular_spheres_ = bounds_of(placed, true);
     Bounds all;
     for (const auto &sphere : spheres_)
         all.add(vector_of(sphere.data()), sphere[3]);

@@ -45,9 +45,11 @@ public:
     // Spheres that contain the visible virtual objects, at most max_spheres.
     static constexpr std::size_t max_spheres = 16;
     std::span<const std::array<float, 4>> spheres() const { return spheres_; } // centre and radius, mm
+    // Like spheres(), but of the objects that reflect or refract light without scattering it.
+    std::span<const std::array<float, 4>> specular_spheres() const { return specular_spheres_; }
 
 private:
-    void bound(std::span<const PlacedObject> objects);
+    std::vector<std::array<float, 4>> bounds_of(std::span<const PlacedObject> objects, bool only_specular) const;
     float *add_record(float type);
     void add_emitter(std::uint32_t object, const PlacedObject &placed);
     void choose(const std::vector<std::uint32_t> &object_of, shading::Vec3 middle, double extent);
@@ -58,7 +60,7 @@ private:
     std::vector<float> records_, cumulative_, lamp_chances_;
     std::vector<Emitter> emitters_;
     float environment_chance_ = 0;
-    std::vector<std::array<float, 4>> spheres_;
+    std::vector<std::array<float, 4>> spheres_, specular_spheres_;
 };
 
 // The irradiance of the scene's environment, divided by π, of surfaces that face each direction: RGBA floats in

@@ -37,6 +37,7 @@ public:
     // Builds the acceleration structures. `arena` must outlive this object.
     EmbreeScene(const arhost_scene &arena, unsigned threads, bool robust, const arhost::Host &host);
 
+    const arhost_scene &arena() const { return arena_; }
     const Scene &view() const { return view_; }
     // Bounding boxes in world space, one per object. The boxes of occluders are empty: their pixels always have alpha
     // 0.

@@ -5,8 +5,9 @@
 #pragma once
 
 #include "embree.hpp"
-#include "raytracer_common/source_record.hpp"
+#include "raytracer_common/photon_map.hpp"
 #include "raytracer_common/samples.hpp"
+#include "raytracer_common/source_record.hpp"
 
 #include <arhost/scene.h>
 #include <arhost/shading/srgb8.hpp>
@@ -119,6 +120,26 @@ struct Video {
     float max_radius_squared; // of (x/z, y/z) in the picture; the lens model is not valid beyond
 };
 
+// The mirrors and glass objects towards which lamps send photons.
+struct Caustics {
+    const float *spheres;                // centre and radius, mm
+    const float *cumulative, *chances;   // as in PhotonTargets
+    std::int32_t sphere_count, lamp_count;
+    std::uint32_t photon_count, first_number; // of this frame; offset into the random sequence
+};
+
+// As in arhost::raytracer_common::PhotonGrid.
+struct PhotonGrid {
+    const float *photons; // nine floats each, as in Photon
+    const std::int32_t *starts;
+    std::int32_t size[3];
+    float low[3], radius;
+};
+struct Photons {
+    PhotonGrid levels[arhost::raytracer_common::PhotonMap::max_levels];
+    std::int32_t level_count;
+};
+
 // What the path integrator needs in addition to the scene.
 struct PathScene {
     const float *sources;    // source_count records (raytracer_common/source_record.hpp)
@@ -131,6 +152,8 @@ struct PathScene {
     std::int32_t sphere_count;
     float max_radiance; // bound of each sample
     Video video;
+    Caustics caustics;
+    Photons photons;
 };
 
 struct Camera {
@@ -192,22 +215,33 @@ struct Scratch {
 // pixels. If there are no such pixels, the rectangle has x1 <= x0.
 using RenderTile = Rectangle (*)(const Frame &frame, const Tile &tile, Scratch &scratch);
 
+// Traces the photons with the numbers from `first` on; `to`: one element per photon.
+using TracePhotons = void (*)(const Frame &frame, std::uint32_t first, std::uint32_t count,
+                              arhost::raytracer_common::Photon *to);
+
 struct Kernel {
     RenderTile render_tile, render_path_tile;
+    TracePhotons trace_photons;
     const char *name;
 };
 
 namespace base {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
+void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
+                   arhost::raytracer_common::Photon *to);
 }
 namespace avx2 {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
+void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
+                   arhost::raytracer_common::Photon *to);
 }
 namespace avx512 {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
+void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
+                   arhost::raytracer_common::Photon *to);
 }
 
 } // namespace rt_embree

@@ -84,14 +84,14 @@ Kernel choose_kernel(const std::string &instruction_set) {
 #if defined(ARHOST_HAS_AVX512)
     if (requested("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
-        return {avx512::render_tile, avx512::render_path_tile, "avx512"};
+        return {avx512::render_tile, avx512::render_path_tile, avx512::trace_photons, "avx512"};
 #endif
 #if defined(__x86_64__)
     if (requested("avx2") && __builtin_cpu_supports("avx2"))
-        return {avx2::render_tile, avx2::render_path_tile, "avx2"};
+        return {avx2::render_tile, avx2::render_path_tile, avx2::trace_photons, "avx2"};
 #endif
     if (requested("base"))
-        return {base::render_tile, base::render_path_tile, "base"};
+        return {base::render_tile, base::render_path_tile, base::trace_photons, "base"};
     throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                   "option 'instruction_set': this processor or this build of rt_embree does not support '" +
                       instruction_set + "'; use 'auto'");
@@ -126,7 +126,7 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
                  threads_),
       samples_per_frame_(settings.samples), samples_(arhost::raytracer_common::sample_positions(settings.samples)),
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
-      single_path_(settings.single_path), max_radiance_(settings.max_radiance),
+      single_path_(settings.single_path), max_radiance_(settings.max_radiance), photons_per_sample_(settings.photons),
       max_radius_squared_(arhost::raytracer_common::max_radius_squared(full_intrinsics_)) {
     if (setup.scene->integrator == ARHOST_INTEGRATOR_PATH) {
         lights_.emplace(*setup.scene);
@@ -170,6 +170,41 @@ void Renderer::set_size(const arhost_camera &camera) {
 void Renderer::place_lights() {
     lights_->place(scene_.placed_objects());
     scene_.set_emitters(lights_->emitters());
+    const auto spheres = lights_->specular_spheres();
+    photon_targets_.set(scene_.arena(), {spheres.begin(), spheres.end()});
+}
+
+// Sends photons from the lamps to mirrors and glass.
+void Renderer::trace_photons(Frame &frame) {
+    constexpr std::uint32_t chunk = 1 << 12, max_photons = 1 << 22;
+    const std::uint64_t wanted = std::uint64_t{photons_per_sample_} * frame.sample_count;
+    if (photon_targets_.empty() || wanted == 0)
+        return;
+    const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted, max_photons));
+    Caustics &caustics = frame.path.caustics;
+    caustics.spheres = photon_targets_.spheres().data()->data();
+    caustics.cumulative = photon_targets_.cumulative().data();
+    caustics.chances = photon_targets_.chances().data();
+    caustics.sphere_count = static_cast<std::int32_t>(photon_targets_.spheres().size());
+    caustics.lamp_count = static_cast<std::int32_t>(frame.scene.light_count);
+    caustics.photon_count = count;
+    caustics.first_number = frame.first_random * photons_per_sample_;
+    photons_.resize(count);
+    threads_.for_each((count + chunk - 1) / chunk, [&](std::size_t i, std::size_t) {
+        const auto first = static_cast<std::uint32_t>(i) * chunk;
+        if (!host_.cancelled())
+            kernel_.trace_photons(frame, first, std::min(chunk, count - first), photons_.data() + first);
+    });
+    photon_map_.build(photons_);
+    Photons &photons = frame.path.photons;
+    for (const arhost::raytracer_common::PhotonGrid &from : photon_map_.levels()) {
+        PhotonGrid &to = photons.levels[photons.level_count++];
+        to.photons = from.photons.data()->position;
+        to.starts = from.starts.data();
+        std::copy_n(from.size.data(), 3, to.size);
+        std::copy_n(from.low.data(), 3, to.low);
+        to.radius = from.radius;
+    }
 }
 
 PathScene Renderer::path_scene() const {
@@ -256,6 +291,8 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     if (!history_.empty())
         for (std::size_t i = 0; i < sum_rows; ++i)
             frame.history[i] = history_.data() + i * tiles.size() * tile_pixels;
+    if (lights_)
+        trace_photons(frame);
     const RenderTile render_tile = lights_ ? kernel_.render_path_tile : kernel_.render_tile;
     Rectangle drawn{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(), 0, 0};
     std::mutex drawn_mutex;

@@ -4,8 +4,9 @@
 #pragma once
 
 #include "embree_scene.hpp"
-#include "raytracer_common/video.hpp"
 #include "ray_table.hpp"
+#include "raytracer_common/photon_map.hpp"
+#include "raytracer_common/video.hpp"
 #include "thread_pool.hpp"
 
 #include <arhost-cpp/plugin.hpp>
@@ -24,6 +25,7 @@ struct Settings {
     bool accumulate = false;        // average over frames while the camera and scene are static
     bool single_path = false;       // glass spawns one random ray instead of two
     float max_radiance = 100;       // path integrator: bound of each sample; infinity: none
+    std::uint32_t photons = 1 << 14; // path integrator: light rays from lamps per frame and sample, for caustics
     std::string instruction_set = "auto";
 };
 
@@ -60,6 +62,7 @@ private:
     void set_size(const arhost_camera &camera);
     void place_lights();
     PathScene path_scene() const;
+    void trace_photons(Frame &frame);
 
     arhost::Host host_;
     const arhost_intrinsics full_intrinsics_; // the intrinsics passed to start
@@ -78,6 +81,10 @@ private:
     std::optional<arhost::raytracer_common::LightSources> lights_;
     std::vector<float> irradiance_; // of the environment
     float max_radiance_;
+    std::uint32_t photons_per_sample_;
+    arhost::raytracer_common::PhotonTargets photon_targets_;
+    std::vector<arhost::raytracer_common::Photon> photons_;
+    arhost::raytracer_common::PhotonMap photon_map_;
     arhost::raytracer_common::VideoImage video_;
     bool has_video_ = false; // of the current frame
     float max_radius_squared_;

@@ -252,4 +252,10 @@ Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratc
     return render<Path>(frame, tile, scratch);
 }
 
+void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
+                   arhost::raytracer_common::Photon *to) {
+    for (std::uint32_t i = 0; i < count; i += lanes)
+        trace_photon_packet(frame, first + i, to + i, lane_numbers() < Int(static_cast<int>(count - i)));
+}
+
 } // namespace rt_embree::ARHOST_ISA

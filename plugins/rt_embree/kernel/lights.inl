@@ -131,33 +131,32 @@ struct Visibility {
 };
 
 // Returns the transmittance of the glass between `origin` and a light source. `to_light`: vector from `origin` to the
-// sampled point; `direction`: unit vector along it; `t_far`: as in LightSample. Sets `is_tinted` for lanes with glass
-// in between.
-// `transmittance_of(material, cosine)`: of a surface of glass.
-template <class TransmittanceOf>
-ARHOST_INLINE Vec3 glass_tint(const Scene &scene, Vec3 origin, Vec3 to_light, Vec3 direction, Float t_far, Bool active,
-                              Bool &is_tinted, TransmittanceOf transmittance_of) {
+// sampled point. Sets `is_tinted` for lanes with glass in between.
+ARHOST_INLINE Vec3 glass_tint(const Scene &scene, Vec3 origin, Vec3 to_light, const LightSample &sample, Bool active,
+                              Bool &is_tinted) {
     constexpr int max_surfaces =
         64; // ignores further surfaces: rays may alternate endlessly between coincident faces
     Vec3 tint = white(), start = origin, remaining = to_light;
     for (int i = 0; i < max_surfaces && any(active); ++i) {
         RTCRayHit16 rays;
-        set_ray(rays.ray, start, remaining, t_far, Int(glass_mask));
+        set_ray(rays.ray, start, remaining, Float(sample.t_far), Int(glass_mask));
         active = trace(scene, scene.root, make_query(Coherence::incoherent), rays, active);
         if (!any(active))
             break;
         is_tinted = is_tinted | active;
         const Surface s = surface_at(scene, rays, active);
-        const Float cosine = abs(dot(s.normal, direction));
+        const Float cosine = abs(dot(s.normal, sample.direction));
         const Float inside = select(s.back_face, s.distance, Float(0.0f)); // mm
         for_each_object(scene, rays.hit, active, [&](const Object &object, Bool here) {
             const arhost_material &glass = *object.material;
             tint = select(here,
-                          tint * transmittance_of(glass, cosine) * bouguer(splat(glass.extinction), inside),
+                          tint * glass_shadow(splat(glass.shadow_attenuation), cosine) *
+                              bouguer(splat(glass.extinction), inside),
                           tint);
         });
         const Vec3 next = s.position - s.geometric_normal * s.offset;
-        remaining = remaining - select(t_far < Float(far_away), next - start, black());
+        if (sample.t_far < far_away)
+            remaining = remaining - (next - start);
         start = next;
         active = active & (largest(tint) > Float(1e-3f));
     }
@@ -176,11 +175,7 @@ ARHOST_INLINE Visibility visibility_of(const Scene &scene, const LightSample &sa
     visibility.is_tinted = bool_of(false);
     visibility.tint = white();
     if (scene.has_glass && any(visibility.unoccluded))
-        visibility.tint = glass_tint(scene, origin, to_light, sample.direction, Float(sample.t_far),
-                                     visibility.unoccluded, visibility.is_tinted,
-                                     [](const arhost_material &glass, Float cosine) __attribute__((always_inline)) {
-                                         return glass_shadow(splat(glass.shadow_attenuation), cosine);
-                                     });
+        visibility.tint = glass_tint(scene, origin, to_light, sample, visibility.unoccluded, visibility.is_tinted);
     return visibility;
 }
 

@@ -6,6 +6,7 @@
 // (Debevec, Rendering Synthetic Objects into Real Scenes, SIGGRAPH 1998; residual path integrals, arXiv 2406.16302).
 #pragma once
 #include "path_catcher.inl"
+#include "photons.inl"
 
 // Paths of fewer bounces are not ended at random.
 constexpr std::uint32_t first_roulette_depth = 2;
@@ -20,36 +21,18 @@ ARHOST_INLINE Bool survive(const Work &work, const Paths &paths, Vec3 &throughpu
     return active & (path_pair(work, paths, roulette_dimension, 0, 1).u < chance);
 }
 
-// A mirror's reflection is not random, and no light sample follows it: its rays see lamps with full weight.
-ARHOST_INLINE void reflect_path(Work &work, const Paths &paths, const Surface &s, Vec3 direction, Vec3 throughput,
-                                Bool active) {
-    active = survive(work, paths, throughput, active);
-    if (any(active))
-        enqueue(work, paths, s.position + s.geometric_normal * s.offset, reflected(s, direction), throughput, active,
-                Float(0.0f));
-}
-
 // Queues a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly.
 ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &paths, const Surface &s, Vec3 direction,
-                                         const arhost_material &glass, Float choice, Bool active) {
-    const Vec3 transmittance = select(s.back_face, bouguer(splat(glass.extinction), s.distance), white());
-    const Float ratio = select(s.back_face, Float(glass.index), Float(1 / glass.index));
-    Refraction refraction = refraction_at(direction, s.normal, ratio);
-    const Bool wrong_side =
-        (dot(refraction.direction, s.geometric_normal) > Float(0.0f)) & (refraction.cosine_squared > Float(0.0f));
-    if (any(active & wrong_side))
-        refraction = refraction_at(direction, select(wrong_side, s.geometric_normal, s.normal), ratio);
-    const Float reflectance = dielectric_reflectance(refraction.cosine, refraction.cosine_squared, ratio);
-    const bool splits = paths.depth == 0;
-    const Bool chosen = choice < reflectance;
-    const Vec3 arriving = paths.throughput * transmittance;
-    Vec3 by_reflection = arriving * splat(glass.reflectivity), by_refraction = arriving * splat(glass.refraction);
-    Bool reflects = active & chosen, refracts = active & ~chosen;
-    if (splits) {
-        by_reflection = by_reflection * reflectance;
-        by_refraction = by_refraction * (Float(1.0f) - reflectance);
+                                         const arhost_material &material, Float choice, Bool active) {
+    const GlassScatter glass = scatter_at_glass(s, direction, material);
+    const Vec3 arriving = paths.throughput * glass.transmittance;
+    Vec3 by_reflection = arriving * splat(material.reflectivity), by_refraction = arriving * splat(material.refraction);
+    Bool reflects = active & (choice < glass.reflectance), refracts = active & ~reflects;
+    if (paths.depth == 0) {
+        by_reflection = by_reflection * glass.reflectance;
+        by_refraction = by_refraction * (Float(1.0f) - glass.reflectance);
         reflects = active;
-        refracts = active & (refraction.cosine_squared >= Float(0.0f));
+        refracts = active & (glass.reflectance < Float(1.0f));
     }
     reflects = survive(work, paths, by_reflection, reflects);
     if (any(reflects))
@@ -57,7 +40,7 @@ ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &paths, const S
                 reflects);
     refracts = survive(work, paths, by_refraction, refracts);
     if (any(refracts))
-        enqueue(work, paths, s.position - s.geometric_normal * s.offset, refraction.direction, by_refraction, refracts);
+        enqueue(work, paths, s.position - s.geometric_normal * s.offset, glass.refracted, by_refraction, refracts);
 }
 
 // Queues one ray for each lane, scattered by the surface.
@@ -78,17 +61,16 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
             mirror_chance = select(here, Float(1.0f), mirror_chance);
         } else if (material.model == ARHOST_MATERIAL_METAL) {
             const Vec3 reflectance = schlick(splat(material.reflectivity), -dot(direction, s.normal));
-            const Float mirror = luminance(reflectance);
             mirror_reflectance = select(here, reflectance, mirror_reflectance);
-            mirror_chance = select(here, mirror / max(mirror + luminance(s.diffuse), Float(1e-6f)), mirror_chance);
+            mirror_chance = select(here, metal_mirror_chance(reflectance, s.diffuse), mirror_chance);
         }
     });
     if (!any(opaque))
         return;
     const Bool mirrors = opaque & (choice.v < mirror_chance);
-    if (any(mirrors))
-        reflect_path(work, paths, s, direction,
-                     paths.throughput * mirror_reflectance * (Float(1.0f) / max(mirror_chance, Float(1e-6f))), mirrors);
+    Vec3 by_mirror = paths.throughput * mirror_reflectance * (Float(1.0f) / max(mirror_chance, Float(1e-6f)));
+    if (const Bool goes_on = survive(work, paths, by_mirror, mirrors); any(goes_on))
+        enqueue(work, paths, s.position + s.geometric_normal * s.offset, reflected(s, direction), by_mirror, goes_on);
     Bool scatters = opaque & ~mirrors & s.is_lit;
     if (!any(scatters))
         return;
@@ -124,7 +106,7 @@ ARHOST_INLINE void shade_path(Work &work, const RTCRayHit16 &rays, Bool active, 
     }
     const Bool emits = active & (largest(s.emission) > Float(0.0f));
     if (any(emits)) {
-        const Float inverse_density = abs(paths.inverse_density);
+        const Float inverse_density = max(paths.inverse_density, Float(0.0f)); // behind mirrors and glass: full weight
         Vec3 emission = s.emission;
         if (paths.depth > 0)
             emission = emission * balance_weight_of_ray(density_of_emitter(work, paths, rays, s, direction, emits),
@@ -133,8 +115,13 @@ ARHOST_INLINE void shade_path(Work &work, const RTCRayHit16 &rays, Bool active, 
     }
     const bool scatters = paths.depth < scene.max_depth;
     const Bool lit = active & s.is_lit;
-    if (any(lit))
-        add_radiance(work, paths, sampled_light(work, paths, s, -direction, scatters, lit), lit);
+    if (any(lit)) {
+        const Vec3 by_photons = photon_light(work, paths, s, lit, [&](Vec3 to_light) __attribute__((always_inline)) {
+            return scattering(s, -direction, to_light, true) *
+                   (Float(1.0f) / max(dot(s.normal, to_light), Float(0.01f)));
+        });
+        add_radiance(work, paths, by_photons + sampled_light(work, paths, s, -direction, scatters, lit), lit);
+    }
     if (scatters)
         scatter_path(work, paths, rays, s, direction, active);
 }

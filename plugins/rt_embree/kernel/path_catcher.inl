@@ -3,6 +3,7 @@
 // Real surfaces: how virtual objects change the light of catchers, and what the video shows of them.
 #pragma once
 #include "path_lights.inl"
+#include "photons.inl"
 
 // Paths that change a catcher have the pixel number of the change, which follows all radiances.
 ARHOST_INLINE Bool changes_catcher(const Paths &paths) {
@@ -99,20 +100,15 @@ ARHOST_INLINE Bounce sample_virtual(const Work &work, const Paths &paths, const 
                               density, Float(0.0f))};
 }
 
-// Returns the part of a lamp's or the environment's sample that virtual objects hide from a real surface. Rays from the
-// surface through glass may find the same lamp; `density_of(direction)`: their density per steradian.
-template <class DensityOf>
-ARHOST_INLINE Vec3 hidden_part(const Work &work, const Surface &s, const SourceSample &sample, Bool active,
-                               DensityOf density_of) {
+// Returns the lanes in which virtual objects hide a lamp's or the environment's sample from a real surface.
+ARHOST_INLINE Bool is_hidden(const Work &work, const Surface &s, const SourceSample &sample, Bool active) {
     active = active & can_meet_virtual(work.frame.path, s.position, sample.to_light, sample.t_far);
-    if (!any(active))
-        return black();
-    const PathVisibility visibility = path_visibility(work.frame.scene, s, sample, active);
-    Vec3 visible = visibility.transmittance;
-    if (any(visibility.is_tinted))
-        visible = visible * select(visibility.is_tinted,
-                                   balance_weight(sample.density, density_of(sample.direction)), Float(1.0f));
-    return select(active, white() - visible, black());
+    return any(active) ? active & ~is_visible(work.frame.scene, s, sample, active) : active;
+}
+
+// Returns the irradiance that photons bring, divided by π.
+ARHOST_INLINE Vec3 photon_irradiance(const Work &work, const Paths &paths, const Surface &s, Bool active) {
+    return photon_light(work, paths, s, active, [](Vec3) { return Float(1.0f); });
 }
 
 // Adds the change of a catcher's light, relative to its light without virtual objects: minus the light that they
@@ -140,13 +136,13 @@ ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHi
         const Bool facing = active & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
         const Bool real = facing & ~sample.is_virtual, emitter = facing & sample.is_virtual;
         if (any(real))
-            change = change - hidden_part(work, s, sample, real, bounce_density) * sample.light * cosine;
+            change = change - select(is_hidden(work, s, sample, real), sample.light * cosine, black());
         if (any(emitter)) {
-            const PathVisibility visibility = path_visibility(frame.scene, s, sample, emitter);
             const Float weight = balance_weight(sample.density, bounce_density(sample.direction));
-            change = change + select(emitter, visibility.transmittance * sample.light * (cosine * weight), black());
+            change = change + select(is_visible(frame.scene, s, sample, emitter), sample.light * (cosine * weight), black());
         }
     }
+    change = change + photon_irradiance(work, paths, s, active);
     add_radiance(work, relative, change, active);
     if (!bounces)
         return;
@@ -212,15 +208,13 @@ ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, 
     const Float cosine = lambert(s.normal, sample.direction);
     const Bool facing =
         active & ~sample.is_virtual & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
-    Vec3 remaining = white();
-    if (any(facing)) {
-        const Vec3 hidden =
-            hidden_part(work, s, sample, facing, [](Vec3) { return Float(0.0f); }) * sample.light * cosine;
-        const auto part = [](Float a, Float whole) __attribute__((always_inline)) {
-            return Float(1.0f) - select(whole > Float(0.0f), a / max(whole, Float(1e-30f)), Float(0.0f));
-        };
-        remaining = {part(hidden.x, before.x), part(hidden.y, before.y), part(hidden.z, before.z)};
-    }
+    Vec3 change = photon_irradiance(work, paths, s, active);
+    if (any(facing))
+        change = change - select(is_hidden(work, s, sample, facing), sample.light * cosine, black());
+    const auto part = [](Float a, Float whole) __attribute__((always_inline)) {
+        return Float(1.0f) + select(whole > Float(0.0f), a / max(whole, Float(1e-30f)), Float(0.0f));
+    };
+    const Vec3 remaining{part(change.x, before.x), part(change.y, before.y), part(change.z, before.z)};
     add_radiance(work, paths, filmed.light * remaining, active);
     return active;
 }

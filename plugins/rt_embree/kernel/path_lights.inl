@@ -3,8 +3,8 @@
 // Light sources of the path integrator: lamps, emissive surfaces and the environment. A light sample chooses one of
 // them at random, in proportion to the light that it sends to the middle of the scene.
 #pragma once
+#include "path_materials.inl"
 #include "path_random.inl"
-#include "scatter.inl"
 
 using namespace arhost::raytracer_common; // SourceRow, SourceType
 
@@ -152,73 +152,15 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
     return sample;
 }
 
-struct PathVisibility {
-    Vec3 transmittance; // 0 if an opaque object is in between
-    Bool is_tinted;     // glass is in between
-};
-
-// Light of the environment that passes through glass is found by refracted rays, so glass hides it here. That of lamps
-// and emissive surfaces passes straight through glass. Real surfaces cast no shadow on each other.
-ARHOST_INLINE PathVisibility path_visibility(const Scene &scene, const Surface &s, const SourceSample &sample,
-                                             Bool active) {
-    const Bool is_finite = sample.t_far < Float(far_away);
-    const Vec3 above = s.lift + s.geometric_normal * s.offset, origin = s.position + above;
-    const Vec3 to_light = sample.to_light - select(is_finite, above, black());
+// Returns the lanes whose light source is not hidden. Light that passes through glass is not sampled: refracted rays
+// and photons find it. Real surfaces cast no shadow on each other.
+ARHOST_INLINE Bool is_visible(const Scene &scene, const Surface &s, const SourceSample &sample, Bool active) {
+    const Vec3 above = s.lift + s.geometric_normal * s.offset;
+    const Vec3 to_light = sample.to_light - select(sample.t_far < Float(far_away), above, black());
     RTCRay16 rays;
-    set_ray(rays, origin, to_light, sample.t_far,
-            select(s.is_real, Int(opaque_mask), Int(opaque_mask | catcher_mask | occluder_mask)) |
-                select(sample.is_environment, Int(glass_mask), Int(0)));
-    const Bool unoccluded = active & ~blocked(scene, rays, active);
-    const Bool through_glass = unoccluded & ~sample.is_environment;
-    Vec3 tint = white();
-    Bool is_tinted = bool_of(false);
-    if (scene.has_glass && any(through_glass))
-        tint = glass_tint(scene, origin, to_light, sample.direction, sample.t_far, through_glass, is_tinted,
-                          [](const arhost_material &glass, Float cosine) __attribute__((always_inline)) {
-                              const Float ratio(1 / glass.index);
-                              return splat(glass.refraction) *
-                                     (Float(1.0f) - dielectric_reflectance(
-                                                        cosine, refracted_cosine_squared(cosine, ratio), ratio));
-                          });
-    return {select(unoccluded, tint, black()), is_tinted};
-}
-
-// The chance that a lit surface scatters a ray by its specular lobe.
-ARHOST_INLINE Float specular_chance(const Surface &s, Vec3 to_eye) {
-    if (!s.any_rough)
-        return Float(0.0f);
-    const Float specular = luminance(schlick(s.specular, dot(s.normal, to_eye))), diffuse = luminance(s.diffuse);
-    const Float chance = specular / max(specular + diffuse, Float(1e-6f));
-    const Float bounded = min(max(chance, Float(0.1f)), Float(0.9f));
-    return select(s.is_rough, select(diffuse > Float(0.0f), bounded, Float(1.0f)), Float(0.0f));
-}
-
-// Returns π · BSDF · cosine of a lit surface. `with_phong`: including the highlights of SPECULAR and METAL, which only
-// light samples see.
-ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light, bool with_phong) {
-    const Float cosine = lambert(s.normal, to_light);
-    Vec3 scattered = s.diffuse * cosine;
-    if (with_phong && s.any_specular)
-        scattered =
-            scattered + select(s.is_rough, black(), s.specular * phong(s.normal, to_light, to_eye, s.exponent));
-    if (s.any_rough) {
-        const Vec3 half_vector = normalize(to_light + to_eye);
-        const Vec3 fresnel = schlick(s.specular, dot(to_eye, half_vector));
-        const Float lobe = ggx_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
-        scattered = select(s.is_rough, s.diffuse * (white() - fresnel) * cosine + fresnel * lobe, scattered);
-    }
-    return scattered;
-}
-
-// Density per steradian of the rays that a lit surface scatters.
-ARHOST_INLINE Float scattering_density(const Surface &s, Vec3 to_eye, Vec3 to_light, Float chance) {
-    Float density = lambert(s.normal, to_light) * Float(0.318309886f) * (Float(1.0f) - chance);
-    if (s.any_rough)
-        density = density + select(s.is_rough,
-                                   chance * ggx_reflection_density(dot(s.normal, to_eye),
-                                                                   dot(s.normal, normalize(to_light + to_eye)), s.alpha),
-                                   Float(0.0f));
-    return select(dot(to_light, s.geometric_normal) > Float(0.0f), density, Float(0.0f));
+    set_ray(rays, s.position + above, to_light, sample.t_far,
+            select(s.is_real, Int(virtual_masks), Int(all_masks)));
+    return active & ~blocked(scene, rays, active);
 }
 
 // Returns the light of sampled light sources that the surfaces reflect. `scatters`: whether scattered rays follow.
@@ -234,14 +176,11 @@ ARHOST_INLINE Vec3 sampled_light(const Work &work, const Paths &paths, const Sur
             active & (dot(s.normal, sample.direction) > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
         if (!any(facing))
             continue;
-        const PathVisibility visibility = path_visibility(scene, s, sample, facing);
+        const Bool visible = is_visible(scene, s, sample, facing);
         Float weight(1.0f);
         if (scatters)
             weight = balance_weight(sample.density, scattering_density(s, to_eye, sample.direction, chance));
-        sum = sum + select(facing,
-                           scattering(s, to_eye, sample.direction, true) * visibility.transmittance * sample.light *
-                               weight,
-                           black());
+        sum = sum + select(visible, scattering(s, to_eye, sample.direction, true) * sample.light * weight, black());
     }
     return sum;
 }
@@ -270,11 +209,15 @@ ARHOST_INLINE Float density_of_emitter(const Work &work, const Paths &paths, con
     return density * Float(static_cast<float>(source_samples(work.frame, paths.depth - 1)));
 }
 
-// Returns the light that rays receive from area lamps before `t_far`, where they hit a surface.
+// Returns the light that rays receive from area lamps before `t_far`, where they hit a surface. Light that reaches a
+// surface by way of mirrors and glass is brought by photons, so rays that a surface has scattered do not count behind
+// them.
 ARHOST_INLINE Vec3 lamps_towards(const Work &work, const Paths &paths, Vec3 origin, Vec3 direction, Float t_far) {
     const float samples = static_cast<float>(source_samples(work.frame, paths.depth - 1));
-    return arriving_from_area_lights(work.frame, origin, direction, t_far, paths.inverse_density,
-                                     [&](std::uint32_t lamp) { return samples * work.frame.path.lamp_chances[lamp]; });
+    const Vec3 light =
+        arriving_from_area_lights(work.frame, origin, direction, t_far, paths.inverse_density,
+                                  [&](std::uint32_t lamp) { return samples * work.frame.path.lamp_chances[lamp]; });
+    return select(paths.inverse_density < Float(0.0f), black(), light);
 }
 
 // Returns the irradiance of a real surface without virtual objects, divided by π: the irradiance map of the

@@ -6,7 +6,7 @@
 #pragma once
 #include "scatter.inl"
 
-enum Dimension : int { source_dimension = 64, light_dimension, scatter_dimension, choice_dimension, roulette_dimension };
+enum Dimension : int { source_dimension = 64, light_dimension, scatter_dimension, choice_dimension, roulette_dimension, photon_dimension };
 
 ARHOST_INLINE Int reversed_bits(Int x) {
     const auto swapped = [](Int a, int distance, int mask) __attribute__((always_inline)) {
@@ -41,16 +41,19 @@ ARHOST_INLINE Int pascal_of(Int index) {
     return add(index, 16, 0x0000ffff);
 }
 
-// Returns pair `index` of the `count` pairs that a sample needs for a dimension of the paths' current vertex.
-ARHOST_INLINE Pair path_pair(const Work &work, const Paths &paths, int dimension, int index, int count) {
-    const Int pixel = paths.pixel ^ work.seed ^ Int(static_cast<int>(paths.depth << 12));
-    const Int seed = hash(hash(pixel) + Int(dimension));
-    const std::uint32_t i = work.sample * static_cast<std::uint32_t>(count) + static_cast<std::uint32_t>(index);
-    const Int shuffled =
-        reversed_bits(nested_permutation(reversed_bits(Int(static_cast<int>(i))), seed ^ Int(0x2545f491)));
+// Returns the point with this index of a two-dimensional sequence.
+ARHOST_INLINE Pair owen_pair(Int index, Int seed) {
+    const Int shuffled = reversed_bits(nested_permutation(reversed_bits(index), seed ^ Int(0x2545f491)));
     const auto unit = [](Int bits) __attribute__((always_inline)) {
         return to_float(shift_right_unsigned(bits, 8)) * Float(0x1p-24f);
     };
     return {unit(reversed_bits(nested_permutation(shuffled, seed))),
             unit(reversed_bits(nested_permutation(pascal_of(shuffled), hash(seed))))};
+}
+
+// Returns pair `index` of the `count` pairs that a sample needs for a dimension of the paths' current vertex.
+ARHOST_INLINE Pair path_pair(const Work &work, const Paths &paths, int dimension, int index, int count) {
+    const Int pixel = paths.pixel ^ work.seed ^ Int(static_cast<int>(paths.depth << 12));
+    const std::uint32_t i = work.sample * static_cast<std::uint32_t>(count) + static_cast<std::uint32_t>(index);
+    return owen_pair(Int(static_cast<int>(i)), hash(hash(pixel) + Int(dimension)));
 }

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How surfaces scatter light in the path integrator.
+#pragma once
+#include "scatter.inl"
+
+// The chance that a lit surface scatters a ray by its specular lobe.
+ARHOST_INLINE Float specular_chance(const Surface &s, Vec3 to_eye) {
+    if (!s.any_rough)
+        return Float(0.0f);
+    const Float specular = luminance(schlick(s.specular, dot(s.normal, to_eye))), diffuse = luminance(s.diffuse);
+    const Float chance = specular / max(specular + diffuse, Float(1e-6f));
+    const Float bounded = min(max(chance, Float(0.1f)), Float(0.9f));
+    return select(s.is_rough, select(diffuse > Float(0.0f), bounded, Float(1.0f)), Float(0.0f));
+}
+
+// Returns π · BSDF · cosine of a lit surface. `with_phong`: including the highlights of SPECULAR and METAL, which only
+// light samples see.
+ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light, bool with_phong) {
+    const Float cosine = lambert(s.normal, to_light);
+    Vec3 scattered = s.diffuse * cosine;
+    if (with_phong && s.any_specular)
+        scattered =
+            scattered + select(s.is_rough, black(), s.specular * phong(s.normal, to_light, to_eye, s.exponent));
+    if (s.any_rough) {
+        const Vec3 half_vector = normalize(to_light + to_eye);
+        const Vec3 fresnel = schlick(s.specular, dot(to_eye, half_vector));
+        const Float lobe = ggx_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+        scattered = select(s.is_rough, s.diffuse * (white() - fresnel) * cosine + fresnel * lobe, scattered);
+    }
+    return scattered;
+}
+
+// Density per steradian of the rays that a lit surface scatters.
+ARHOST_INLINE Float scattering_density(const Surface &s, Vec3 to_eye, Vec3 to_light, Float chance) {
+    Float density = lambert(s.normal, to_light) * Float(0.318309886f) * (Float(1.0f) - chance);
+    if (s.any_rough)
+        density = density + select(s.is_rough,
+                                   chance * ggx_reflection_density(dot(s.normal, to_eye),
+                                                                   dot(s.normal, normalize(to_light + to_eye)), s.alpha),
+                                   Float(0.0f));
+    return select(dot(to_light, s.geometric_normal) > Float(0.0f), density, Float(0.0f));
+}
+
+// The chance that METAL, a mirror over a diffuse surface, reflects a ray like a mirror.
+ARHOST_INLINE Float metal_mirror_chance(Vec3 reflectance, Vec3 diffuse) {
+    const Float mirror = luminance(reflectance);
+    return mirror / max(mirror + luminance(diffuse), Float(1e-6f));
+}
+
+// Reflection and refraction at glass. `transmittance`: of the way inside to the surface.
+struct GlassScatter {
+    Float reflectance;
+    Vec3 transmittance, refracted;
+};
+ARHOST_INLINE GlassScatter scatter_at_glass(const Surface &s, Vec3 direction, const arhost_material &glass) {
+    const Float ratio = select(s.back_face, Float(glass.index), Float(1 / glass.index));
+    Refraction refraction = refraction_at(direction, s.normal, ratio);
+    // If refraction at the interpolated normal leaves the ray on the wrong side, the geometric normal is used instead.
+    const Bool wrong_side =
+        (dot(refraction.direction, s.geometric_normal) > Float(0.0f)) & (refraction.cosine_squared > Float(0.0f));
+    if (any(wrong_side))
+        refraction = refraction_at(direction, select(wrong_side, s.geometric_normal, s.normal), ratio);
+    return {dielectric_reflectance(refraction.cosine, refraction.cosine_squared, ratio),
+            select(s.back_face, bouguer(splat(glass.extinction), s.distance), white()), refraction.direction};
+}

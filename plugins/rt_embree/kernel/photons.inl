@@ -1,0 +1,255 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Caustics: photons that lamps send onto mirrors and glass, and the light that these photons bring to the surfaces on
+// which they arrive. Paths from the eye do not find small lamps by way of mirrors and glass.
+#pragma once
+#include "path_lights.inl"
+
+using arhost::raytracer_common::Photon;
+
+enum PhotonDimension : int { target_dimension = 128, origin_dimension, aim_dimension, first_bounce_dimension };
+
+// Returns the random numbers of a dimension of the photons with these numbers.
+ARHOST_INLINE Pair photon_pair(Int number, int dimension) {
+    return owen_pair(number, hash(Int(dimension)));
+}
+
+// Light that leaves a lamp towards a mirror or glass.
+struct EmittedPhotons {
+    Vec3 origin, direction, power;
+    Bool active;
+    Bool grows; // lamps without falloff: the power is to be multiplied by the squared distance to the first surface
+};
+
+ARHOST_INLINE EmittedPhotons emit_photons(const Frame &frame, Int number, Bool active) {
+    const PathScene &path = frame.path;
+    const Caustics &caustics = path.caustics;
+    const Pair target = photon_pair(number, target_dimension);
+    const Int pair = search(caustics.cumulative, Int(0), caustics.sphere_count * caustics.lamp_count, target.u);
+    const Int lamp = to_int(floor((to_float(pair) + Float(0.5f)) * Float(1.0f / static_cast<float>(caustics.sphere_count))));
+    const Int first_pair = lamp * Int(caustics.sphere_count), first = lamp * Int(source_rows);
+    const auto field = [&](int row) __attribute__((always_inline)) { return gather(path.sources + row, first); };
+    const auto vector = [&](int row) __attribute__((always_inline)) {
+        return Vec3{field(row), field(row + 1), field(row + 2)};
+    };
+    const auto sphere_at = [&](Int i, int row) __attribute__((always_inline)) {
+        return gather(caustics.spheres + row, i << Int(2));
+    };
+    const Int chosen = pair - first_pair;
+    const Vec3 centre{sphere_at(chosen, 0), sphere_at(chosen, 1), sphere_at(chosen, 2)};
+    const Float sphere_radius = sphere_at(chosen, 3);
+    const Int type = to_int(field(type_row));
+    const Bool directional = type == Int(ARHOST_LIGHT_DIRECTIONAL), rectangle = type == Int(ARHOST_LIGHT_RECTANGLE),
+               spot = type == Int(ARHOST_LIGHT_SPOT);
+    const Vec3 lamp_direction = vector(direction_row), position = vector(position_row);
+    const Pair uv = photon_pair(number, origin_dimension), aim = photon_pair(number, aim_dimension);
+
+    // The point of the lamp, and the cone from there to the sphere.
+    const Float radius = field(radius_row);
+    Vec3 origin = position;
+    if (any(radius > Float(0.0f)))
+        origin = select(radius > Float(0.0f), centre + vector_to_disc(position - centre, radius, uv.u, uv.v), origin);
+    if (any(rectangle))
+        origin = select(rectangle,
+                        vector_to_rectangle(position, vector(axis_u_row), vector(axis_v_row), uv.u, uv.v), origin);
+    const auto slope_of = [](Float sphere, Float squared) __attribute__((always_inline)) {
+        const Float sine_squared = min(sphere * sphere / max(squared, Float(1e-20f)), Float(1.0f));
+        // From inside the sphere, all directions.
+        return select(sine_squared < Float(1.0f),
+                      sine_squared / (Float(1.0f) + sqrt(max(Float(1.0f) - sine_squared, Float(0.0f)))), Float(2.0f));
+    };
+    const Vec3 to_centre = centre - origin;
+    const Float squared = dot(to_centre, to_centre);
+    Vec3 direction = cone_direction(normalize(to_centre), slope_of(sphere_radius, squared), aim.u, aim.v);
+    if (any(directional)) { // parallel light, from a disc before the sphere
+        const Vec3 disc = vector_to_disc(-lamp_direction, sphere_radius, aim.u, aim.v) + lamp_direction;
+        origin = select(directional, centre + disc - lamp_direction * (sphere_radius * Float(2.0f)), origin);
+        direction = select(directional, lamp_direction, direction);
+    }
+    // The density of the photons of this lamp in the direction, per steradian, or of parallel light, per area.
+    Float density(0.0f);
+    for (std::int32_t i = 0; i < caustics.sphere_count; ++i) {
+        const float *sphere = caustics.spheres + 4 * i;
+        const Vec3 to_sphere = splat(sphere) - origin;
+        const Float chance = gather(caustics.chances + i, first_pair);
+        const Float slope = slope_of(Float(sphere[3]), dot(to_sphere, to_sphere));
+        const Bool in_cone = dot(direction, normalize(to_sphere)) >= Float(1.0f) - slope;
+        const Vec3 across = to_sphere - direction * dot(to_sphere, direction);
+        const Bool in_beam = dot(across, across) < Float(sphere[3] * sphere[3]);
+        const Float of_cone = Float(0.159154943f) / slope, of_beam(0.318309886f / (sphere[3] * sphere[3]));
+        density = density + chance * select(directional, select(in_beam, of_beam, Float(0.0f)),
+                                            select(in_cone, of_cone, Float(0.0f)));
+    }
+    Float share = Float(1.0f) / max(density * Float(static_cast<float>(caustics.photon_count)), Float(1e-30f));
+    if (any(spot))
+        share = select(spot,
+                       share * spot_attenuation(dot(lamp_direction, direction), field(cosine_inner_row),
+                                                field(cosine_outer_row)),
+                       share);
+    if (any(rectangle))
+        share = select(rectangle, share * lambert(lamp_direction, direction), share);
+    return {origin, direction, vector(intensity_row) * share,
+            active & (share > Float(0.0f)) & (density > Float(0.0f)),
+            (field(falloff_row) < Float(0.5f)) & ~directional};
+}
+
+// Follows photons through mirrors and glass. Returns those that then arrive at another surface.
+ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, Photon *to, Bool active) {
+    const Scene &scene = frame.scene;
+    const Int number = lane_numbers() + Int(static_cast<int>(first + frame.path.caustics.first_number));
+    const EmittedPhotons emitted = emit_photons(frame, number, active);
+    Vec3 origin = emitted.origin, direction = emitted.direction, power = emitted.power;
+    Bool flying = emitted.active, arrived = bool_of(false);
+    Vec3 position = black(), arriving = black();
+    for (std::uint32_t bounce = 0; bounce <= scene.max_depth && any(flying); ++bounce) {
+        RTCRayHit16 rays;
+        set_ray(rays.ray, origin, direction, Float(far_away), Int(all_masks));
+        flying = trace(scene, scene.root, make_query(Coherence::incoherent), rays, flying);
+        if (!any(flying))
+            break;
+        const Surface s = surface_at(scene, rays, flying);
+        if (bounce == 0)
+            power = select(emitted.grows, power * (s.distance * s.distance), power);
+        const Float choice = photon_pair(number, first_bounce_dimension + static_cast<int>(bounce)).u;
+        Bool specular = bool_of(false);
+        Vec3 next_origin = origin, next_direction = direction;
+        for_each_object(scene, rays.hit, flying, [&](const Object &object, Bool here) {
+            const arhost_material &material = *object.material;
+            const Vec3 above = s.position + s.geometric_normal * s.offset;
+            if (material.model == ARHOST_MATERIAL_MIRROR || material.model == ARHOST_MATERIAL_METAL) {
+                Vec3 reflectance = splat(material.reflectivity);
+                Float chance(1.0f);
+                if (material.model == ARHOST_MATERIAL_METAL) {
+                    reflectance = schlick(reflectance, -dot(direction, s.normal));
+                    chance = metal_mirror_chance(reflectance, s.diffuse);
+                }
+                const Bool mirrored = here & (choice < chance);
+                power = select(mirrored, power * reflectance * (Float(1.0f) / max(chance, Float(1e-6f))),
+                               select(here, power * (Float(1.0f) / max(Float(1.0f) - chance, Float(1e-6f))), power));
+                next_origin = select(mirrored, above, next_origin);
+                next_direction = select(mirrored, reflected(s, direction), next_direction);
+                specular = specular | mirrored;
+            } else if (material.model == ARHOST_MATERIAL_GLASS) {
+                const GlassScatter glass = scatter_at_glass(s, direction, material);
+                const Bool reflects = here & (choice < glass.reflectance);
+                power = select(here,
+                               power * glass.transmittance *
+                                   select(reflects, splat(material.reflectivity), splat(material.refraction)),
+                               power);
+                next_origin = select(here, select(reflects, above, s.position - s.geometric_normal * s.offset), next_origin);
+                next_direction = select(here, select(reflects, reflected(s, direction), glass.refracted), next_direction);
+                specular = specular | here;
+            }
+        });
+        if (bounce > 0) {
+            const Bool ends = flying & ~specular & s.is_lit;
+            position = select(ends, s.position, position);
+            arriving = select(ends, direction, arriving);
+            arrived = arrived | ends;
+        }
+        flying = flying & specular & (largest(power) > Float(0.0f));
+        origin = next_origin;
+        direction = normalize(next_direction);
+    }
+    alignas(64) float rows[9][lanes];
+    const Float values[] = {position.x, position.y, position.z, arriving.x, arriving.y, arriving.z,
+                            select(arrived, power.x, Float(-1.0f)), power.y, power.z};
+    for (int row = 0; row < 9; ++row)
+        store(rows[row], values[row]);
+    for (unsigned remaining = mask_of(active.lane); remaining; remaining &= remaining - 1) {
+        const int i = __builtin_ctz(remaining);
+        auto *numbers = reinterpret_cast<float *>(to + i);
+        for (int row = 0; row < 9; ++row)
+            numbers[row] = rows[row][i];
+    }
+}
+
+// The cells of a grid around surface points: two along each axis. The two along x are contiguous.
+struct NearCells {
+    Bool inside[4];
+    Int first[4], end[4]; // photons of each row of two cells
+    Int count;            // photons in all of them
+};
+ARHOST_INLINE NearCells cells_near(const PhotonGrid &grid, const Surface &s, Bool active) {
+    const Float inverse_cell(0.5f / grid.radius), half(0.5f);
+    const Vec3 at = (s.position - splat(grid.low)) * inverse_cell - Vec3{half, half, half};
+    const auto size = [&](int i) __attribute__((always_inline)) { return Float(static_cast<float>(grid.size[i])); };
+    active = active & (at.x > Float(-1.0f)) & (at.y > Float(-1.0f)) & (at.z > Float(-1.0f)) & (at.x < size(0)) &
+             (at.y < size(1)) & (at.z < size(2));
+    NearCells cells;
+    cells.count = Int(0);
+    if (!any(active)) {
+        for (int row = 0; row < 4; ++row)
+            cells.inside[row] = active;
+        return cells;
+    }
+    const Vec3 low{floor(at.x), floor(at.y), floor(at.z)};
+    const Int x0 = to_int(max(low.x, Float(0.0f))), x1 = to_int(min(low.x + Float(1.0f), size(0) - Float(1.0f)));
+    for (int row = 0; row < 4; ++row) {
+        const Float y = low.y + Float(static_cast<float>(row & 1)), z = low.z + Float(static_cast<float>(row >> 1));
+        const Bool inside = active & (y >= Float(0.0f)) & (z >= Float(0.0f)) & (y < size(1)) & (z < size(2));
+        const Int first = (to_int(z) * Int(grid.size[1]) + to_int(y)) * Int(grid.size[0]);
+        cells.inside[row] = inside;
+        cells.first[row] = gather(grid.starts, select(inside, first + x0, Int(0)));
+        cells.end[row] = gather(grid.starts, select(inside, first + x1 + Int(1), Int(0)));
+        cells.count = cells.count + select(inside, cells.end[row] - cells.first[row], Int(0));
+    }
+    return cells;
+}
+
+template <class Weight>
+ARHOST_INLINE Vec3 photon_density(const PhotonGrid &grid, const NearCells &cells, const Surface &s, Bool active,
+                                  Weight weight) {
+    const Float radius_squared(grid.radius * grid.radius), scale(2 / (3.14159265f * grid.radius * grid.radius));
+    Vec3 sum = black();
+    for (int row = 0; row < 4; ++row) {
+        const Bool inside = active & cells.inside[row];
+        for (Int next = cells.first[row]; ; next = next + Int(1)) {
+            const Bool here = inside & (next < cells.end[row]);
+            if (!any(here))
+                break;
+            const Int photon = select(here, next, Int(0)) * Int(9);
+            const auto value = [&](int i) __attribute__((always_inline)) { return gather(grid.photons + i, photon); };
+            const Vec3 offset = Vec3{value(0), value(1), value(2)} - s.position;
+            const Float squared = dot(offset, offset), height = dot(offset, s.geometric_normal);
+            // Photons of other surfaces near an edge do not count.
+            const Bool near = here & (squared < radius_squared) & (height * height < radius_squared * Float(0.09f));
+            if (!any(near))
+                continue;
+            const Vec3 to_light = -Vec3{value(3), value(4), value(5)};
+            const Bool counts = near & (dot(to_light, s.geometric_normal) > Float(0.0f));
+            const Float kernel = scale * (Float(1.0f) - squared * (Float(1.0f) / radius_squared));
+            sum = sum + select(counts, Vec3{value(6), value(7), value(8)} * weight(to_light) * kernel, black());
+        }
+    }
+    return sum;
+}
+
+// Returns the light that photons bring to the surfaces: the sum of weight(direction to the light) · irradiance / π.
+// All samples of a pixel see the same photons, so only some of them make an estimate, for the others too.
+template <class Weight>
+ARHOST_INLINE Vec3 photon_light(const Work &work, const Paths &paths, const Surface &s, Bool active, Weight weight) {
+    const Photons &photons = work.frame.path.photons;
+    if (photons.level_count == 0)
+        return black();
+    const std::int32_t step = work.frame.sample_count > 8 ? 4 : 1;
+    if ((work.sample - work.frame.first_random) % static_cast<std::uint32_t>(step) != 0)
+        return black();
+    const std::int32_t estimates = (work.frame.sample_count + step - 1) / step;
+    const Float jitter = path_pair(work, paths, photon_dimension, 0, 1).u; // hides where the radius changes
+    // The cells cover 16/π times the area of the density estimate.
+    constexpr float enough = 5 * static_cast<float>(arhost::raytracer_common::PhotonMap::photons_per_estimate);
+    const Int limit = to_int(Float(enough) * (Float(1.0f) + Float(3.0f) * jitter));
+    Vec3 sum = black();
+    for (std::int32_t level = 0; level < photons.level_count && any(active); ++level) {
+        const PhotonGrid &grid = photons.levels[level];
+        const NearCells cells = cells_near(grid, s, active);
+        active = active & (Int(0) < cells.count);
+        const Bool dense = active & (limit < cells.count) & bool_of(level + 1 < photons.level_count);
+        const Bool here = active & ~dense;
+        if (any(here))
+            sum = sum + photon_density(grid, cells, s, here, weight);
+        active = dense;
+    }
+    return sum * Float(static_cast<float>(work.frame.sample_count) / static_cast<float>(estimates));
+}
