@@ -38,7 +38,7 @@ Picture::Picture(std::uint32_t width, std::uint32_t height, std::uint8_t fill)
 }
 
 arhost_image Picture::image() {
-    return {sizeof(arhost_image), stride_, width_, height_, bytes() + row(0)};
+    return {sizeof(arhost_image), stride_, width_, height_, bytes() + row(0), nullptr};
 }
 
 Pixel Picture::at(std::uint32_t x, std::uint32_t y) const {

@@ -66,8 +66,10 @@ Tracer::Tracer(Context &context, scene::ArenaBuilder builder, Settings overrides
 
 arhost_status Tracer::try_start(const arhost_intrinsics &intrinsics) {
     stop();
-    const arhost_raytracer_setup setup{sizeof setup,   intrinsics.width, intrinsics.height, 0,
-                                       &scene_->get(), &intrinsics};
+    const arhost_raytracer_setup setup{
+        sizeof setup,   intrinsics.width, intrinsics.height,       ARHOST_IMAGE_FORM_STRAIGHT,
+        &scene_->get(), &intrinsics,      ARHOST_COMPOSITING_SRGB, 0,
+        nullptr};
     const arhost_status status =
         in_call(instance_.library().calls(), Call::start, [&] { return functions_.start(instance_.get(), &setup); });
     if (status == ARHOST_STATUS_OK)
@@ -91,7 +93,7 @@ void Tracer::change_scene(scene::ArenaBuilder builder) {
 
 arhost_status Tracer::try_render(const arhost_camera &camera, Picture &picture, arhost_render_info &info,
                                  const arhost_motion *motion) {
-    const arhost_render_request request{sizeof request, max_samples_, 0, 0, camera, motion};
+    const arhost_render_request request{sizeof request, max_samples_, 0, 0, camera, motion, nullptr};
     slot_ = picture; // keeps its address, because the size is the same
     const arhost_image image = slot_->image();
     info = {};

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Renders a scene with rt_embree's path integrator for `tools/bench light`:
-//   render-light SCENE OUT WIDTH HEIGHT FOCAL_PX EYE_X EYE_Y EYE_Z AT_X AT_Y AT_Z UP_X UP_Y UP_Z SAMPLES FRAMES [KEY=VALUE...]
+//   render-light SCENE OUT WIDTH HEIGHT FOCAL_PX EYE_X EYE_Y EYE_Z AT_X AT_Y AT_Z UP_X UP_Y UP_Z SAMPLES FRAMES
+//   [KEY=VALUE...]
 // renders FRAMES images of SAMPLES samples with successive frame numbers, writes their mean to OUT as six floats per
 // pixel (added light and transmittance), and prints the CPU time of all images as JSON. Keys: light_samples,
 // max_radiance (0: no bound), photons, threads, video (a file of R, G, B bytes: the picture under the overlay).
@@ -30,7 +31,8 @@ float float_of_half(std::uint16_t half) {
 
 void run(int argc, char **argv) {
     if (argc < 17)
-        throw std::runtime_error("usage: render-light SCENE OUT WIDTH HEIGHT FOCAL EYE AT UP SAMPLES FRAMES [KEY=VALUE...]");
+        throw std::runtime_error(
+            "usage: render-light SCENE OUT WIDTH HEIGHT FOCAL EYE AT UP SAMPLES FRAMES [KEY=VALUE...]");
     const auto number = [&](int i) { return std::strtod(argv[i], nullptr); };
     const auto width = static_cast<std::uint32_t>(number(3)), height = static_cast<std::uint32_t>(number(4));
     const arhost_intrinsics intrinsics{sizeof(arhost_intrinsics),
@@ -116,7 +118,8 @@ void run(int argc, char **argv) {
     for (std::size_t i = 0; i < sums.size(); ++i)
         means[i] = static_cast<float>(sums[i] / frames);
     std::ofstream out(argv[2], std::ios::binary);
-    out.write(reinterpret_cast<const char *>(means.data()), static_cast<std::streamsize>(means.size() * sizeof(float)));
+    out.write(reinterpret_cast<const char *>(means.data()),
+              static_cast<std::streamsize>(means.size() * sizeof(float)));
     if (!out.flush())
         throw std::runtime_error(std::string("cannot write ") + argv[2]);
     std::printf(R"({"cpu_s": %.6f, "kernel": "%s"})"

@@ -166,9 +166,12 @@ class Trial {
 public:
     Trial(Case made)
         : case_(std::move(made)), pixels_(width * height * 4),
-          renderer_({sizeof(arhost_raytracer_setup), width, height, 0, &case_.arena.scene(), &camera_.intrinsics},
+          renderer_({sizeof(arhost_raytracer_setup), width, height, ARHOST_IMAGE_FORM_STRAIGHT, &case_.arena.scene(),
+                     &camera_.intrinsics, ARHOST_COMPOSITING_SRGB, 0, nullptr},
                     case_.settings, arhost::Host(&host_)) {}
-    void render() { renderer_.render(camera_, {sizeof(arhost_image), width * 4, width, height, pixels_.data()}); }
+    void render() {
+        renderer_.render(camera_, {sizeof(arhost_image), width * 4, width, height, pixels_.data(), nullptr});
+    }
     const std::vector<std::uint8_t> &pixels() const { return pixels_; }
     const rt_embree::Renderer &renderer() const { return renderer_; }
 

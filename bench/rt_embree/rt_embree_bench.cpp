@@ -94,11 +94,12 @@ class Trial {
 public:
     Trial(const Arena &arena, const rt_embree::Settings &settings)
         : pixels_(width * height * 4),
-          renderer_({sizeof(arhost_raytracer_setup), width, height, 0, &arena.scene(), &camera_.intrinsics}, settings,
-                    arhost::Host(&host_)) {}
+          renderer_({sizeof(arhost_raytracer_setup), width, height, ARHOST_IMAGE_FORM_STRAIGHT, &arena.scene(),
+                     &camera_.intrinsics, ARHOST_COMPOSITING_SRGB, 0, nullptr},
+                    settings, arhost::Host(&host_)) {}
 
     Timing time() {
-        const arhost_image image{sizeof image, width * 4, width, height, pixels_.data()};
+        const arhost_image image{sizeof image, width * 4, width, height, pixels_.data(), nullptr};
         return time_frames([&] { renderer_.render(camera_, image); });
     }
     double covered() const {

@@ -162,11 +162,11 @@ Ours trace(const Arena &arena) {
         const arhost_camera camera = camera_of(sizes[i]);
         const auto [width, height] = sizes[i];
         std::vector<std::uint8_t> pixels(std::size_t{4} * width * height);
-        const arhost_image image{sizeof image, 4 * width, width, height, pixels.data()};
+        const arhost_image image{sizeof image, 4 * width, width, height, pixels.data(), nullptr};
         const auto start = Clock::now();
-        rt_embree::Renderer renderer(
-            {sizeof(arhost_raytracer_setup), width, height, 0, &arena.scene(), &camera.intrinsics}, settings,
-            arhost::Host(&host));
+        rt_embree::Renderer renderer({sizeof(arhost_raytracer_setup), width, height, ARHOST_IMAGE_FORM_STRAIGHT,
+                                      &arena.scene(), &camera.intrinsics, ARHOST_COMPOSITING_SRGB, 0, nullptr},
+                                     settings, arhost::Host(&host));
         renderer.render(camera, image);
         if (i == 1) {
             ours.first_frame_ms = ms_since(start);

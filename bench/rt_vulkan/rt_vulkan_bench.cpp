@@ -83,7 +83,7 @@ double median(std::vector<double> values) {
 class ImageMemory {
 public:
     explicit ImageMemory(const arhost_intrinsics &in)
-        : image_{sizeof image_, 4 * in.width, in.width, in.height, nullptr},
+        : image_{sizeof image_, 4 * in.width, in.width, in.height, nullptr, nullptr},
           bytes_(static_cast<std::uint8_t *>(
                      std::aligned_alloc(4096, (4ul * in.width * in.height + 4095) / 4096 * 4096)),
                  &std::free) {
@@ -118,8 +118,10 @@ rt_vulkan::Shaders bare_shaders(rt_vulkan::Path path) {
 nlohmann::json measured(const rt_vulkan::PhysicalDevice &device, const arhost::Host &host, rt_vulkan::Path path,
                         const scene::Arena &arena, const arhost_camera &view, int rounds) {
     const arhost_scene &scene = arena.scene();
-    const arhost_raytracer_setup setup{sizeof setup, view.intrinsics.width, view.intrinsics.height, 0,
-                                       &scene,       &view.intrinsics};
+    const arhost_raytracer_setup setup{
+        sizeof setup, view.intrinsics.width, view.intrinsics.height,  ARHOST_IMAGE_FORM_STRAIGHT,
+        &scene,       &view.intrinsics,      ARHOST_COMPOSITING_SRGB, 0,
+        nullptr};
     const auto plugin = std::make_unique<rt_vulkan::Renderer>(setup, rt_vulkan::Settings{}, host, device,
                                                               rt_vulkan::shaders_of(path));
     const auto bare =

@@ -118,15 +118,19 @@ Traced raytracer_and_composite(const VideoFrame &video, const std::string &scene
     require(plugin.create(), plugin);
     const auto &raytracer = plugin.functions<arhost_raytracer>();
     const arhost_intrinsics &camera = *trajectory.intrinsics;
-    const arhost_raytracer_setup setup{sizeof setup, camera.width, camera.height, 0, &arena.scene(), &camera};
+    const arhost_raytracer_setup setup{
+        sizeof setup,   camera.width, camera.height,           ARHOST_IMAGE_FORM_STRAIGHT,
+        &arena.scene(), &camera,      ARHOST_COMPOSITING_SRGB, 0,
+        nullptr};
     require(raytracer.start(plugin.instance(), &setup), plugin);
     const GuardedBuffer slot(std::size_t{4} * camera.width * camera.height);
     arhost_render_info info{};
     const double ms = cpu_ms_of(frames, [&](int i) {
         const auto &frame = trajectory.frames[static_cast<std::size_t>(i) % trajectory.frames.size()];
         const arhost_render_request request{
-            sizeof request, 0, frame.frame, 0, arhost::camera::camera_of(frame.view.value(), camera), nullptr};
-        const arhost_image image{sizeof image, 4 * camera.width, camera.width, camera.height, slot.data()};
+            sizeof request, 0,      frame.frame, 0, arhost::camera::camera_of(frame.view.value(), camera),
+            nullptr,        nullptr};
+        const arhost_image image{sizeof image, 4 * camera.width, camera.width, camera.height, slot.data(), nullptr};
         info = {};
         info.struct_size = sizeof info;
         require(raytracer.render(plugin.instance(), &request, &image, &info), plugin);

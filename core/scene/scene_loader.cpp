@@ -92,7 +92,8 @@ void set(float (&to)[3], const glm::vec3 &from) {
 }
 
 constexpr double light_limit = 1e6;
-constexpr std::uint32_t default_path_depth = 8; // later bounces add less than a code to the rooms of tools/bench truth
+constexpr std::uint32_t default_path_depth =
+    8; // later bounces add less than a code to the rooms of tools/bench truth
 
 // Version 2 changed the defaults: scenes of version 1 keep their pictures.
 arhost_integrator integrator_of(const Node &root) {
@@ -363,8 +364,8 @@ arhost_light light_of(const Node &node, arhost_axes axes) {
         node.allow_keys({"type", "position", "intensity", "falloff", "radius"});
         light.radius = static_cast<float>(length_of(node.require("radius")));
     } else if (type == "spot") {
-        node.allow_keys({"type", "position", "intensity", "falloff", "direction", "inner_degrees", "outer_degrees",
-                         "radius"});
+        node.allow_keys(
+            {"type", "position", "intensity", "falloff", "direction", "inner_degrees", "outer_degrees", "radius"});
         if (const auto radius = node.find("radius"))
             light.radius = static_cast<float>(length_of(*radius));
         set(light.direction, direction_of(node.require("direction")));

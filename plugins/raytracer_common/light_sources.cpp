@@ -249,8 +249,9 @@ void LightSources::place(std::span<const PlacedObject> placed) {
         to[radius_row] = is_round ? lamp.radius : 0;
         to[cosine_inner_row] = lamp.cosine_inner;
         to[cosine_outer_row] = lamp.cosine_outer;
-        to[area_row] = static_cast<float>(is_round ? std::numbers::pi * lamp.radius * lamp.radius
-                                                   : 4 * length(vector_of(lamp.axis_u)) * length(vector_of(lamp.axis_v)));
+        to[area_row] =
+            static_cast<float>(is_round ? std::numbers::pi * lamp.radius * lamp.radius
+                                        : 4 * length(vector_of(lamp.axis_u)) * length(vector_of(lamp.axis_v)));
     }
     std::vector<std::uint32_t> object_of; // of each emissive record
     for (std::uint32_t i = 0; i < arena_.objects.count; ++i) {
@@ -262,9 +263,9 @@ void LightSources::place(std::span<const PlacedObject> placed) {
     choose(object_of, middle, extent);
 }
 
-// Sets the chances of the light sources. A lamp, an emissive object and the environment are chosen in proportion to the
-// light that they send to the middle of the virtual objects, and the triangles of an object in proportion to their
-// areas. `object_of`: the object of each emissive record. `extent`: radius of the virtual objects, mm.
+// Sets the chances of the light sources. A lamp, an emissive object and the environment are chosen in proportion to
+// the light that they send to the middle of the virtual objects, and the triangles of an object in proportion to
+// their areas. `object_of`: the object of each emissive record. `extent`: radius of the virtual objects, mm.
 void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 middle, double extent) {
     const std::size_t count = records_.size() / source_rows, lamps = lamp_count(), emissive = object_of.size();
     // Sources nearer than the objects' extent count as if they were that far away.
@@ -287,8 +288,10 @@ void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 midd
             area_of[object_of[i - lamps]] += from[area_row];
         }
     }
-    const auto emitters = static_cast<std::size_t>(std::ranges::count_if(area_of, [](double area) { return area > 0; }));
-    // A small part of the samples is spread evenly, because a surface may be near a source that is far from the middle.
+    const auto emitters =
+        static_cast<std::size_t>(std::ranges::count_if(area_of, [](double area) { return area > 0; }));
+    // A small part of the samples is spread evenly, because a surface may be near a source that is far from the
+    // middle.
     constexpr double even = 0.1;
     const double share = 1 / static_cast<double>(count - emissive + emitters);
     const auto chance_of = [&](double part) { return sum > 0 ? (1 - even) * part / sum + even * share : share; };

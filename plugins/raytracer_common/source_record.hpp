@@ -5,8 +5,8 @@
 
 namespace arhost::raytracer_common {
 
-// A light source is a record of `source_rows` floats: an arhost_light, an emissive triangle (`position`, and its edges
-// `axis_u` and `axis_v`), an emissive ball, or the environment.
+// A light source is a record of `source_rows` floats: an arhost_light, an emissive triangle (`position`, and its
+// edges `axis_u` and `axis_v`), an emissive ball, or the environment.
 enum SourceRow : int {
     type_row,    // an arhost_light_type, or a SourceType
     falloff_row, // 1: inverse-square, 0: none

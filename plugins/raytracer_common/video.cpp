@@ -13,7 +13,9 @@ namespace {
 
 void convert_row(const arhost_frame &frame, const YuvMatrix &matrix, std::size_t y, std::uint8_t *bgr) {
     const arhost_frame_format &format = *frame.format;
-    const auto row = [&](std::size_t plane, std::size_t at) { return frame.plane[plane] + at * format.stride[plane]; };
+    const auto row = [&](std::size_t plane, std::size_t at) {
+        return frame.plane[plane] + at * format.stride[plane];
+    };
     switch (format.pixel_format) {
     case ARHOST_PIXEL_FORMAT_GREY8:
         return rows::bgr_from_grey(row(0, y), bgr, format.width);

@@ -46,7 +46,7 @@ public:
     // Updates the transforms of moved objects and the deformed meshes. `motion` must stay valid until the next call
     // or until this object is no longer used.
     void move(const arhost_motion &motion);
-    std::vector<arhost::raytracer_common::PlacedObject> placed_objects() const; // valid until the next move()
+    std::vector<arhost::raytracer_common::PlacedObject> placed_objects() const;     // valid until the next move()
     void set_emitters(std::span<const arhost::raytracer_common::Emitter> emitters); // one per object
     std::uint64_t rebuilds() const { return rebuilds_; } // number of full rebuilds of deforming objects' BVHs so far
 

@@ -228,8 +228,12 @@ PathScene Renderer::path_scene() const {
     if (!has_video_)
         return path;
     const arhost_intrinsics &of = full_intrinsics_;
-    path.video.image = {video_.texels(),      static_cast<std::int32_t>(of.width), static_cast<std::int32_t>(of.height),
-                        ARHOST_TEXEL_SRGB8, ARHOST_WRAP_CLAMP,                   ARHOST_WRAP_CLAMP};
+    path.video.image = {video_.texels(),
+                        static_cast<std::int32_t>(of.width),
+                        static_cast<std::int32_t>(of.height),
+                        ARHOST_TEXEL_SRGB8,
+                        ARHOST_WRAP_CLAMP,
+                        ARHOST_WRAP_CLAMP};
     path.video.fx = static_cast<float>(of.fx);
     path.video.fy = static_cast<float>(of.fy);
     path.video.cx = static_cast<float>(of.cx);

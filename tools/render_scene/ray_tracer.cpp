@@ -105,8 +105,8 @@ cv::Mat RayTracer::render(const arhost_scene &scene, const arhost_camera &camera
     const std::uint32_t width = camera.intrinsics.width, height = camera.intrinsics.height;
     const std::uint32_t stride = ipc::overlay_stride(width);
     const ImageMemory memory(std::size_t{stride} * height);
-    const arhost_image image{sizeof image, stride, width, height, memory.get()};
-    arhost_render_request request{sizeof request, 0, 0, time_s, camera, nullptr};
+    const arhost_image image{sizeof image, stride, width, height, memory.get(), nullptr};
+    arhost_render_request request{sizeof request, 0, 0, time_s, camera, nullptr, nullptr};
     arhost_motion motion;
     std::optional<arhost::scene::MotionEvaluator> evaluator; // owns the memory of `motion`
     if (scene.duration_s > 0) {
@@ -116,7 +116,15 @@ cv::Mat RayTracer::render(const arhost_scene &scene, const arhost_camera &camera
     arhost_render_info info{};
     info.struct_size = sizeof info;
 
-    const arhost_raytracer_setup setup{sizeof setup, width, height, 0, &scene, &camera.intrinsics};
+    const arhost_raytracer_setup setup{sizeof setup,
+                                       width,
+                                       height,
+                                       ARHOST_IMAGE_FORM_STRAIGHT,
+                                       &scene,
+                                       &camera.intrinsics,
+                                       ARHOST_COMPOSITING_SRGB,
+                                       0,
+                                       nullptr};
     expect_ok("start", functions.start(instance_, &setup));
     const arhost_status status = functions.render(instance_, &request, &image, &info);
     functions.stop(instance_);

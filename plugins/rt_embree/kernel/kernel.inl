@@ -16,8 +16,7 @@ ARHOST_INLINE bool trace_primary_and_shade(Work &work, int first_pixel, Vec3 dir
     const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0, Float(0.0f)};
     const PrimaryHits hits = trace_primary(work.frame.scene, splat(work.frame.camera.eye), direction, active);
     if (any(hits.caught)) {
-        const CatcherLight light =
-            catcher_light(work.frame, hits.catcher_rays, hits.caught, random_of(work, paths));
+        const CatcherLight light = catcher_light(work.frame, hits.catcher_rays, hits.caught, random_of(work, paths));
         const Vec3 hidden = select(hits.caught, light.hidden, black());
         add_to_sum(work.scratch, caught_row, first_pixel, select(hits.caught, Float(1.0f), Float(0.0f)));
         add_to_sum(work.scratch, irradiance_row, first_pixel, select(hits.caught, light.irradiance, Float(0.0f)));

@@ -535,7 +535,7 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         const std::uint32_t width = image->width * self.fineness, height = image->height * self.fineness;
         const std::uint32_t stride = (4 * width + 63) / 64 * 64;
         std::vector<std::uint8_t> bytes(std::size_t{stride} * height);
-        const arhost_image other{sizeof other, stride, width, height, bytes.data()};
+        const arhost_image other{sizeof other, stride, width, height, bytes.data(), nullptr};
         embree_functions().render(self.other, &modified, &other, info);
         for (std::uint32_t y = 0; y < image->height; ++y)
             for (std::uint32_t x = 0; x < image->width; ++x)

@@ -343,7 +343,7 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
     const std::string ball = start + "objects:\n  - {sphere: {radius: 1}, material: grey";
     const arhost::test::ErrorCase cases[] = {
         {"axes: z-up\n", "1:1: the key 'version' is missing"},
-        {"version: 2\naxes: z-up\n", "1:10: version: must be 1"},
+        {"version: 3\naxes: z-up\n", "1:10: version: must be 1 or 2"},
         {"version: 1\naxes: zup\n", "2:7: axes: 'zup' is not one of z-up, y-up; did you mean 'z-up'?"},
         {"version: 1\naxes: z-up\nmaterial: {}\n", "3:1: material: unknown key; did you mean 'materials'?"},
         {start + "max_depth: 101\n", "5:12: max_depth: must be 0 to 100, but is 101"},

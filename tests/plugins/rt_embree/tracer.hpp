@@ -61,7 +61,7 @@ public:
         : width(in.width), height(in.height), stride_((4 * width + 63) / 64 * 64 + 64),
           buffer_(std::size_t{stride_} * height) {}
 
-    arhost_image image() { return {sizeof(arhost_image), stride_, width, height, buffer_.data()}; }
+    arhost_image image() { return {sizeof(arhost_image), stride_, width, height, buffer_.data(), nullptr}; }
     Pixel at(std::uint32_t x, std::uint32_t y) const {
         const std::uint8_t *p = buffer_.data() + std::size_t{stride_} * y + 4 * x;
         return {p[0], p[1], p[2], p[3]};
@@ -162,13 +162,15 @@ public:
 
     arhost_status start(const arhost_intrinsics &in) {
         stop();
-        const arhost_raytracer_setup setup{sizeof setup, in.width, in.height, 0, &scene(), &in};
+        const arhost_raytracer_setup setup{
+            sizeof setup, in.width, in.height, ARHOST_IMAGE_FORM_STRAIGHT, &scene(), &in, ARHOST_COMPOSITING_SRGB, 0,
+            nullptr};
         const arhost_status status = functions().start(plugin_.instance(), &setup);
         started_ = status == ARHOST_STATUS_OK;
         return status;
     }
     arhost_status try_render(const arhost_camera &camera, Picture &picture, const arhost_motion *motion = nullptr) {
-        const arhost_render_request request{sizeof request, 0, 0, 0, camera, motion};
+        const arhost_render_request request{sizeof request, 0, 0, 0, camera, motion, nullptr};
         const arhost_image image = picture.image();
         return functions().render(plugin_.instance(), &request, &image, &picture.info);
     }

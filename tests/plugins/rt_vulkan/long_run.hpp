@@ -70,7 +70,10 @@ inline LongRun long_run(const std::vector<std::filesystem::path> &scenes, int ch
     LongRun run;
     for (int change = 0; change < changes; ++change) {
         const arhost_scene &scene = arenas[static_cast<std::size_t>(change) % arenas.size()].scene();
-        const arhost_raytracer_setup setup{sizeof setup, intrinsics.width, intrinsics.height, 0, &scene, &intrinsics};
+        const arhost_raytracer_setup setup{
+            sizeof setup, intrinsics.width, intrinsics.height,       ARHOST_IMAGE_FORM_STRAIGHT,
+            &scene,       &intrinsics,      ARHOST_COMPOSITING_SRGB, 0,
+            nullptr};
         require(functions.start(plugin.instance(), &setup));
         scene::MotionEvaluator evaluator(scene);
         for (int i = 0; i < images; ++i) {
@@ -80,9 +83,14 @@ inline LongRun long_run(const std::vector<std::filesystem::path> &scenes, int ch
                                            : camera({side, 150, 330}, {0, 50, 0}, {0, 1, 0}, intrinsics);
             const arhost_motion motion = evaluator.at(0.04 * i);
             const arhost_render_request request{
-                sizeof request, 0, static_cast<std::uint64_t>(i), 0, view, scene.duration_s > 0 ? &motion : nullptr};
-            const arhost_image image{sizeof image, 4 * intrinsics.width, intrinsics.width, intrinsics.height,
-                                     memory.get() + static_cast<std::size_t>(i) % slots * size};
+                sizeof request, 0, static_cast<std::uint64_t>(i), 0, view, scene.duration_s > 0 ? &motion : nullptr,
+                nullptr};
+            const arhost_image image{sizeof image,
+                                     4 * intrinsics.width,
+                                     intrinsics.width,
+                                     intrinsics.height,
+                                     memory.get() + static_cast<std::size_t>(i) % slots * size,
+                                     nullptr};
             arhost_render_info info{};
             info.struct_size = sizeof info;
             require(functions.render(plugin.instance(), &request, &image, &info));

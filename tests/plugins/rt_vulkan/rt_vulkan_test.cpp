@@ -178,7 +178,15 @@ TEST_P(EachPath, TracesTheSamePictureInBandsAndAtOnce) {
     scene::Arena arena = rich_scene().build();
     for (const std::uint32_t height : {1u, 7u, 65u, 72u}) {
         const arhost_intrinsics in = pinhole(96, height, 96);
-        const arhost_raytracer_setup setup{sizeof setup, in.width, in.height, 0, &arena.scene(), &in};
+        const arhost_raytracer_setup setup{sizeof setup,
+                                           in.width,
+                                           in.height,
+                                           ARHOST_IMAGE_FORM_STRAIGHT,
+                                           &arena.scene(),
+                                           &in,
+                                           ARHOST_COMPOSITING_SRGB,
+                                           0,
+                                           nullptr};
         // Renders three images and returns the third. The first image always uses bands, because its time is not yet
         // known; the second may use them.
         const auto third = [&](rt_vulkan::Bands::Milliseconds max_band_time) {
@@ -255,8 +263,15 @@ TEST_P(EachPath, RendersSeveralScenesInTurn) {
     RendererParts parts(GetParam());
     const auto picture_of = [&](scene::ArenaBuilder scene, const arhost_camera &view) {
         scene::Arena arena = std::move(scene).build();
-        const arhost_raytracer_setup setup{sizeof setup,   small.width,     small.height, 0,
-                                           &arena.scene(), &view.intrinsics};
+        const arhost_raytracer_setup setup{sizeof setup,
+                                           small.width,
+                                           small.height,
+                                           ARHOST_IMAGE_FORM_STRAIGHT,
+                                           &arena.scene(),
+                                           &view.intrinsics,
+                                           ARHOST_COMPOSITING_SRGB,
+                                           0,
+                                           nullptr};
         rt_vulkan::Renderer renderer = parts.renderer(setup);
         Picture picture(small);
         const rt_vulkan::Rectangle drawn = renderer.render(view, picture.image());
@@ -281,7 +296,15 @@ TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
         GTEST_SKIP() << parts.device.name << " does not support VK_EXT_external_memory_host";
     scene::Arena arena = rich_scene().build();
     const arhost_camera view = from_the_side(small);
-    const arhost_raytracer_setup setup{sizeof setup, small.width, small.height, 0, &arena.scene(), &view.intrinsics};
+    const arhost_raytracer_setup setup{sizeof setup,
+                                       small.width,
+                                       small.height,
+                                       ARHOST_IMAGE_FORM_STRAIGHT,
+                                       &arena.scene(),
+                                       &view.intrinsics,
+                                       ARHOST_COMPOSITING_SRGB,
+                                       0,
+                                       nullptr};
     rt_vulkan::Renderer renderer = parts.renderer(setup);
 
     const std::uint32_t stride = 4 * small.width + 64;
@@ -294,7 +317,7 @@ TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
         pictures.emplace_back(small);
     while (reinterpret_cast<std::uintptr_t>(pictures.back().image().rgba) % 4096 == 0);
     Picture &copied = pictures.back();
-    const arhost_image in_place{sizeof in_place, stride, small.width, small.height, memory};
+    const arhost_image in_place{sizeof in_place, stride, small.width, small.height, memory, nullptr};
     const rt_vulkan::Rectangle drawn = renderer.render(view, in_place);
     if (!renderer.wrote_in_place() && parts.device.properties.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU)
         GTEST_SKIP() << parts.device.name << " does not import shared memory"; // such as AMD's Linux driver
@@ -441,7 +464,15 @@ TEST(Device, RejectsADeviceThatLacksARequirement) {
     const rt_vulkan::PhysicalDevice usable = instance.devices()[0];
     const auto shaders = rt_vulkan::shaders_of(rt_vulkan::Path::plain);
     scene::Arena arena = rich_scene().build();
-    const arhost_raytracer_setup setup{sizeof setup, small.width, small.height, 0, &arena.scene(), &small};
+    const arhost_raytracer_setup setup{sizeof setup,
+                                       small.width,
+                                       small.height,
+                                       ARHOST_IMAGE_FORM_STRAIGHT,
+                                       &arena.scene(),
+                                       &small,
+                                       ARHOST_COMPOSITING_SRGB,
+                                       0,
+                                       nullptr};
     const auto complaint = [&](auto change) {
         rt_vulkan::PhysicalDevice device = usable;
         change(device);

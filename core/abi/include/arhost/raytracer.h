@@ -40,7 +40,7 @@ typedef struct arhost_raytracer_setup {
     const arhost_intrinsics *intrinsics; /* the same in every request, except with ARHOST_CAPABILITY_SCALED_IMAGES;
                                             precompute ray tables here */
     arhost_compositing compositing;
-    uint32_t reserved; /* 0 */
+    uint32_t reserved;                       /* 0 */
     const arhost_frame_format *video_format; /* of every arhost_render_request.video; NULL: there is no video */
 } arhost_raytracer_setup;
 
@@ -59,14 +59,15 @@ typedef struct arhost_render_request {
     const arhost_frame *video;
 } arhost_render_request;
 
-/* The image to write, top row first. Write every pixel and nothing else; leave the bytes after the last row unchanged.
- * The pixels are aligned to a 4,096-byte page and their last page is fully mapped, so a GPU can import the memory.
- * Between `start` and `stop`, the pointer has at most 8 different values. Near clip: 1e-4 × scene extent.
+/* The image to write, top row first. Write every pixel and nothing else; leave the bytes after the last row
+ * unchanged. The pixels are aligned to a 4,096-byte page and their last page is fully mapped, so a GPU can import the
+ * memory. Between `start` and `stop`, the pointer has at most 8 different values. Near clip: 1e-4 × scene extent.
  *
- * ARHOST_IMAGE_FORM_STRAIGHT: R, G, B, A bytes, straight (not premultiplied) alpha, sRGB-encoded. Alpha is exactly 0 where the primary ray hits nothing (the colour is then ignored) and 255 on virtual objects. Samples of a
- * pixel are averaged in linear light and then encoded. Samples brighter than white count in full, up to a bound of at
- * least 100 times white. Samples of virtual objects and samples of shadows are averaged separately; the two averages
- * are blended in sRGB, weighted by their shares of the alpha.
+ * ARHOST_IMAGE_FORM_STRAIGHT: R, G, B, A bytes, straight (not premultiplied) alpha, sRGB-encoded. Alpha is exactly 0
+ * where the primary ray hits nothing (the colour is then ignored) and 255 on virtual objects. Samples of a pixel are
+ * averaged in linear light and then encoded. Samples brighter than white count in full, up to a bound of at least 100
+ * times white. Samples of virtual objects and samples of shadows are averaged separately; the two averages are
+ * blended in sRGB, weighted by their shares of the alpha.
  *
  * ARHOST_IMAGE_FORM_LINEAR: eight half-precision floats (IEEE 754 binary16) per pixel: added light R, G, B, 0, then
  * transmittance R, G, B, 0. The host shows added + transmittance · video in each channel, where the video is linear
@@ -87,7 +88,8 @@ typedef struct arhost_image {
 typedef struct arhost_render_info {
     uint32_t struct_size;
     int32_t has_region; /* non-zero: the following four fields are set; 0: the region is the whole image */
-    /* Region, px. Outside it, virtual objects affect no pixel; the host skips these pixels. Width 0: the whole image is empty. */
+    /* Region, px. Outside it, virtual objects affect no pixel; the host skips these pixels. Width 0: the whole image
+     * is empty. */
     uint32_t region_x, region_y, region_width, region_height;
     uint64_t device_time_ns; /* device (GPU) time from the image's first command to its last; 0: not measured */
     uint32_t full_samples;   /* samples per pixel that an image without a limit would take, whatever the limit of this

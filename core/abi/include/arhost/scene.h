@@ -257,8 +257,8 @@ enum {
      * `shadow_alpha_opaque` and `shadow_alpha_translucent`. */
     ARHOST_INTEGRATOR_WHITTED = 1,
     /* All paths of at most `max_depth` bounces: light that surfaces reflect onto each other, emissive surfaces as
-     * light sources. `background` is the radiance of an environment of one colour. Ignores `ambient` and the constants
-     * of shadows. Catchers show the change of their light (ARHOST_IMAGE_FORM_LINEAR). */
+     * light sources. `background` is the radiance of an environment of one colour. Ignores `ambient` and the
+     * constants of shadows. Catchers show the change of their light (ARHOST_IMAGE_FORM_LINEAR). */
     ARHOST_INTEGRATOR_PATH = 2
 };
 

@@ -38,7 +38,8 @@ ARHOST_LEAF Float shadow_alpha(Float opaque_fraction, Float translucent_fraction
 // Alpha of a straight image, from the transmittance of a linear one (arhost/raytracer.h): the mean light that it
 // removes from the video.
 ARHOST_LEAF Float overlay_alpha(Vec3 transmittance) {
-    Float sum = min(transmittance.x, Float(1.0)) + min(transmittance.y, Float(1.0)) + min(transmittance.z, Float(1.0));
+    Float sum =
+        min(transmittance.x, Float(1.0)) + min(transmittance.y, Float(1.0)) + min(transmittance.z, Float(1.0));
     return max(Float(1.0) - sum * Float(1.0 / 3.0), Float(0.0));
 }
 

@@ -65,9 +65,9 @@ ARHOST_LEAF Float glass_reflected_fraction(Bool from_inside, Float cosine, Float
                   glass_reflectance(select(from_inside, refracted, cosine), exponent, minimum, maximum));
 }
 
-// Fresnel's reflectance of a dielectric for unpolarized light; 1 for total internal reflection. `cosine`: of the angle of
-// incidence; `refracted_squared`: squared cosine of the angle of refraction; `ratio`: as in refracted_cosine_squared
-// (Fresnel 1823; M. Pharr et al., Physically Based Rendering, 4th edition, section 9.3.5).
+// Fresnel's reflectance of a dielectric for unpolarized light; 1 for total internal reflection. `cosine`: of the
+// angle of incidence; `refracted_squared`: squared cosine of the angle of refraction; `ratio`: as in
+// refracted_cosine_squared (Fresnel 1823; M. Pharr et al., Physically Based Rendering, 4th edition, section 9.3.5).
 ARHOST_LEAF Float dielectric_reflectance(Float cosine, Float refracted_squared, Float ratio) {
     Float refracted = sqrt(max(refracted_squared, Float(0.0)));
     Float parallel = (cosine - ratio * refracted) / max(cosine + ratio * refracted, Float(1e-6));
