@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "compositor/compositor.hpp"
 
+#include "pixels/linear.hpp"
 #include "pixels/rows.hpp"
 
 #include <algorithm>
@@ -13,7 +14,7 @@ namespace arhost {
 namespace {
 
 Region clipped(const Region &region, const ImageView &overlay, const arhost_frame_format &format) {
-    if (!overlay.rgba || region.x >= format.width || region.y >= format.height)
+    if (!overlay.pixels || region.x >= format.width || region.y >= format.height)
         return {};
     return {region.x, region.y, std::min(region.width, format.width - region.x),
             std::min(region.height, format.height - region.y)};
@@ -34,6 +35,16 @@ void convert_row(const arhost_frame_format &format, const YuvMatrix &matrix, con
     case ARHOST_PIXEL_FORMAT_I420:
         return rows::bgr_from_i420(row(0, y), row(1, y / 2), row(2, y / 2), matrix, bgr, format.width);
     }
+}
+
+void blend_row(const std::uint8_t *bgr, const std::uint8_t *overlay, const OverlayFormat &format, std::uint8_t *out,
+               std::size_t count) {
+    if (format.is_linear())
+        rows::add_light(bgr, reinterpret_cast<const std::uint16_t *>(overlay), out, count);
+    else if (format.compositing == ARHOST_COMPOSITING_LINEAR)
+        blend_in_linear_light(bgr, overlay, out, count);
+    else
+        rows::blend(bgr, overlay, out, count);
 }
 
 constexpr std::uint32_t one = 128; // weights are multiples of 1/128, so that the sums fit in 32 bits
@@ -61,10 +72,37 @@ std::pair<std::uint32_t, std::uint32_t> enlarged(std::uint32_t begin, std::uint3
             std::min(to_size, static_cast<std::uint32_t>(std::ceil((end + 0.5) * factor + 0.5)))};
 }
 
+void mix_straight(const std::uint8_t *const (&corners)[4], const std::uint32_t (&weights)[4], std::uint8_t *to) {
+    std::uint32_t alpha = 0, sums[3] = {};
+    for (int i = 0; i < 4; ++i) {
+        const std::uint32_t share = weights[i] * corners[i][3];
+        alpha += share;
+        for (int c = 0; c < 3; ++c)
+            sums[c] += share * corners[i][c];
+    }
+    for (int c = 0; c < 3; ++c)
+        to[c] = static_cast<std::uint8_t>(alpha > 0 ? (sums[c] + alpha / 2) / alpha : 0);
+    to[3] = static_cast<std::uint8_t>((alpha + one * one / 2) / (one * one));
+}
+
+void mix_linear(const std::uint8_t *const (&corners)[4], const std::uint32_t (&weights)[4], std::uint8_t *to) {
+    LinearPixel pixels[4];
+    for (int i = 0; i < 4; ++i)
+        std::memcpy(&pixels[i], corners[i], sizeof pixels[i]);
+    LinearPixel mixed = pixels[0];
+    if (std::ranges::count(pixels, mixed) < 4) {
+        LinearSum sum;
+        for (int i = 0; i < 4; ++i)
+            sum.add(pixels[i], static_cast<float>(weights[i]) / (one * one));
+        mixed = sum.pixel();
+    }
+    std::memcpy(to, &mixed, sizeof mixed);
+}
+
 } // namespace
 
 Region enlarge(const ImageView &image, std::uint32_t from_width, std::uint32_t from_height, const Region &region,
-               const arhost_frame_format &format, std::uint8_t *rgba, std::size_t stride) {
+               const arhost_frame_format &format, std::uint8_t *pixels, std::size_t stride) {
     if (region.width == 0 || region.height == 0 || region.x >= from_width || region.y >= from_height)
         return {};
     const auto [x0, x1] =
@@ -76,27 +114,18 @@ Region enlarge(const ImageView &image, std::uint32_t from_width, std::uint32_t f
         columns.push_back(between(x, from_width, format.width));
     for (std::uint32_t y = y0; y < y1; ++y) {
         const Between row = between(y, from_height, format.height);
-        const std::uint8_t *upper = image.rgba + row.first * image.stride,
-                           *lower = image.rgba + row.second * image.stride;
-        std::uint8_t *to = rgba + y * stride + 4 * std::size_t{x0};
+        std::uint8_t *to = pixels + y * stride + x0 * image.format.pixel_bytes();
         for (const Between &column : columns) {
-            const std::uint8_t *pixels[] = {
-                upper + std::size_t{4} * column.first, upper + std::size_t{4} * column.second,
-                lower + std::size_t{4} * column.first, lower + std::size_t{4} * column.second};
+            const std::uint8_t *corners[] = {image.at(column.first, row.first), image.at(column.second, row.first),
+                                             image.at(column.first, row.second), image.at(column.second, row.second)};
             const std::uint32_t weights[] = {(one - column.weight) * (one - row.weight),
                                              column.weight * (one - row.weight), (one - column.weight) * row.weight,
                                              column.weight * row.weight};
-            std::uint32_t alpha = 0, sums[3] = {};
-            for (int i = 0; i < 4; ++i) {
-                const std::uint32_t share = weights[i] * pixels[i][3];
-                alpha += share;
-                for (int c = 0; c < 3; ++c)
-                    sums[c] += share * pixels[i][c];
-            }
-            for (int c = 0; c < 3; ++c)
-                to[c] = static_cast<std::uint8_t>(alpha > 0 ? (sums[c] + alpha / 2) / alpha : 0);
-            to[3] = static_cast<std::uint8_t>((alpha + one * one / 2) / (one * one));
-            to += 4;
+            if (image.format.is_linear())
+                mix_linear(corners, weights, to);
+            else
+                mix_straight(corners, weights, to);
+            to += image.format.pixel_bytes();
         }
     }
     return {x0, y0, x1 - x0, y1 - y0};
@@ -124,8 +153,7 @@ void composite(const arhost_frame_format &format, const std::uint8_t *const plan
             }
         }
         if (blending)
-            rows::blend(from + begin, overlay.rgba + y * overlay.stride + 4 * std::size_t(inside.x), to + begin,
-                        inside.width);
+            blend_row(from + begin, overlay.at(inside.x, y), overlay.format, to + begin, inside.width);
     }
 }
 

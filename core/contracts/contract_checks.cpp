@@ -2,12 +2,14 @@
 #include "contracts/contract_checks.hpp"
 
 #include "camera/lens_model.hpp"
+#include "pixels/linear.hpp"
 #include "scene/motion.hpp"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <set>
 #include <string_view>
 #include <tuple>
@@ -84,6 +86,36 @@ std::optional<Rectangle> rectangle_of(const scene::Box &box, const arhost_camera
     }
     constexpr double margin = 1.5; // px; the ray tracer's samples are spread around the pixel's centre
     return Rectangle{bounds.min - margin, bounds.max + margin};
+}
+
+// How much of the video a virtual object in the pixel hides. In a linear image, a fully shadowed catcher has a
+// transmittance of 0, too, but adds no light.
+enum class Coverage { none, partial, full };
+Coverage coverage_of(const std::uint8_t *bytes, const OverlayFormat &format) {
+    if (!format.is_linear())
+        return bytes[3] == 0 ? Coverage::none : bytes[3] == 255 ? Coverage::full : Coverage::partial;
+    LinearPixel pixel;
+    std::memcpy(&pixel, bytes, sizeof pixel);
+    if (pixel == untouched)
+        return Coverage::none;
+    const auto is_zero = [](std::uint16_t half) { return half == 0; };
+    return std::ranges::all_of(pixel.transmittance, is_zero) && !std::ranges::all_of(pixel.added, is_zero)
+               ? Coverage::full
+               : Coverage::partial;
+}
+
+std::string problem_with_light(const std::uint8_t *bytes, std::uint32_t x, std::uint32_t y) {
+    std::uint16_t halves[8];
+    std::memcpy(halves, bytes, sizeof halves);
+    for (int i = 0; i < 8; ++i) {
+        if (halves[i] >= 0x7c00) // infinite, NaN, or the sign is set
+            return fmt::format("pixel ({}, {}): value {} is {}; it must be finite and not negative", x, y, i,
+                               float_of(halves[i]));
+        if (i % 4 == 3 && halves[i] != 0)
+            return fmt::format("pixel ({}, {}): value {} is {}, but reserved; it must be 0", x, y, i,
+                               float_of(halves[i]));
+    }
+    return {};
 }
 
 } // namespace
@@ -167,8 +199,9 @@ std::size_t sample_hash(std::span<const std::byte> bytes, std::uint64_t frame) {
 
 OverlayChecks::OverlayChecks(const arhost_scene &scene) {
     const auto is_opaque = [](float alpha) { return alpha * 255 >= 254.5f; };
-    checks_place_ = !scene::is_moving(scene) && !is_opaque(scene.shadow_alpha_opaque) &&
-                    !is_opaque(scene.shadow_alpha_translucent);
+    checks_place_ = !scene::is_moving(scene);
+    has_translucent_shadows_ = scene.integrator == ARHOST_INTEGRATOR_WHITTED &&
+                               !is_opaque(scene.shadow_alpha_opaque) && !is_opaque(scene.shadow_alpha_translucent);
     if (!checks_place_)
         return;
     const auto array = [&]<class T>(const arhost_buffer &buffer, const T *) {
@@ -195,7 +228,8 @@ OverlayChecks::OverlayChecks(const arhost_scene &scene) {
 void OverlayChecks::check(ContractChecks &checks, std::uint64_t frame, const arhost_camera &camera,
                           const Region &region, const ImageView &overlay) {
     const std::optional<Rectangle> rectangle = virtual_box_ ? rectangle_of(*virtual_box_, camera) : Rectangle();
-    const bool can_check_place = checks_place_ && rectangle;
+    const bool can_check_place =
+        (overlay.format.is_linear() || has_translucent_shadows_) && checks_place_ && rectangle;
     const bool is_pinhole = camera.intrinsics.distortion == ARHOST_DISTORTION_NONE;
     if (!is_pinhole && can_check_place && !lens_)
         lens_.emplace(camera.intrinsics);
@@ -214,28 +248,33 @@ void OverlayChecks::check(ContractChecks &checks, std::uint64_t frame, const arh
         if (!at || (at->x >= rectangle->min.x && at->x <= rectangle->max.x && at->y >= rectangle->min.y &&
                     at->y <= rectangle->max.y))
             return {};
-        return fmt::format("pixel ({}, {}): alpha is 255, but {}", x, y,
+        return fmt::format("pixel ({}, {}): {}, but {}", x, y,
+                           overlay.format.is_linear() ? "adds light and hides the video" : "alpha is 255",
                            virtual_box_ ? fmt::format("all virtual objects are between ({:.0f}, {:.0f}) and ({:.0f}, "
                                                       "{:.0f}){}",
                                                       rectangle->min.x, rectangle->min.y, rectangle->max.x,
                                                       rectangle->max.y, is_pinhole ? "" : " before lens distortion")
                                         : std::string("there is no virtual object"));
     };
-    std::string outside_region, misplaced;
+    std::string outside_region, misplaced, not_a_light;
     for (std::uint32_t y = first_of(frame); y < camera.intrinsics.height; y += sample_step) {
-        const std::uint8_t *alpha = overlay.rgba + y * overlay.stride + 3;
         std::optional<std::uint32_t> first, last; // opaque pixels of this row that are inside the region
-        for (std::uint32_t x = 0; x < camera.intrinsics.width; ++x, alpha += 4) {
-            if (*alpha == 0)
+        for (std::uint32_t x = 0; x < camera.intrinsics.width; ++x) {
+            const Coverage coverage = coverage_of(overlay.at(x, y), overlay.format);
+            if (coverage == Coverage::none)
                 continue;
+            if (overlay.format.is_linear() && not_a_light.empty())
+                not_a_light = problem_with_light(overlay.at(x, y), x, y);
             // Left of or above the region, the subtraction wraps to a large number.
             const bool in_region = x - region.x < region.width && y - region.y < region.height;
             if (outside_region.empty() && !in_region)
                 outside_region = fmt::format(
-                    "pixel ({}, {}) is outside the reported region, but has alpha {}; the region is {} x {} px at "
-                    "({}, {})",
-                    x, y, *alpha, region.width, region.height, region.x, region.y);
-            if (*alpha == 255 && in_region) {
+                    "pixel ({}, {}) is outside the reported region, but {}; the region is {} x {} px at ({}, {})", x,
+                    y,
+                    overlay.format.is_linear() ? "changes the video"
+                                               : fmt::format("has alpha {}", overlay.at(x, y)[3]),
+                    region.width, region.height, region.x, region.y);
+            if (coverage == Coverage::full && in_region) {
                 if (!first)
                     first = x;
                 last = x;
@@ -251,6 +290,8 @@ void OverlayChecks::check(ContractChecks &checks, std::uint64_t frame, const arh
     checks.add("raytracer.region", frame, outside_region);
     if (can_check_place)
         checks.add("raytracer.place", frame, misplaced);
+    if (overlay.format.is_linear())
+        checks.add("raytracer.light", frame, not_a_light);
 }
 
 } // namespace arhost::contracts

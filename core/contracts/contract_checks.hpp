@@ -83,9 +83,10 @@ void check_tracking(ContractChecks &checks, std::uint64_t frame, std::span<const
 std::size_t sample_hash(std::span<const std::byte> bytes, std::uint64_t frame);
 
 // Checks the images of a ray tracer:
-// raytracer.region: alpha is 0 outside the reported region.
-// raytracer.place: alpha is 255 only inside the projected bounding box of the virtual objects. Checked only for
-// static scenes.
+// raytracer.region: virtual objects affect no pixel outside the reported region.
+// raytracer.place: alpha is 255 only inside the projected bounding box of the virtual objects, or in a linear image,
+// light is added and the video hidden only there. Checked only for static scenes.
+// raytracer.light: the numbers of a linear image are finite and not negative, the reserved ones 0.
 class OverlayChecks {
 public:
     explicit OverlayChecks(const arhost_scene &scene);
@@ -94,6 +95,7 @@ public:
                const ImageView &overlay);
 
 private:
+    bool has_translucent_shadows_ = false;  // straight images: alpha is 255 on virtual objects only
     bool checks_place_ = false;             // whether raytracer.place is checked
     std::optional<shading::Lens> lens_;     // lens of the camera, the same in all frames
     std::optional<scene::Box> virtual_box_; // world coordinates, mm; nullopt if the scene has no virtual object

@@ -122,6 +122,7 @@ std::unique_ptr<SceneLoading> Assembly::load(const run_config::Scene &scene,
         if (const std::string problem = problem_with(anchors, tracker_of_anchors()); !problem.empty())
             return on_failed(problem);
         loaded->coordinates = latest_->coordinates.value_or(camera::default_for(content.axes));
+        loaded->integrator = content.integrator;
         if (conform)
             loaded->overlay_checks.emplace(content);
         loaded->arena = std::move(arena);

@@ -2,6 +2,7 @@
 #include "host/compositing.hpp"
 
 #include "host/raytracer.hpp"
+#include "pixels/linear.hpp"
 
 #include <algorithm>
 #include <cstring>
@@ -28,9 +29,13 @@ void copy_inputs(const Frame &frame, const arhost_frame_format &format, const Im
     if (!frame.has_overlay())
         return;
     for (std::size_t y = region.y; y < region.y + region.height; ++y) {
-        const std::size_t begin = y * stride + 4 * std::size_t{region.x};
-        std::memcpy(rgba + begin, reinterpret_cast<const std::byte *>(overlay.rgba) + begin,
-                    4 * std::size_t{region.width});
+        const std::uint8_t *from = overlay.at(region.x, y);
+        std::byte *const to = rgba + y * stride + 4 * std::size_t{region.x};
+        if (overlay.format.is_linear())
+            straight_from_linear(reinterpret_cast<const std::uint16_t *>(from), reinterpret_cast<std::uint8_t *>(to),
+                                 region.width);
+        else
+            std::memcpy(to, from, 4 * std::size_t{region.width});
     }
 }
 
@@ -81,10 +86,10 @@ std::pair<ImageView, Region> Compositing::full_size_overlay(const Frame &frame) 
     const ImageView overlay = overlay_of(frame, format);
     if (width == format.width && height == format.height)
         return {overlay, region};
-    const std::size_t stride = overlay_stride(format.width);
+    const std::size_t stride = overlay_stride(format.width, overlay.format.form);
     enlarged_.resize(stride * format.height);
     const Region larger = enlarge(overlay, width, height, region, format, enlarged_.data(), stride);
-    return {ImageView{enlarged_.data(), stride}, larger};
+    return {ImageView{enlarged_.data(), stride, overlay.format}, larger};
 }
 
 // Reports a contract violation if a buffer changed after hand-over.

@@ -3,6 +3,7 @@
 // A video frame on its way through a run.
 #pragma once
 
+#include "compositor/compositor.hpp"
 #include "host/quality.hpp"
 #include "host/slots.hpp"
 #include "host/statistics.hpp"
@@ -46,6 +47,7 @@ struct Frame {
     Lease anchors;              // slot that the ray tracer reads, while rendering
     Lease overlay;              // slot in the ray tracer's memory
     arhost_render_info render{};
+    OverlayFormat overlay_format;       // of the worker that rendered the overlay
     Quality quality;                    // quality of the overlay
     arhost_record record{};             // without the arrays and their lengths
     std::vector<arhost_target> targets; // the targets that have been seen so far

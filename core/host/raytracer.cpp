@@ -26,7 +26,8 @@ std::pair<std::uint32_t, std::uint32_t> overlay_size(const arhost_frame_format &
 
 ImageView overlay_of(const Frame &frame, const arhost_frame_format &format) {
     return {reinterpret_cast<const std::uint8_t *>(frame.overlay.bytes().data()),
-            overlay_stride(overlay_size(format, frame.quality).first)};
+            overlay_stride(overlay_size(format, frame.quality).first, frame.overlay_format.form),
+            frame.overlay_format};
 }
 
 Raytracer::Raytracer(RunParts &parts, Configuration configuration, std::shared_ptr<LoadedScene> scene,
@@ -40,23 +41,48 @@ Raytracer::Raytracer(RunParts &parts, Configuration configuration, std::shared_p
 
 SlotLayout Raytracer::on_ready(const messages::Ready &) {
     const arhost_frame_format &format = parts_.video.format;
-    return {std::uint64_t(overlay_stride(format.width)) * format.height, stage_slot_count};
+    return {std::uint64_t(overlay_stride(format.width, overlay_format_.form)) * format.height, stage_slot_count};
 }
 
 void Raytracer::on_disabled(const std::string &reason, bool is_configuration_error) {
     parts_.failures.add_disabled("raytracer", configuration_->node, reason, is_configuration_error);
 }
 
+// Whether the plugin does not support the camera's lens, so that its worker warps the images.
+bool Raytracer::warps_images(const PluginDescription &plugin) const {
+    return parts_.video.intrinsics.distortion != ARHOST_DISTORTION_NONE &&
+           !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION);
+}
+
+OverlayFormat Raytracer::choose_format(const PluginDescription &plugin) const {
+    const bool is_path = scene_->integrator == ARHOST_INTEGRATOR_PATH;
+    OverlayFormat format;
+    format.compositing =
+        configuration_->composite.value_or(is_path ? ARHOST_COMPOSITING_LINEAR : ARHOST_COMPOSITING_SRGB);
+    if (!is_path || format.compositing == ARHOST_COMPOSITING_SRGB)
+        return format;
+    if (plugin.capabilities & ARHOST_CAPABILITY_LINEAR_IMAGES)
+        format.form = ARHOST_IMAGE_FORM_LINEAR;
+    else
+        component().log(ARHOST_SEVERITY_WARNING,
+                        plugin.id + " cannot write linear images: the overlay cannot brighten the video, and its "
+                                    "shadows have no colour");
+    return format;
+}
+
 Component::Create Raytracer::on_hello(const PluginDescription &plugin, std::size_t candidate) {
     const Video &video = parts_.video;
     std::vector<OptionValue> options =
         parts_.options.choose(component(), ARHOST_KIND_RAYTRACER, *configuration_, candidate);
-    if (video.intrinsics.distortion != ARHOST_DISTORTION_NONE &&
-        !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION))
+    if (warps_images(plugin))
         component().log(ARHOST_SEVERITY_WARNING,
                         plugin.id + " does not support lens distortion: its worker warps the rendered images, which "
                                     "costs sharpness and time");
-    return {{std::move(options), messages::RaytracerSetup{video.format.width, video.format.height, video.intrinsics}},
+    overlay_format_ = choose_format(plugin);
+    reads_video_ = (plugin.capabilities & ARHOST_CAPABILITY_VIDEO) != 0 && !warps_images(plugin);
+    return {{std::move(options), messages::RaytracerSetup{video.format.width, video.format.height, video.intrinsics,
+                                                          overlay_format_.form, overlay_format_.compositing,
+                                                          reads_video_ ? std::optional(video.format) : std::nullopt}},
             {scene_->arena.fd()}};
 }
 
@@ -84,6 +110,8 @@ void Raytracer::render(Frame &frame) {
     command.kind = CommandKind::render;
     command.slot = frame.overlay.index();
     command.sequence = frame.record.sequence;
+    command.capture_ns = frame.record.capture_ns;
+    command.clock = frame.record.clock;
     command.time_s = 1e-9 * static_cast<double>(frame.record.capture_ns);
     command.max_samples = frame.quality.samples;
     command.camera = frame.record.camera;
@@ -91,11 +119,14 @@ void Raytracer::render(Frame &frame) {
         const auto [width, height] = overlay_size(parts_.video.format, frame.quality);
         command.camera.intrinsics = shading::scaled(frame.record.camera.intrinsics, width, height);
     }
-    if (!frame.anchors)
-        return component().submit(command);
-    write_anchors(frame);
-    command.input_slot = frame.anchors.index();
-    component().submit(command, frame.anchors.region());
+    if (frame.anchors) {
+        write_anchors(frame);
+        command.input_slot = frame.anchors.index();
+    }
+    if (reads_video_)
+        command.video_slot = frame.pixels.index();
+    component().submit(command, frame.anchors ? frame.anchors.region() : nullptr, nullptr,
+                       reads_video_ ? frame.pixels.region() : nullptr);
 }
 
 // Writes the poses of the anchors: the targets to which objects of the scene are attached. The poses are those of
@@ -131,6 +162,7 @@ void Raytracer::on_result(const Command &command, const Result &result) {
     if (!frame)
         return;
     frame->render = result.render;
+    frame->overlay_format = overlay_format_;
     frame->times.raytracer = busy;
     frame->times.device = device;
     frame->record.overlay_scale = frame->quality.scale < 1 ? frame->quality.scale : 0;
@@ -155,8 +187,7 @@ void Raytracer::start_quality() {
     const auto supports = [&](std::uint32_t capability) { return (plugin.capabilities & capability) != 0; };
     QualityController::Limits limits{.target_fps = run.target_fps};
     // If the worker warps the images because the plugin does not support lenses, they must have full size.
-    if (supports(ARHOST_CAPABILITY_SCALED_IMAGES) &&
-        (supports(ARHOST_CAPABILITY_LENS_DISTORTION) || parts_.video.intrinsics.distortion == ARHOST_DISTORTION_NONE))
+    if (supports(ARHOST_CAPABILITY_SCALED_IMAGES) && !warps_images(plugin))
         limits.min_scale = run.min_scale;
     limits.max_samples = full_samples_.value_or(0);
     limits.min_samples = std::min(run.min_samples, limits.max_samples);

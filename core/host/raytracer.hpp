@@ -15,6 +15,7 @@ struct LoadedScene {
     std::set<std::filesystem::path> files; // as in SceneLoading::Callbacks
     ipc::SharedMemory arena;
     std::vector<Anchor> anchors;
+    arhost_integrator integrator = ARHOST_INTEGRATOR_WHITTED;
     camera::Coordinates coordinates;                        // from the configuration or from the scene's axes
     std::optional<contracts::OverlayChecks> overlay_checks; // only for `conform: true`
 };
@@ -44,13 +45,18 @@ private:
     void on_running() override { start_quality(); }
     void on_result(const ipc::Command &command, const ipc::Result &result) override;
     void on_disabled(const std::string &reason, bool is_configuration_error) override;
+    bool warps_images(const model::PluginDescription &plugin) const;
+    OverlayFormat choose_format(const model::PluginDescription &plugin) const;
     void start_quality();
     void set_full_samples(std::uint32_t full_samples);
     void write_anchors(const Frame &frame) const;
 
     const Configuration configuration_;
     const std::shared_ptr<LoadedScene> scene_;
-    std::shared_ptr<SlotPool> anchor_slots_;   // slots for AnchorPose; null if the scene has no anchors
+    std::shared_ptr<SlotPool> anchor_slots_; // slots for AnchorPose; null if the scene has no anchors
+    // Of the current worker.
+    OverlayFormat overlay_format_;
+    bool reads_video_ = false;
     std::optional<QualityController> quality_; // only with `live.target_fps`
     std::string adapted_plugin_;               // the plugin whose quality is adapted
     std::optional<std::uint32_t>

@@ -137,7 +137,7 @@ namespace messages {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SourceSetup, first_sequence, fps, paced, intrinsics)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TrackerSetup, format, intrinsics, full_search_every, smooth, confirm)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RaytracerSetup, width, height, intrinsics)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(RaytracerSetup, width, height, intrinsics, form, compositing, video_format)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SinkSetup, video_format, fps, first_sequence, intrinsics, run_description)
 
 void to_json(Json &json, const Create &create) {

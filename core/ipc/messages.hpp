@@ -93,6 +93,9 @@ struct RaytracerSetup {
     static constexpr const char *kind = "raytracer";
     std::uint32_t width = 0, height = 0;
     arhost_intrinsics intrinsics{};
+    arhost_image_form form = ARHOST_IMAGE_FORM_STRAIGHT;
+    arhost_compositing compositing = ARHOST_COMPOSITING_SRGB;
+    std::optional<arhost_frame_format> video_format{}; // set: each command names a frame of this format
 };
 struct SinkSetup {
     static constexpr const char *kind = "sink";

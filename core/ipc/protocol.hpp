@@ -21,7 +21,8 @@ enum class CommandKind : std::uint32_t {
     track = 3,   // tracker: process slot `input_slot` of input memory `input_generation`, with the state in slot
                  // `state_slot` of input memory `state_generation`; write result and new state to output slot `slot`
     render = 4,  // ray tracer: render the view of `camera` into output slot `slot`; the anchors of the scene, if it
-                 // has any, are in slot `input_slot` of input memory `input_generation`
+                 // has any, are in slot `input_slot` of input memory `input_generation`, and the frame under the
+                 // overlay, if the setup has a format for it, in slot `video_slot` of `video_generation`
     write = 5    // sink: write the frame in slot `input_slot` of input memory `input_generation`
 };
 
@@ -39,6 +40,8 @@ struct Command {
     std::uint32_t state_is_of_solver_only; // non-zero: another plugin wrote the plugin's part of the state
     double time_s;
     std::uint32_t max_samples; // render: as in arhost_render_request
+    std::uint32_t video_generation;
+    std::uint32_t video_slot;
     std::uint32_t reserved;
     arhost_camera camera;
 };
@@ -95,9 +98,9 @@ using CommandConsumer = Consumer<Command, ring_capacity>;
 using ResultProducer = Producer<Result, ring_capacity>;
 using ResultConsumer = Consumer<Result, ring_capacity>;
 
-// Bytes from one row of the RGBA8 image in a ray tracer's slot to the next.
-inline std::uint32_t overlay_stride(std::uint32_t width) {
-    return (width * 4 + 63) / 64 * 64;
+// Bytes from one row of the image in a ray tracer's slot to the next.
+inline std::uint32_t overlay_stride(std::uint32_t width, arhost_image_form form = ARHOST_IMAGE_FORM_STRAIGHT) {
+    return (width * (form == ARHOST_IMAGE_FORM_LINEAR ? 16 : 4) + 63) / 64 * 64;
 }
 
 // A slot that a ray tracer's worker reads contains one AnchorPose for each anchor of the scene.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pixels/rows.hpp"
 
+#include "pixels/linear.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -17,7 +19,19 @@ namespace arhost::rows::HWY_NAMESPACE {
 
 using Bytes = const std::uint8_t *;
 
+bool is_untouched(const std::uint16_t *pixel) {
+    return std::memcmp(pixel, &untouched, sizeof untouched) == 0;
+}
+
 #if HWY_TARGET == HWY_SCALAR
+void add_light(Bytes bgr, const std::uint16_t *linear, std::uint8_t *out, std::size_t count) {
+    for (std::size_t i = 0; i < count; ++i, linear += 8)
+        for (std::size_t c = 0; c < 3; ++c)
+            out[3 * i + c] = is_untouched(linear)
+                                 ? bgr[3 * i + c]
+                                 : added_and_transmitted(linear[2 - c], linear[6 - c], bgr[3 * i + c]);
+}
+
 void blend(Bytes bgr, Bytes rgba, std::uint8_t *out, std::size_t count) {
     for (std::size_t i = 0; i < count; ++i)
         for (std::size_t c = 0; c < 3; ++c)
@@ -170,6 +184,49 @@ void blend(Bytes bgr, Bytes rgba, std::uint8_t *out, std::size_t count) {
                          [](const auto &in, std::uint8_t *to) HWY_ATTR { blend_chunk(in[0], in[1], to); });
 }
 
+const hn::FixedTag<float, 4> df4;
+const hn::FixedTag<std::int32_t, 4> di4;
+
+HWY_INLINE auto floats_of(const std::uint16_t *halves) {
+#if HWY_ARCH_X86 && HWY_TARGET > HWY_AVX2 // Highway's emulation is wrong for infinity and NaN
+    const float numbers[] = {float_of(halves[0]), float_of(halves[1]), float_of(halves[2]), float_of(halves[3])};
+    return hn::LoadU(df4, numbers);
+#else
+    const hn::Rebind<hwy::float16_t, decltype(df4)> d_half;
+    return hn::PromoteTo(df4, hn::LoadU(d_half, reinterpret_cast<const hwy::float16_t *>(halves)));
+#endif
+}
+
+// The same as Srgb8Table, for four numbers.
+HWY_INLINE auto codes_of(const shading::Srgb8Table &table, hn::Vec<decltype(df4)> light) {
+    using Table = shading::Srgb8Table;
+    const auto smallest = hn::Set(df4, Table::smallest);
+    const auto x = hn::IfThenElse(hn::Gt(light, smallest), hn::Min(light, hn::Set(df4, 1.0f)), smallest);
+    const auto bits = hn::BitCast(di4, x);
+    const auto index = hn::ShiftRight<Table::shift>(hn::Sub(bits, hn::Set(di4, Table::first_bits)));
+    const auto cell = hn::GatherIndex(di4, table.cells, index);
+    const auto is_same =
+        hn::Lt(hn::And(bits, hn::Set(di4, Table::low_mask)), hn::And(cell, hn::Set(di4, Table::threshold_mask)));
+    const auto next = hn::Add(hn::ShiftRight<Table::code_shift>(cell), hn::Set(di4, 1));
+    return hn::Add(next, hn::VecFromMask(di4, is_same)); // true is −1
+}
+
+void add_light(Bytes bgr, const std::uint16_t *linear, std::uint8_t *out, std::size_t count) {
+    const LightTables &tables = light_tables();
+    for (std::size_t i = 0; i < count; ++i, bgr += 3, linear += 8, out += 3) {
+        if (is_untouched(linear)) {
+            std::memmove(out, bgr, 3);
+            continue;
+        }
+        const float video[] = {tables.light_of[bgr[2]], tables.light_of[bgr[1]], tables.light_of[bgr[0]], 0};
+        const auto light = hn::Add(floats_of(linear), hn::Mul(floats_of(linear + 4), hn::LoadU(df4, video)));
+        std::int32_t codes[4];
+        hn::StoreU(codes_of(tables.code_of, light), di4, codes);
+        for (std::size_t c = 0; c < 3; ++c)
+            out[c] = static_cast<std::uint8_t>(codes[2 - c]);
+    }
+}
+
 void bgr_from_grey(Bytes grey, std::uint8_t *bgr, std::size_t count) {
     for_each_chunk<1, 3>({grey}, {2}, bgr, count, [](const auto &in, std::uint8_t *to) HWY_ATTR {
         const V8 y = hn::LoadU(d8, in[0]);
@@ -312,6 +369,7 @@ HWY_AFTER_NAMESPACE();
 namespace arhost::rows {
 
 HWY_EXPORT(blend);
+HWY_EXPORT(add_light);
 HWY_EXPORT(bgr_from_grey);
 HWY_EXPORT(bgr_from_rgb);
 HWY_EXPORT(bgr_from_yuyv);
@@ -324,6 +382,9 @@ HWY_EXPORT(grey_from_limited_luma);
 
 void blend(const std::uint8_t *bgr, const std::uint8_t *rgba, std::uint8_t *out, std::size_t count) {
     HWY_DYNAMIC_DISPATCH(blend)(bgr, rgba, out, count);
+}
+void add_light(const std::uint8_t *bgr, const std::uint16_t *linear, std::uint8_t *out, std::size_t count) {
+    HWY_DYNAMIC_DISPATCH(add_light)(bgr, linear, out, count);
 }
 void bgr_from_grey(const std::uint8_t *grey, std::uint8_t *bgr, std::size_t count) {
     HWY_DYNAMIC_DISPATCH(bgr_from_grey)(grey, bgr, count);

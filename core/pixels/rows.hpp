@@ -14,6 +14,11 @@ namespace arhost::rows {
 // Blends `rgba` over `bgr` and writes the result to `out`, which may be the same buffer as `bgr`.
 void blend(const std::uint8_t *bgr, const std::uint8_t *rgba, std::uint8_t *out, std::size_t count);
 
+// Adds the light of an overlay of ARHOST_IMAGE_FORM_LINEAR, eight halves per pixel, to the light of `bgr` that it
+// transmits; like added_and_transmitted() of linear.hpp, and exactly `bgr` where the pixel is `untouched`. `out` may
+// be `bgr`.
+void add_light(const std::uint8_t *bgr, const std::uint16_t *linear, std::uint8_t *out, std::size_t count);
+
 // Convert to BGR. For YUV formats, `count` must be even, and chroma is replicated.
 void bgr_from_grey(const std::uint8_t *grey, std::uint8_t *bgr, std::size_t count);
 void bgr_from_rgb(const std::uint8_t *rgb, std::uint8_t *bgr, std::size_t count);

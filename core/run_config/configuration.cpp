@@ -269,6 +269,10 @@ void parse_stages(Configuration &configuration, const Shared &shared, const std:
         if (!configuration.tracker && !configuration.trajectory)
             node->fail("a ray tracer needs camera poses from a 'tracker' or a 'trajectory'");
         configuration.raytracer->scene = find_scene(scene, built_in_plugins);
+        if (const auto composite = node->find("composite"))
+            configuration.raytracer->composite = composite->choice(key_at("raytracer.composite").choices) == "linear"
+                                                     ? ARHOST_COMPOSITING_LINEAR
+                                                     : ARHOST_COMPOSITING_SRGB;
     }
 }
 

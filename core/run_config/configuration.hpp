@@ -57,6 +57,7 @@ struct TrackerConfiguration : ComponentConfiguration {
 struct RaytracerConfiguration : ComponentConfiguration {
     std::filesystem::path scene;
     yaml::Node scene_node;
+    std::optional<arhost_compositing> composite{}; // nullopt: the scene's integrator decides
 };
 
 struct Scene {

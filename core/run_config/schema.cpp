@@ -20,7 +20,7 @@ struct Row {
 };
 
 constexpr std::string_view run_modes[] = {"lockstep", "live"}, distortion_models[] = {"none", "brown", "fisheye"},
-                           filters[] = {"none", "adaptive"};
+                           filters[] = {"none", "adaptive"}, compositing_spaces[] = {"linear", "srgb"};
 
 constexpr Row run_keys[] = {
     {"version", integer, required, "Version of this format: 1."},
@@ -135,6 +135,10 @@ constexpr Row tracker_keys[] = {
 constexpr Row raytracer_keys[] = {
     {"scene", input_path, required,
      "Scene file (docs/scenes.md), or the name of a scene in config/scenes, such as demo."},
+    {"composite", text, "from the scene's integrator",
+     "Space in which the overlay is blended with the video: `linear` light, the default of `integrator: path`, or "
+     "`srgb` codes, the default of `integrator: whitted`.",
+     compositing_spaces},
     fallback,
     conform};
 

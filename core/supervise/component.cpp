@@ -136,11 +136,14 @@ std::uint32_t Component::attach(const RegionPointer &input) {
     return attached_inputs_.back().generation;
 }
 
-void Component::submit(Command command, const RegionPointer &input, const RegionPointer &state) {
+void Component::submit(Command command, const RegionPointer &input, const RegionPointer &state,
+                       const RegionPointer &video) {
     if (input)
         command.input_generation = attach(input);
     if (state)
         command.state_generation = attach(state);
+    if (video)
+        command.video_generation = attach(video);
     std::erase_if(attached_inputs_, [this](const AttachedInput &attached) {
         if (!attached.region.expired())
             return false;

@@ -103,9 +103,10 @@ public:
     const RegionPointer &output() const { return output_; }
 
     std::size_t in_flight() const { return in_flight_.size(); }
-    // Sets the ticket and the generations of the command and sends it. If the worker does not know `input` or `state`
-    // yet, attaches them first. Detaches inputs to which nothing refers any more.
-    void submit(ipc::Command command, const RegionPointer &input = nullptr, const RegionPointer &state = nullptr);
+    // Sets the ticket and the generations of the command and sends it. First attaches the regions that the worker
+    // does not know yet. Detaches inputs to which nothing refers any more.
+    void submit(ipc::Command command, const RegionPointer &input = nullptr, const RegionPointer &state = nullptr,
+                const RegionPointer &video = nullptr);
 
     // Answers a command of the sink. Does nothing if the worker that sent the command is no longer running:
     // `restarts` is the number of restarts when the command was sent.

@@ -2,6 +2,7 @@
 #include "worker/lens_warp.hpp"
 
 #include "ipc/protocol.hpp"
+#include "pixels/linear.hpp"
 
 #include <arhost/shading/lens.hpp>
 
@@ -19,12 +20,20 @@ constexpr std::size_t page = 4096; // alignment of arhost_image.rgba
 
 } // namespace
 
-LensWarp::LensWarp(const arhost_intrinsics &lens, const std::function<void(double)> &progress) : pinhole_(lens) {
+void set_pixels(arhost_image &image, arhost_image_form form, void *pixels) {
+    if (form == ARHOST_IMAGE_FORM_LINEAR)
+        image.linear = static_cast<std::uint16_t *>(pixels);
+    else
+        image.rgba = static_cast<std::uint8_t *>(pixels);
+}
+
+LensWarp::LensWarp(const arhost_intrinsics &lens, arhost_image_form form, const std::function<void(double)> &progress)
+    : pinhole_(lens), form_(form) {
     const shading::Lens distortion(lens);
     const std::size_t width = lens.width, height = lens.height;
     sources_.resize(width * height, {no_source, no_source});
     // One page more for the alignment, and one for the rest of the last page.
-    pixels_.resize(ipc::overlay_stride(lens.width) * height + 2 * page);
+    pixels_.resize(std::size_t{ipc::overlay_stride(lens.width, form)} * height + 2 * page);
     double max_x = 1e-3, max_y = 1e-3; // extent of the lens's view on the plane z = 1
     for (std::size_t y = 0; y < height; ++y) {
         if (progress)
@@ -55,12 +64,12 @@ LensWarp::LensWarp(const arhost_intrinsics &lens, const std::function<void(doubl
 arhost_image LensWarp::pinhole_image() {
     arhost_image image{};
     image.struct_size = sizeof image;
-    image.stride = ipc::overlay_stride(pinhole_.width);
+    image.stride = ipc::overlay_stride(pinhole_.width, form_);
     image.width = pinhole_.width;
     image.height = pinhole_.height;
     void *at = pixels_.data();
     std::size_t room = pixels_.size();
-    image.rgba = static_cast<std::uint8_t *>(std::align(page, room - page, at, room));
+    set_pixels(image, form_, std::align(page, room - page, at, room));
     return image;
 }
 
@@ -76,27 +85,51 @@ void LensWarp::warp(const arhost_render_info &info, const arhost_image &lens_ima
                 top = has_region ? static_cast<float>(info.region_y) : 0;
     const float right = has_region ? end(info.region_x, info.region_width, width) : static_cast<float>(width),
                 bottom = has_region ? end(info.region_y, info.region_height, height) : static_cast<float>(height);
+    // Calls add(x, y, weight) for the pixels of the pinhole image between which the source lies.
+    const auto for_each_neighbour = [&](const Point &source, const auto &add) {
+        const float x0 = std::floor(source.x), y0 = std::floor(source.y), across = source.x - x0,
+                    down = source.y - y0;
+        for (int corner = 0; corner < 4; ++corner) {
+            const float x = x0 + static_cast<float>(corner & 1), y = y0 + static_cast<float>(corner >> 1);
+            if (x >= left && x < right && y >= top && y < bottom)
+                add(static_cast<std::size_t>(x), static_cast<std::size_t>(y),
+                    (corner & 1 ? across : 1 - across) * (corner >> 1 ? down : 1 - down));
+        }
+    };
+    const auto is_inside = [&](const Point &source) {
+        return source.x > left - 1 && source.x < right && source.y > top - 1 && source.y < bottom;
+    };
     for (std::size_t row = 0; row < height; ++row) {
+        const Point *source = &sources_[row * width];
+        if (form_ == ARHOST_IMAGE_FORM_LINEAR) {
+            auto *out = reinterpret_cast<LinearPixel *>(reinterpret_cast<std::byte *>(lens_image.linear) +
+                                                        row * lens_image.stride);
+            for (std::size_t column = 0; column < width; ++column, ++source, ++out) {
+                *out = untouched;
+                if (!is_inside(*source))
+                    continue;
+                LinearSum sum;
+                for_each_neighbour(*source, [&](std::size_t x, std::size_t y, float weight) {
+                    sum.add(reinterpret_cast<const LinearPixel *>(reinterpret_cast<const std::byte *>(image.linear) +
+                                                                  y * image.stride)[x],
+                            weight);
+                });
+                *out = sum.pixel();
+            }
+            continue;
+        }
         std::uint8_t *out = lens_image.rgba + row * lens_image.stride;
         std::memset(out, 0, 4 * width);
-        for (std::size_t column = 0; column < width; ++column, out += 4) {
-            const Point &source = sources_[row * width + column];
-            if (!(source.x > left - 1 && source.x < right && source.y > top - 1 && source.y < bottom))
+        for (std::size_t column = 0; column < width; ++column, ++source, out += 4) {
+            if (!is_inside(*source))
                 continue;
-            const float x0 = std::floor(source.x), y0 = std::floor(source.y), across = source.x - x0,
-                        down = source.y - y0;
             float sum[4] = {};
-            for (int corner = 0; corner < 4; ++corner) {
-                const float x = x0 + static_cast<float>(corner & 1), y = y0 + static_cast<float>(corner >> 1);
-                if (x < left || x >= right || y < top || y >= bottom)
-                    continue;
-                const std::uint8_t *pixel =
-                    image.rgba + static_cast<std::size_t>(y) * image.stride + 4 * static_cast<std::size_t>(x);
-                const float weight = (corner & 1 ? across : 1 - across) * (corner >> 1 ? down : 1 - down);
+            for_each_neighbour(*source, [&](std::size_t x, std::size_t y, float weight) {
+                const std::uint8_t *pixel = image.rgba + y * image.stride + 4 * x;
                 for (int c = 0; c < 3; ++c)
                     sum[c] += weight * static_cast<float>(pixel[3]) * static_cast<float>(pixel[c]);
                 sum[3] += weight * static_cast<float>(pixel[3]);
-            }
+            });
             if (sum[3] <= 0)
                 continue;
             for (int c = 0; c < 3; ++c)

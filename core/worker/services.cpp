@@ -38,6 +38,47 @@ template <class T> const T &setup_of_kind(const messages::Setup &setup) {
     return *found;
 }
 
+// A video frame in a slot, for a tracker or a ray tracer. It must not be moved, because frames refer to its format.
+class VideoFrame {
+public:
+    explicit VideoFrame(const arhost_frame_format &format) : format_(format) {
+        if (has_limited_luma_plane(format_))
+            full_range_luma_.resize(format_.grey_stride / sizeof(Block) * format_.height);
+    }
+    VideoFrame(const VideoFrame &) = delete;
+    VideoFrame &operator=(const VideoFrame &) = delete;
+
+    const arhost_frame_format &format() const { return format_; }
+
+    // The result is valid until the next call.
+    arhost_frame at(std::span<std::byte> slot, const Command &command) {
+        require(slot.size() >= format_.byte_size, "the slots of video frames are too small");
+        arhost_frame frame{};
+        frame.struct_size = sizeof frame;
+        frame.clock = command.clock;
+        frame.format = &format_;
+        for (std::uint32_t i = 0; i < format_.plane_count; ++i)
+            frame.plane[i] = as_pixels(slot) + format_.offset[i];
+        frame.grey = as_pixels(slot) + format_.grey_offset;
+        if (!full_range_luma_.empty()) {
+            std::uint8_t *grey = full_range_luma_.front().bytes;
+            expand_luma_plane(format_, frame.grey, grey);
+            frame.grey = grey;
+        }
+        frame.depth_mm = format_.has_depth ? as_depth(slot.subspan(format_.depth_offset)) : nullptr;
+        frame.sequence = command.sequence;
+        frame.capture_ns = command.capture_ns;
+        return frame;
+    }
+
+private:
+    struct alignas(64) Block { // strides and alignments of planes are multiples of its size
+        std::uint8_t bytes[64];
+    };
+    const arhost_frame_format format_;
+    std::vector<Block> full_range_luma_; // only for a luma plane of limited range
+};
+
 class SourceService final : public Service {
 public:
     SourceService(const arhost_source &source, arhost_instance *instance) : source_(source), instance_(instance) {}
@@ -148,14 +189,12 @@ public:
         require(!fds.empty(), "'create' was sent without the descriptor of the targets");
         std::vector<Target> targets =
             targets_from(SharedMemory::adopt(base::UniqueFd(::dup(fds[0].get()))).map(Access::read_only));
-        format_ = message.format;
-        if (has_limited_luma_plane(format_))
-            full_range_luma_.resize(format_.grey_stride / sizeof(Block) * format_.height);
+        video_.emplace(message.format);
         const TrackerSetup arrays(targets);
         arhost_tracker_setup setup{};
         setup.struct_size = sizeof setup;
         setup.target_count = static_cast<std::uint32_t>(arrays.configs.size());
-        setup.format = &format_;
+        setup.format = &video_->format();
         setup.intrinsics = &message.intrinsics;
         setup.targets = arrays.configs.data();
         setup.markers = arrays.markers.data();
@@ -185,23 +224,8 @@ public:
         require(command.kind == CommandKind::track, "a tracker got a command other than track");
         const std::span<std::byte> input = memory.input(command.input_generation).slot(command.input_slot);
         const std::span<std::byte> output = memory.output.slot(command.slot);
-        require(input.size() >= format_.byte_size && output.size() >= plugin_offset_ + state_size_,
-                "the tracker's slots are too small");
-        arhost_frame frame{};
-        frame.struct_size = sizeof frame;
-        frame.clock = command.clock;
-        frame.format = &format_;
-        for (std::uint32_t i = 0; i < format_.plane_count; ++i)
-            frame.plane[i] = as_pixels(input) + format_.offset[i];
-        frame.grey = as_pixels(input) + format_.grey_offset;
-        if (!full_range_luma_.empty()) {
-            std::uint8_t *grey = full_range_luma_.front().bytes;
-            expand_luma_plane(format_, frame.grey, grey);
-            frame.grey = grey;
-        }
-        frame.depth_mm = format_.has_depth ? as_depth(input.subspan(format_.depth_offset)) : nullptr;
-        frame.sequence = command.sequence;
-        frame.capture_ns = command.capture_ns;
+        require(output.size() >= plugin_offset_ + state_size_, "the tracker's slots are too small");
+        const arhost_frame frame = video_->at(input, command);
         arhost_track_request request{};
         request.struct_size = sizeof request;
         request.frame = &frame;
@@ -263,20 +287,15 @@ private:
             }
     }
 
-    struct alignas(64) Block { // strides and alignments of planes are multiples of its size
-        std::uint8_t bytes[64];
-    };
-
     const arhost_tracker &tracker_;
     arhost_instance *instance_;
-    arhost_frame_format format_{};
+    std::optional<VideoFrame> video_;
     std::optional<TargetSolver> solver_;
     std::optional<TrackerSlot> layout_;
     std::vector<arhost_observation> observations_ = std::vector<arhost_observation>(ARHOST_MAX_OBSERVATIONS);
     std::vector<arhost_body_pose> poses_;
-    std::uint64_t state_size_ = 0;       // size of the plugin's state
-    std::uint64_t plugin_offset_ = 0;    // offset of the plugin's state in a slot
-    std::vector<Block> full_range_luma_; // only for a luma plane of limited range
+    std::uint64_t state_size_ = 0;    // size of the plugin's state
+    std::uint64_t plugin_offset_ = 0; // offset of the plugin's state in a slot
 };
 
 class RaytracerService final : public Service {
@@ -298,9 +317,14 @@ public:
         setup.width = width_ = message.width;
         setup.height = height_ = message.height;
         setup.scene = &arena_.as<arhost_scene>();
+        setup.form = form_ = message.form;
+        setup.compositing = message.compositing;
         setup.intrinsics = &message.intrinsics;
+        if (message.video_format)
+            setup.video_format = &video_.emplace(*message.video_format).format();
         if (message.intrinsics.distortion != ARHOST_DISTORTION_NONE && !supports_lenses_) {
-            warp_.emplace(message.intrinsics,
+            require(!video_, "a plugin whose image is warped got video");
+            warp_.emplace(message.intrinsics, form_,
                           [this](double fraction) { link_.progress(fraction, "computing the lens distortion"); });
             setup.intrinsics = &warp_->pinhole();
         }
@@ -322,9 +346,9 @@ public:
         const bool is_scaled = (descriptor_.capabilities & ARHOST_CAPABILITY_SCALED_IMAGES) != 0 && !warp_;
         image.width = is_scaled ? command.camera.intrinsics.width : width_;
         image.height = is_scaled ? command.camera.intrinsics.height : height_;
-        image.stride = overlay_stride(image.width);
+        image.stride = overlay_stride(image.width, form_);
         require(image.width <= width_ && image.height <= height_, "the image is larger than that of the setup");
-        image.rgba = as_pixels(output);
+        set_pixels(image, form_, output.data());
         require(output.size() >= std::uint64_t(image.stride) * image.height, "the image slots are too small");
         arhost_render_request request{};
         request.struct_size = sizeof request;
@@ -338,6 +362,11 @@ public:
                 read_anchors(memory.input(command.input_generation).slot(command.input_slot));
             motion = motion_->at(command.time_s, anchors_);
             request.motion = &motion;
+        }
+        arhost_frame video{};
+        if (video_) {
+            video = video_->at(memory.input(command.video_generation).slot(command.video_slot), command);
+            request.video = &video;
         }
         result.render.struct_size = sizeof result.render;
         if (!warp_)
@@ -368,7 +397,9 @@ private:
     const arhost_raytracer &raytracer_;
     arhost_instance *instance_;
     bool supports_lenses_;
-    std::optional<LensWarp> warp_; // only for a distorting lens that the plugin does not support
+    arhost_image_form form_ = ARHOST_IMAGE_FORM_STRAIGHT;
+    std::optional<VideoFrame> video_; // only if the plugin reads the video
+    std::optional<LensWarp> warp_;    // only for a distorting lens that the plugin does not support
     Mapping arena_;
     std::optional<scene::MotionEvaluator> motion_; // only if objects move or deform
     std::vector<scene::Anchored> anchors_;

@@ -43,6 +43,12 @@ ARHOST_LEAF Float overlay_alpha(Vec3 transmittance) {
     return max(Float(1.0) - sum * Float(1.0 / 3.0), Float(0.0));
 }
 
+// Linear light of a straight image's colour where a linear one adds `added` and overlay_alpha is `alpha`. The pair
+// approximates light that is added to catchers, which needs an alpha of 0, and coloured shadows.
+ARHOST_LEAF Float overlay_colour(Float added, Float alpha) {
+    return select(alpha > Float(0.0), added / max(alpha, Float(1e-9)), Float(0.0));
+}
+
 // One channel of the sRGB-encoded colour of a coloured shadow. All channels of a pixel share `alpha`, although the
 // shadow has the alpha `channel_alpha` in this channel. The colour compensates for the difference, exactly so over
 // mid-grey video.
