@@ -105,7 +105,7 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
                               sample.light);
         sample.density = select(rectangle, density_over_area(squared, field(area_row), cosine), sample.density);
     }
-    constexpr float before_surface = 0.999f; // the shadow ray ends before the emissive surface itself
+    constexpr float before_surface = 0.9999f; // the shadow ray ends before the emissive surface itself
     if (const Bool triangle = is(triangle_source); any(triangle)) {
         const Vec3 edge_1 = vector(axis_u_row), edge_2 = vector(axis_v_row);
         const Float along = sqrt(uv.u); // uniform over the triangle
