@@ -44,7 +44,8 @@ private:
     std::vector<PhotonGrid> levels_;
 };
 
-// Chances with which photons are sent from each lamp towards each of the spheres around the mirrors and glass objects.
+// Chances with which photons are sent from each lamp towards each of the spheres around the mirrors and glass
+// objects.
 class PhotonTargets {
 public:
     // `spheres`: centre and radius, mm.
@@ -52,7 +53,8 @@ public:
 
     bool empty() const { return cumulative_.empty(); }
     std::span<const std::array<float, 4>> spheres() const { return spheres_; }
-    // For lamp i and sphere j, at index i · (number of spheres) + j: the cumulative chance, and the chance of the pair.
+    // For lamp i and sphere j, at index i · (number of spheres) + j: the cumulative chance, and the chance of the
+    // pair.
     std::span<const float> cumulative() const { return cumulative_; }
     std::span<const float> chances() const { return chances_; }
 

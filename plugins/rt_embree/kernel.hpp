@@ -40,8 +40,8 @@ struct Object {
     const float *positions; // vertex positions
     const float *normals;   // NULL if flat-shaded or a sphere
     const float *texcoords; // NULL if absent
-    // Light samples of the path integrator: their expected number per unit of the emissive mesh's area (1/mm²), or on a
-    // ball; 0 if the object is not sampled as a light source. Radius of the ball in world space, mm; 0: a mesh.
+    // Light samples of the path integrator: their expected number per unit of the emissive mesh's area (1/mm²), or on
+    // a ball; 0 if the object is not sampled as a light source. Radius of the ball in world space, mm; 0: a mesh.
     float emitter_density, ball_radius;
     std::uint32_t position_stride, normal_stride, index_stride, texcoord_stride;
 };
@@ -122,8 +122,8 @@ struct Video {
 
 // The mirrors and glass objects towards which lamps send photons.
 struct Caustics {
-    const float *spheres;                // centre and radius, mm
-    const float *cumulative, *chances;   // as in PhotonTargets
+    const float *spheres;              // centre and radius, mm
+    const float *cumulative, *chances; // as in PhotonTargets
     std::int32_t sphere_count, lamp_count;
     std::uint32_t photon_count, first_number; // of this frame; offset into the random sequence
 };
@@ -230,18 +230,18 @@ Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
                    arhost::raytracer_common::Photon *to);
-}
+} // namespace base
 namespace avx2 {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
                    arhost::raytracer_common::Photon *to);
-}
+} // namespace avx2
 namespace avx512 {
 Rectangle render_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 Rectangle render_path_tile(const Frame &frame, const Tile &tile, Scratch &scratch);
 void trace_photons(const Frame &frame, std::uint32_t first, std::uint32_t count,
                    arhost::raytracer_common::Photon *to);
-}
+} // namespace avx512
 
 } // namespace rt_embree

@@ -128,6 +128,9 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
       single_path_(settings.single_path), max_radiance_(settings.max_radiance), photons_per_sample_(settings.photons),
       max_radius_squared_(arhost::raytracer_common::max_radius_squared(full_intrinsics_)) {
+    if (setup.form == ARHOST_IMAGE_FORM_LINEAR && setup.scene->integrator != ARHOST_INTEGRATOR_PATH)
+        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+                      "linear images need a scene with the path integrator; request straight ones");
     if (setup.scene->integrator == ARHOST_INTEGRATOR_PATH) {
         lights_.emplace(*setup.scene);
         irradiance_ = arhost::raytracer_common::environment_irradiance(*setup.scene);

@@ -21,10 +21,10 @@ struct Settings {
     std::uint32_t samples = 1; // per pixel
     unsigned threads = 0;      // 0: one per processor
     bool robust = false;
-    std::int32_t light_samples = 4; // per shaded point and area light, environment or background
-    bool accumulate = false;        // average over frames while the camera and scene are static
-    bool single_path = false;       // glass spawns one random ray instead of two
-    float max_radiance = 100;       // path integrator: bound of each sample; infinity: none
+    std::int32_t light_samples = 4;  // per shaded point and area light, environment or background
+    bool accumulate = false;         // average over frames while the camera and scene are static
+    bool single_path = false;        // glass spawns one random ray instead of two
+    float max_radiance = 100;        // path integrator: bound of each sample; infinity: none
     std::uint32_t photons = 1 << 14; // path integrator: light rays from lamps per frame and sample, for caustics
     std::string instruction_set = "auto";
 };

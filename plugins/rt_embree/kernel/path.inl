@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The path integrator: next-event estimation, scattered rays, and multiple importance sampling of both (Veach, Robust
-// Monte Carlo Methods for Light Transport Simulation, 1997). A path that starts at a virtual object collects radiance;
-// one that starts at a catcher collects the change of its light, relative to the light without virtual objects
-// (Debevec, Rendering Synthetic Objects into Real Scenes, SIGGRAPH 1998; residual path integrals, arXiv 2406.16302).
+// Monte Carlo Methods for Light Transport Simulation, 1997). A path that starts at a virtual object collects
+// radiance; one that starts at a catcher collects the change of its light, relative to the light without virtual
+// objects (Debevec, Rendering Synthetic Objects into Real Scenes, SIGGRAPH 1998; residual path integrals, arXiv
+// 2406.16302).
 #pragma once
 #include "path_catcher.inl"
 #include "photons.inl"
@@ -26,7 +27,8 @@ ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &paths, const S
                                          const arhost_material &material, Float choice, Bool active) {
     const GlassScatter glass = scatter_at_glass(s, direction, material);
     const Vec3 arriving = paths.throughput * glass.transmittance;
-    Vec3 by_reflection = arriving * splat(material.reflectivity), by_refraction = arriving * splat(material.refraction);
+    Vec3 by_reflection = arriving * splat(material.reflectivity),
+         by_refraction = arriving * splat(material.refraction);
     Bool reflects = active & (choice < glass.reflectance), refracts = active & ~reflects;
     if (paths.depth == 0) {
         by_reflection = by_reflection * glass.reflectance;
@@ -79,13 +81,14 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
     const Pair uv = path_pair(work, paths, scatter_dimension, 0, 1);
     Vec3 out = cosine_direction(s.normal, uv.u, uv.v);
     if (s.any_rough && any(specular & scatters))
-        out = select(specular, mirror_direction(direction, ggx_half_vector(s.normal, to_eye, s.alpha, uv.u, uv.v)), out);
+        out = select(specular, mirror_direction(direction, ggx_half_vector(s.normal, to_eye, s.alpha, uv.u, uv.v)),
+                     out);
     const Float cosine = dot(out, s.normal);
     const Float density = scattering_density(s, to_eye, out, chance);
     Vec3 throughput = paths.throughput * scattering(s, to_eye, out, false) *
                       (Float(0.318309886f) / max(density * (Float(1.0f) - mirror_chance), Float(1e-20f)));
-    scatters = scatters & (cosine > Float(0.0f)) & (dot(out, s.geometric_normal) > Float(0.0f)) &
-               (density > Float(0.0f));
+    scatters =
+        scatters & (cosine > Float(0.0f)) & (dot(out, s.geometric_normal) > Float(0.0f)) & (density > Float(0.0f));
     scatters = survive(work, paths, throughput, scatters);
     if (any(scatters))
         enqueue(work, paths, s.position + s.geometric_normal * s.offset, out, throughput, scatters,
@@ -106,7 +109,8 @@ ARHOST_INLINE void shade_path(Work &work, const RTCRayHit16 &rays, Bool active, 
     }
     const Bool emits = active & (largest(s.emission) > Float(0.0f));
     if (any(emits)) {
-        const Float inverse_density = max(paths.inverse_density, Float(0.0f)); // behind mirrors and glass: full weight
+        const Float inverse_density =
+            max(paths.inverse_density, Float(0.0f)); // behind mirrors and glass: full weight
         Vec3 emission = s.emission;
         if (paths.depth > 0)
             emission = emission * balance_weight_of_ray(density_of_emitter(work, paths, rays, s, direction, emits),
@@ -116,10 +120,11 @@ ARHOST_INLINE void shade_path(Work &work, const RTCRayHit16 &rays, Bool active, 
     const bool scatters = paths.depth < scene.max_depth;
     const Bool lit = active & s.is_lit;
     if (any(lit)) {
-        const Vec3 by_photons = photon_light(work, paths, s, lit, [&](Vec3 to_light) __attribute__((always_inline)) {
-            return scattering(s, -direction, to_light, true) *
-                   (Float(1.0f) / max(dot(s.normal, to_light), Float(0.01f)));
-        });
+        const Vec3 by_photons = photon_light(
+            work, paths, s, lit, [&](Vec3 to_light) __attribute__((always_inline)) {
+                return scattering(s, -direction, to_light, true) *
+                       (Float(1.0f) / max(dot(s.normal, to_light), Float(0.01f)));
+            });
         add_radiance(work, paths, by_photons + sampled_light(work, paths, s, -direction, scatters, lit), lit);
     }
     if (scatters)
@@ -136,8 +141,7 @@ ARHOST_INLINE void trace_path_packet(Work &work, std::uint32_t depth) {
     const Bool of_catcher = depth == 0 ? changes_catcher(next.paths) : bool_of(false);
     const Bool missed = next.active & ~hit & ~of_catcher;
     if (any(missed))
-        add_radiance(work, next.paths, environment_towards(work, next.paths, next.direction, missed),
-                     missed);
+        add_radiance(work, next.paths, environment_towards(work, next.paths, next.direction, missed), missed);
     if (scene.has_area_lights) {
         const Vec3 light = lamps_towards(work, next.paths, next.origin, next.direction, load(rays.ray.tfar));
         const Bool lit = next.active & ~of_catcher & (largest(light) > Float(0.0f));
@@ -171,8 +175,8 @@ ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, Boo
     return true;
 }
 
-// Adds the radiance of the current sample and the change of the catchers to the pixels' sums. The bound keeps a single
-// random ray that hits a tiny, very bright light from dominating the pixel.
+// Adds the radiance of the current sample and the change of the catchers to the pixels' sums. The bound keeps a
+// single random ray that hits a tiny, very bright light from dominating the pixel.
 ARHOST_INLINE void accumulate_path(const Frame &frame, Scratch &scratch, int first_pixel) {
     const Float bound(frame.path.max_radiance);
     for (int i = 0; i < 3; ++i) {
@@ -207,8 +211,8 @@ ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch
     LinearBlock linear{{mean(light_row), mean(light_row + 1), mean(light_row + 2)},
                        {uncovered, uncovered, uncovered}};
     if (frame.scene.has_catchers)
-        linear.transmittance = linear.transmittance +
-                               Vec3{mean(change_row), mean(change_row + 1), mean(change_row + 2)};
+        linear.transmittance =
+            linear.transmittance + Vec3{mean(change_row), mean(change_row + 1), mean(change_row + 2)};
     const auto bounded = [](Float a) __attribute__((always_inline)) {
         return min(max(a, Float(0.0f)), Float(65504.0f));
     };
@@ -219,7 +223,8 @@ ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch
 }
 
 // Writes a block of the image. Returns whether virtual objects affect any of its pixels.
-ARHOST_INLINE bool write_linear(const Frame &frame, int x, int y, int width, int height, const LinearBlock &block_of) {
+ARHOST_INLINE bool write_linear(const Frame &frame, int x, int y, int width, int height,
+                                const LinearBlock &block_of) {
     alignas(64) int halves[6][lanes];
     const Float values[] = {block_of.added.x,         block_of.added.y,         block_of.added.z,
                             block_of.transmittance.x, block_of.transmittance.y, block_of.transmittance.z};

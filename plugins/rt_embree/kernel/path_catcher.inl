@@ -27,10 +27,10 @@ ARHOST_INLINE Bool can_meet_virtual(const PathScene &path, Vec3 origin, Vec3 to,
 // The directions in which a catcher may see a virtual object are sampled by the bounding spheres: uniformly in the
 // cone of a sphere, or in the whole hemisphere if the sphere is close.
 struct SphereCone {
-    Vec3 axis;      // unit vector to the centre
-    Float share;    // about the form factor of the sphere, an upper bound
-    Float cosine;   // of the half angle; valid unless `is_wide`
-    Float slope;    // 1 − cosine
+    Vec3 axis;    // unit vector to the centre
+    Float share;  // about the form factor of the sphere, an upper bound
+    Float cosine; // of the half angle; valid unless `is_wide`
+    Float slope;  // 1 − cosine
     Bool is_wide;
 };
 ARHOST_INLINE SphereCone cone_of(const float *sphere, const Surface &s) {
@@ -139,7 +139,8 @@ ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHi
             change = change - select(is_hidden(work, s, sample, real), sample.light * cosine, black());
         if (any(emitter)) {
             const Float weight = balance_weight(sample.density, bounce_density(sample.direction));
-            change = change + select(is_visible(frame.scene, s, sample, emitter), sample.light * (cosine * weight), black());
+            change = change +
+                     select(is_visible(frame.scene, s, sample, emitter), sample.light * (cosine * weight), black());
         }
     }
     change = change + photon_irradiance(work, paths, s, active);
@@ -175,17 +176,17 @@ ARHOST_INLINE Filmed filmed_towards(const Frame &frame, Vec3 to_point) {
     else if (video.distortion == ARHOST_DISTORTION_FISHEYE)
         at = kannala_brandt({k[0], k[1], k[2], k[3]}, at);
     // Pixel centres are at integers, texel centres at halves.
-    const Float x = at.x * Float(video.fx) + Float(video.cx + 0.5f), y = at.y * Float(video.fy) + Float(video.cy + 0.5f);
+    const Float x = at.x * Float(video.fx) + Float(video.cx + 0.5f),
+                y = at.y * Float(video.fy) + Float(video.cy + 0.5f);
     const Float width(static_cast<float>(video.image.width)), height(static_cast<float>(video.image.height));
-    const Bool inside =
-        in_front & (x > Float(0.0f)) & (x < width) & (y > Float(0.0f)) & (y < height);
+    const Bool inside = in_front & (x > Float(0.0f)) & (x < width) & (y > Float(0.0f)) & (y < height);
     if (!any(inside))
         return {inside, black()};
     return {inside, sample_texture(frame.scene, video.image, x / width, y / height).colour};
 }
 
-// Adds the light of real surfaces that the video shows, with the shadows of virtual objects on them. Returns the lanes
-// whose light it has added.
+// Adds the light of real surfaces that the video shows, with the shadows of virtual objects on them. Returns the
+// lanes whose light it has added.
 ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, Bool active) {
     const Frame &frame = work.frame;
     if (!frame.path.video.image.texels || !any(active))
@@ -206,8 +207,7 @@ ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, 
     const Vec3 before = irradiance_without_objects(frame, s);
     const SourceSample sample = sample_source(work, paths, s, 0, 1);
     const Float cosine = lambert(s.normal, sample.direction);
-    const Bool facing =
-        active & ~sample.is_virtual & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
+    const Bool facing = active & ~sample.is_virtual & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
     Vec3 change = photon_irradiance(work, paths, s, active);
     if (any(facing))
         change = change - select(is_hidden(work, s, sample, facing), sample.light * cosine, black());
@@ -227,7 +227,8 @@ ARHOST_INLINE Vec3 environment_towards(const Work &work, const Paths &paths, Vec
     const Bool is_specular = active & (paths.inverse_density == Float(0.0f)) & ~changes_catcher(paths);
     if (frame.path.video.image.texels && any(is_specular)) {
         const Filmed filmed = filmed_towards(frame, direction);
-        Bool seen = is_specular & filmed.inside & (largest(filmed.light) < Float(0.95f)); // the video is not saturated
+        Bool seen =
+            is_specular & filmed.inside & (largest(filmed.light) < Float(0.95f)); // the video is not saturated
         if (any(seen)) {
             RTCRay16 ray;
             set_ray(ray, splat(frame.camera.eye), direction, Float(far_away), Int(catcher_mask | occluder_mask));

@@ -41,7 +41,8 @@ ARHOST_INLINE Float environment_source_density(const Frame &frame, Vec3 directio
     const Vec3 d = transform(environment.environment_from_world, direction);
     const Float u = equirectangular_u(d), v = equirectangular_v(d);
     const auto texel = [](Float at, std::int32_t size) __attribute__((always_inline)) {
-        return to_int(min(max(at * Float(static_cast<float>(size)), Float(0.0f)), Float(static_cast<float>(size - 1))));
+        return to_int(
+            min(max(at * Float(static_cast<float>(size)), Float(0.0f)), Float(static_cast<float>(size - 1))));
     };
     const Int row = texel(v, image.height), first = row * Int(image.width);
     return chance * environment_density(image, step_of_sums(environment.rows, Int(0), row).v,
@@ -49,7 +50,8 @@ ARHOST_INLINE Float environment_source_density(const Frame &frame, Vec3 directio
 }
 
 // Returns light sample `index` of `count`. The samples are spread evenly over the light sources.
-ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, const Surface &s, int index, int count) {
+ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, const Surface &s, int index,
+                                         int count) {
     const Frame &frame = work.frame;
     const PathScene &path = frame.path;
     SourceSample sample{s.normal, Float(1.0f), s.normal, black(), Float(0.0f), bool_of(false), bool_of(false)};
@@ -58,12 +60,15 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
     const Pair uv = path_pair(work, paths, light_dimension, index, count);
     Int source(0);
     if (path.source_count > 1) {
-        const Float chosen = (path_pair(work, paths, source_dimension, index, count).u + Float(static_cast<float>(index))) *
-                             Float(1.0f / static_cast<float>(count));
+        const Float chosen =
+            (path_pair(work, paths, source_dimension, index, count).u + Float(static_cast<float>(index))) *
+            Float(1.0f / static_cast<float>(count));
         source = search(path.cumulative, Int(0), path.source_count, chosen);
     }
     const Int first = source * Int(source_rows);
-    const auto field = [&](int row) __attribute__((always_inline)) { return gather(path.sources + row, first); };
+    const auto field = [&](int row) __attribute__((always_inline)) {
+        return gather(path.sources + row, first);
+    };
     const auto vector = [&](int row) __attribute__((always_inline)) {
         return Vec3{field(row), field(row + 1), field(row + 2)};
     };
@@ -71,7 +76,9 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
     const Float chance = field(chance_row) * Float(static_cast<float>(count)), share = Float(1.0f) / chance;
     const Vec3 to_centre = vector(position_row) - s.position, intensity = vector(intensity_row);
     const Bool inverse_square = field(falloff_row) > Float(0.5f);
-    const auto is = [&](int wanted) __attribute__((always_inline)) { return type == Int(wanted); };
+    const auto is = [&](int wanted) __attribute__((always_inline)) {
+        return type == Int(wanted);
+    };
     const auto emitted = [&](Float density) __attribute__((always_inline)) { // of sources of known radiance
         return intensity * (irradiance_of_density(density) * share);
     };
@@ -95,7 +102,8 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
                            light);
         sample.to_light = select(round, to_point, sample.to_light);
         sample.light = select(round, intensity * light, sample.light);
-        sample.density = select(round & extended, density_over_area(squared, field(area_row), cosine), sample.density);
+        sample.density =
+            select(round & extended, density_over_area(squared, field(area_row), cosine), sample.density);
     }
     if (const Bool rectangle = is(ARHOST_LIGHT_RECTANGLE); any(rectangle)) {
         const Vec3 to_point = vector_to_rectangle(to_centre, vector(axis_u_row), vector(axis_v_row), uv.u, uv.v);
@@ -142,7 +150,8 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
         else
             of_environment = sample_background(frame.scene, s, uv, 1);
         sample.to_light = select(environment, of_environment.to_light, sample.to_light);
-        sample.light = select(environment, of_environment.intensity * (of_environment.irradiance * share), sample.light);
+        sample.light =
+            select(environment, of_environment.intensity * (of_environment.irradiance * share), sample.light);
         sample.density = select(environment, of_environment.sampling_density, sample.density);
         sample.t_far = select(environment, Float(far_away), sample.t_far);
         sample.is_environment = environment;
@@ -158,8 +167,7 @@ ARHOST_INLINE Bool is_visible(const Scene &scene, const Surface &s, const Source
     const Vec3 above = s.lift + s.geometric_normal * s.offset;
     const Vec3 to_light = sample.to_light - select(sample.t_far < Float(far_away), above, black());
     RTCRay16 rays;
-    set_ray(rays, s.position + above, to_light, sample.t_far,
-            select(s.is_real, Int(virtual_masks), Int(all_masks)));
+    set_ray(rays, s.position + above, to_light, sample.t_far, select(s.is_real, Int(virtual_masks), Int(all_masks)));
     return active & ~blocked(scene, rays, active);
 }
 
@@ -186,8 +194,8 @@ ARHOST_INLINE Vec3 sampled_light(const Work &work, const Paths &paths, const Sur
 }
 
 // Expected number of light samples per steradian, at the previous vertex of the paths, of the emissive surfaces hit.
-ARHOST_INLINE Float density_of_emitter(const Work &work, const Paths &paths, const RTCRayHit16 &rays, const Surface &s,
-                                       Vec3 direction, Bool active) {
+ARHOST_INLINE Float density_of_emitter(const Work &work, const Paths &paths, const RTCRayHit16 &rays,
+                                       const Surface &s, Vec3 direction, Bool active) {
     Float density(0.0f);
     for_each_object(work.frame.scene, rays.hit, active, [&](const Object &object, Bool here) {
         if (object.emitter_density <= 0)
@@ -195,15 +203,16 @@ ARHOST_INLINE Float density_of_emitter(const Work &work, const Paths &paths, con
         const Float per_source(object.emitter_density);
         if (object.ball_radius > 0) {
             const Float radius(object.ball_radius);
-            const Vec3 to_centre = direction * s.distance + select(s.back_face, s.geometric_normal, -s.geometric_normal) * radius;
+            const Vec3 to_centre =
+                direction * s.distance + select(s.back_face, s.geometric_normal, -s.geometric_normal) * radius;
             const Float sine_squared = radius * radius / max(dot(to_centre, to_centre), Float(1e-20f));
-            const Float slope =
-                sine_squared / (Float(1.0f) + sqrt(max(Float(1.0f) - sine_squared, Float(0.0f))));
+            const Float slope = sine_squared / (Float(1.0f) + sqrt(max(Float(1.0f) - sine_squared, Float(0.0f))));
             density = select(here & (sine_squared < Float(0.9999f)),
                              per_source * Float(0.159154943f) / max(slope, Float(1e-12f)), density);
         } else {
             const Float cosine = abs(dot(s.geometric_normal, direction));
-            density = select(here, per_source * density_over_area(s.distance * s.distance, Float(1.0f), cosine), density);
+            density =
+                select(here, per_source * density_over_area(s.distance * s.distance, Float(1.0f), cosine), density);
         }
     });
     return density * Float(static_cast<float>(source_samples(work.frame, paths.depth - 1)));

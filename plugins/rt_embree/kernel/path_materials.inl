@@ -14,8 +14,8 @@ ARHOST_INLINE Float specular_chance(const Surface &s, Vec3 to_eye) {
     return select(s.is_rough, select(diffuse > Float(0.0f), bounded, Float(1.0f)), Float(0.0f));
 }
 
-// Returns π · BSDF · cosine of a lit surface. `with_phong`: including the highlights of SPECULAR and METAL, which only
-// light samples see.
+// Returns π · BSDF · cosine of a lit surface. `with_phong`: including the highlights of SPECULAR and METAL, which
+// only light samples see.
 ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light, bool with_phong) {
     const Float cosine = lambert(s.normal, to_light);
     Vec3 scattered = s.diffuse * cosine;
@@ -35,10 +35,11 @@ ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light, bool
 ARHOST_INLINE Float scattering_density(const Surface &s, Vec3 to_eye, Vec3 to_light, Float chance) {
     Float density = lambert(s.normal, to_light) * Float(0.318309886f) * (Float(1.0f) - chance);
     if (s.any_rough)
-        density = density + select(s.is_rough,
-                                   chance * ggx_reflection_density(dot(s.normal, to_eye),
-                                                                   dot(s.normal, normalize(to_light + to_eye)), s.alpha),
-                                   Float(0.0f));
+        density =
+            density + select(s.is_rough,
+                             chance * ggx_reflection_density(dot(s.normal, to_eye),
+                                                             dot(s.normal, normalize(to_light + to_eye)), s.alpha),
+                             Float(0.0f));
     return select(dot(to_light, s.geometric_normal) > Float(0.0f), density, Float(0.0f));
 }
 
@@ -56,7 +57,8 @@ struct GlassScatter {
 ARHOST_INLINE GlassScatter scatter_at_glass(const Surface &s, Vec3 direction, const arhost_material &glass) {
     const Float ratio = select(s.back_face, Float(glass.index), Float(1 / glass.index));
     Refraction refraction = refraction_at(direction, s.normal, ratio);
-    // If refraction at the interpolated normal leaves the ray on the wrong side, the geometric normal is used instead.
+    // If refraction at the interpolated normal leaves the ray on the wrong side, the geometric normal is used
+    // instead.
     const Bool wrong_side =
         (dot(refraction.direction, s.geometric_normal) > Float(0.0f)) & (refraction.cosine_squared > Float(0.0f));
     if (any(wrong_side))

@@ -6,7 +6,14 @@
 #pragma once
 #include "scatter.inl"
 
-enum Dimension : int { source_dimension = 64, light_dimension, scatter_dimension, choice_dimension, roulette_dimension, photon_dimension };
+enum Dimension : int {
+    source_dimension = 64,
+    light_dimension,
+    scatter_dimension,
+    choice_dimension,
+    roulette_dimension,
+    photon_dimension
+};
 
 ARHOST_INLINE Int reversed_bits(Int x) {
     const auto swapped = [](Int a, int distance, int mask) __attribute__((always_inline)) {

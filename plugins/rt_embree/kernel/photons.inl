@@ -26,9 +26,12 @@ ARHOST_INLINE EmittedPhotons emit_photons(const Frame &frame, Int number, Bool a
     const Caustics &caustics = path.caustics;
     const Pair target = photon_pair(number, target_dimension);
     const Int pair = search(caustics.cumulative, Int(0), caustics.sphere_count * caustics.lamp_count, target.u);
-    const Int lamp = to_int(floor((to_float(pair) + Float(0.5f)) * Float(1.0f / static_cast<float>(caustics.sphere_count))));
+    const Int lamp =
+        to_int(floor((to_float(pair) + Float(0.5f)) * Float(1.0f / static_cast<float>(caustics.sphere_count))));
     const Int first_pair = lamp * Int(caustics.sphere_count), first = lamp * Int(source_rows);
-    const auto field = [&](int row) __attribute__((always_inline)) { return gather(path.sources + row, first); };
+    const auto field = [&](int row) __attribute__((always_inline)) {
+        return gather(path.sources + row, first);
+    };
     const auto vector = [&](int row) __attribute__((always_inline)) {
         return Vec3{field(row), field(row + 1), field(row + 2)};
     };
@@ -50,8 +53,8 @@ ARHOST_INLINE EmittedPhotons emit_photons(const Frame &frame, Int number, Bool a
     if (any(radius > Float(0.0f)))
         origin = select(radius > Float(0.0f), centre + vector_to_disc(position - centre, radius, uv.u, uv.v), origin);
     if (any(rectangle))
-        origin = select(rectangle,
-                        vector_to_rectangle(position, vector(axis_u_row), vector(axis_v_row), uv.u, uv.v), origin);
+        origin = select(rectangle, vector_to_rectangle(position, vector(axis_u_row), vector(axis_v_row), uv.u, uv.v),
+                        origin);
     const auto slope_of = [](Float sphere, Float squared) __attribute__((always_inline)) {
         const Float sine_squared = min(sphere * sphere / max(squared, Float(1e-20f)), Float(1.0f));
         // From inside the sphere, all directions.
@@ -136,8 +139,10 @@ ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, 
                                power * glass.transmittance *
                                    select(reflects, splat(material.reflectivity), splat(material.refraction)),
                                power);
-                next_origin = select(here, select(reflects, above, s.position - s.geometric_normal * s.offset), next_origin);
-                next_direction = select(here, select(reflects, reflected(s, direction), glass.refracted), next_direction);
+                next_origin =
+                    select(here, select(reflects, above, s.position - s.geometric_normal * s.offset), next_origin);
+                next_direction =
+                    select(here, select(reflects, reflected(s, direction), glass.refracted), next_direction);
                 specular = specular | here;
             }
         });
@@ -152,8 +157,15 @@ ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, 
         direction = normalize(next_direction);
     }
     alignas(64) float rows[9][lanes];
-    const Float values[] = {position.x, position.y, position.z, arriving.x, arriving.y, arriving.z,
-                            select(arrived, power.x, Float(-1.0f)), power.y, power.z};
+    const Float values[] = {position.x,
+                            position.y,
+                            position.z,
+                            arriving.x,
+                            arriving.y,
+                            arriving.z,
+                            select(arrived, power.x, Float(-1.0f)),
+                            power.y,
+                            power.z};
     for (int row = 0; row < 9; ++row)
         store(rows[row], values[row]);
     for (unsigned remaining = mask_of(active.lane); remaining; remaining &= remaining - 1) {
@@ -173,7 +185,9 @@ struct NearCells {
 ARHOST_INLINE NearCells cells_near(const PhotonGrid &grid, const Surface &s, Bool active) {
     const Float inverse_cell(0.5f / grid.radius), half(0.5f);
     const Vec3 at = (s.position - splat(grid.low)) * inverse_cell - Vec3{half, half, half};
-    const auto size = [&](int i) __attribute__((always_inline)) { return Float(static_cast<float>(grid.size[i])); };
+    const auto size = [&](int i) __attribute__((always_inline)) {
+        return Float(static_cast<float>(grid.size[i]));
+    };
     active = active & (at.x > Float(-1.0f)) & (at.y > Float(-1.0f)) & (at.z > Float(-1.0f)) & (at.x < size(0)) &
              (at.y < size(1)) & (at.z < size(2));
     NearCells cells;
@@ -204,12 +218,14 @@ ARHOST_INLINE Vec3 photon_density(const PhotonGrid &grid, const NearCells &cells
     Vec3 sum = black();
     for (int row = 0; row < 4; ++row) {
         const Bool inside = active & cells.inside[row];
-        for (Int next = cells.first[row]; ; next = next + Int(1)) {
+        for (Int next = cells.first[row];; next = next + Int(1)) {
             const Bool here = inside & (next < cells.end[row]);
             if (!any(here))
                 break;
             const Int photon = select(here, next, Int(0)) * Int(9);
-            const auto value = [&](int i) __attribute__((always_inline)) { return gather(grid.photons + i, photon); };
+            const auto value = [&](int i) __attribute__((always_inline)) {
+                return gather(grid.photons + i, photon);
+            };
             const Vec3 offset = Vec3{value(0), value(1), value(2)} - s.position;
             const Float squared = dot(offset, offset), height = dot(offset, s.geometric_normal);
             // Photons of other surfaces near an edge do not count.

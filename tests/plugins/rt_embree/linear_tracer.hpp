@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Provides tests of ray tracers with linear images and video.
+#pragma once
+
+#include "tracer.hpp"
+
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace arhost::test {
+
+inline float float_of_half(std::uint16_t half) {
+    const int exponent = half >> 10 & 31, mantissa = half & 1023;
+    return exponent == 0 ? std::ldexp(static_cast<float>(mantissa), -24)
+                         : std::ldexp(static_cast<float>(mantissa + 1024), exponent - 25);
+}
+
+using LinearPixel = std::array<std::uint16_t, 8>;
+inline constexpr LinearPixel untouched = {0, 0, 0, 0, 0x3c00, 0x3c00, 0x3c00, 0};
+
+// A linear image with row padding and guard bytes.
+class LinearPicture {
+public:
+    explicit LinearPicture(const arhost_intrinsics &in)
+        : width(in.width), height(in.height), stride_((16 * width + 63) / 64 * 64 + 64),
+          buffer_(std::size_t{stride_} * height) {}
+
+    arhost_image image() {
+        return {
+            sizeof(arhost_image), stride_, width, height, nullptr, reinterpret_cast<std::uint16_t *>(buffer_.data())};
+    }
+    LinearPixel at(std::uint32_t x, std::uint32_t y) const {
+        LinearPixel pixel;
+        std::memcpy(pixel.data(), buffer_.data() + std::size_t{stride_} * y + 16 * x, sizeof pixel);
+        return pixel;
+    }
+    // Channels 0 to 2: added light; 4 to 6: transmittance.
+    float value(std::uint32_t x, std::uint32_t y, std::size_t channel) const {
+        return float_of_half(at(x, y)[channel]);
+    }
+    std::vector<LinearPixel> pixels() const {
+        std::vector<LinearPixel> all;
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t x = 0; x < width; ++x)
+                all.push_back(at(x, y));
+        return all;
+    }
+    bool only_pixels_written() const {
+        for (std::uint32_t y = 0; y < height; ++y)
+            for (std::uint32_t i = 16 * width; i < stride_; ++i)
+                if (buffer_.data()[std::size_t{stride_} * y + i] != 0xa5)
+                    return false;
+        return buffer_.intact();
+    }
+
+    std::uint32_t width, height;
+    arhost_render_info info{sizeof(arhost_render_info), 0, 0, 0, 0, 0, 0, 0, 0};
+
+private:
+    std::uint32_t stride_;
+    GuardedBuffer buffer_;
+};
+
+// A video whose picture is brighter to the right and bluer to the bottom.
+class Video {
+public:
+    explicit Video(const arhost_intrinsics &in) {
+        format_.struct_size = sizeof format_;
+        format_.pixel_format = ARHOST_PIXEL_FORMAT_RGB8;
+        format_.width = in.width;
+        format_.height = in.height;
+        arhost_frame_layout(&format_);
+        bytes_.resize(format_.byte_size);
+        for (std::uint32_t y = 0; y < in.height; ++y)
+            for (std::uint32_t x = 0; x < in.width; ++x) {
+                std::uint8_t *to = bytes_.data() + std::size_t{format_.stride[0]} * y + 3 * x;
+                to[0] = to[1] = static_cast<std::uint8_t>(40 + 160 * x / in.width);
+                to[2] = static_cast<std::uint8_t>(40 + 160 * y / in.height);
+            }
+        frame_.struct_size = sizeof frame_;
+        frame_.format = &format_;
+        frame_.plane[0] = bytes_.data();
+    }
+    Video(const Video &) = delete;
+    Video &operator=(const Video &) = delete;
+    const arhost_frame_format &format() const { return format_; }
+    const arhost_frame &frame() const { return frame_; }
+
+private:
+    arhost_frame_format format_{};
+    std::vector<std::uint8_t> bytes_;
+    arhost_frame frame_{};
+};
+
+// A ray tracer that renders linear images.
+class LinearTracer {
+public:
+    LinearTracer(scene::ArenaBuilder scene, const Options &options, const std::string &plugin)
+        : tracer_(std::move(scene), options, plugin) {}
+    ~LinearTracer() { stop(); }
+    LinearTracer(const LinearTracer &) = delete;
+    LinearTracer &operator=(const LinearTracer &) = delete;
+
+    arhost_status start(const arhost_intrinsics &in, const Video *video = nullptr) {
+        stop();
+        const arhost_raytracer_setup setup{sizeof setup,
+                                           in.width,
+                                           in.height,
+                                           ARHOST_IMAGE_FORM_LINEAR,
+                                           &tracer_.scene(),
+                                           &in,
+                                           ARHOST_COMPOSITING_LINEAR,
+                                           0,
+                                           video ? &video->format() : nullptr};
+        const arhost_status status = functions().start(tracer_.plugin().instance(), &setup);
+        started_ = status == ARHOST_STATUS_OK;
+        return status;
+    }
+    LinearPicture render(const arhost_camera &camera, std::uint64_t sequence = 0, const Video *video = nullptr,
+                         std::optional<double> time_s = {}) {
+        if (time_s && !motion_)
+            motion_.emplace(tracer_.scene());
+        arhost_motion motion{};
+        if (time_s)
+            motion = motion_->at(*time_s);
+        const arhost_render_request request{
+            sizeof request, 0, sequence, 0, camera, time_s ? &motion : nullptr, video ? &video->frame() : nullptr};
+        LinearPicture picture(camera.intrinsics);
+        const arhost_image image = picture.image();
+        EXPECT_EQ(functions().render(tracer_.plugin().instance(), &request, &image, &picture.info), ARHOST_STATUS_OK)
+            << log();
+        EXPECT_TRUE(picture.only_pixels_written());
+        return picture;
+    }
+    std::string log() const { return tracer_.log(); }
+
+private:
+    void stop() {
+        if (started_)
+            functions().stop(tracer_.plugin().instance());
+        started_ = false;
+    }
+    const arhost_raytracer &functions() { return tracer_.plugin().functions<arhost_raytracer>(); }
+
+    Tracer tracer_;
+    std::optional<scene::MotionEvaluator> motion_;
+    bool started_ = false;
+};
+
+} // namespace arhost::test

@@ -1,0 +1,356 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The path integrator, compared with closed formulas.
+#include "linear_tracer.hpp"
+#include "rich_scene.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace arhost::test {
+namespace {
+
+scene::Settings path_settings(float background = 0, std::uint32_t max_depth = 8) {
+    scene::Settings settings;
+    settings.integrator = ARHOST_INTEGRATOR_PATH;
+    settings.ambient = glm::vec3(0);
+    settings.background = glm::vec3(background);
+    settings.max_depth = max_depth;
+    return settings;
+}
+
+arhost_material emissive(float radiance, float albedo = 0) {
+    arhost_material material = diffuse(albedo, albedo, albedo);
+    set3(material.emission, radiance, radiance, radiance);
+    return material;
+}
+
+LinearPicture rendered(SceneBuilder scene, const arhost_camera &view, const Options &options = {{"samples", "64"}},
+                       std::uint64_t sequence = 0, const Video *video = nullptr) {
+    LinearTracer tracer(std::move(scene), options, "rt_embree");
+    EXPECT_EQ(tracer.start(view.intrinsics, video), ARHOST_STATUS_OK) << tracer.log();
+    return tracer.render(view, sequence, video);
+}
+
+// Mean of a channel over the pixels of a square around (x, y).
+double mean_at(const LinearPicture &picture, std::uint32_t x, std::uint32_t y, std::size_t channel, int half = 2) {
+    double sum = 0;
+    for (int dy = -half; dy <= half; ++dy)
+        for (int dx = -half; dx <= half; ++dx)
+            sum += picture.value(x + static_cast<std::uint32_t>(dx), y + static_cast<std::uint32_t>(dy), channel);
+    return sum / ((2 * half + 1) * (2 * half + 1));
+}
+
+constexpr std::size_t transmittance = 4;
+
+// A table from above: pixel (x, y) of from_above() shows the point on_the_floor(x, y).
+SceneBuilder table(const scene::Settings &settings, float albedo = 0.5f) {
+    SceneBuilder scene(settings);
+    scene.add_mesh("table", square(2000), diffuse(albedo, albedo, albedo), ARHOST_ROLE_CATCHER);
+    return scene;
+}
+
+TEST(PathIntegrator, ConvexSurfaceInAFurnaceReflectsItsAlbedo) {
+    SceneBuilder scene(path_settings(1));
+    scene.add_ball("ball", {0, 0, 0, 40}, diffuse(0.8f, 0.5f, 0.2f));
+    const LinearPicture picture = rendered(std::move(scene), from_above());
+    EXPECT_NEAR(mean_at(picture, 100, 75, 0), 0.8, 0.008);
+    EXPECT_NEAR(mean_at(picture, 100, 75, 1), 0.5, 0.005);
+    EXPECT_NEAR(mean_at(picture, 100, 75, 2), 0.2, 0.002);
+    EXPECT_EQ(picture.value(100, 75, transmittance), 0);
+}
+
+TEST(PathIntegrator, GlassInAFurnaceIsInvisible) {
+    SceneBuilder scene(path_settings(1, 32));
+    scene.add_ball("ball", {0, 0, 0, 40}, glass_of());
+    const LinearPicture picture = rendered(std::move(scene), from_above());
+    EXPECT_NEAR(mean_at(picture, 100, 75, 0), 1, 0.01);
+    EXPECT_NEAR(mean_at(picture, 125, 75, 0), 1, 0.01);
+}
+
+TEST(PathIntegrator, LightBouncesInAClosedBox) {
+    SceneBuilder scene(path_settings(0, 64));
+    scene.add_mesh("box", cube(100), emissive(0.5f, 0.5f));
+    const LinearPicture picture =
+        rendered(std::move(scene), camera({0, 0, 0}, {0, 1, 0}, {0, 0, 1}), {{"samples", "16"}});
+    double sum = 0;
+    for (std::uint32_t y = 0; y < 150; ++y)
+        for (std::uint32_t x = 0; x < 200; ++x)
+            sum += picture.value(x, y, 0);
+    EXPECT_NEAR(sum / (200 * 150), 0.5 / (1 - 0.5), 0.01);
+}
+
+TEST(PathIntegrator, BlackBallShadowsACatcherByItsFormFactor) {
+    constexpr double radius = 20, height = 40;
+    SceneBuilder scene = table(path_settings(1));
+    scene.add_ball("ball", {0, 0, height, radius}, diffuse(0, 0, 0));
+    const LinearPicture picture = rendered(std::move(scene), from_above(), {{"samples", "256"}});
+    for (const std::uint32_t x : {135u, 150u, 180u}) {
+        const double distance = on_the_floor(static_cast<int>(x), 75).x,
+                     squared = distance * distance + height * height;
+        const double form_factor = radius * radius / squared * height / std::sqrt(squared);
+        EXPECT_NEAR(mean_at(picture, x, 75, transmittance), 1 - form_factor, 0.01) << x;
+    }
+}
+
+TEST(PathIntegrator, EmissiveBallLightsACatcher) {
+    constexpr double radius = 15, height = 50, radiance = 4;
+    SceneBuilder scene = table(path_settings());
+    scene.add_light(sun(0.6f, 0, -0.8f));
+    scene.add_ball("ball", {0, 0, height, radius}, emissive(radiance));
+    const LinearPicture picture = rendered(std::move(scene), from_above(), {{"samples", "64"}});
+    const double distance = on_the_floor(60, 75).x, squared = distance * distance + height * height; // not in shadow
+    const double form_factor = radius * radius / squared * height / std::sqrt(squared);
+    EXPECT_NEAR(mean_at(picture, 60, 75, transmittance), 1 + radiance * form_factor / 0.8, 0.02);
+}
+
+TEST(PathIntegrator, BrightObjectReflectsItsColourOntoACatcher) {
+    SceneBuilder scene = table(path_settings(1));
+    scene.add_mesh("wall", quad({20, -200, 0}, {20, 200, 0}, {20, 200, 200}, {20, -200, 200}), diffuse(1, 0, 0));
+    const LinearPicture picture = rendered(std::move(scene), from_above(), {{"samples", "64"}});
+    const double red = mean_at(picture, 110, 75, transmittance), green = mean_at(picture, 110, 75, transmittance + 1);
+    EXPECT_GT(red, green + 0.1);
+    EXPECT_LT(red, 1);
+}
+
+TEST(PathIntegrator, LampsOfTwoColoursMakeColouredShadows) {
+    SceneBuilder scene = table(path_settings());
+    arhost_light red = sun(0.6f, 0, -0.8f), blue = sun(-0.6f, 0, -0.8f);
+    set3(red.intensity, 1, 0, 0);
+    set3(blue.intensity, 0, 0, 1);
+    scene.add_light(red);
+    scene.add_light(blue);
+    scene.add_ball("ball", {0, 0, 40, 10}, diffuse(0, 0, 0));
+    const LinearPicture picture = rendered(std::move(scene), from_above(), {{"samples", "64"}});
+    // The shadow of the red lamp is 30 mm to the right.
+    EXPECT_NEAR(mean_at(picture, 130, 75, transmittance), 0, 0.05);
+    EXPECT_NEAR(mean_at(picture, 130, 75, transmittance + 2), 1, 0.02);
+    EXPECT_NEAR(mean_at(picture, 70, 75, transmittance), 1, 0.02);
+    EXPECT_NEAR(mean_at(picture, 70, 75, transmittance + 2), 0, 0.05);
+}
+
+TEST(PathIntegrator, LeavesPixelsUntouchedThatNothingAffects) {
+    SceneBuilder scene = table(path_settings());
+    scene.add_light(sun());
+    scene.add_ball("ball", {0, 0, 5, 5}, diffuse(1, 1, 1));
+    const LinearPicture picture = rendered(std::move(scene), from_above());
+    EXPECT_EQ(picture.at(2, 2), untouched);
+    EXPECT_EQ(picture.at(197, 147), untouched);
+    EXPECT_NE(picture.at(100, 75), untouched);
+    EXPECT_TRUE(picture.info.has_region);
+    EXPECT_LT(picture.info.region_width, 200u);
+}
+
+TEST(PathIntegrator, GlassFocusesTheLightOfALampOntoACatcher) {
+    SceneBuilder scene = table(path_settings(0, 16));
+    scene.add_light(sun());
+    scene.add_ball("ball", {0, 0, 30, 20}, glass_of());
+    // The camera sees the caustic past the ball.
+    const arhost_camera view = camera({0, -200, 60}, {0, 0, 0}, {0, 0, 1});
+    const LinearPicture picture = rendered(std::move(scene), view, {{"samples", "16"}, {"photons", "65536"}});
+    float brightest = 0;
+    for (std::uint32_t y = 0; y < 150; ++y)
+        for (std::uint32_t x = 0; x < 200; ++x)
+            brightest = std::max(brightest, picture.value(x, y, transmittance));
+    EXPECT_GT(brightest, 4);
+}
+
+// A pane with parallel faces shifts the light, and reflects twice F = 4 % of it, with the reflections inside
+// 2F/(1+F).
+TEST(PathIntegrator, PaneOfGlassLosesTheReflectedLight) {
+    SceneBuilder scene = table(path_settings(0, 16), 0); // a black table: the pane reflects no light back onto it
+    scene.add_light(sun());
+    scene::TriangleMesh pane = cube(0.5f);
+    for (glm::vec3 &position : pane.positions)
+        position = {position.x * 200, position.y * 200, position.z * 4 + 60};
+    scene.add_mesh("pane", pane, glass_of(), ARHOST_ROLE_VIRTUAL, glm::mat4x3(1));
+    // From below the pane, past its lower face.
+    const arhost_camera view = camera({0, -100, 50}, {0, 0, 0}, {0, 0, 1});
+    const LinearPicture picture =
+        rendered(std::move(scene), view, {{"samples", "64"}, {"photons", "16384"}, {"light_samples", "1"}});
+    EXPECT_NEAR(mean_at(picture, 100, 75, transmittance, 8), 1 - 2 * 0.04 / 1.04, 0.015);
+}
+
+TEST(PathIntegrator, ShowsTheFilmedTableInAMirror) {
+    SceneBuilder scene = table(path_settings());
+    scene.add_light(sun());
+    scene.add_mesh("mirror", quad({-60, 40, 0}, {60, 40, 0}, {60, 40, 80}, {-60, 40, 80}), mirror(1));
+    const arhost_camera view = camera({0, -150, 100}, {0, 0, 0}, {0, 0, 1});
+    const Video video(view.intrinsics);
+    const LinearPicture picture = rendered(std::move(scene), view, {{"samples", "4"}}, 0, &video);
+    // The table in front of the mirror's middle, as far before it as it appears behind it.
+    const auto project = [&](glm::dvec3 p) {
+        const double length = std::hypot(150.0, 100.0);
+        const glm::dvec3 forward(0, 150 / length, -100 / length), down(0, -100 / length, -150 / length);
+        const glm::dvec3 d = p - glm::dvec3(0, -150, 100);
+        const double depth = d.y * forward.y + d.z * forward.z;
+        return glm::dvec2(99.5 + 200 * d.x / depth, 74.5 + 200 * (d.y * down.y + d.z * down.z) / depth);
+    };
+    const glm::dvec2 reflected = project({20, 10, 0}), seen = project({20, 70, 0});
+    const double red = shading::srgb_decode((40 + std::floor(160 * std::round(reflected.x) / 200)) / 255),
+                 blue = shading::srgb_decode((40 + std::floor(160 * std::round(reflected.y) / 150)) / 255);
+    const auto x = static_cast<std::uint32_t>(std::lround(seen.x)),
+               y = static_cast<std::uint32_t>(std::lround(seen.y));
+    EXPECT_NEAR(mean_at(picture, x, y, 0, 1), red, 0.01);
+    EXPECT_NEAR(mean_at(picture, x, y, 2, 1), blue, 0.01);
+}
+
+TEST(PathIntegrator, MeanOfOneSampleFramesIsTheConvergedImage) {
+    const auto make = [] {
+        SceneBuilder scene = table(path_settings(0.5f));
+        scene.add_light(bulb({60, 0, 120}, 20, 1));
+        scene.add_ball("ball", {0, 0, 30, 20}, diffuse(0.8f, 0.8f, 0.8f));
+        return scene;
+    };
+    const arhost_camera view = camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, pinhole(40, 30, 40));
+    const LinearPicture converged = rendered(make(), view, {{"samples", "256"}});
+    LinearTracer tracer(make(), {}, "rt_embree");
+    ASSERT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK);
+    std::array<double, 8> sum{}, expected{};
+    std::vector<double> mean(std::size_t{40} * 30 * 8);
+    for (std::uint64_t frame = 0; frame < 256; ++frame) {
+        const LinearPicture one = tracer.render(view, frame);
+        for (std::uint32_t i = 0; i < 40 * 30; ++i)
+            for (std::size_t c = 0; c < 8; ++c)
+                mean[8 * i + c] += one.value(i % 40, i / 40, c) / 256;
+    }
+    double worst = 0;
+    for (std::uint32_t i = 0; i < 40 * 30; ++i)
+        for (std::size_t c = 0; c < 8; ++c) {
+            const double other = converged.value(i % 40, i / 40, c);
+            sum[c] += mean[8 * i + c];
+            expected[c] += other;
+            worst = std::max(worst, std::abs(mean[8 * i + c] - other));
+        }
+    for (std::size_t c = 0; c < 8; ++c)
+        EXPECT_NEAR(sum[c], expected[c], 0.003 * 40 * 30) << c;
+    EXPECT_LT(worst, 0.12);
+}
+
+TEST(PathIntegrator, EqualRequestsGiveEqualBytes) {
+    const auto make = [] {
+        SceneBuilder scene = table(path_settings(0.3f));
+        scene.add_light(bulb({60, 0, 120}, 20, 1));
+        scene.add_ball("ball", {-30, 0, 30, 20}, glass_of());
+        scene.add_ball("metal", {30, 0, 30, 20}, metallic_roughness({1, 0.8f, 0.4f}, 1, 0.3f));
+        scene.add_ball("lamp", {0, 30, 10, 5}, emissive(3));
+        return scene;
+    };
+    const LinearPicture one = rendered(make(), from_the_side(), {{"threads", "1"}, {"samples", "2"}}, 7);
+    EXPECT_EQ(one.pixels(), rendered(make(), from_the_side(), {{"threads", "3"}, {"samples", "2"}}, 7).pixels());
+    EXPECT_EQ(one.pixels(),
+              rendered(make(), from_the_side(), {{"instruction_set", "base"}, {"samples", "2"}}, 7).pixels());
+    EXPECT_NE(one.pixels(), rendered(make(), from_the_side(), {{"samples", "2"}}, 8).pixels());
+}
+
+TEST(PathIntegrator, RejectsLinearImagesOfWhittedScenes) {
+    SceneBuilder scene;
+    scene.add_ball("ball", {0, 0, 0, 40}, diffuse(1, 1, 1));
+    LinearTracer tracer(std::move(scene), {}, "rt_embree");
+    EXPECT_EQ(tracer.start(pinhole()), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+}
+
+TEST(PathIntegrator, StraightImagesHaveTheMeanTransmittanceAsAlpha) {
+    const auto make = [] {
+        SceneBuilder scene = table(path_settings(1));
+        scene.add_ball("ball", {0, 0, 40, 20}, diffuse(0.2f, 0.2f, 0.2f));
+        return scene;
+    };
+    const LinearPicture linear = rendered(make(), from_above());
+    Tracer tracer(make(), {{"samples", "64"}});
+    const Picture straight = tracer.render(from_above());
+    for (std::uint32_t x = 0; x < 200; ++x) {
+        const double alpha =
+            shading::overlay_alpha({linear.value(x, 75, 4), linear.value(x, 75, 5), linear.value(x, 75, 6)});
+        EXPECT_NEAR(straight.alpha(x, 75), 255 * alpha, 1) << x;
+    }
+    EXPECT_TRUE(is_code_of(straight.at(100, 75)[0], linear.value(100, 75, 0), 2e-3));
+}
+
+struct OddScene {
+    const char *name;
+    void (*add)(SceneBuilder &scene);
+};
+// An environment of one colour except for its first texel.
+void add_sky(SceneBuilder &scene, std::uint32_t width, std::uint32_t height, float radiance, float sun) {
+    std::vector<glm::vec4> texels(std::size_t{width} * height, glm::vec4(glm::vec3(radiance), 1));
+    texels[0] = glm::vec4(glm::vec3(sun), 1);
+    scene::Texture texture = float_texture_of(width, height, texels);
+    texture.wrap_v = ARHOST_WRAP_CLAMP;
+    scene::Environment environment;
+    scene::add_cumulative_sums(environment, texture, scene::Reporter({}, "sky"));
+    environment.texture = scene.add_texture("sky", std::move(texture));
+    scene.environment = std::move(environment);
+    scene.add_ball("ball", {0, 0, 20, 20}, glass_of());
+    scene.add_ball("metal", {50, 0, 20, 20}, metallic_roughness({1, 1, 1}, 1, 0));
+    scene.add_mesh("table", square(500), diffuse(1, 1, 1), ARHOST_ROLE_CATCHER);
+}
+
+class OddPathScene : public testing::TestWithParam<OddScene> {};
+
+TEST_P(OddPathScene, HasFiniteNonNegativePixels) {
+    SceneBuilder scene(path_settings());
+    GetParam().add(scene);
+    const LinearPicture picture = rendered(std::move(scene), from_the_side(pinhole(60, 45, 60)), {{"samples", "4"}});
+    for (const LinearPixel &pixel : picture.pixels())
+        for (const std::uint16_t half : pixel)
+            ASSERT_LT(half, 0x7c00) << "negative, infinite or NaN";
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Scenes, OddPathScene,
+    testing::Values(OddScene{"Empty", [](SceneBuilder &) {}},
+                    OddScene{"NoLight",
+                             [](SceneBuilder &scene) {
+                                 scene.add_ball("ball", {0, 0, 0, 20}, glass_of());
+                             }},
+                    OddScene{"EnvironmentOfOnePixel", [](SceneBuilder &scene) { add_sky(scene, 1, 1, 0, 2); }},
+                    OddScene{"BlackEnvironment", [](SceneBuilder &scene) { add_sky(scene, 8, 4, 0, 0); }},
+                    OddScene{"SunOfAMillion", [](SceneBuilder &scene) { add_sky(scene, 64, 32, 0.1f, 1e6f); }},
+                    OddScene{"ThousandsOfLamps",
+                             [](SceneBuilder &scene) {
+                                 for (int i = 0; i < 3000; ++i)
+                                     scene.add_light(bulb({i % 50 * 10 - 250, i / 50 * 10 - 300, 200}, 2, 0.001f));
+                                 scene.add_ball("ball", {0, 0, 20, 20}, glass_of());
+                                 scene.add_mesh("table", square(500), diffuse(1, 1, 1), ARHOST_ROLE_CATCHER);
+                             }},
+                    OddScene{
+                        "EmissiveTrianglesWithoutArea",
+                        [](SceneBuilder &scene) {
+                            scene.add_mesh("lamp", quad({0, 0, 0}, {10, 0, 0}, {20, 0, 0}, {30, 0, 0}), emissive(1));
+                            scene.add_mesh("table", square(500), diffuse(1, 1, 1), ARHOST_ROLE_CATCHER);
+                            scene.add_ball("ball", {0, 0, 20, 20}, diffuse(1, 1, 1));
+                        }},
+                    OddScene{"CatcherWithoutArea",
+                             [](SceneBuilder &scene) {
+                                 scene.add_mesh("table", quad({0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}),
+                                                diffuse(1, 1, 1), ARHOST_ROLE_CATCHER);
+                                 scene.add_ball("ball", {0, 0, 20, 20}, diffuse(1, 1, 1));
+                                 scene.add_light(sun());
+                             }},
+                    OddScene{"LampInsideABall",
+                             [](SceneBuilder &scene) {
+                                 scene.add_ball("ball", {0, 0, 20, 20}, glass_of());
+                                 scene.add_light(bulb({0, 0, 20}, 5, 1e6f, ARHOST_FALLOFF_INVERSE_SQUARE));
+                                 scene.add_mesh("table", square(500), diffuse(1, 1, 1), ARHOST_ROLE_CATCHER);
+                             }},
+                    OddScene{"HugeEmission",
+                             [](SceneBuilder &scene) {
+                                 scene.add_ball("ball", {0, 0, 20, 20}, emissive(1e6f));
+                                 scene.add_mesh("table", square(500), diffuse(1, 1, 1), ARHOST_ROLE_CATCHER);
+                                 scene.add_light(sun());
+                             }},
+                    OddScene{"HugeCoordinates",
+                             [](SceneBuilder &scene) {
+                                 scene.add_ball("far", {1e9f, 1e9f, 1e9f, 1e8f}, mirror(1));
+                                 scene.add_ball("ball", {0, 0, 20, 20}, diffuse(1, 1, 1));
+                                 scene.add_mesh("table", square(1e9f), diffuse(1, 1, 1), ARHOST_ROLE_CATCHER);
+                                 scene.add_light(light(0, 0, 1e9f, 1));
+                             }}),
+    [](const auto &info) { return std::string(info.param.name); });
+
+} // namespace
+} // namespace arhost::test
