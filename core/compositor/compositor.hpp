@@ -12,7 +12,7 @@
 
 namespace arhost {
 
-// What the pixels of an overlay are, and how they are blended with the video.
+// The meaning of the pixels of an overlay, and how they are blended with the video.
 struct OverlayFormat {
     arhost_image_form form = ARHOST_IMAGE_FORM_STRAIGHT;
     arhost_compositing compositing = ARHOST_COMPOSITING_SRGB; // of straight images

@@ -74,7 +74,8 @@ struct LightTables {
 };
 const LightTables &light_tables();
 
-// What the host shows for one channel of a linear pixel that is not untouched, over video of the code `video`.
+// Returns the code that the host shows for one channel of a linear pixel that is not untouched, over video of the
+// code `video`.
 inline std::uint8_t added_and_transmitted(std::uint16_t added, std::uint16_t transmittance, std::uint8_t video) {
     const LightTables &tables = light_tables();
     return static_cast<std::uint8_t>(

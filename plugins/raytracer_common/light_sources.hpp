@@ -24,7 +24,7 @@ struct PlacedObject {
     bool is_visible;
 };
 
-// What a light sample has to know about an emissive object that scattered rays hit.
+// The light samples of an emissive object, for the weights of scattered rays that hit it.
 struct Emitter {
     float density = 0;     // chance of a light sample per mm² of the mesh, or that of the ball; 0: it is not sampled
     float ball_radius = 0; // world space, mm; 0: a mesh

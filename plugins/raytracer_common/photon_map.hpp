@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Photons: light that lamps send by way of mirrors and glass onto other surfaces (H. W. Jensen, Global Illumination
+// Photons: light that mirrors and glass send from lamps onto other surfaces (H. W. Jensen, Global Illumination
 // using Photon Maps, EGWR 1996), sorted into the cells of a regular grid.
 #pragma once
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "raytracer_common/video.hpp"
 
-#include "pixels/rows.hpp"
-
 #include <arhost/shading/lens.hpp>
 
 #include <algorithm>
@@ -11,44 +9,75 @@
 namespace arhost::raytracer_common {
 namespace {
 
-void convert_row(const arhost_frame &frame, const YuvMatrix &matrix, std::size_t y, std::uint8_t *bgr) {
-    const arhost_frame_format &format = *frame.format;
-    const auto row = [&](std::size_t plane, std::size_t at) {
-        return frame.plane[plane] + at * format.stride[plane];
-    };
-    switch (format.pixel_format) {
-    case ARHOST_PIXEL_FORMAT_GREY8:
-        return rows::bgr_from_grey(row(0, y), bgr, format.width);
-    case ARHOST_PIXEL_FORMAT_RGB8:
-        return rows::bgr_from_rgb(row(0, y), bgr, format.width);
-    case ARHOST_PIXEL_FORMAT_BGR8:
-        std::copy_n(row(0, y), std::size_t{3} * format.width, bgr);
-        return;
-    case ARHOST_PIXEL_FORMAT_YUYV:
-        return rows::bgr_from_yuyv(row(0, y), matrix, bgr, format.width);
-    case ARHOST_PIXEL_FORMAT_NV12:
-        return rows::bgr_from_nv12(row(0, y), row(1, y / 2), matrix, bgr, format.width);
-    case ARHOST_PIXEL_FORMAT_I420:
-        return rows::bgr_from_i420(row(0, y), row(1, y / 2), row(2, y / 2), matrix, bgr, format.width);
-    }
+// Weights of red and blue in luma (ITU-R BT.601-7, BT.709-6).
+struct LumaWeights {
+    float red, blue;
+};
+LumaWeights weights_of(arhost_yuv_matrix matrix) {
+    return matrix == ARHOST_YUV_MATRIX_BT709 ? LumaWeights{0.2126f, 0.0722f} : LumaWeights{0.299f, 0.114f};
 }
+
+std::uint8_t code_of(float value) {
+    return static_cast<std::uint8_t>(std::clamp(value + 0.5f, 0.0f, 255.0f));
+}
+
+// Writes the colours of the frame's pixels with these Y', Cb and Cr codes.
+class FromYuv {
+public:
+    explicit FromYuv(const arhost_frame_format &format)
+        : weights_(weights_of(format.yuv_matrix)), is_limited_(format.yuv_range == ARHOST_YUV_RANGE_LIMITED) {}
+
+    void write(std::uint8_t luma, std::uint8_t cb, std::uint8_t cr, std::uint8_t *to) const {
+        const float y = is_limited_ ? (luma - 16.0f) * (255.0f / 219) : luma;
+        const float scale = is_limited_ ? 255.0f / 224 : 1, b = (cb - 128.0f) * scale, r = (cr - 128.0f) * scale;
+        const float red = y + 2 * (1 - weights_.red) * r, blue = y + 2 * (1 - weights_.blue) * b;
+        const float green = (y - weights_.red * red - weights_.blue * blue) / (1 - weights_.red - weights_.blue);
+        to[0] = code_of(red);
+        to[1] = code_of(green);
+        to[2] = code_of(blue);
+    }
+
+private:
+    LumaWeights weights_;
+    bool is_limited_;
+};
 
 } // namespace
 
 void VideoImage::set(const arhost_frame &frame) {
-    const std::size_t width = frame.format->width, height = frame.format->height;
-    const YuvMatrix matrix = yuv_matrix(*frame.format);
-    row_.resize(3 * width);
-    texels_.resize(4 * width * height);
+    const arhost_frame_format &format = *frame.format;
+    const FromYuv from_yuv(format);
+    texels_.resize(std::size_t{4} * format.width * format.height, 255);
     std::uint8_t *to = texels_.data();
-    for (std::size_t y = 0; y < height; ++y) {
-        convert_row(frame, matrix, y, row_.data());
-        for (std::size_t x = 0; x < width; ++x, to += 4) {
-            to[0] = row_[3 * x + 2];
-            to[1] = row_[3 * x + 1];
-            to[2] = row_[3 * x];
-            to[3] = 255;
-        }
+    for (std::size_t y = 0; y < format.height; ++y) {
+        const auto row = [&](std::size_t plane, std::size_t at) {
+            return frame.plane[plane] + at * format.stride[plane];
+        };
+        for (std::size_t x = 0; x < format.width; ++x, to += 4)
+            switch (format.pixel_format) {
+            case ARHOST_PIXEL_FORMAT_GREY8:
+                std::fill_n(to, 3, row(0, y)[x]);
+                break;
+            case ARHOST_PIXEL_FORMAT_RGB8:
+                std::copy_n(row(0, y) + 3 * x, 3, to);
+                break;
+            case ARHOST_PIXEL_FORMAT_BGR8:
+                std::reverse_copy(row(0, y) + 3 * x, row(0, y) + 3 * x + 3, to);
+                break;
+            case ARHOST_PIXEL_FORMAT_YUYV: {
+                const std::uint8_t *pair = row(0, y) + x / 2 * 4;
+                from_yuv.write(pair[x % 2 * 2], pair[1], pair[3], to);
+                break;
+            }
+            case ARHOST_PIXEL_FORMAT_NV12: {
+                const std::uint8_t *chroma = row(1, y / 2) + x / 2 * 2;
+                from_yuv.write(row(0, y)[x], chroma[0], chroma[1], to);
+                break;
+            }
+            case ARHOST_PIXEL_FORMAT_I420:
+                from_yuv.write(row(0, y)[x], row(1, y / 2)[x / 2], row(2, y / 2)[x / 2], to);
+                break;
+            }
     }
 }
 

@@ -19,7 +19,7 @@ public:
     const std::uint8_t *texels() const { return texels_.data(); }
 
 private:
-    std::vector<std::uint8_t> texels_, row_;
+    std::vector<std::uint8_t> texels_;
 };
 
 // Returns the largest squared length of (x/z, y/z) of the directions in the picture: lens models are not valid far

@@ -140,7 +140,7 @@ struct Photons {
     std::int32_t level_count;
 };
 
-// What the path integrator needs in addition to the scene.
+// Input of the path integrator in addition to the scene.
 struct PathScene {
     const float *sources;    // source_count records (raytracer_common/source_record.hpp)
     const float *cumulative; // cumulative chances of the sources

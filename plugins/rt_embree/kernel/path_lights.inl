@@ -219,8 +219,8 @@ ARHOST_INLINE Float density_of_emitter(const Work &work, const Paths &paths, con
 }
 
 // Returns the light that rays receive from area lamps before `t_far`, where they hit a surface. Light that reaches a
-// surface by way of mirrors and glass is brought by photons, so rays that a surface has scattered do not count behind
-// them.
+// surface off mirrors and through glass is brought by photons, so rays that a surface has scattered do not count
+// behind them.
 ARHOST_INLINE Vec3 lamps_towards(const Work &work, const Paths &paths, Vec3 origin, Vec3 direction, Float t_far) {
     const float samples = static_cast<float>(source_samples(work.frame, paths.depth - 1));
     const Vec3 light =

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Caustics: photons that lamps send onto mirrors and glass, and the light that these photons bring to the surfaces on
-// which they arrive. Paths from the eye do not find small lamps by way of mirrors and glass.
+// which they arrive. Paths from the eye do not find small lamps off mirrors and through glass.
 #pragma once
 #include "path_lights.inl"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the primary rays of a block of 4×4 pixels hit, and sums over the samples of a pixel.
+// Hits of the primary rays of a block of 4×4 pixels, and sums over the samples of a pixel.
 #pragma once
 #include "scatter.inl"
 

@@ -15,7 +15,7 @@
 extern "C" {
 #endif
 
-/* What the pixels of an image are. */
+/* The meaning of the pixels of an image. */
 typedef int32_t arhost_image_form;
 enum {
     ARHOST_IMAGE_FORM_STRAIGHT = 1, /* arhost_image.rgba: colour and alpha, 8 bits each */
