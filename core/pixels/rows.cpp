@@ -19,8 +19,11 @@ namespace arhost::rows::HWY_NAMESPACE {
 
 using Bytes = const std::uint8_t *;
 
-bool is_untouched(const std::uint16_t *pixel) {
-    return std::memcmp(pixel, &untouched, sizeof untouched) == 0;
+HWY_INLINE bool is_untouched(const std::uint16_t *pixel) {
+    const auto expected = std::bit_cast<std::array<std::uint64_t, 2>>(untouched);
+    std::uint64_t words[2];
+    std::memcpy(words, pixel, sizeof words);
+    return ((words[0] ^ expected[0]) | (words[1] ^ expected[1])) == 0;
 }
 
 #if HWY_TARGET == HWY_SCALAR
@@ -197,33 +200,39 @@ HWY_INLINE auto floats_of(const std::uint16_t *halves) {
 #endif
 }
 
-// The same as Srgb8Table, for four numbers.
-HWY_INLINE auto codes_of(const shading::Srgb8Table &table, hn::Vec<decltype(df4)> light) {
-    using Table = shading::Srgb8Table;
-    const auto smallest = hn::Set(df4, Table::smallest);
-    const auto x = hn::IfThenElse(hn::Gt(light, smallest), hn::Min(light, hn::Set(df4, 1.0f)), smallest);
-    const auto bits = hn::BitCast(di4, x);
-    const auto index = hn::ShiftRight<Table::shift>(hn::Sub(bits, hn::Set(di4, Table::first_bits)));
-    const auto cell = hn::GatherIndex(di4, table.cells, index);
-    const auto is_same =
-        hn::Lt(hn::And(bits, hn::Set(di4, Table::low_mask)), hn::And(cell, hn::Set(di4, Table::threshold_mask)));
-    const auto next = hn::Add(hn::ShiftRight<Table::code_shift>(cell), hn::Set(di4, 1));
-    return hn::Add(next, hn::VecFromMask(di4, is_same)); // true is −1
-}
-
+// Works in steps over a chunk, because a vector load that follows the stores of its parts at once is slow.
 void add_light(Bytes bgr, const std::uint16_t *linear, std::uint8_t *out, std::size_t count) {
+    using Table = shading::Srgb8Table;
     const LightTables &tables = light_tables();
-    for (std::size_t i = 0; i < count; ++i, bgr += 3, linear += 8, out += 3) {
-        if (is_untouched(linear)) {
-            std::memmove(out, bgr, 3);
-            continue;
+    const auto smallest = hn::Set(df4, Table::smallest), one = hn::Set(df4, 1.0f);
+    constexpr std::size_t chunk = 32;
+    alignas(16) float video[4 * chunk] = {};
+    alignas(16) std::int32_t bits[4 * chunk];
+    std::uint8_t changed[chunk]; // indices of the pixels that change the video
+    for (std::size_t n; count > 0; count -= n, bgr += 3 * n, linear += 8 * n, out += 3 * n) {
+        n = std::min(count, chunk);
+        std::size_t changed_count = 0;
+        for (std::size_t i = 0; i < n; ++i) {
+            changed[changed_count] = static_cast<std::uint8_t>(i);
+            changed_count += !is_untouched(linear + 8 * i);
         }
-        const float video[] = {tables.light_of[bgr[2]], tables.light_of[bgr[1]], tables.light_of[bgr[0]], 0};
-        const auto light = hn::Add(floats_of(linear), hn::Mul(floats_of(linear + 4), hn::LoadU(df4, video)));
-        std::int32_t codes[4];
-        hn::StoreU(codes_of(tables.code_of, light), di4, codes);
-        for (std::size_t c = 0; c < 3; ++c)
-            out[c] = static_cast<std::uint8_t>(codes[2 - c]);
+        for (std::size_t k = 0; k < changed_count; ++k)
+            for (std::size_t c = 0; c < 3; ++c)
+                video[4 * k + c] = tables.light_of[bgr[3 * changed[k] + 2 - c]];
+        if (bgr != out)
+            std::memcpy(out, bgr, 3 * n);
+        for (std::size_t k = 0; k < changed_count; ++k) {
+            const std::uint16_t *pixel = linear + 8 * std::size_t{changed[k]};
+            const auto light =
+                hn::Add(floats_of(pixel), hn::Mul(floats_of(pixel + 4), hn::Load(df4, video + 4 * k)));
+            // As in Srgb8Table: NaN becomes black.
+            const auto clamped = hn::IfThenElse(hn::Gt(light, smallest), hn::Min(light, one), smallest);
+            hn::Store(hn::BitCast(di4, clamped), di4, bits + 4 * k);
+        }
+        for (std::size_t k = 0; k < changed_count; ++k)
+            for (std::size_t c = 0; c < 3; ++c)
+                out[3 * std::size_t{changed[k]} + 2 - c] =
+                    static_cast<std::uint8_t>(tables.code_of.code_of_bits(bits[4 * k + c]));
     }
 }
 

@@ -187,7 +187,7 @@ TEST_P(Rejects, Field) {
 
 const Corruption faults_of_small_scene[] = {
     {"Magic", [](Parts a) { a.scene.magic ^= 1; }, "magic number"},
-    {"Version", [](Parts a) { a.scene.version = 1; }, "version is 1, not 3"},
+    {"Version", [](Parts a) { a.scene.version = 1; }, "version is 1, not 4"},
     {"StructSize", [](Parts a) { a.scene.struct_size += 8; }, "the struct_size of its header is wrong"},
     {"ByteSizeTooLarge", [](Parts a) { a.scene.byte_size += 64; }, "bytes, but"},
     {"ByteSizeHuge", [](Parts a) { a.scene.byte_size = ~0ull; }, "bytes, but"},

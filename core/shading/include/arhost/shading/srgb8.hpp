@@ -26,7 +26,10 @@ struct Srgb8Table {
 
     std::int32_t operator()(float linear) const {
         const float x = linear > smallest ? (linear < 1 ? linear : 1.0f) : smallest; // NaN becomes black
-        const auto bits = std::bit_cast<std::int32_t>(x);
+        return code_of_bits(std::bit_cast<std::int32_t>(x));
+    }
+    // `bits`: those of a float from `smallest` to 1.
+    std::int32_t code_of_bits(std::int32_t bits) const {
         const std::int32_t cell = cells[(bits - first_bits) >> shift];
         return (cell >> code_shift) + ((bits & low_mask) >= (cell & threshold_mask));
     }
