@@ -187,8 +187,11 @@ void blend_forms(benchmark::State &state, const arhost::OverlayFormat &form) {
 }
 #define SIZES Args({640, 480, 30})->Args({640, 480, 100})->Args({1280, 720, 30})->Args({1280, 720, 100})
 BENCHMARK_CAPTURE(blend_forms, straight_srgb, arhost::OverlayFormat{})->SIZES;
-BENCHMARK_CAPTURE(blend_forms, straight_linear, arhost::OverlayFormat{ARHOST_IMAGE_FORM_STRAIGHT, ARHOST_COMPOSITING_LINEAR})->SIZES;
-BENCHMARK_CAPTURE(blend_forms, linear, arhost::OverlayFormat{ARHOST_IMAGE_FORM_LINEAR, ARHOST_COMPOSITING_LINEAR})->SIZES;
+BENCHMARK_CAPTURE(blend_forms, straight_linear,
+                  arhost::OverlayFormat{ARHOST_IMAGE_FORM_STRAIGHT, ARHOST_COMPOSITING_LINEAR})
+    ->SIZES;
+BENCHMARK_CAPTURE(blend_forms, linear, arhost::OverlayFormat{ARHOST_IMAGE_FORM_LINEAR, ARHOST_COMPOSITING_LINEAR})
+    ->SIZES;
 #undef SIZES
 
 void plain_frame(benchmark::State &state, arhost_pixel_format pixel_format) {

@@ -57,7 +57,7 @@ public:
         LinearPixel pixel{};
         for (int c = 0; c < 3; ++c) {
             pixel.added[c] = half_of(added_[c]);
-            pixel.transmittance[c] = half_of(1 - removed_[c]);
+            pixel.transmittance[c] = half_of(std::max(0.0f, 1 - removed_[c]));
         }
         return pixel;
     }

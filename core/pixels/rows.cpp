@@ -223,8 +223,7 @@ void add_light(Bytes bgr, const std::uint16_t *linear, std::uint8_t *out, std::s
             std::memcpy(out, bgr, 3 * n);
         for (std::size_t k = 0; k < changed_count; ++k) {
             const std::uint16_t *pixel = linear + 8 * std::size_t{changed[k]};
-            const auto light =
-                hn::Add(floats_of(pixel), hn::Mul(floats_of(pixel + 4), hn::Load(df4, video + 4 * k)));
+            const auto light = hn::Add(floats_of(pixel), hn::Mul(floats_of(pixel + 4), hn::Load(df4, video + 4 * k)));
             // As in Srgb8Table: NaN becomes black.
             const auto clamped = hn::IfThenElse(hn::Gt(light, smallest), hn::Min(light, one), smallest);
             hn::Store(hn::BitCast(di4, clamped), di4, bits + 4 * k);

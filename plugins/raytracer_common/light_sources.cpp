@@ -42,7 +42,7 @@ void for_each_point(const arhost_scene &arena, std::uint32_t number, const Place
     const arhost_geometry &geometry = elements<arhost_geometry>(arena, arena.geometries)[object.geometry];
     const std::byte *at = placed.positions ? reinterpret_cast<const std::byte *>(placed.positions)
                                            : bytes(arena) + geometry.positions.offset;
-    const std::size_t stride = placed.positions ? 3 * sizeof(float) : geometry.positions.stride;
+    const std::size_t stride = placed.positions ? placed.position_stride : geometry.positions.stride;
     const bool is_sphere = geometry.type == ARHOST_GEOMETRY_SPHERES;
     const double scale = length(vector_of(placed.world_from_object));
     for (std::uint32_t i = 0; i < geometry.positions.count; ++i, at += stride) {
@@ -74,14 +74,12 @@ struct Bounds {
     double radius() const { return length(high - low) / 2; }
 };
 
-// Radius of a sphere around the boxes.
 struct Sphere {
-    Bounds bounds;
     Vec3 centre;
     double radius;
 };
 
-// The smallest sphere around two spheres, from the box around both.
+// Returns the smallest sphere around two spheres.
 Sphere merged(const Sphere &a, const Sphere &b) {
     const double distance = length(b.centre - a.centre);
     if (distance + b.radius <= a.radius)
@@ -89,7 +87,7 @@ Sphere merged(const Sphere &a, const Sphere &b) {
     if (distance + a.radius <= b.radius)
         return b;
     const double radius = (distance + a.radius + b.radius) / 2;
-    return {{}, a.centre + (b.centre - a.centre) * ((radius - a.radius) / std::max(distance, 1e-12)), radius};
+    return {a.centre + (b.centre - a.centre) * ((radius - a.radius) / std::max(distance, 1e-12)), radius};
 }
 
 } // namespace
@@ -135,7 +133,7 @@ std::vector<std::array<float, 4>> LightSources::bounds_of(std::span<const Placed
         for_each_point(
             arena_, i, placed[i], [&](Vec3 p) { radius = std::max(radius, length(p - centre)); },
             [&](Vec3 c, double r) { radius = std::max(radius, length(c - centre) + r); });
-        spheres.push_back({box, centre, radius});
+        spheres.push_back({centre, radius});
         all.add(box.low);
         all.add(box.high);
     }
@@ -182,13 +180,15 @@ float *LightSources::add_record(float type) {
     return to;
 }
 
-// Adds the records of an object that emits light. Surfaces with an emission texture and geometries of several spheres
-// are not sampled; scattered rays find them.
+// Adds the records of an object that emits light. Surfaces with an emission texture or holes, and geometries of
+// several spheres, are not sampled; scattered rays find them.
 void LightSources::add_emitter(std::uint32_t number, const PlacedObject &placed) {
     const arhost_object &object = elements<arhost_object>(arena_, arena_.objects)[number];
     const arhost_material &material = elements<arhost_material>(arena_, arena_.materials)[object.material];
     const arhost_geometry &geometry = elements<arhost_geometry>(arena_, arena_.geometries)[object.geometry];
-    if (!placed.is_visible || mean_of(material.emission) <= 0 || material.emission_texture != ARHOST_NONE ||
+    if (object.role != ARHOST_ROLE_VIRTUAL || !placed.is_visible || mean_of(material.emission) <= 0 ||
+        material.emission_texture != ARHOST_NONE ||
+        (material.alpha_cutoff > 0 && material.colour_texture != ARHOST_NONE) ||
         material.model == ARHOST_MATERIAL_MIRROR || material.model == ARHOST_MATERIAL_GLASS)
         return;
     const auto add = [&](SourceType type, Vec3 position, double area) {
@@ -218,7 +218,7 @@ void LightSources::add_emitter(std::uint32_t number, const PlacedObject &placed)
         std::memcpy(corners, at, sizeof corners);
         const Vec3 a = vertices[corners[0]], edge_1 = vertices[corners[1]] - a, edge_2 = vertices[corners[2]] - a;
         const double area = length(cross(edge_1, edge_2)) / 2;
-        if (!(area > 0))
+        if (!(static_cast<float>(area) > 0))
             continue;
         float *to = add(triangle_source, a, area);
         write(edge_1, to + axis_u_row);
@@ -288,6 +288,7 @@ void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 midd
             area_of[object_of[i - lamps]] += from[area_row];
         }
     }
+    light_ = static_cast<float>(sum);
     const auto emitters =
         static_cast<std::size_t>(std::ranges::count_if(area_of, [](double area) { return area > 0; }));
     // A small part of the samples is spread evenly, because a surface may be near a source that is far from the
@@ -325,34 +326,34 @@ std::vector<float> environment_irradiance(const arhost_scene &arena) {
         return {};
     const arhost_texture &image = elements<arhost_texture>(arena, arena.textures)[environment.texture];
     const auto texels = elements<std::array<float, 4>>(arena, image.texels);
-    // Radiance times solid angle of the cells of a coarse grid: enough for a cosine lobe.
+    // Moments of the light from the cells of a coarse grid, for each channel: the sum of radiance times solid angle
+    // times direction. They are exact for surfaces that see all of a cell.
     constexpr std::uint32_t columns = 128, rows = 64;
-    std::vector<Vec3> power(std::size_t{columns} * rows, Vec3{0, 0, 0}), direction(power);
+    std::vector<std::array<Vec3, 3>> moments(std::size_t{columns} * rows);
     const std::uint32_t cells_x = std::max(columns, image.width), cells_y = std::max(rows, image.height);
     const double area = 2 * std::numbers::pi * std::numbers::pi / (static_cast<double>(cells_x) * cells_y);
     for (std::uint32_t y = 0; y < cells_y; ++y) {
-        const double v = (y + 0.5) / cells_y, solid_angle = area * shading::equirectangular_sine(v);
+        const double v = (y + 0.5) / cells_y;
+        const double power = area * shading::equirectangular_sine(v) * environment.intensity;
         const std::size_t from_row = std::size_t{y} * image.height / cells_y * image.width;
         const std::size_t to_row = std::size_t{y} * rows / cells_y * columns;
         for (std::uint32_t x = 0; x < cells_x; ++x) {
             const float *texel = texels[from_row + std::size_t{x} * image.width / cells_x].data();
-            Vec3 &to = power[to_row + std::size_t{x} * columns / cells_x];
-            to = to + vector_of(texel) * (solid_angle * environment.intensity);
+            const Vec3 direction = shading::equirectangular_direction((x + 0.5) / cells_x, v) * power;
+            std::array<Vec3, 3> &to = moments[to_row + std::size_t{x} * columns / cells_x];
+            for (std::size_t c = 0; c < 3; ++c)
+                to[c] = to[c] + direction * texel[c];
         }
     }
-    for (std::uint32_t y = 0; y < rows; ++y)
-        for (std::uint32_t x = 0; x < columns; ++x)
-            direction[std::size_t{y} * columns + x] =
-                shading::equirectangular_direction((x + 0.5) / columns, (y + 0.5) / rows);
     std::vector<float> irradiance(std::size_t{4} * irradiance_width * irradiance_height);
     for (std::uint32_t y = 0; y < irradiance_height; ++y)
         for (std::uint32_t x = 0; x < irradiance_width; ++x) {
             const Vec3 normal =
                 shading::equirectangular_direction((x + 0.5) / irradiance_width, (y + 0.5) / irradiance_height);
             Vec3 sum{0, 0, 0};
-            for (std::size_t i = 0; i < power.size(); ++i)
-                if (const double cosine = dot(normal, direction[i]); cosine > 0)
-                    sum = sum + power[i] * cosine;
+            for (const auto &[red, green, blue] : moments)
+                sum = sum + Vec3{std::max(dot(normal, red), 0.0), std::max(dot(normal, green), 0.0),
+                                 std::max(dot(normal, blue), 0.0)};
             write(sum * std::numbers::inv_pi, irradiance.data() + 4 * (std::size_t{y} * irradiance_width + x));
         }
     return irradiance;

@@ -20,7 +20,8 @@ namespace arhost::raytracer_common {
 // Where an object is, and the shape of a deforming one.
 struct PlacedObject {
     const float *world_from_object; // column-major 3×4
-    const float *positions;         // three floats per vertex, tightly packed; NULL: those of the arena
+    const float *positions;         // of the vertices; NULL: those of the arena
+    std::uint32_t position_stride;  // bytes; ignored if `positions` is NULL
     bool is_visible;
 };
 
@@ -41,6 +42,8 @@ public:
     std::span<const float> cumulative() const { return cumulative_; }
     std::span<const float> lamp_chances() const { return lamp_chances_; }
     float environment_chance() const { return environment_chance_; }
+    // The light of all sources in the middle of the virtual objects: irradiance / π at perpendicular incidence.
+    float light() const { return light_; }
     std::span<const Emitter> emitters() const { return emitters_; } // one per object
     // Spheres that contain the visible virtual objects, at most max_spheres.
     static constexpr std::size_t max_spheres = 16;
@@ -59,7 +62,7 @@ private:
     float environment_radiance_ = 0; // mean over all directions
     std::vector<float> records_, cumulative_, lamp_chances_;
     std::vector<Emitter> emitters_;
-    float environment_chance_ = 0;
+    float environment_chance_ = 0, light_ = 0;
     std::vector<std::array<float, 4>> spheres_, specular_spheres_;
 };
 

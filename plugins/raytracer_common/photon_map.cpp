@@ -4,93 +4,86 @@
 #include "raytracer_common/scene_geometry.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <limits>
+#include <iterator>
 #include <numbers>
 #include <utility>
 
 namespace arhost::raytracer_common {
 namespace {
 
-struct Grid {
-    std::array<float, 3> low;
-    std::array<std::int32_t, 3> size;
-    float cell;
-
-    std::size_t count() const {
-        return static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) *
-               static_cast<std::size_t>(size[2]);
-    }
-    std::size_t index_of(const Photon &photon) const {
-        std::size_t at[3];
-        for (int i = 0; i < 3; ++i)
-            at[i] = static_cast<std::size_t>(
-                std::clamp(static_cast<std::int32_t>((photon.position[i] - low[i]) / cell), 0, size[i] - 1));
-        return (at[2] * static_cast<std::size_t>(size[1]) + at[1]) * static_cast<std::size_t>(size[0]) + at[0];
-    }
-};
-
-Grid make_grid(const std::array<float, 3> &low, const std::array<float, 3> &high, float cell) {
-    Grid grid{low, {}, cell};
-    for (std::size_t i = 0; i < 3; ++i)
-        grid.size[i] = static_cast<std::int32_t>(std::min((high[i] - low[i]) / cell, 1e6f)) + 1;
-    return grid;
+std::int32_t cell_at(float position, float low, float side) {
+    return static_cast<std::int32_t>(std::min((position - low) / side, 1e9f));
 }
 
-void sort(std::span<const Photon> arrived, const Grid &grid, PhotonGrid &to) {
-    to.size = grid.size;
-    to.low = grid.low;
-    to.radius = grid.cell / 2;
-    to.starts.assign(grid.count() + 1, 0);
-    for (const Photon &photon : arrived)
-        ++to.starts[grid.index_of(photon) + 1];
-    for (std::size_t i = 1; i < to.starts.size(); ++i)
-        to.starts[i] += to.starts[i - 1];
-    std::vector<std::int32_t> next(to.starts.begin(), to.starts.end() - 1);
-    to.photons.resize(arrived.size());
-    for (const Photon &photon : arrived)
-        to.photons[static_cast<std::size_t>(next[grid.index_of(photon)]++)] = photon;
+void sort(std::span<const Photon> photons, const std::array<float, 3> &low, PhotonGrid &grid) {
+    const std::size_t buckets = std::bit_ceil(2 * photons.size());
+    const auto bucket_of = [&](const Photon &photon) {
+        const float side = 2 * grid.radius;
+        return PhotonGrid::hash(cell_at(photon.position[0], low[0], side), cell_at(photon.position[1], low[1], side),
+                                cell_at(photon.position[2], low[2], side)) &
+               (buckets - 1);
+    };
+    grid.starts.assign(buckets + 1, 0);
+    for (const Photon &photon : photons)
+        ++grid.starts[bucket_of(photon) + 1];
+    for (std::size_t i = 1; i < grid.starts.size(); ++i)
+        grid.starts[i] += grid.starts[i - 1];
+    std::vector<std::int32_t> next(grid.starts.begin(), grid.starts.end() - 1);
+    grid.numbers.resize(photons.size());
+    for (std::size_t i = 0; i < photons.size(); ++i)
+        grid.numbers[static_cast<std::size_t>(next[bucket_of(photons[i])]++)] = static_cast<std::int32_t>(i);
+}
+
+// The area on which photons arrive, in mm²: that of the cells of a coarse grid that they hit. `extent`: without the
+// few photons that fly far away.
+double lit_area(std::span<const Photon> photons, const std::array<float, 3> &low, float extent) {
+    constexpr std::int32_t side = 64;
+    const float cell = extent / side;
+    std::vector<bool> is_hit(std::size_t{side} * side * side);
+    for (const Photon &photon : photons) {
+        std::size_t at = 0;
+        for (std::size_t i = 0; i < 3; ++i)
+            at = at * side +
+                 static_cast<std::size_t>(std::clamp(cell_at(photon.position[i], low[i], cell), 0, side - 1));
+        is_hit[at] = true;
+    }
+    return static_cast<double>(std::ranges::count(is_hit, true)) * cell * cell;
 }
 
 } // namespace
 
 void PhotonMap::build(std::span<const Photon> photons) {
-    std::vector<Photon> arrived;
-    std::array<float, 3> low, high;
-    low.fill(std::numeric_limits<float>::max());
-    high.fill(std::numeric_limits<float>::lowest());
-    for (const Photon &photon : photons) {
-        if (photon.power[0] < 0)
-            continue;
-        arrived.push_back(photon);
-        for (std::size_t i = 0; i < 3; ++i) {
-            low[i] = std::min(low[i], photon.position[i]);
-            high[i] = std::max(high[i], photon.position[i]);
-        }
-    }
-    levels_.resize(arrived.empty() ? 0 : 1);
-    if (arrived.empty())
+    photons_.clear();
+    levels_.clear();
+    std::ranges::copy_if(photons, std::back_inserter(photons_),
+                         [](const Photon &photon) { return photon.power[0] >= 0; });
+    if (photons_.empty())
         return;
+    std::array<float, 3> central_low;
     float extent = 1e-6f;
-    for (std::size_t i = 0; i < 3; ++i)
-        extent = std::max(extent, high[i] - low[i]);
-    // The first radius follows from the area on which photons arrive: the cells of a coarse grid that they hit.
-    const Grid coarse = make_grid(low, high, extent / 64);
-    std::vector<bool> is_hit(coarse.count());
-    for (const Photon &photon : arrived)
-        is_hit[coarse.index_of(photon)] = true;
-    const double area =
-        static_cast<double>(std::ranges::count(is_hit, true)) * static_cast<double>(coarse.cell) * coarse.cell;
-    const double radius =
-        std::sqrt(area * photons_per_estimate / (std::numbers::pi * static_cast<double>(arrived.size())));
-    Grid grid = make_grid(low, high, std::max(static_cast<float>(2 * radius), extent / 128));
-    sort(arrived, grid, levels_[0]);
-    const std::size_t max_cells = std::max<std::size_t>(8 * arrived.size(), 1 << 16);
-    while (levels_.size() < max_levels) {
-        grid = make_grid(low, high, grid.cell / 2);
-        if (grid.count() > max_cells)
-            break;
-        sort(arrived, grid, levels_.emplace_back());
+    std::vector<float> along(photons_.size());
+    for (std::size_t i = 0; i < 3; ++i) {
+        std::ranges::transform(photons_, along.begin(), [i](const Photon &photon) { return photon.position[i]; });
+        const auto at = [&](double share) {
+            const auto nth =
+                along.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(along.size() - 1));
+            std::ranges::nth_element(along, nth);
+            return *nth;
+        };
+        low_[i] = *std::ranges::min_element(along);
+        central_low[i] = at(0.02);
+        extent = std::max(extent, at(0.98) - central_low[i]);
+    }
+    const double radius = std::sqrt(lit_area(photons_, central_low, extent) * photons_per_estimate /
+                                    (std::numbers::pi * static_cast<double>(photons_.size())));
+    levels_.resize(max_levels);
+    levels_[0].radius = std::max(static_cast<float>(radius), extent * 1e-4f);
+    for (std::size_t i = 0; i < levels_.size(); ++i) {
+        if (i > 0)
+            levels_[i].radius = levels_[i - 1].radius / 2;
+        sort(photons_, low_, levels_[i]);
     }
 }
 

@@ -19,14 +19,18 @@ struct Photon {
     float power[3];     // irradiance times area (mm²), divided by π; negative red: the photon arrived nowhere
 };
 
-// Photons, sorted into the cells of a regular grid. Those of cell (x, y, z) begin at index
-// starts[(z·size[1] + y)·size[0] + x] and end where those of the next cell begin.
+// A hash table of the cells of a regular grid. Cells share a bucket by chance, so compare the cell of each photon.
 struct PhotonGrid {
-    std::vector<Photon> photons;
-    std::vector<std::int32_t> starts;
-    std::array<std::int32_t, 3> size; // cells
-    std::array<float, 3> low;         // mm: corner of cell (0, 0, 0)
-    float radius;                     // mm: of density estimates; half of a cell's side
+    std::vector<std::int32_t> numbers; // of photons, by bucket
+    std::vector<std::int32_t> starts;  // first element of `numbers` of each bucket, and its size
+    float radius;                      // mm: of density estimates; half of a cell's side
+
+    // The bucket of a cell is this number modulo the number of buckets, which is a power of two. Cell numbers are not
+    // negative.
+    static std::uint32_t hash(std::int32_t x, std::int32_t y, std::int32_t z) {
+        return static_cast<std::uint32_t>(x) * 73856093u ^ static_cast<std::uint32_t>(y) * 19349663u ^
+               static_cast<std::uint32_t>(z) * 83492791u;
+    }
 };
 
 // Grids of the same photons whose cells are half as large from level to level: where photons are dense, a density
@@ -36,12 +40,16 @@ public:
     static constexpr std::size_t max_levels = 6;
     static constexpr int photons_per_estimate = 24; // about
 
-    // Sorts the photons that arrived somewhere.
+    // Keeps the photons that arrived somewhere.
     void build(std::span<const Photon> photons);
+    std::span<const Photon> photons() const { return photons_; }
     std::span<const PhotonGrid> levels() const { return levels_; } // empty if no photon arrived
+    const std::array<float, 3> &low() const { return low_; }       // mm: corner of cell (0, 0, 0) of all grids
 
 private:
+    std::vector<Photon> photons_;
     std::vector<PhotonGrid> levels_;
+    std::array<float, 3> low_{};
 };
 
 // Chances with which photons are sent from each lamp towards each of the spheres around the mirrors and glass

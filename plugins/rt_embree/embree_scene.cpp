@@ -160,6 +160,7 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         placements_.push_back({local_box(arena, object), {}, true});
         visible_boxes_.push_back(empty_box());
         place_object(number, object.world_from_object);
+        view_.has_several_real |= object.role != ARHOST_ROLE_VIRTUAL && (view_.has_catchers || view_.has_occluders);
         view_.has_catchers |= object.role == ARHOST_ROLE_CATCHER;
         view_.has_occluders |= object.role == ARHOST_ROLE_OCCLUDER;
         view_.has_glass |= mask_of(objects_.back()) == glass_mask;
@@ -285,7 +286,7 @@ std::vector<arhost::raytracer_common::PlacedObject> EmbreeScene::placed_objects(
     std::vector<arhost::raytracer_common::PlacedObject> placed;
     for (std::uint32_t i = 0; i < from.size(); ++i)
         placed.push_back({placements_[i].world_from_object.data(), from[i].deforms ? objects_[i].positions : nullptr,
-                          placements_[i].is_visible});
+                          objects_[i].position_stride, placements_[i].is_visible});
     return placed;
 }
 

@@ -91,6 +91,7 @@ struct Scene {
     float shadow_alpha_opaque, shadow_alpha_translucent;
     bool coloured_shadows;
     bool has_catchers, has_occluders, has_glass;
+    bool has_several_real; // several catchers or occluders
     bool has_area_lights;
     bool has_background; // a background that is not black, and no environment
     bool has_instances;
@@ -125,17 +126,19 @@ struct Caustics {
     const float *spheres;              // centre and radius, mm
     const float *cumulative, *chances; // as in PhotonTargets
     std::int32_t sphere_count, lamp_count;
+    float scene_extent;                       // mm: length of the diagonal of the scene's bounds
     std::uint32_t photon_count, first_number; // of this frame; offset into the random sequence
 };
 
-// As in arhost::raytracer_common::PhotonGrid.
+// As in arhost::raytracer_common::PhotonMap.
 struct PhotonGrid {
-    const float *photons; // nine floats each, as in Photon
-    const std::int32_t *starts;
-    std::int32_t size[3];
-    float low[3], radius;
+    const std::int32_t *numbers, *starts;
+    std::int32_t bucket_mask; // number of buckets − 1
+    float radius;
 };
 struct Photons {
+    const float *photons; // nine floats each, as in Photon
+    float low[3];
     PhotonGrid levels[arhost::raytracer_common::PhotonMap::max_levels];
     std::int32_t level_count;
 };
@@ -151,6 +154,9 @@ struct PathScene {
     const float *spheres; // centre and radius of spheres that contain all virtual objects, mm
     std::int32_t sphere_count;
     float max_radiance; // bound of each sample
+    // The change of a catcher's light is relative to at least this irradiance / π, so that a catcher in the dark does
+    // not flicker. 0: the scene has no light, and catchers do not change.
+    float least_irradiance;
     Video video;
     Caustics caustics;
     Photons photons;
@@ -177,6 +183,7 @@ struct Frame {
     std::uint16_t *linear;
     std::uint32_t first_random; // offset into the random sequences of the path integrator
     PathScene path;
+    bool blends_codes; // straight images of the path integrator: the host blends sRGB codes, not linear light
 };
 
 struct Rectangle {

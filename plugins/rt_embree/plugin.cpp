@@ -38,7 +38,7 @@ public:
     }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
-        renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request));
+        renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request), settings_.samples);
         const bool has_video = request.struct_size >= sizeof request; // an older host's struct lacks the field
         const Rectangle drawn = renderer_->render(request.camera, image, request.motion,
                                                   has_video ? request.video : nullptr, request.sequence);

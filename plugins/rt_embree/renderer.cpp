@@ -73,6 +73,13 @@ void clear(const arhost_image &image, const Rectangle &pixels) {
                         std::size_t{4} * (pixels.x1 - pixels.x0));
 }
 
+float scene_extent(const arhost_scene &arena) {
+    double squared = 0;
+    for (int i = 0; i < 3; ++i)
+        squared += std::pow(double{arena.bounds_max[i]} - arena.bounds_min[i], 2);
+    return static_cast<float>(std::sqrt(squared));
+}
+
 Rectangle united(const Rectangle &a, const Rectangle &b) {
     return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
 }
@@ -126,7 +133,9 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
                  threads_),
       samples_per_frame_(settings.samples), samples_(arhost::raytracer_common::sample_positions(settings.samples)),
       scene_(*setup.scene, threads_.thread_count(), settings.robust, host), light_samples_(settings.light_samples),
-      single_path_(settings.single_path), max_radiance_(settings.max_radiance), photons_per_sample_(settings.photons),
+      single_path_(settings.single_path), max_radiance_(settings.max_radiance),
+      blends_codes_(setup.compositing != ARHOST_COMPOSITING_LINEAR), full_samples_(settings.samples),
+      photons_per_sample_(settings.photons),
       max_radius_squared_(arhost::raytracer_common::max_radius_squared(full_intrinsics_)) {
     if (setup.form == ARHOST_IMAGE_FORM_LINEAR && setup.scene->integrator != ARHOST_INTEGRATOR_PATH)
         throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
@@ -142,7 +151,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
         history_.resize(sum_rows * ray_table_.tiles().size() * tile_pixels);
 }
 
-void Renderer::set_samples(std::uint32_t samples) {
+void Renderer::set_samples(std::uint32_t samples, std::uint32_t full_samples) {
+    full_samples_ = full_samples;
     if (samples == samples_per_frame_)
         return;
     if (samples > 1 && !ray_table_.rays().has_derivatives)
@@ -179,7 +189,7 @@ void Renderer::place_lights() {
 
 // Sends photons from the lamps to mirrors and glass.
 void Renderer::trace_photons(Frame &frame) {
-    constexpr std::uint32_t chunk = 1 << 12, max_photons = 1 << 22;
+    constexpr std::uint32_t chunk = 1 << 12, max_photons = 1 << 20;
     const std::uint64_t wanted = std::uint64_t{photons_per_sample_} * frame.sample_count;
     if (photon_targets_.empty() || wanted == 0)
         return;
@@ -190,6 +200,7 @@ void Renderer::trace_photons(Frame &frame) {
     caustics.chances = photon_targets_.chances().data();
     caustics.sphere_count = static_cast<std::int32_t>(photon_targets_.spheres().size());
     caustics.lamp_count = static_cast<std::int32_t>(frame.scene.light_count);
+    caustics.scene_extent = scene_extent(scene_.arena());
     caustics.photon_count = count;
     caustics.first_number = frame.first_random * photons_per_sample_;
     photons_.resize(count);
@@ -200,14 +211,13 @@ void Renderer::trace_photons(Frame &frame) {
     });
     photon_map_.build(photons_);
     Photons &photons = frame.path.photons;
-    for (const arhost::raytracer_common::PhotonGrid &from : photon_map_.levels()) {
-        PhotonGrid &to = photons.levels[photons.level_count++];
-        to.photons = from.photons.data()->position;
-        to.starts = from.starts.data();
-        std::copy_n(from.size.data(), 3, to.size);
-        std::copy_n(from.low.data(), 3, to.low);
-        to.radius = from.radius;
-    }
+    if (photon_map_.photons().empty())
+        return;
+    photons.photons = photon_map_.photons().data()->position;
+    std::copy_n(photon_map_.low().data(), 3, photons.low);
+    for (const arhost::raytracer_common::PhotonGrid &from : photon_map_.levels())
+        photons.levels[photons.level_count++] = {from.numbers.data(), from.starts.data(),
+                                                 static_cast<std::int32_t>(from.starts.size() - 2), from.radius};
 }
 
 PathScene Renderer::path_scene() const {
@@ -225,9 +235,10 @@ PathScene Renderer::path_scene() const {
                        ARHOST_TEXEL_RGBA32F,
                        ARHOST_WRAP_REPEAT,
                        ARHOST_WRAP_CLAMP};
-    path.spheres = lights_->spheres().data()->data();
+    path.spheres = reinterpret_cast<const float *>(lights_->spheres().data()); // there may be none
     path.sphere_count = static_cast<std::int32_t>(lights_->spheres().size());
     path.max_radiance = max_radiance_;
+    path.least_irradiance = 1e-3f * lights_->light();
     if (!has_video_)
         return path;
     const arhost_intrinsics &of = full_intrinsics_;
@@ -278,7 +289,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     // The random numbers of successive frames continue one sequence.
     std::uint32_t first_random = history_samples_;
     if (lights_ && history_.empty()) {
-        first_random = static_cast<std::uint32_t>(sequence) * samples_per_frame_;
+        first_random = static_cast<std::uint32_t>(sequence) * full_samples_;
         samples_ = arhost::raytracer_common::sample_positions(first_random % (1u << 16), samples_per_frame_);
     }
     Frame frame{scene_.view(),
@@ -294,7 +305,8 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                 image.stride,
                 image.linear,
                 first_random,
-                path_scene()};
+                path_scene(),
+                blends_codes_};
     if (!history_.empty())
         for (std::size_t i = 0; i < sum_rows; ++i)
             frame.history[i] = history_.data() + i * tiles.size() * tile_pixels;

@@ -52,7 +52,8 @@ public:
                      const arhost_frame *video = nullptr, std::uint64_t sequence = 0);
     const EmbreeScene &scene() const { return scene_; }
     // Both functions change the images of later calls as if the renderer had been created with the new setting.
-    void set_samples(std::uint32_t samples);
+    // `full_samples`: number of samples of an image without a limit (arhost_render_request.max_samples).
+    void set_samples(std::uint32_t samples, std::uint32_t full_samples);
     void set_light_samples(std::int32_t samples);
 
     const char *kernel_name() const { return kernel_.name; }
@@ -81,6 +82,8 @@ private:
     std::optional<arhost::raytracer_common::LightSources> lights_;
     std::vector<float> irradiance_; // of the environment
     float max_radiance_;
+    bool blends_codes_;          // as in Frame
+    std::uint32_t full_samples_; // the random numbers of a frame begin at its number times this
     std::uint32_t photons_per_sample_;
     arhost::raytracer_common::PhotonTargets photon_targets_;
     std::vector<arhost::raytracer_common::Photon> photons_;

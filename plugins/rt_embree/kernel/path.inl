@@ -14,7 +14,7 @@ constexpr std::uint32_t first_roulette_depth = 2;
 
 // Ends paths at random, so that those that go on have about the same throughput.
 ARHOST_INLINE Bool survive(const Work &work, const Paths &paths, Vec3 &throughput, Bool active) {
-    active = active & (largest(throughput) > Float(min_throughput));
+    active = active & (largest(throughput) > Float(0.0f));
     if (paths.depth < first_roulette_depth || !any(active))
         return active;
     const Float chance = min(max(largest(throughput), Float(0.05f)), Float(1.0f));
@@ -85,7 +85,7 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
                      out);
     const Float cosine = dot(out, s.normal);
     const Float density = scattering_density(s, to_eye, out, chance);
-    Vec3 throughput = paths.throughput * scattering(s, to_eye, out, false) *
+    Vec3 throughput = paths.throughput * scattering(s, to_eye, out) *
                       (Float(0.318309886f) / max(density * (Float(1.0f) - mirror_chance), Float(1e-20f)));
     scatters =
         scatters & (cosine > Float(0.0f)) & (dot(out, s.geometric_normal) > Float(0.0f)) & (density > Float(0.0f));
@@ -122,7 +122,7 @@ ARHOST_INLINE void shade_path(Work &work, const RTCRayHit16 &rays, Bool active, 
     if (any(lit)) {
         const Vec3 by_photons = photon_light(
             work, paths, s, lit, [&](Vec3 to_light) __attribute__((always_inline)) {
-                return scattering(s, -direction, to_light, true) *
+                return (scattering(s, -direction, to_light) + highlight(s, -direction, to_light)) *
                        (Float(1.0f) / max(dot(s.normal, to_light), Float(0.01f)));
             });
         add_radiance(work, paths, by_photons + sampled_light(work, paths, s, -direction, scatters, lit), lit);
@@ -179,11 +179,15 @@ ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, Boo
 // single random ray that hits a tiny, very bright light from dominating the pixel.
 ARHOST_INLINE void accumulate_path(const Frame &frame, Scratch &scratch, int first_pixel) {
     const Float bound(frame.path.max_radiance);
+    const auto bounded = [&](const float *from) __attribute__((always_inline)) {
+        const Float value = load(from);
+        return select(abs(value) < Float(1e30f), min(max(value, -bound), bound), Float(0.0f)); // NaN: 0
+    };
     for (int i = 0; i < 3; ++i) {
         const float *radiance = scratch.radiance[i] + first_pixel;
-        add_to_sum(scratch, light_row + i, first_pixel, min(max(load(radiance), Float(0.0f)), bound));
+        add_to_sum(scratch, light_row + i, first_pixel, bounded(radiance));
         if (frame.scene.has_catchers)
-            add_to_sum(scratch, change_row + i, first_pixel, min(max(load(radiance + tile_pixels), -bound), bound));
+            add_to_sum(scratch, change_row + i, first_pixel, bounded(radiance + tile_pixels));
     }
 }
 
@@ -203,9 +207,9 @@ struct LinearBlock {
 
 ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch, int first_pixel,
                                       std::uint32_t count) {
-    const Float share(1.0f / static_cast<float>(count));
+    const Float samples(static_cast<float>(count));
     const auto mean = [&](int row) __attribute__((always_inline)) {
-        return load(scratch.sum[row] + first_pixel) * share;
+        return load(scratch.sum[row] + first_pixel) / samples; // exactly 1 if all samples are covered
     };
     const Float uncovered = Float(1.0f) - mean(coverage_row);
     LinearBlock linear{{mean(light_row), mean(light_row + 1), mean(light_row + 2)},
@@ -249,7 +253,8 @@ ARHOST_INLINE bool write_linear(const Frame &frame, int x, int y, int width, int
 }
 
 ARHOST_INLINE Int straight_of(const Frame &frame, const LinearBlock &linear) {
-    const Float alpha = overlay_alpha(linear.transmittance);
+    const Float removed = overlay_alpha(linear.transmittance);
+    const Float alpha = frame.blends_codes ? alpha_of_light(Float(1.0f) - removed) : removed;
     const Vec3 colour = linear.added * (Float(1.0f) / max(alpha, Float(1e-6f)));
     const arhost::shading::Srgb8Table &table = *frame.scene.srgb8;
     return rgba8(srgb8(table, colour.x), srgb8(table, colour.y), srgb8(table, colour.z), to_int(code_8bit(alpha)));

@@ -61,8 +61,8 @@ ARHOST_INLINE Float virtual_density(const PathScene &path, const Surface &s, Vec
     return density / max(total, Float(1e-20f));
 }
 
-// Chance of a ray from a catcher towards the virtual objects, from the sum of their form factors. Effects below 1/512
-// of the light are cut.
+// Chance of a ray from a catcher towards the virtual objects, from the sum of their form factors. There is none where
+// this sum is below 1/512, so that objects do not affect the whole desk.
 ARHOST_INLINE Float bounce_chance(Float form_factors) {
     return select(form_factors < Float(1.0f / 512), Float(0.0f),
                   min(max(form_factors * Float(3.0f), Float(0.02f)), Float(1.0f)));
@@ -117,8 +117,9 @@ ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHi
     const Frame &frame = work.frame;
     const Surface s = surface_at(frame.scene, rays, active);
     const Vec3 before = irradiance_without_objects(frame, s);
-    const auto inverse = [](Float a) __attribute__((always_inline)) {
-        return select(a > Float(0.0f), Float(1.0f) / max(a, Float(1e-30f)), Float(0.0f));
+    const float least = frame.path.least_irradiance;
+    const auto inverse = [least](Float a) __attribute__((always_inline)) {
+        return least > 0 ? Float(1.0f) / max(a, Float(least)) : Float(0.0f);
     };
     Paths relative = paths;
     relative.throughput = {inverse(before.x), inverse(before.y), inverse(before.z)};
@@ -193,10 +194,11 @@ ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, 
         return bool_of(false);
     const Vec3 eye = splat(frame.camera.eye), to_point = s.position - eye;
     const Filmed filmed = filmed_towards(frame, to_point);
-    active = active & filmed.inside;
+    // The video shows the side of the surface that faces the camera.
+    active = active & filmed.inside & (dot(s.geometric_normal, to_point) < Float(0.0f));
     if (!any(active))
         return active;
-    if (frame.scene.has_occluders) { // the video shows a nearer real surface
+    if (frame.scene.has_several_real) { // the video shows a nearer real surface
         RTCRay16 ray;
         const Float end = Float(1.0f) - s.offset * Float(4.0f) / max(length(to_point), Float(1e-20f));
         set_ray(ray, eye, to_point, end, Int(catcher_mask | occluder_mask));
@@ -211,8 +213,9 @@ ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, 
     Vec3 change = photon_irradiance(work, paths, s, active);
     if (any(facing))
         change = change - select(is_hidden(work, s, sample, facing), sample.light * cosine, black());
-    const auto part = [](Float a, Float whole) __attribute__((always_inline)) {
-        return Float(1.0f) + select(whole > Float(0.0f), a / max(whole, Float(1e-30f)), Float(0.0f));
+    const float least = frame.path.least_irradiance;
+    const auto part = [least](Float a, Float whole) __attribute__((always_inline)) {
+        return least > 0 ? Float(1.0f) + a / max(whole, Float(least)) : Float(1.0f);
     };
     const Vec3 remaining{part(change.x, before.x), part(change.y, before.y), part(change.z, before.z)};
     add_radiance(work, paths, filmed.light * remaining, active);

@@ -188,7 +188,11 @@ ARHOST_INLINE Vec3 sampled_light(const Work &work, const Paths &paths, const Sur
         Float weight(1.0f);
         if (scatters)
             weight = balance_weight(sample.density, scattering_density(s, to_eye, sample.direction, chance));
-        sum = sum + select(visible, scattering(s, to_eye, sample.direction, true) * sample.light * weight, black());
+        sum =
+            sum + select(visible,
+                         (scattering(s, to_eye, sample.direction) * weight + highlight(s, to_eye, sample.direction)) *
+                             sample.light,
+                         black());
     }
     return sum;
 }
@@ -230,7 +234,7 @@ ARHOST_INLINE Vec3 lamps_towards(const Work &work, const Paths &paths, Vec3 orig
 }
 
 // Returns the irradiance of a real surface without virtual objects, divided by π: the irradiance map of the
-// environment, and a regular grid of points on each lamp.
+// environment, and a regular grid of points on each lamp, which has fewer points if there are many lamps.
 ARHOST_INLINE Vec3 irradiance_without_objects(const Frame &frame, const Surface &s) {
     const Scene &scene = frame.scene;
     Vec3 sum = splat(scene.background);
@@ -240,7 +244,7 @@ ARHOST_INLINE Vec3 irradiance_without_objects(const Frame &frame, const Surface 
     }
     for (std::uint32_t i = 0; i < scene.light_count; ++i) {
         const arhost_light &light = scene.lights[i];
-        const int side = is_area_light(light) ? 4 : 1;
+        const int side = !is_area_light(light) || scene.light_count > 64 ? 1 : scene.light_count > 8 ? 2 : 4;
         Float irradiance(0.0f);
         for (int u = 0; u < side; ++u)
             for (int v = 0; v < side; ++v) {

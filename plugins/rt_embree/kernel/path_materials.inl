@@ -14,14 +14,18 @@ ARHOST_INLINE Float specular_chance(const Surface &s, Vec3 to_eye) {
     return select(s.is_rough, select(diffuse > Float(0.0f), bounded, Float(1.0f)), Float(0.0f));
 }
 
-// Returns π · BSDF · cosine of a lit surface. `with_phong`: including the highlights of SPECULAR and METAL, which
-// only light samples see.
-ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light, bool with_phong) {
+// Returns the highlights of SPECULAR and METAL. Only light samples bring them; scattered rays do not follow this
+// lobe.
+ARHOST_INLINE Vec3 highlight(const Surface &s, Vec3 to_eye, Vec3 to_light) {
+    if (!s.any_specular)
+        return black();
+    return select(s.is_rough, black(), s.specular * phong(s.normal, to_light, to_eye, s.exponent));
+}
+
+// Returns π · BSDF · cosine of a lit surface, without highlight().
+ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light) {
     const Float cosine = lambert(s.normal, to_light);
     Vec3 scattered = s.diffuse * cosine;
-    if (with_phong && s.any_specular)
-        scattered =
-            scattered + select(s.is_rough, black(), s.specular * phong(s.normal, to_light, to_eye, s.exponent));
     if (s.any_rough) {
         const Vec3 half_vector = normalize(to_light + to_eye);
         const Vec3 fresnel = schlick(s.specular, dot(to_eye, half_vector));

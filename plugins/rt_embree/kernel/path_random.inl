@@ -60,7 +60,7 @@ ARHOST_INLINE Pair owen_pair(Int index, Int seed) {
 
 // Returns pair `index` of the `count` pairs that a sample needs for a dimension of the paths' current vertex.
 ARHOST_INLINE Pair path_pair(const Work &work, const Paths &paths, int dimension, int index, int count) {
-    const Int pixel = paths.pixel ^ work.seed ^ Int(static_cast<int>(paths.depth << 12));
+    const Int pixel = paths.pixel + hash(work.seed) + Int(static_cast<int>(paths.depth << 12));
     const std::uint32_t i = work.sample * static_cast<std::uint32_t>(count) + static_cast<std::uint32_t>(index);
     return owen_pair(Int(static_cast<int>(i)), hash(hash(pixel) + Int(dimension)));
 }

@@ -64,9 +64,9 @@ ARHOST_INLINE EmittedPhotons emit_photons(const Frame &frame, Int number, Bool a
     const Vec3 to_centre = centre - origin;
     const Float squared = dot(to_centre, to_centre);
     Vec3 direction = cone_direction(normalize(to_centre), slope_of(sphere_radius, squared), aim.u, aim.v);
-    if (any(directional)) { // parallel light, from a disc before the sphere
+    if (any(directional)) { // parallel light, from a disc outside of the scene
         const Vec3 disc = vector_to_disc(-lamp_direction, sphere_radius, aim.u, aim.v) + lamp_direction;
-        origin = select(directional, centre + disc - lamp_direction * (sphere_radius * Float(2.0f)), origin);
+        origin = select(directional, centre + disc - lamp_direction * Float(caustics.scene_extent), origin);
         direction = select(directional, lamp_direction, direction);
     }
     // The density of the photons of this lamp in the direction, per steradian, or of parallel light, per area.
@@ -76,9 +76,11 @@ ARHOST_INLINE EmittedPhotons emit_photons(const Frame &frame, Int number, Bool a
         const Vec3 to_sphere = splat(sphere) - origin;
         const Float chance = gather(caustics.chances + i, first_pair);
         const Float slope = slope_of(Float(sphere[3]), dot(to_sphere, to_sphere));
-        const Bool in_cone = dot(direction, normalize(to_sphere)) >= Float(1.0f) - slope;
-        const Vec3 across = to_sphere - direction * dot(to_sphere, direction);
-        const Bool in_beam = dot(across, across) < Float(sphere[3] * sphere[3]);
+        const Float along = dot(to_sphere, direction);
+        const Vec3 across = to_sphere - direction * along;
+        // The sphere that was aimed at counts in spite of rounding errors.
+        const Bool in_beam = (dot(across, across) < Float(sphere[3] * sphere[3])) | (chosen == Int(i));
+        const Bool in_cone = in_beam & ((along > Float(0.0f)) | (slope > Float(1.0f)));
         const Float of_cone = Float(0.159154943f) / slope, of_beam(0.318309886f / (sphere[3] * sphere[3]));
         density = density + chance * select(directional, select(in_beam, of_beam, Float(0.0f)),
                                             select(in_cone, of_cone, Float(0.0f)));
@@ -176,60 +178,57 @@ ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, 
     }
 }
 
-// The cells of a grid around surface points: two along each axis. The two along x are contiguous.
+// The cells of a grid around surface points: two along each axis.
 struct NearCells {
-    Bool inside[4];
-    Int first[4], end[4]; // photons of each row of two cells
-    Int count;            // photons in all of them
+    Int cell[8][3], first[8], end[8]; // the photons of the cell's bucket
+    Int count;                        // photons in all of these buckets
 };
-ARHOST_INLINE NearCells cells_near(const PhotonGrid &grid, const Surface &s, Bool active) {
-    const Float inverse_cell(0.5f / grid.radius), half(0.5f);
-    const Vec3 at = (s.position - splat(grid.low)) * inverse_cell - Vec3{half, half, half};
-    const auto size = [&](int i) __attribute__((always_inline)) {
-        return Float(static_cast<float>(grid.size[i]));
+ARHOST_INLINE NearCells cells_near(const Photons &photons, const PhotonGrid &grid, const Surface &s) {
+    const Float inverse_cell(0.5f / grid.radius);
+    const Vec3 at = (s.position - splat(photons.low)) * inverse_cell;
+    const auto lower = [](Float a) __attribute__((always_inline)) {
+        return to_int(floor(min(max(a, Float(-2.0f)), Float(1e9f)) - Float(0.5f)));
     };
-    active = active & (at.x > Float(-1.0f)) & (at.y > Float(-1.0f)) & (at.z > Float(-1.0f)) & (at.x < size(0)) &
-             (at.y < size(1)) & (at.z < size(2));
+    const Int low[3] = {lower(at.x), lower(at.y), lower(at.z)};
     NearCells cells;
     cells.count = Int(0);
-    if (!any(active)) {
-        for (int row = 0; row < 4; ++row)
-            cells.inside[row] = active;
-        return cells;
-    }
-    const Vec3 low{floor(at.x), floor(at.y), floor(at.z)};
-    const Int x0 = to_int(max(low.x, Float(0.0f))), x1 = to_int(min(low.x + Float(1.0f), size(0) - Float(1.0f)));
-    for (int row = 0; row < 4; ++row) {
-        const Float y = low.y + Float(static_cast<float>(row & 1)), z = low.z + Float(static_cast<float>(row >> 1));
-        const Bool inside = active & (y >= Float(0.0f)) & (z >= Float(0.0f)) & (y < size(1)) & (z < size(2));
-        const Int first = (to_int(z) * Int(grid.size[1]) + to_int(y)) * Int(grid.size[0]);
-        cells.inside[row] = inside;
-        cells.first[row] = gather(grid.starts, select(inside, first + x0, Int(0)));
-        cells.end[row] = gather(grid.starts, select(inside, first + x1 + Int(1), Int(0)));
-        cells.count = cells.count + select(inside, cells.end[row] - cells.first[row], Int(0));
+    for (int i = 0; i < 8; ++i) {
+        Int *cell = cells.cell[i];
+        cell[0] = low[0] + Int(i & 1);
+        cell[1] = low[1] + Int(i >> 1 & 1);
+        cell[2] = low[2] + Int(i >> 2);
+        const Int bucket = ((cell[0] * Int(73856093)) ^ (cell[1] * Int(19349663)) ^ (cell[2] * Int(83492791))) &
+                           Int(grid.bucket_mask); // as PhotonGrid::hash of raytracer_common
+        cells.first[i] = gather(grid.starts, bucket);
+        cells.end[i] = gather(grid.starts + 1, bucket);
+        cells.count = cells.count + cells.end[i] - cells.first[i];
     }
     return cells;
 }
 
 template <class Weight>
-ARHOST_INLINE Vec3 photon_density(const PhotonGrid &grid, const NearCells &cells, const Surface &s, Bool active,
-                                  Weight weight) {
+ARHOST_INLINE Vec3 photon_density(const Photons &photons, const PhotonGrid &grid, const NearCells &cells,
+                                  const Surface &s, Bool active, Weight weight) {
     const Float radius_squared(grid.radius * grid.radius), scale(2 / (3.14159265f * grid.radius * grid.radius));
+    const Float inverse_cell(0.5f / grid.radius);
     Vec3 sum = black();
-    for (int row = 0; row < 4; ++row) {
-        const Bool inside = active & cells.inside[row];
-        for (Int next = cells.first[row];; next = next + Int(1)) {
-            const Bool here = inside & (next < cells.end[row]);
+    for (int i = 0; i < 8; ++i)
+        for (Int next = cells.first[i];; next = next + Int(1)) {
+            const Bool here = active & (next < cells.end[i]);
             if (!any(here))
                 break;
-            const Int photon = select(here, next, Int(0)) * Int(9);
-            const auto value = [&](int i) __attribute__((always_inline)) {
-                return gather(grid.photons + i, photon);
+            const Int photon = gather(grid.numbers, select(here, next, Int(0))) * Int(9);
+            const auto value = [&](int row) __attribute__((always_inline)) {
+                return gather(photons.photons + row, photon);
             };
-            const Vec3 offset = Vec3{value(0), value(1), value(2)} - s.position;
+            const Vec3 position{value(0), value(1), value(2)}, offset = position - s.position;
+            const Vec3 at = (position - splat(photons.low)) * inverse_cell;
+            const Bool of_cell = (to_int(at.x) == cells.cell[i][0]) & (to_int(at.y) == cells.cell[i][1]) &
+                                 (to_int(at.z) == cells.cell[i][2]);
             const Float squared = dot(offset, offset), height = dot(offset, s.geometric_normal);
             // Photons of other surfaces near an edge do not count.
-            const Bool near = here & (squared < radius_squared) & (height * height < radius_squared * Float(0.09f));
+            const Bool near =
+                here & of_cell & (squared < radius_squared) & (height * height < radius_squared * Float(0.09f));
             if (!any(near))
                 continue;
             const Vec3 to_light = -Vec3{value(3), value(4), value(5)};
@@ -237,7 +236,6 @@ ARHOST_INLINE Vec3 photon_density(const PhotonGrid &grid, const NearCells &cells
             const Float kernel = scale * (Float(1.0f) - squared * (Float(1.0f) / radius_squared));
             sum = sum + select(counts, Vec3{value(6), value(7), value(8)} * weight(to_light) * kernel, black());
         }
-    }
     return sum;
 }
 
@@ -259,12 +257,12 @@ ARHOST_INLINE Vec3 photon_light(const Work &work, const Paths &paths, const Surf
     Vec3 sum = black();
     for (std::int32_t level = 0; level < photons.level_count && any(active); ++level) {
         const PhotonGrid &grid = photons.levels[level];
-        const NearCells cells = cells_near(grid, s, active);
+        const NearCells cells = cells_near(photons, grid, s);
         active = active & (Int(0) < cells.count);
         const Bool dense = active & (limit < cells.count) & bool_of(level + 1 < photons.level_count);
         const Bool here = active & ~dense;
         if (any(here))
-            sum = sum + photon_density(grid, cells, s, here, weight);
+            sum = sum + photon_density(photons, grid, cells, s, here, weight);
         active = dense;
     }
     return sum * Float(static_cast<float>(work.frame.sample_count) / static_cast<float>(estimates));
