@@ -207,12 +207,18 @@ ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, 
             return active;
     }
     const Vec3 before = irradiance_without_objects(frame, s);
-    const SourceSample sample = sample_source(work, paths, s, 0, 1);
-    const Float cosine = lambert(s.normal, sample.direction);
-    const Bool facing = active & ~sample.is_virtual & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
     Vec3 change = photon_irradiance(work, paths, s, active);
-    if (any(facing))
-        change = change - select(is_hidden(work, s, sample, facing), sample.light * cosine, black());
+    // The eye sees these surfaces in mirrors and glass, so they get as many light samples as those that it sees
+    // directly.
+    const int count = source_samples(frame, paths.depth - 1);
+    for (int i = 0; i < count; ++i) {
+        const SourceSample sample = sample_source(work, paths, s, i, count);
+        const Float cosine = lambert(s.normal, sample.direction);
+        const Bool facing =
+            active & ~sample.is_virtual & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
+        if (any(facing))
+            change = change - select(is_hidden(work, s, sample, facing), sample.light * cosine, black());
+    }
     const float least = frame.path.least_irradiance;
     const auto part = [least](Float a, Float whole) __attribute__((always_inline)) {
         return least > 0 ? Float(1.0f) + a / max(whole, Float(least)) : Float(1.0f);

@@ -68,6 +68,9 @@ typedef struct arhost_render_request {
  * averaged in linear light and then encoded. Samples brighter than white count in full, up to a bound of at least 100
  * times white. Samples of virtual objects and samples of shadows are averaged separately; the two averages are
  * blended in sRGB, weighted by their shares of the alpha.
+ * With ARHOST_INTEGRATOR_PATH, alpha is the mean share of the video's light that a linear image would remove
+ * (ARHOST_COMPOSITING_LINEAR), or the alpha that removes this share from mid-grey video (ARHOST_COMPOSITING_SRGB).
+ * Light that is added on real surfaces is lost.
  *
  * ARHOST_IMAGE_FORM_LINEAR: eight half-precision floats (IEEE 754 binary16) per pixel: added light R, G, B, 0, then
  * transmittance R, G, B, 0. The host shows added + transmittance · video in each channel, where the video is linear
