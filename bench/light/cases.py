@@ -122,7 +122,7 @@ def spheres_in(name, image, intensity):
             materials[key] = rough([0.9, 0.5, 0.2], metallic, roughness)
             objects.append(ball(key, (60 * j - 90, 40 - 80 * i, 0), 18, key))
     return Case(f"glTF in {name}", scene(objects, materials, environment={"image": image, "intensity": intensity}), (0, 0, 900),
-                (0, 0, 0), 560, samples=1024, reference_samples=2048)
+                (0, 0, 0), 560, samples=4096, reference_samples=8192)
 
 
 def table_things():
@@ -153,8 +153,8 @@ def checkerboard(folder):
 def glass_on_checks(name, folder, **light):
     objects = [plane("floor", (0, 0, 0), (360, 360), "checks"), ball("glass", (0, 45, 0), 45, "glass")]
     materials = {"checks": checkerboard(folder), "glass": {"model": "glass", "index": 1.5}}
-    return Case(f"glass, {name}", scene(objects, materials, **light), (0, 160, 320), (0, 35, 0), 190, samples=1024,
-                reference_samples=1024)
+    return Case(f"glass, {name}", scene(objects, materials, **light), (0, 160, 320), (0, 35, 0), 190, samples=2048,
+                reference_samples=8192)
 
 
 def many_lamps():
@@ -165,7 +165,7 @@ def many_lamps():
         power = random.uniform(0.2, 1) * 200
         lights.append(lamp("sphere", [float(power * each) for each in random.uniform(0.3, 1, 3)],
                            position=[float(x), float(random.uniform(90, 130)), float(z)], radius=1))
-    return things("200 sphere lamps", lights, samples=1024)
+    return things("200 sphere lamps", lights, samples=1024, reference_samples=2048)
 
 
 def ring(folder):
@@ -296,7 +296,7 @@ def all_cases(folder, environments):
     yield many_lamps()
     yield things("directional lamp", [lamp("directional", [1, 0.9, 0.7], direction=[0.4, -0.8, -0.4])])
     yield things("spot lamp, hard", [lamp("spot", 40000, position=[120, 200, 60], direction=[-0.5, -0.8, -0.25],
-                                          outer_degrees=28)])
+                                          outer_degrees=28)], samples=1024, reference_samples=2048)
     yield things("rectangle lamp", [lamp("rectangle", [20000, 16000, 12000], position=[-130, 150, 60],
                                          direction=[0.6, -0.75, -0.28], size=[80, 50])])
     yield from spot_lamps()

@@ -146,6 +146,17 @@ def emitter(lamp):
     return made | {"emitter": {"type": "area", "radiance": rgb(intensity / area)}, "bsdf": {"type": "null"}}
 
 
+def environment_rows(file):
+    """Mitsuba puts the first and the last row of an environment at the poles, arhost half a row before them. Rows
+    between those of the picture make both interpolate the same light."""
+    rows = np.array(mi.Bitmap(file).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+    made = np.empty((2 * len(rows) + 1, *rows.shape[1:]), np.float32)
+    made[1::2] = rows
+    made[2:-1:2] = (rows[:-1] + rows[1:]) / 2
+    made[0], made[-1] = rows[0], rows[-1]
+    return mi.Bitmap(made)
+
+
 def mitsuba_scene(case, folder, width, height, with_virtual=True):
     scene = case.scene
     made = {"type": "scene", "sensor": {
@@ -161,7 +172,7 @@ def mitsuba_scene(case, folder, width, height, with_virtual=True):
         made[f"lamp-{i}"] = emitter(lamp)
     if "environment" in scene:
         # In arhost, the image's centre is in front of a y-up scene; in Mitsuba, its edge is.
-        made["sky"] = {"type": "envmap", "filename": os.path.join(folder, scene["environment"]["image"]),
+        made["sky"] = {"type": "envmap", "bitmap": environment_rows(os.path.join(folder, scene["environment"]["image"])),
                        "scale": scene["environment"].get("intensity", 1.0), "to_world": T().rotate([0, 1, 0], 180)}
     elif "background" in scene:
         made["sky"] = {"type": "constant", "radiance": rgb(scene["background"])}
