@@ -116,7 +116,7 @@ void composite_reference(const arhost_frame_format &format, const std::uint8_t *
         for (std::size_t x = 0; x < format.width; ++x) {
             Bgr c = pixel(format, planes, x, y);
             if (contains(region, x, y)) {
-                const std::uint8_t *rgba = overlay.rgba + y * overlay.stride + 4 * x;
+                const std::uint8_t *rgba = overlay.at(x, y);
                 c = {blended(c.b, rgba[2], rgba[3]), blended(c.g, rgba[1], rgba[3]), blended(c.r, rgba[0], rgba[3])};
             }
             std::memcpy(out.bgr + y * out.stride + 3 * x, &c, 3);

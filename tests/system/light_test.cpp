@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Tests linear images and video for ray tracers, with rt_light: the colour of its square encodes the number of the
+// frame that it got as video.
+#include "arhost_run.hpp"
+
+using namespace arhost::test;
+using testing::HasSubstr;
+
+namespace {
+
+using Frames = std::set<std::uint64_t>;
+
+std::string with_plugin(const std::string &plugin, std::string yaml) {
+    return yaml.replace(yaml.find("rt_counter"), std::string("rt_counter").size(), plugin);
+}
+
+class LightRun : public ArhostRun {
+public:
+    explicit LightRun(const Counting &options, const std::string &plugin = "rt_light")
+        : ArhostRun(with_plugin(plugin, counting(options))) {
+        std::string scene = small_scene;
+        write("scene.yaml", scene.replace(scene.find('1'), 1, "2"));
+    }
+};
+
+} // namespace
+
+TEST(LinearImages, ShowTheVideoOfTheirFrame) {
+    LightRun run({.source = "frames: 300"});
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_EQ(expect_all_frames(run, 300), Frames{});
+}
+
+TEST(LinearImages, DarkenTheVideoInLinearLight) {
+    LightRun run({.source = "frames: 256", .raytracer = "shades: true"});
+    ASSERT_EQ(run.run(), 0) << run.output();
+    const auto lines = counted(run);
+    ASSERT_EQ(lines.size(), 256u);
+    EXPECT_EQ(lines[255].video, 188u); // the code of half the light of 255
+    EXPECT_EQ(lines[0].video, 0u);
+}
+
+TEST(LinearImages, KillingWorkersDoesNotChangeThem) {
+    const Counting options{.source = "frames: 300, delay_ms: 1", .raytracer = "shades: true"};
+    LightRun clean(options), run(options);
+    ASSERT_EQ(clean.run(), 0) << clean.output();
+    run.start();
+    std::size_t at = 0;
+    for (const char *plugin : {"rt_light", "source_counter", "rt_light"}) {
+        run.wait_for_lines(at += 60);
+        const pid_t worker = run.worker(plugin);
+        ASSERT_NE(worker, 0) << plugin << "\n" << run.output();
+        send_signal(worker, SIGKILL);
+    }
+    ASSERT_EQ(run.wait(), 0) << run.output();
+    EXPECT_EQ(run.read("counted.txt"), clean.read("counted.txt"));
+    EXPECT_EQ(run.stats()["restarts"]["raytracer"], 2);
+}
+
+TEST(LinearImages, AreNotRequestedFromAPluginWithoutThem) {
+    LightRun run({.source = "frames: 30"}, "rt_counter");
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_EQ(expect_all_frames(run, 30), Frames{});
+    EXPECT_THAT(run.output(), HasSubstr("rt_counter cannot write linear images"));
+}
+
+TEST(LinearImages, GiveWayToTheStraightImagesOfAFallback) {
+    ArhostRun run(with_plugin("rt_light, fallback: rt_counter",
+                              counting({.source = "frames: 60",
+                                        .raytracer = "crash_at: 20",
+                                        .more = "restart: {proven_after_frames: 1000, quarantine_after: 1}\n"})));
+    std::string scene = small_scene;
+    run.write("scene.yaml", scene.replace(scene.find('1'), 1, "2"));
+    run.run();
+    EXPECT_EQ(expect_all_frames(run, 60), Frames{});
+    EXPECT_THAT(run.output(), HasSubstr("falling back to rt_counter"));
+}
+
+TEST(LinearImages, AreNotRequestedIfTheConfigurationBlendsCodes) {
+    LightRun run({.source = "frames: 30"}, "rt_light, composite: srgb");
+    run.expect(2, {"needs linear images and video"});
+}
+
+TEST(LinearImages, AreNotRequestedForWhittedScenes) {
+    LightRun run({.source = "frames: 30"});
+    run.write("scene.yaml", small_scene);
+    run.expect(2, {"needs linear images and video"});
+}
