@@ -13,6 +13,7 @@
 #include "surface.glsl"
 #include "lights.glsl"
 #include "scatter.glsl"
+#include "pixel.glsl"
 #include "integrator.glsl"
 #include "bare.glsl"
 

@@ -4,6 +4,9 @@
 // all others. Offsets are in elements, not bytes.
 #pragma once
 
+#include "raytracer_common/light_sources.hpp"
+
+#include <arhost/camera.h>
 #include <arhost/scene.h>
 
 #include <cstdint>
@@ -19,7 +22,7 @@ struct Object {
     std::uint32_t material, role, mask, flags;
     std::uint32_t root; // the root node of its mesh's BVH; without software BVHs, the mesh's first primitive
     std::uint32_t first_index, first_normal, first_texcoord;
-    float extent[3], unused;
+    float extent[3], emitter_density;
 };
 
 struct Material {
@@ -101,11 +104,22 @@ struct Frame {
     float environment_from_world[3][4];
     std::uint32_t environment_rows, environment_columns, has_slopes, unused;
     float samples[max_samples][4];
+    // The path integrator.
+    float spheres[arhost::raytracer_common::LightSources::max_spheres][4];
+    std::uint32_t sphere_count, source_count, first_source, first_cumulative;
+    float environment_chance, max_radiance;
+    std::uint32_t irradiance_texture, first_random;
+    std::uint32_t is_linear, has_several_real, has_video, video_texture;
+    float focal_length[2], principal_point[2];
+    float lens[ARHOST_MAX_DISTORTION];
+    std::uint32_t distortion;
+    float max_radius_squared, least_irradiance;
+    std::uint32_t blends_codes;
 };
 
 static_assert(sizeof(Object) == 208 && sizeof(Material) == 176 && sizeof(Light) == 80 && sizeof(Texture) == 32 &&
               sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Sums) == 48 &&
-              sizeof(Frame) == 208 + 16 * max_samples);
+              sizeof(Frame) == 592 + 16 * max_samples);
 
 // The bindings of the descriptor set, from 0.
 enum Binding : std::uint32_t {
@@ -132,7 +146,7 @@ enum Binding : std::uint32_t {
 struct Specialization {
     std::int32_t stack_capacity;
     std::uint32_t has_glass, has_catchers, has_holes; // 0 or 1
-    std::uint32_t ray_dimensions, has_textures, has_area_lights;
+    std::uint32_t ray_dimensions, has_textures, has_area_lights, may_have_video;
 };
 
 } // namespace rt_vulkan

@@ -6,6 +6,7 @@
 #include <arhost-cpp/plugin.hpp>
 
 #include <cstdio>
+#include <limits>
 #include <optional>
 
 namespace rt_vulkan {
@@ -67,26 +68,30 @@ public:
     Plugin(const arhost::Host &host, const arhost::Options &options)
         : host_(host), instance_(host, options.boolean("validate")),
           physical_(chosen_device(instance_, options.text("device"), host_)),
-          paths_(choose_paths(physical_, options.text("path"))), shaders_(shaders_of(paths_[0])) {
+          paths_(choose_paths(physical_, options.text("path"))) {
         settings_.samples = static_cast<std::uint32_t>(options.integer("samples"));
         settings_.light_samples = static_cast<std::uint32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
         settings_.single_path = options.text("glass") == "path";
+        if (const double bound = options.real("max_radiance"); bound > 0)
+            settings_.max_radiance = static_cast<float>(bound);
+        else
+            settings_.max_radiance = std::numeric_limits<float>::infinity();
     }
 
     void start(const arhost_raytracer_setup &setup) {
-        while (!try_start(setup)) {
+        while (!try_start(setup))
             paths_.erase(paths_.begin());
-            shaders_ = shaders_of(paths_[0]);
-        }
-        host_.info("Vulkan device '" + physical_.name + "' (" + physical_.uuid + "), path " + name_of(shaders_.path) +
+        host_.info("Vulkan device '" + physical_.name + "' (" + physical_.uuid + "), path " + name_of(paths_[0]) +
                    ", " + std::to_string(setup.scene->objects.count) + " objects" +
                    (instance_.validates() ? ", with the validation layers" : ""));
     }
 
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
-        renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request));
-        const Rectangle drawn = renderer_->render(request.camera, image, request.motion);
+        renderer_->set_samples(arhost::raytracer_common::limited(settings_.samples, request), settings_.samples);
+        const bool has_video = request.struct_size >= sizeof request; // an older host's struct lacks the field
+        const Rectangle drawn = renderer_->render(request.camera, image, request.motion,
+                                                  has_video ? request.video : nullptr, request.sequence);
         info.has_region = 1;
         info.region_x = drawn.x;
         info.region_y = drawn.y;
@@ -122,12 +127,13 @@ private:
     // Tries to start with the first of `paths_`. If that fails and trying another path makes sense, returns false;
     // otherwise throws.
     bool try_start(const arhost_raytracer_setup &setup) {
+        const Shaders shaders = shaders_of(paths_[0], setup.scene->integrator);
         try {
             if (paths_.size() > 1) // another path can be used instead
-                if (const std::string why = difference_from_plain(setup, settings_, host_, physical_, shaders_);
+                if (const std::string why = difference_from_plain(setup, settings_, host_, physical_, shaders);
                     !why.empty())
                     throw arhost::Failure(ARHOST_STATUS_ERROR_UNSUPPORTED, why);
-            renderer_.emplace(setup, settings_, host_, physical_, shaders_);
+            renderer_.emplace(setup, settings_, host_, physical_, shaders);
             return true;
         } catch (const arhost::Failure &failure) {
             const arhost_status status = failure.status();
@@ -144,7 +150,6 @@ private:
     Instance instance_;
     PhysicalDevice physical_;
     std::vector<Path> paths_; // paths that have not failed yet, best first
-    Shaders shaders_;
     Settings settings_;
     std::optional<Renderer> renderer_;
 };
@@ -173,6 +178,10 @@ constexpr arhost_option_descriptor options[] = {
                    "Rays traced at glass; 'tree': both the reflected and the refracted ray; 'path': one of them, "
                    "chosen at random.",
                    0, 0, glass_modes),
+    arhost::option(ARHOST_OPTION_REAL, "max_radiance", "100",
+                   "Path integrator: bound of each sample's radiance, in multiples of white, so that single bright "
+                   "paths make no fireflies; 0: none.",
+                   0, 1e6),
     arhost::option(ARHOST_OPTION_BOOL, "validate", "false",
                    "Enable Vulkan's validation layers and log their messages; slow.")};
 
@@ -185,7 +194,8 @@ constexpr arhost_descriptor descriptor = {
     .vendor = "arhost",
     .licence = "Apache-2.0",
     .description = "Ray tracer for any Vulkan 1.1 GPU; renders the same images as rt_embree.",
-    .capabilities = ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE,
+    .capabilities = ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE |
+                    ARHOST_CAPABILITY_LINEAR_IMAGES | ARHOST_CAPABILITY_VIDEO,
     .option_count = std::size(options),
     .options = options,
     .needs = needs,

@@ -21,7 +21,8 @@ using arhost::Failure;
 
 static_assert(Bands::unit % group_side == 0); // a work group never covers two bands
 
-constexpr Binding moving_bindings[] = {objects_binding, nodes_binding, primitives_binding, attributes_binding};
+constexpr Binding moving_bindings[] = {objects_binding, nodes_binding, primitives_binding, attributes_binding,
+                                       tables_binding};
 constexpr std::size_t drawn_size = 4 * sizeof(std::int32_t); // bytes of the buffer Drawn in shaders/scene.glsl
 constexpr std::size_t max_targets = 8; // kept, as the host reuses image memory (arhost/raytracer.h)
 enum Timestamp : std::uint32_t { begun, traced, copied, timestamp_count }; // per image
@@ -41,7 +42,7 @@ const char *contents_of(Binding binding) {
     case texels_binding:
         return "the scene's textures";
     case tables_binding:
-        return "the scene's environment";
+        return "the scene's environment and emissive meshes";
     case rays_binding:
     case history_binding:
     case image_binding:
@@ -62,6 +63,19 @@ PhysicalDevice checked(const PhysicalDevice &device) {
         throw Failure(ARHOST_STATUS_ERROR_UNSUPPORTED,
                       "the Vulkan device '" + device.name + "' " + why + "; choose another with option 'device'");
     return device;
+}
+
+bool is_linear(const arhost_raytracer_setup &setup) {
+    if (setup.form != ARHOST_IMAGE_FORM_LINEAR)
+        return false;
+    if (setup.scene->integrator != ARHOST_INTEGRATOR_PATH)
+        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
+                      "linear images need a scene with the path integrator; request straight ones");
+    return true;
+}
+
+std::byte *pixels_of(const arhost_image &image) {
+    return image.linear ? reinterpret_cast<std::byte *>(image.linear) : reinterpret_cast<std::byte *>(image.rgba);
 }
 
 // Returns the maximum duration of a band. On a GPU, it is far below the shortest watchdog timeout (0.5 s in Linux's
@@ -96,10 +110,11 @@ private:
 
 Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host,
                    const PhysicalDevice &physical, const Shaders &shaders)
-    : host_(host), settings_(settings),
+    : host_(host), settings_(settings), full_samples_(settings.samples),
       intrinsics_((arhost::raytracer_common::check_setup(setup), *setup.intrinsics)),
+      is_path_(setup.scene->integrator == ARHOST_INTEGRATOR_PATH), pixel_size_(is_linear(setup) ? 16 : 4),
       stage_(shaders.pipeline_stage()), device_(checked(physical), shaders.path), submission_(device_),
-      scene_(*setup.scene, shaders.path == Path::plain, host),
+      scene_(setup, shaders.path == Path::plain, host),
       samples_(arhost::raytracer_common::sample_positions(settings.samples)),
       bands_(intrinsics_.height, settings.max_band_time.value_or(max_band_time(physical))) {
     frame_ = scene_.frame();
@@ -108,6 +123,10 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     frame_.light_samples = settings.light_samples;
     frame_.single_path = settings.single_path;
     frame_.accumulates = settings.accumulate;
+    frame_.max_radiance = settings.max_radiance;
+    frame_.is_linear = is_linear(setup);
+    frame_.blends_codes = setup.compositing != ARHOST_COMPOSITING_LINEAR;
+    set_lens();
     make_buffers(shaders.path);
     if (shaders.path != Path::plain) {
         const Heartbeat heartbeat(host_, "building acceleration structures");
@@ -134,7 +153,8 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
     scene_.release_static_parts();
 }
 
-void Renderer::set_samples(std::uint32_t samples) {
+void Renderer::set_samples(std::uint32_t samples, std::uint32_t full_samples) {
+    full_samples_ = full_samples;
     if (samples == settings_.samples)
         return;
     if (samples > 1 && !frame_.has_slopes) {
@@ -188,18 +208,21 @@ void Renderer::make_buffers(Path path) {
     std::size_t moving_size = 0;
     for (std::uint32_t i = objects_binding; i <= tables_binding; ++i) {
         const auto binding = static_cast<Binding>(i);
-        buffers_[binding] = make_buffer(binding, scene_.parts(binding), 0,
+        const std::size_t min_size = binding == texels_binding ? scene_.video_offset() + scene_.video_size() : 0;
+        buffers_[binding] = make_buffer(binding, scene_.parts(binding), min_size,
                                         binding == indices_binding && path != Path::plain ? build_input_usage : 0);
-        moving_size += scene_.moving_size(binding);
+        moving_size += scene_.moving_part(binding).size();
     }
-    make_rays(settings_.samples > 1 || settings_.accumulate);
+    make_rays(settings_.samples > 1 || settings_.accumulate || is_path_);
     buffers_[history_binding] = make_buffer(history_binding, {}, settings_.accumulate ? sizeof(Sums) * pixels : 0);
-    buffers_[image_binding] = make_buffer(image_binding, {}, 4 * pixels);
+    buffers_[image_binding] = make_buffer(image_binding, {}, pixel_size_ * pixels);
     buffers_[drawn_binding] = make_buffer(drawn_binding, {}, drawn_size);
     buffers_[frame_binding] =
         Buffer(device_, sizeof(Frame), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, Buffer::Place::host_written);
     if (moving_size)
         moving_ = Buffer(device_, moving_size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT, Buffer::Place::staging);
+    if (scene_.video_size())
+        video_ = Buffer(device_, scene_.video_size(), VK_BUFFER_USAGE_TRANSFER_SRC_BIT, Buffer::Place::staging);
     drawn_ = Buffer(device_, drawn_size, VK_BUFFER_USAGE_TRANSFER_DST_BIT, Buffer::Place::host_read);
 }
 
@@ -268,15 +291,19 @@ void Renderer::write_descriptor_set() {
 }
 
 void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
-    // If glass spawns two rays, up to one ray per depth waits on the stack.
-    const bool branches = scene_.has_glass() && !settings_.single_path;
-    const Specialization constants{branches ? static_cast<std::int32_t>(max_depth) + 1 : 1,
+    // If glass spawns two rays, up to one ray per depth waits on the stack. With the path integrator, glass spawns
+    // two rays at the first hit only.
+    const bool branches = scene_.has_glass() && (is_path_ || !settings_.single_path);
+    const Specialization constants{!branches  ? 1
+                                   : is_path_ ? 2
+                                              : static_cast<std::int32_t>(max_depth) + 1,
                                    scene_.has_glass(),
                                    scene_.has_catchers(),
                                    scene_.has_holes(),
                                    ray_dimensions_,
                                    scene_.has_textures(),
-                                   scene_.has_area_lights()};
+                                   scene_.has_area_lights(),
+                                   scene_.video_size() > 0};
     const Heartbeat heartbeat(host_, "compiling the shader");
     pipeline_.emplace(device_, shaders, layout_.get(), constants);
     // Lavapipe compiles a shader when it is first dispatched. Therefore this runs the shader once for a frame of
@@ -294,20 +321,20 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
 // one buffer.
 Renderer::Target &Renderer::target_for(const arhost_image &image) {
     for (Target &target : targets_)
-        if (target.rgba == image.rgba && target.stride == image.stride)
+        if (target.pixels == pixels_of(image) && target.stride == image.stride)
             return target;
     Target target;
     if (imports_)
-        target.buffer = Buffer::imported(device_, image.rgba, std::size_t{image.stride} * image.height);
+        target.buffer = Buffer::imported(device_, pixels_of(image), std::size_t{image.stride} * image.height);
     imports_ = static_cast<bool>(target.buffer);
     if (imports_) {
-        target.rgba = image.rgba;
+        target.pixels = pixels_of(image);
         target.stride = image.stride;
     } else {
         for (Target &known : targets_)
-            if (!known.rgba)
+            if (!known.pixels)
                 return known;
-        target.stride = 4 * image.width;
+        target.stride = pixel_size_ * image.width;
         target.buffer = Buffer(device_, std::size_t{target.stride} * image.height, VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                                Buffer::Place::host_read);
     }
@@ -336,16 +363,21 @@ void Renderer::record(Target &target, Rows rows) const {
     target.recorded = rows;
 }
 
-// Records commands that upload the moving parts and reset the bounding rectangle of drawn pixels to empty.
+// Records commands that upload the moving parts and the video, and reset the bounding rectangle of drawn pixels to
+// empty.
 void Renderer::record_preparation(VkCommandBuffer commands) const {
     const VolkDeviceTable &vk = device_.functions();
     VkDeviceSize offset = 0;
     for (const Binding binding : moving_bindings)
-        if (const VkDeviceSize size = scene_.moving_size(binding)) {
-            const VkBufferCopy copy{offset, 0, size};
+        if (const VkDeviceSize size = scene_.moving_part(binding).size()) {
+            const VkBufferCopy copy{offset, scene_.moving_offset(binding), size};
             vk.vkCmdCopyBuffer(commands, moving_.get(), buffers_[binding].get(), 1, &copy);
             offset += size;
         }
+    if (video_) {
+        const VkBufferCopy copy{0, scene_.video_offset(), scene_.video_size()};
+        vk.vkCmdCopyBuffer(commands, video_.get(), buffers_[texels_binding].get(), 1, &copy);
+    }
     const std::int32_t empty[4] = {std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(),
                                    0, 0};
     vk.vkCmdUpdateBuffer(commands, buffers_[drawn_binding].get(), 0, drawn_size, empty);
@@ -361,7 +393,7 @@ void Renderer::record_copy(const Target &target) const {
     if (timestamps_.get())
         vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, timestamps_.get(), traced);
     // If the image has padding at the end of rows, copies row by row: the padding must not be overwritten.
-    const VkDeviceSize row = VkDeviceSize{4} * intrinsics_.width;
+    const VkDeviceSize row = VkDeviceSize{pixel_size_} * intrinsics_.width;
     std::vector<VkBufferCopy> rows;
     if (target.stride == row)
         rows.push_back({0, 0, row * intrinsics_.height});
@@ -387,14 +419,35 @@ void Renderer::write_moving_parts() {
         return;
     std::byte *to = moving_.mapped().data();
     for (const Binding binding : moving_bindings)
-        if (const std::size_t size = scene_.moving_size(binding)) {
-            std::memcpy(to, scene_.parts(binding)[0].data(), size);
-            to += size;
-        }
+        if (const Bytes part = scene_.moving_part(binding); !part.empty())
+            to = std::ranges::copy(part, to).out;
 }
 
-Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion) {
+// Sets the fields of the frame with which the path integrator finds the pixel of the video in a direction.
+void Renderer::set_lens() {
+    frame_.focal_length[0] = static_cast<float>(intrinsics_.fx);
+    frame_.focal_length[1] = static_cast<float>(intrinsics_.fy);
+    frame_.principal_point[0] = static_cast<float>(intrinsics_.cx);
+    frame_.principal_point[1] = static_cast<float>(intrinsics_.cy);
+    frame_.distortion = static_cast<std::uint32_t>(intrinsics_.distortion);
+    std::copy_n(intrinsics_.coefficients, intrinsics_.coefficient_count, frame_.lens);
+    frame_.max_radius_squared = arhost::raytracer_common::max_radius_squared(intrinsics_);
+}
+
+void Renderer::set_video(const arhost_frame *video) {
+    frame_.has_video =
+        video_ && video && video->format->width == intrinsics_.width && video->format->height == intrinsics_.height;
+    if (!frame_.has_video)
+        return;
+    video_image_.set(*video);
+    std::memcpy(video_.mapped().data(), video_image_.texels(), scene_.video_size());
+}
+
+Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion,
+                           const arhost_frame *video, std::uint64_t sequence) {
     arhost::raytracer_common::check_render(camera, image, intrinsics_);
+    if (!image.linear == (frame_.is_linear != 0))
+        throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT, "the image buffer must have the form passed to start");
     if (image.stride % 4)
         throw Failure(ARHOST_STATUS_ERROR_INVALID_ARGUMENT,
                       "the image buffer's stride must be a multiple of 4 bytes");
@@ -407,11 +460,14 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         commands.push_back(start_timestamps_);
     if (motion) {
         scene_.update(*motion);
+        if (is_path_)
+            scene_.write_lights(frame_);
         if (structures_)
             commands.push_back(structures_->update(*motion, scene_.objects()));
     }
     if (motion || image_count_ == 0)
         write_moving_parts();
+    set_video(video);
 
     if (settings_.accumulate) {
         if (motion || !history_camera_ || !arhost::raytracer_common::same_view(*history_camera_, camera))
@@ -421,7 +477,11 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
             history_samples_,
             history_samples_ < arhost::raytracer_common::max_accumulated_samples ? settings_.samples : 0);
     }
-    frame_.first_sample = history_samples_;
+    frame_.first_sample = frame_.first_random = history_samples_;
+    if (is_path_ && !settings_.accumulate) { // the random numbers of successive frames continue one sequence
+        frame_.first_random = static_cast<std::uint32_t>(sequence) * full_samples_;
+        samples_ = arhost::raytracer_common::sample_positions(frame_.first_random % (1u << 16), settings_.samples);
+    }
     frame_.sample_count = static_cast<std::uint32_t>(samples_.size());
     for (std::size_t i = 0; i < samples_.size(); ++i) {
         frame_.samples[i][0] = samples_[i].x;
@@ -456,10 +516,10 @@ void Renderer::trace(std::vector<VkCommandBuffer> commands, Target &target) {
 
 Rectangle Renderer::read_back(const Target &target, const arhost_image &image) {
     const auto begin = std::chrono::steady_clock::now();
-    wrote_in_place_ = target.rgba != nullptr;
+    wrote_in_place_ = target.pixels != nullptr;
     if (!wrote_in_place_)
         for (std::uint32_t y = 0; y < image.height; ++y)
-            std::memcpy(image.rgba + std::size_t{image.stride} * y,
+            std::memcpy(pixels_of(image) + std::size_t{image.stride} * y,
                         target.buffer.mapped().data() + std::size_t{target.stride} * y, target.stride);
     read_back_ms_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
     ++image_count_;

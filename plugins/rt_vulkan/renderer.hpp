@@ -9,6 +9,7 @@
 #include "camera_data.hpp"
 #include "image_pipeline.hpp"
 #include "raytracer_common/samples.hpp"
+#include "raytracer_common/video.hpp"
 #include "scene_data.hpp"
 
 #include <optional>
@@ -21,6 +22,7 @@ struct Settings {
     std::uint32_t light_samples = 4;                  // per shaded point and area light, environment or background
     bool accumulate = false;                          // average over frames while the camera and scene are static
     bool single_path = false;                         // glass spawns one random ray instead of two
+    float max_radiance = 100;                         // path integrator: bound of each sample; infinity: none
     std::optional<Bands::Milliseconds> max_band_time; // set by tests only; the default depends on the device
 };
 
@@ -33,12 +35,15 @@ public:
     Renderer(const arhost_raytracer_setup &setup, const Settings &settings, const arhost::Host &host,
              const PhysicalDevice &physical, const Shaders &shaders);
 
-    // Returns the bounding rectangle of the pixels with non-zero alpha; its width is 0 if there are none. `motion` is
-    // NULL if nothing has moved since the last call.
-    Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr);
+    // Returns a rectangle that contains all pixels that virtual objects affect; its width is 0 if there are none.
+    // `motion` is NULL if nothing has moved since the last call, `video` if the frame under the overlay is unknown.
+    // `sequence`: number of the frame, for the random numbers of the path integrator.
+    Rectangle render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion = nullptr,
+                     const arhost_frame *video = nullptr, std::uint64_t sequence = 0);
 
     // Both functions change the images of later calls as if the renderer had been created with the new setting.
-    void set_samples(std::uint32_t samples);
+    // `full_samples`: number of samples of an image without a limit (arhost_render_request.max_samples).
+    void set_samples(std::uint32_t samples, std::uint32_t full_samples);
     void set_light_samples(std::uint32_t samples);
 
     const SceneData &scene() const { return scene_; }
@@ -57,9 +62,9 @@ public:
 
 private:
     // The memory to which the device writes an image: either the caller's memory, imported into Vulkan, or a buffer
-    // from which the host copies the image (`rgba` is NULL).
+    // from which the host copies the image (`pixels` is NULL).
     struct Target {
-        std::uint8_t *rgba = nullptr;
+        std::byte *pixels = nullptr;
         std::uint32_t stride = 0;
         Buffer buffer;
         VkCommandBuffer commands = VK_NULL_HANDLE;
@@ -80,11 +85,16 @@ private:
     void record_copy(const Target &target) const;
     void trace(std::vector<VkCommandBuffer> commands, Target &target);
     void write_moving_parts();
+    void set_lens();
+    void set_video(const arhost_frame *video);
     Rectangle read_back(const Target &target, const arhost_image &image);
 
     arhost::Host host_;
     Settings settings_;
+    std::uint32_t full_samples_; // per pixel of an image without a limit
     arhost_intrinsics intrinsics_;
+    bool is_path_;               // has the path integrator
+    std::uint32_t pixel_size_;   // bytes per pixel of the images
     VkPipelineStageFlags stage_; // pipeline stage in which the shaders run
     Device device_;
     Submission submission_;
@@ -93,7 +103,9 @@ private:
     std::vector<arhost::raytracer_common::Sample> samples_; // sample positions of the current image
     Frame frame_{};
     std::array<Buffer, binding_count> buffers_;
-    Buffer moving_;                                    // staging buffer for the moving parts of all buffers
+    Buffer moving_; // staging buffer for the moving parts of all buffers
+    arhost::raytracer_common::VideoImage video_image_;
+    Buffer video_;                                     // staging buffer for the video; empty if no image has one
     Buffer drawn_;                                     // bounding rectangle of the drawn pixels, for the host
     std::optional<AccelerationStructures> structures_; // empty on the path `plain`
     QueryPool timestamps_;                             // empty if unsupported

@@ -20,6 +20,7 @@ using arhost::raytracer_common::bytes;
 using arhost::raytracer_common::elements;
 using arhost::raytracer_common::is_identity;
 using arhost::raytracer_common::object_extent;
+using arhost::raytracer_common::PlacedObject;
 using arhost::raytracer_common::quantized_alpha;
 using arhost::raytracer_common::transform_box;
 
@@ -107,16 +108,20 @@ Bvh unordered(std::size_t count) {
 
 } // namespace
 
-SceneData::SceneData(const arhost_scene &arena, bool has_bvhs, const arhost::Host &host)
-    : arena_(arena), has_bvhs_(has_bvhs), host_(host) {
+SceneData::SceneData(const arhost_raytracer_setup &setup, bool has_bvhs, const arhost::Host &host)
+    : arena_(*setup.scene), has_bvhs_(has_bvhs), host_(host) {
+    const arhost_scene &arena = arena_;
     for (const arhost_material &material : elements<arhost_material>(arena, arena.materials))
         materials_.push_back(material_of(material));
     for (const arhost_light &light : elements<arhost_light>(arena, arena.lights)) {
         lights_.push_back(light_of(light));
-        has_area_lights_ |= light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE;
+        has_area_lights_ |= light.type == ARHOST_LIGHT_RECTANGLE || light.type == ARHOST_LIGHT_SPHERE ||
+                            (light.type == ARHOST_LIGHT_SPOT && light.radius > 0);
     }
     add_textures();
     add_tables();
+    if (arena.integrator == ARHOST_INTEGRATOR_PATH)
+        add_path_textures(setup);
 
     check_cancelled();
     const auto geometries = elements<arhost_geometry>(arena, arena.geometries);
@@ -143,6 +148,8 @@ SceneData::SceneData(const arhost_scene &arena, bool has_bvhs, const arhost::Hos
         add_object(object, meshes_.at(object.geometry));
     }
     build_top_level();
+    if (arena.integrator == ARHOST_INTEGRATOR_PATH)
+        add_light_sources();
 }
 
 void SceneData::check_cancelled() const {
@@ -313,6 +320,8 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
     set_transform(object, mesh, from.world_from_object);
     has_glass_ |= is_glass;
     has_catchers_ |= from.role == ARHOST_ROLE_CATCHER;
+    has_several_real_ |= from.role != ARHOST_ROLE_VIRTUAL && has_real_;
+    has_real_ |= from.role != ARHOST_ROLE_VIRTUAL;
     has_holes_ |= (object.flags & rt_vulkan::has_holes) != 0;
     objects_.push_back(object);
     solid_objects_ += !mesh.is_empty;
@@ -378,6 +387,16 @@ void SceneData::update(const arhost_motion &motion) {
             motion.deformed[i].is_visible ? mask_of(from[motion.deformed[i].object]) : 0;
     }
     build_top_level();
+    if (!light_sources_)
+        return;
+    for (std::uint32_t i = 0; i < motion.moved_count; ++i)
+        placed_[motion.moved[i].object].is_visible = motion.moved[i].is_visible != 0;
+    for (std::uint32_t i = 0; i < motion.deformed_count; ++i) {
+        PlacedObject &placed = placed_[motion.deformed[i].object];
+        placed.positions = motion.deformed[i].positions;
+        placed.is_visible = motion.deformed[i].is_visible != 0;
+    }
+    place_lights();
 }
 
 void SceneData::deform(const arhost_deformed_geometry &deformed) {
@@ -426,6 +445,78 @@ void SceneData::add_textures() {
     }
 }
 
+// Adds the irradiance of the environment, and space for the video.
+void SceneData::add_path_textures(const arhost_raytracer_setup &setup) {
+    std::size_t size = 0; // bytes
+    for (const Bytes &texels : texels_)
+        size += texels.size();
+    const auto add = [&](arhost_texel_format format, arhost_wrap wrap_u, std::uint32_t width, std::uint32_t height) {
+        textures_.push_back({static_cast<std::uint32_t>(format),
+                             static_cast<std::uint32_t>(size / 4),
+                             static_cast<std::uint32_t>(wrap_u),
+                             ARHOST_WRAP_CLAMP,
+                             static_cast<std::int32_t>(width),
+                             static_cast<std::int32_t>(height),
+                             {}});
+        return static_cast<std::uint32_t>(textures_.size() - 1);
+    };
+    using namespace arhost::raytracer_common;
+    irradiance_ = environment_irradiance(arena_);
+    if (!irradiance_.empty()) {
+        irradiance_texture_ = add(ARHOST_TEXEL_RGBA32F, ARHOST_WRAP_REPEAT, irradiance_width, irradiance_height);
+        texels_.push_back(bytes_of(irradiance_));
+        size += texels_.back().size();
+    }
+    if (setup.video_format) {
+        video_texture_ = add(ARHOST_TEXEL_SRGB8, ARHOST_WRAP_CLAMP, setup.width, setup.height);
+        video_offset_ = size;
+        video_size_ = std::size_t{4} * setup.width * setup.height;
+    }
+}
+
+// Makes space for as many light sources as there can ever be, and adds those at the start.
+void SceneData::add_light_sources() {
+    const auto objects = elements<arhost_object>(arena_, arena_.objects);
+    const auto materials = elements<arhost_material>(arena_, arena_.materials);
+    const auto geometries = elements<arhost_geometry>(arena_, arena_.geometries);
+    max_sources_ = arena_.lights.count + 1; // with the environment
+    for (std::size_t i = 0; i < objects.size(); ++i) {
+        const arhost_object &object = objects[i];
+        const float *emission = materials[object.material].emission;
+        const arhost_geometry &geometry = geometries[object.geometry];
+        if (emission[0] + emission[1] + emission[2] > 0)
+            max_sources_ += geometry.type == ARHOST_GEOMETRY_SPHERES ? 1 : geometry.indices.count;
+        placed_.push_back({transforms_[i].data(), nullptr, 3 * sizeof(float), true});
+    }
+    first_source_ = static_cast<std::uint32_t>(tables_.size());
+    sources_.resize(std::size_t{max_sources_} * (arhost::raytracer_common::source_rows + 1));
+    light_sources_.emplace(arena_);
+    place_lights();
+}
+
+void SceneData::place_lights() {
+    light_sources_->place(placed_);
+    const auto write = [](std::span<const float> from, std::uint32_t *to) {
+        std::ranges::transform(from, to, [](float number) { return std::bit_cast<std::uint32_t>(number); });
+    };
+    write(light_sources_->records(), sources_.data());
+    write(light_sources_->cumulative(),
+          sources_.data() + std::size_t{max_sources_} * arhost::raytracer_common::source_rows);
+    for (std::size_t i = 0; i < objects_.size(); ++i)
+        objects_[i].emitter_density = light_sources_->emitters()[i].density;
+}
+
+void SceneData::write_lights(Frame &frame) const {
+    frame.sphere_count = static_cast<std::uint32_t>(light_sources_->spheres().size());
+    for (std::size_t i = 0; i < frame.sphere_count; ++i)
+        std::ranges::copy(light_sources_->spheres()[i], frame.spheres[i]);
+    frame.source_count = static_cast<std::uint32_t>(light_sources_->cumulative().size());
+    frame.first_source = first_source_;
+    frame.first_cumulative = first_source_ + max_sources_ * arhost::raytracer_common::source_rows;
+    frame.environment_chance = light_sources_->environment_chance();
+    frame.least_irradiance = 1e-3f * light_sources_->light();
+}
+
 // Fills `tables_` in the order that scene.glsl expects: sRGB encoding, sRGB decoding, environment.
 void SceneData::add_tables() {
     const arhost::shading::Srgb8Table codes = arhost::shading::make_srgb8_table();
@@ -464,26 +555,28 @@ std::vector<Bytes> SceneData::parts(Binding binding) const {
     case texels_binding:
         return texels_;
     case tables_binding:
-        return {bytes_of(tables_)};
+        return {bytes_of(tables_), bytes_of(sources_)};
     default:
         return {};
     }
 }
 
-std::size_t SceneData::moving_size(Binding binding) const {
+Bytes SceneData::moving_part(Binding binding) const {
     if (!anything_moves_)
-        return 0;
+        return {};
     switch (binding) {
     case objects_binding:
-        return objects_.size() * sizeof(Object);
+        return bytes_of(objects_);
     case nodes_binding:
-        return moving_nodes_ * sizeof(Node);
+        return bytes_of(nodes_).first(moving_nodes_ * sizeof(Node));
     case primitives_binding:
-        return moving_primitives_ * sizeof(Primitive);
+        return bytes_of(primitives_).first(moving_primitives_ * sizeof(Primitive));
     case attributes_binding:
-        return moving_attributes_ * sizeof(float);
+        return bytes_of(attributes_).first(moving_attributes_ * sizeof(float));
+    case tables_binding:
+        return bytes_of(sources_);
     default:
-        return 0;
+        return {};
     }
 }
 
@@ -498,6 +591,7 @@ void SceneData::release_static_parts() {
     keep(indices_, 0);
     keep(texels_, 0);
     keep(tables_, 0);
+    keep(irradiance_, 0);
 }
 
 Frame SceneData::frame() const {
@@ -520,6 +614,11 @@ Frame SceneData::frame() const {
         frame.environment_rows = environment_rows_;
         frame.environment_columns = environment_columns_;
     }
+    frame.has_several_real = has_several_real_;
+    frame.irradiance_texture = irradiance_texture_;
+    frame.video_texture = video_texture_;
+    if (light_sources_)
+        write_lights(frame);
     return frame;
 }
 

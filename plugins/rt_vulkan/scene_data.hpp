@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Converts a scene to the buffers that the shaders read; for the path `plain`, also builds BVHs. In each buffer, the
-// parts that may move come first, so a single copy updates them on the device.
+// parts that may move are together, so a single copy updates them on the device.
 #pragma once
 
 #include "bvh.hpp"
+#include "raytracer_common/light_sources.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 #include <arhost/motion.h>
@@ -28,29 +29,38 @@ std::vector<Box> boxes_of(const arhost_scene &arena, const arhost_geometry &geom
 
 class SceneData {
 public:
-    // `has_bvhs`: build BVHs for software traversal. `arena` must outlive this object.
-    SceneData(const arhost_scene &arena, bool has_bvhs, const arhost::Host &host);
+    // `has_bvhs`: build BVHs for software traversal. `setup.scene` must outlive this object.
+    SceneData(const arhost_raytracer_setup &setup, bool has_bvhs, const arhost::Host &host);
 
     void update(const arhost_motion &motion);
     std::uint64_t rebuilds() const {
         return rebuilds_;
     } // number of BVHs rebuilt so far because they had degraded too much
 
-    // parts() returns the contents of a buffer, to be concatenated. moving_size() returns the number of bytes at the
-    // start of the buffer that may change.
+    // parts() returns the contents of a buffer, to be concatenated; moving_part() returns the bytes that may change,
+    // and moving_offset() where in the buffer they begin.
     std::vector<Bytes> parts(Binding binding) const;
-    std::size_t moving_size(Binding binding) const;
+    Bytes moving_part(Binding binding) const;
+    std::size_t moving_offset(Binding binding) const {
+        return binding == tables_binding ? sizeof(std::uint32_t) * first_source_ : 0;
+    }
+    // The bytes of the texels that the video occupies, after those of parts(); its size is 0 if no image has a video.
+    std::size_t video_offset() const { return video_offset_; }
+    std::size_t video_size() const { return video_size_; }
     // Frees the data that never changes. Call it after the data has been uploaded.
     void release_static_parts();
 
     std::span<const Object> objects() const { return objects_; }
     // Returns a frame in which only the fields that depend on the scene are set; all others are 0.
     Frame frame() const;
+    // Sets the fields that depend on where the light sources and the virtual objects are. Only with the path
+    // integrator.
+    void write_lights(Frame &frame) const;
     bool has_glass() const { return has_glass_; }
     bool has_catchers() const { return has_catchers_; }
     bool has_holes() const { return has_holes_; }
     bool has_area_lights() const { return has_area_lights_; }
-    bool has_textures() const { return !textures_.empty(); } // including the environment
+    bool has_textures() const { return arena_.textures.count > 0; } // including the environment
 
 private:
     // The offsets of a geometry's data in the arrays below.
@@ -74,7 +84,10 @@ private:
     void refit_bvh(Mesh &mesh, std::span<const Box> boxes);
     void build_top_level();
     void add_textures();
+    void add_path_textures(const arhost_raytracer_setup &setup);
     void add_tables();
+    void add_light_sources();
+    void place_lights();
     void check_cancelled() const; // throws if the host has cancelled, else reports progress
 
     const arhost_scene &arena_;
@@ -92,10 +105,20 @@ private:
     std::vector<Texture> textures_;
     std::vector<Bytes> texels_;
     std::vector<std::uint32_t> tables_;
+    // The path integrator; empty with another integrator.
+    std::optional<arhost::raytracer_common::LightSources> light_sources_;
+    std::vector<arhost::raytracer_common::PlacedObject> placed_; // one per object
+    std::vector<float> irradiance_;                              // of the environment
+    std::vector<std::uint32_t>
+        sources_; // the end of `tables_`: records of the light sources, then their cumulative chances
+    std::uint32_t first_source_ = 0, max_sources_ = 0, irradiance_texture_ = ARHOST_NONE,
+                  video_texture_ = ARHOST_NONE;
+    std::size_t video_offset_ = 0, video_size_ = 0;
+
     std::size_t moving_nodes_ = 0, moving_primitives_ = 0, moving_attributes_ = 0;
     std::uint32_t solid_objects_ = 0, environment_rows_ = 0, environment_columns_ = 0;
     bool anything_moves_ = false, has_glass_ = false, has_catchers_ = false, has_holes_ = false,
-         has_area_lights_ = false;
+         has_area_lights_ = false, has_real_ = false, has_several_real_ = false;
     std::uint64_t rebuilds_ = 0;
 };
 

@@ -94,6 +94,8 @@ std::string difference_from_plain(const arhost_raytracer_setup &setup, const Set
     intrinsics.cy = (height - 1) / 2.0;
     intrinsics.distortion = ARHOST_DISTORTION_NONE;
     arhost_raytracer_setup small = setup;
+    small.form = ARHOST_IMAGE_FORM_STRAIGHT;
+    small.video_format = nullptr;
     small.width = width;
     small.height = height;
     small.intrinsics = &intrinsics;
@@ -105,7 +107,7 @@ std::string difference_from_plain(const arhost_raytracer_setup &setup, const Set
     const Pixels got = picture_by(shaders, small, once, host, physical, camera);
     Pixels expected;
     try {
-        expected = picture_by(shaders_of(Path::plain), small, once, host, physical, camera);
+        expected = picture_by(shaders_of(Path::plain, setup.scene->integrator), small, once, host, physical, camera);
     } catch (const arhost::Failure &failure) {
         if (failure.status() == ARHOST_STATUS_ERROR_CANCELLED)
             throw;

@@ -6,8 +6,11 @@
 #include "spirv/pipeline.rgen.h"
 #include "spirv/pipeline.rint.h"
 #include "spirv/pipeline.rmiss.h"
+#include "spirv/pipeline_path.rgen.h"
 #include "spirv/plain.comp.h"
+#include "spirv/plain_path.comp.h"
 #include "spirv/query.comp.h"
+#include "spirv/query_path.comp.h"
 
 namespace rt_vulkan {
 
@@ -23,13 +26,15 @@ VkPipelineStageFlags Shaders::pipeline_stage() const {
                                   : VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT;
 }
 
-Shaders shaders_of(Path path) {
+Shaders shaders_of(Path path, arhost_integrator integrator) {
+    using Words = std::span<const std::uint32_t>;
+    const bool is_path = integrator == ARHOST_INTEGRATOR_PATH;
     if (path == Path::plain)
-        return {path, {{VK_SHADER_STAGE_COMPUTE_BIT, plain_comp}}};
+        return {path, {{VK_SHADER_STAGE_COMPUTE_BIT, is_path ? Words(plain_path_comp) : Words(plain_comp)}}};
     if (path == Path::query)
-        return {path, {{VK_SHADER_STAGE_COMPUTE_BIT, query_comp}}};
+        return {path, {{VK_SHADER_STAGE_COMPUTE_BIT, is_path ? Words(query_path_comp) : Words(query_comp)}}};
     return {path,
-            {{VK_SHADER_STAGE_RAYGEN_BIT_KHR, pipeline_rgen},
+            {{VK_SHADER_STAGE_RAYGEN_BIT_KHR, is_path ? Words(pipeline_path_rgen) : Words(pipeline_rgen)},
              {VK_SHADER_STAGE_MISS_BIT_KHR, pipeline_rmiss},
              {VK_SHADER_STAGE_CLOSEST_HIT_BIT_KHR, pipeline_rchit},
              {VK_SHADER_STAGE_ANY_HIT_BIT_KHR, pipeline_rahit},

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The compiled shaders of each path, embedded in the plugin.
+// The compiled shaders of each path and integrator, embedded in the plugin.
 #pragma once
 
 #include "instance.hpp"
+
+#include <arhost/scene.h>
 
 #include <cstdint>
 #include <span>
@@ -24,6 +26,6 @@ struct Shaders {
     VkPipelineStageFlags pipeline_stage() const; // the stage in which the shaders run, for barriers
 };
 
-Shaders shaders_of(Path path);
+Shaders shaders_of(Path path, arhost_integrator integrator = ARHOST_INTEGRATOR_WHITTED);
 
 } // namespace rt_vulkan

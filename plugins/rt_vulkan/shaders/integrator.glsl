@@ -3,6 +3,14 @@
 // Computes a pixel's colour and alpha. Equivalent to rt_embree's kernel/kernel.inl. A single loop with a single call of
 // trace() handles all kinds of rays, because trace() is inlined and its code is long.
 
+float light_samples_of(uint lamp, uint depth) {
+    return float(frame.light_samples);
+}
+
+vec3 shadow_of_glass(uint material, float cosine) {
+    return glass_shadow(materials[material].shadow_attenuation, cosine);
+}
+
 const int PRIMARY_STAGE = 1, CATCHER_STAGE = 2, PATH_STAGE = 3;
 
 // Renders a sample and adds it to the pixel's sums. Catchers do not hide the virtual objects behind them, so primary rays
@@ -29,10 +37,11 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
             }
         } else if (stage == PATH_STAGE) {
             if (has_area_lights)
-                light +=
-                    path.throughput * arriving_from_area_lights(ray.origin, ray.direction, hit.t, path.inverse_density);
+                light += path.throughput * arriving_from_area_lights(ray.origin, ray.direction, hit.t,
+                                                                     path.inverse_density, path.depth);
             if (!is_hit)
-                light += path.throughput * arriving_from_environment(ray.direction, path.inverse_density);
+                light += path.throughput * arriving_from_environment(ray.direction, path.inverse_density,
+                                                                     float(frame.light_samples));
         }
         if (is_hit) {
             Surface s = surface_at(ray, hit, true);
@@ -64,43 +73,6 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
     // Radiance is averaged in linear light and encoded only once. sRGB codes are not linear and limited to 1, so
     // averaging them would darken noise and highlights.
     sums.light += vec3(bounded_radiance(light.x), bounded_radiance(light.y), bounded_radiance(light.z));
-}
-
-// Reads a ray direction in camera axes, or one of its derivatives, from `rays`. `z`: the z component if only x and y
-// are stored.
-vec3 stored_ray(uint first, float z) {
-    return vec3(rays[first], rays[first + 1u], ray_dimensions == 3u ? rays[first + 2u] : z);
-}
-
-// Computes the ray direction, in world space, at the offset `within` from a pixel's centre. Returns false if the
-// pixel is outside the field of view of the lens.
-bool direction_of(uint pixel, vec2 within, out vec3 direction) {
-    uint first = pixel * ray_dimensions * (frame.has_slopes != 0u ? 3u : 1u);
-    direction = stored_ray(first, 1.0);
-    bool is_visible = abs(direction.x) < 1e29;
-    if (frame.has_slopes != 0u)
-        direction += stored_ray(first + ray_dimensions, 0.0) * within.x +
-                     stored_ray(first + 2u * ray_dimensions, 0.0) * within.y;
-    mat3 m = frame.world_from_camera;
-    precise vec3 in_world = m[0] * direction.x + m[1] * direction.y + m[2] * direction.z; // not m * direction: see ordered_dot()
-    direction = in_world;
-    return is_visible;
-}
-
-uint srgb8(float linear) {
-    // Looks up the code in the table of arhost/shading/srgb8.hpp. The result equals that of the exact formula, rounded.
-    int bits = floatBitsToInt(clamp(linear, 1.0 / 8192.0, 1.0));
-    uint number = min(uint((bits - (114 << 23)) >> 16), FIRST_LIGHT_OF_CODE - 1u); // stays inside the table even for NaN
-    int cell = int(tables[FIRST_SRGB_CELL + number]);
-    return uint((cell >> 17) + ((bits & 0xffff) >= (cell & 0x1ffff) ? 1 : 0));
-}
-
-uint packed(uvec4 codes) {
-    return codes.x | (codes.y << 8) | (codes.z << 16) | (codes.w << 24);
-}
-
-uint code_of(float value) {
-    return uint(code_8bit(value));
 }
 
 // Returns a pixel's RGBA code, the mean of all samples so far. Virtual objects and catchers are averaged separately.
@@ -146,17 +118,6 @@ void write_pixel(uvec2 position) {
         return;
     uint pixel = shade_pixel(position);
     image_pixels[position.y * frame.width + position.x] = pixel;
-    if (pixel >> 24 == 0u)
-        return;
-    // Most pixels do not extend the bounding rectangle and skip the atomic operations. A stale value causes at most a
-    // redundant atomic operation.
-    ivec2 corner = ivec2(position);
-    if (corner.x < drawn_x0)
-        atomicMin(drawn_x0, corner.x);
-    if (corner.y < drawn_y0)
-        atomicMin(drawn_y0, corner.y);
-    if (corner.x >= drawn_x1)
-        atomicMax(drawn_x1, corner.x + 1);
-    if (corner.y >= drawn_y1)
-        atomicMax(drawn_y1, corner.y + 1);
+    if (pixel >> 24 != 0u)
+        mark_drawn(position);
 }

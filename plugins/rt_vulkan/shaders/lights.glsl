@@ -2,6 +2,12 @@
 //
 // Direct light from lamps and the environment, and its occlusion. Equivalent to rt_embree's kernel/lights.inl.
 
+// Each integrator defines these functions.
+// Expected number of light samples of an area light at the vertex of a path after which it has `depth` bounces.
+float light_samples_of(uint lamp, uint depth);
+// Transmittance of a surface of glass for shadow rays.
+vec3 shadow_of_glass(uint material, float cosine);
+
 // The light that arrives at a surface point from one sampled point of a light source.
 struct LightSample {
     vec3 to_light;    // vector from the surface to the sampled point; of unit length if the light is infinitely far
@@ -22,7 +28,14 @@ LightSample make_light_sample(Surface s, vec3 to_light, float t_max, float irrad
 }
 
 bool is_area_light(uint lamp) {
-    return lights[lamp].type == RECTANGLE_LIGHT || lights[lamp].type == SPHERE_LIGHT;
+    return lights[lamp].type == RECTANGLE_LIGHT || lights[lamp].type == SPHERE_LIGHT ||
+           (lights[lamp].type == SPOT_LIGHT && lights[lamp].radius > 0.0);
+}
+
+// `to_light`: unit vector.
+float spot_share(uint lamp, vec3 to_light) {
+    return spot_attenuation(dot(lights[lamp].direction, -to_light), lights[lamp].cosine_inner,
+                            lights[lamp].cosine_outer);
 }
 
 // Returns, for a point of an area light, the irradiance per unit of intensity (x) and the density per steradian of one
@@ -31,7 +44,7 @@ vec2 arriving_from_point(uint lamp, vec3 to_centre, vec3 to_point) {
     vec3 direction = normalize(to_point);
     float distance_squared = dot(to_point, to_point);
     float falloff = point_light_falloff(lights[lamp].falloff == FALLOFF_INVERSE_SQUARE, distance_squared);
-    if (lights[lamp].type == SPHERE_LIGHT) {
+    if (lights[lamp].type != RECTANGLE_LIGHT) {
         float area = 3.14159265 * lights[lamp].radius * lights[lamp].radius;
         return vec2(falloff, density_over_area(distance_squared, area, dot(normalize(to_centre), direction)));
     }
@@ -44,47 +57,49 @@ vec2 arriving_from_point(uint lamp, vec3 to_centre, vec3 to_point) {
 // `sample_uv` selects the sampled point of an area light. `count`: number of samples of the area light.
 LightSample sample_light(uint lamp, Surface s, vec2 sample_uv, uint count) {
     uint type = lights[lamp].type;
-    vec3 intensity = lights[lamp].intensity, axis = lights[lamp].direction;
+    vec3 intensity = lights[lamp].intensity;
     if (type == DIRECTIONAL_LIGHT)
-        return make_light_sample(s, -axis, INFINITY, 1.0, intensity);
+        return make_light_sample(s, -lights[lamp].direction, INFINITY, 1.0, intensity);
     vec3 to_centre = lights[lamp].position - s.position;
+    LightSample result;
     if (is_area_light(lamp)) {
-        vec3 to_point = type == SPHERE_LIGHT
-                            ? vector_to_disc(to_centre, lights[lamp].radius, sample_uv.x, sample_uv.y)
-                            : vector_to_rectangle(to_centre, lights[lamp].axis_u, lights[lamp].axis_v, sample_uv.x,
-                                                  sample_uv.y);
+        vec3 to_point = type == RECTANGLE_LIGHT
+                            ? vector_to_rectangle(to_centre, lights[lamp].axis_u, lights[lamp].axis_v, sample_uv.x,
+                                                  sample_uv.y)
+                            : vector_to_disc(to_centre, lights[lamp].radius, sample_uv.x, sample_uv.y);
         vec2 arriving = arriving_from_point(lamp, to_centre, to_point);
-        LightSample result = make_light_sample(s, to_point, 1.0, arriving.x, intensity);
+        result = make_light_sample(s, to_point, 1.0, arriving.x, intensity);
         result.sampling_density = arriving.y * float(count);
-        return result;
+    } else {
+        bool falls_off = lights[lamp].falloff == FALLOFF_INVERSE_SQUARE;
+        result = make_light_sample(s, to_centre, 1.0, point_light_falloff(falls_off, dot(to_centre, to_centre)),
+                                   intensity);
     }
-    bool falls_off = lights[lamp].falloff == FALLOFF_INVERSE_SQUARE;
-    LightSample arriving =
-        make_light_sample(s, to_centre, 1.0, point_light_falloff(falls_off, dot(to_centre, to_centre)), intensity);
     if (type == SPOT_LIGHT)
-        arriving.irradiance *= spot_attenuation(dot(axis, -arriving.direction), lights[lamp].cosine_inner,
-                                          lights[lamp].cosine_outer);
-    return arriving;
+        result.irradiance *= spot_share(lamp, result.direction);
+    return result;
 }
 
 // Returns the light that a secondary ray receives from area lights before `t_max`, where the ray hits a surface. Lamps
 // do not hide each other or anything else. `inverse_density`: see Path. After a reflection off a rough surface, mirrors
 // and glass on the path are ignored in the weight, as if the lamp were seen directly. Otherwise, the few random rays
-// that find a small lamp along such a path would cause bright spots.
-vec3 arriving_from_area_lights(vec3 origin, vec3 direction, float t_max, float inverse_density) {
+// that find a small lamp along such a path would cause bright spots. `depth`: number of bounces of the path.
+vec3 arriving_from_area_lights(vec3 origin, vec3 direction, float t_max, float inverse_density, uint depth) {
     vec3 sum = vec3(0.0);
     for (uint lamp = 0u; lamp < frame.light_count; ++lamp) {
         if (!is_area_light(lamp))
             continue;
         vec3 to_centre = lights[lamp].position - origin;
-        float t = lights[lamp].type == SPHERE_LIGHT
-                      ? distance_to_disc(to_centre, lights[lamp].radius, direction)
-                      : distance_to_rectangle(to_centre, lights[lamp].direction, lights[lamp].axis_u,
-                                              lights[lamp].axis_v, direction);
+        float t = lights[lamp].type == RECTANGLE_LIGHT
+                      ? distance_to_rectangle(to_centre, lights[lamp].direction, lights[lamp].axis_u,
+                                              lights[lamp].axis_v, direction)
+                      : distance_to_disc(to_centre, lights[lamp].radius, direction);
         if (!(t > 0.0) || !(t < t_max))
             continue;
         vec2 arriving = arriving_from_point(lamp, to_centre, direction * t);
-        float sampled = arriving.y * float(frame.light_samples);
+        if (lights[lamp].type == SPOT_LIGHT)
+            arriving.x *= spot_share(lamp, direction);
+        float sampled = arriving.y * light_samples_of(lamp, depth);
         sum += lights[lamp].intensity * (arriving.x * arriving.y * 3.14159265 *
                                          balance_weight_of_ray(sampled, abs(inverse_density)));
     }
@@ -94,35 +109,37 @@ vec3 arriving_from_area_lights(vec3 origin, vec3 direction, float t_max, float i
 // The visibility of a light source from a surface point.
 struct Visibility {
     bool unoccluded; // no opaque object is in between
-    bool is_tinted;     // glass is in between
-    vec3 tint;          // transmittance of the glass in between
+    bool is_tinted;  // glass is in between
+    vec3 tint;       // transmittance of the glass in between
 };
 
 // Traces shadow rays. Real surfaces (catchers and occluders) cast no virtual shadow on each other: the video already
 // shows their shadows. The first ray searches for opaque objects; each further ray leads from one glass surface to
-// the next. A single loop traces all of them, because trace() is inlined and its code is long.
-Visibility visibility(LightSample arriving, Surface s) {
+// the next. A single loop traces all of them, because trace() is inlined and its code is long. `to_light`, `t_max`: as in
+// LightSample; `direction`: unit vector along `to_light`. `through_glass`: false if glass hides the light source.
+Visibility visibility(Surface s, vec3 to_light, float t_max, vec3 direction, bool through_glass) {
     const int max_surfaces = 64; // ignores further surfaces: rays may alternate endlessly between coincident faces
-    vec3 lift = s.lift + s.geometric_normal * s.offset, start = s.position + lift, to_light = arriving.to_light;
-    if (arriving.t_max < INFINITY)
+    vec3 lift = s.lift + s.geometric_normal * s.offset, start = s.position + lift;
+    bool is_finite_distance = t_max < INFINITY;
+    if (is_finite_distance)
         to_light -= lift;
-    bool is_finite_distance = arriving.t_max < INFINITY;
     uint mask = s.is_real ? OPAQUE_MASK : OPAQUE_MASK | CATCHER_MASK | OCCLUDER_MASK;
-    Ray ray = Ray(start, to_light, arriving.t_max, mask);
+    if (!through_glass)
+        mask |= GLASS_MASK;
+    Ray ray = Ray(start, to_light, t_max, mask);
     Visibility result = Visibility(false, false, vec3(1.0));
     for (int i = 0; i <= max_surfaces; ++i) {
         Hit hit = trace(ray, i == 0, false);
         bool is_hit = hit.object != NONE;
         if (i == 0)
             result.unoccluded = !is_hit;
-        if (!has_glass || is_hit == (i == 0))
+        if (!has_glass || !through_glass || is_hit == (i == 0))
             break;
         if (i > 0) {
             result.is_tinted = true;
             Surface glass = surface_at(ray, hit, false);
             uint material = objects[hit.object].material;
-            result.tint *= glass_shadow(materials[material].shadow_attenuation,
-                                        abs(dot(glass.normal, arriving.direction))) *
+            result.tint *= shadow_of_glass(material, abs(dot(glass.normal, direction))) *
                            bouguer(materials[material].extinction, glass.back_face ? glass.distance : 0.0);
             if (!(largest(result.tint) > 1e-3))
                 break;
@@ -132,7 +149,7 @@ Visibility visibility(LightSample arriving, Surface s) {
                 to_light -= next - start;
             start = next;
         }
-        ray = Ray(start, to_light, arriving.t_max, GLASS_MASK);
+        ray = Ray(start, to_light, t_max, GLASS_MASK);
     }
     return result;
 }
@@ -163,8 +180,8 @@ float environment_density(float row_step, float column_step, float v) {
 }
 
 // Returns the light that a secondary ray receives from the environment or the background if it hits no surface.
-// `inverse_density`: see Path.
-vec3 arriving_from_environment(vec3 direction, float inverse_density) {
+// `inverse_density`: see Path. `samples`: the expected number of light samples of the environment or background.
+vec3 arriving_from_environment(vec3 direction, float inverse_density, float samples) {
     inverse_density = max(inverse_density, 0.0); // negative after a mirror; shadow rays do not follow mirrors
     vec3 light = frame.background;
     float density = hemisphere_density();
@@ -180,21 +197,21 @@ vec3 arriving_from_environment(vec3 direction, float inverse_density) {
                 step_of_sums(frame.environment_columns + uint(texel.y * size.x), texel.x).y, at.y);
         }
     }
-    return light * balance_weight_of_ray(density * float(frame.light_samples), inverse_density);
+    return light * balance_weight_of_ray(density * samples, inverse_density);
 }
 
-// Samples a direction of the hemisphere uniformly, for rough reflections in a scene without an environment.
-LightSample sample_background(Surface s, vec2 sample_uv) {
+// Samples a direction of the hemisphere uniformly, in a scene without an environment.
+LightSample sample_background(Surface s, vec2 sample_uv, uint count) {
     vec3 direction = hemisphere_direction(s.normal, sample_uv.x, sample_uv.y);
     LightSample arriving =
         make_light_sample(s, direction, INFINITY, irradiance_of_density(hemisphere_density()), frame.background);
-    arriving.sampling_density = hemisphere_density() * float(frame.light_samples);
+    arriving.sampling_density = hemisphere_density() * float(count);
     arriving.is_background = true;
     return arriving;
 }
 
 // Samples a direction in proportion to the environment's luminance. `sample_uv`: random numbers from 0 to 1.
-LightSample sample_environment(Surface s, vec2 sample_uv) {
+LightSample sample_environment(Surface s, vec2 sample_uv, uint count) {
     int width = textures[frame.environment_texture].width, height = textures[frame.environment_texture].height;
     int row = search_sums(frame.environment_rows, height, sample_uv.y);
     vec2 row_step = step_of_sums(frame.environment_rows, row);
@@ -208,7 +225,7 @@ LightSample sample_environment(Surface s, vec2 sample_uv) {
     float density = environment_density(row_step.y, column_step.y, v);
     vec3 light = sample_texture(frame.environment_texture, vec2(u, v)).rgb * frame.environment_intensity;
     LightSample arriving = make_light_sample(s, direction, INFINITY, irradiance_of_density(density), light);
-    arriving.sampling_density = density * float(frame.light_samples);
+    arriving.sampling_density = density * float(count);
     return arriving;
 }
 
@@ -277,12 +294,12 @@ DirectLight direct_light(Surface s, vec3 to_eye, bool catches, bool rays_follow,
             if (is_lamp)
                 arriving = sample_light(lamp, s, sample_uv, point_count);
             else if (has_environment)
-                arriving = sample_environment(s, sample_uv);
+                arriving = sample_environment(s, sample_uv, point_count);
             else
-                arriving = sample_background(s, sample_uv);
+                arriving = sample_background(s, sample_uv, point_count);
             if (!(arriving.cosine > 0.0) || !(catches || arriving.irradiance > 0.0))
                 continue;
-            Visibility visible = visibility(arriving, s);
+            Visibility visible = visibility(s, arriving.to_light, arriving.t_max, arriving.direction, true);
             if (catches)
                 add_shadow(sum, arriving, visible, share);
             else if (visible.unoccluded)

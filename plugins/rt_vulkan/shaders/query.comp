@@ -14,6 +14,7 @@
 #include "surface.glsl"
 #include "lights.glsl"
 #include "scatter.glsl"
+#include "pixel.glsl"
 #include "integrator.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;

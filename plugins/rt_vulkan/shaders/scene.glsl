@@ -11,6 +11,7 @@ const uint DIFFUSE = 1u, SPECULAR = 2u, MIRROR = 3u, METAL = 4u, GLASS = 5u, MET
 const uint VIRTUAL = 1u, CATCHER = 2u, OCCLUDER = 3u;
 const uint DIRECTIONAL_LIGHT = 2u, SPOT_LIGHT = 3u, RECTANGLE_LIGHT = 4u, SPHERE_LIGHT = 5u;
 const uint FALLOFF_INVERSE_SQUARE = 2u;
+const uint BROWN_DISTORTION = 2u, FISHEYE_DISTORTION = 3u; // arhost/camera.h
 const uint TEXEL_SRGB8 = 1u, TEXEL_RGBA8 = 2u, TEXEL_RGBA32F = 3u;
 const uint WRAP_CLAMP = 2u, WRAP_MIRROR = 3u;
 
@@ -26,6 +27,7 @@ layout(constant_id = 3) const bool has_holes = true; // whether any object has h
 layout(constant_id = 4) const uint ray_dimensions = 2u;
 layout(constant_id = 5) const bool has_textures = true; // whether the scene has textures
 layout(constant_id = 6) const bool has_area_lights = true;
+layout(constant_id = 7) const bool may_have_video = true; // whether any image has a video
 
 struct Object {
     mat4x3 object_from_world;
@@ -34,6 +36,9 @@ struct Object {
     uint root; // the root node of its mesh's BVH; without software BVHs, the mesh's first primitive
     uint first_index, first_normal, first_texcoord; // NONE if absent
     vec3 extent;                                    // result of object_extent() (raytracer_common/scene_geometry.hpp)
+    // Light samples of the path integrator: their expected number per unit of the emissive mesh's area (1/mm²), or on a
+    // ball; 0 if the object is not sampled as a light source.
+    float emitter_density;
 };
 
 struct Material {
@@ -115,6 +120,24 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     uint environment_rows, environment_columns; // indices into `tables`
     uint has_slopes, unused;
     vec4 samples[256]; // x, y: offset from the pixel's centre in px, −½ to ½
+
+    // The path integrator.
+    vec4 spheres[16]; // centre and radius of spheres that contain all virtual objects, mm
+    uint sphere_count, source_count;
+    uint first_source, first_cumulative; // indices into `tables`
+    float environment_chance;            // that a light sample chooses the environment or background
+    float max_radiance;                  // bound of each sample
+    uint irradiance_texture; // irradiance of the environment, divided by π, of surfaces that face a direction
+    uint first_random;       // offset into the random sequences
+    uint is_linear, has_several_real; // has_several_real: several catchers or occluders
+    // The video under the overlay, undistorted coordinates to pixels as in arhost/camera.h.
+    uint has_video, video_texture;
+    vec2 focal_length, principal_point;
+    vec4 lens[3]; // the distortion's coefficients
+    uint distortion;
+    float max_radius_squared; // of (x/z, y/z) in the picture; the lens model is not valid beyond
+    float least_irradiance;   // bound of a catcher's light without virtual objects; 0: there is no light
+    uint blends_codes;        // whether straight images are blended in sRGB
 }
 frame;
 
@@ -151,7 +174,8 @@ layout(std430, set = 0, binding = 9) readonly buffer Texels {
     uint texels[];
 };
 layout(std430, set = 0, binding = 10) readonly buffer Tables {
-    uint tables[]; // sRGB encoding, sRGB decoding, and the environment's cumulative sums
+    // sRGB encoding, sRGB decoding, the environment's cumulative sums, the light sources and their cumulative chances
+    uint tables[];
 };
 layout(std430, set = 0, binding = 11) readonly buffer Rays {
     float rays[]; // result of make_ray_table() (view.hpp)
@@ -162,6 +186,7 @@ struct Sums {
     float coverage;   // number of samples that hit a virtual object
     // The parts of `irradiance` that virtual objects hide. With coloured shadows, there is one part per colour channel.
     // Otherwise, the values are the part that opaque objects hide, the part that translucent objects hide, and 0.
+    // Path integrator: the change of the catcher's light relative to its light without virtual objects.
     vec3 hidden;
     float irradiance; // irradiance of the catcher without shadows
     float caught;     // number of samples that hit a catcher

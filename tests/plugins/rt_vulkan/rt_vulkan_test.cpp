@@ -146,6 +146,29 @@ TEST_P(EachPath, MatchesRtEmbree) {
     expect_rt_embrees_picture(from_the_side(small), {}, GetParam());
 }
 
+TEST_P(EachPath, MatchesRtEmbreeWithARoundSpotLamp) {
+    const auto scene = [] {
+        SceneBuilder builder({.background = glm::vec3(0)});
+        arhost_light lamp = placed(ARHOST_LIGHT_SPOT, {0, -60, 80}, 0.8f);
+        set3(lamp.direction, 0, 0.6f, -0.8f);
+        lamp.cosine_inner = 0.95f;
+        lamp.cosine_outer = 0.7f;
+        lamp.radius = 8;
+        builder.add_light(lamp);
+        builder.add_mesh("floor", square(90), diffuse(0.7f, 0.7f, 0.7f));
+        builder.add_ball("mirror", {0, 0, 20, 20}, mirror(0.8f));
+        return builder;
+    };
+    const Options options{{"samples", "4"}};
+    Options with_path = options;
+    with_path["path"] = GetParam();
+    const Likeness like = likeness(picture_by("rt_vulkan", scene(), from_the_side(small), with_path),
+                                   picture_by("rt_embree", scene(), from_the_side(small), options));
+    EXPECT_EQ(like.alphas_off, 0) << like;
+    EXPECT_GE(like.psnr(), 45) << like;
+    EXPECT_GT(like.inside, 300) << like;
+}
+
 TEST_P(EachPath, DoesNotSelfShadowLargeSurfaces) {
     for (const LargeSurface &surface : large_surfaces)
         EXPECT_EQ(pixels_out_of_light(surface, "rt_vulkan", {{"path", GetParam()}}), 0) << surface;

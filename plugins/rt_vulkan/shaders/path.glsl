@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// The path integrator: computes the added light and the transmittance of a pixel. Equivalent to rt_embree's
+// kernel/path.inl, except that there are no photons: the light of lamps passes straight through glass, and rays find
+// lamps in mirrors. A path that starts at a virtual object collects radiance; one that starts at a catcher
+// collects the change of its light, relative to the light without virtual objects.
+
+// Paths of fewer bounces are not ended at random.
+const uint first_roulette_depth = 2u;
+
+const int PRIMARY_STAGE = 1, CATCHER_STAGE = 2, PATH_STAGE = 3;
+
+// Path.inverse_density of rays that a mirror reflects after a surface has scattered them. They see lamps with full
+// weight, because light samples do not follow mirrors.
+const float behind_mirror = -1e-30;
+
+// The surfaces that receive the light of sampled light sources.
+const int LIT_SURFACE = 1, CATCHER_SURFACE = 2, FILMED_SURFACE = 3;
+
+// Ends paths at random, so that those that go on have about the same throughput.
+bool survives(uint depth, Random random, inout vec3 throughput) {
+    if (!(largest(throughput) > 0.0))
+        return false;
+    if (depth < first_roulette_depth)
+        return true;
+    float chance = clamp(largest(throughput), 0.05, 1.0);
+    throughput *= 1.0 / chance;
+    return path_pair(random, ROULETTE_DIMENSION, 0u, 1u).x < chance;
+}
+
+// Pushes a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly.
+void scatter_path_in_glass(Path path, Surface s, vec3 direction, uint material, float choice, Random random) {
+    vec3 arriving = path.throughput;
+    if (s.back_face)
+        arriving *= bouguer(materials[material].extinction, s.distance);
+    float index = materials[material].index, ratio = s.back_face ? index : 1.0 / index;
+    Refraction refraction = refraction_at(direction, s.normal, ratio);
+    if (dot(refraction.direction, s.geometric_normal) > 0.0 && refraction.cosine_squared > 0.0)
+        refraction = refraction_at(direction, s.geometric_normal, ratio);
+    float reflectance = dielectric_reflectance(refraction.cosine, refraction.cosine_squared, ratio);
+    vec3 by_reflection = arriving * materials[material].reflectivity,
+         by_refraction = arriving * materials[material].refraction;
+    bool reflects = choice < reflectance, refracts = !reflects;
+    if (path.depth == 0u) {
+        by_reflection *= reflectance;
+        by_refraction *= 1.0 - reflectance;
+        reflects = true;
+        refracts = reflectance < 1.0;
+    }
+    if (reflects && survives(path.depth, random, by_reflection))
+        push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), by_reflection,
+             -abs(path.inverse_density));
+    if (refracts && survives(path.depth, random, by_refraction))
+        push(path, s.position - s.geometric_normal * s.offset, refraction.direction, by_refraction,
+             -abs(path.inverse_density));
+}
+
+// Pushes a ray that the surface scatters; in glass at the first hit, two rays.
+void scatter_path(Path path, Surface s, vec3 direction, uint material, Random random) {
+    uint model = materials[material].model;
+    vec2 choice = path_pair(random, CHOICE_DIMENSION, 0u, 1u);
+    if (has_glass && model == GLASS) {
+        scatter_path_in_glass(path, s, direction, material, choice.y, random);
+        return;
+    }
+    float mirror_chance = 0.0;
+    vec3 mirror_reflectance = materials[material].reflectivity;
+    if (model == MIRROR) {
+        mirror_chance = 1.0;
+    } else if (model == METAL) {
+        mirror_reflectance = schlick(mirror_reflectance, -dot(direction, s.normal));
+        float mirror = luminance(mirror_reflectance);
+        mirror_chance = mirror / max(mirror + luminance(s.diffuse), 1e-6);
+    }
+    if (choice.y < mirror_chance) {
+        vec3 throughput = path.throughput * mirror_reflectance * (1.0 / max(mirror_chance, 1e-6));
+        if (survives(path.depth, random, throughput))
+            push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), throughput,
+                 path.inverse_density == 0.0 ? 0.0 : behind_mirror);
+        return;
+    }
+    vec3 to_eye = -direction;
+    float specular = specular_chance(s, to_eye);
+    vec2 uv = path_pair(random, SCATTER_DIMENSION, 0u, 1u);
+    vec3 to = choice.x < specular
+                  ? mirror_direction(direction, ggx_half_vector(s.normal, to_eye, s.alpha, uv.x, uv.y))
+                  : cosine_direction(s.normal, uv.x, uv.y);
+    float density = scattering_density(s, to_eye, to, specular);
+    vec3 throughput = path.throughput * scattering(s, to_eye, to) *
+                      (0.318309886 / max(density * (1.0 - mirror_chance), 1e-20));
+    if (dot(to, s.normal) > 0.0 && dot(to, s.geometric_normal) > 0.0 && density > 0.0 &&
+        survives(path.depth, random, throughput))
+        push(path, above(s), to, throughput, 1.0 / max(density, 1e-30));
+}
+
+// Returns the light of sampled light sources that a lit surface reflects to the eye. For a real surface, returns the
+// change of its irradiance (divided by π) by virtual objects: minus the light that they hide, plus that of emissive
+// ones, which a filmed surface ignores. `scatters`: whether a scattered ray follows.
+vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatters, Random random) {
+    // The eye sees filmed surfaces in mirrors and glass, so they get as many samples as those that it sees directly.
+    uint count = source_samples(receiver == FILMED_SURFACE ? depth - 1u : depth);
+    float specular = receiver == LIT_SURFACE ? specular_chance(s, to_eye) : 0.0;
+    float form_factors = receiver == CATCHER_SURFACE ? form_factors_of(s) : 0.0;
+    vec3 sum = vec3(0.0);
+    for (uint i = 0u; i < count; ++i) {
+        SourceSample source = sample_source(s, random, i, count);
+        float cosine = dot(s.normal, source.direction);
+        bool hides = receiver != LIT_SURFACE && !source.is_virtual;
+        if (!(cosine > 0.0) || !(largest(source.light) > 0.0) || (receiver == FILMED_SURFACE && source.is_virtual) ||
+            (hides && !can_meet_virtual(s.position, source.to_light, source.t_max)))
+            continue;
+        // Refracted rays find the environment and emissive surfaces behind glass, but hardly ever a small lamp.
+        Visibility visible = visibility(s, source.to_light, source.t_max, source.direction, source.is_lamp);
+        vec3 transmittance = visible.unoccluded ? visible.tint : vec3(0.0);
+        float other_density = 0.0; // of scattered rays
+        if (scatters && receiver == LIT_SURFACE)
+            other_density = scattering_density(s, to_eye, source.direction, specular);
+        else if (scatters && receiver == CATCHER_SURFACE)
+            other_density = bounce_density(s, source.direction, form_factors);
+        float weight = balance_weight(source.density, other_density);
+        if (hides)
+            sum -= (vec3(1.0) - transmittance * (visible.is_tinted ? weight : 1.0)) * source.light * cosine;
+        else if (receiver == CATCHER_SURFACE)
+            sum += transmittance * source.light * (cosine * weight);
+        else
+            sum += (scattering(s, to_eye, source.direction) * weight + highlight(s, to_eye, source.direction)) *
+                   transmittance * source.light;
+    }
+    return sum;
+}
+
+// Reciprocal of a real surface's irradiance without virtual objects.
+float reciprocal(float irradiance) {
+    return frame.least_irradiance > 0.0 ? 1.0 / max(irradiance, frame.least_irradiance) : 0.0;
+}
+
+// Bounds a sample, so that a single random ray that hits a tiny, very bright light does not dominate the pixel.
+float bounded(float value) {
+    return abs(value) < 1e30 ? clamp(value, -frame.max_radiance, frame.max_radiance) : 0.0; // NaN: 0
+}
+
+// Returns the light that a ray brings to its origin, without that of the rays it pushes. `of_catcher`: the path began
+// at a catcher.
+vec3 light_along(Path path, Ray ray, Hit hit, int stage, bool of_catcher, Random random) {
+    bool is_hit = hit.object != NONE, is_bounce = of_catcher && path.depth == 1u;
+    vec3 sum = vec3(0.0);
+    if (is_bounce && !is_hit) // the light of a catcher changes only where it sees a virtual object
+        return sum;
+    if (has_area_lights && path.depth > 0u && !is_bounce)
+        sum = arriving_from_area_lights(ray.origin, ray.direction, hit.t, path.inverse_density, path.depth);
+    Surface s;
+    if (is_hit) {
+        s = surface_at(ray, hit, true);
+        if (is_bounce && s.is_real)
+            return sum;
+    }
+    // Rays that only mirrors and glass have scattered see the video also where it shows the environment, which is
+    // nearer than infinity there.
+    vec3 video;
+    bool is_filmed = false;
+    if (may_have_video && frame.has_video != 0u && path.depth > 0u &&
+        (is_hit ? s.is_real : path.inverse_density == 0.0 && !of_catcher)) {
+        vec3 to_point = is_hit ? s.position - frame.eye : ray.direction;
+        float end = is_hit ? 1.0 - s.offset * 4.0 / max(length(to_point), 1e-20) : INFINITY;
+        // The video shows the side of the surface that faces the camera. A bright video may be saturated.
+        is_filmed = filmed_towards(to_point, video) &&
+                    (is_hit ? dot(s.geometric_normal, to_point) < 0.0 : largest(video) < 0.95);
+        if (is_filmed && (frame.has_several_real != 0u || !is_hit)) // the video may show a nearer real surface
+            is_filmed = trace(Ray(frame.eye, to_point, end, CATCHER_MASK | OCCLUDER_MASK), true, false).object == NONE;
+    }
+    if (!is_hit)
+        return sum + (is_filmed ? video
+                                : arriving_from_environment(ray.direction, path.inverse_density,
+                                                            frame.environment_chance *
+                                                                float(source_samples(path.depth - 1u))));
+    vec3 direction = normalize(ray.direction);
+    uint material = objects[hit.object].material;
+    int receiver = stage == CATCHER_STAGE ? CATCHER_SURFACE : is_filmed ? FILMED_SURFACE : LIT_SURFACE;
+    bool is_lit = materials[material].model != MIRROR && materials[material].model != GLASS;
+    bool scatters = path.depth < frame.max_depth;
+    vec3 relative = vec3(1.0); // factor of the reflected light
+    if (receiver != LIT_SURFACE) {
+        vec3 before = irradiance_without_objects(s);
+        relative = vec3(reciprocal(before.x), reciprocal(before.y), reciprocal(before.z));
+    } else if (is_lit) {
+        add_material(s, hit);
+        if (largest(s.emission) > 0.0)
+            sum += s.emission * (path.depth > 0u ? balance_weight_of_ray(density_of_emitter(s, hit, direction, path.depth),
+                                                                         max(path.inverse_density, 0.0))
+                                                 : 1.0);
+    }
+    vec3 reflected = vec3(0.0);
+    if (receiver != LIT_SURFACE || is_lit)
+        reflected = sampled_light(receiver, s, -direction, path.depth, scatters, random) * relative;
+    if (receiver == FILMED_SURFACE)
+        return sum + video * (vec3(1.0) + reflected);
+    if (scatters && receiver == CATCHER_SURFACE)
+        push_bounce(path, s, relative, random);
+    else if (scatters)
+        scatter_path(path, s, direction, material, random);
+    return sum + reflected;
+}
+
+// Renders a sample and adds it to the pixel's sums. As in the other integrator, a single loop with a single call of
+// trace() handles all kinds of rays that find surfaces.
+void trace_sample(vec3 direction, Random random, inout Sums sums) {
+    vec3 light = vec3(0.0);
+    stack_size = 0;
+    int stage = PRIMARY_STAGE;
+    bool of_catcher = false;
+    Path path = Path(frame.eye, direction, vec3(1.0), 0.0, 0u);
+    Ray ray = Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK);
+    for (;;) {
+        Hit hit = trace(ray, false, stage == CATCHER_STAGE);
+        bool is_hit = hit.object != NONE;
+        if (stage == PRIMARY_STAGE) {
+            if (is_hit && objects[hit.object].role == VIRTUAL) {
+                sums.coverage += 1.0;
+            } else {
+                if (!has_catchers)
+                    return;
+                ray.t_max = is_hit ? hit.t : INFINITY;
+                ray.mask = CATCHER_MASK;
+                stage = CATCHER_STAGE;
+                continue;
+            }
+        } else if (stage == CATCHER_STAGE) {
+            if (!is_hit)
+                return;
+            of_catcher = true;
+            random.pixel += 1024u; // as in rt_embree, where the changes of a tile's catchers follow its radiances
+        }
+        Random of_vertex = Random(random.pixel + (path.depth << 12), random.seed, random.number);
+        light += path.throughput * light_along(path, ray, hit, stage, of_catcher, of_vertex);
+        if (stack_size == 0)
+            break;
+        path = stack[--stack_size];
+        ray = Ray(path.origin, path.direction, INFINITY, ALL_MASKS);
+        stage = PATH_STAGE;
+    }
+    light = vec3(bounded(light.x), bounded(light.y), bounded(light.z));
+    if (of_catcher)
+        sums.hidden += light;
+    else
+        sums.light += light;
+}
+
+// Returns the bits of a half-precision float, rounded to nearest, ties to even; packHalf2x16() may round otherwise.
+uint half_of(float value) {
+    float a = clamp(value, 0.0, 65504.0);
+    uint bits = floatBitsToUint(a);
+    if (a < 6.103515625e-5) // adding ½ shifts the bits of a subnormal half to the end of the mantissa
+        return floatBitsToUint(a + 0.5) - (126u << 23);
+    return ((bits + 0xfffu + ((bits >> 13) & 1u)) >> 13) - (112u << 10);
+}
+uvec2 halves_of(vec3 rgb) {
+    return uvec2(half_of(rgb.x) | (half_of(rgb.y) << 16), half_of(rgb.z));
+}
+
+void write_pixel(uvec2 position) {
+    position.y += band.first_row;
+    if (position.x >= frame.width || position.y >= frame.height)
+        return;
+    uint pixel = position.y * frame.width + position.x;
+    Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, 0.0, 0.0, 0.0, 0.0);
+    for (uint i = 0u; i < frame.sample_count; ++i) {
+        vec3 direction;
+        if (direction_of(pixel, frame.samples[i].xy, direction))
+            trace_sample(direction, random_of_pixel(position, frame.first_random + i), sums);
+    }
+    if (frame.accumulates != 0u) {
+        if (frame.first_sample > 0u) {
+            sums.light += history[pixel].light;
+            sums.coverage += history[pixel].coverage;
+            sums.hidden += history[pixel].hidden;
+        }
+        history[pixel] = sums;
+    }
+    float count = float(frame.first_sample + frame.sample_count);
+    float coverage = sums.coverage == count ? 1.0 : sums.coverage / count; // GLSL's division may round otherwise
+    vec3 added = sums.light / count, transmittance = vec3(1.0 - coverage) + sums.hidden / count;
+    if (frame.is_linear != 0u) {
+        uvec4 halves = uvec4(halves_of(added), halves_of(transmittance));
+        for (uint i = 0u; i < 4u; ++i)
+            image_pixels[4u * pixel + i] = halves[i];
+        if (halves != uvec4(0u, 0u, 0x3c003c00u, 0x3c00u))
+            mark_drawn(position);
+        return;
+    }
+    float removed = overlay_alpha(clamp(transmittance, 0.0, 65504.0));
+    float alpha = frame.blends_codes != 0u ? alpha_of_light(1.0 - removed) : removed;
+    vec3 colour = added * (1.0 / max(alpha, 1e-6));
+    uint codes = packed(uvec4(srgb8(colour.x), srgb8(colour.y), srgb8(colour.z), code_of(alpha)));
+    image_pixels[pixel] = codes;
+    if (codes >> 24 != 0u)
+        mark_drawn(position);
+}

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Like plain.comp, with the path integrator: renders a pixel with software BVH traversal, on any Vulkan 1.1 device.
+#version 450
+#extension GL_GOOGLE_include_directive : require
+#include "arhost/shading/glsl.h"
+
+#include "scene.glsl"
+#include "random.glsl"
+#include "path_random.glsl"
+#include "texture.glsl"
+#include "hits.glsl"
+#include "trace_plain.glsl"
+#include "surface.glsl"
+#include "lights.glsl"
+#include "scatter.glsl"
+#include "path_lights.glsl"
+#include "path_catcher.glsl"
+#include "pixel.glsl"
+#include "path.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+void main() {
+    write_pixel(gl_GlobalInvocationID.xy);
+}

@@ -1,0 +1,305 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Compares the images of rt_vulkan's path integrator with those of rt_embree's. Both use the same random numbers, so
+// their noise is similar. Lavapipe takes some 10 s to compile the shader for each combination of features that a
+// scene has, so the scenes have few such combinations.
+#include "linear_tracer.hpp"
+#include "rich_scene.hpp"
+#include "two_tracers.hpp"
+
+namespace arhost::test {
+namespace {
+
+const arhost_intrinsics small = pinhole(48, 36, 48);
+
+// Expects that the mean of each channel in each of 4×3 regions differs by at most 1 %.
+void expect_like(const LinearPicture &got, const LinearPicture &expected) {
+    const std::uint32_t width = got.width / 4, height = got.height / 3;
+    for (std::uint32_t region = 0; region < 12; ++region)
+        for (const std::size_t channel : {0, 1, 2, 4, 5, 6}) {
+            double sum = 0, wanted = 0;
+            for (std::uint32_t y = region / 4 * height; y < (region / 4 + 1) * height; ++y)
+                for (std::uint32_t x = region % 4 * width; x < (region % 4 + 1) * width; ++x) {
+                    sum += double{got.value(x, y, channel)};
+                    wanted += double{expected.value(x, y, channel)};
+                }
+            EXPECT_NEAR(sum, wanted, 0.01 * wanted + 1e-3 * width * height)
+                << "region " << region % 4 << ", " << region / 4 << ", channel " << channel;
+        }
+}
+
+scene::Settings path_settings(const glm::vec3 &background = glm::vec3(0), std::uint32_t max_depth = 5) {
+    return {.max_depth = max_depth, .background = background, .integrator = ARHOST_INTEGRATOR_PATH};
+}
+
+arhost_material emissive(float r, float g, float b) {
+    arhost_material material = diffuse(0, 0, 0);
+    set3(material.emission, r, g, b);
+    return material;
+}
+
+arhost_light round_spot() {
+    arhost_light lamp = placed(ARHOST_LIGHT_SPOT, {30, -20, 80}, 3000, ARHOST_FALLOFF_INVERSE_SQUARE);
+    set3(lamp.direction, -0.6f, 0, -0.8f);
+    lamp.cosine_inner = 0.9f;
+    lamp.cosine_outer = 0.7f;
+    lamp.radius = 6;
+    return lamp;
+}
+
+// A box that is open to the front, with an emissive panel and ball and a round spot lamp.
+SceneBuilder lit_box() {
+    SceneBuilder builder(path_settings());
+    builder.add_mesh("floor", square(60), diffuse(0.7f, 0.7f, 0.7f));
+    builder.add_mesh("back", quad({-60, 60, 0}, {60, 60, 0}, {60, 60, 100}, {-60, 60, 100}),
+                     diffuse(0.6f, 0.6f, 0.6f));
+    builder.add_mesh("left", quad({-60, -60, 0}, {-60, 60, 0}, {-60, 60, 100}, {-60, -60, 100}),
+                     diffuse(0.8f, 0.1f, 0.1f));
+    builder.add_mesh("right", quad({60, 60, 0}, {60, -60, 0}, {60, -60, 100}, {60, 60, 100}), shiny(0.3f, 0.4f, 20));
+    builder.add_mesh("ceiling", square(60, 100), diffuse(0.7f, 0.7f, 0.7f));
+    builder.add_mesh("panel", square(15, 95), emissive(6, 5, 4));
+    builder.add_ball("bulb", {-30, 10, 20, 8}, emissive(1, 2, 4));
+    builder.add_mesh("block", moved(cube(12), {25, 20, 12}), metallic_roughness({0.7f, 0.6f, 0.3f}, 0.5f, 0.4f));
+    builder.add_light(round_spot());
+    return builder;
+}
+
+// Balls of all materials that reflect, in an environment.
+SceneBuilder balls_in_an_environment() {
+    SceneBuilder builder(path_settings(glm::vec3(0), 6));
+    add_environment(builder, [](std::uint32_t column) {
+        return glm::vec3(0.2f + 0.1f * static_cast<float>(column), 0.5f, 1.2f - 0.1f * static_cast<float>(column));
+    });
+    arhost_material glass = glass_of(1.5f), metal = scene::make_material(ARHOST_MATERIAL_METAL);
+    set3(glass.extinction, 0.02f, 0.005f, 0.01f);
+    set3(metal.diffuse, 0.3f, 0.2f, 0.1f);
+    set3(metal.reflectivity, 0.6f, 0.5f, 0.3f);
+    builder.add_ball("glass", {-30, 0, 22, 20}, glass);
+    builder.add_ball("metal", {12, 20, 22, 20}, metal);
+    builder.add_ball("rough", {35, -20, 17, 15}, metallic_roughness({0.9f, 0.7f, 0.4f}, 1, 0.3f));
+    builder.add_mesh("floor", square(90), diffuse(0.5f, 0.6f, 0.4f));
+    return builder;
+}
+
+// A desk with a ball that shadows and colours it, one that shines onto it, and an occluder in front.
+SceneBuilder desk(const arhost_material &of_ball) {
+    SceneBuilder builder(path_settings(glm::vec3(0.4f)));
+    builder.add_mesh("desk", square(90), diffuse(0.6f, 0.6f, 0.6f), ARHOST_ROLE_CATCHER);
+    builder.add_mesh("box", moved(cube(10), {-40, -40, 10}), diffuse(0.6f, 0.6f, 0.6f), ARHOST_ROLE_OCCLUDER);
+    builder.add_ball("ball", {0, 0, 20, 20}, of_ball);
+    builder.add_ball("bulb", {40, -30, 12, 6}, emissive(4, 3, 1));
+    return builder;
+}
+SceneBuilder desk_with_lamps() {
+    SceneBuilder builder = desk(diffuse(0.8f, 0.2f, 0.1f));
+    builder.add_light(bulb({-60, 40, 150}, 20, 8000, ARHOST_FALLOFF_INVERSE_SQUARE));
+    builder.add_light(sun(0.6f, 0, -0.8f));
+    return builder;
+}
+SceneBuilder desk_with_glass() {
+    SceneBuilder builder = desk(mirror(0.9f));
+    builder.add_ball("glass", {-35, 20, 12, 12}, glass_of(1.5f));
+    builder.add_ball("red", {-5, 45, 10, 10}, diffuse(0.8f, 0.2f, 0.1f));
+    return builder;
+}
+
+// An emissive square that moves over a desk within a second.
+SceneBuilder moving_lamp() {
+    SceneBuilder builder(path_settings());
+    builder.settings.duration_s = 1;
+    builder.add_mesh("desk", square(90), diffuse(0.6f, 0.6f, 0.6f));
+    builder.add_light(round_spot());
+    builder.add_animated("lamp", square(10, 40), emissive(8, 4, 2),
+                         {.moves = true, .node = builder.add_moving_node({-40, 0, 0}, {40, 0, 0})});
+    return builder;
+}
+
+arhost_camera into_the_box() {
+    return camera({0, -150, 60}, {0, 0, 45}, {0, 0, 1}, small);
+}
+
+} // namespace
+
+class PathIntegrator : public testing::Test {
+protected:
+    void SetUp() override { ARHOST_REQUIRE_VULKAN(); }
+};
+
+namespace {
+
+void expect_rt_embrees_picture(SceneBuilder (*scene)(), const arhost_camera &view, const Options &options,
+                               const std::string &path = "plain", const Video *video = nullptr) {
+    Options with_path = options;
+    with_path["path"] = path;
+    LinearTracer vulkan(scene(), with_path, "rt_vulkan"), embree(scene(), options, "rt_embree");
+    for (LinearTracer *tracer : {&vulkan, &embree})
+        ASSERT_EQ(tracer->start(view.intrinsics, video), ARHOST_STATUS_OK) << tracer->log();
+    expect_like(vulkan.render(view, 3, video), embree.render(view, 3, video));
+}
+
+} // namespace
+
+TEST_F(PathIntegrator, LightsABoxAsRtEmbreeDoes) {
+    expect_rt_embrees_picture(&lit_box, into_the_box(), {{"samples", "64"}});
+}
+
+TEST_F(PathIntegrator, ScattersLightInGlassAndMetalAsRtEmbreeDoes) {
+    expect_rt_embrees_picture(&balls_in_an_environment, from_the_side(small), {{"samples", "64"}});
+}
+
+TEST_F(PathIntegrator, ChangesCatchersAsRtEmbreeDoes) {
+    expect_rt_embrees_picture(&desk_with_lamps, from_the_side(small), {{"samples", "64"}, {"max_radiance", "0"}});
+}
+
+TEST_F(PathIntegrator, LeavesOtherPixelsUntouched) {
+    LinearTracer tracer(desk_with_lamps(), {{"samples", "4"}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
+    const LinearPicture picture = tracer.render(camera({0, -300, 220}, {0, 0, 0}, {0, 0, 1}, small));
+    const arhost_render_info &info = picture.info;
+    int inside = 0;
+    for (std::uint32_t y = 0; y < small.height; ++y)
+        for (std::uint32_t x = 0; x < small.width; ++x) {
+            const bool in_region = x >= info.region_x && x < info.region_x + info.region_width &&
+                                   y >= info.region_y && y < info.region_y + info.region_height;
+            inside += in_region;
+            EXPECT_TRUE(in_region || picture.at(x, y) == untouched) << x << " " << y;
+        }
+    EXPECT_EQ(picture.at(0, 0), untouched) << "beside the desk";
+    EXPECT_GT(inside, 50);
+    EXPECT_LT(inside, 1500);
+    EXPECT_EQ(picture.at(24, 17)[4], 0) << "the ball lets no light through";
+}
+
+TEST_F(PathIntegrator, KeepsEnergyInAFurnace) {
+    SceneBuilder builder(path_settings(glm::vec3(0), 32));
+    add_environment(builder, [](std::uint32_t) { return glm::vec3(0.5f); });
+    builder.add_ball("diffuse", {-45, 0, 0, 20}, diffuse(1, 1, 1));
+    builder.add_ball("glass", {0, 0, 0, 20}, glass_of(1.5f));
+    builder.add_ball("mirror", {45, 0, 0, 20}, mirror(1));
+    LinearTracer tracer(std::move(builder), {{"samples", "64"}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
+    const LinearPicture picture = tracer.render(camera({0, -150, 0}, {0, 0, 0}, {0, 0, 1}, small));
+    for (const std::uint32_t middle : {9u, 24u, 38u}) {
+        double sum = 0;
+        for (std::uint32_t y = 15; y < 21; ++y)
+            for (std::uint32_t x = middle - 3; x < middle + 3; ++x) {
+                sum += double{picture.value(x, y, 1)} / 36;
+                EXPECT_EQ(picture.value(x, y, 5), 0) << x << " " << y;
+            }
+        EXPECT_NEAR(sum, 0.5, 0.005) << middle;
+    }
+}
+
+TEST_F(PathIntegrator, FollowsMovingEmitters) {
+    const Options options{{"samples", "32"}};
+    LinearTracer vulkan(moving_lamp(), options, "rt_vulkan"), embree(moving_lamp(), options, "rt_embree");
+    for (LinearTracer *tracer : {&vulkan, &embree})
+        ASSERT_EQ(tracer->start(small), ARHOST_STATUS_OK) << tracer->log();
+    for (const double time_s : {0.0, 1.0})
+        expect_like(vulkan.render(from_the_side(small), 0, nullptr, time_s),
+                    embree.render(from_the_side(small), 0, nullptr, time_s));
+}
+
+TEST_F(PathIntegrator, AccumulatesToRtEmbreesPicture) {
+    const Options options{{"samples", "8"}, {"accumulate", "true"}};
+    LinearTracer vulkan(desk_with_lamps(), options, "rt_vulkan"), embree(desk_with_lamps(), options, "rt_embree");
+    for (LinearTracer *tracer : {&vulkan, &embree}) {
+        ASSERT_EQ(tracer->start(small), ARHOST_STATUS_OK) << tracer->log();
+        for (int i = 0; i < 3; ++i)
+            tracer->render(from_the_side(small));
+    }
+    expect_like(vulkan.render(from_the_side(small)), embree.render(from_the_side(small)));
+}
+
+TEST_F(PathIntegrator, WritesStraightImages) {
+    const Options options{{"samples", "32"}};
+    const Picture got = Tracer(desk_with_lamps(), options, "rt_vulkan").render(from_the_side(small)),
+                  expected = Tracer(desk_with_lamps(), options).render(from_the_side(small));
+    int differ = 0, shadowed = 0;
+    for (std::uint32_t y = 0; y < small.height; ++y)
+        for (std::uint32_t x = 0; x < small.width; ++x) {
+            differ += std::abs(got.alpha(x, y) - expected.alpha(x, y)) > 2;
+            shadowed += got.alpha(x, y) > 20 && got.alpha(x, y) < 255;
+        }
+    EXPECT_LE(differ, 17) << "1 % of the pixels";
+    EXPECT_GT(shadowed, 50);
+    const Likeness like = likeness(got, expected);
+    EXPECT_GE(like.psnr(), 40) << like;
+}
+
+// A lamp of one colour behind coloured glass lights the desk in the glass's colour.
+TEST_F(PathIntegrator, LampsShineThroughGlass) {
+    const auto light_of = [](bool has_glass) {
+        SceneBuilder builder(path_settings());
+        add_environment(builder, [](std::uint32_t) { return glm::vec3(0); });
+        arhost_material glass = glass_of(1.0f);
+        set3(glass.refraction, 0.8f, 0.4f, 0.4f);
+        builder.add_mesh("desk", square(90), diffuse(0.5f, 0.5f, 0.5f));
+        builder.add_light(light(0, 0, 100, 2000, ARHOST_FALLOFF_INVERSE_SQUARE));
+        builder.add_mesh("pane", square(5, has_glass ? 90.0f : 200.0f), glass);
+        LinearTracer tracer(std::move(builder), {{"samples", "4"}}, "rt_vulkan");
+        EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
+        const LinearPicture picture = tracer.render(camera({0, -60, 20}, {0, 0, 0}, {0, 0, 1}, small));
+        return std::array{picture.value(24, 18, 0), picture.value(24, 18, 1)};
+    };
+    const auto without = light_of(false), with = light_of(true);
+    EXPECT_GT(without[0], 0.05f);
+    EXPECT_NEAR(with[0] / without[0], 0.8, 0.01);
+    EXPECT_NEAR(with[1] / without[1], 0.4, 0.01);
+}
+
+// Each traversal path (option `path` of rt_vulkan), with all kinds of rays.
+class PathIntegratorOnEachPath : public testing::TestWithParam<std::string> {
+protected:
+    void SetUp() override { ARHOST_REQUIRE_VULKAN(GetParam()); }
+};
+INSTANTIATE_TEST_SUITE_P(Paths, PathIntegratorOnEachPath, testing::Values("plain", "query", "pipeline"),
+                         [](const auto &info) { return info.param; });
+
+TEST_P(PathIntegratorOnEachPath, ShowsTheVideoInAMirrorAsRtEmbreeDoes) {
+    const arhost_intrinsics lens = with_lens(small, ARHOST_DISTORTION_BROWN, {-0.2, 0.05, 0.001, -0.002});
+    const Video video(lens);
+    expect_rt_embrees_picture(&desk_with_glass, from_the_side(lens), {{"samples", "64"}}, GetParam(), &video);
+}
+
+TEST_P(PathIntegratorOnEachPath, EqualRequestsGiveEqualBytes) {
+    const Video video(small);
+    LinearTracer tracer(desk_with_glass(), {{"samples", "2"}, {"path", GetParam()}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small, &video), ARHOST_STATUS_OK) << tracer.log();
+    const auto first = tracer.render(from_the_side(small), 7, &video).pixels(); // in bands
+    EXPECT_NE(tracer.render(from_the_side(small), 7).pixels(), first) << "the mirror shows the video";
+    EXPECT_NE(tracer.render(from_the_side(small), 8, &video).pixels(), first) << "the noise of each frame differs";
+    EXPECT_EQ(tracer.render(from_the_side(small), 7, &video).pixels(), first);
+}
+
+TEST_P(PathIntegratorOnEachPath, ValidationReportsNothing) {
+    if (PluginUnderTest("rt_vulkan").create({{"validate", "true"}}) != ARHOST_STATUS_OK)
+        GTEST_SKIP() << "needs Vulkan's validation layers";
+    const Options options{{"validate", "true"}, {"path", GetParam()}};
+    const Video video(small);
+    LinearTracer filmed(desk_with_glass(), options, "rt_vulkan"), moving(moving_lamp(), options, "rt_vulkan");
+    ASSERT_EQ(filmed.start(small, &video), ARHOST_STATUS_OK) << filmed.log();
+    ASSERT_EQ(moving.start(small), ARHOST_STATUS_OK) << moving.log();
+    for (std::uint64_t i = 0; i < 4; ++i) {
+        filmed.render(from_the_side(small), i, &video);
+        moving.render(from_the_side(small), i, nullptr, 0.2 * static_cast<double>(i));
+    }
+    EXPECT_EQ(filmed.log().find("Vulkan validation: "), std::string::npos) << filmed.log();
+    EXPECT_EQ(moving.log().find("Vulkan validation: "), std::string::npos) << moving.log();
+}
+
+TEST(PathIntegratorPlugin, DeclaresLinearImagesAndVideo) {
+    const PluginUnderTest plugin("rt_vulkan");
+    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_CAPABILITY_LINEAR_IMAGES);
+    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_CAPABILITY_VIDEO);
+}
+
+TEST(PathIntegratorPlugin, RejectsLinearImagesOfTheOtherIntegrator) {
+    ARHOST_REQUIRE_VULKAN();
+    LinearTracer tracer(rich_scene(), {}, "rt_vulkan");
+    EXPECT_EQ(tracer.start(small), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
+    EXPECT_NE(tracer.log().find("linear images need a scene with the path integrator"), std::string::npos)
+        << tracer.log();
+}
+
+} // namespace arhost::test
