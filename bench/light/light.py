@@ -189,7 +189,7 @@ def main():
         strips.append(strip(case, light, truth))
         for each in regions:
             verdict = each.verdict(case.tolerance)
-            elif verdict != "met":
+            if verdict != "met":
                 missed.append(f"{case.name}, {each.name}" + (" (too noisy)" if verdict.startswith("NOT") else ""))
             results.append({"case": case.name, "region": each.name, "ours": each.light.tolist(), "truth": each.truth.tolist(),
                             "difference": each.difference, "noise": each.noise, "worst": each.worst, "worst_noise": each.worst_noise,
