@@ -216,4 +216,33 @@ TEST(Ggx, HalfVectorsRotateWithTheSurface) {
     expect_near(ggx_half_vector(normal, turned_eye, 0.4, 0.3, 0.8), x * n.x + y * n.y + normal * n.z, 1e-14);
 }
 
+TEST(DielectricReflectance, IsFresnels) {
+    const double ratio = 1 / 1.5;
+    EXPECT_NEAR(dielectric_reflectance(1, refracted_cosine_squared(1, ratio), ratio), 0.04, 1e-12);
+    const double brewster = std::cos(std::atan(1.5)),
+                 refracted = std::sqrt(refracted_cosine_squared(brewster, ratio));
+    const double perpendicular = (ratio * brewster - refracted) / (ratio * brewster + refracted);
+    EXPECT_NEAR(dielectric_reflectance(brewster, refracted * refracted, ratio), perpendicular * perpendicular / 2,
+                1e-12);
+    EXPECT_EQ(dielectric_reflectance(0.5, refracted_cosine_squared(0.5, 1.5), 1.5), 1); // total internal reflection
+}
+
+TEST(ConeDirection, IsInsideTheCone) {
+    const Vec3 axis = normalize(Vec3{1, 2, 3});
+    for (const double u : {0.0, 0.3, 0.999}) {
+        const Vec3 d = cone_direction(axis, 0.1, u, 0.7);
+        EXPECT_NEAR(length(d), 1, 1e-12);
+        EXPECT_NEAR(dot(d, axis), 1 - 0.1 * u, 1e-12);
+    }
+}
+
+TEST(CosineDirection, HasADensityProportionalToTheCosine) {
+    const Vec3 normal = normalize(Vec3{-1, 0.5, 2});
+    double sum = 0;
+    constexpr int count = 1000;
+    for (int i = 0; i < count; ++i)
+        sum += dot(cosine_direction(normal, (i + 0.5) / count, 0.3), normal);
+    EXPECT_NEAR(sum / count, 2.0 / 3, 1e-5);
+}
+
 } // namespace arhost::shading
