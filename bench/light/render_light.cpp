@@ -7,11 +7,10 @@
 // pixel (added light and transmittance), and prints the CPU time of all images as JSON. Keys: light_samples,
 // max_radiance (0: no bound), photons, threads, video (a file of R, G, B bytes: the picture under the overlay).
 #include "bunny.hpp"
+#include "pixels/linear.hpp"
 #include "renderer.hpp"
 #include "scene/scene_loader.hpp"
 
-#include <bit>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
@@ -22,12 +21,6 @@
 #include <vector>
 
 namespace {
-
-float float_of_half(std::uint16_t half) {
-    const int exponent = half >> 10 & 31, mantissa = half & 1023;
-    return exponent == 0 ? std::ldexp(static_cast<float>(mantissa), -24)
-                         : std::ldexp(static_cast<float>(mantissa + 1024), exponent - 25);
-}
 
 void run(int argc, char **argv) {
     if (argc < 17)
@@ -111,7 +104,7 @@ void run(int argc, char **argv) {
                         static_cast<std::uint64_t>(frame));
         for (std::size_t i = 0; i < std::size_t{width} * height; ++i)
             for (std::size_t c = 0; c < 6; ++c)
-                sums[6 * i + c] += float_of_half(pixels[8 * i + c + (c >= 3)]);
+                sums[6 * i + c] += arhost::float_of(pixels[8 * i + c + (c >= 3)]);
     }
     const double seconds = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
     std::vector<float> means(sums.size());

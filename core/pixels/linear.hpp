@@ -5,6 +5,7 @@
 
 #include <arhost/shading/srgb8.hpp>
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>

@@ -18,6 +18,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <initializer_list>
 #include <set>
 #include <source_location>
 #include <sstream>
@@ -188,6 +189,17 @@ inline void send_signal(pid_t pid, int signal) {
     if (pid <= 0)
         throw std::runtime_error("no process to signal");
     ::kill(pid, signal);
+}
+
+// Kills the worker of each plugin, 60 frames after the previous one.
+inline void kill_in_turn(const ArhostRun &run, std::initializer_list<const char *> plugins) {
+    std::size_t at = 0;
+    for (const char *plugin : plugins) {
+        run.wait_for_lines(at += 60);
+        const pid_t worker = run.worker(plugin);
+        ASSERT_NE(worker, 0) << plugin << "\n" << run.output();
+        send_signal(worker, SIGKILL);
+    }
 }
 
 inline const char *const small_scene = "version: 1\naxes: z-up\nmaterials: {m: {model: diffuse, diffuse: 0.5}}\n"

@@ -46,13 +46,7 @@ TEST(LinearImages, KillingWorkersDoesNotChangeThem) {
     LightRun clean(options), run(options);
     ASSERT_EQ(clean.run(), 0) << clean.output();
     run.start();
-    std::size_t at = 0;
-    for (const char *plugin : {"rt_light", "source_counter", "rt_light"}) {
-        run.wait_for_lines(at += 60);
-        const pid_t worker = run.worker(plugin);
-        ASSERT_NE(worker, 0) << plugin << "\n" << run.output();
-        send_signal(worker, SIGKILL);
-    }
+    kill_in_turn(run, {"rt_light", "source_counter", "rt_light"});
     ASSERT_EQ(run.wait(), 0) << run.output();
     EXPECT_EQ(run.read("counted.txt"), clean.read("counted.txt"));
     EXPECT_EQ(run.stats()["restarts"]["raytracer"], 2);

@@ -288,13 +288,7 @@ TEST(Supervision, KillingWorkersDoesNotChangeTheResult) {
     ArhostRun run(yaml);
     run.write("scene.yaml", small_scene);
     run.start();
-    std::size_t at = 0;
-    for (const char *plugin : {"source_counter", "tracker_counter", "rt_counter", "sink_counter"}) {
-        run.wait_for_lines(at += 60);
-        const pid_t worker = run.worker(plugin);
-        ASSERT_NE(worker, 0) << plugin << "\n" << run.output();
-        send_signal(worker, SIGKILL);
-    }
+    kill_in_turn(run, {"source_counter", "tracker_counter", "rt_counter", "sink_counter"});
     ASSERT_EQ(run.wait(), 0) << run.output();
     EXPECT_EQ(run.read("counted.txt"), clean.read("counted.txt"));
     for (const char *component : {"source", "tracker", "raytracer", "sink_counter"})

@@ -207,6 +207,18 @@ ARHOST_INLINE Float environment_density(const Texture &image, Float row_step, Fl
     return equirectangular_density(row_step * column_step * texels, v);
 }
 
+// Returns the density per steradian of sample_environment() at the point (u, v) of the image.
+ARHOST_INLINE Float environment_density_at(const Environment &environment, Float u, Float v) {
+    const Texture &image = *environment.image;
+    const auto texel = [](Float at, std::int32_t size) __attribute__((always_inline)) {
+        return to_int(
+            min(max(at * Float(static_cast<float>(size)), Float(0.0f)), Float(static_cast<float>(size - 1))));
+    };
+    const Int row = texel(v, image.height), first = row * Int(image.width);
+    return environment_density(image, step_of_sums(environment.rows, Int(0), row).v,
+                               step_of_sums(environment.columns, first, texel(u, image.width)).v, v);
+}
+
 // Returns the light that secondary rays receive from the environment or the background if they hit no surface.
 // `inverse_density`: see RayQueue.
 ARHOST_INLINE Vec3 arriving_from_environment(const Frame &frame, Vec3 direction, Float inverse_density) {
@@ -216,19 +228,11 @@ ARHOST_INLINE Vec3 arriving_from_environment(const Frame &frame, Vec3 direction,
     Vec3 light = splat(frame.scene.background);
     Float density = hemisphere_density();
     if (environment.image) {
-        const Texture &image = *environment.image;
         const Vec3 d = transform(environment.environment_from_world, direction);
         const Float u = equirectangular_u(d), v = equirectangular_v(d);
-        light = sample_texture(frame.scene, image, u, v).colour * Float(environment.intensity);
-        if (is_random) {
-            const auto texel = [](Float at, std::int32_t size) __attribute__((always_inline)) {
-                return to_int(
-                    min(max(at * Float(static_cast<float>(size)), Float(0.0f)), Float(static_cast<float>(size - 1))));
-            };
-            const Int row = texel(v, image.height), first = row * Int(image.width);
-            density = environment_density(image, step_of_sums(environment.rows, Int(0), row).v,
-                                          step_of_sums(environment.columns, first, texel(u, image.width)).v, v);
-        }
+        light = sample_texture(frame.scene, *environment.image, u, v).colour * Float(environment.intensity);
+        if (is_random)
+            density = environment_density_at(environment, u, v);
     }
     const Float sampled = density * Float(static_cast<float>(frame.light_samples));
     return is_random ? light * balance_weight_of_ray(sampled, inverse_density) : light;

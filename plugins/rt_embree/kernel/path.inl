@@ -25,7 +25,7 @@ ARHOST_INLINE Bool survive(const Work &work, const Paths &paths, Vec3 &throughpu
 // Queues a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly.
 ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &paths, const Surface &s, Vec3 direction,
                                          const arhost_material &material, Float choice, Bool active) {
-    const GlassScatter glass = scatter_at_glass(s, direction, material);
+    const GlassScatter glass = scatter_at_glass(s, direction, material, active);
     const Vec3 arriving = paths.throughput * glass.transmittance;
     Vec3 by_reflection = arriving * splat(material.reflectivity),
          by_refraction = arriving * splat(material.refraction);

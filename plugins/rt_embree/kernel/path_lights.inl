@@ -19,7 +19,7 @@ struct SourceSample {
     Vec3 direction; // unit vector in the direction of `to_light`
     Vec3 light;     // irradiance at perpendicular incidence, divided by π and by the number of samples
     Float density;  // expected number of samples per steradian; 0 if scattered rays cannot hit the light source
-    Bool is_virtual, is_environment;
+    Bool is_virtual;
 };
 
 ARHOST_INLINE Vec3 environment_light(const Frame &frame, Vec3 direction) {
@@ -37,16 +37,8 @@ ARHOST_INLINE Float environment_source_density(const Frame &frame, Vec3 directio
     const Float chance = frame.path.environment_chance;
     if (!environment.image)
         return hemisphere_density() * chance;
-    const Texture &image = *environment.image;
     const Vec3 d = transform(environment.environment_from_world, direction);
-    const Float u = equirectangular_u(d), v = equirectangular_v(d);
-    const auto texel = [](Float at, std::int32_t size) __attribute__((always_inline)) {
-        return to_int(
-            min(max(at * Float(static_cast<float>(size)), Float(0.0f)), Float(static_cast<float>(size - 1))));
-    };
-    const Int row = texel(v, image.height), first = row * Int(image.width);
-    return chance * environment_density(image, step_of_sums(environment.rows, Int(0), row).v,
-                                        step_of_sums(environment.columns, first, texel(u, image.width)).v, v);
+    return chance * environment_density_at(environment, equirectangular_u(d), equirectangular_v(d));
 }
 
 // Returns light sample `index` of `count`. The samples are spread evenly over the light sources.
@@ -54,7 +46,7 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
                                          int count) {
     const Frame &frame = work.frame;
     const PathScene &path = frame.path;
-    SourceSample sample{s.normal, Float(1.0f), s.normal, black(), Float(0.0f), bool_of(false), bool_of(false)};
+    SourceSample sample{s.normal, Float(1.0f), s.normal, black(), Float(0.0f), bool_of(false)};
     if (path.source_count == 0)
         return sample;
     const Pair uv = path_pair(work, paths, light_dimension, index, count);
@@ -154,7 +146,6 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
             select(environment, of_environment.intensity * (of_environment.irradiance * share), sample.light);
         sample.density = select(environment, of_environment.sampling_density, sample.density);
         sample.t_far = select(environment, Float(far_away), sample.t_far);
-        sample.is_environment = environment;
     }
     sample.density = sample.density * chance;
     sample.direction = normalize(sample.to_light);

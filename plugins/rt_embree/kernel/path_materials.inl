@@ -58,15 +58,10 @@ struct GlassScatter {
     Float reflectance;
     Vec3 transmittance, refracted;
 };
-ARHOST_INLINE GlassScatter scatter_at_glass(const Surface &s, Vec3 direction, const arhost_material &glass) {
+ARHOST_INLINE GlassScatter scatter_at_glass(const Surface &s, Vec3 direction, const arhost_material &glass,
+                                            Bool active) {
     const Float ratio = select(s.back_face, Float(glass.index), Float(1 / glass.index));
-    Refraction refraction = refraction_at(direction, s.normal, ratio);
-    // If refraction at the interpolated normal leaves the ray on the wrong side, the geometric normal is used
-    // instead.
-    const Bool wrong_side =
-        (dot(refraction.direction, s.geometric_normal) > Float(0.0f)) & (refraction.cosine_squared > Float(0.0f));
-    if (any(wrong_side))
-        refraction = refraction_at(direction, select(wrong_side, s.geometric_normal, s.normal), ratio);
+    const Refraction refraction = refraction_of(s, direction, ratio, active);
     return {dielectric_reflectance(refraction.cosine, refraction.cosine_squared, ratio),
             select(s.back_face, bouguer(splat(glass.extinction), s.distance), white()), refraction.direction};
 }

@@ -135,7 +135,7 @@ ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, 
                 next_direction = select(mirrored, reflected(s, direction), next_direction);
                 specular = specular | mirrored;
             } else if (material.model == ARHOST_MATERIAL_GLASS) {
-                const GlassScatter glass = scatter_at_glass(s, direction, material);
+                const GlassScatter glass = scatter_at_glass(s, direction, material, here);
                 const Bool reflects = here & (choice < glass.reflectance);
                 power = select(here,
                                power * glass.transmittance *

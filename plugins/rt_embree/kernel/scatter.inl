@@ -106,6 +106,17 @@ ARHOST_INLINE Refraction refraction_at(Vec3 direction, Vec3 normal, Float ratio)
     return {cosine, squared, refracted_direction(direction, normal, ratio, cosine, sqrt(max(squared, Float(0.0f))))};
 }
 
+// If refraction at the interpolated normal leaves the ray on the wrong side of the surface, the geometric normal is
+// used instead; reflected() does the same for reflection. `ratio`: as in refracted_cosine_squared().
+ARHOST_INLINE Refraction refraction_of(const Surface &s, Vec3 direction, Float ratio, Bool active) {
+    const Refraction refraction = refraction_at(direction, s.normal, ratio);
+    const Bool wrong_side =
+        (dot(refraction.direction, s.geometric_normal) > Float(0.0f)) & (refraction.cosine_squared > Float(0.0f));
+    if (!any(active & wrong_side))
+        return refraction;
+    return refraction_at(direction, select(wrong_side, s.geometric_normal, s.normal), ratio);
+}
+
 // Queues the reflected and the refracted ray, or, with `single_path`, only one of them, chosen at random. A ray is
 // not traced if it exceeds the depth limit or falls below the importance cutoff. It then contributes the material's
 // cutoff colour.
@@ -115,13 +126,7 @@ ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surfac
     const Vec3 throughput = paths.throughput * transmittance;
 
     const Float ratio = select(s.back_face, Float(glass.index), Float(1 / glass.index));
-    Refraction refraction = refraction_at(direction, s.normal, ratio);
-    // If refraction at the interpolated normal leaves the ray outside the glass, the geometric normal is used
-    // instead; reflected() does the same for reflection.
-    const Bool wrong_side =
-        (dot(refraction.direction, s.geometric_normal) > Float(0.0f)) & (refraction.cosine_squared > Float(0.0f));
-    if (any(active & wrong_side))
-        refraction = refraction_at(direction, select(wrong_side, s.geometric_normal, s.normal), ratio);
+    const Refraction refraction = refraction_of(s, direction, ratio, active);
     const Bool total = refraction.cosine_squared < Float(0.0f);
     const Float reflectance = glass_reflected_fraction(s.back_face, refraction.cosine, refraction.cosine_squared,
                                                        Float(glass.fresnel_exponent), Float(glass.fresnel_minimum),

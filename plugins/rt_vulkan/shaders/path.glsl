@@ -34,9 +34,7 @@ void scatter_path_in_glass(Path path, Surface s, vec3 direction, uint material, 
     if (s.back_face)
         arriving *= bouguer(materials[material].extinction, s.distance);
     float index = materials[material].index, ratio = s.back_face ? index : 1.0 / index;
-    Refraction refraction = refraction_at(direction, s.normal, ratio);
-    if (dot(refraction.direction, s.geometric_normal) > 0.0 && refraction.cosine_squared > 0.0)
-        refraction = refraction_at(direction, s.geometric_normal, ratio);
+    Refraction refraction = refraction_of(s, direction, ratio);
     float reflectance = dielectric_reflectance(refraction.cosine, refraction.cosine_squared, ratio);
     vec3 by_reflection = arriving * materials[material].reflectivity,
          by_refraction = arriving * materials[material].refraction;

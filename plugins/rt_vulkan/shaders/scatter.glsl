@@ -44,6 +44,15 @@ Refraction refraction_at(vec3 direction, vec3 normal, float ratio) {
                       refracted_direction(direction, normal, ratio, cosine, sqrt(max(squared, 0.0))));
 }
 
+// If refraction at the interpolated normal leaves the ray on the wrong side of the surface, the geometric normal is used
+// instead; mirror_direction_off_facet() does the same for reflection.
+Refraction refraction_of(Surface s, vec3 direction, float ratio) {
+    Refraction refraction = refraction_at(direction, s.normal, ratio);
+    if (dot(refraction.direction, s.geometric_normal) > 0.0 && refraction.cosine_squared > 0.0)
+        refraction = refraction_at(direction, s.geometric_normal, ratio);
+    return refraction;
+}
+
 // Pushes the reflected and the refracted ray, or, with frame.single_path, only one of them, chosen at random. A ray is
 // not traced if it exceeds the depth limit or falls below the importance cutoff. The function then returns the cutoff
 // colour, which the ray contributes instead.
@@ -52,11 +61,7 @@ vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Rando
     if (s.back_face)
         throughput *= bouguer(materials[material].extinction, s.distance);
     float index = materials[material].index, ratio = s.back_face ? index : 1.0 / index;
-    Refraction refraction = refraction_at(direction, s.normal, ratio);
-    // If refraction at the interpolated normal leaves the ray outside the glass, the geometric normal is used instead;
-    // mirror_direction_off_facet() does the same for reflection.
-    if (dot(refraction.direction, s.geometric_normal) > 0.0 && refraction.cosine_squared > 0.0)
-        refraction = refraction_at(direction, s.geometric_normal, ratio);
+    Refraction refraction = refraction_of(s, direction, ratio);
     float reflectance = glass_reflected_fraction(
         s.back_face, refraction.cosine, refraction.cosine_squared, materials[material].fresnel_exponent,
         materials[material].fresnel_minimum, materials[material].fresnel_maximum);

@@ -3,9 +3,9 @@
 // Provides tests of ray tracers with linear images and video.
 #pragma once
 
+#include "pixels/linear.hpp"
 #include "tracer.hpp"
 
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <optional>
@@ -14,12 +14,6 @@
 #include <vector>
 
 namespace arhost::test {
-
-inline float float_of_half(std::uint16_t half) {
-    const int exponent = half >> 10 & 31, mantissa = half & 1023;
-    return exponent == 0 ? std::ldexp(static_cast<float>(mantissa), -24)
-                         : std::ldexp(static_cast<float>(mantissa + 1024), exponent - 25);
-}
 
 using LinearPixel = std::array<std::uint16_t, 8>;
 inline constexpr LinearPixel untouched = {0, 0, 0, 0, 0x3c00, 0x3c00, 0x3c00, 0};
@@ -41,9 +35,7 @@ public:
         return pixel;
     }
     // Channels 0 to 2: added light; 4 to 6: transmittance.
-    float value(std::uint32_t x, std::uint32_t y, std::size_t channel) const {
-        return float_of_half(at(x, y)[channel]);
-    }
+    float value(std::uint32_t x, std::uint32_t y, std::size_t channel) const { return float_of(at(x, y)[channel]); }
     std::vector<LinearPixel> pixels() const {
         std::vector<LinearPixel> all;
         for (std::uint32_t y = 0; y < height; ++y)
@@ -51,13 +43,7 @@ public:
                 all.push_back(at(x, y));
         return all;
     }
-    bool only_pixels_written() const {
-        for (std::uint32_t y = 0; y < height; ++y)
-            for (std::uint32_t i = 16 * width; i < stride_; ++i)
-                if (buffer_.data()[std::size_t{stride_} * y + i] != 0xa5)
-                    return false;
-        return buffer_.intact();
-    }
+    bool only_pixels_written() const { return only_rows_written(buffer_, 16 * width, stride_, height); }
 
     std::uint32_t width, height;
     arhost_render_info info{sizeof(arhost_render_info), 0, 0, 0, 0, 0, 0, 0, 0};

@@ -54,6 +54,16 @@ inline arhost_camera camera(std::array<double, 3> eye, std::array<double, 3> loo
     return c;
 }
 
+// Whether the padding of an image's rows and the guard bytes around it still have the value 0xa5.
+inline bool only_rows_written(const GuardedBuffer &buffer, std::uint32_t row_bytes, std::uint32_t stride,
+                              std::uint32_t height) {
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t i = row_bytes; i < stride; ++i)
+            if (buffer.data()[std::size_t{stride} * y + i] != 0xa5)
+                return false;
+    return buffer.intact();
+}
+
 // An image with row padding and guard bytes, which the plugin must not write.
 class Picture {
 public:
@@ -93,13 +103,7 @@ public:
                 }
         return {x0, y0, x1, y1};
     }
-    bool only_pixels_written() const {
-        for (std::uint32_t y = 0; y < height; ++y)
-            for (std::uint32_t i = 4 * width; i < stride_; ++i)
-                if (buffer_.data()[std::size_t{stride_} * y + i] != 0xa5)
-                    return false;
-        return buffer_.intact();
-    }
+    bool only_pixels_written() const { return only_rows_written(buffer_, 4 * width, stride_, height); }
 
     std::uint32_t width, height;
     arhost_render_info info{sizeof(arhost_render_info), 0, 0, 0, 0, 0, 0, 0, 0};

@@ -196,20 +196,25 @@ TEST_P(EachPath, CancelsAnImageAndContinues) {
     EXPECT_EQ(after, tracer.render_at(0.3, moving_camera()).pixels());
 }
 
+// `arena` and `intrinsics` must outlive the result.
+arhost_raytracer_setup straight_setup(const scene::Arena &arena, const arhost_intrinsics &intrinsics) {
+    arhost_raytracer_setup setup{};
+    setup.struct_size = sizeof setup;
+    setup.width = intrinsics.width;
+    setup.height = intrinsics.height;
+    setup.form = ARHOST_IMAGE_FORM_STRAIGHT;
+    setup.scene = &arena.scene();
+    setup.intrinsics = &intrinsics;
+    setup.compositing = ARHOST_COMPOSITING_SRGB;
+    return setup;
+}
+
 TEST_P(EachPath, TracesTheSamePictureInBandsAndAtOnce) {
     RendererParts parts(GetParam());
     scene::Arena arena = rich_scene().build();
     for (const std::uint32_t height : {1u, 7u, 65u, 72u}) {
         const arhost_intrinsics in = pinhole(96, height, 96);
-        const arhost_raytracer_setup setup{sizeof setup,
-                                           in.width,
-                                           in.height,
-                                           ARHOST_IMAGE_FORM_STRAIGHT,
-                                           &arena.scene(),
-                                           &in,
-                                           ARHOST_COMPOSITING_SRGB,
-                                           0,
-                                           nullptr};
+        const arhost_raytracer_setup setup = straight_setup(arena, in);
         // Renders three images and returns the third. The first image always uses bands, because its time is not yet
         // known; the second may use them.
         const auto third = [&](rt_vulkan::Bands::Milliseconds max_band_time) {
@@ -286,15 +291,7 @@ TEST_P(EachPath, RendersSeveralScenesInTurn) {
     RendererParts parts(GetParam());
     const auto picture_of = [&](scene::ArenaBuilder scene, const arhost_camera &view) {
         scene::Arena arena = std::move(scene).build();
-        const arhost_raytracer_setup setup{sizeof setup,
-                                           small.width,
-                                           small.height,
-                                           ARHOST_IMAGE_FORM_STRAIGHT,
-                                           &arena.scene(),
-                                           &view.intrinsics,
-                                           ARHOST_COMPOSITING_SRGB,
-                                           0,
-                                           nullptr};
+        const arhost_raytracer_setup setup = straight_setup(arena, view.intrinsics);
         rt_vulkan::Renderer renderer = parts.renderer(setup);
         Picture picture(small);
         const rt_vulkan::Rectangle drawn = renderer.render(view, picture.image());
@@ -319,15 +316,7 @@ TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
         GTEST_SKIP() << parts.device.name << " does not support VK_EXT_external_memory_host";
     scene::Arena arena = rich_scene().build();
     const arhost_camera view = from_the_side(small);
-    const arhost_raytracer_setup setup{sizeof setup,
-                                       small.width,
-                                       small.height,
-                                       ARHOST_IMAGE_FORM_STRAIGHT,
-                                       &arena.scene(),
-                                       &view.intrinsics,
-                                       ARHOST_COMPOSITING_SRGB,
-                                       0,
-                                       nullptr};
+    const arhost_raytracer_setup setup = straight_setup(arena, view.intrinsics);
     rt_vulkan::Renderer renderer = parts.renderer(setup);
 
     const std::uint32_t stride = 4 * small.width + 64;
@@ -487,15 +476,7 @@ TEST(Device, RejectsADeviceThatLacksARequirement) {
     const rt_vulkan::PhysicalDevice usable = instance.devices()[0];
     const auto shaders = rt_vulkan::shaders_of(rt_vulkan::Path::plain);
     scene::Arena arena = rich_scene().build();
-    const arhost_raytracer_setup setup{sizeof setup,
-                                       small.width,
-                                       small.height,
-                                       ARHOST_IMAGE_FORM_STRAIGHT,
-                                       &arena.scene(),
-                                       &small,
-                                       ARHOST_COMPOSITING_SRGB,
-                                       0,
-                                       nullptr};
+    const arhost_raytracer_setup setup = straight_setup(arena, small);
     const auto complaint = [&](auto change) {
         rt_vulkan::PhysicalDevice device = usable;
         change(device);
