@@ -73,6 +73,11 @@ def demo_light():
             "intensity: [1.25, 1.3, 1.38]}"]
 
 
+def default_light():
+    """That of scenes that describe none."""
+    return ["version: 2"]
+
+
 def known_light(room, integrator):
     lights = ["lights:", *("  - " + lamp(each) for each in room.lamps)] if room.lamps else []
     shadows = ["shadow_alpha: {opaque: 1, translucent: 0.5}", "coloured_shadows: true"] if integrator == "whitted" else []

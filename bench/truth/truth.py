@@ -124,6 +124,7 @@ def rows_of(room):
         catcher = load(room, "catcher", view)
         catchers.append(measure.photo(catcher[..., :3] + (1 - catcher[..., 3:]) * plate[..., :3], room.name, view))
     return {"nothing": photos, "demo lamp": augmented(room, "demo", scenes.demo_light()),
+            "default light": augmented(room, "default", scenes.default_light()),
             "whitted": augmented(room, "whitted", scenes.known_light(room, "whitted")),
             "known light": augmented(room, "known", scenes.known_light(room, "path")), "Blender's catcher": catchers,
             "floor": [measure.photo(load(room, "again", view), room.name, view) for view in VIEWS]}

@@ -315,6 +315,7 @@ void ArenaBuilder::write(std::span<std::byte> arena) && {
     scene.environment.texture = environment.texture;
     if (environment.texture != ARHOST_NONE) {
         scene.environment.intensity = environment.intensity;
+        scene.environment.follows_video = environment.follows_video;
         for (int column = 0; column < 3; ++column)
             copy(environment.environment_from_world[column], scene.environment.environment_from_world + 3 * column);
     }

@@ -57,6 +57,7 @@ struct Environment {
     std::uint32_t texture = ARHOST_NONE;
     float intensity = 1;
     glm::mat3 environment_from_world{1};
+    bool follows_video = false;
     std::vector<float> rows, columns; // cumulative sums for importance sampling, see arhost/scene.h
 };
 

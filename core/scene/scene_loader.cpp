@@ -2,6 +2,7 @@
 #include "scene/scene_loader.hpp"
 
 #include "scene/box.hpp"
+#include "scene/default_light.hpp"
 #include "scene/gltf.hpp"
 #include "scene/mesh_loader.hpp"
 #include "scene/shapes.hpp"
@@ -231,6 +232,12 @@ std::uint32_t texture_or_none(const Node &material, std::string_view key, bool i
     }
 }
 
+// To rotate the environment to the left, directions are rotated to the right before the lookup.
+glm::mat3 environment_from_world(arhost_axes axes, double rotation_degrees) {
+    const Transform y_up = axes == ARHOST_AXES_Z_UP ? Transform::rotation({1, 0, 0}, -90) : Transform();
+    return glm::mat3(glm::dmat3((y_up * Transform::rotation(up_of(axes), -rotation_degrees)).matrix()));
+}
+
 Environment environment_of(const Node &node, arhost_axes axes, Textures &textures) {
     if (!node.is_map())
         node.fail("must be a map with the key 'image'");
@@ -245,10 +252,15 @@ Environment environment_of(const Node &node, arhost_axes axes, Textures &texture
         image.fail(error.what());
     }
     environment.intensity = intensity;
-    // To rotate the environment, directions are rotated by the inverse before the lookup.
-    const Transform y_up = axes == ARHOST_AXES_Z_UP ? Transform::rotation({1, 0, 0}, -90) : Transform();
-    environment.environment_from_world =
-        glm::mat3(glm::dmat3((y_up * Transform::rotation(up_of(axes), rotation ? -rotation->real() : 0)).matrix()));
+    environment.environment_from_world = environment_from_world(axes, rotation ? rotation->real() : 0);
+    return environment;
+}
+
+// The light of scenes that describe none.
+Environment default_environment(arhost_axes axes, Textures &textures) {
+    Environment environment = textures.add_environment("default light", default_light());
+    environment.environment_from_world = environment_from_world(axes, 0);
+    environment.follows_video = true;
     return environment;
 }
 
@@ -606,6 +618,9 @@ public:
         if (const auto environment = root_.find("environment")) {
             set_origin(*environment);
             builder_.environment = environment_of(*environment, builder_.settings.axes, textures_);
+        } else if (builder_.settings.integrator == ARHOST_INTEGRATOR_PATH && !root_.find("background") &&
+                   !root_.find("lights")) {
+            builder_.environment = default_environment(builder_.settings.axes, textures_);
         }
         const Node materials = root_.require("materials");
         for (const auto &[name, node] : materials.entries()) {

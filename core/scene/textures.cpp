@@ -49,9 +49,18 @@ Environment Textures::add_environment(const std::filesystem::path &file) {
     Image image = linearized(read_image(file, {}, reporter), reporter);
     Texture texture{ARHOST_TEXEL_RGBA32F, image.width,       image.height,
                     ARHOST_WRAP_REPEAT,   ARHOST_WRAP_CLAMP, std::move(image.texels)};
+    return add_environment(printable(file.string()), std::move(texture), reporter);
+}
+
+Environment Textures::add_environment(const std::string &name, Texture texture) {
+    const LoadCallbacks callbacks = image_callbacks();
+    return add_environment(name, std::move(texture), Reporter(callbacks, name));
+}
+
+Environment Textures::add_environment(const std::string &name, Texture texture, const Reporter &reporter) {
     Environment environment;
     add_cumulative_sums(environment, texture, reporter);
-    environment.texture = builder_.add_texture(printable(file.string()), std::move(texture));
+    environment.texture = builder_.add_texture(name, std::move(texture));
     return environment;
 }
 

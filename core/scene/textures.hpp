@@ -26,9 +26,12 @@ public:
 
     // Loads an environment map and computes its cumulative sums. Throws ImageError.
     Environment add_environment(const std::filesystem::path &file);
+    // Adds an environment map (RGBA32F, repeats only horizontally) and computes its cumulative sums.
+    Environment add_environment(const std::string &name, Texture texture);
 
 private:
     LoadCallbacks image_callbacks() const;
+    Environment add_environment(const std::string &name, Texture texture, const Reporter &reporter);
 
     ArenaBuilder &builder_;
     const LoadCallbacks &callbacks_;

@@ -357,6 +357,7 @@ ENVIRONMENT = _struct(80,
     ("texture", "u4", 0),
     ("intensity", "f4", 4),
     ("environment_from_world", ("f4", (9,)), 8),
+    ("follows_video", "u4", 44),
     ("rows", BUFFER, 48),
     ("columns", BUFFER, 64))
 INTEGRATOR_WHITTED = 1

@@ -2,6 +2,7 @@
 #include "raytracer_common/light_sources.hpp"
 
 #include "raytracer_common/scene_geometry.hpp"
+#include "raytracer_common/video.hpp"
 
 #include <arhost/shading/scalar.hpp>
 
@@ -108,7 +109,8 @@ LightSources::LightSources(const arhost_scene &arena) : arena_(arena) {
         sum += row * weight;
         weights += weight * image.width;
     }
-    environment_radiance_ = static_cast<float>(sum / weights * arena.environment.intensity);
+    // The chances of the light sources need not follow the video.
+    environment_radiance_ = static_cast<float>(sum / weights * environment_scale(arena.environment, nullptr)[0]);
 }
 
 // One sphere for each object. If there are too many, the two that lie next to each other along the longest axis and
@@ -334,7 +336,7 @@ std::vector<float> environment_irradiance(const arhost_scene &arena) {
     const double area = 2 * std::numbers::pi * std::numbers::pi / (static_cast<double>(cells_x) * cells_y);
     for (std::uint32_t y = 0; y < cells_y; ++y) {
         const double v = (y + 0.5) / cells_y;
-        const double power = area * shading::equirectangular_sine(v) * environment.intensity;
+        const double power = area * shading::equirectangular_sine(v);
         const std::size_t from_row = std::size_t{y} * image.height / cells_y * image.width;
         const std::size_t to_row = std::size_t{y} * rows / cells_y * columns;
         for (std::uint32_t x = 0; x < cells_x; ++x) {

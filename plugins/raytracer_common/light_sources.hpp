@@ -66,8 +66,9 @@ private:
     std::vector<std::array<float, 4>> spheres_, specular_spheres_;
 };
 
-// The irradiance of the scene's environment, divided by π, of surfaces that face each direction: RGBA floats in
-// equirectangular projection, in the axes of the environment. Empty without an environment.
+// The irradiance of the environment's texels before they are scaled (environment_scale()), divided by π, of surfaces
+// that face each direction: RGBA floats in equirectangular projection, in the axes of the environment. Empty without
+// an environment.
 inline constexpr std::uint32_t irradiance_width = 64, irradiance_height = 32;
 std::vector<float> environment_irradiance(const arhost_scene &arena);
 

@@ -2,6 +2,7 @@
 #include "raytracer_common/video.hpp"
 
 #include <arhost/shading/lens.hpp>
+#include <arhost/shading/scalar.hpp>
 
 #include <algorithm>
 #include <limits>
@@ -47,6 +48,8 @@ private:
 void VideoImage::set(const arhost_frame &frame) {
     const arhost_frame_format &format = *frame.format;
     const FromYuv from_yuv(format);
+    width_ = format.width;
+    height_ = format.height;
     texels_.resize(std::size_t{4} * format.width * format.height, 255);
     std::uint8_t *to = texels_.data();
     for (std::size_t y = 0; y < format.height; ++y) {
@@ -79,6 +82,35 @@ void VideoImage::set(const arhost_frame &frame) {
                 break;
             }
     }
+}
+
+std::array<float, 3> VideoImage::mean() const {
+    constexpr std::size_t step = 4;
+    std::array<std::array<std::uint32_t, 256>, 3> counts{};
+    std::uint32_t count = 0;
+    for (std::size_t y = step / 2; y < height_; y += step)
+        for (std::size_t x = step / 2; x < width_; x += step, ++count)
+            for (std::size_t c = 0; c < 3; ++c)
+                ++counts[c][texels_[4 * (y * width_ + x) + c]];
+    std::array<double, 3> sum{};
+    for (std::size_t code = 0; code < 256; ++code)
+        for (std::size_t c = 0; c < 3; ++c)
+            sum[c] += counts[c][code] * shading::srgb_decode(static_cast<double>(code) / 255);
+    std::array<float, 3> mean{};
+    std::ranges::transform(sum, mean.begin(),
+                           [&](double each) { return static_cast<float>(each / std::max(count, 1u)); });
+    return mean;
+}
+
+std::array<float, 3> environment_scale(const arhost_environment &environment, const VideoImage *video) {
+    std::array<float, 3> scale{1, 1, 1};
+    if (environment.follows_video) {
+        constexpr float mid_grey = 0.18f;
+        scale = video ? video->mean() : std::array{mid_grey, mid_grey, mid_grey};
+    }
+    for (float &each : scale)
+        each *= environment.intensity;
+    return scale;
 }
 
 float max_radius_squared(const arhost_intrinsics &intrinsics) {

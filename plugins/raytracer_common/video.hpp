@@ -5,7 +5,10 @@
 
 #include <arhost/camera.h>
 #include <arhost/frame.h>
+#include <arhost/scene.h>
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -17,10 +20,16 @@ public:
     void set(const arhost_frame &frame);
     // R, G, B, A bytes, sRGB codes, top row first, without padding.
     const std::uint8_t *texels() const { return texels_.data(); }
+    // The mean colour in linear light, of every fourth pixel in both directions.
+    std::array<float, 3> mean() const;
 
 private:
+    std::size_t width_ = 0, height_ = 0;
     std::vector<std::uint8_t> texels_;
 };
+
+// Returns the factors by which the texels of an environment are multiplied. `video`: NULL if it is unknown.
+std::array<float, 3> environment_scale(const arhost_environment &environment, const VideoImage *video);
 
 // Returns the largest squared length of (x/z, y/z) of the directions in the picture: lens models are not valid far
 // outside of it. Infinite for a camera without distortion.

@@ -216,12 +216,15 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
     if (const arhost_environment &from = arena.environment; from.texture != ARHOST_NONE) {
         Environment &to = view_.environment;
         to.image = &textures_[from.texture];
-        to.intensity = from.intensity;
         std::copy_n(from.environment_from_world, 9, to.environment_from_world);
         to.rows = elements<float>(arena, from.rows).data();
         to.columns = elements<float>(arena, from.columns).data();
     }
     view_.srgb8 = srgb8_.get();
+}
+
+void EmbreeScene::set_environment_scale(const std::array<float, 3> &scale) {
+    std::ranges::copy(scale, view_.environment.intensity);
 }
 
 void EmbreeScene::move(const arhost_motion &motion) {

@@ -48,6 +48,8 @@ public:
     void move(const arhost_motion &motion);
     std::vector<arhost::raytracer_common::PlacedObject> placed_objects() const;     // valid until the next move()
     void set_emitters(std::span<const arhost::raytracer_common::Emitter> emitters); // one per object
+    // Sets the factors of the environment's texels.
+    void set_environment_scale(const std::array<float, 3> &scale);
     std::uint64_t rebuilds() const { return rebuilds_; } // number of full rebuilds of deforming objects' BVHs so far
 
 private:

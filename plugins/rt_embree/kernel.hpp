@@ -55,7 +55,7 @@ struct Texture {
 
 struct Environment {
     const Texture *image; // NULL if the scene has no environment
-    float intensity;
+    float intensity[3];   // multiplies the texels
     float environment_from_world[9];
     const float *rows, *columns; // cumulative sums for importance sampling (arhost/scene.h)
 };
@@ -150,7 +150,9 @@ struct PathScene {
     std::int32_t source_count;
     const float *lamp_chances; // of each lamp of the scene
     float environment_chance;
-    Texture irradiance;   // irradiance of the environment, divided by π, of surfaces that face a direction (RGBA32F)
+    // Irradiance of the environment's texels, not multiplied by its intensity, divided by π, of surfaces that face a
+    // direction (RGBA32F).
+    Texture irradiance;
     const float *spheres; // centre and radius of spheres that contain all virtual objects, mm
     std::int32_t sphere_count;
     float max_radiance; // bound of each sample

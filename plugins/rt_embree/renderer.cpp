@@ -272,6 +272,8 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                  video->format->height == full_intrinsics_.height;
     if (has_video_)
         video_.set(*video);
+    scene_.set_environment_scale(
+        arhost::raytracer_common::environment_scale(scene_.arena().environment, has_video_ ? &video_ : nullptr));
 
     std::vector<Window> windows;
     for (const Box &box : scene_.visible_boxes())

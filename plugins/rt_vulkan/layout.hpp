@@ -98,11 +98,12 @@ struct Frame {
     std::uint32_t coloured_shadows;
     float background[3];
     std::uint32_t accumulates;
-    float shadow_alpha_opaque, shadow_alpha_translucent;
+    float environment_intensity[3];
     std::uint32_t environment_texture;
-    float environment_intensity;
     float environment_from_world[3][4];
-    std::uint32_t environment_rows, environment_columns, has_slopes, unused;
+    std::uint32_t environment_rows, environment_columns;
+    float shadow_alpha_opaque, shadow_alpha_translucent;
+    std::uint32_t has_slopes, unused[3];
     float samples[max_samples][4];
     // The path integrator.
     float spheres[arhost::raytracer_common::LightSources::max_spheres][4];
@@ -119,7 +120,7 @@ struct Frame {
 
 static_assert(sizeof(Object) == 208 && sizeof(Material) == 176 && sizeof(Light) == 80 && sizeof(Texture) == 32 &&
               sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Sums) == 48 &&
-              sizeof(Frame) == 592 + 16 * max_samples);
+              sizeof(Frame) == 608 + 16 * max_samples);
 
 // The bindings of the descriptor set, from 0.
 enum Binding : std::uint32_t {

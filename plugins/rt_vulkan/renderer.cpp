@@ -437,10 +437,13 @@ void Renderer::set_lens() {
 void Renderer::set_video(const arhost_frame *video) {
     frame_.has_video =
         video_ && video && video->format->width == intrinsics_.width && video->format->height == intrinsics_.height;
-    if (!frame_.has_video)
-        return;
-    video_image_.set(*video);
-    std::memcpy(video_.mapped().data(), video_image_.texels(), scene_.video_size());
+    if (frame_.has_video) {
+        video_image_.set(*video);
+        std::memcpy(video_.mapped().data(), video_image_.texels(), scene_.video_size());
+    }
+    std::ranges::copy(
+        arhost::raytracer_common::environment_scale(scene_.environment(), frame_.has_video ? &video_image_ : nullptr),
+        frame_.environment_intensity);
 }
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion,

@@ -607,7 +607,6 @@ Frame SceneData::frame() const {
     const arhost_environment &environment = arena_.environment;
     frame.environment_texture = environment.texture;
     if (environment.texture != ARHOST_NONE) {
-        frame.environment_intensity = environment.intensity;
         for (int column = 0; column < 3; ++column)
             std::copy_n(environment.environment_from_world + std::size_t{3} * column, 3,
                         frame.environment_from_world[column]);

@@ -56,6 +56,7 @@ public:
     // Sets the fields that depend on where the light sources and the virtual objects are. Only with the path
     // integrator.
     void write_lights(Frame &frame) const;
+    const arhost_environment &environment() const { return arena_.environment; }
     bool has_glass() const { return has_glass_; }
     bool has_catchers() const { return has_catchers_; }
     bool has_holes() const { return has_holes_; }

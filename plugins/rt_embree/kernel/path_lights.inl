@@ -28,7 +28,7 @@ ARHOST_INLINE Vec3 environment_light(const Frame &frame, Vec3 direction) {
         return splat(frame.scene.background);
     const Vec3 d = transform(environment.environment_from_world, direction);
     return sample_texture(frame.scene, *environment.image, equirectangular_u(d), equirectangular_v(d)).colour *
-           Float(environment.intensity);
+           splat(environment.intensity);
 }
 
 // Expected number of samples of the environment per steradian in a direction, of one light sample.
@@ -231,7 +231,8 @@ ARHOST_INLINE Vec3 irradiance_without_objects(const Frame &frame, const Surface 
     Vec3 sum = splat(scene.background);
     if (scene.environment.image) {
         const Vec3 d = transform(scene.environment.environment_from_world, s.normal);
-        sum = sample_texture(scene, frame.path.irradiance, equirectangular_u(d), equirectangular_v(d)).colour;
+        sum = sample_texture(scene, frame.path.irradiance, equirectangular_u(d), equirectangular_v(d)).colour *
+              splat(scene.environment.intensity);
     }
     for (std::uint32_t i = 0; i < scene.light_count; ++i) {
         const arhost_light &light = scene.lights[i];

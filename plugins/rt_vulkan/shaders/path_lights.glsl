@@ -160,7 +160,8 @@ vec3 irradiance_without_objects(Surface s) {
     vec3 sum = frame.background;
     if (frame.environment_texture != NONE) {
         vec3 d = frame.environment_from_world * s.normal;
-        sum = sample_texture(frame.irradiance_texture, vec2(equirectangular_u(d), equirectangular_v(d))).rgb;
+        sum = sample_texture(frame.irradiance_texture, vec2(equirectangular_u(d), equirectangular_v(d))).rgb *
+              frame.environment_intensity;
     }
     for (uint lamp = 0u; lamp < frame.light_count; ++lamp) {
         uint side = !is_area_light(lamp) || frame.light_count > 64u ? 1u : frame.light_count > 8u ? 2u : 4u, points = side * side;

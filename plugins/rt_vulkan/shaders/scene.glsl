@@ -113,12 +113,12 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     uint coloured_shadows;
     vec3 background;
     uint accumulates;
-    float shadow_alpha_opaque, shadow_alpha_translucent;
+    vec3 environment_intensity; // multiplies the texels
     uint environment_texture;
-    float environment_intensity;
     mat3 environment_from_world;
     uint environment_rows, environment_columns; // indices into `tables`
-    uint has_slopes, unused;
+    float shadow_alpha_opaque, shadow_alpha_translucent;
+    uint has_slopes;
     vec4 samples[256]; // x, y: offset from the pixel's centre in px, −½ to ½
 
     // The path integrator.
@@ -127,7 +127,7 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     uint first_source, first_cumulative; // indices into `tables`
     float environment_chance;            // that a light sample chooses the environment or background
     float max_radiance;                  // bound of each sample
-    uint irradiance_texture; // irradiance of the environment, divided by π, of surfaces that face a direction
+    uint irradiance_texture; // irradiance of the environment's texels, divided by π, of surfaces that face a direction
     uint first_random;       // offset into the random sequences
     uint is_linear, has_several_real; // has_several_real: several catchers or occluders
     // The video under the overlay, undistorted coordinates to pixels as in arhost/camera.h.

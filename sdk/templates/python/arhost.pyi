@@ -381,6 +381,7 @@ class Environment:
     texture: int
     intensity: float
     environment_from_world: np.ndarray
+    follows_video: int
     rows: Buffer
     columns: Buffer
 INTEGRATOR_WHITTED: int

@@ -371,8 +371,8 @@ STRUCT(arhost_light, 80,
        FIELD(cosine_inner, 72, 4) FIELD(cosine_outer, 76, 4))
 
 STRUCT(arhost_environment, 80,
-       FIELD(texture, 0, 4) FIELD(intensity, 4, 4) FIELD(environment_from_world, 8, 36) FIELD(rows, 48, 16)
-       FIELD(columns, 64, 16))
+       FIELD(texture, 0, 4) FIELD(intensity, 4, 4) FIELD(environment_from_world, 8, 36) FIELD(follows_video, 44, 4)
+       FIELD(rows, 48, 16) FIELD(columns, 64, 16))
 VALUE(ARHOST_INTEGRATOR_WHITTED, 1);
 VALUE(ARHOST_INTEGRATOR_PATH, 2);
 

@@ -11,6 +11,8 @@
 
 #include <cmath>
 #include <cstring>
+#include <numbers>
+#include <span>
 
 using namespace arhost::scene;
 using namespace arhost::scene::test;
@@ -94,6 +96,39 @@ TEST(SceneFile, SetsTheSceneSettings) {
     EXPECT_THAT(arena.scene().background, ElementsAre(1, 0, 0));
     EXPECT_EQ(arena.scene().shadow_alpha_opaque, 0.5f);
     EXPECT_EQ(arena.scene().shadow_alpha_translucent, 0.0f);
+}
+
+// The rows of the environment map are from the zenith down.
+TEST(SceneFile, HasDefaultLightThatFollowsTheVideo) {
+    const Arena arena = load("version: 2\naxes: z-up\nmaterials: {}\nobjects: []\n");
+    const arhost_environment &environment = arena.scene().environment;
+    ASSERT_NE(environment.texture, ARHOST_NONE);
+    EXPECT_NE(environment.follows_video, 0u);
+    EXPECT_EQ(environment.intensity, 1);
+    EXPECT_THAT(std::span(environment.environment_from_world + 6, 3),
+                ElementsAre(FloatNear(0, 1e-6f), FloatNear(1, 1e-6f), FloatNear(0, 1e-6f)))
+        << "z is up";
+    const auto &texture = elements<arhost_texture>(arena, arena.scene().textures)[environment.texture];
+    const auto texels = elements<glm::vec4>(arena, texture.texels);
+    double irradiance = 0; // of a horizontal surface, divided by π
+    for (std::uint32_t row = 0; row < texture.height / 2; ++row) {
+        const double begin = std::numbers::pi * row / texture.height,
+                     end = std::numbers::pi * (row + 1) / texture.height;
+        irradiance += (std::pow(std::sin(end), 2) - std::pow(std::sin(begin), 2)) * double{texels[row].x};
+    }
+    EXPECT_NEAR(0.35 * irradiance, 1, 0.02) << "a surface of reflectance 0.35 has the radiance of the video";
+    EXPECT_NEAR(texels[texture.height - 1].x, 1, 1e-6) << "below";
+}
+
+TEST(SceneFile, HasNoDefaultLightIfItDescribesLight) {
+    for (const std::string with :
+         {"background: 0\n", "lights: []\n", "lights:\n  - {position: [1, 2, 3], intensity: 0.8}\n"})
+        EXPECT_EQ(load("version: 2\naxes: z-up\nmaterials: {}\nobjects: []\n" + with).scene().environment.texture,
+                  ARHOST_NONE)
+            << with;
+    EXPECT_EQ(
+        load("version: 2\nintegrator: whitted\naxes: z-up\nmaterials: {}\nobjects: []\n").scene().environment.texture,
+        ARHOST_NONE);
 }
 
 TEST(SceneFile, AcceptsLinearAndSrgbColours) {

@@ -2,6 +2,7 @@
 //
 // The path integrator, compared with closed formulas.
 #include "linear_tracer.hpp"
+#include "raytracer_common/video.hpp"
 #include "rich_scene.hpp"
 
 #include <algorithm>
@@ -196,6 +197,28 @@ TEST(PathIntegrator, ShowsTheFilmedTableInAMirror) {
                y = static_cast<std::uint32_t>(std::lround(seen.y));
     EXPECT_NEAR(mean_at(picture, x, y, 0, 1), red, 0.01);
     EXPECT_NEAR(mean_at(picture, x, y, 2, 1), blue, 0.01);
+}
+
+TEST(PathIntegrator, EnvironmentFollowsTheVideo) {
+    const auto make = [] {
+        SceneBuilder scene = table(path_settings());
+        add_environment(scene, [](std::uint32_t) { return glm::vec3(2); });
+        scene.environment.follows_video = true;
+        scene.add_ball("ball", {0, 0, 40, 30}, diffuse(1, 1, 1));
+        return scene;
+    };
+    const arhost_camera view = from_above();
+    const Video video(view.intrinsics);
+    const LinearPicture lit = rendered(make(), view, {{"samples", "64"}}, 0, &video),
+                        unknown = rendered(make(), view, {{"samples", "64"}});
+    raytracer_common::VideoImage image;
+    image.set(video.frame());
+    const std::array<float, 3> mean = image.mean();
+    for (std::size_t c = 0; c < 3; ++c) {
+        const double expected = mean_at(unknown, 100, 75, c, 8) * double{mean[c]} / 0.18;
+        EXPECT_NEAR(mean_at(lit, 100, 75, c, 8), expected, 0.01 * expected) << c;
+    }
+    EXPECT_LT(mean_at(lit, 60, 75, transmittance, 4), 0.9) << "the shadow does not depend on the colour";
 }
 
 TEST(PathIntegrator, MeanOfOneSampleFramesIsTheConvergedImage) {

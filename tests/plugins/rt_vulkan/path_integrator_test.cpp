@@ -98,6 +98,9 @@ SceneBuilder desk_with_lamps() {
 }
 SceneBuilder desk_with_glass() {
     SceneBuilder builder = desk(mirror(0.9f));
+    add_environment(builder,
+                    [](std::uint32_t column) { return glm::vec3(1, 1 + 0.1f * static_cast<float>(column), 1); });
+    builder.environment.follows_video = true;
     builder.add_ball("glass", {-35, 20, 12, 12}, glass_of(1.5f));
     builder.add_ball("red", {-5, 45, 10, 10}, diffuse(0.8f, 0.2f, 0.1f));
     return builder;

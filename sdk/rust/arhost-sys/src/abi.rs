@@ -784,6 +784,7 @@ pub struct arhost_environment {
     pub texture: u32,
     pub intensity: f32,
     pub environment_from_world: [f32; 9],
+    pub follows_video: u32,
     pub rows: arhost_buffer,
     pub columns: arhost_buffer,
 }
