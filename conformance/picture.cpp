@@ -29,28 +29,16 @@ std::string base64(const std::vector<std::uint8_t> &bytes) {
 
 } // namespace
 
-Picture::Picture(std::uint32_t width, std::uint32_t height, std::uint8_t fill)
-    : width_(width), height_(height), stride_((4 * width + 63) / 64 * 64 + 64),
+GuardedImage::GuardedImage(std::uint32_t width, std::uint32_t height, std::size_t pixel_bytes, std::uint8_t fill)
+    : width_(width), height_(height), pixel_bytes_(pixel_bytes),
+      stride_(static_cast<std::uint32_t>((pixel_bytes * width + 63) / 64 * 64 + 64)),
       memory_((2 * guard_size + std::size_t{stride_} * height + sizeof(Page) - 1) / sizeof(Page)) {
     std::memset(bytes(), guard, memory_.size() * sizeof(Page));
     for (std::uint32_t y = 0; y < height; ++y)
-        std::memset(bytes() + row(y), fill, std::size_t{4} * width);
+        std::memset(pixel(0, y), fill, pixel_bytes * width);
 }
 
-arhost_image Picture::image() {
-    return {sizeof(arhost_image), stride_, width_, height_, bytes() + row(0), nullptr};
-}
-
-Pixel Picture::at(std::uint32_t x, std::uint32_t y) const {
-    const std::uint8_t *p = bytes() + row(y) + std::size_t{4} * x;
-    return {p[0], p[1], p[2], p[3]};
-}
-
-void Picture::set(std::uint32_t x, std::uint32_t y, const Pixel &pixel) {
-    std::copy(pixel.begin(), pixel.end(), bytes() + row(y) + std::size_t{4} * x);
-}
-
-std::string Picture::damage() const {
+std::string GuardedImage::damage() const {
     const auto first_in = [&](std::size_t begin, std::size_t end) -> std::optional<std::size_t> {
         for (std::size_t i = begin; i < end; ++i)
             if (bytes()[i] != guard)
@@ -60,16 +48,65 @@ std::string Picture::damage() const {
     if (const auto at = first_in(0, guard_size))
         return fmt::format("a guard byte {} bytes before the image", guard_size - *at);
     for (std::uint32_t y = 0; y < height_; ++y)
-        if (const auto at = first_in(row(y) + std::size_t{4} * width_,
-                                     y + 1 < height_ ? row(y + 1) : memory_.size() * sizeof(Page)))
+        if (const auto at =
+                first_in(offset(width_, y), y + 1 < height_ ? offset(0, y + 1) : memory_.size() * sizeof(Page)))
             return y + 1 < height_ ? fmt::format("a guard byte in row {}, {} bytes after its last pixel", y, *at)
                                    : fmt::format("a guard byte {} bytes after the image's last pixel", *at);
     return {};
 }
 
+arhost_image Picture::image() {
+    return {sizeof(arhost_image), stride(), width(), height(), pixel(0, 0), nullptr};
+}
+
+Pixel Picture::at(std::uint32_t x, std::uint32_t y) const {
+    const std::uint8_t *p = pixel(x, y);
+    return {p[0], p[1], p[2], p[3]};
+}
+
+void Picture::set(std::uint32_t x, std::uint32_t y, const Pixel &value) {
+    std::copy(value.begin(), value.end(), pixel(x, y));
+}
+
+arhost_image LinearPicture::image() {
+    return {
+        sizeof(arhost_image), stride(), width(), height(), nullptr, reinterpret_cast<std::uint16_t *>(pixel(0, 0))};
+}
+
+LinearPixel LinearPicture::at(std::uint32_t x, std::uint32_t y) const {
+    LinearPixel value;
+    std::memcpy(&value, pixel(x, y), sizeof value);
+    return value;
+}
+
+Picture LinearPicture::shown() const {
+    constexpr std::uint8_t video = 128;
+    Picture shown(width(), height());
+    for (std::uint32_t y = 0; y < height(); ++y)
+        for (std::uint32_t x = 0; x < width(); ++x) {
+            const LinearPixel p = at(x, y);
+            Pixel code{0, 0, 0, 255};
+            for (int c = 0; c < 3; ++c)
+                code[c] = added_and_transmitted(p.added[c], p.transmittance[c], video);
+            shown.set(x, y, code);
+        }
+    return shown;
+}
+
+Picture LinearPicture::straight() const {
+    Picture straight(width(), height());
+    for (std::uint32_t y = 0; y < height(); ++y)
+        for (std::uint32_t x = 0; x < width(); ++x) {
+            std::uint8_t rgba[4];
+            straight_from_linear(reinterpret_cast<const std::uint16_t *>(pixel(x, y)), rgba, 1);
+            straight.set(x, y, {rgba[0], rgba[1], rgba[2], rgba[3]});
+        }
+    return straight;
+}
+
 bool Picture::is_smooth(std::uint32_t x, std::uint32_t y) const {
-    for (std::uint32_t j = y - (y > 0); j <= std::min(y + 1, height_ - 1); ++j)
-        for (std::uint32_t i = x - (x > 0); i <= std::min(x + 1, width_ - 1); ++i)
+    for (std::uint32_t j = y - (y > 0); j <= std::min(y + 1, height() - 1); ++j)
+        for (std::uint32_t i = x - (x > 0); i <= std::min(x + 1, width() - 1); ++i)
             if (alpha(i, j) != alpha(x, y) || differs(at(i, j), at(x, y), 24))
                 return false;
     return true;
@@ -78,12 +115,12 @@ bool Picture::is_smooth(std::uint32_t x, std::uint32_t y) const {
 std::string Picture::png_base64() const {
     png_image png{};
     png.version = PNG_IMAGE_VERSION;
-    png.width = width_;
-    png.height = height_;
+    png.width = width();
+    png.height = height();
     png.format = PNG_FORMAT_RGBA;
     std::vector<std::uint8_t> file(PNG_IMAGE_PNG_SIZE_MAX(png));
     png_alloc_size_t size = file.size();
-    if (!png_image_write_to_memory(&png, file.data(), &size, 0, bytes() + row(0), static_cast<png_int_32>(stride_),
+    if (!png_image_write_to_memory(&png, file.data(), &size, 0, pixel(0, 0), static_cast<png_int_32>(stride()),
                                    nullptr))
         throw std::runtime_error(std::string("libpng: ") + png.message);
     file.resize(size);

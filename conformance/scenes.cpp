@@ -52,6 +52,11 @@ arhost_material diffuse(const glm::vec3 &colour) {
     copy(colour, material.diffuse);
     return material;
 }
+arhost_material emissive(const glm::vec3 &radiance) {
+    arhost_material material = glowing(glm::vec3(0));
+    copy(radiance, material.emission);
+    return material;
+}
 arhost_material mirror(float reflectivity) {
     arhost_material material = scene::make_material(ARHOST_MATERIAL_MIRROR);
     copy(glm::vec3(reflectivity), material.reflectivity);
@@ -128,6 +133,19 @@ scene::ArenaBuilder ball_over_catcher(const arhost_material &ball) {
     builder.add_object("ball", builder.add_spheres({{30, 0, 40, 12}}), builder.add_material(ball));
     builder.add_light(lamp({150, 0, 200}, 1));
     return builder;
+}
+
+scene::ArenaBuilder path_scene(float background) {
+    scene::ArenaBuilder builder;
+    builder.settings.integrator = ARHOST_INTEGRATOR_PATH;
+    builder.settings.ambient = glm::vec3(0);
+    builder.settings.background = glm::vec3(background);
+    return builder;
+}
+
+void add_table(scene::ArenaBuilder &builder) {
+    builder.add_object("table", builder.add_triangles(square(400, 0)), builder.add_material(diffuse(glm::vec3(0.5f))),
+                       ARHOST_ROLE_CATCHER);
 }
 
 scene::ArenaBuilder still_life(const glm::mat4 &moved, bool is_matte) {

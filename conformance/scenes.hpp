@@ -22,6 +22,7 @@ arhost_camera from_front(const arhost_intrinsics &intrinsics = pinhole());
 // whatever the lamps.
 arhost_material glowing(const glm::vec3 &colour);
 arhost_material diffuse(const glm::vec3 &colour); // also as ambient colour
+arhost_material emissive(const glm::vec3 &radiance);
 arhost_material mirror(float reflectivity);
 arhost_material glass();
 
@@ -39,6 +40,11 @@ scene::ArenaBuilder one_sphere(const glm::vec4 &sphere, const arhost_material &m
 // A catcher at z = 0. The lamp at (150, 0, 200) casts the shadow of a ball at (30, 0, 40) on the origin: 38 × 30 mm,
 // next to the ball in from_front's image.
 scene::ArenaBuilder ball_over_catcher(const arhost_material &ball);
+
+// A scene for ARHOST_INTEGRATOR_PATH without ambient light. `background`: the radiance of an environment.
+scene::ArenaBuilder path_scene(float background = 0);
+// Adds a catcher of 800 mm × 800 mm in the plane z = 0.
+void add_table(scene::ArenaBuilder &builder);
 
 // Shadows, a mirror, lamps and an occluder. `moved`: a rigid transform of the whole scene. `is_matte`: all materials
 // are diffuse, for ray tracers without ARHOST_CAPABILITY_REFLECTION.

@@ -63,7 +63,9 @@ std::span<const Test> raytracer_camera_tests();
 std::span<const Test> raytracer_image_tests();
 std::span<const Test> raytracer_life_tests();
 std::span<const Test> raytracer_light_tests();
+std::span<const Test> raytracer_linear_tests();
 std::span<const Test> raytracer_scene_tests();
+std::span<const Test> raytracer_video_tests();
 std::span<const Test> tracker_body_tests();
 std::span<const Test> tracker_image_tests();
 std::span<const Test> tracker_life_tests();
@@ -78,8 +80,9 @@ inline std::vector<Test> all_tests() {
     std::vector<Test> all;
     for (const auto part :
          {abi_tests(), raytracer_life_tests(), raytracer_alpha_tests(), raytracer_camera_tests(),
-          raytracer_light_tests(), raytracer_scene_tests(), raytracer_image_tests(), tracker_life_tests(),
-          tracker_corner_tests(), tracker_image_tests(), tracker_body_tests(), source_tests(), sink_tests()})
+          raytracer_light_tests(), raytracer_scene_tests(), raytracer_image_tests(), raytracer_linear_tests(),
+          raytracer_video_tests(), tracker_life_tests(), tracker_corner_tests(), tracker_image_tests(),
+          tracker_body_tests(), source_tests(), sink_tests()})
         all.insert(all.end(), part.begin(), part.end());
     return all;
 }

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <sys/mman.h>
 #include <tuple>
+#include <type_traits>
 
 namespace arhost::conformance {
 
@@ -53,9 +54,10 @@ void need_capability(Context &context, std::uint32_t capability, const char *nam
         throw Skip(fmt::format("ARHOST_CAPABILITY_{} is not declared", name));
 }
 
-Settings many_samples(Context &context) {
-    const arhost_option_descriptor *samples = context.library.option("samples");
-    return samples && samples->type == ARHOST_OPTION_INTEGER ? Settings{{"samples", "16"}} : Settings{};
+Settings with_samples(Context &context, int samples) {
+    const arhost_option_descriptor *option = context.library.option("samples");
+    return option && option->type == ARHOST_OPTION_INTEGER ? Settings{{"samples", std::to_string(samples)}}
+                                                           : Settings{};
 }
 
 Tracer::Tracer(Context &context, scene::ArenaBuilder builder, Settings overrides)
@@ -66,10 +68,15 @@ Tracer::Tracer(Context &context, scene::ArenaBuilder builder, Settings overrides
 
 arhost_status Tracer::try_start(const arhost_intrinsics &intrinsics) {
     stop();
-    const arhost_raytracer_setup setup{
-        sizeof setup,   intrinsics.width, intrinsics.height,       ARHOST_IMAGE_FORM_STRAIGHT,
-        &scene_->get(), &intrinsics,      ARHOST_COMPOSITING_SRGB, 0,
-        nullptr};
+    const arhost_raytracer_setup setup{sizeof setup,
+                                       intrinsics.width,
+                                       intrinsics.height,
+                                       form_,
+                                       &scene_->get(),
+                                       &intrinsics,
+                                       compositing_,
+                                       0,
+                                       video_ ? &video_->format() : nullptr};
     const arhost_status status =
         in_call(instance_.library().calls(), Call::start, [&] { return functions_.start(instance_.get(), &setup); });
     if (status == ARHOST_STATUS_OK)
@@ -91,26 +98,55 @@ void Tracer::change_scene(scene::ArenaBuilder builder) {
     scene_.emplace(std::move(builder));
 }
 
-arhost_status Tracer::try_render(const arhost_camera &camera, Picture &picture, arhost_render_info &info,
-                                 const arhost_motion *motion) {
-    const arhost_render_request request{sizeof request, max_samples_, 0, 0, camera, motion, nullptr};
-    slot_ = picture; // keeps its address, because the size is the same
-    const arhost_image image = slot_->image();
+void Tracer::set_compositing(arhost_compositing compositing) {
+    if (compositing != std::exchange(compositing_, compositing))
+        stop();
+}
+
+void Tracer::set_video(const Video *video) {
+    const auto format_of = [](const Video *of) { return of ? of->format().pixel_format : 0; };
+    if (format_of(video) != format_of(std::exchange(video_, video)))
+        stop();
+}
+
+template <class Image>
+arhost_status Tracer::try_render(const arhost_camera &camera, std::optional<Image> &slot, Image &picture,
+                                 arhost_render_info &info, const arhost_motion *motion) {
+    const arhost_render_request request{
+        sizeof request, max_samples_, sequence_, 0, camera, motion, video_ ? &video_->frame() : nullptr};
+    slot = picture; // keeps its address, because the size is the same
+    const arhost_image image = slot->image();
     info = {};
     info.struct_size = sizeof info;
     const auto begin = std::chrono::steady_clock::now();
     const arhost_status status = in_call(instance_.library().calls(), Call::per_frame,
                                          [&] { return functions_.render(instance_.get(), &request, &image, &info); });
     duration_ = std::chrono::steady_clock::now() - begin;
-    picture = *slot_;
+    picture = *slot;
     return status;
+}
+template arhost_status Tracer::try_render(const arhost_camera &, std::optional<Picture> &, Picture &,
+                                          arhost_render_info &, const arhost_motion *);
+
+template <class Image>
+void Tracer::render(const arhost_camera &camera, std::optional<Image> &slot, Image &picture,
+                    const arhost_motion *motion) {
+    const arhost_image_form form =
+        std::is_same_v<Image, Picture> ? ARHOST_IMAGE_FORM_STRAIGHT : ARHOST_IMAGE_FORM_LINEAR;
+    if (form != std::exchange(form_, form) || !started_ || !same(*started_, camera.intrinsics))
+        start(camera.intrinsics);
+    instance_.expect_ok("render", try_render(camera, slot, picture, info_, motion));
 }
 
 Picture Tracer::render(const arhost_camera &camera, const arhost_motion *motion, std::uint8_t fill) {
-    if (!started_ || !same(*started_, camera.intrinsics))
-        start(camera.intrinsics);
     Picture picture(camera.intrinsics.width, camera.intrinsics.height, fill);
-    instance_.expect_ok("render", try_render(camera, picture, info_, motion));
+    render(camera, straight_slot_, picture, motion);
+    return picture;
+}
+
+LinearPicture Tracer::render_linear(const arhost_camera &camera, std::uint8_t fill) {
+    LinearPicture picture(camera.intrinsics.width, camera.intrinsics.height, fill);
+    render(camera, linear_slot_, picture, nullptr);
     return picture;
 }
 

@@ -6,6 +6,7 @@
 #include "conformance/plugin_library.hpp"
 #include "conformance/scenes.hpp"
 #include "conformance/test.hpp"
+#include "conformance/video.hpp"
 #include "scene/arena_builder.hpp"
 
 #include <chrono>
@@ -33,9 +34,13 @@ bool has_capability(Context &context, std::uint32_t capability);
 // Throws Skip unless the ray tracer declares the capability. `name`: without ARHOST_CAPABILITY_.
 void need_capability(Context &context, std::uint32_t capability, const char *name);
 
-// Sets the option `samples`, if the ray tracer has it, to 16 samples per pixel.
-Settings many_samples(Context &context);
+// Sets the option `samples` of the ray tracer, if it has it.
+Settings with_samples(Context &context, int samples);
+inline Settings many_samples(Context &context) {
+    return with_samples(context, 16);
+}
 
+// Renders straight images for blending in sRGB, without video, unless told otherwise.
 class Tracer {
 public:
     Tracer(Context &context, scene::ArenaBuilder builder, Settings overrides = {});
@@ -48,25 +53,45 @@ public:
     void stop();
     void change_scene(scene::ArenaBuilder builder); // stops
     arhost_status try_render(const arhost_camera &camera, Picture &picture, arhost_render_info &info,
-                             const arhost_motion *motion = nullptr);
+                             const arhost_motion *motion = nullptr) {
+        return try_render(camera, straight_slot_, picture, info, motion);
+    }
 
     // Of later requests; 0: no limit.
     void limit_samples(std::uint32_t max_samples) { max_samples_ = max_samples; }
+    void set_sequence(std::uint64_t sequence) { sequence_ = sequence; }
+    // Of later images; stops if it differs.
+    void set_compositing(arhost_compositing compositing);
+    // Of later requests, until it is changed; nullptr: none. Stops if the format differs.
+    void set_video(const Video *video);
     // Starts if necessary. Throws Failure unless it succeeds.
     Picture render(const arhost_camera &camera, const arhost_motion *motion = nullptr, std::uint8_t fill = 0);
+    LinearPicture render_linear(const arhost_camera &camera, std::uint8_t fill = 0);
 
     Instance &instance() { return instance_; }
     const arhost_render_info &info() const { return info_; }        // of the last render
     std::chrono::nanoseconds duration() const { return duration_; } // duration of the last render
 
 private:
+    template <class Image>
+    arhost_status try_render(const arhost_camera &camera, std::optional<Image> &slot, Image &picture,
+                             arhost_render_info &info, const arhost_motion *motion);
+    template <class Image>
+    void render(const arhost_camera &camera, std::optional<Image> &slot, Image &picture, const arhost_motion *motion);
+
     Instance instance_;
     std::optional<SealedScene> scene_; // must stay valid from start to stop
     const arhost_raytracer &functions_;
     std::optional<arhost_intrinsics> started_;
-    std::optional<Picture> slot_; // the same memory for all images from start to stop
+    arhost_image_form form_ = ARHOST_IMAGE_FORM_STRAIGHT;
+    arhost_compositing compositing_ = ARHOST_COMPOSITING_SRGB;
+    const Video *video_ = nullptr;
+    // The same memory for all images from start to stop.
+    std::optional<Picture> straight_slot_;
+    std::optional<LinearPicture> linear_slot_;
     arhost_render_info info_{};
     std::uint32_t max_samples_ = 0;
+    std::uint64_t sequence_ = 0;
     std::chrono::nanoseconds duration_{};
 };
 

@@ -6,6 +6,7 @@
 #include <arhost/arhost.h>
 #include <arhost/shading/srgb8.hpp>
 #include <directories.hpp>
+#include <pixels/linear.hpp>
 
 #include <algorithm>
 #include <array>
@@ -24,6 +25,7 @@
 namespace {
 
 namespace shading = arhost::shading;
+using arhost::LinearPixel;
 using namespace arhost::test;
 
 // ---- The modified ray tracer ------------------------------------------------------------------------
@@ -57,6 +59,8 @@ struct Wrong {
     std::uint32_t max_samples = 0;        // of an earlier request
     std::int64_t threads = 0;             // the option
     std::vector<std::uint8_t> last;       // image
+    std::vector<std::uint8_t> last_video; // plane 0 of the previous request's video
+    arhost_frame_format last_format{};    // of the previous request's video
     SceneCopy scene{nullptr, &std::free}; // modified
     // Defects that combine two images: renders the other one, of another scene and with `fineness` times as many
     // pixels along each axis.
@@ -184,6 +188,87 @@ void modify(const Pixels &pixels) {
     if (has("writes_padding"))
         for (std::uint32_t y = 0; y < image.height; ++y)
             std::memset(pixels.at(image.width, y), 0, 4);
+}
+
+// A linear image.
+struct LinearPixels {
+    const arhost_image &image;
+    LinearPixel &at(std::uint32_t x, std::uint32_t y) const {
+        return reinterpret_cast<LinearPixel *>(image.linear + std::size_t{image.stride} / 2 * y)[x];
+    }
+    template <class Function> void each(Function &&function) const {
+        for (std::uint32_t y = 0; y < image.height; ++y)
+            for (std::uint32_t x = 0; x < image.width; ++x)
+                function(at(x, y));
+    }
+};
+
+bool is_miss(const LinearPixel &p) {
+    return p == arhost::untouched;
+}
+bool is_hit(const LinearPixel &p) {
+    return p.transmittance[1] == 0 && p.added[1] != 0;
+}
+bool is_edge(const LinearPixel &p) {
+    return p.transmittance[1] != 0 && p.added[1] != 0;
+}
+bool is_changed_catcher(const LinearPixel &p) {
+    return p.added[1] == 0 && !is_miss(p);
+}
+
+void modify(const LinearPixels &pixels) {
+    using arhost::float_of, arhost::half_of, arhost::half_of_one;
+    const arhost_image &image = pixels.image;
+    const auto change = [&](const char *defect, bool (*applies)(const LinearPixel &), auto function) {
+        if (has(defect))
+            pixels.each([&](LinearPixel &p) {
+                if (applies(p))
+                    function(p);
+            });
+    };
+    const auto change_added = [&](const char *defect, bool (*applies)(const LinearPixel &), auto function) {
+        change(defect, applies, [&](LinearPixel &p) {
+            for (std::uint16_t &added : p.added)
+                added = half_of(function(float_of(added), float_of(p.transmittance[1])));
+        });
+    };
+    change("darkens_misses", is_miss, [](LinearPixel &p) { p.transmittance[1] = half_of_one - 1; });
+    change("nan_on_catchers", is_changed_catcher, [](LinearPixel &p) { p.transmittance[1] = 0x7e00; });
+    change("infinite_on_catchers", is_changed_catcher, [](LinearPixel &p) { p.transmittance[1] = 0x7c00; });
+    change("negative_zero", is_changed_catcher, [](LinearPixel &p) { p.added[1] = 0x8000; });
+    change("alpha_in_linear_images", is_hit, [](LinearPixel &p) { p.reserved_0 = half_of_one; });
+    change("transmits_through_objects", is_hit, [](LinearPixel &p) { p.transmittance[1] = 1; });
+    change("brightens_at_edges", is_edge, [](LinearPixel &p) { p.transmittance[1] = half_of_one + 1; });
+    change("grey_shadows", is_changed_catcher, [](LinearPixel &p) {
+        const auto &[r, g, b] = p.transmittance;
+        std::fill_n(p.transmittance, 3, half_of((float_of(r) + float_of(g) + float_of(b)) / 3));
+    });
+    change("no_bounce_onto_catchers", is_changed_catcher, [](LinearPixel &p) {
+        for (std::uint16_t &transmittance : p.transmittance)
+            transmittance = std::min(transmittance, half_of_one);
+    });
+    change_added("added_at_most_1", is_hit, [](float added, float) { return std::min(added, 1.0f); });
+    change_added("dark_linear_images", is_hit, [](float added, float) { return 0.8f * added; });
+    change_added("added_not_weighted", is_edge,
+                 [](float added, float transmittance) { return added / (1 - std::min(transmittance, 0.9f)); });
+    if (has("random_linear_images")) {
+        static std::atomic<unsigned> images{0};
+        const unsigned noise = images++ & 1;
+        pixels.each([&](LinearPixel &p) {
+            if (is_hit(p))
+                p.added[1] = static_cast<std::uint16_t>(p.added[1] ^ noise);
+        });
+    }
+    if (has("writes_linear_padding"))
+        for (std::uint32_t y = 0; y < image.height; ++y)
+            pixels.at(image.width, y) = {};
+}
+
+void modify(arhost_render_info &info, const arhost_image &image) {
+    if (has("region_too_narrow") && info.region_width > 4)
+        info.region_width -= 4;
+    if (has("region_beyond_image"))
+        info.region_width = image.width + 1;
 }
 
 // ---- The plugin --------------------------------------------------------------------------------------
@@ -395,6 +480,7 @@ void start_other(Wrong &self, arhost_raytracer_setup setup) {
     setup.intrinsics = &intrinsics;
     setup.width = intrinsics.width;
     setup.height = intrinsics.height;
+    setup.form = ARHOST_IMAGE_FORM_STRAIGHT;
     embree_functions().start(self.other, &setup);
 }
 
@@ -441,11 +527,76 @@ arhost_status start(arhost_instance *instance, const arhost_raytracer_setup *set
     SceneCopy copy = make_copy(*setup->scene);
     modify(scene_in(copy));
     modified.scene = &scene_in(copy);
+    if (has("ignores_form"))
+        modified.form = ARHOST_IMAGE_FORM_STRAIGHT;
     self.is_tiny = modified.scene->bounds_max[0] - modified.scene->bounds_min[0] < 1;
     if (self.other)
         start_other(self, modified);
     const arhost_status status = embree_functions().start(self.real, &modified);
     self.scene = std::move(copy); // frees the previous one
+    return status;
+}
+
+// The video that the ray tracer reads instead of that of the request.
+class OtherVideo {
+public:
+    OtherVideo(Wrong &self, const arhost_frame *video) : frame_(video) {
+        std::vector<std::uint8_t> now;
+        if (video)
+            now.assign(video->plane[0],
+                       video->plane[0] + std::size_t{video->format->stride[0]} * video->format->height);
+        if ((has("shows_previous_video") || (has("keeps_last_video") && !video)) && !self.last_video.empty()) {
+            bytes_ = self.last_video;
+            replace(self.last_format);
+            copy_.plane[0] = bytes_.data();
+        }
+        if (has("ignores_video"))
+            frame_ = nullptr;
+        if (video && has("rgb_video_as_bgr") && video->format->pixel_format == ARHOST_PIXEL_FORMAT_RGB8) {
+            replace(*video->format);
+            format_.pixel_format = ARHOST_PIXEL_FORMAT_BGR8;
+        }
+        if (video && has("all_video_has_full_range")) {
+            replace(*video->format);
+            format_.yuv_range = ARHOST_YUV_RANGE_FULL;
+        }
+        if (video) {
+            self.last_video = std::move(now);
+            self.last_format = *video->format;
+        }
+    }
+    const arhost_frame *frame() const { return frame_; }
+
+private:
+    void replace(const arhost_frame_format &format) {
+        copy_ = frame_ ? *frame_ : arhost_frame{};
+        format_ = format;
+        copy_.format = &format_;
+        frame_ = &copy_;
+    }
+
+    const arhost_frame *frame_;
+    arhost_frame_format format_{};
+    arhost_frame copy_{};
+    std::vector<std::uint8_t> bytes_;
+};
+
+arhost_status render_linear(const Wrong &self, const arhost_render_request &request, const arhost_image &image,
+                            arhost_render_info &info) {
+    const LinearPixels pixels{image};
+    const std::uint16_t last_number = pixels.at(image.width - 1, image.height - 1).reserved_1;
+    arhost_image target = image;
+    if (has("ignores_form")) {
+        target.rgba = reinterpret_cast<std::uint8_t *>(image.linear);
+        target.linear = nullptr;
+    }
+    const arhost_status status = embree_functions().render(self.real, &request, &target, &info);
+    if (status != ARHOST_STATUS_OK)
+        return status;
+    modify(pixels);
+    modify(info, image);
+    if (has("unwritten_reserved_number"))
+        pixels.at(image.width - 1, image.height - 1).reserved_1 = last_number;
     return status;
 }
 
@@ -476,6 +627,12 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         modified.max_samples = self.max_samples = request->max_samples ? request->max_samples : self.max_samples;
     if (has("near_clip_at_1_mm") && is_near(self, modified.camera))
         modified.camera.eye[2] -= 1; // the camera looks along −z
+    if (has("ignores_sequence"))
+        modified.sequence = 0;
+    const OtherVideo video(self, request->video);
+    modified.video = video.frame();
+    if (image->linear)
+        return render_linear(self, modified, *image, *info);
     const arhost_moved_object nowhere{0, 1, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
     const arhost_motion still{sizeof still, 1, &nowhere, nullptr, 0, 0};
     if ((has("no_motion") || has("lambert_only")) && request->motion)
@@ -553,10 +710,7 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
                                                              (1 - shading::light_under_alpha(opaque))));
         });
     }
-    if (has("region_too_narrow") && info->region_width > 4)
-        info->region_width -= 4;
-    if (has("region_beyond_image"))
-        info->region_width = image->width + 1;
+    modify(*info, *image);
     if (has("device_time_since_boot"))
         info->device_time_ns =
             static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count());
@@ -664,6 +818,8 @@ const arhost_plugin &wrong_plugin() {
         descriptor.capabilities |= ARHOST_CAPABILITY_LIVE;
     if (has("unknown_capability"))
         descriptor.capabilities |= 1u << 31;
+    if (has("undeclared_video"))
+        descriptor.capabilities &= ~ARHOST_CAPABILITY_VIDEO;
     static bool was_called = false;
     if (has("withdraws_a_capability") && std::exchange(was_called, true))
         descriptor.capabilities &= ~ARHOST_CAPABILITY_LENS_DISTORTION;
