@@ -39,7 +39,18 @@ Raytracer::Raytracer(RunParts &parts, Configuration configuration, std::shared_p
             supervise::make_host_region("arhost-anchors", {count * sizeof(AnchorPose), stage_slot_count}));
 }
 
-SlotLayout Raytracer::on_ready(const messages::Ready &) {
+SlotLayout Raytracer::on_ready(const messages::Ready &ready) {
+    const bool is_linear_wanted =
+        scene_->integrator == ARHOST_INTEGRATOR_PATH && overlay_format_.compositing == ARHOST_COMPOSITING_LINEAR;
+    if (!(ready.capabilities & ARHOST_CAPABILITY_LINEAR_IMAGES)) {
+        overlay_format_.form = ARHOST_IMAGE_FORM_STRAIGHT;
+        if (is_linear_wanted)
+            component().log(ARHOST_SEVERITY_WARNING,
+                            component().description().id +
+                                " cannot write linear images: the overlay cannot brighten the video, and its shadows "
+                                "have no colour");
+    }
+    reads_video_ = reads_video_ && (ready.capabilities & ARHOST_CAPABILITY_VIDEO) != 0;
     const arhost_frame_format &format = parts_.video.format;
     return {std::uint64_t(overlay_stride(format.width, overlay_format_.form)) * format.height, stage_slot_count};
 }
@@ -63,10 +74,6 @@ OverlayFormat Raytracer::choose_format(const PluginDescription &plugin) const {
         return format;
     if (plugin.capabilities & ARHOST_CAPABILITY_LINEAR_IMAGES)
         format.form = ARHOST_IMAGE_FORM_LINEAR;
-    else
-        component().log(ARHOST_SEVERITY_WARNING,
-                        plugin.id + " cannot write linear images: the overlay cannot brighten the video, and its "
-                                    "shadows have no colour");
     return format;
 }
 

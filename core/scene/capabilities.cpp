@@ -76,8 +76,9 @@ std::uint32_t needed_capabilities(const arhost_scene &scene) {
 std::uint32_t capabilities_of(const arhost_descriptor &descriptor, const arhost_raytracer &functions,
                               arhost_instance *instance) {
     constexpr std::size_t size = offsetof(arhost_raytracer, capabilities) + sizeof(arhost_raytracer::capabilities);
-    return functions.struct_size < size || !functions.capabilities ? descriptor.capabilities
-                                                                   : functions.capabilities(instance);
+    return functions.struct_size < size || !functions.capabilities
+               ? descriptor.capabilities
+               : descriptor.capabilities & functions.capabilities(instance);
 }
 
 std::string missing_capabilities_text(const std::string &id, std::uint32_t missing) {

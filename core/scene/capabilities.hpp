@@ -14,7 +14,7 @@ namespace arhost::scene {
 // the materials of virtual objects and catchers count: occluders are invisible.
 std::uint32_t needed_capabilities(const arhost_scene &scene);
 
-// Returns the capabilities of a ray tracer's instance.
+// Returns the capabilities of a ray tracer's instance: those of the descriptor, or fewer.
 std::uint32_t capabilities_of(const arhost_descriptor &descriptor, const arhost_raytracer &functions,
                               arhost_instance *instance);
 

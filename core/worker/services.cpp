@@ -307,8 +307,9 @@ public:
           supports_lenses_((plugin.descriptor->capabilities & ARHOST_CAPABILITY_LENS_DISTORTION) != 0) {}
 
     arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &fds,
-                        messages::Ready &) override {
+                        messages::Ready &ready) override {
         const auto &message = setup_of_kind<messages::RaytracerSetup>(any);
+        ready.capabilities = scene::capabilities_of(descriptor_, raytracer_, instance_);
         require(!fds.empty(), "'create' was sent without the descriptor of the scene's arena");
         arena_ = SharedMemory::adopt(base::UniqueFd(::dup(fds[0].get()))).map(Access::read_only);
         require(arena_.bytes().size() >= sizeof(arhost_scene), "the scene's arena is too small");
@@ -317,10 +318,12 @@ public:
         setup.width = width_ = message.width;
         setup.height = height_ = message.height;
         setup.scene = &arena_.as<arhost_scene>();
-        setup.form = form_ = message.form;
+        if (ready.capabilities & ARHOST_CAPABILITY_LINEAR_IMAGES)
+            form_ = message.form;
+        setup.form = form_;
         setup.compositing = message.compositing;
         setup.intrinsics = &message.intrinsics;
-        if (message.video_format)
+        if (message.video_format && ready.capabilities & ARHOST_CAPABILITY_VIDEO)
             setup.video_format = &video_.emplace(*message.video_format).format();
         if (message.intrinsics.distortion != ARHOST_DISTORTION_NONE && !supports_lenses_) {
             require(!video_, "a plugin whose image is warped got video");
@@ -331,8 +334,7 @@ public:
         if (scene::is_moving(*setup.scene))
             motion_.emplace(*setup.scene);
         anchors_.resize(setup.scene->anchors.count);
-        const std::uint32_t missing =
-            scene::needed_capabilities(*setup.scene) & ~scene::capabilities_of(descriptor_, raytracer_, instance_);
+        const std::uint32_t missing = scene::needed_capabilities(*setup.scene) & ~ready.capabilities;
         if (const std::string warning = scene::missing_capabilities_text(descriptor_.id, missing); !warning.empty())
             host_.log(&host_, ARHOST_SEVERITY_WARNING, warning.c_str());
         return raytracer_.start(instance_, &setup);

@@ -369,12 +369,15 @@ class _RaytracerAdapter(_Adapter):
         return STATUS_OK, int(getattr(self.plugin, "capabilities", CAPABILITY_EVERY_SCENE))
 
     @_reporting()
-    def start(self, width, height, scene, intrinsics):
-        self.plugin.start(Fields(width=width, height=height, scene=Scene(scene),
+    def start(self, width, height, scene, intrinsics, form, compositing, video_format):
+        self.video_format = video_format and Fields(_record(video_format, FRAME_FORMAT))
+        self.plugin.start(Fields(width=width, height=height, scene=Scene(scene), form=form, compositing=compositing,
+                                 video_format=self.video_format,
                                  intrinsics=Fields(_record(intrinsics, INTRINSICS))))
+        self.form = form
         return STATUS_OK
 
-    def render(self, max_samples, sequence, time_s, camera, moved, deformed, pixels, height, width, stride):
+    def render(self, max_samples, sequence, time_s, camera, moved, deformed, video, pixels, height, width, stride):
         def render():
             request = Fields(
                 max_samples=max_samples, full_samples=0, sequence=sequence, time_s=time_s,
@@ -382,14 +385,16 @@ class _RaytracerAdapter(_Adapter):
                 moved=np.ndarray(len(moved) // MOVED_OBJECT.itemsize, MOVED_OBJECT, moved),
                 deformed=[Fields(object=index, is_visible=bool(is_visible), positions=_vectors(positions),
                                  normals=normals and _vectors(normals))
-                          for index, is_visible, positions, normals in deformed])
-            region = self.plugin.render(request, _pixels(pixels, height, width, 4, stride))
+                          for index, is_visible, positions, normals in deformed],
+                video=video and Fields(format=self.video_format, planes=_planes(self.video_format, video)))
+            region = self.plugin.render(request, np.ndarray((height, width, 8), np.float16, pixels, 0, (stride, 16, 2))
+                                        if self.form == IMAGE_FORM_LINEAR else _pixels(pixels, height, width, 4, stride))
             if not 0 <= request.full_samples < 1 << 32:
                 raise ValueError(f"full_samples is {request.full_samples}; it must be 0 to 4294967295")
             return STATUS_OK, (int(request.full_samples),
                                None if region is None else tuple(int(side) for side in region))
 
-        memory = [pixels, moved] + [view for _, _, p, n in deformed for view in (p, n) if view]
+        memory = [pixels, moved, *(video or ())] + [view for _, _, p, n in deformed for view in (p, n) if view]
         return self._with_memory(memory, render)
 
 

@@ -34,7 +34,8 @@
 #define KIND ARHOST_KIND_RAYTRACER
 #define METHOD "render"
 #define ADAPTER "_RaytracerAdapter"
-#define CAPABILITIES ARHOST_CAPABILITY_EVERY_SCENE // a script may implement less: the attribute `capabilities`
+// A script declares its own: the attribute `capabilities`.
+#define CAPABILITIES (ARHOST_CAPABILITY_EVERY_SCENE | ARHOST_CAPABILITY_LINEAR_IMAGES | ARHOST_CAPABILITY_VIDEO)
 #else
 #define KIND ARHOST_KIND_SINK
 #define METHOD "write"
@@ -129,6 +130,10 @@ template <class Plane> Object views_of_planes(const arhost_frame_format &format,
     for (std::uint32_t i = 0; i < format.plane_count; ++i)
         views.push_back(view(planes[i], plane_size(format, i), flag));
     return tuple_of(std::move(views));
+}
+
+std::size_t image_size(const arhost_image &image, std::size_t pixel_bytes) {
+    return std::size_t{image.stride} * (image.height - 1) + pixel_bytes * image.width;
 }
 
 // ---- functions that the script can call; `self` is a capsule that holds the arhost_host ----
@@ -379,8 +384,9 @@ public:
 #endif
     void start(const arhost_raytracer_setup &setup) {
         const GilLock lock;
-        call("start", "IINN", setup.width, setup.height, view(setup.scene, setup.scene->byte_size).release(),
-             view_of(setup.intrinsics).release());
+        call("start", "IINNiiN", setup.width, setup.height, view(setup.scene, setup.scene->byte_size).release(),
+             view_of(setup.intrinsics).release(), setup.form, setup.compositing,
+             view_of(setup.video_format).release());
     }
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
         const GilLock lock;
@@ -394,13 +400,15 @@ public:
                               geometry.normals ? view(geometry.normals, size).release() : Py_NewRef(Py_None))));
         }
         const Answer answer =
-            call("render", "IKdNNNNIII", request.max_samples, static_cast<unsigned long long>(request.sequence),
+            call("render", "IKdNNNNNIII", request.max_samples, static_cast<unsigned long long>(request.sequence),
                  request.time_s, view_of(&request.camera).release(),
                  view(motion ? motion->moved : nullptr, motion ? motion->moved_count * sizeof *motion->moved : 0)
                      .release(),
                  tuple_of(std::move(deformed)).release(),
-                 view(image.rgba, std::size_t(image.stride) * (image.height - 1) + std::size_t(4) * image.width,
-                      PyBUF_WRITE)
+                 request.video ? views_of_planes(*request.video->format, request.video->plane, PyBUF_READ).release()
+                               : Py_NewRef(Py_None),
+                 (image.linear ? view(image.linear, image_size(image, 16), PyBUF_WRITE)
+                               : view(image.rgba, image_size(image, 4), PyBUF_WRITE))
                      .release(),
                  image.height, image.width, image.stride);
         std::uint32_t full_samples = 0;

@@ -540,6 +540,13 @@ class RaytracerSetup(Protocol):
     height: int
     scene: Scene
     intrinsics: Intrinsics
+    form: int
+    compositing: int
+    video_format: Optional[FrameFormat]
+
+class Video(Protocol):
+    format: FrameFormat
+    planes: list[np.ndarray]
 
 class Deformed(Protocol):
     object: int
@@ -555,6 +562,7 @@ class RenderRequest(Protocol):
     camera: Camera
     moved: np.ndarray
     deformed: list[Deformed]
+    video: Optional[Video]
 
 class SinkSetup(Protocol):
     width: int

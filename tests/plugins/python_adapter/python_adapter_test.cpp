@@ -584,6 +584,51 @@ TEST_F(PythonAdapter, TheRayTracersScriptDeclaresItsCapabilities) {
     }
 }
 
+TEST_F(PythonAdapter, ARayTracersScriptWritesLinearImagesAndReadsTheVideo) {
+    ArhostRun run(raytracer);
+    std::string scene = small_scene;
+    run.write("scene.yaml", scene.replace(scene.find('1'), 1, "2"));
+    // The colour of the square is that of the video's first pixel, which is the number of the frame.
+    run.write("script.py", R"(
+import arhost, numpy as np
+def light(code): return code / 255 / 12.92 if code <= 10 else ((code / 255 + 0.055) / 1.055) ** 2.4
+class Tracer:
+    capabilities = arhost.CAPABILITY_EVERY_SCENE | arhost.CAPABILITY_LINEAR_IMAGES | arhost.CAPABILITY_VIDEO
+    def __init__(self, host): pass
+    def start(self, setup):
+        assert (setup.form, setup.compositing) == (arhost.IMAGE_FORM_LINEAR, arhost.COMPOSITING_LINEAR)
+        assert setup.video_format.width == setup.width
+    def render(self, request, image):
+        assert image.shape == (48, 64, 8) and image.dtype == np.float16, image.shape
+        b, g, r = (int(code) for code in request.video.planes[0][0, 0])
+        image[...] = 0, 0, 0, 0, 1, 1, 1, 0
+        image[:16, :16] = light(b), light(g), light(170), 0, 0, 0, 0, 0
+)");
+    ASSERT_EQ(run.run({"--config", "run.yaml", "--verbose"}), 0) << run.output();
+    EXPECT_EQ(expect_all_frames(run, 6), std::set<std::uint64_t>{});
+    EXPECT_THAT(run.output(), Not(HasSubstr("cannot write linear images")));
+}
+
+TEST_F(PythonAdapter, ARayTracersScriptWithoutLinearImagesGetsStraightOnesAndNoVideo) {
+    ArhostRun run(raytracer);
+    std::string scene = small_scene;
+    run.write("scene.yaml", scene.replace(scene.find('1'), 1, "2"));
+    run.write("script.py", R"(
+import arhost, numpy as np
+class Tracer:
+    def __init__(self, host): self.frame = 0
+    def start(self, setup):
+        assert setup.form == arhost.IMAGE_FORM_STRAIGHT and setup.video_format is None
+    def render(self, request, image):
+        assert image.shape == (48, 64, 4) and image.dtype == np.uint8 and request.video is None
+        image[...] = 0
+        image[:16, :16] = request.sequence, 0, 170, 255
+)");
+    ASSERT_EQ(run.run({"--config", "run.yaml", "--verbose"}), 0) << run.output();
+    EXPECT_EQ(expect_all_frames(run, 6), std::set<std::uint64_t>{});
+    EXPECT_THAT(run.output(), HasSubstr("rt_python cannot write linear images"));
+}
+
 // Compares the classes of arhost.pyi with the objects that the methods of a script receive.
 TEST_F(PythonAdapter, TheTypeStubDescribesTheObjectsOfTheMethods) {
     const std::string check = R"(
@@ -617,8 +662,11 @@ class Tracker:
         return [arhost.Observation(3, [[20, 15], [40, 15], [40, 35], [20, 35]])]
 class Tracer:
     def __init__(self, host): pass
-    def start(self, setup): check("RaytracerSetup", setup), check("Scene", setup.scene)
-    def render(self, request, image): check("RenderRequest", request), check("Camera", request.camera)
+    capabilities = arhost.CAPABILITY_EVERY_SCENE | arhost.CAPABILITY_VIDEO
+    def start(self, setup):
+        check("RaytracerSetup", setup), check("Scene", setup.scene), check("FrameFormat", setup.video_format)
+    def render(self, request, image):
+        check("RenderRequest", request), check("Camera", request.camera), check("Video", request.video)
 class Sink:
     def __init__(self, host): pass
     def start(self, setup): check("SinkSetup", setup)

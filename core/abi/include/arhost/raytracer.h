@@ -118,7 +118,7 @@ typedef struct arhost_raytracer {
     void (*stop)(arhost_instance *instance);
 
     /* [worker, created] Optional: may be NULL. Returns the capabilities of this instance, if they depend on its
-     * options: the descriptor's capabilities, of which it may clear only bits of ARHOST_CAPABILITY_EVERY_SCENE. */
+     * options: the descriptor's, of which it may clear bits of …_EVERY_SCENE, …_LINEAR_IMAGES and …_VIDEO. */
     uint32_t (*capabilities)(arhost_instance *instance);
 } arhost_raytracer;
 

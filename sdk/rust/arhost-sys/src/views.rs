@@ -149,7 +149,41 @@ fn plane_size(format: &arhost_frame_format, plane: usize) -> usize {
     format.stride[plane] as usize * (format.height as usize / if halved { 2 } else { 1 })
 }
 
-/// The image to write: RGBA8, straight alpha, sRGB-encoded, alpha exactly 0 where no ray hit.
+/// A pixel of an image of `ARHOST_IMAGE_FORM_LINEAR`: eight binary16 numbers, added light and transmittance.
+pub type LinearPixel = [u16; 8];
+
+/// A pixel that virtual objects do not affect.
+pub const UNTOUCHED: LinearPixel = [0, 0, 0, 0, 0x3c00, 0x3c00, 0x3c00, 0];
+
+/// `transmittance`: the share of the video that stays visible, 0 on virtual objects.
+pub fn linear_pixel(added: [f32; 3], transmittance: [f32; 3]) -> LinearPixel {
+    let ([r, g, b], [x, y, z]) = (added.map(half_of), transmittance.map(half_of));
+    [r, g, b, 0, x, y, z, 0]
+}
+
+/// Converts to binary16, rounded to nearest, ties to even. Numbers that are too large become infinite.
+pub fn half_of(number: f32) -> u16 {
+    let (sign, bits) = ((number.to_bits() >> 16 & 0x8000) as u16, number.to_bits() & 0x7fff_ffff);
+    let half = if bits < (127 - 14) << 23 {
+        // The sum's last bit is that of a subnormal half.
+        (f32::from_bits(bits) + 0.5).to_bits() - 0.5f32.to_bits()
+    } else if bits >= 0x477f_f000 {
+        if bits > 0x7f80_0000 { 0x7e00 } else { 0x7c00 }
+    } else {
+        (bits + 0xfff + (bits >> 13 & 1) - ((127 - 15) << 23)) >> 13
+    };
+    sign | half as u16
+}
+
+impl arhost_render_request {
+    /// The frame under the overlay, only with `ARHOST_CAPABILITY_VIDEO`.
+    pub fn video_frame(&self) -> Option<Frame<'_>> {
+        unsafe { self.video.as_ref() }.map(Frame)
+    }
+}
+
+/// The image to write, in the form that the setup asks for: straight RGBA8 (sRGB-encoded, alpha exactly 0 where no ray
+/// hit), or linear pixels.
 pub struct Image<'a>(pub(crate) &'a arhost_image);
 
 impl Image<'_> {
@@ -159,10 +193,19 @@ impl Image<'_> {
     pub fn height(&self) -> u32 {
         self.0.height
     }
+    /// Only if the form is `ARHOST_IMAGE_FORM_STRAIGHT`.
     pub fn row_mut(&mut self, row: u32) -> &mut [[u8; 4]] {
-        assert!(row < self.0.height);
+        assert!(row < self.0.height && !self.0.rgba.is_null());
         unsafe {
             let first = self.0.rgba.add(row as usize * self.0.stride as usize);
+            slice::from_raw_parts_mut(first.cast(), self.0.width as usize)
+        }
+    }
+    /// Only if the form is `ARHOST_IMAGE_FORM_LINEAR`.
+    pub fn linear_row_mut(&mut self, row: u32) -> &mut [LinearPixel] {
+        assert!(row < self.0.height && !self.0.linear.is_null());
+        unsafe {
+            let first = self.0.linear.cast::<u8>().add(row as usize * self.0.stride as usize);
             slice::from_raw_parts_mut(first.cast(), self.0.width as usize)
         }
     }
