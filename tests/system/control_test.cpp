@@ -227,6 +227,21 @@ TEST(Control, ReplacesTrackerAndRayTracerWithoutLosingAFrame) {
     EXPECT_EQ(stats["frames"]["tracked"], stats["frames"]["composited"]) << "no frame may count twice";
 }
 
+TEST(Control, ReplacesStraightByLinearImagesAndBackWithoutLosingAFrame) {
+    std::string yaml = controlled("lockstep"), scene = small_scene;
+    const std::string second = "second, plugin: rt_counter";
+    ControlledRun run(yaml.replace(yaml.find(second), second.size(), "light, plugin: rt_light"));
+    run.write("scene.yaml", scene.replace(scene.find('1'), 1, "2"));
+    run.start_and_connect();
+    for (int i = 0; i < 2; ++i)
+        for (const char *plugin : {"light", "rt_counter"}) {
+            run.succeed(swap("raytracer", plugin));
+            run.wait_for_frames(20);
+        }
+    ASSERT_EQ(run.quit(), 0) << run.output();
+    expect_all_frames_with_their_overlays(run);
+}
+
 TEST(Control, ReplacesComponentsInModeLiveWithTheirFramesOverlays) {
     ControlledRun run(controlled("live"));
     run.start_and_connect();
@@ -306,6 +321,26 @@ TEST(Control, LoadsAScene) {
     ASSERT_EQ(reference.run(), 0) << reference.output();
     EXPECT_NE(read_file(frames.front()), reference.read("out/" + frames.front().filename().string()));
     EXPECT_EQ(read_file(frames.back()), reference.read("out/" + frames.back().filename().string()));
+}
+
+TEST(Control, ASceneOfAnotherIntegratorReplacesTheFormOfImages) {
+    std::string yaml = controlled("lockstep"), path = small_scene;
+    const std::string second = "second, plugin: rt_counter";
+    ControlledRun run(yaml.replace(yaml.find(second), second.size(), "light, plugin: rt_light"));
+    run.write("other.yaml", path.replace(path.find('1'), 1, "2"));
+    run.start_and_connect();
+    const auto load = [](const std::string &scene) { return Json{{"command", "load_scene"}, {"scene", scene}}; };
+    EXPECT_THAT(run.error_of(swap("raytracer", "light")), HasSubstr("needs linear images and video"));
+    run.succeed(load("other"));
+    run.succeed(swap("raytracer", "light"));
+    run.wait_for_frames(20);
+    EXPECT_THAT(run.error_of(load("scene")), HasSubstr("needs linear images and video"));
+    run.wait_for_frames(20);
+    run.succeed(swap("raytracer", "rt_counter"));
+    run.succeed(load("scene"));
+    run.wait_for_frames(20);
+    ASSERT_EQ(run.quit(), 0) << run.output();
+    expect_all_frames_with_their_overlays(run);
 }
 
 TEST(Control, KeepsTheSceneIfTheNewOneIsInvalid) {

@@ -4,6 +4,9 @@
 // frame that it got as video.
 #include "arhost_run.hpp"
 
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+
 using namespace arhost::test;
 using testing::HasSubstr;
 
@@ -74,6 +77,54 @@ TEST(LinearImages, GiveWayToTheStraightImagesOfAFallback) {
 TEST(LinearImages, AreNotRequestedIfTheConfigurationBlendsCodes) {
     LightRun run({.source = "frames: 30"}, "rt_light, composite: srgb");
     run.expect(2, {"needs linear images and video"});
+}
+
+TEST(LinearImages, ANaNIsShownAsBlackAndReported) {
+    LightRun run({.source = "frames: 60", .raytracer = "writes_nan: true"}, "rt_light, conform: true");
+    run.run();
+    const auto lines = counted(run);
+    ASSERT_EQ(lines.size(), 60u) << run.output();
+    for (const CountedLine &line : lines) {
+        EXPECT_EQ(line.video, 0u) << line.sequence; // the last pixel
+        EXPECT_EQ(line.overlay, std::to_string(line.sequence));
+    }
+    EXPECT_THAT(run.output(), HasSubstr("raytracer.light"));
+    EXPECT_THAT(run.output(), HasSubstr("pixel (63, 47): value 4 is nan; it must be finite and not negative"));
+}
+
+TEST(LinearImages, AreEnlargedInModeLive) {
+    LightRun run({.mode = "live",
+                  .source = "frames: 90",
+                  .raytracer = "delay_ms: 3", // no rate of 10,000 fps is possible
+                  .more = "live: {target_fps: 10000, min_scale: 0.5}\n"});
+    ASSERT_EQ(run.run(), 0) << run.output();
+    EXPECT_EQ(run.stats()["quality"]["scale"], 0.5) << run.stats().dump(1);
+    const auto lines = counted(run);
+    ASSERT_FALSE(lines.empty());
+    expect_own_overlays(lines); // also checks that the last pixel shows the unchanged video
+}
+
+TEST(LinearImages, ReachSinksOfTheOverlayAsStraightOnes) {
+    std::string yaml = counting({.source = "frames: 4", .raytracer = "shades: true"});
+    const std::string sink = "outputs: [{plugin: sink_counter, path: counted.txt}]";
+    yaml.replace(yaml.find(sink), sink.size(),
+                 "outputs: [{plugin: sink_images, path: \"%04d.png\", options: {content: overlay}}]");
+    ArhostRun run(with_plugin("rt_light", yaml));
+    std::string scene = small_scene;
+    run.write("scene.yaml", scene.replace(scene.find('1'), 1, "2"));
+    ASSERT_EQ(run.run(), 0) << run.output();
+    const cv::Mat overlay = cv::imread(run.path("0003.png").string(), cv::IMREAD_UNCHANGED);
+    ASSERT_EQ(overlay.type(), CV_8UC4);
+    for (int y = 0; y < overlay.rows; ++y)
+        for (int x = 0; x < overlay.cols; ++x) {
+            const auto pixel = overlay.at<cv::Vec4b>(y, x);
+            if (x < 16 && y < 16)
+                EXPECT_EQ(pixel, cv::Vec4b(170, 0, 3, 255)); // B, G, R, alpha of frame 3
+            else if (x == overlay.cols - 1 && y == overlay.rows - 1)
+                EXPECT_EQ(pixel, cv::Vec4b(0, 0, 0, 128)) << "half of the light is removed";
+            else
+                EXPECT_EQ(pixel[3], 0) << x << " " << y;
+        }
 }
 
 TEST(LinearImages, AreNotRequestedForWhittedScenes) {

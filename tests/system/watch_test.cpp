@@ -96,6 +96,23 @@ TEST(Watch, AnEditedSceneReplacesTheScene) {
     EXPECT_NE(run.read("out/000000.png"), picture_of_a_fresh_run(run, "000000.png"));
 }
 
+TEST(Watch, AnEditOfTheIntegratorReplacesTheFormOfImages) {
+    WatchedRun run;
+    const std::string whitted = run.read("scene.yaml");
+    std::string path = whitted;
+    path.replace(path.find("version: 1"), 10, "version: 2");
+    run.start_watching();
+    int edits = 0;
+    for (const std::string &scene : {path, whitted, path}) {
+        run.replace("scene.yaml", scene);
+        run.wait_for("raytracer is now rt_embree with the scene scene", ++edits);
+        const int goal = std::stoi(run.last_picture()) + 3; // images of this form
+        EXPECT_TRUE(run.eventually([&] { return std::stoi(run.last_picture()) >= goal; })) << run.output();
+    }
+    EXPECT_EQ(run.interrupt(), 130) << run.output();
+    EXPECT_EQ(run.read("out/" + run.last_picture()), picture_of_a_fresh_run(run, run.last_picture()));
+}
+
 TEST(Watch, AnEditedMeshReplacesTheScene) {
     const auto triangle = [](const std::string &height) {
         return "v -20 -20 1\nv 20 -20 1\nv 0 20 " + height + "\nf 1 2 3\n";

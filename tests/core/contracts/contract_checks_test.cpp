@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "contracts/contract_checks.hpp"
+#include "pixels/linear.hpp"
 
 #include "camera/lens_model.hpp"
 #include "scene/arena_builder.hpp"
@@ -246,6 +247,66 @@ TEST(OverlayChecks, DoNotTreatACatcherAsAVirtualObject) {
     View empty(std::nullopt);
     empty.set(330, 235, 153);
     EXPECT_EQ(empty.violations(), "");
+}
+
+// A linear image of the same view, untouched but for the pixels that a test sets.
+struct LinearView : View {
+    std::vector<LinearPixel> light = std::vector<LinearPixel>(std::size_t{640} * 480, untouched);
+    std::string violations(const Region &region = {0, 0, 640, 480}) const {
+        OverlayChecks overlay(scene.scene());
+        ContractChecks checks;
+        for (std::uint64_t frame = 0; frame < 16; ++frame)
+            overlay.check(checks, frame, camera, region,
+                          {reinterpret_cast<const std::uint8_t *>(light.data()),
+                           640 * sizeof(LinearPixel),
+                           {ARHOST_IMAGE_FORM_LINEAR, ARHOST_COMPOSITING_LINEAR}});
+        return ::violations(checks);
+    }
+    LinearPixel &at(std::uint32_t x, std::uint32_t y) { return light[640 * y + x]; }
+};
+
+TEST(OverlayChecks, PassForACorrectLinearImage) {
+    LinearView view;
+    view.at(330, 235) = linear_pixel({4, 2, 1}, {0, 0, 0});       // the ball's centre
+    view.at(330, 206) = linear_pixel({1, 1, 1}, {0.5f, 0.5f, 1}); // the ball's edge
+    view.at(10, 10) = linear_pixel({0, 0, 0}, {0, 0, 0});         // a shadow, which may be anywhere
+    view.at(20, 10) = linear_pixel({0, 0, 0}, {1.5f, 1, 1});      // light that the ball reflects onto a catcher
+    EXPECT_EQ(view.violations(), "");
+}
+
+TEST(OverlayChecks, FailForNumbersThatAreNoLight) {
+    const auto violations_of = [](std::uint16_t LinearPixel::*reserved, int added, int transmittance,
+                                  std::uint16_t half) {
+        LinearView view;
+        LinearPixel &pixel = view.at(330, 235);
+        if (reserved)
+            pixel.*reserved = half;
+        if (added >= 0)
+            pixel.added[added] = half;
+        if (transmittance >= 0)
+            pixel.transmittance[transmittance] = half;
+        return view.violations();
+    };
+    constexpr std::uint16_t nan = 0x7e00, infinity = 0x7c00, minus_one = 0xbc00;
+    const std::string place = "raytracer.light: frame 11: pixel (330, 235): value ";
+    EXPECT_EQ(violations_of(nullptr, 1, -1, nan), place + "1 is nan; it must be finite and not negative");
+    EXPECT_EQ(violations_of(nullptr, -1, 2, infinity), place + "6 is inf; it must be finite and not negative");
+    EXPECT_EQ(violations_of(nullptr, 0, -1, minus_one), place + "0 is -1; it must be finite and not negative");
+    EXPECT_EQ(violations_of(nullptr, -1, 0, minus_one), place + "4 is -1; it must be finite and not negative");
+    EXPECT_EQ(violations_of(&LinearPixel::reserved_0, -1, -1, half_of_one),
+              place + "3 is 1, but reserved; it must be 0");
+    EXPECT_EQ(violations_of(&LinearPixel::reserved_1, -1, -1, half_of_one),
+              place + "7 is 1, but reserved; it must be 0");
+}
+
+TEST(OverlayChecks, FailForLightOutsideTheRegionAndTheObjects) {
+    LinearView view;
+    view.at(100, 50) = linear_pixel({1, 1, 1}, {0, 0, 0});
+    EXPECT_EQ(view.violations({300, 200, 60, 70}),
+              "raytracer.region: frame 2: pixel (100, 50) is outside the reported region, but changes the video; the "
+              "region is 60 x 70 px at (300, 200)");
+    EXPECT_EQ(view.violations(), "raytracer.place: frame 2: pixel (100, 50): adds light and hides the video, but all "
+                                 "virtual objects are between (297, 201) and (363, 269)");
 }
 
 TEST(OverlayChecks, SkipPlacesBehindTheCamera) {

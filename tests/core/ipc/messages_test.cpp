@@ -72,6 +72,16 @@ TEST(Messages, PreserveTheSetupOfEachKind) {
     EXPECT_FALSE(tracker_setup.confirm);
     const auto raytracer = sent(messages::Create{{}, messages::RaytracerSetup{64, 48, lens()}});
     EXPECT_EQ(std::get<messages::RaytracerSetup>(raytracer.setup).height, 48u);
+    EXPECT_EQ(std::get<messages::RaytracerSetup>(raytracer.setup).form, ARHOST_IMAGE_FORM_STRAIGHT);
+    EXPECT_EQ(std::get<messages::RaytracerSetup>(raytracer.setup).compositing, ARHOST_COMPOSITING_SRGB);
+    EXPECT_EQ(std::get<messages::RaytracerSetup>(raytracer.setup).video_format, std::nullopt);
+    const auto linear = sent(messages::Create{
+        {}, messages::RaytracerSetup{64, 48, lens(), ARHOST_IMAGE_FORM_LINEAR, ARHOST_COMPOSITING_LINEAR, format()}});
+    const auto &linear_setup = std::get<messages::RaytracerSetup>(linear.setup);
+    EXPECT_EQ(linear_setup.form, ARHOST_IMAGE_FORM_LINEAR);
+    EXPECT_EQ(linear_setup.compositing, ARHOST_COMPOSITING_LINEAR);
+    EXPECT_EQ(linear_setup.video_format.value().byte_size, 64u * 48);
+    EXPECT_EQ(linear_setup.video_format.value().pixel_format, ARHOST_PIXEL_FORMAT_GREY8);
     const auto sink = sent(messages::Create{{}, messages::SinkSetup{format(), 25, 12, {}}});
     EXPECT_EQ(std::get<messages::SinkSetup>(sink.setup).first_sequence, 12u);
     EXPECT_EQ(std::get<messages::SinkSetup>(sink.setup).intrinsics, std::nullopt);

@@ -36,6 +36,39 @@ struct Warnings : testing::Test {
 
 } // namespace
 
+// Configurations of a ray tracer.
+struct Composite : testing::Test {
+    Composite() {
+        for (const char *file : {"source_x.so", "tracker_x.so", "rt_x.so", "scene.yaml"})
+            std::ofstream(scratch.path() / file) << "";
+    }
+    std::optional<arhost_compositing> of(const std::string &keys) const {
+        const auto root = yaml::Node::parse("version: 1\nsource: {plugin: source_x}\n"
+                                            "tracker: {plugin: tracker_x, targets: [{marker: 0, family: t, side_mm: "
+                                            "80}]}\n"
+                                            "raytracer: {plugin: rt_x, scene: scene.yaml" +
+                                                keys + "}\n",
+                                            (scratch.path() / "lab.yaml").string());
+        return run_config::parse(root, scratch.path()).raytracer.value().composite;
+    }
+    std::string error_of(const std::string &keys) const {
+        return test::without_folder(test::error_of([&] { of(keys); }), scratch.path());
+    }
+    test::ScratchFolder scratch;
+};
+
+TEST_F(Composite, IsTheSpaceOfBlendingOrUpToTheScene) {
+    EXPECT_EQ(of(""), std::nullopt);
+    EXPECT_EQ(of(", composite: linear"), ARHOST_COMPOSITING_LINEAR);
+    EXPECT_EQ(of(", composite: srgb"), ARHOST_COMPOSITING_SRGB);
+}
+
+TEST_F(Composite, ErrorsNameFileLineAndKey) {
+    EXPECT_EQ(error_of(", composite: linaer"), "lab.yaml:4:57: raytracer.composite: 'linaer' is not one of linear, "
+                                               "srgb; did you mean 'linear'?");
+    EXPECT_THAT(error_of(", composite: [srgb]"), testing::HasSubstr("lab.yaml:4:57: raytracer.composite: "));
+}
+
 TEST_F(Warnings, AreForImplausibleFocalLengths) {
     EXPECT_THAT(of(camera, "80"), IsEmpty());
     EXPECT_THAT(of("{width: 640, height: 480, fx: 100}", "80"), IsEmpty());

@@ -77,6 +77,20 @@ const std::string triangle_with_normals = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0.6 0
 
 } // namespace
 
+TEST(SceneFile, OfVersion2UsesThePathIntegrator) {
+    const std::string rest = "axes: z-up\nmaterials: {m: {model: mirror}}\nobjects: []\n";
+    const Arena old = load("version: 1\n" + rest), path = load("version: 2\n" + rest),
+                whitted = load("version: 2\nintegrator: whitted\n" + rest);
+    EXPECT_EQ(old.scene().integrator, ARHOST_INTEGRATOR_WHITTED);
+    EXPECT_EQ(whitted.scene().integrator, ARHOST_INTEGRATOR_WHITTED);
+    EXPECT_EQ(whitted.scene().ambient[0], old.scene().ambient[0]);
+    EXPECT_EQ(path.scene().integrator, ARHOST_INTEGRATOR_PATH);
+    EXPECT_EQ(load("version: 2\nintegrator: path\n" + rest).scene().integrator, ARHOST_INTEGRATOR_PATH);
+    EXPECT_GT(path.scene().max_depth, old.scene().max_depth);
+    EXPECT_EQ(path.scene().ambient[0], 0);
+    EXPECT_EQ(path.scene().background[0], 0);
+}
+
 TEST(SceneFile, HasDefaults) {
     const Arena arena = load(start + "objects: []\n");
     EXPECT_EQ(arena.scene().axes, ARHOST_AXES_Z_UP);
@@ -379,6 +393,16 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
     const arhost::test::ErrorCase cases[] = {
         {"axes: z-up\n", "1:1: the key 'version' is missing"},
         {"version: 3\naxes: z-up\n", "1:10: version: must be 1 or 2"},
+        {"version: 1\nintegrator: path\naxes: z-up\n", "2:13: integrator: needs 'version: 2'"},
+        {"version: 2\nintegrator: pth\naxes: z-up\n",
+         "2:13: integrator: 'pth' is not one of path, whitted; did you mean 'path'?"},
+        {"version: 2\nintegrator: 3\naxes: z-up\n", "2:13: integrator: '3' is not one of path, whitted"},
+        {"version: 2\naxes: z-up\nambient: 0.2\n",
+         "3:10: ambient: only applies to 'integrator: whitted'; the path integrator computes this light"},
+        {"version: 2\naxes: z-up\nshadow_alpha: {opaque: 1}\n",
+         "3:15: shadow_alpha: only applies to 'integrator: whitted'; the path integrator computes this light"},
+        {"version: 2\naxes: z-up\ncoloured_shadows: true\n",
+         "3:19: coloured_shadows: only applies to 'integrator: whitted'; the path integrator computes this light"},
         {"version: 1\naxes: zup\n", "2:7: axes: 'zup' is not one of z-up, y-up; did you mean 'z-up'?"},
         {"version: 1\naxes: z-up\nmaterial: {}\n", "3:1: material: unknown key; did you mean 'materials'?"},
         {start + "max_depth: 101\n", "5:12: max_depth: must be 0 to 100, but is 101"},

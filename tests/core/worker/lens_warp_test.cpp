@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/lens_warp.hpp"
 
+#include "pixels/linear.hpp"
+
 #include <arhost/shading/lens.hpp>
 
 #include <gtest/gtest.h>
@@ -103,7 +105,63 @@ TEST(LensWarp, ReadsOnlyTheRegionEvenIfItExceedsTheImage) {
     warp.warp(region, none.image); // AddressSanitizer detects reads outside the image
 }
 
+// The linear image that LensWarp writes. Its old content must be replaced.
+struct LinearLensImage {
+    static constexpr std::uint32_t stride = 16 * width + 64;
+    std::vector<std::uint16_t> halves = std::vector<std::uint16_t>(std::size_t{stride} / 2 * height, 0x7e00);
+    arhost_image image{sizeof image, stride, width, height, nullptr, halves.data()};
+    const LinearPixel &at(std::uint32_t x, std::uint32_t y) const { return linear_row(image, y)[x]; }
+};
+
+TEST(LensWarp, InterpolatesLightAndTransmittance) {
+    const arhost_intrinsics in = lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001});
+    LensWarp warp(in, ARHOST_IMAGE_FORM_LINEAR);
+    const arhost_image pinhole = warp.pinhole_image();
+    // A bright object left of the middle of the view, a coloured shadow right of it.
+    const LinearPixel object = linear_pixel({4, 2, 1}, {0, 0, 0}), shadow = linear_pixel({0, 0, 0}, {0.5f, 1, 1.5f});
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x)
+            linear_row(pinhole, y)[x] = x < warp.pinhole().cx ? object : shadow;
+    const LinearLensImage warped;
+    warp.warp({}, warped.image);
+    int edges = 0;
+    for (std::uint32_t y = 0; y < height; ++y)
+        for (std::uint32_t x = 0; x < width; ++x) {
+            const LinearPixel &p = warped.at(x, y);
+            const float covered = float_of(p.added[0]) / 4;
+            edges += covered > 0 && covered < 1;
+            ASSERT_EQ(p.reserved_0 | p.reserved_1, 0);
+            ASSERT_NEAR(float_of(p.added[1]), 2 * covered, 0.01) << x << " " << y;
+            ASSERT_NEAR(float_of(p.transmittance[0]), 0.5f * (1 - covered), 0.01) << x << " " << y;
+            ASSERT_NEAR(float_of(p.transmittance[2]), 1.5f * (1 - covered), 0.01) << x << " " << y;
+        }
+    EXPECT_GT(edges, static_cast<int>(height) / 2);
+    EXPECT_NEAR(float_of(warped.at(10, 120).added[0]), 4, 0.01);
+    EXPECT_NEAR(float_of(warped.at(310, 120).transmittance[2]), 1.5, 0.01);
+}
+
+TEST(LensWarp, LeavesUntouchedPixelsExactlyUntouched) {
+    LensWarp warp(lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}), ARHOST_IMAGE_FORM_LINEAR);
+    const arhost_image pinhole = warp.pinhole_image();
+    for (std::uint32_t y = 0; y < height; ++y)
+        std::fill_n(linear_row(pinhole, y), width, untouched);
+    const LinearLensImage warped;
+    const auto expect_untouched = [&] {
+        for (std::uint32_t i = 0; i < width * height; ++i)
+            ASSERT_EQ(warped.at(i % width, i / width), untouched) << i % width << " " << i / width;
+    };
+    warp.warp({}, warped.image);
+    expect_untouched();
+    for (std::uint32_t y = 0; y < height; ++y)
+        std::fill_n(linear_row(pinhole, y), width, LinearPixel{});
+    warp.warp({sizeof(arhost_render_info), 1, 0, 0, 0, 0, 0, 0, 0}, warped.image);
+    expect_untouched();
+}
+
 TEST(LensWarp, RendersToMemoryThatAGpuCanImport) {
+    LensWarp linear(lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}), ARHOST_IMAGE_FORM_LINEAR);
+    EXPECT_EQ(reinterpret_cast<std::uintptr_t>(linear.pinhole_image().linear) % 4096, 0u);
+    EXPECT_EQ(linear.pinhole_image().rgba, nullptr);
     LensWarp warp(lens(ARHOST_DISTORTION_BROWN, {-0.3, 0.1, 0.002, -0.001}));
     const arhost_image image = warp.pinhole_image();
     EXPECT_EQ(reinterpret_cast<std::uintptr_t>(image.rgba) % 4096, 0u);
