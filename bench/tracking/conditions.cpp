@@ -11,6 +11,7 @@
 
 #include <fiducial/prints.hpp>
 #include <fiducial/rendered_marker.hpp>
+#include <fiducial/search_regions.hpp>
 
 #include <fmt/format.h>
 
@@ -239,19 +240,23 @@ public:
                 throw std::runtime_error(tracker.log());
         }
     }
+    static constexpr unsigned looks = 2; // closer looks of each tracker
     static constexpr const char *names[] = {"tracker_apriltag", "AprilTag", "tracker_aruco", "OpenCV"};
+    // Shows the picture to a tracker until it has taken each closer look in each tile.
     std::optional<Detection> detect(std::size_t which, const GreyFrame &frame) {
         if (which % 2 == 1) {
             const bench::Detections found = which == 1 ? april_tag_(frame) : opencv_(frame);
             return found.contains(0) ? std::optional(Detection{found.at(0)}) : std::nullopt;
         }
-        for (const arhost_observation &seen : trackers_[which / 2].track(frame))
-            if (seen.id == 0) {
-                Detection detection{{}, seen.corner_sigma_px};
-                for (std::size_t i = 0; i < 4; ++i)
-                    detection.corners[i] = {seen.corners_px[i][0], seen.corners_px[i][1]};
-                return detection;
-            }
+        for (std::uint64_t sequence = 0; sequence < looks * fiducial::SearchRegions::tile_count; ++sequence)
+            for (const arhost_observation &seen :
+                 trackers_[which / 2].track(GreyFrame(bench::grey_of(frame), ARHOST_TRANSFER_LINEAR, sequence)))
+                if (seen.id == 0) {
+                    Detection detection{{}, seen.corner_sigma_px};
+                    for (std::size_t i = 0; i < 4; ++i)
+                        detection.corners[i] = {seen.corners_px[i][0], seen.corners_px[i][1]};
+                    return detection;
+                }
         return std::nullopt;
     }
 

@@ -19,7 +19,6 @@ std::vector<std::optional<MeasuredCorners>> FrameRefinement::refine(std::span<co
     constexpr double work_of_edges = 1'300;
     // More than the work of most prints: as many as the budget suffices for are fitted before it is checked again.
     constexpr double max_work = 10'000;
-    constexpr std::size_t min_part = 2;
     const auto in_parallel = [&](std::size_t count, const auto &step) {
         cv::parallel_for_(
             {0, static_cast<int>(count)},
@@ -47,9 +46,9 @@ std::vector<std::optional<MeasuredCorners>> FrameRefinement::refine(std::span<co
         const double area_px = (corners[2] - corners[0]).cross(corners[3] - corners[1]) / 2;
         return std::tuple(-area_px, corners[0].x, corners[0].y, i);
     });
-    for (std::span<const std::size_t> rest = order; !rest.empty() && work_left_ > 0;) {
-        const auto affordable = static_cast<std::size_t>(work_left_ / max_work);
-        const auto part = rest.first(std::min(std::max(affordable, min_part), rest.size()));
+    for (std::span<const std::size_t> rest = order; !rest.empty() && work_left_ > reserved_;) {
+        const auto affordable = static_cast<std::size_t>((work_left_ - reserved_) / max_work);
+        const auto part = rest.first(std::min(std::max<std::size_t>(affordable, 1), rest.size()));
         rest = rest.subspan(part.size());
         std::vector<std::uint64_t> work(part.size());
         in_parallel(part.size(), [&](std::size_t i) {

@@ -29,11 +29,14 @@ public:
     // only on the frame and on the order of the calls. Uses up to `threads` threads (0: as many as OpenCV has).
     std::vector<std::optional<MeasuredCorners>> refine(std::span<const RoughMarker> markers, int threads = 0);
 
+    // Reserves a part of the budget, in the same unit, for other work on the frame. Further calls reserve no more.
+    void reserve(double work_per_px) { reserved_ = work_per_px * static_cast<double>(grey_.total()); }
+
 private:
     const cv::Mat &grey_;
     arhost_transfer transfer_;
     const Lens &lens_;
-    double work_left_;
+    double work_left_, reserved_ = 0;
 };
 
 } // namespace arhost::fiducial

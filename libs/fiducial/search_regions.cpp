@@ -93,53 +93,56 @@ SearchRegions::SearchRegions(const arhost_tracker_setup &setup,
         markers_.push_back({marker.id, marker.family, marker.target, traits.at(marker.family)});
 }
 
+std::vector<arhost_observation> SearchRegions::verified_markers(const arhost_track_request &request,
+                                                                const Verify &verify) const {
+    std::vector<arhost_observation> verified;
+    std::vector<const arhost_expected_marker *> order;
+    for (const arhost_expected_marker &expected : elements(request.expected, request.expected_count))
+        order.push_back(&expected);
+    std::ranges::stable_sort(order, std::ranges::greater(), area_px2); // the largest first
+    for (const arhost_expected_marker *expected : order) {
+        const Marker &marker = markers_.at(expected->marker);
+        if (const auto one = verify(*expected, marker.id, marker.family))
+            verified.push_back(*one);
+    }
+    return verified;
+}
+
 Verified SearchRegions::verified(const arhost_track_request &request, const Verify &verify) const {
-    const auto verify_all = [this, &request, &verify] {
-        std::vector<arhost_observation> verified;
-        const auto all = elements(request.expected, request.expected_count);
-        std::vector<const arhost_expected_marker *> order;
-        for (const arhost_expected_marker &expected : all)
-            order.push_back(&expected);
-        std::ranges::stable_sort(order, std::ranges::greater(), area_px2); // the largest first
-        for (const arhost_expected_marker *expected : order) {
-            const Marker &marker = markers_.at(expected->marker);
-            if (const auto one = verify(*expected, marker.id, marker.family))
-                verified.push_back(*one);
-        }
-        return verified;
-    };
     if (request.expected_count == 0)
         return {};
     // If no thread can be started, the caller of get() verifies the markers.
     const std::launch by_any_thread = std::launch::async | std::launch::deferred;
-    return std::async(request.search_everywhere ? by_any_thread : std::launch::deferred, verify_all).share();
+    return std::async(request.search_everywhere ? by_any_thread : std::launch::deferred,
+                      [this, &request, &verify] { return verified_markers(request, verify); })
+        .share();
 }
 
 Seen SearchRegions::search(const arhost_track_request &request, const RegionLimits &limits,
                            std::span<const Pass> passes, const Verified &verified) const {
     const cv::Rect whole = whole_of(request);
     Seen seen;
-    for (const Pass &pass : passes)
-        seen.add(detected(pass.detect, request.search_everywhere
-                                           ? std::vector{whole}
-                                           : rectangles(request, limits, pass.family, markers_of(verified))));
+    std::vector<const Pass *> partial; // passes that have not searched the whole frame
+    for (const Pass &pass : passes) {
+        const std::vector<cv::Rect> regions = request.search_everywhere
+                                                  ? std::vector{whole}
+                                                  : rectangles(request, limits, pass.family, markers_of(verified));
+        seen.add(detected(pass.detect, regions));
+        if (regions != std::vector{whole})
+            partial.push_back(&pass);
+    }
     const std::span<const arhost_observation> known = markers_of(verified);
     if (!request.search_everywhere)
         seen.candidates += known.size();
     seen.markers.insert(seen.markers.end(), known.begin(), known.end());
 
-    seen.add(look_closer(passes, missed_markers(seen.markers), [&](const CloserLook &look, const Indices &wanted) {
-        std::vector<cv::Rect> regions = around_expected(
-            request, limits, [&](const arhost_expected_marker &one) { return wanted.contains(one.marker); });
-        int area = tile_width_px * tile_height_px; // remaining area for a slow look
-        if (look.is_slow)
-            std::erase_if(regions, [&](const cv::Rect &region) {
-                const bool fits = region.area() <= area;
-                area -= fits ? region.area() : 0;
-                return !fits;
-            });
-        return regions;
-    }));
+    const Indices missed = missed_markers(seen.markers);
+    std::vector<LookAt> looks = looks_at_expected(request, limits, passes, missed);
+    if (looks.empty() && request.search_everywhere)
+        looks = look_in_turn(request, limits, passes, missed);
+    for (const LookAt &look : looks)
+        seen.add(look_closer(look, missed));
+
     if (miss_a_target(request, seen.markers)) {
         const auto is_new = [&](std::int32_t id, std::uint32_t family) {
             return std::ranges::none_of(seen.markers, [&](const arhost_observation &known) {
@@ -147,37 +150,81 @@ Seen SearchRegions::search(const arhost_track_request &request, const RegionLimi
             });
         };
         Seen everywhere;
-        for (const Pass &pass : passes)
-            everywhere.add(detected(pass.detect, {whole}, is_new));
+        for (const Pass *pass : partial)
+            everywhere.add(detected(pass->detect, {whole}, is_new));
         std::erase_if(everywhere.markers, [&](const arhost_observation &one) { return !is_new(one.id, one.family); });
         seen.add(everywhere);
     }
-    if (request.search_everywhere)
-        seen.add(look_closer(passes, missed_markers(seen.markers), [&](const CloserLook &look, const Indices &) {
-            return std::vector{look.is_slow ? tile_of(whole.size(), request.frame->sequence) : whole};
-        }));
     // One candidate may be a marker of several families.
     seen.candidates = std::max(seen.candidates, seen.markers.size());
     return seen;
 }
 
-template <class RegionsOf>
-Seen SearchRegions::look_closer(std::span<const Pass> passes, const Indices &missed,
-                                const RegionsOf &regions_of) const {
+bool SearchRegions::needs_closer_look(const arhost_track_request &request, std::span<const arhost_observation> seen,
+                                      const Family *family) const {
+    const Indices wanted = wanted_of(family, missed_markers(seen));
+    return request.search_everywhere
+               ? !wanted.empty()
+               : std::ranges::any_of(
+                     elements(request.expected, request.expected_count),
+                     [&](std::uint32_t marker) { return wanted.contains(marker); }, &arhost_expected_marker::marker);
+}
+
+SearchRegions::Indices SearchRegions::wanted_of(const Family *family, const Indices &missed) const {
+    Indices wanted;
+    std::ranges::copy_if(missed, std::inserter(wanted, wanted.end()), [&](std::uint32_t marker) {
+        return !family || family->lists(markers_[marker].id, markers_[marker].family);
+    });
+    return wanted;
+}
+
+std::vector<SearchRegions::LookAt> SearchRegions::looks_at_expected(const arhost_track_request &request,
+                                                                    const RegionLimits &limits,
+                                                                    std::span<const Pass> passes,
+                                                                    const Indices &missed) const {
+    std::vector<LookAt> looks;
+    for (const Pass &pass : passes) {
+        const Indices wanted = wanted_of(pass.family, missed);
+        const std::vector<cv::Rect> regions = around_expected(
+            request, limits, [&](const arhost_expected_marker &one) { return wanted.contains(one.marker); });
+        for (const CloserLook &look : pass.closer_looks) {
+            LookAt &added = looks.emplace_back(LookAt{&look, regions});
+            double left = look.max_part * whole_of(request).area();
+            std::erase_if(added.regions, [&](const cv::Rect &region) {
+                const bool fits = region.area() <= left;
+                left -= fits ? region.area() : 0;
+                return !fits;
+            });
+        }
+    }
+    std::erase_if(looks, [](const LookAt &look) { return look.regions.empty(); });
+    return looks;
+}
+
+std::vector<SearchRegions::LookAt> SearchRegions::look_in_turn(const arhost_track_request &request,
+                                                               const RegionLimits &limits,
+                                                               std::span<const Pass> passes,
+                                                               const Indices &missed) const {
+    std::vector<const CloserLook *> looks;
+    for (const Pass &pass : passes)
+        if (!wanted_of(pass.family, missed).empty())
+            for (const CloserLook &look : pass.closer_looks)
+                looks.push_back(&look);
+    if (looks.empty())
+        return {};
+    const auto count = static_cast<unsigned>(looks.size());
+    const unsigned turn = turn_of(request.frame->sequence, count * tile_count);
+    const CloserLook *look = looks[turn % count];
+    const cv::Rect whole = whole_of(request);
+    return {{look, {look->is_slow() ? tile_of(whole.size(), limits, turn / count) : whole}}};
+}
+
+Seen SearchRegions::look_closer(const LookAt &look, const Indices &missed) const {
     const auto is_missed = [&](std::int32_t id, std::uint32_t family) {
         return std::ranges::any_of(
             missed, [&](std::uint32_t i) { return markers_[i].id == id && markers_[i].family == family; });
     };
-    Seen closer;
-    for (const Pass &pass : passes) {
-        Indices wanted;
-        std::ranges::copy_if(missed, std::inserter(wanted, wanted.end()), [&](std::uint32_t marker) {
-            return !pass.family || pass.family->lists(markers_[marker].id, markers_[marker].family);
-        });
-        if (!wanted.empty())
-            for (const CloserLook &look : pass.closer_looks)
-                closer.add(detected(look.detect, regions_of(look, wanted), is_missed));
-    }
+    Seen closer = detected(look.look->detect, look.regions, is_missed);
     std::erase_if(closer.markers, [&](const arhost_observation &one) {
         return one.false_positive_rate > max_rate_of_closer_look || !is_missed(one.id, one.family);
     });
@@ -197,26 +244,22 @@ SearchRegions::Indices SearchRegions::missed_markers(std::span<const arhost_obse
     return missed;
 }
 
-cv::Rect SearchRegions::tile_of(cv::Size frame, std::uint64_t sequence) {
-    constexpr int overlap_px = 96; // a marker of up to this size is completely in at least one tile
-    const cv::Size tile(std::min(frame.width, tile_width_px), std::min(frame.height, tile_height_px));
-    const auto count = [](int length, int tile_length) {
-        return length == tile_length
-                   ? 1U
-                   : 1U + static_cast<unsigned>((length - overlap_px - 1) / (tile_length - overlap_px));
+cv::Rect SearchRegions::tile_of(cv::Size frame, const RegionLimits &limits, unsigned index) {
+    const auto along = [&](int length, unsigned position, unsigned count) {
+        const int part = std::max((3 * length + 6) / 7, std::min(length, limits.min_side_px));
+        const int last = static_cast<int>(count) - 1, begin = static_cast<int>(position) * (length - part) / last;
+        return Interval{begin / limits.grid_px * limits.grid_px, begin + part};
     };
-    const auto begin = [](unsigned index, unsigned tiles, int length, int tile_length) {
-        return tiles == 1 ? 0 : static_cast<int>(index * static_cast<unsigned>(length - tile_length) / (tiles - 1));
-    };
-    const unsigned columns = count(frame.width, tile.width), rows = count(frame.height, tile.height);
-    // SplitMix64. With a fixed order, some tiles might never be searched if only every nth frame is searched.
-    std::uint64_t hash = (sequence + 1) * 0x9E3779B97F4A7C15;
+    const Interval x = along(frame.width, index % tile_columns, tile_columns),
+                   y = along(frame.height, index / tile_columns, tile_rows);
+    return {x.begin, y.begin, x.end - x.begin, y.end - y.begin};
+}
+
+unsigned SearchRegions::turn_of(std::uint64_t sequence, unsigned count) {
+    std::uint64_t hash = (sequence / count + 1) * 0x9E3779B97F4A7C15; // SplitMix64
     hash = (hash ^ (hash >> 30)) * 0xBF58476D1CE4E5B9;
     hash = (hash ^ (hash >> 27)) * 0x94D049BB133111EB;
-    const auto index = static_cast<unsigned>((hash ^ (hash >> 31)) % (columns * rows));
-    return {{begin(index % columns, columns, frame.width, tile.width),
-             begin(index / columns, rows, frame.height, tile.height)},
-            tile};
+    return static_cast<unsigned>((sequence % count + (hash ^ (hash >> 31)) % count) % count);
 }
 
 std::vector<cv::Rect> SearchRegions::rectangles(const arhost_track_request &request, const RegionLimits &limits,

@@ -40,7 +40,11 @@ using Detect = std::function<void(const cv::Rect &region, Seen &seen)>;
 // A search with other thresholds or resampled pixels, for targets that the normal search misses.
 struct CloserLook {
     Detect detect;
-    bool is_slow; // searches only a tile of the frame
+    // The largest part of the frame that the look searches at expected places. A look with less than 1 is slow: where
+    // nothing is expected, it searches a tile.
+    double max_part = 1;
+
+    bool is_slow() const { return max_part < 1; }
 };
 
 // A search for the markers of `family`, or for those of all families if `family` is null.
@@ -77,15 +81,18 @@ public:
     SearchRegions(const arhost_tracker_setup &setup,
                   const std::function<FamilyTraits(const std::string &family)> &traits_of);
 
-    // Verifies the expected markers. If the whole frame is to be searched, another thread verifies them, because
+    // Verifies the expected markers, the largest first.
+    std::vector<arhost_observation> verified_markers(const arhost_track_request &request, const Verify &verify) const;
+    // Does so when the result is needed. If the whole frame is to be searched, another thread verifies them, because
     // detection does not use all processors all the time. `request`, `verify` and the objects that `verify` uses must
     // outlive the result.
     Verified verified(const arhost_track_request &request, const Verify &verify) const;
 
     // Returns the verified markers, and the markers that the passes detect where the other expected markers should
     // be. If a target is not at its expected place, also returns the other markers that the passes detect in the
-    // whole frame. Takes closer looks for targets that are still missing: first where their markers are expected, and
-    // then, if the request asks to search everywhere, in the whole frame (slow looks: in tile_of()). The result may
+    // whole frame. Takes closer looks for targets that are missing after the first search: all looks where their
+    // markers are expected. If there is no such place and the request asks to search everywhere, a single look in the
+    // whole frame (a slow look: in a tile); the number of the frame tells which look, and which tile. The result may
     // contain a marker twice.
     Seen search(const arhost_track_request &request, const RegionLimits &limits, std::span<const Pass> passes,
                 const Verified &verified = {}) const;
@@ -101,10 +108,19 @@ public:
     // tracker must then search the whole frame.
     bool miss_a_target(const arhost_track_request &request, std::span<const arhost_observation> seen) const;
 
-    // Returns the part of a frame that slow closer looks search, at most tile_width_px × tile_height_px. The part
-    // changes with the frame number in a pseudo-random order.
-    static cv::Rect tile_of(cv::Size frame, std::uint64_t sequence);
-    static constexpr int tile_width_px = 480, tile_height_px = 360;
+    // Returns whether search() takes a closer look for markers of `family` (null: of any family) if its first search
+    // finds only `seen`.
+    bool needs_closer_look(const arhost_track_request &request, std::span<const arhost_observation> seen,
+                           const Family *family = nullptr) const;
+
+    // The tiles of a frame that slow looks search, 3/7 of its width and height each, in columns and rows that
+    // overlap. A marker of up to 1/7 of the width and 1/5 of the height is completely in at least one tile.
+    static constexpr unsigned tile_columns = 3, tile_rows = 4, tile_count = tile_columns * tile_rows;
+    static cv::Rect tile_of(cv::Size frame, const RegionLimits &limits, unsigned index);
+    // Returns a number below `count` for a frame. Each number occurs once among `count` successive frames from a
+    // multiple of `count`, and so at least once among any 2·count − 1. Each begins with a pseudo-random number,
+    // because a regular order omits numbers if only every nth frame is searched.
+    static unsigned turn_of(std::uint64_t sequence, unsigned count);
 
 private:
     struct Marker {
@@ -119,10 +135,22 @@ private:
     };
     using Indices = std::set<std::uint32_t>; // indices of markers_
 
-    // Returns the missed markers that the closer looks of all passes find. `regions_of` returns the regions that a
-    // look has to search for the missed markers of its pass.
-    template <class RegionsOf>
-    Seen look_closer(std::span<const Pass> passes, const Indices &missed, const RegionsOf &regions_of) const;
+    // A closer look and the regions that it searches.
+    struct LookAt {
+        const CloserLook *look;
+        std::vector<cv::Rect> regions; // not empty
+    };
+
+    // Returns the markers of `missed` that belong to `family`, or all if `family` is null.
+    Indices wanted_of(const Family *family, const Indices &missed) const;
+    // Returns all closer looks where the missed markers are expected.
+    std::vector<LookAt> looks_at_expected(const arhost_track_request &request, const RegionLimits &limits,
+                                          std::span<const Pass> passes, const Indices &missed) const;
+    // Returns the closer look whose turn it is in this frame; none if no pass has one for the missed markers.
+    std::vector<LookAt> look_in_turn(const arhost_track_request &request, const RegionLimits &limits,
+                                     std::span<const Pass> passes, const Indices &missed) const;
+    // Returns the missed markers that the look finds.
+    Seen look_closer(const LookAt &look, const Indices &missed) const;
     // Returns the markers of those targets of which no marker has been seen. Excludes families with so few bits that
     // a closer look would often cause false positives.
     Indices missed_markers(std::span<const arhost_observation> seen) const;

@@ -57,10 +57,12 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_REAL, "min_decision_margin", "0",
                    "Minimum bit contrast of a tag, in grey levels from 0 to 255; tags of lower contrast are ignored.",
                    0, 255),
-    arhost::option(ARHOST_OPTION_BOOL, "closer_look", "true",
-                   "If a target is not found, searches a part of the frame again, at twice the resolution, and with "
-                   "sharper bits and more candidates for corners: finds more of the strongly tilted, blurred, small "
-                   "and partly hidden tags of families with more than 25 bits."),
+    arhost::option(
+        ARHOST_OPTION_BOOL, "closer_look", "true",
+        "If a target is not found, searches again, at twice the resolution or with sharper bits and more "
+        "candidates for corners: where the target is expected, otherwise by turns in a part of the frame. "
+        "Finds more of the strongly tilted, blurred, small and partly hidden tags of families with more than "
+        "25 bits."),
     arhost::option(ARHOST_OPTION_INTEGER, "threads", "1",
                    "Number of detector threads; it does not affect the result.", 1, 64),
 };
@@ -130,6 +132,7 @@ struct Look {
 // If an object hides a corner, the places where its outline crosses the square look like corners, too. `sharpened`
 // therefore tries more places.
 constexpr Look enlarged{2}, sharpened{1, 2, 20};
+constexpr double max_part = 1 / 8.0; // of the frame, that each of them searches at expected places
 
 class AprilTagTracker {
 public:
@@ -196,9 +199,9 @@ public:
         };
         fiducial::Pass pass{.family = nullptr, .detect = detection({})};
         if (looks_closer_)
-            pass.closer_looks.push_back({detection(enlarged), true});
+            pass.closer_looks.push_back({detection(enlarged), max_part});
         if (looks_closer_ && min_margin_ == 0 && sharpening_ < sharpened.min_sharpening)
-            pass.closer_looks.push_back({detection(sharpened), true});
+            pass.closer_looks.push_back({detection(sharpened), max_part});
         search_->track(request, observations, {grid_px(), apriltag::min_image_side_px(*detector_)}, {&pass, 1});
     }
 

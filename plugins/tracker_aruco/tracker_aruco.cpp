@@ -11,6 +11,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
@@ -68,8 +69,9 @@ constexpr arhost_option_descriptor options[] = {
         -1, 1),
     arhost::option(
         ARHOST_OPTION_BOOL, "closer_look", "true",
-        "If a target is not found, searches the frame again, smoothed and in part at twice the resolution: "
-        "finds more of the noisy, dim and small markers of dictionaries with more than 25 bits."),
+        "If a target is not found, searches again, smoothed or at twice the resolution, with other thresholds: where "
+        "the target is expected, otherwise by turns in the frame or a part of it. Finds more of the noisy, dim, "
+        "blurred and small markers of dictionaries with more than 25 bits."),
     arhost::option(ARHOST_OPTION_INTEGER, "border_bits", "1", "Width of the black border in cells.", 1, 8),
     arhost::option(ARHOST_OPTION_BOOL, "inverted", "false", "Also detects white-on-black markers."),
 };
@@ -148,6 +150,9 @@ struct Look {
     double sigma_px = 0;                      // standard deviation of a Gaussian blur
     std::optional<double> threshold = {};     // adaptiveThreshConstant, in grey levels
     std::optional<double> min_deviation = {}; // minOtsuStdDev: standard deviation of the grey levels of a marker
+    std::array<int, 2> windows_px = {}; // of the adaptive threshold: the smallest and the largest; 0: the options
+
+    bool is_closer() const { return windows_px[0] > 0; }
 
     cv::Mat prepared(const cv::Mat &grey) const {
         cv::Mat scaled = grey, blurred; // copies, because `grey` is read-only
@@ -159,7 +164,17 @@ struct Look {
         return blurred;
     }
 };
-constexpr Look smoothed{1, 1, 2, 1}, enlarged{2, 0, 3, 1};
+// Each window takes a third of the time of a normal search. The small one of `enlarged` suits small and strongly
+// tilted markers, the large one blurred markers. A lower threshold lets the noise of uniform surfaces through, whose
+// outlines take longer than all else.
+constexpr Look smoothed{1, 1, 2, 1, {23, 23}}, enlarged{2, 0, 5, 1, {13, 45}};
+
+// Of the frame, that `enlarged` searches at expected places. If all contours of a picture are there, that takes as
+// long as a normal search of the frame.
+constexpr double max_part = 1 / 16.0;
+
+// The budget of refinement. OpenCV takes about 10 ns for each pixel, refinement with all of the budget about as long.
+constexpr double work_per_px = 0.12, work_of_closer_look_per_px = 0.08;
 
 class ArucoTracker {
 public:
@@ -231,24 +246,28 @@ public:
 
     void track(const arhost_track_request &request, arhost::Observations &observations) {
         const cv::Mat grey = fiducial::grey_of(*request.frame);
-        // OpenCV takes about 10 ns for each pixel, refinement at most about as long.
-        constexpr double work_per_px = 0.12;
         fiducial::FrameRefinement refinement(grey, request.frame->format->transfer, search_->lens(), work_per_px);
-        const fiducial::Verify verify = [&](const arhost_expected_marker &expected, std::int32_t id,
-                                            std::uint32_t family) {
-            return verify_one(grey, expected, id, family, refinement);
+        const fiducial::SearchRegions &regions = search_->regions();
+        const auto verification = [&](fiducial::FrameRefinement *by) {
+            return [&, by](const arhost_expected_marker &expected, std::int32_t id, std::uint32_t family) {
+                return verify_one(grey, expected, id, family, by);
+            };
         };
-        const auto verified = refine_edges_ ? search_->regions().verified(request, verify) : fiducial::Verified();
+        if (looks_closer_ && request.expected_count > 0 &&
+            regions.needs_closer_look(request, regions.verified_markers(request, verification(nullptr))))
+            refinement.reserve(work_of_closer_look_per_px);
+        const fiducial::Verify verify = verification(&refinement);
+        const auto verified = refine_edges_ ? regions.verified(request, verify) : fiducial::Verified();
         std::vector<fiducial::Pass> passes;
         for (const Detectable &detectable : detectables_) {
             const auto detection = [&](const Look &look) {
                 return [&, look](const cv::Rect &region, auto &seen) {
-                    observe(grey, region, look, detectable, verified, refinement, seen);
+                    observe(request, grey, region, look, detectable, verified, refinement, seen);
                 };
             };
             fiducial::Pass &pass = passes.emplace_back(fiducial::Pass{&detectable.family, detection({})});
             if (looks_closer_)
-                pass.closer_looks = {{detection(smoothed), false}, {detection(enlarged), true}};
+                pass.closer_looks = {{detection(smoothed)}, {detection(enlarged), max_part}};
         }
         search_->track(request, observations, {}, passes, verified);
     }
@@ -262,13 +281,18 @@ public:
 
 private:
     // Adds the markers of a dictionary in a region of the frame to `seen`, except the verified ones.
-    void observe(const cv::Mat &grey, const cv::Rect &region, const Look &look, const Detectable &detectable,
-                 const fiducial::Verified &verified, fiducial::FrameRefinement &refinement,
-                 fiducial::Seen &seen) const {
+    void observe(const arhost_track_request &request, const cv::Mat &grey, const cv::Rect &region, const Look &look,
+                 const Detectable &detectable, const fiducial::Verified &verified,
+                 fiducial::FrameRefinement &refinement, fiducial::Seen &seen) const {
         const cv::aruco::Dictionary &table = detectable.dictionary.table;
         cv::aruco::DetectorParameters parameters = detectable.parameters;
         parameters.adaptiveThreshConstant = look.threshold.value_or(parameters.adaptiveThreshConstant);
         parameters.minOtsuStdDev = look.min_deviation.value_or(parameters.minOtsuStdDev);
+        if (look.is_closer()) {
+            parameters.adaptiveThreshWinSizeMin = look.windows_px[0];
+            parameters.adaptiveThreshWinSizeMax = look.windows_px[1];
+            parameters.adaptiveThreshWinSizeStep = std::max(look.windows_px[1] - look.windows_px[0], 1);
+        }
         // OpenCV divides the perimeter by the longer side of the image that it receives.
         parameters.minMarkerPerimeterRate *=
             static_cast<double>(std::max(grey.cols, grey.rows)) / std::max(region.width, region.height);
@@ -285,6 +309,7 @@ private:
         };
         std::vector<Marker> markers; // those that are listed begin
         std::vector<fiducial::RoughMarker> rough;
+        std::vector<arhost_observation> listed(known.begin(), known.end());
         for (const bool is_listed : {true, false})
             for (std::size_t i = 0; i < found.ids.size(); ++i) {
                 Marker marker{found.ids[i], detectable.family.lists(found.ids[i]), {}};
@@ -299,6 +324,8 @@ private:
                 const auto is_same = [&](const arhost_observation &one) {
                     return fiducial::are_of_one_print(one, seen_roughly);
                 };
+                if (is_listed)
+                    listed.push_back(seen_roughly);
                 if (is_listed && (std::ranges::any_of(known, is_same) ||
                                   (seen.wants && !seen.wants(marker.id, seen_roughly.family))))
                     continue;
@@ -306,6 +333,9 @@ private:
                     rough.push_back(rough_marker(detectable.dictionary, marker.id, marker.corners.corners_px));
                 markers.push_back(marker);
             }
+        if (looks_closer_ && !look.is_closer() && request.search_everywhere &&
+            search_->regions().needs_closer_look(request, listed, &detectable.family))
+            refinement.reserve(work_of_closer_look_per_px);
         const auto refined = refinement.refine(rough);
         std::vector<std::optional<arhost_observation>> observations(markers.size());
         const auto observe_one = [&](std::size_t i) {
@@ -330,10 +360,11 @@ private:
                 seen.markers.push_back(*one);
     }
 
-    // Reads an expected marker at its expected place, without detection. Returns std::nullopt if this fails.
+    // Reads an expected marker at its expected place, without detection, and refines its corners if `refinement` is
+    // set. Returns std::nullopt if this fails.
     std::optional<arhost_observation> verify_one(const cv::Mat &grey, const arhost_expected_marker &expected,
                                                  std::int32_t id, std::uint32_t family,
-                                                 fiducial::FrameRefinement &refinement) const {
+                                                 fiducial::FrameRefinement *refinement) const {
         const auto found =
             std::ranges::find_if(detectables_, [&](const Detectable &one) { return one.family.lists(id, family); });
         if (found == detectables_.end())
@@ -349,8 +380,10 @@ private:
         if (!std::ranges::all_of(corners, [&](const cv::Point2d &corner) { return frame.contains(corner); }) ||
             !is_there(read_upright(grey, corners, found->dictionary, id)))
             return std::nullopt;
+        if (!refinement)
+            return found->family.observation(id, {corners});
         const std::array rough = {rough_marker(found->dictionary, id, corners)};
-        const auto measured = refinement.refine(rough).front();
+        const auto measured = refinement->refine(rough).front();
         if (!measured)
             return std::nullopt;
         const Reading reading = read_upright(grey, measured->corners_px, found->dictionary, id);

@@ -87,16 +87,26 @@ struct Difficult {
     }
 };
 
+// Shows a picture until so many markers are seen, but not longer than it takes until each closer look has been taken
+// in each tile. Returns what is seen in the last frame.
+inline std::vector<arhost_observation> track_until_seen(Tracker &tracker, const cv::Mat &picture,
+                                                        std::size_t count = 1, std::uint64_t first_sequence = 0) {
+    constexpr std::uint64_t frames_of_all_turns = 47; // for one family
+    std::vector<arhost_observation> seen;
+    for (std::uint64_t i = 0; i < frames_of_all_turns && seen.size() < count; ++i)
+        seen = tracker.track(GreyFrame(picture, ARHOST_TRANSFER_LINEAR, first_sequence + i));
+    return seen;
+}
+
 // Expects that a tracker finds the marker only in a closer look, and in a large frame whenever it is expected.
 inline void expect_found_in_closer_look(const std::string &plugin, const Difficult &marker) {
-    const GreyFrame frame(marker.picture(tag(3)));
+    const cv::Mat picture = marker.picture(tag(3));
     Tracker tracker(plugin);
     ASSERT_EQ(tracker.start(test_camera, {{3}}), ARHOST_STATUS_OK) << tracker.log();
     for (const auto &[closer_look, count] : {std::pair{"true", 1u}, {"false", 0u}, {"true", 1u}}) {
         EXPECT_EQ(tracker.set("closer_look", closer_look), ARHOST_STATUS_OK) << tracker.log();
-        EXPECT_EQ(tracker.track(frame).size(), count) << closer_look;
+        EXPECT_EQ(track_until_seen(tracker, picture).size(), count) << closer_look;
     }
-    const cv::Mat picture = marker.picture(tag(3));
     cv::Mat wide(720, 1280, CV_8U, cv::Scalar(picture.at<uint8_t>(0, 0)));
     const cv::Rect place(430, 210, picture.cols, picture.rows);
     picture.copyTo(wide(place));
@@ -444,16 +454,31 @@ TEST_P(FiducialTracker, FindsSmallTiltedBlurredDimAndNoisyMarkers) {
                                  {"blurred", 60, 30, 3.8},
                                  {"dim", 60, 30, 0.6, 0.06},
                                  {"noisy", 60, 30, 0.6, 1, 40}}) {
-        const auto seen = track(one.picture(tag(3)), {{3}});
+        ASSERT_EQ(tracker_.start(test_camera, {{3}}), ARHOST_STATUS_OK);
+        const auto seen = track_until_seen(tracker_, one.picture(tag(3)));
         ASSERT_EQ(seen.size(), 1u) << one.name;
         EXPECT_LT(greatest_distance_px(seen[0], corners_of(one.truth(), test_camera, 100)), 0.5) << one.name;
     }
 }
 
+TEST_P(FiducialTracker, FindsASmallMarkerAnywhereBeforeAllTurnsHavePassed) {
+    ASSERT_EQ(tracker_.start(test_camera, {{3}}), ARHOST_STATUS_OK);
+    std::uint64_t sequence = 1000;
+    for (const double x : {-1400, 0, 1400})
+        for (const double y : {-1000, 1000}) {
+            const Mt truth = pose_of(x, y, 3200, 20, -15, 10);
+            const auto seen = track_until_seen(tracker_, picture_of({{tag(3), 100, truth}}), 1, sequence);
+            ASSERT_EQ(seen.size(), 1u) << x << ' ' << y;
+            EXPECT_LT(greatest_distance_px(seen[0], corners_of(truth, test_camera, 100)), 0.5);
+            sequence += 17;
+        }
+}
+
 TEST_P(FiducialTracker, TakesACloserLookWhereASmallMarkerIsExpected) {
     const Mt small = pose_of(-700, 500, 3200, 20, -15, 10), large = pose_of(60, -20, 500);
     const cv::Mat picture = picture_of({{tag(3), 100, small}, {tag(5), 100, large}});
-    ASSERT_EQ(track(picture, {{3}, {5}}).size(), 2u);
+    ASSERT_EQ(tracker_.start(test_camera, {{3}, {5}}), ARHOST_STATUS_OK);
+    ASSERT_EQ(track_until_seen(tracker_, picture, 2).size(), 2u);
     const auto seen =
         tracker_.track(GreyFrame(picture), {expected_at(0, corners_of(small, test_camera, 100))}, false);
     ASSERT_EQ(seen.size(), 1u) << "not by a search of the whole frame";
@@ -516,13 +541,15 @@ TEST_P(FiducialTracker, SearchesRegionsOfTinyFrames) {
 }
 
 TEST_P(FiducialTracker, ReportsAMarkerInTheSameWayIfAnotherOneIsMissed) {
-    const GreyFrame frame(picture_of({{tag(3), 100, pose_of(20, 10, 400, 20, 10, 30)}}));
+    const cv::Mat picture = picture_of({{tag(3), 100, pose_of(20, 10, 400, 20, 10, 30)}});
     ASSERT_EQ(tracker_.start(test_camera, {{3}}), ARHOST_STATUS_OK);
-    const auto alone = tracker_.track(frame);
-    ASSERT_EQ(tracker_.start(test_camera, {{3}, {4}}), ARHOST_STATUS_OK); // takes a closer look for marker 4
-    const auto seen = tracker_.track(frame);
-    ASSERT_EQ(seen.size(), 1u);
-    EXPECT_EQ(std::memcmp(seen.data(), alone.data(), sizeof seen[0]), 0);
+    const auto alone = tracker_.track(GreyFrame(picture));
+    ASSERT_EQ(tracker_.start(test_camera, {{3}, {4}}), ARHOST_STATUS_OK); // takes closer looks for marker 4
+    for (const std::uint64_t sequence : {0, 1}) {
+        const auto seen = tracker_.track(GreyFrame(picture, ARHOST_TRANSFER_LINEAR, sequence));
+        ASSERT_EQ(seen.size(), 1u);
+        EXPECT_EQ(std::memcmp(seen.data(), alone.data(), sizeof seen[0]), 0);
+    }
 }
 
 // The corners of the enlarged picture must not be shifted by a part of a pixel.
@@ -535,7 +562,7 @@ TEST_P(FiducialTracker, FindsCornersOfSmallMarkersWithoutBias) {
     int found = 0;
     for (int i = 0; i < 40; ++i) {
         const Mt truth = pose_of(10 + 0.37 * i, 5 - 0.29 * i, 450 * 100 / 14.0, 30, 0, 9 * i);
-        const auto seen = tracker.track(GreyFrame(picture_of({{tag(3), 100, truth}})));
+        const auto seen = track_until_seen(tracker, picture_of({{tag(3), 100, truth}}));
         if (seen.empty())
             continue;
         const auto corners = corners_of(truth, test_camera, 100);
@@ -548,15 +575,17 @@ TEST_P(FiducialTracker, FindsCornersOfSmallMarkersWithoutBias) {
 }
 
 TEST_P(FiducialTracker, DoesNotModifyTheFrame) {
-    const GreyFrame frame(picture_of({{tag(3), 100, pose_of(0, 0, 400)}}));
-    const std::vector<uint8_t> before(frame.slot().data(), frame.slot().data() + frame.slot().size());
-    ASSERT_EQ(tracker_.start(test_camera, {{3, 100}}), ARHOST_STATUS_OK);
-    EXPECT_EQ(tracker_.track(frame).size(), 1u);
-    EXPECT_TRUE(std::equal(before.begin(), before.end(), frame.slot().data()));
-    ASSERT_EQ(tracker_.start(test_camera, {{3, 100}, {4, 100}}), ARHOST_STATUS_OK); // a closer look for marker 4
-    EXPECT_EQ(tracker_.track(frame).size(), 1u);
-    EXPECT_TRUE(std::equal(before.begin(), before.end(), frame.slot().data()));
-    EXPECT_TRUE(frame.slot().intact());
+    const cv::Mat picture = picture_of({{tag(3), 100, pose_of(0, 0, 400)}});
+    for (const std::vector<Listed> &listed : {std::vector<Listed>{{3}}, {{3}, {4}}}) { // closer looks for marker 4
+        ASSERT_EQ(tracker_.start(test_camera, listed), ARHOST_STATUS_OK);
+        for (const std::uint64_t sequence : {0, 1}) {
+            const GreyFrame frame(picture, ARHOST_TRANSFER_LINEAR, sequence);
+            const std::vector<uint8_t> before(frame.slot().data(), frame.slot().data() + frame.slot().size());
+            EXPECT_EQ(tracker_.track(frame).size(), 1u);
+            EXPECT_TRUE(std::equal(before.begin(), before.end(), frame.slot().data()));
+            EXPECT_TRUE(frame.slot().intact());
+        }
+    }
 }
 
 } // namespace arhost::test

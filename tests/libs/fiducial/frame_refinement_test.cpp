@@ -143,5 +143,16 @@ TEST(FrameRefinement, HasOneBudgetForAllCallsInAFrame) {
     EXPECT_NE(picture.refinement(grey, 0.5).refine(last).front(), std::nullopt);
 }
 
+TEST(FrameRefinement, ReservesAPartOfTheBudgetOnce) {
+    const Picture picture(overexposed);
+    const cv::Mat grey = picture.grey();
+    FrameRefinement refinement = picture.refinement(grey, 0.8);
+    for (int call = 0; call < 3; ++call)
+        refinement.reserve(0.3);
+    const auto corners = corners_of(refinement.refine(picture.tags()));
+    EXPECT_EQ(corners, corners_of(picture.refined(0.5, picture.tags())));
+    EXPECT_NE(corners, corners_of(picture.refined(0.8, picture.tags())));
+}
+
 } // namespace
 } // namespace arhost::test::frame_refinement

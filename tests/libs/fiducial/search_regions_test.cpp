@@ -10,6 +10,7 @@
 #include <limits>
 #include <set>
 #include <string>
+#include <tuple>
 
 namespace {
 
@@ -188,6 +189,18 @@ TEST_F(Regions, AreSearchedByEachPassAndThenTheWholeFrameIfATargetIsMissed) {
     EXPECT_THAT(searched, ElementsAre(near_first, near_second, std::pair(1, whole_frame), std::pair(2, whole_frame)));
 }
 
+TEST_F(Regions, ThatAreTheWholeFrameAreSearchedOnce) {
+    expect(0, 100, 150);
+    expected_.back().margin_px = 1000;
+    int searches = 0;
+    const Pass pass{.family = nullptr, .detect = [&](const cv::Rect &region, auto &) {
+                        EXPECT_EQ(region, whole_frame);
+                        ++searches;
+                    }};
+    EXPECT_THAT(regions_->search(request_, {}, {&pass, 1}).markers, IsEmpty());
+    EXPECT_EQ(searches, 1) << "although a target is missed";
+}
+
 TEST_F(Regions, OfVerifiedMarkersAreSearchedOnlyIfEverythingIs) {
     expect(0, 100, 150);
     expect(3, 300, 150);
@@ -240,7 +253,7 @@ protected:
                                     all.markers.push_back(seen(0));
                                 all.candidates += 2;
                             },
-                        .closer_looks = {{look("fast"), false}, {look("slow"), true}}};
+                        .closer_looks = {{look("fast")}, {look("slow"), 1 / 16.0}}};
         return regions_->search(request_, {}, {&pass, 1});
     }
     using Search = std::pair<std::string, cv::Rect>;
@@ -248,6 +261,7 @@ protected:
     std::vector<Search> searched_;
     std::set<std::int32_t> wanted_;         // by the closer looks, of the first family
     std::vector<arhost_observation> finds_; // the closer looks
+    static constexpr std::uint64_t frames_of_all_turns = 47;
     const cv::Rect first_{75, 125, 51, 51}, third_{275, 125, 51, 51};
 };
 
@@ -285,35 +299,80 @@ TEST_F(CloserLooks, KeepWhatTheyAndTheRegionsHaveFoundIfAnotherTargetIsMissed) {
     EXPECT_THAT(found.markers, testing::Contains(testing::Field(&arhost_observation::decision_margin, 7)));
 }
 
-TEST_F(CloserLooks, AreTakenAtExpectedPlacesAlsoIfEverythingIsSearched) {
+TEST_F(CloserLooks, AreTakenOnlyAtExpectedPlacesAlsoIfEverythingIsSearched) {
     expect(2, 300, 150);
     request_.search_everywhere = 1;
-    finds_ = {seen(2)};
-    search();
-    EXPECT_THAT(searched_,
-                ElementsAre(Search("normal", whole_frame), Search("fast", third_), Search("slow", third_)));
-}
-
-TEST_F(CloserLooks, SearchTheWholeFrameOrATileForTargetsThatAreNotExpected) {
-    request_.search_everywhere = 1;
-    format_.width = 1280;
-    format_.height = 720;
-    const cv::Rect everywhere(0, 0, 1280, 720);
     for (frame_.sequence = 0; frame_.sequence < 3; ++frame_.sequence) {
         search();
-        EXPECT_THAT(searched_, ElementsAre(Search("normal", everywhere), Search("fast", everywhere),
-                                           Search("slow", SearchRegions::tile_of({1280, 720}, frame_.sequence))));
+        EXPECT_THAT(searched_,
+                    ElementsAre(Search("normal", whole_frame), Search("fast", third_), Search("slow", third_)));
     }
 }
 
-TEST_F(CloserLooks, AreSlowInAtMostTheAreaOfATile) {
+TEST_F(CloserLooks, TakeTurnsIfEverythingIsSearchedAndNoMissedMarkerIsExpected) {
+    expect(0, 100, 150); // is seen
+    request_.search_everywhere = 1;
+    constexpr std::uint64_t first = 5;
+    std::set<std::tuple<std::string, int, int>> closer;
+    for (frame_.sequence = first; frame_.sequence < first + frames_of_all_turns; ++frame_.sequence) {
+        search();
+        const unsigned turn = SearchRegions::turn_of(frame_.sequence, 2 * SearchRegions::tile_count);
+        const Search expected = turn % 2 == 0
+                                    ? Search("fast", whole_frame)
+                                    : Search("slow", SearchRegions::tile_of(whole_frame.size(), {}, turn / 2));
+        ASSERT_THAT(searched_, ElementsAre(Search("normal", whole_frame), expected));
+        closer.emplace(expected.first, expected.second.x, expected.second.y);
+    }
+    EXPECT_EQ(closer.size(), 1 + SearchRegions::tile_count) << "the fast one, and the slow one in each tile";
+}
+
+TEST_F(CloserLooks, TakeTurnsOnlyIfTheirPassHasAMissedMarker) {
+    request_.search_everywhere = 1;
+    const Family one{"tag36h11", 0, 587, {{0, 0}, {1, 0}}}, other{"tag36h10", 0, 587, {{2, 0}}};
+    std::vector<std::string> looks;
+    const auto pass = [&](const Family &family, const std::vector<std::int32_t> &sees) {
+        return Pass{&family,
+                    [sees](const cv::Rect &, auto &all) {
+                        for (const std::int32_t id : sees)
+                            all.markers.push_back(seen(id));
+                    },
+                    {{[&](const cv::Rect &, auto &) { looks.push_back(family.name); }}}};
+    };
+    const Pass passes[] = {pass(one, {1}), pass(other, {})};
+    for (frame_.sequence = 0; frame_.sequence < 5; ++frame_.sequence)
+        regions_->search(request_, {}, passes);
+    EXPECT_EQ(looks, std::vector<std::string>(5, "tag36h10"));
+}
+
+TEST_F(CloserLooks, SearchAtMostTheirPartOfTheFrameAtExpectedPlaces) {
     format_.width = 1280;
     format_.height = 720;
     expect(2, 700, 300);
-    expected_.back().margin_px = 210;
-    search();
-    EXPECT_THAT(searched_, ElementsAre(testing::Pair("normal", testing::_), testing::Pair("fast", testing::_),
-                                       testing::Pair("normal", cv::Rect(0, 0, 1280, 720))));
+    for (const auto &[margin_px, is_taken] : {std::pair(99, true), {100, false}}) { // 239² and 241² px
+        expected_.back().margin_px = margin_px;
+        search();
+        EXPECT_THAT(searched_, testing::Contains(testing::Pair("fast", testing::_)));
+        EXPECT_EQ(std::ranges::count(searched_, "slow", &Search::first), is_taken) << margin_px;
+    }
+}
+
+TEST_F(CloserLooks, AreNeededForMissedMarkersOfTheFamilyThatMayBeFound) {
+    const Family first{"tag36h11", 0, 587, {{0, 0}, {1, 0}, {2, 0}}}, second{"tag25h9", 1, 35, {{3, 1}}};
+    const auto need = [&](const std::vector<arhost_observation> &seen, const Family *family = nullptr) {
+        return regions_->needs_closer_look(request_, seen, family);
+    };
+    request_.search_everywhere = 1;
+    EXPECT_TRUE(need({seen(1)}));
+    EXPECT_TRUE(need({seen(1)}, &first));
+    EXPECT_FALSE(need({seen(1)}, &second)) << "has too few bits";
+    EXPECT_FALSE(need({seen(1), seen(2)}));
+    request_.search_everywhere = 0;
+    expect(1, 200, 150);
+    EXPECT_FALSE(need({seen(0)})) << "marker 2 is not expected, and the target of marker 1 is seen";
+    EXPECT_TRUE(need({seen(2)}));
+    expect(2, 300, 150);
+    EXPECT_TRUE(need({seen(0)}));
+    EXPECT_FALSE(need({seen(0), seen(2)}));
 }
 
 TEST_F(CloserLooks, AreNotTakenForMarkersOfSmallFamilies) {
@@ -338,37 +397,62 @@ TEST_F(CloserLooks, AreNotTakenIfAllTargetsAreSeen) {
                         [&](const cv::Rect &, auto &all) {
                             all.markers = {seen(1), seen(2), seen(3, 1)};
                         },
-                    .closer_looks = {{[&](const cv::Rect &, auto &) { ++looks; }, false}}};
+                    .closer_looks = {{[&](const cv::Rect &, auto &) { ++looks; }}}};
     EXPECT_EQ(regions_->search(request_, {}, {&pass, 1}).markers.size(), 3u);
     EXPECT_EQ(looks, 0) << "one marker of the first target is enough";
 }
 
-TEST(Tiles, AreTheWholeOfASmallFrame) {
-    for (const cv::Size size : {cv::Size(1, 1), cv::Size(300, 20), cv::Size(480, 360)})
-        for (const std::uint64_t sequence : {0, 1, 1000})
-            EXPECT_EQ(SearchRegions::tile_of(size, sequence), cv::Rect({}, size));
+TEST(Tiles, AreThreeSeventhsOfTheFrameOnTheGridAndLargeEnoughForTheDetector) {
+    for (const cv::Size size : {cv::Size(1, 1), cv::Size(7, 7), cv::Size(33, 9), cv::Size(640, 480)})
+        for (const RegionLimits limits : {RegionLimits{}, {4, 8}, {6, 20}})
+            for (unsigned index = 0; index < SearchRegions::tile_count; ++index) {
+                const cv::Rect tile = SearchRegions::tile_of(size, limits, index);
+                EXPECT_EQ(tile & cv::Rect({}, size), tile);
+                EXPECT_EQ(tile.x % limits.grid_px + tile.y % limits.grid_px, 0) << tile;
+                for (const auto &[part, whole] : {std::pair(tile.width, size.width), {tile.height, size.height}}) {
+                    const int least = std::max((3 * whole + 6) / 7, std::min(whole, limits.min_side_px));
+                    EXPECT_GE(part, least);
+                    EXPECT_LT(part, least + limits.grid_px);
+                }
+            }
 }
 
-TEST(Tiles, ContainEveryMarkerOf96PxSoonHoweverOftenFramesAreSearched) {
-    for (const cv::Size size : {cv::Size(481, 361), cv::Size(640, 480), cv::Size(1280, 720), cv::Size(1920, 1080)})
-        for (const std::uint64_t every : {1, 2, 5, 6, 10, 30, 34, 55, 89}) {
-            std::set<std::pair<int, int>> begins;
-            for (std::uint64_t sequence = 0; sequence < 300 * every; sequence += every) {
-                const cv::Rect tile = SearchRegions::tile_of(size, sequence);
-                ASSERT_EQ(tile & cv::Rect({}, size), tile);
-                ASSERT_EQ(tile.size(), cv::Size(480, 360));
-                begins.emplace(tile.x, tile.y);
-            }
-            for (int y = 0; y <= size.height - 96; y += 24)
-                for (int x = 0; x <= size.width - 96; x += 24)
-                    EXPECT_TRUE(std::ranges::any_of(
-                        begins,
-                        [&](const auto &begin) {
-                            const cv::Rect marker(x, y, 96, 96);
-                            return (cv::Rect({begin.first, begin.second}, cv::Size(480, 360)) & marker) == marker;
-                        }))
-                        << x << ' ' << y << " in " << size << ", every " << every;
+TEST(Tiles, ContainEveryMarkerOfASeventhOfTheWidthAndAFifthOfTheHeight) {
+    for (const cv::Size size : {cv::Size(479, 361), cv::Size(640, 480), cv::Size(1280, 720), cv::Size(1920, 1080)})
+        for (const RegionLimits limits : {RegionLimits{}, {4, 8}}) {
+            std::vector<cv::Rect> tiles;
+            for (unsigned index = 0; index < SearchRegions::tile_count; ++index)
+                tiles.push_back(SearchRegions::tile_of(size, limits, index));
+            const cv::Size marker(size.width / 7, size.height / 5);
+            for (int y = 0; y <= size.height - marker.height; ++y)
+                for (int x = 0; x <= size.width - marker.width; ++x) {
+                    const cv::Rect place({x, y}, marker);
+                    ASSERT_TRUE(std::ranges::any_of(tiles, [&](const cv::Rect &t) { return (t & place) == place; }))
+                        << place << " in " << size;
+                }
         }
+}
+
+TEST(Turns, OccurOnceInEachBlockAndSoAmongTwiceAsManyFrames) {
+    for (const unsigned count : {1U, 12U, 24U, 36U, 48U})
+        for (std::uint64_t begin = 0; begin < 5 * count; ++begin) {
+            std::set<unsigned> turns;
+            const std::uint64_t frames = begin % count == 0 ? count : 2 * count - 1;
+            for (std::uint64_t sequence = begin; sequence < begin + frames; ++sequence)
+                turns.insert(SearchRegions::turn_of(sequence, count));
+            EXPECT_EQ(turns.size(), count) << "from " << begin;
+            EXPECT_EQ(*turns.rbegin(), count - 1);
+        }
+}
+
+TEST(Turns, AllOccurHoweverOftenFramesAreSearched) {
+    constexpr unsigned count = 2 * SearchRegions::tile_count;
+    for (const std::uint64_t every : {2, 5, 6, 10, 12, 24, 30, 34, 48, 55, 89}) {
+        std::set<unsigned> turns;
+        for (std::uint64_t sequence = 0; sequence < 300 * every; sequence += every)
+            turns.insert(SearchRegions::turn_of(sequence, count));
+        EXPECT_EQ(turns.size(), count) << "every " << every;
+    }
 }
 
 } // namespace

@@ -162,7 +162,7 @@ TEST(AprilTagTracker, FindsATagWithAHiddenCornerInACloserLook) {
     add_noise(picture, 1.5, 252);
     for (const auto &[closer_look, count] : {std::pair{"false", 0u}, {"true", 1u}}) {
         Tracker tracker("tracker_apriltag", {{"closer_look", closer_look}}, camera, {{0}});
-        const auto seen = tracker.track(GreyFrame(picture));
+        const auto seen = track_until_seen(tracker, picture);
         ASSERT_EQ(seen.size(), count) << closer_look;
         for (const arhost_observation &one : seen)
             EXPECT_LT(greatest_distance_px(one, corners_of(truth, camera, 100)), 0.05);

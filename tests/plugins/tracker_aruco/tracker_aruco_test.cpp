@@ -2,6 +2,7 @@
 #include <fiducial/clutter.hpp>
 #include <fiducial/fiducial_tracker_test.hpp>
 #include <fiducial/real_photos.hpp>
+#include <fiducial/tag_sheet.hpp>
 
 #include <nlohmann/json.hpp>
 
@@ -341,6 +342,35 @@ TEST(ArucoTracker, FindsSmallMarkersInACloserLook) {
     expect_found_in_closer_look("tracker_aruco", {"small", 13});
 }
 
+// A closer look takes a part of the budget for the refinement of prints, but only one, however many families it
+// searches.
+TEST(ArucoTracker, RefinesFewerPrintsIfItLooksCloser) {
+    const TagSheet &sheet = few_tags;
+    const GreyFrame frame = sheet.frame(exposures[2]);
+    std::vector<Listed> listed;
+    for (int id = 0; id < sheet.count(); ++id)
+        listed.push_back({id});
+    const auto seen = [&](const std::vector<Listed> &missed, const Options &options = {}) {
+        std::vector<Listed> all = listed;
+        all.insert(all.end(), missed.begin(), missed.end());
+        return Tracker("tracker_aruco", options, plain_camera(sheet.size), all).track(frame);
+    };
+    const auto all = seen({}), some = seen({{100}}), of_two_families = seen({{100}, {100, 100, "tag36h10"}});
+    const auto same = [](const auto &a, const auto &b) {
+        return std::ranges::count_if(a, [&](const arhost_observation &one) {
+            return std::ranges::any_of(b, [&](const arhost_observation &other) {
+                return other.id == one.id &&
+                       std::memcmp(other.corners_px, one.corners_px, sizeof one.corners_px) == 0;
+            });
+        });
+    };
+    ASSERT_EQ(all.size(), listed.size());
+    EXPECT_GE(same(all, some), 2);
+    EXPECT_LT(same(all, some), std::ssize(all));
+    EXPECT_EQ(same(some, of_two_families), std::ssize(some));
+    EXPECT_EQ(same(all, seen({{100}}, {{"closer_look", "false"}})), std::ssize(all));
+}
+
 TEST(ArucoTracker, LooksCloserAtTinyFramesWithEachRefinement) {
     for (const std::string refinement : {"edges", "none", "subpix", "contour", "apriltag"}) {
         Tracker tracker("tracker_aruco", {{"corner_refinement", refinement}});
@@ -351,6 +381,7 @@ TEST(ArucoTracker, LooksCloserAtTinyFramesWithEachRefinement) {
             ASSERT_EQ(tracker.start(plain_camera(size), {{3}}), ARHOST_STATUS_OK) << tracker.log();
             const auto expected = expected_at(0, {cv::Point2d(-3, -3), {9, -3}, {9, 9}, {-3, 9}});
             EXPECT_TRUE(tracker.track(GreyFrame(picture), {expected}, true).empty()) << refinement << ' ' << size;
+            EXPECT_TRUE(track_until_seen(tracker, picture).empty()) << refinement << ' ' << size;
         }
     }
 }
@@ -359,7 +390,7 @@ TEST(ArucoTracker, LooksCloserAtTinyFramesWithEachRefinement) {
 TEST(ArucoTracker, TakesNoCloserLookForASmallFamily) {
     Tracker tracker("tracker_aruco", {}, test_camera, {{3, 100, "DICT_5X5_50"}});
     const Difficult dim{"dim", 60, 30, 0.6, 0.06};
-    EXPECT_TRUE(tracker.track(GreyFrame(dim.picture(aruco_marker("DICT_5X5_50", 3)))).empty());
+    EXPECT_TRUE(track_until_seen(tracker, dim.picture(aruco_marker("DICT_5X5_50", 3))).empty());
 }
 
 TEST(ArucoTracker, RejectsContradictoryThresholdWindows) {
