@@ -116,6 +116,39 @@ void frames_before(Context &context) {
         throw Failure("two different cameras give the same image").with("rendered", first);
 }
 
+// A new instance that gets the state of another one continues as that one does.
+void state(Context &context) {
+    const arhost_camera here = still_life_camera(), there = camera({120, -90, 160}, {0, 0, 10}, {0, 0, 1});
+    Tracer tracer(context, still_life());
+    tracer.start(here.intrinsics);
+    if (tracer.state_size() == 0)
+        throw Skip("it has no state");
+    std::vector<std::byte> before;
+    std::uint64_t number = 0;
+    for (const arhost_camera *view : {&here, &here, &there, &here}) {
+        const std::string when = fmt::format("in image {}, with the state of the image before it,", number + 1);
+        const auto next = [&](Tracer &one, std::byte filler) {
+            one.set_state(before, number, filler);
+            return one.render(*view);
+        };
+        constexpr std::byte filler{0xa5}, other_filler{0x3c};
+        const Picture expected = next(tracer, filler);
+        const std::vector<std::byte> after = tracer.state_after();
+        Tracer other(context, still_life()), with_other_filler(context, still_life());
+        other.start(here.intrinsics);
+        with_other_filler.start(here.intrinsics);
+        expect_alike(next(other, filler), expected, when + " a new instance gives different bytes");
+        if (other.state_after() != after)
+            throw Failure(when + " a new instance writes another state_after");
+        expect_alike(next(with_other_filler, other_filler), expected,
+                     when + " and with other initial content of state_after, a new instance gives different bytes");
+        if (with_other_filler.state_after() != after)
+            throw Failure(when + " a new instance leaves bytes of state_after unwritten");
+        before = after;
+        ++number;
+    }
+}
+
 void threads(Context &context) {
     const arhost_option_descriptor *option = context.library.option("threads");
     if (!option || option->type != ARHOST_OPTION_INTEGER)
@@ -188,6 +221,8 @@ constexpr Test tests[] = {
     {"raytracer.deterministic", "The same request gives the same bytes, repeatedly and in another instance.", gate,
      20s, deterministic},
     {"raytracer.frames-before", "An image does not depend on previous frames.", gate, 20s, frames_before},
+    {"raytracer.state", "Image and state_after depend only on the request and state_before.",
+     "raytracer.deterministic", 20s, state},
     {"raytracer.threads", "The image does not depend on the number of threads.", gate, 20s, threads},
     {"raytracer.reference",
      "The image matches that of the reference ray tracer: a PSNR of 40 dB inside objects, equal alpha except at "

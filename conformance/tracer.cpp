@@ -3,6 +3,7 @@
 
 #include "base/unique_fd.hpp"
 #include "scene/capabilities.hpp"
+#include "worker/library.hpp"
 
 #include <fmt/format.h>
 
@@ -16,6 +17,11 @@ namespace arhost::conformance {
 using ipc::Call;
 
 namespace {
+
+// Memory for a state, whose address is aligned as in the worker.
+std::unique_ptr<GuardedMemory> state_memory(std::uint64_t size) {
+    return std::make_unique<GuardedMemory>((size + 4095) / 4096 * 4096);
+}
 
 bool same(const arhost_intrinsics &a, const arhost_intrinsics &b) {
     return std::tie(a.width, a.height, a.distortion, a.fx, a.fy, a.cx, a.cy) ==
@@ -79,8 +85,12 @@ arhost_status Tracer::try_start(const arhost_intrinsics &intrinsics) {
                                        video_ ? &video_->format() : nullptr};
     const arhost_status status =
         in_call(instance_.library().calls(), Call::start, [&] { return functions_.start(instance_.get(), &setup); });
-    if (status == ARHOST_STATUS_OK)
-        started_ = intrinsics;
+    if (status != ARHOST_STATUS_OK)
+        return status;
+    started_ = intrinsics;
+    state_size_ = in_call(instance_.library().calls(), Call::start,
+                          [&] { return worker::state_size_of(functions_, instance_.get()); });
+    state_before_.reset();
     return status;
 }
 
@@ -112,8 +122,16 @@ void Tracer::set_video(const Video *video) {
 template <class Image>
 arhost_status Tracer::try_render(const arhost_camera &camera, std::optional<Image> &slot, Image &picture,
                                  arhost_render_info &info, const arhost_motion *motion) {
-    const arhost_render_request request{
-        sizeof request, max_samples_, sequence_, 0, camera, motion, video_ ? &video_->frame() : nullptr};
+    arhost_render_request request{
+        sizeof request, max_samples_, sequence_, 0, camera, motion, video_ ? &video_->frame() : nullptr,
+        nullptr, nullptr, 0};
+    if (state_size_ > 0) {
+        state_after_ = state_memory(state_size_);
+        std::fill_n(state_after_->data(), state_size_, state_filler_);
+        request.state_before = state_before_ ? state_before_->data() : nullptr;
+        request.state_after = state_after_->data();
+        request.state_size = state_size_;
+    }
     slot = picture; // keeps its address, because the size is the same
     const arhost_image image = slot->image();
     info = {};
@@ -136,6 +154,23 @@ void Tracer::render(const arhost_camera &camera, std::optional<Image> &slot, Ima
     if (form != std::exchange(form_, form) || !started_ || !same(*started_, camera.intrinsics))
         start(camera.intrinsics);
     instance_.expect_ok("render", try_render(camera, slot, picture, info_, motion));
+}
+
+void Tracer::set_state(const std::vector<std::byte> &state, std::uint64_t sequence, std::byte filler) {
+    sequence_ = sequence;
+    state_filler_ = filler;
+    state_before_.reset();
+    if (state.empty())
+        return;
+    state_before_ = state_memory(state.size());
+    std::ranges::copy(state, state_before_->data());
+    state_before_->seal();
+}
+
+std::vector<std::byte> Tracer::state_after() const {
+    if (!state_after_)
+        return {};
+    return {state_after_->data(), state_after_->data() + state_size_};
 }
 
 Picture Tracer::render(const arhost_camera &camera, const arhost_motion *motion, std::uint8_t fill) {

@@ -2,6 +2,7 @@
 // Runs a ray tracer on a scene.
 #pragma once
 
+#include "conformance/guarded_memory.hpp"
 #include "conformance/picture.hpp"
 #include "conformance/plugin_library.hpp"
 #include "conformance/scenes.hpp"
@@ -10,7 +11,9 @@
 #include "scene/arena_builder.hpp"
 
 #include <chrono>
+#include <memory>
 #include <optional>
+#include <vector>
 
 namespace arhost::conformance {
 
@@ -64,6 +67,11 @@ public:
     void set_compositing(arhost_compositing compositing);
     // Of later requests, until it is changed; nullptr: none. Stops if the format differs.
     void set_video(const Video *video);
+    // The next calls of render get `state` as their state_before, or NULL if it is empty, and `sequence`; before a
+    // call, state_after is filled with `filler`.
+    void set_state(const std::vector<std::byte> &state, std::uint64_t sequence, std::byte filler = std::byte{0xa5});
+    std::uint64_t state_size() const { return state_size_; } // 0 before the start
+    std::vector<std::byte> state_after() const;              // of the last render
     // Starts if necessary. Throws Failure unless it succeeds.
     Picture render(const arhost_camera &camera, const arhost_motion *motion = nullptr, std::uint8_t fill = 0);
     LinearPicture render_linear(const arhost_camera &camera, std::uint8_t fill = 0);
@@ -91,7 +99,9 @@ private:
     std::optional<LinearPicture> linear_slot_;
     arhost_render_info info_{};
     std::uint32_t max_samples_ = 0;
-    std::uint64_t sequence_ = 0;
+    std::uint64_t sequence_ = 0, state_size_ = 0;
+    std::byte state_filler_{0xa5};
+    std::unique_ptr<GuardedMemory> state_before_, state_after_; // null: none
     std::chrono::nanoseconds duration_{};
 };
 

@@ -6,6 +6,7 @@
 
 #include <arhost/shading/lens.hpp>
 #include <glm/gtc/type_ptr.hpp>
+#include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
 #include <cmath>
@@ -32,7 +33,7 @@ ImageView overlay_of(const Frame &frame, const arhost_frame_format &format) {
 
 Raytracer::Raytracer(RunParts &parts, Configuration configuration, std::shared_ptr<LoadedScene> scene,
                      Abandon abandon)
-    : Stage(parts, "raytracer", *configuration, Frame::Stage::to_render, parts.live() ? 1 : 2, std::move(abandon)),
+    : Stage(parts, "raytracer", *configuration, Frame::Stage::to_render, 1, std::move(abandon)),
       configuration_(std::move(configuration)), scene_(std::move(scene)) {
     if (const std::size_t count = scene_->anchors.size(); count > 0)
         anchor_slots_ = std::make_shared<SlotPool>(
@@ -52,7 +53,19 @@ SlotLayout Raytracer::on_ready(const messages::Ready &ready) {
     }
     reads_video_ = reads_video_ && (ready.capabilities & ARHOST_CAPABILITY_VIDEO) != 0;
     const arhost_frame_format &format = parts_.video.format;
-    return {std::uint64_t(overlay_stride(format.width, overlay_format_.form)) * format.height, stage_slot_count};
+    const RaytracerSlot slot(format.width, format.height, overlay_format_.form);
+    has_state_ = ready.state_size > 0;
+    max_in_flight_ = parts_.live() || has_state_ ? 1 : 2; // an image needs the state after the previous one
+    const SlotLayout layout{slot.byte_size(ready.state_size), has_state_ ? slot_count_with_state : stage_slot_count};
+    const std::uint64_t limit = sandbox::memory_limit(configuration_->policy);
+    if (has_state_ && limit > 0 && (ready.state_size > limit || layout.byte_size() > limit))
+        throw std::runtime_error(
+            fmt::format("the ray tracer's state has {} MiB; {} states and images do not fit into "
+                        "the {} MiB that it may use ('memory_mb')",
+                        ready.state_size >> 20, layout.count, limit >> 20));
+    if (!continues_state(layout.slot_size))
+        state_ = Lease();
+    return layout;
 }
 
 void Raytracer::on_disabled(const std::string &reason, bool is_configuration_error) {
@@ -130,9 +143,11 @@ void Raytracer::render(Frame &frame) {
         write_anchors(frame);
         command.input_slot = frame.anchors.index();
     }
+    if (state_)
+        command.state_slot = state_.index();
     if (reads_video_)
         command.video_slot = frame.pixels.index();
-    component().submit(command, frame.anchors ? frame.anchors.region() : nullptr, nullptr,
+    component().submit(command, frame.anchors ? frame.anchors.region() : nullptr, state_ ? state_.region() : nullptr,
                        reads_video_ ? frame.pixels.region() : nullptr);
 }
 
@@ -168,6 +183,8 @@ void Raytracer::on_result(const Command &command, const Result &result) {
     Frame *const frame = accept(command, result);
     if (!frame)
         return;
+    if (has_state_)
+        state_ = frame->overlay.share();
     frame->render = result.render;
     frame->overlay_format = overlay_format_;
     frame->times.raytracer = busy;

@@ -56,7 +56,7 @@ private:
     std::shared_ptr<SlotPool> anchor_slots_; // slots for AnchorPose; null if the scene has no anchors
     // Of the current worker.
     OverlayFormat overlay_format_;
-    bool reads_video_ = false;
+    bool reads_video_ = false, has_state_ = false;
     std::optional<QualityController> quality_; // only with `live.target_fps`
     std::string adapted_plugin_;               // the plugin whose quality is adapted
     std::optional<std::uint32_t>

@@ -52,6 +52,8 @@ std::vector<std::uint64_t> sequences_of(const std::vector<ipc::Command> &command
 
 // Slots for frames, for the results of a stage, and for frames that an output has not written yet (mode live).
 constexpr std::uint32_t source_slot_count = 8, stage_slot_count = 4;
+// Slots of a ray tracer with state, which may be large: the previous state, the next one, and an image to composite.
+constexpr std::uint32_t slot_count_with_state = 3;
 constexpr std::size_t live_sink_depth = 3;
 
 } // namespace arhost::host

@@ -9,7 +9,12 @@ namespace arhost::host {
 
 Lease::~Lease() {
     if (pool_)
-        pool_->in_use_[index_] = false;
+        --pool_->leases_[index_];
+}
+
+Lease Lease::share() const {
+    ++pool_->leases_[index_];
+    return {pool_, index_};
 }
 
 const supervise::RegionPointer &Lease::region() const {
@@ -20,18 +25,18 @@ std::span<std::byte> Lease::bytes() const {
     return region()->layout.slot(region()->mapping, index_);
 }
 
-SlotPool::SlotPool(supervise::RegionPointer region) : region_(std::move(region)), in_use_(region_->layout.count) {}
+SlotPool::SlotPool(supervise::RegionPointer region) : region_(std::move(region)), leases_(region_->layout.count) {}
 
 bool SlotPool::has_free() const {
-    return std::ranges::find(in_use_, false) != in_use_.end();
+    return std::ranges::find(leases_, 0u) != leases_.end();
 }
 
 std::optional<Lease> SlotPool::acquire() {
-    const auto free = std::ranges::find(in_use_, false);
-    if (free == in_use_.end())
+    const auto free = std::ranges::find(leases_, 0u);
+    if (free == leases_.end())
         return std::nullopt;
-    *free = true;
-    return Lease(shared_from_this(), static_cast<std::uint32_t>(free - in_use_.begin()));
+    *free = 1;
+    return Lease(shared_from_this(), static_cast<std::uint32_t>(free - leases_.begin()));
 }
 
 } // namespace arhost::host

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Manages the slots of a shared-memory region. Only the host assigns slots. A slot is free again when its Lease is
+// Manages the slots of a shared-memory region. Only the host assigns slots. A slot is free again when its leases are
 // destroyed, even if the worker has died.
 #pragma once
 
@@ -19,7 +19,7 @@ namespace arhost::host {
 
 class SlotPool;
 
-// Represents exclusive use of one slot. Releases the slot on destruction.
+// Represents use of one slot. The slot is released when all its leases are destroyed.
 class Lease {
 public:
     Lease() = default;
@@ -32,6 +32,7 @@ public:
         return *this;
     }
 
+    Lease share() const; // another lease of the same slot
     explicit operator bool() const { return pool_ != nullptr; }
     std::uint32_t index() const { return index_; }
     const std::shared_ptr<const supervise::Region> &region() const;
@@ -47,7 +48,7 @@ private:
 class SlotPool : public std::enable_shared_from_this<SlotPool> {
 public:
     explicit SlotPool(std::shared_ptr<const supervise::Region> region);
-    explicit SlotPool(std::size_t count) : in_use_(count) {} // slots without memory
+    explicit SlotPool(std::size_t count) : leases_(count) {} // slots without memory
 
     bool has_free() const;
     std::optional<Lease> acquire();
@@ -55,7 +56,7 @@ public:
 private:
     friend class Lease;
     std::shared_ptr<const supervise::Region> region_;
-    std::vector<bool> in_use_;
+    std::vector<std::uint32_t> leases_; // number of leases of each slot
 };
 
 } // namespace arhost::host

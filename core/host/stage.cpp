@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "host/stage.hpp"
 
+#include <utility>
+
 namespace arhost::host {
 
 using namespace ipc;
@@ -41,6 +43,11 @@ FrameFlow::Intake Stage::intake() const {
                          : component_->in_flight() >= max_in_flight_ ? busy
                                                                      : ready,
             .slots = slots_.get()};
+}
+
+bool Stage::continues_state(std::uint64_t slot_size) {
+    const StateOwner owner{component_->candidate(), component_->description().version, slot_size};
+    return std::exchange(state_owner_, owner) == owner;
 }
 
 Frame *Stage::accept(const Command &command, const Result &result) {

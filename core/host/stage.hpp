@@ -40,11 +40,24 @@ protected:
     // this stage.
     Frame *accept(const ipc::Command &command, const ipc::Result &result);
 
+    // Returns whether a worker that has just started can read the plugin's part of `state_`: it has the same plugin
+    // and version, and slots of the same size, as the previous worker.
+    bool continues_state(std::uint64_t slot_size);
+
     RunParts &parts_;
     std::shared_ptr<SlotPool> slots_; // slots of the current worker; null unless the worker is running
+    std::size_t max_in_flight_;
+    Lease state_; // the state that the last accepted call has written (docs/adr/0026)
 
 private:
-    const std::size_t max_in_flight_;
+    struct StateOwner {
+        std::size_t candidate = 0;
+        std::string version;
+        std::uint64_t slot_size = 0;
+        bool operator==(const StateOwner &) const = default;
+    };
+
+    StateOwner state_owner_; // the current worker
     std::unique_ptr<supervise::Component> component_;
 };
 

@@ -4,7 +4,6 @@
 #include "host/frame_validation.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace arhost::host {
 
@@ -69,10 +68,10 @@ SlotLayout Tracker::on_ready(const messages::Ready &ready) {
     if (ready.state_size > max_size)
         throw ProtocolViolation("the state has " + std::to_string(ready.state_size) + " bytes; the limit is " +
                                 std::to_string(max_size));
-    const StateOwner owner{component().candidate(), component().description().version, ready.state_size};
-    if (std::exchange(state_owner_, owner) != owner)
+    const std::uint64_t slot_size = TrackerSlot(configuration_->targets.size()).byte_size(ready.state_size);
+    if (!continues_state(slot_size))
         state_is_of_solver_only_ = true;
-    return {TrackerSlot(configuration_->targets.size()).byte_size(ready.state_size), stage_slot_count};
+    return {slot_size, stage_slot_count};
 }
 
 void Tracker::on_disabled(const std::string &reason, bool is_configuration_error) {

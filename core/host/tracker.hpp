@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// The tracker of a run. The host owns the tracker's state. The state that a call writes becomes valid with the call's
-// result, and survives the worker (docs/adr/0026).
+// The tracker of a run.
 #pragma once
 
 #include "host/sightings.hpp"
@@ -22,13 +21,6 @@ public:
     void take_over(Tracker *previous);
 
 private:
-    // Identifies the workers that can read the plugin's part of a state: those with the same plugin.
-    struct StateOwner {
-        std::size_t candidate = 0;
-        std::string version;
-        std::uint64_t size = 0;
-        bool operator==(const StateOwner &) const = default;
-    };
     supervise::Component::Create on_hello(const model::PluginDescription &plugin, std::size_t candidate) override;
     ipc::SlotLayout on_ready(const ipc::messages::Ready &ready) override;
     void on_result(const ipc::Command &command, const ipc::Result &result) override;
@@ -38,8 +30,6 @@ private:
     const Configuration configuration_;
     const ipc::SharedMemory targets_; // the configured targets, for the workers
     const std::size_t family_count_;
-    StateOwner state_owner_;               // the current worker
-    Lease state_;                          // the state that the last accepted call has written
     bool state_is_of_solver_only_ = false; // another plugin wrote the rest (ipc::Command)
 };
 

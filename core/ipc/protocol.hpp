@@ -20,8 +20,9 @@ enum class CommandKind : std::uint32_t {
     read = 2,    // source: read a frame into output slot `slot`
     track = 3,   // tracker: process slot `input_slot` of input memory `input_generation`, with the state in slot
                  // `state_slot` of input memory `state_generation`; write result and new state to output slot `slot`
-    render = 4,  // ray tracer: render the view of `camera` into output slot `slot`; the anchors of the scene, if it
-                 // has any, are in slot `input_slot` of input memory `input_generation`, and the frame under the
+    render = 4,  // ray tracer: render the view of `camera`, with the state in slot `state_slot` of input memory
+                 // `state_generation`; write image and new state to output slot `slot`. The anchors of the scene, if
+                 // it has any, are in slot `input_slot` of input memory `input_generation`, and the frame under the
                  // overlay, if the setup has a format for it, in slot `video_slot` of `video_generation`
     write = 5    // sink: write the frame in slot `input_slot` of input memory `input_generation`
 };
@@ -102,6 +103,19 @@ using ResultConsumer = Consumer<Result, ring_capacity>;
 inline std::uint32_t overlay_stride(std::uint32_t width, arhost_image_form form = ARHOST_IMAGE_FORM_STRAIGHT) {
     return (width * (form == ARHOST_IMAGE_FORM_LINEAR ? 16 : 4) + 63) / 64 * 64;
 }
+
+// Layout of a slot that a ray tracer's worker writes: the image, then the plugin's state, which only the worker can
+// read.
+class RaytracerSlot {
+public:
+    RaytracerSlot(std::uint32_t width, std::uint32_t height, arhost_image_form form)
+        : image_size(std::uint64_t{overlay_stride(width, form)} * height),
+          state_offset((image_size + 4095) / 4096 * 4096) {}
+    const std::uint64_t image_size, state_offset;
+    std::uint64_t byte_size(std::uint64_t state_size) const {
+        return state_size > 0 ? state_offset + state_size : image_size;
+    }
+};
 
 // A slot that a ray tracer's worker reads contains one AnchorPose for each anchor of the scene.
 struct AnchorPose {

@@ -161,6 +161,12 @@ std::uint64_t state_size_of(const arhost_tracker &tracker, arhost_instance *inst
     return size;
 }
 
+std::uint64_t state_size_of(const arhost_raytracer &raytracer, arhost_instance *instance) {
+    if (raytracer.struct_size < ARHOST_SIZE_UP_TO(arhost_raytracer, state_size) || !raytracer.state_size)
+        return 0;
+    return raytracer.state_size(instance);
+}
+
 double aspect_of(const arhost_tracker &tracker, arhost_instance *instance, std::uint32_t marker) {
     if (tracker.struct_size < ARHOST_SIZE_UP_TO(arhost_tracker, aspect) || !tracker.aspect)
         return 1;

@@ -337,7 +337,10 @@ public:
         const std::uint32_t missing = scene::needed_capabilities(*setup.scene) & ~ready.capabilities;
         if (const std::string warning = scene::missing_capabilities_text(descriptor_.id, missing); !warning.empty())
             host_.log(&host_, ARHOST_SEVERITY_WARNING, warning.c_str());
-        return raytracer_.start(instance_, &setup);
+        const arhost_status status = raytracer_.start(instance_, &setup);
+        if (status == ARHOST_STATUS_OK)
+            ready.state_size = state_size_ = state_size_of(raytracer_, instance_);
+        return status;
     }
 
     arhost_status execute(const Command &command, const Memory &memory, Result &result) override {
@@ -351,7 +354,8 @@ public:
         image.stride = overlay_stride(image.width, form_);
         require(image.width <= width_ && image.height <= height_, "the image is larger than that of the setup");
         set_pixels(image, form_, output.data());
-        require(output.size() >= std::uint64_t(image.stride) * image.height, "the image slots are too small");
+        const RaytracerSlot slot(width_, height_, form_);
+        require(output.size() >= slot.byte_size(state_size_), "the image slots are too small");
         arhost_render_request request{};
         request.struct_size = sizeof request;
         request.max_samples = command.max_samples;
@@ -369,6 +373,15 @@ public:
         if (video_) {
             video = video_->at(memory.input(command.video_generation).slot(command.video_slot), command);
             request.video = &video;
+        }
+        if (state_size_ > 0) {
+            if (command.state_generation != 0) {
+                const std::span<std::byte> before = memory.input(command.state_generation).slot(command.state_slot);
+                require(before.size() == output.size(), "the slot of the ray tracer's state has another size");
+                request.state_before = before.data() + slot.state_offset;
+            }
+            request.state_after = output.data() + slot.state_offset;
+            request.state_size = state_size_;
         }
         result.render.struct_size = sizeof result.render;
         if (!warp_)
@@ -406,6 +419,7 @@ private:
     std::optional<scene::MotionEvaluator> motion_; // only if objects move or deform
     std::vector<scene::Anchored> anchors_;
     std::uint32_t width_ = 0, height_ = 0;
+    std::uint64_t state_size_ = 0;
 };
 
 class SinkService final : public Service {

@@ -145,6 +145,10 @@ def _pixels(memory, height, width, channels, stride):
     return np.ndarray(shape, np.uint8, memory, 0, strides)
 
 
+def _state(memory):
+    return memory and np.ndarray(len(memory), np.uint8, memory)
+
+
 def _vectors(memory):
     return np.ndarray((len(memory) // 12, 3), np.float32, memory)
 
@@ -212,6 +216,10 @@ class _Adapter:
             hint = "" if wanted or not classes else "; name one in the option 'class'"
             raise Failure(f"{script} has {len(classes) or 'no'} classes{named} with a method '{self.method}'{hint}")
         return classes[0]
+
+    def _state_size(self, limit):
+        size = self.plugin.state_size() if hasattr(self.plugin, "state_size") else 0
+        return _integer("'state_size' returned", size, 0, limit, STATUS_ERROR_CONFIGURATION)
 
     def _run(self, call, status=STATUS_ERROR_INTERNAL):
         try:
@@ -322,8 +330,7 @@ class _TrackerAdapter(_Adapter):
                                                  pattern_ratio=ratio)
                                           for id, family, target, corners, file, ratio in markers],
                                  families=list(families)))
-        size = self.plugin.state_size() if hasattr(self.plugin, "state_size") else 0
-        return STATUS_OK, _integer("'state_size' returned", size, 0, MAX_STATE, STATUS_ERROR_CONFIGURATION)
+        return STATUS_OK, self._state_size(MAX_STATE)
 
     @_reporting()
     def aspect(self, marker):
@@ -337,9 +344,7 @@ class _TrackerAdapter(_Adapter):
                            grey=_pixels(grey, int(f.height), int(f.width), 1, int(f.grey_stride)),
                            search_everywhere=search_everywhere,
                            expected=[Fields(marker) for marker in _elements(bytes(expected), EXPECTED_MARKER)],
-                           state_before=state_before and np.ndarray(len(state_before), np.uint8, state_before),
-                           state_after=state_after and np.ndarray(len(state_after), np.uint8, state_after),
-                           candidate_count=-1)
+                           state_before=_state(state_before), state_after=_state(state_after), candidate_count=-1)
             out, count = _elements(observations, OBSERVATION), 0
             result = self.plugin.track(frame)
             if not hasattr(result, "__iter__") and result is not None:
@@ -375,9 +380,10 @@ class _RaytracerAdapter(_Adapter):
                                  video_format=self.video_format,
                                  intrinsics=Fields(_record(intrinsics, INTRINSICS))))
         self.form = form
-        return STATUS_OK
+        return STATUS_OK, self._state_size(2**63 - 1)
 
-    def render(self, max_samples, sequence, time_s, camera, moved, deformed, video, pixels, height, width, stride):
+    def render(self, max_samples, sequence, time_s, camera, moved, deformed, video, state_before, state_after, pixels,
+               height, width, stride):
         def render():
             request = Fields(
                 max_samples=max_samples, full_samples=0, sequence=sequence, time_s=time_s,
@@ -386,7 +392,8 @@ class _RaytracerAdapter(_Adapter):
                 deformed=[Fields(object=index, is_visible=bool(is_visible), positions=_vectors(positions),
                                  normals=normals and _vectors(normals))
                           for index, is_visible, positions, normals in deformed],
-                video=video and Fields(format=self.video_format, planes=_planes(self.video_format, video)))
+                video=video and Fields(format=self.video_format, planes=_planes(self.video_format, video)),
+                state_before=_state(state_before), state_after=_state(state_after))
             region = self.plugin.render(request, np.ndarray((height, width, 8), np.float16, pixels, 0, (stride, 16, 2))
                                         if self.form == IMAGE_FORM_LINEAR else _pixels(pixels, height, width, 4, stride))
             if not 0 <= request.full_samples < 1 << 32:
@@ -394,8 +401,9 @@ class _RaytracerAdapter(_Adapter):
             return STATUS_OK, (int(request.full_samples),
                                None if region is None else tuple(int(side) for side in region))
 
-        memory = [pixels, moved, *(video or ())] + [view for _, _, p, n in deformed for view in (p, n) if view]
-        return self._with_memory(memory, render)
+        memory = [pixels, moved, state_before, state_after, *(video or ())]
+        memory += [view for _, _, p, n in deformed for view in (p, n)]
+        return self._with_memory([view for view in memory if view is not None], render)
 
 
 class _SinkAdapter(_Adapter):

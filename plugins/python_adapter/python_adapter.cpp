@@ -362,17 +362,15 @@ public:
         const GilLock lock;
         const arhost_frame &frame = *request.frame;
         const arhost_frame_format &format = *frame.format;
-        const auto state = [&](const void *bytes, int flag) {
-            return bytes ? view(bytes, request.state_size, flag).release() : Py_NewRef(Py_None);
-        };
-        const Answer answer = call("track", "KLiNNNNNNN", static_cast<unsigned long long>(frame.sequence),
-                                   static_cast<long long>(frame.capture_ns), frame.clock,
-                                   views_of_planes(format, frame.plane, PyBUF_READ).release(),
-                                   view(frame.grey, std::size_t(format.grey_stride) * format.height).release(),
-                                   PyBool_FromLong(request.search_everywhere),
-                                   view_of_elements(request.expected, request.expected_count).release(),
-                                   state(request.state_before, PyBUF_READ), state(request.state_after, PyBUF_WRITE),
-                                   view_of_elements(result.observations, ARHOST_MAX_OBSERVATIONS).release());
+        const Answer answer =
+            call("track", "KLiNNNNNNN", static_cast<unsigned long long>(frame.sequence),
+                 static_cast<long long>(frame.capture_ns), frame.clock,
+                 views_of_planes(format, frame.plane, PyBUF_READ).release(),
+                 view(frame.grey, std::size_t(format.grey_stride) * format.height).release(),
+                 PyBool_FromLong(request.search_everywhere),
+                 view_of_elements(request.expected, request.expected_count).release(),
+                 state_view(request.state_before, PyBUF_READ), state_view(request.state_after, PyBUF_WRITE),
+                 view_of_elements(result.observations, ARHOST_MAX_OBSERVATIONS).release());
         require(PyArg_ParseTuple(answer.value.get(), "Ii", &result.observation_count, &result.candidate_count));
     }
 
@@ -384,9 +382,11 @@ public:
 #endif
     void start(const arhost_raytracer_setup &setup) {
         const GilLock lock;
-        call("start", "IINNiiN", setup.width, setup.height, view(setup.scene, setup.scene->byte_size).release(),
-             view_of(setup.intrinsics).release(), setup.form, setup.compositing,
-             view_of(setup.video_format).release());
+        state_size_ = PyLong_AsUnsignedLongLong(
+            call("start", "IINNiiN", setup.width, setup.height, view(setup.scene, setup.scene->byte_size).release(),
+                 view_of(setup.intrinsics).release(), setup.form, setup.compositing,
+                 view_of(setup.video_format).release())
+                .value.get());
     }
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
         const GilLock lock;
@@ -400,13 +400,14 @@ public:
                               geometry.normals ? view(geometry.normals, size).release() : Py_NewRef(Py_None))));
         }
         const Answer answer =
-            call("render", "IKdNNNNNIII", request.max_samples, static_cast<unsigned long long>(request.sequence),
+            call("render", "IKdNNNNNNNIII", request.max_samples, static_cast<unsigned long long>(request.sequence),
                  request.time_s, view_of(&request.camera).release(),
                  view(motion ? motion->moved : nullptr, motion ? motion->moved_count * sizeof *motion->moved : 0)
                      .release(),
                  tuple_of(std::move(deformed)).release(),
                  request.video ? views_of_planes(*request.video->format, request.video->plane, PyBUF_READ).release()
                                : Py_NewRef(Py_None),
+                 state_view(request.state_before, PyBUF_READ), state_view(request.state_after, PyBUF_WRITE),
                  (image.linear ? view(image.linear, image_size(image, 16), PyBUF_WRITE)
                                : view(image.rgba, image_size(image, 4), PyBUF_WRITE))
                      .release(),
@@ -448,6 +449,11 @@ private:
         arhost_status status;
         Object value;
     };
+
+    // Returns a view of a state, or None.
+    PyObject *state_view(const void *bytes, int flag) const {
+        return bytes ? view(bytes, state_size_, flag).release() : Py_NewRef(Py_None);
+    }
 
     static arhost_status list_devices(const arhost_host *host, arhost_take_device take, void *context) {
         return detail::guarded(Host(host), [&] {
@@ -500,7 +506,7 @@ private:
 
     Host host_;
     std::string path_;
-    std::uint64_t state_size_ = 0; // size of a tracker's state
+    std::uint64_t state_size_ = 0; // of a tracker or a ray tracer
     Object capsule_, adapter_;
 #if defined(KIND_RAYTRACER)
     std::uint32_t capabilities_ = 0;

@@ -393,6 +393,87 @@ TEST(Supervision, ARejectedResultLeavesTheStateAsItWas) {
     EXPECT_THAT(run.output(), HasSubstr("contract violation"));
 }
 
+namespace {
+
+std::string with_raytracer_state(const std::string &frames, const std::string &raytracer) {
+    return "version: 1\nsource: {plugin: source_counter, options: {delay_ms: 1, frames: " + frames + "}}\n" +
+           "tracker: {plugin: tracker_counter, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n" +
+           "raytracer: {plugin: rt_counter, scene: scene.yaml, options: {" + raytracer + "}}\n" +
+           "outputs: [{plugin: sink_counter, path: counted.txt}]\nstats: stats.json\n" +
+           "restart: {first_delay_ms: 1, quarantine_after: 2}\n";
+}
+
+// For each frame with an overlay: how many images rt_counter had rendered before.
+std::vector<double> rendered_before(const ArhostRun &run) {
+    std::istringstream lines(run.read("counted.txt"));
+    std::vector<double> counts;
+    std::string frame, pixels, count, overlay;
+    while (lines >> frame >> pixels >> count >> overlay)
+        if (count != "none")
+            counts.push_back(std::stod(count));
+    return counts;
+}
+
+} // namespace
+
+TEST(Supervision, ARaytracersStateSurvivesItsWorker) {
+    constexpr std::size_t frames = 300;
+    for (const char *size : {"8", "10000000"}) {
+        ArhostRun run(with_raytracer_state("300", std::string("delay_ms: 1, state_size: ") + size));
+        run.write("scene.yaml", small_scene);
+        run.start();
+        for (std::size_t lines = 0; lines < frames - 60;) {
+            // More lines than frames can be in the pipeline: a frame that two workers die with is given up.
+            ASSERT_TRUE(run.wait_for_lines(lines + 40, "counted.txt")) << run.output();
+            lines = run.lines("counted.txt");
+            if (const pid_t worker = run.worker("rt_counter"))
+                send_signal(worker, SIGKILL);
+        }
+        ASSERT_EQ(run.wait(), 0) << run.output();
+        EXPECT_EQ(rendered_before(run), numbers(frames));
+        EXPECT_GT(run.stats()["restarts"]["raytracer"], 3);
+    }
+}
+
+// The worker dies while it renders frame 20, after it has written a part of state_after.
+TEST(Supervision, AnImageThatKillsItsRaytracerLeavesTheStateAsItWas) {
+    ArhostRun run(with_raytracer_state("40", "state_size: 100000, crash_at: 20"));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run(), 1) << "frame 20 has crashed two workers\n" << run.output();
+    EXPECT_EQ(rendered_before(run), numbers(39));
+}
+
+TEST(Supervision, AnImageThatARaytracerCannotRenderLeavesItsStateAsItWas) {
+    ArhostRun run(with_raytracer_state("40", "state_size: 8, error_at: 20"));
+    run.write("scene.yaml", small_scene);
+    EXPECT_EQ(run.run(), 1) << run.output();
+    EXPECT_EQ(rendered_before(run), numbers(39));
+}
+
+TEST(Supervision, AFallbackBeginsWithoutTheStateOfTheRaytracerThatItReplaces) {
+    ArhostRun run(with_raytracer_state("40", "state_size: 8, crash_at: 20"));
+    run.write("scene.yaml", small_scene);
+    ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.fallback=rt_counter", "--set",
+                       "restart.quarantine_after=1"}),
+              1)
+        << "frame 20 has crashed two workers\n"
+        << run.output();
+    // The fallback has its default options, with which it has no state and draws the numbers of the frames.
+    std::vector<double> expected = numbers(40);
+    expected.erase(expected.begin() + 20);
+    EXPECT_EQ(rendered_before(run), expected);
+}
+
+TEST(Supervision, ARaytracerWhoseStateDoesNotFitIntoItsMemoryIsRejected) {
+    for (const char *size : {"90000000", "9223372036854775807", "-1"}) {
+        ArhostRun run(with_raytracer_state("4", std::string("state_size: ") + size));
+        run.write("scene.yaml", small_scene);
+        EXPECT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.memory_mb=256"}), 2) << run.output();
+        EXPECT_THAT(run.output(), HasSubstr("MiB; 3 states and images do not fit into the 256 MiB that it may use "
+                                            "('memory_mb')"));
+    }
+}
+
 TEST(Supervision, ATrackerWithTooMuchStateIsRejected) {
     ArhostRun run(with_state("frames: 4", "state_size: 16777217"));
     run.expect(2, {"the tracker's state_size is 16777217 bytes; the limit is 16777216"});

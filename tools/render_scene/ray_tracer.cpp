@@ -106,7 +106,7 @@ cv::Mat RayTracer::render(const arhost_scene &scene, const arhost_camera &camera
     const std::uint32_t stride = ipc::overlay_stride(width);
     const ImageMemory memory(std::size_t{stride} * height);
     const arhost_image image{sizeof image, stride, width, height, memory.get(), nullptr};
-    arhost_render_request request{sizeof request, 0, 0, time_s, camera, nullptr, nullptr};
+    arhost_render_request request{sizeof request, 0, 0, time_s, camera, nullptr, nullptr, nullptr, nullptr, 0};
     arhost_motion motion;
     std::optional<arhost::scene::MotionEvaluator> evaluator; // owns the memory of `motion`
     if (scene.duration_s > 0) {
@@ -126,6 +126,9 @@ cv::Mat RayTracer::render(const arhost_scene &scene, const arhost_camera &camera
                                        0,
                                        nullptr};
     expect_ok("start", functions.start(instance_, &setup));
+    request.state_size = worker::state_size_of(functions, instance_);
+    const ImageMemory state(request.state_size);
+    request.state_after = request.state_size > 0 ? state.get() : nullptr;
     const arhost_status status = functions.render(instance_, &request, &image, &info);
     functions.stop(instance_);
     expect_ok("render", status);

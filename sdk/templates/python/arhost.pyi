@@ -563,6 +563,8 @@ class RenderRequest(Protocol):
     moved: np.ndarray
     deformed: list[Deformed]
     video: Optional[Video]
+    state_before: Optional[np.ndarray]
+    state_after: Optional[np.ndarray]
 
 class SinkSetup(Protocol):
     width: int

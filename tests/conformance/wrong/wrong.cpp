@@ -57,6 +57,7 @@ struct Wrong {
     bool was_started = false, is_tiny = false;
     unsigned users = 0;
     std::uint32_t max_samples = 0;        // of an earlier request
+    std::uint32_t images = 0;             // rendered so far
     std::int64_t threads = 0;             // the option
     std::vector<std::uint8_t> last;       // image
     std::vector<std::uint8_t> last_video; // plane 0 of the previous request's video
@@ -600,6 +601,29 @@ arhost_status render_linear(const Wrong &self, const arhost_render_request &requ
     return status;
 }
 
+// The state of the ray tracers that have one counts the images. Later images are brighter.
+constexpr std::size_t state_bytes = 5000;
+std::uint64_t state_size(arhost_instance *) {
+    constexpr const char *defects[] = {"counts_in_its_state", "counts_in_its_heap", "reads_state_after",
+                                       "writes_half_its_state"};
+    return std::ranges::any_of(defects, [](const char *defect) { return has(defect); }) ? state_bytes : 0;
+}
+
+// Returns the number of images before this one.
+unsigned count(Wrong &self, const arhost_render_request &request) {
+    const auto *before = static_cast<const std::uint8_t *>(request.state_before);
+    auto *after = static_cast<std::uint8_t *>(request.state_after);
+    unsigned images = before ? before[0] : 0;
+    if (has("counts_in_its_heap") && before)
+        images = self.images;
+    if (has("reads_state_after") && before)
+        images += after[0] & 3u;
+    std::memset(after, 0, has("writes_half_its_state") ? state_bytes / 2 : state_bytes);
+    after[0] = static_cast<std::uint8_t>(images + 1);
+    ++self.images;
+    return images;
+}
+
 arhost_status render(arhost_instance *instance, const arhost_render_request *request, const arhost_image *image,
                      arhost_render_info *info) {
     Wrong &self = wrong(instance);
@@ -659,6 +683,10 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         return status;
 
     modify(pixels);
+    if (request->state_size > 0) {
+        const unsigned images = count(self, *request);
+        pixels.each_colour([&](double colour, double) { return std::min(1.0, colour + 0.02 * images); });
+    }
     if (has("drops_small_objects") && self.is_tiny)
         pixels.each([](std::uint8_t *p) { p[3] = 0; });
     if (has("unwritten_pixel"))
@@ -790,8 +818,12 @@ std::uint32_t capabilities(arhost_instance *) {
 }
 
 const arhost_plugin &wrong_plugin() {
-    static const arhost_raytracer functions = {sizeof functions, start, has("no_render") ? nullptr : render, stop,
-                                               has("lambert_only") ? capabilities : nullptr};
+    static const arhost_raytracer functions = {sizeof functions,
+                                               start,
+                                               has("no_render") ? nullptr : render,
+                                               stop,
+                                               has("lambert_only") ? capabilities : nullptr,
+                                               state_size};
     static std::vector<arhost_option_descriptor> options(
         embree().descriptor->options, embree().descriptor->options + embree().descriptor->option_count);
     static arhost_descriptor descriptor = *embree().descriptor;

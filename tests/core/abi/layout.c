@@ -408,9 +408,10 @@ STRUCT(arhost_raytracer_setup, 48,
        FIELD(struct_size, 0, 4) FIELD(width, 4, 4) FIELD(height, 8, 4) FIELD(form, 12, 4) FIELD(scene, 16, 8)
        FIELD(intrinsics, 24, 8) FIELD(compositing, 32, 4) FIELD(reserved, 36, 4) FIELD(video_format, 40, 8))
 
-STRUCT(arhost_render_request, 272,
+STRUCT(arhost_render_request, 296,
        FIELD(struct_size, 0, 4) FIELD(max_samples, 4, 4) FIELD(sequence, 8, 8) FIELD(time_s, 16, 8)
-       FIELD(camera, 24, 232) FIELD(motion, 256, 8) FIELD(video, 264, 8))
+       FIELD(camera, 24, 232) FIELD(motion, 256, 8) FIELD(video, 264, 8) FIELD(state_before, 272, 8)
+       FIELD(state_after, 280, 8) FIELD(state_size, 288, 8))
 
 STRUCT(arhost_image, 32,
        FIELD(struct_size, 0, 4) FIELD(stride, 4, 4) FIELD(width, 8, 4) FIELD(height, 12, 4) FIELD(rgba, 16, 8)
@@ -421,8 +422,9 @@ STRUCT(arhost_render_info, 40,
        FIELD(region_width, 16, 4) FIELD(region_height, 20, 4) FIELD(device_time_ns, 24, 8) FIELD(full_samples, 32, 4)
        FIELD(reserved, 36, 4))
 
-STRUCT(arhost_raytracer, 40,
-       FIELD(struct_size, 0, 4) FIELD(start, 8, 8) FIELD(render, 16, 8) FIELD(stop, 24, 8) FIELD(capabilities, 32, 8))
+STRUCT(arhost_raytracer, 48,
+       FIELD(struct_size, 0, 4) FIELD(start, 8, 8) FIELD(render, 16, 8) FIELD(stop, 24, 8) FIELD(capabilities, 32, 8)
+       FIELD(state_size, 40, 8))
 
 /* arhost/sink.h */
 

@@ -243,6 +243,28 @@ class Tracer:
         EXPECT_EQ(lines[i].overlay, std::to_string(i));
 }
 
+TEST_F(PythonAdapter, TheStateOfARayTracerSurvivesItsProcess) {
+    ArhostRun run(raytracer);
+    EXPECT_EQ(run_script(run, R"(
+import os
+class Tracer:
+    def __init__(self, host): self.first = None
+    def start(self, setup): self.pixels = setup.width * setup.height
+    def state_size(self): return 8 * self.pixels
+    def render(self, request, image):
+        if self.first is None: self.first = request.sequence
+        if self.first == 0 and request.sequence == 3: os._exit(1)
+        count = 0 if request.state_before is None else int(request.state_before.view("u8")[-1])
+        assert count == request.sequence and (request.state_before is None) == (request.sequence == 0)
+        assert request.state_before is None or not request.state_before.flags.writeable
+        request.state_after.view("u8")[...] = count + 1
+        image[...] = 0
+)"),
+              0)
+        << run.output();
+    EXPECT_EQ(run.stats()["frames"]["augmented"], 6);
+}
+
 TEST_F(PythonAdapter, SourceAndSinkExchangeFrames) {
     ArhostRun run(
         "version: 1\nsource: {plugin: source_python, options: {script: script.py, class: Source, "

@@ -115,8 +115,16 @@ public:
         arhost_motion motion{};
         if (time_s)
             motion = motion_->at(*time_s);
-        const arhost_render_request request{
-            sizeof request, 0, sequence, 0, camera, time_s ? &motion : nullptr, video ? &video->frame() : nullptr};
+        const arhost_render_request request{sizeof request,
+                                            0,
+                                            sequence,
+                                            0,
+                                            camera,
+                                            time_s ? &motion : nullptr,
+                                            video ? &video->frame() : nullptr,
+                                            nullptr,
+                                            nullptr,
+                                            0};
         LinearPicture picture(camera.intrinsics);
         const arhost_image image = picture.image();
         EXPECT_EQ(functions().render(tracer_.plugin().instance(), &request, &image, &picture.info), ARHOST_STATUS_OK)

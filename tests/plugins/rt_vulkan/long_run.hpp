@@ -82,9 +82,16 @@ inline LongRun long_run(const std::vector<std::filesystem::path> &scenes, int ch
                                            ? camera({side, -330, 150}, {0, 0, 50}, {0, 0, 1}, intrinsics)
                                            : camera({side, 150, 330}, {0, 50, 0}, {0, 1, 0}, intrinsics);
             const arhost_motion motion = evaluator.at(0.04 * i);
-            const arhost_render_request request{
-                sizeof request, 0, static_cast<std::uint64_t>(i), 0, view, scene.duration_s > 0 ? &motion : nullptr,
-                nullptr};
+            const arhost_render_request request{sizeof request,
+                                                0,
+                                                static_cast<std::uint64_t>(i),
+                                                0,
+                                                view,
+                                                scene.duration_s > 0 ? &motion : nullptr,
+                                                nullptr,
+                                                nullptr,
+                                                nullptr,
+                                                0};
             const arhost_image image{sizeof image,
                                      4 * intrinsics.width,
                                      intrinsics.width,

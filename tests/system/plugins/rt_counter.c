@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A ray tracer in plain C. Draws a square of 16 px in the top left corner. The colour of the square is the frame
- * number, which is derived from the camera's distance: R and G are its low and high byte. With the option
+ * number, which is derived from the camera's distance: R and G are its low and high byte. If it has state, the square
+ * shows how many images it has rendered before instead, which it counts in the first 8 bytes. With the option
  * writes_later, the plugin also writes to the previous image, which the ABI forbids.
  */
 #include "misbehave.h"
@@ -20,6 +21,7 @@ struct arhost_instance {
     int64_t images; /* rendered so far */
     double delay_ms;
     int64_t delay_from, reports_progress, writes_later, device_time_ns;
+    uint64_t state_size;
     uint8_t *last; /* previous image */
 };
 
@@ -42,6 +44,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     self->reports_progress = arhost_find_option(options, option_count, "reports_progress")->integer;
     self->writes_later = arhost_find_option(options, option_count, "writes_later")->integer;
     self->device_time_ns = arhost_find_option(options, option_count, "device_time_ns")->integer;
+    self->state_size = (uint64_t)arhost_find_option(options, option_count, "state_size")->integer;
     if (arhost_find_option(options, option_count, "reject")->integer) {
         host->log(host, ARHOST_SEVERITY_ERROR, "rejected, as the option 'reject' requests");
         free(self);
@@ -81,9 +84,25 @@ static int wait_or_cancel(const arhost_instance *self) {
     return left_ms > 0;
 }
 
+static uint64_t state_size(arhost_instance *self) {
+    return self->state_size;
+}
+
+/* Returns the number of images that were rendered before. */
+static uint64_t count(const arhost_render_request *request) {
+    uint64_t before = 0, after;
+    if (request->state_before)
+        memcpy(&before, request->state_before, sizeof before);
+    after = before + 1;
+    memset(request->state_after, 0xa5, request->state_size);
+    memcpy(request->state_after, &after, sizeof after);
+    return before;
+}
+
 static arhost_status render(arhost_instance *self, const arhost_render_request *request, const arhost_image *image,
                             arhost_render_info *info) {
     const int64_t number = (int64_t)(request->camera.eye[2] - 500.0 + 0.5);
+    const uint64_t shown = request->state_size > 0 ? count(request) : (uint64_t)number;
     uint32_t x, y;
     if (number == self->crash_at) {
         signal(SIGSEGV, SIG_DFL);
@@ -101,8 +120,8 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
     for (y = 0; y < image->height; ++y)
         for (x = 0; x < image->width; ++x) {
             uint8_t *pixel = image->rgba + (size_t)y * image->stride + 4 * (size_t)x;
-            pixel[0] = (uint8_t)number;
-            pixel[1] = (uint8_t)(number >> 8);
+            pixel[0] = (uint8_t)shown;
+            pixel[1] = (uint8_t)(shown >> 8);
             pixel[2] = 170;
             pixel[3] = x < 16 && y < 16 ? 255 : 0;
         }
@@ -143,6 +162,8 @@ static const arhost_option_descriptor options[] = {
      "Also writes to the previous image"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "device_time_ns", "0", 0, 0, NULL,
      "Reported device time; negative values wrap to huge ones"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "state_size", "0", 0, 0, NULL,
+     "Bytes of state: 0, or at least 8"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "reject", "false", 0, 0, NULL, "Fails in create"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "crash_in_create", "false", 0, 0, NULL,
      "Crashes in create"},
@@ -159,7 +180,7 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              sizeof options / sizeof *options,
                                              options,
                                              NULL};
-static const arhost_raytracer functions = {sizeof(arhost_raytracer), start, render, stop, NULL};
+static const arhost_raytracer functions = {sizeof(arhost_raytracer), start, render, stop, NULL, state_size};
 static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {

@@ -503,6 +503,8 @@ template <class T> constexpr arhost_raytracer make_raytracer_functions() {
     raytracer.stop = stop_instance<T>;
     if constexpr (requires(const T &p) { p.capabilities(); })
         raytracer.capabilities = capabilities_of<T>;
+    if constexpr (requires(const T &p) { p.state_size(); })
+        raytracer.state_size = state_size_of<T>;
     return raytracer;
 }
 template <class T> inline constexpr arhost_raytracer raytracer_functions = make_raytracer_functions<T>();

@@ -57,6 +57,16 @@ typedef struct arhost_render_request {
      * ARHOST_CAPABILITY_VIDEO; else NULL. Also NULL if the worker warps the image (ARHOST_CAPABILITY_LENS_DISTORTION)
      */
     const arhost_frame *video;
+    /* Memory of the ray tracer that survives the end of the worker process, because the host keeps it: accumulated
+     * samples, for example. Both pointers are aligned to 4,096 bytes; both are NULL if `state_size` is 0.
+     * `state_before`, read-only: the `state_after` of the last accepted call, even if another worker process made
+     * that call. NULL in the first image after a start with another scene or size, and after a swap to another ray
+     * tracer, a fallback, or a restart with another version or another state_size. `state_after`: its initial content
+     * is undefined; write it completely. The host discards it if the call fails, and may discard it even if the call
+     * succeeds. */
+    const void *state_before;
+    void *state_after;
+    uint64_t state_size; /* bytes of each; 0 if both are NULL */
 } arhost_render_request;
 
 /* The image to write, top row first. Write every pixel and nothing else; leave the bytes after the last row
@@ -109,8 +119,9 @@ typedef struct arhost_raytracer {
      * called again after `stop`, with another scene and image size. */
     arhost_status (*start)(arhost_instance *instance, const arhost_raytracer_setup *setup);
 
-    /* [worker, started] Renders one image. Equal requests must give identical bytes, with any number of threads,
-     * unless an option of the plugin, off by default, says otherwise. */
+    /* [worker, started] Renders one image. Equal requests, including equal bytes of state_before, must give identical
+     * bytes of the image and of state_after, with any number of threads, unless an option of the plugin, off by
+     * default, says otherwise. Frames may be missing or repeated. */
     arhost_status (*render)(arhost_instance *instance, const arhost_render_request *request,
                             const arhost_image *image, arhost_render_info *info);
 
@@ -120,6 +131,11 @@ typedef struct arhost_raytracer {
     /* [worker, created] Optional: may be NULL. Returns the capabilities of this instance, if they depend on its
      * options: the descriptor's, of which it may clear bits of …_EVERY_SCENE, …_LINEAR_IMAGES and …_VIDEO. */
     uint32_t (*capabilities)(arhost_instance *instance);
+
+    /* [worker, started] Optional; NULL: no memory. Called once after each successful `start`. Returns the size in
+     * bytes of the memory that the ray tracer needs from image to image (arhost_render_request.state_before) for
+     * images of the setup's size. Three states and three images must fit into the memory that the worker may use. */
+    uint64_t (*state_size)(arhost_instance *instance);
 } arhost_raytracer;
 
 #ifdef __cplusplus

@@ -893,8 +893,11 @@ pub struct arhost_render_request {
     pub camera: arhost_camera,
     pub motion: *const arhost_motion,
     pub video: *const arhost_frame,
+    pub state_before: *const c_void,
+    pub state_after: *mut c_void,
+    pub state_size: u64,
 }
-const _: () = assert!(size_of::<arhost_render_request>() == 272);
+const _: () = assert!(size_of::<arhost_render_request>() == 296);
 unsafe impl Sync for arhost_render_request {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -930,8 +933,9 @@ pub struct arhost_raytracer {
     pub render: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_render_request, *const arhost_image, *mut arhost_render_info) -> arhost_status>,
     pub stop: Option<unsafe extern "C" fn(*mut arhost_instance)>,
     pub capabilities: Option<unsafe extern "C" fn(*mut arhost_instance) -> u32>,
+    pub state_size: Option<unsafe extern "C" fn(*mut arhost_instance) -> u64>,
 }
-const _: () = assert!(size_of::<arhost_raytracer>() == 40);
+const _: () = assert!(size_of::<arhost_raytracer>() == 48);
 unsafe impl Sync for arhost_raytracer {} // a plugin's statics are immutable
 
 // ---- arhost/sink.h ----

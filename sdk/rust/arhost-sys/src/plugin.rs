@@ -197,10 +197,14 @@ pub trait Raytracer: Plugin {
     fn start(&mut self, setup: &arhost_raytracer_setup) -> Result<(), Failure>;
     fn render(
         &mut self,
-        request: &arhost_render_request,
+        request: &mut RenderRequest,
         image: &mut Image,
         info: &mut arhost_render_info,
     ) -> Result<(), Failure>;
+    /// The size in bytes of `RenderRequest::state_before` and `state_after`.
+    fn state_size(&self) -> u64 {
+        0
+    }
 }
 
 pub trait Sink: Plugin {
@@ -581,6 +585,14 @@ pub const fn tracker<T: Tracker>() -> arhost_tracker {
     }
 }
 
+unsafe extern "C" fn raytracer_state_size<T: Raytracer>(instance: *mut arhost_instance) -> u64 {
+    let mut size = 0;
+    with(instance, |plugin: &mut T| {
+        size = plugin.state_size();
+        Ok(ARHOST_STATUS_OK)
+    });
+    size
+}
 unsafe extern "C" fn start_raytracer<T: Raytracer>(
     instance: *mut arhost_instance,
     setup: *const arhost_raytracer_setup,
@@ -594,7 +606,7 @@ unsafe extern "C" fn render<T: Raytracer>(
     info: *mut arhost_render_info,
 ) -> arhost_status {
     with(instance, |plugin: &mut T| {
-        plugin.render(&*request, &mut Image(&*image), &mut *info).map(|()| ARHOST_STATUS_OK)
+        plugin.render(&mut RenderRequest(&*request), &mut Image(&*image), &mut *info).map(|()| ARHOST_STATUS_OK)
     })
 }
 #[doc(hidden)]
@@ -605,6 +617,7 @@ pub const fn raytracer<T: Raytracer>() -> arhost_raytracer {
         render: Some(render::<T>),
         stop: Some(stop::<T>),
         capabilities: None,
+        state_size: Some(raytracer_state_size::<T>),
     }
 }
 

@@ -333,10 +333,30 @@ impl arhost_raytracer_setup {
     }
 }
 
-impl arhost_render_request {
+/// The input of `Raytracer::render`. Its fields are those of `arhost_render_request`.
+pub struct RenderRequest<'a>(pub(crate) &'a arhost_render_request);
+
+impl RenderRequest<'_> {
     /// The animated state of the scene; `None` for a static scene.
     pub fn motion(&self) -> Option<&arhost_motion> {
-        unsafe { self.motion.as_ref() }
+        unsafe { self.0.motion.as_ref() }
+    }
+    /// What an earlier call wrote to `state_after`; `None` in the first image.
+    pub fn state_before(&self) -> Option<&[u8]> {
+        let before = self.0.state_before.cast::<u8>();
+        unsafe { (!before.is_null()).then(|| slice::from_raw_parts(before, self.0.state_size as usize)) }
+    }
+    /// To be written completely.
+    pub fn state_after(&mut self) -> &mut [u8] {
+        let after = self.0.state_after.cast::<u8>();
+        unsafe { if after.is_null() { &mut [] } else { slice::from_raw_parts_mut(after, self.0.state_size as usize) } }
+    }
+}
+
+impl Deref for RenderRequest<'_> {
+    type Target = arhost_render_request;
+    fn deref(&self) -> &arhost_render_request {
+        self.0
     }
 }
 

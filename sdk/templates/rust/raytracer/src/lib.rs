@@ -131,7 +131,7 @@ impl Raytracer for @CLASS@ {
 
     fn render(
         &mut self,
-        request: &arhost_render_request,
+        request: &mut RenderRequest,
         image: &mut Image,
         _info: &mut arhost_render_info, // optional: set a region outside of which every alpha is 0
     ) -> Result<(), Failure> {
