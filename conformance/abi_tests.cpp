@@ -159,13 +159,15 @@ void descriptor(Context &context) {
     for (const auto &[field, text] : texts)
         if (!text || !*text)
             throw Failure(fmt::format("the descriptor's {} is empty", field));
-    constexpr std::uint32_t capabilities_of_kind[] = {
-        0, ARHOST_CAPABILITY_SEEK | ARHOST_CAPABILITY_LIVE, ARHOST_CAPABILITY_REPORTS_POSES,
-        ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE | ARHOST_CAPABILITY_SCALED_IMAGES |
-            ARHOST_CAPABILITY_LINEAR_IMAGES | ARHOST_CAPABILITY_VIDEO,
-        ARHOST_CAPABILITY_NUMBERED_FILES | ARHOST_CAPABILITY_REALTIME_SINK | ARHOST_CAPABILITY_STANDARD_OUTPUT |
-            ARHOST_CAPABILITY_VIDEO_INPUT | ARHOST_CAPABILITY_OVERLAY_INPUT | ARHOST_CAPABILITY_RUN_DESCRIPTION};
-    if (const std::uint32_t invalid = d.capabilities & ~capabilities_of_kind[d.kind])
+    constexpr std::uint64_t capabilities_of_kind[] = {
+        0, ARHOST_SOURCE_CAPABILITY_SEEK | ARHOST_SOURCE_CAPABILITY_LIVE, ARHOST_TRACKER_CAPABILITY_REPORTS_POSES,
+        ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION | ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE |
+            ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES | ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES |
+            ARHOST_RAYTRACER_CAPABILITY_VIDEO | ARHOST_RAYTRACER_CAPABILITY_DEPTH,
+        ARHOST_SINK_CAPABILITY_NUMBERED_FILES | ARHOST_SINK_CAPABILITY_REALTIME |
+            ARHOST_SINK_CAPABILITY_STANDARD_OUTPUT | ARHOST_SINK_CAPABILITY_VIDEO_INPUT |
+            ARHOST_SINK_CAPABILITY_OVERLAY_INPUT | ARHOST_SINK_CAPABILITY_RUN_DESCRIPTION};
+    if (const std::uint64_t invalid = d.capabilities & ~capabilities_of_kind[d.kind])
         throw Failure(fmt::format("the capability bits {:#x} are not defined for this kind of plugin", invalid));
     const ipc::Json described = model::describe(d);
     for (const auto &[field, value] : described.items()) {

@@ -215,7 +215,8 @@ std::string family_of(std::span<const Test> tests, RunSettings settings,
         if (run_alone(*start, settings).verdict != Verdict::fail)
             return family;
     }
-    return plugin.capabilities & ARHOST_CAPABILITY_REPORTS_POSES ? "" : drawn_families.front(); // tests report why
+    return plugin.capabilities & ARHOST_TRACKER_CAPABILITY_REPORTS_POSES ? ""
+                                                                         : drawn_families.front(); // tests report why
 }
 
 // The plugins that run a class of a Python script, and the kinds of `arhost new-plugin`.
@@ -266,7 +267,7 @@ Settings default_paths(std::span<const Test> tests, RunSettings settings,
         values = {folder / "%02d.png", folder / "00.png"};
     } else if (plugin.kind == ARHOST_KIND_SINK) {
         values = {"out", "out.mp4", "out.jsonl", standard_output};
-        if (plugin.capabilities & ARHOST_CAPABILITY_NUMBERED_FILES)
+        if (plugin.capabilities & ARHOST_SINK_CAPABILITY_NUMBERED_FILES)
             values.insert(values.begin(), "%03d.png");
     }
     const arhost_option_type type = is_source ? ARHOST_OPTION_INPUT_PATH : ARHOST_OPTION_OUTPUT_PATH;

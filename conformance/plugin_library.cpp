@@ -107,8 +107,10 @@ Host::Host()
     host_.cancelled = [](const arhost_host *host) { return static_cast<std::int32_t>(self(host).cancelled_); };
     host_.get_extension = [](const arhost_host *host, const char *name) -> const void * {
         static constexpr arhost_control control = {
-            sizeof control, [](const arhost_host *sink_host, const char *command, arhost_take_answer take,
-                               void *context) { return self(sink_host).send(command, take, context); }};
+            sizeof control, 0,
+            [](const arhost_host *sink_host, const char *command, arhost_take_answer take, void *context) {
+                return self(sink_host).send(command, take, context);
+            }};
         return self(host).offers_control_ && name && std::string_view(name) == ARHOST_CONTROL_EXTENSION ? &control
                                                                                                         : nullptr;
     };

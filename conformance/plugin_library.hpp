@@ -44,7 +44,7 @@ template <class Function> auto in_call(const CallPage &calls, ipc::Call call, Fu
 
 using Settings = std::map<std::string, std::string>; // option values as text, as in the YAML
 
-// Value of an output path; see ARHOST_CAPABILITY_STANDARD_OUTPUT.
+// Value of an output path; see ARHOST_SINK_CAPABILITY_STANDARD_OUTPUT.
 constexpr const char *standard_output = "-";
 
 // A listening socket for an option of the type ARHOST_OPTION_LISTEN.

@@ -127,7 +127,7 @@ void opaque_shadow(Context &context) {
 }
 
 void translucent_shadow(Context &context) {
-    need_capability(context, ARHOST_CAPABILITY_GLASS, "GLASS");
+    need_capability(context, ARHOST_RAYTRACER_CAPABILITY_GLASS, "GLASS");
     const Picture picture = Tracer(context, ball_over_catcher(glass())).render(from_front());
     expect_shadow(picture, translucent, "a glass ball");
 }
@@ -144,7 +144,7 @@ void catcher_in_light(Context &context) {
 }
 
 void stronger_shadow_wins(Context &context) {
-    need_capability(context, ARHOST_CAPABILITY_GLASS, "GLASS");
+    need_capability(context, ARHOST_RAYTRACER_CAPABILITY_GLASS, "GLASS");
     scene::ArenaBuilder builder = ball_over_catcher(diffuse(glm::vec3(0.5f)));
     // A glass sphere between lamp and ball. Its shadow covers half of the ball's shadow and extends beyond it.
     builder.add_object("glass", builder.add_spheres({{90, 7, 120, 8}}), builder.add_material(glass()));
@@ -160,7 +160,7 @@ void stronger_shadow_wins(Context &context) {
 
 void shadow_alpha_of_the_scene(Context &context) {
     for (const bool is_glass : {false, true}) {
-        if (is_glass && !has_capability(context, ARHOST_CAPABILITY_GLASS))
+        if (is_glass && !has_capability(context, ARHOST_RAYTRACER_CAPABILITY_GLASS))
             break;
         scene::ArenaBuilder builder = ball_over_catcher(is_glass ? glass() : diffuse(glm::vec3(0.5f)));
         builder.settings.shadow_alpha_opaque = 0.8f;
@@ -179,7 +179,7 @@ void shadow_alpha_of_the_scene(Context &context) {
 // One of two lamps is hidden. Its light is two thirds of the light of both.
 void partial_shadow(Context &context) {
     for (const bool is_glass : {false, true}) {
-        if (is_glass && !has_capability(context, ARHOST_CAPABILITY_GLASS))
+        if (is_glass && !has_capability(context, ARHOST_RAYTRACER_CAPABILITY_GLASS))
             break;
         scene::ArenaBuilder builder = ball_over_catcher(is_glass ? glass() : diffuse(glm::vec3(0.5f)));
         const double alpha_opaque = double{builder.settings.shadow_alpha_opaque},

@@ -129,8 +129,8 @@ void eye_look_at_up(Context &context) {
 }
 
 void lens(Context &context) {
-    if (!(context.library.descriptor().capabilities & ARHOST_CAPABILITY_LENS_DISTORTION))
-        throw Skip("ARHOST_CAPABILITY_LENS_DISTORTION is not declared");
+    if (!(context.library.descriptor().capabilities & ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION))
+        throw Skip("ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION is not declared");
     arhost_intrinsics in = pinhole();
     in.distortion = ARHOST_DISTORTION_BROWN;
     in.coefficient_count = 4;
@@ -172,7 +172,7 @@ void moved_with_camera(Context &context) {
 }
 
 void moving_object(Context &context) {
-    need_capability(context, ARHOST_CAPABILITY_MOTION, "MOTION");
+    need_capability(context, ARHOST_RAYTRACER_CAPABILITY_MOTION, "MOTION");
     constexpr double radius = 15;
     scene::ArenaBuilder builder;
     builder.settings.ambient = glm::vec3(1);

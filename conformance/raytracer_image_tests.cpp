@@ -167,7 +167,7 @@ void reference(Context &context) {
                                  "' does not exist; give --reference FILE");
     PluginLibrary library(context.reference, {}, context.library.calls());
     Context of_reference{library, context.reference, context.random};
-    const bool is_matte = !has_capability(context, ARHOST_CAPABILITY_REFLECTION);
+    const bool is_matte = !has_capability(context, ARHOST_RAYTRACER_CAPABILITY_REFLECTION);
     const auto scene = [&] { return still_life(glm::mat4(1), is_matte); };
     const Picture expected = Tracer(of_reference, scene()).render(still_life_camera());
     const Picture actual = Tracer(context, scene()).render(still_life_camera());

@@ -126,7 +126,7 @@ void shadow_on_object(Context &context) {
 
 // The light of a glass ball's shadow on an object, relative to the light without a ball.
 void glass_shadow(Context &context) {
-    need_capability(context, ARHOST_CAPABILITY_GLASS, "GLASS");
+    need_capability(context, ARHOST_RAYTRACER_CAPABILITY_GLASS, "GLASS");
     const glm::vec3 attenuation(0.9f, 0.6f, 0.3f);
     arhost_material material = glass();
     std::copy_n(&attenuation.x, 3, material.shadow_attenuation);
@@ -152,19 +152,19 @@ void glass_shadow(Context &context) {
 
 // Lamps of radiance 0.5 that are seen in a mirror or through a pane of glass without refraction and reflection.
 void visible_lamps(Context &context) {
-    need_capability(context, ARHOST_CAPABILITY_AREA_LIGHTS, "AREA_LIGHTS");
+    need_capability(context, ARHOST_RAYTRACER_CAPABILITY_AREA_LIGHTS, "AREA_LIGHTS");
     arhost_material pane = glass();
     pane.index = 1;
     pane.fresnel_minimum = pane.fresnel_maximum = 0;
     struct Way {
         const char *name;
-        std::uint32_t capability;
+        std::uint64_t capability;
         arhost_material material;
         float lamp_z; // between camera and mirror, or behind the pane; its lower or upper side is visible
     };
     bool is_checked = false;
-    for (const Way &way : {Way{"in a mirror", ARHOST_CAPABILITY_REFLECTION, mirror(1), 100},
-                           Way{"through a pane of glass", ARHOST_CAPABILITY_GLASS, pane, -100}})
+    for (const Way &way : {Way{"in a mirror", ARHOST_RAYTRACER_CAPABILITY_REFLECTION, mirror(1), 100},
+                           Way{"through a pane of glass", ARHOST_RAYTRACER_CAPABILITY_GLASS, pane, -100}})
         for (const arhost_light_type type : {ARHOST_LIGHT_SPHERE, ARHOST_LIGHT_RECTANGLE}) {
             if (!has_capability(context, way.capability))
                 continue;
@@ -196,7 +196,8 @@ void visible_lamps(Context &context) {
             });
         }
     if (!is_checked)
-        throw Skip("neither ARHOST_CAPABILITY_REFLECTION nor ARHOST_CAPABILITY_GLASS is declared");
+        throw Skip(
+            "neither ARHOST_RAYTRACER_CAPABILITY_REFLECTION nor ARHOST_RAYTRACER_CAPABILITY_GLASS is declared");
 }
 
 // A coarse ball whose normals are those of a sphere.

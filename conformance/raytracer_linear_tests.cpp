@@ -17,7 +17,7 @@ const double silhouette = 200 * 30 / std::sqrt(200.0 * 200 - 30 * 30);
 constexpr std::array channel_names = {"red", "green", "blue"};
 
 void need_linear_images(Context &context) {
-    need_capability(context, ARHOST_CAPABILITY_LINEAR_IMAGES, "LINEAR_IMAGES");
+    need_capability(context, ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES, "LINEAR_IMAGES");
 }
 
 scene::ArenaBuilder emissive_sphere(const glm::vec3 &radiance) {

@@ -10,8 +10,8 @@ namespace arhost::conformance {
 namespace {
 
 void need_video(Context &context) {
-    need_capability(context, ARHOST_CAPABILITY_VIDEO, "VIDEO");
-    need_capability(context, ARHOST_CAPABILITY_REFLECTION, "REFLECTION");
+    need_capability(context, ARHOST_RAYTRACER_CAPABILITY_VIDEO, "VIDEO");
+    need_capability(context, ARHOST_RAYTRACER_CAPABILITY_REFLECTION, "REFLECTION");
 }
 
 // A mirror that stands upright on a filmed table, under a lamp that shines straight down: it neither shadows nor
@@ -43,7 +43,7 @@ Video ramps(arhost_pixel_format format, bool is_dark = false) {
 // An image in the form that the host would ask for, over mid-grey video.
 Picture seen(Context &context, Tracer &tracer) {
     tracer.set_compositing(ARHOST_COMPOSITING_LINEAR);
-    return has_capability(context, ARHOST_CAPABILITY_LINEAR_IMAGES) ? tracer.render_linear(view()).shown()
+    return has_capability(context, ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES) ? tracer.render_linear(view()).shown()
                                                                     : tracer.render(view());
 }
 
@@ -118,13 +118,13 @@ void own_frame(Context &context) {
 }
 
 void undeclared(Context &context) {
-    if (has_capability(context, ARHOST_CAPABILITY_VIDEO))
-        throw Skip("ARHOST_CAPABILITY_VIDEO is declared");
+    if (has_capability(context, ARHOST_RAYTRACER_CAPABILITY_VIDEO))
+        throw Skip("ARHOST_RAYTRACER_CAPABILITY_VIDEO is declared");
     const Video video = ramps(ARHOST_PIXEL_FORMAT_BGR8);
     Tracer without(context, mirror_on_a_table()), with(context, mirror_on_a_table());
     with.set_video(&video);
     expect_alike(seen(context, with), seen(context, without),
-                 "it does not declare ARHOST_CAPABILITY_VIDEO, but its image depends on the request's video");
+                 "it does not declare ARHOST_RAYTRACER_CAPABILITY_VIDEO, but its image depends on the request's video");
 }
 
 constexpr const char *gate = "raytracer.render";

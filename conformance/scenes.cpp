@@ -31,7 +31,7 @@ arhost_intrinsics pinhole(std::uint32_t width, std::uint32_t height, double foca
 
 arhost_camera camera(const glm::dvec3 &eye, const glm::dvec3 &look_at, const glm::dvec3 &up,
                      const arhost_intrinsics &intrinsics) {
-    arhost_camera c{sizeof c, 0, {}, {}, {}, intrinsics};
+    arhost_camera c{sizeof c, 0, {}, {}, {}, intrinsics, {}};
     std::copy_n(&eye.x, 3, c.eye);
     std::copy_n(&look_at.x, 3, c.look_at);
     std::copy_n(&up.x, 3, c.up);

@@ -47,7 +47,7 @@ scene::ArenaBuilder path_scene(float background = 0);
 void add_table(scene::ArenaBuilder &builder);
 
 // Shadows, a mirror, lamps and an occluder. `moved`: a rigid transform of the whole scene. `is_matte`: all materials
-// are diffuse, for ray tracers without ARHOST_CAPABILITY_REFLECTION.
+// are diffuse, for ray tracers without ARHOST_RAYTRACER_CAPABILITY_REFLECTION.
 scene::ArenaBuilder still_life(const glm::mat4 &moved = glm::mat4(1), bool is_matte = false);
 arhost_camera still_life_camera(const arhost_intrinsics &intrinsics = pinhole(),
                                 const glm::dmat4 &moved = glm::dmat4(1));

@@ -176,7 +176,7 @@ arhost_status SinkRun::try_start(std::uint64_t first_sequence, const Size &size)
         create();
     const arhost_intrinsics intrinsics = lens(size);
     const arhost_frame_format format = video_format(size);
-    const bool describes = (library_.plugin().descriptor->capabilities & ARHOST_CAPABILITY_RUN_DESCRIPTION) != 0;
+    const bool describes = (library_.plugin().descriptor->capabilities & ARHOST_SINK_CAPABILITY_RUN_DESCRIPTION) != 0;
     const arhost_sink_setup setup{sizeof setup,
                                   size.width,
                                   size.height,
@@ -201,14 +201,14 @@ void SinkRun::start(std::uint64_t first_sequence, const Size &size) {
 
 arhost_status SinkRun::try_write(const SealedOutput &frame) {
     arhost_output output = frame.output();
-    const std::uint32_t capabilities =
+    const std::uint64_t capabilities =
         library_.plugin().descriptor->capabilities &
-        (functions_.capabilities ? functions_.capabilities(instance_->get()) : ~std::uint32_t{0});
-    if (!(capabilities & ARHOST_CAPABILITY_VIDEO_INPUT)) {
+        (functions_.capabilities ? functions_.capabilities(instance_->get()) : ~std::uint64_t{0});
+    if (!(capabilities & ARHOST_SINK_CAPABILITY_VIDEO_INPUT)) {
         std::fill(std::begin(output.video), std::end(output.video), nullptr);
         output.depth_mm = nullptr;
     }
-    if (!(capabilities & ARHOST_CAPABILITY_OVERLAY_INPUT)) {
+    if (!(capabilities & ARHOST_SINK_CAPABILITY_OVERLAY_INPUT)) {
         output.overlay_rgba = nullptr;
         output.overlay_stride = 0;
     }

@@ -326,8 +326,8 @@ void files(Context &context) {
 }
 
 void require_every_frame(Context &context) {
-    if (context.library.descriptor().capabilities & ARHOST_CAPABILITY_REALTIME_SINK)
-        throw Skip("ARHOST_CAPABILITY_REALTIME_SINK is declared");
+    if (context.library.descriptor().capabilities & ARHOST_SINK_CAPABILITY_REALTIME)
+        throw Skip("ARHOST_SINK_CAPABILITY_REALTIME is declared");
 }
 
 void every_frame(Context &context) {

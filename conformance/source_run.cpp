@@ -66,8 +66,8 @@ arhost_status SourceRun::try_start(const Request &request) {
         instance_.emplace(library_);
         instance_->create_or_fail();
     }
-    const arhost_source_setup setup{sizeof setup,      0, request.first_sequence, request.fps, request.paced,
-                                    request.intrinsics};
+    const arhost_source_setup setup{sizeof setup,  0, request.first_sequence, request.fps,
+                                    request.paced, 0, request.intrinsics};
     properties_ = {};
     properties_.struct_size = sizeof properties_;
     properties_.format.struct_size = sizeof properties_.format;

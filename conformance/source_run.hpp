@@ -76,8 +76,8 @@ public:
     Frame frame() const;                              // the last one read
     std::uint64_t next() const { return next_; }      // arhost_frame_buffer.sequence of the next one
 
-    bool is_live() const { return (library_.descriptor().capabilities & ARHOST_CAPABILITY_LIVE) != 0; }
-    bool can_seek() const { return (library_.descriptor().capabilities & ARHOST_CAPABILITY_SEEK) != 0; }
+    bool is_live() const { return (library_.descriptor().capabilities & ARHOST_SOURCE_CAPABILITY_LIVE) != 0; }
+    bool can_seek() const { return (library_.descriptor().capabilities & ARHOST_SOURCE_CAPABILITY_SEEK) != 0; }
     const arhost_source_properties &properties() const { return properties_; }
     const arhost_frame_format &format() const { return properties_.format; }
     Instance &instance() { return *instance_; }

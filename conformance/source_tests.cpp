@@ -343,7 +343,7 @@ void two_instances(Context &context) {
 void seek(Context &context) {
     SourceRun run(context);
     if (!run.can_seek())
-        throw Skip("ARHOST_CAPABILITY_SEEK is not declared");
+        throw Skip("ARHOST_SOURCE_CAPABILITY_SEEK is not declared");
     run.start();
     const std::vector<Frame> frames = run.read_up_to(8);
     for (const std::size_t first : {std::size_t{1}, std::size_t{5}}) {

@@ -47,7 +47,7 @@ SealedScene::~SealedScene() {
         ::munmap(memory_, size_);
 }
 
-bool has_capability(Context &context, std::uint32_t capability) {
+bool has_capability(Context &context, std::uint64_t capability) {
     Instance instance(context.library);
     instance.create_or_fail();
     const arhost_plugin &plugin = context.library.plugin();
@@ -55,9 +55,9 @@ bool has_capability(Context &context, std::uint32_t capability) {
     return (scene::capabilities_of(*plugin.descriptor, functions, instance.get()) & capability) != 0;
 }
 
-void need_capability(Context &context, std::uint32_t capability, const char *name) {
+void need_capability(Context &context, std::uint64_t capability, const char *name) {
     if (!has_capability(context, capability))
-        throw Skip(fmt::format("ARHOST_CAPABILITY_{} is not declared", name));
+        throw Skip(fmt::format("ARHOST_RAYTRACER_CAPABILITY_{} is not declared", name));
 }
 
 Settings with_samples(Context &context, int samples) {
@@ -124,7 +124,7 @@ arhost_status Tracer::try_render(const arhost_camera &camera, std::optional<Imag
                                  arhost_render_info &info, const arhost_motion *motion) {
     arhost_render_request request{
         sizeof request, max_samples_, sequence_, 0, camera, motion, video_ ? &video_->frame() : nullptr,
-        nullptr, nullptr, 0};
+        nullptr, nullptr, 0, nullptr};
     if (state_size_ > 0) {
         state_after_ = state_memory(state_size_);
         std::fill_n(state_after_->data(), state_size_, state_filler_);

@@ -33,9 +33,9 @@ private:
 };
 
 // Whether the ray tracer declares the capability.
-bool has_capability(Context &context, std::uint32_t capability);
-// Throws Skip unless the ray tracer declares the capability. `name`: without ARHOST_CAPABILITY_.
-void need_capability(Context &context, std::uint32_t capability, const char *name);
+bool has_capability(Context &context, std::uint64_t capability);
+// Throws Skip unless the ray tracer declares the capability. `name`: without ARHOST_RAYTRACER_CAPABILITY_.
+void need_capability(Context &context, std::uint64_t capability, const char *name);
 
 // Sets the option `samples` of the ray tracer, if it has it.
 Settings with_samples(Context &context, int samples);

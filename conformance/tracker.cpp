@@ -294,8 +294,8 @@ std::vector<arhost_observation> Tracker::observations() const {
 
 std::vector<arhost_body_pose> Tracker::poses() const {
     const auto &result = *reinterpret_cast<const arhost_tracker_result *>(result_memory_.data());
-    if (result.pose_count > 0 && !(library_.descriptor().capabilities & ARHOST_CAPABILITY_REPORTS_POSES))
-        throw Failure("it reports poses, but does not declare ARHOST_CAPABILITY_REPORTS_POSES");
+    if (result.pose_count > 0 && !(library_.descriptor().capabilities & ARHOST_TRACKER_CAPABILITY_REPORTS_POSES))
+        throw Failure("it reports poses, but does not declare ARHOST_TRACKER_CAPABILITY_REPORTS_POSES");
     return elements_of<arhost_body_pose>(*pose_memory_, pose_size(), result.pose_count, target_count_, "poses");
 }
 

@@ -37,8 +37,8 @@ struct Started {
 };
 
 void start(Context &context) {
-    if (!(context.library.descriptor().capabilities & ARHOST_CAPABILITY_REPORTS_POSES))
-        throw Skip("ARHOST_CAPABILITY_REPORTS_POSES is not declared");
+    if (!(context.library.descriptor().capabilities & ARHOST_TRACKER_CAPABILITY_REPORTS_POSES))
+        throw Skip("ARHOST_TRACKER_CAPABILITY_REPORTS_POSES is not declared");
     if (context.body.empty() && context.family.empty())
         throw Failure("it starts with no marker, and no body is named: give --family NAME or --body NAME");
     if (context.body.empty())

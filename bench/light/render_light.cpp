@@ -38,13 +38,15 @@ void run(int argc, char **argv) {
                                        (height - 1) / 2.0,
                                        0,
                                        0,
+                                       {},
                                        {}};
     const arhost_camera camera{sizeof(arhost_camera),
                                0,
                                {number(6), number(7), number(8)},
                                {number(9), number(10), number(11)},
                                {number(12), number(13), number(14)},
-                               intrinsics};
+                               intrinsics,
+                               {}};
     arhost_frame_format format{};
     format.struct_size = sizeof format;
     format.pixel_format = ARHOST_PIXEL_FORMAT_RGB8;
@@ -92,7 +94,7 @@ void run(int argc, char **argv) {
     setup.compositing = ARHOST_COMPOSITING_LINEAR;
     rt_embree::Renderer renderer(setup, settings, arhost::Host(&host));
     std::vector<std::uint16_t> pixels(std::size_t{8} * width * height);
-    const arhost_image image{sizeof(arhost_image), 16 * width, width, height, nullptr, pixels.data()};
+    const arhost_image image{sizeof(arhost_image), 16 * width, width, height, nullptr, pixels.data(), nullptr};
     arhost_frame frame_of_video{};
     frame_of_video.struct_size = sizeof frame_of_video;
     frame_of_video.format = &format;

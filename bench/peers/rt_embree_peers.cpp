@@ -153,13 +153,15 @@ arhost_camera camera() {
                                        (height - 1) / 2.0,
                                        0,
                                        0,
+                                       {},
                                        {}};
     return {sizeof(arhost_camera),
             0,
             {eye[0], eye[1], eye[2]},
             {look_at[0], look_at[1], look_at[2]},
             {0, 1, 0},
-            intrinsics};
+            intrinsics,
+            {}};
 }
 
 class Trial {
@@ -170,7 +172,7 @@ public:
                      &camera_.intrinsics, ARHOST_COMPOSITING_SRGB, 0, nullptr},
                     case_.settings, arhost::Host(&host_)) {}
     void render() {
-        renderer_.render(camera_, {sizeof(arhost_image), width * 4, width, height, pixels_.data(), nullptr});
+        renderer_.render(camera_, {sizeof(arhost_image), width * 4, width, height, pixels_.data(), nullptr, nullptr});
     }
     const std::vector<std::uint8_t> &pixels() const { return pixels_; }
     const rt_embree::Renderer &renderer() const { return renderer_; }

@@ -82,12 +82,13 @@ arhost_intrinsics intrinsics() {
             (height - 1) / 2.0,
             0,
             0,
+            {},
             {}};
 }
 
 // Returns a camera in whose image the bunny fills the height.
 arhost_camera camera() {
-    return {sizeof(arhost_camera), 0, {0, 50, 170}, {0, 50, 169}, {0, 1, 0}, intrinsics()};
+    return {sizeof(arhost_camera), 0, {0, 50, 170}, {0, 50, 169}, {0, 1, 0}, intrinsics(), {}};
 }
 
 class Trial {
@@ -99,7 +100,7 @@ public:
                     settings, arhost::Host(&host_)) {}
 
     Timing time() {
-        const arhost_image image{sizeof image, width * 4, width, height, pixels_.data(), nullptr};
+        const arhost_image image{sizeof image, width * 4, width, height, pixels_.data(), nullptr, nullptr};
         return time_frames([&] { renderer_.render(camera_, image); });
     }
     double covered() const {

@@ -149,7 +149,9 @@ arhost_camera camera_of(const Size &size) {
              (size.height - 1) / 2.0,
              0,
              0,
-             {}}};
+             {},
+             {}},
+            {}};
 }
 
 Ours trace(const Arena &arena) {
@@ -162,7 +164,7 @@ Ours trace(const Arena &arena) {
         const arhost_camera camera = camera_of(sizes[i]);
         const auto [width, height] = sizes[i];
         std::vector<std::uint8_t> pixels(std::size_t{4} * width * height);
-        const arhost_image image{sizeof image, 4 * width, width, height, pixels.data(), nullptr};
+        const arhost_image image{sizeof image, 4 * width, width, height, pixels.data(), nullptr, nullptr};
         const auto start = Clock::now();
         rt_embree::Renderer renderer({sizeof(arhost_raytracer_setup), width, height, ARHOST_IMAGE_FORM_STRAIGHT,
                                       &arena.scene(), &camera.intrinsics, ARHOST_COMPOSITING_SRGB, 0, nullptr},

@@ -51,7 +51,7 @@ double source_alone(const std::string &picture, int frames) {
     PluginUnderTest plugin("source_file");
     require(plugin.create({{"path", picture}}), plugin);
     const auto &source = plugin.functions<arhost_source>();
-    const arhost_source_setup setup{sizeof setup, 0, 0, 0, 0, nullptr};
+    const arhost_source_setup setup{sizeof setup, 0, 0, 0, 0, 0, nullptr};
     arhost_source_properties properties{};
     properties.struct_size = sizeof properties;
     properties.format.struct_size = sizeof properties.format;
@@ -129,8 +129,10 @@ Traced raytracer_and_composite(const VideoFrame &video, const std::string &scene
         const auto &frame = trajectory.frames[static_cast<std::size_t>(i) % trajectory.frames.size()];
         const arhost_render_request request{
             sizeof request, 0,       frame.frame, 0,       arhost::camera::camera_of(frame.view.value(), camera),
-            nullptr,        nullptr, nullptr,     nullptr, 0};
-        const arhost_image image{sizeof image, 4 * camera.width, camera.width, camera.height, slot.data(), nullptr};
+            nullptr,        nullptr, nullptr,     nullptr, 0,
+            nullptr};
+        const arhost_image image{sizeof image, 4 * camera.width, camera.width, camera.height,
+                                 slot.data(),  nullptr,          nullptr};
         info = {};
         info.struct_size = sizeof info;
         require(raytracer.render(plugin.instance(), &request, &image, &info), plugin);

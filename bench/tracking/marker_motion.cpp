@@ -80,8 +80,8 @@ std::optional<double> lag_of(const Rigid &filtered, double frame, const Truth &t
 }
 
 Cell run(double side_px, double noise_px, int frames) {
-    const arhost_intrinsics in{sizeof in, 1280, 720, ARHOST_DISTORTION_NONE, focal_px, focal_px, 639.5, 359.5,
-                               0,         0,    {}};
+    const arhost_intrinsics in{sizeof in, 1280, 720, ARHOST_DISTORTION_NONE, focal_px, focal_px, 639.5, 359.5, 0,
+                               0,         {},   {}};
     Cell cell;
     constexpr int frames_per_run = 1000;
     std::chrono::nanoseconds spent{};

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+#include <span>
 
 namespace arhost::camera {
 namespace {
@@ -36,6 +37,10 @@ std::optional<glm::dvec2> project(const arhost_intrinsics &intrinsics, const glm
 std::string problem_with_lens(const arhost_intrinsics &intrinsics) {
     if (intrinsics.distortion != ARHOST_DISTORTION_BROWN && intrinsics.distortion != ARHOST_DISTORTION_FISHEYE)
         return {};
+    const std::span tilt = std::span(intrinsics.coefficients).subspan(untilted_coefficients);
+    if (intrinsics.coefficient_count > untilted_coefficients &&
+        std::ranges::any_of(tilt, [](double angle) { return angle != 0; }))
+        return "a tilted sensor (tauX, tauY) is not supported; calibrate without CALIB_TILTED_MODEL";
     const shading::Lens lens(intrinsics);
     // The largest distance of a corner from the principal point, on the plane z = 1. A fisheye lens sees a hemisphere
     // at most near its centre.

@@ -61,7 +61,7 @@ std::vector<model::PluginDescription> check_plugins(const run_config::Configurat
     for (const run_config::ComponentConfiguration &output : configuration.outputs) {
         const model::PluginDescription plugin = check_component(output, ARHOST_KIND_SINK).back();
         if (const auto path = run_config::path_of(output.node))
-            files.push_back({*path, (plugin.capabilities & ARHOST_CAPABILITY_NUMBERED_FILES) != 0});
+            files.push_back({*path, (plugin.capabilities & ARHOST_SINK_CAPABILITY_NUMBERED_FILES) != 0});
     }
     run_config::expect_distinct(files);
     return raytracers;
@@ -71,7 +71,7 @@ std::vector<model::PluginDescription> check_plugins(const run_config::Configurat
 void check_scene(const run_config::Configuration &configuration, supervise::Context &context,
                  const std::vector<model::PluginDescription> &raytracers) {
     std::optional<std::string> outcome;
-    std::uint32_t needed = 0;
+    std::uint64_t needed = 0;
     const SceneLoading loading(
         context, configuration.raytracer->scene, configuration.raytracer->policy, configuration.raytracer->limits,
         configuration.files,

@@ -17,11 +17,11 @@ namespace {
 
 // Copies the video frame and the overlay, each only if a sink reads it.
 void copy_inputs(const Frame &frame, const arhost_frame_format &format, const ImageView &overlay,
-                 const Region &region, std::uint32_t inputs, std::span<std::byte> slot) {
+                 const Region &region, std::uint64_t inputs, std::span<std::byte> slot) {
     const OutputSlot layout(format);
-    if (inputs & ARHOST_CAPABILITY_VIDEO_INPUT)
+    if (inputs & ARHOST_SINK_CAPABILITY_VIDEO_INPUT)
         std::memcpy(slot.data() + layout.video_offset, frame.pixels.bytes().data(), format.byte_size);
-    if (!(inputs & ARHOST_CAPABILITY_OVERLAY_INPUT))
+    if (!(inputs & ARHOST_SINK_CAPABILITY_OVERLAY_INPUT))
         return;
     const std::size_t stride = overlay_stride(format.width);
     std::byte *const rgba = slot.data() + layout.overlay_offset;
@@ -41,7 +41,7 @@ void copy_inputs(const Frame &frame, const arhost_frame_format &format, const Im
 
 } // namespace
 
-void Compositing::write(Frame &frame, std::uint32_t inputs, std::span<std::byte> slot) {
+void Compositing::write(Frame &frame, std::uint64_t inputs, std::span<std::byte> slot) {
     const arhost_frame_format &format = parts_.video.format;
     check_buffers_unmodified(frame);
     const Clock::time_point begin = Clock::now();

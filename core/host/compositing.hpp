@@ -19,8 +19,8 @@ class Compositing {
 public:
     explicit Compositing(RunParts &parts) : parts_(parts) {}
 
-    // Writes an output slot (ipc::OutputSlot). `inputs`: ARHOST_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT.
-    void write(Frame &frame, std::uint32_t inputs, std::span<std::byte> slot);
+    // Writes an output slot (ipc::OutputSlot). `inputs`: ARHOST_SINK_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT.
+    void write(Frame &frame, std::uint64_t inputs, std::span<std::byte> slot);
 
 private:
     void write_record(Frame &frame, std::span<std::byte> slot) const;

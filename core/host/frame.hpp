@@ -78,7 +78,7 @@ struct OutputFrame {
     std::uint64_t sequence;
     Lease slot;
     Frame::Clock::time_point captured; // as Frame::captured
-    std::uint32_t inputs;              // what `slot` has: ARHOST_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT
+    std::uint64_t inputs;              // what `slot` has: ARHOST_SINK_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT
 };
 using OutputFramePointer = std::shared_ptr<const OutputFrame>;
 

@@ -113,7 +113,8 @@ const char *accept_tracker_result(std::span<const std::byte> slot, const std::ve
                            .unlisted_count = 0,
                            .expected_count = expected_count,
                            .missed_count = missed_count,
-                           .candidate_count = candidate_count};
+                           .candidate_count = candidate_count,
+                           .reserved_for_growth = {}};
     return nullptr;
 }
 

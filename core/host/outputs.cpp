@@ -85,7 +85,8 @@ SinkQueue &Outputs::make_sink(const run_config::ComponentConfiguration &output, 
         return on_hello(*sink, plugin, candidate);
     };
     callbacks.ready = [sink](const messages::Ready &ready) {
-        sink->set_inputs(ready.capabilities & (ARHOST_CAPABILITY_VIDEO_INPUT | ARHOST_CAPABILITY_OVERLAY_INPUT));
+        sink->set_inputs(ready.capabilities &
+                         (ARHOST_SINK_CAPABILITY_VIDEO_INPUT | ARHOST_SINK_CAPABILITY_OVERLAY_INPUT));
         return SlotLayout{};
     };
     callbacks.running = [this, sink] { on_running(*sink); };
@@ -115,14 +116,14 @@ Component::Create Outputs::on_hello(SinkQueue &sink, const PluginDescription &pl
     const run_config::ComponentConfiguration &output = *sink.configuration;
     const run_config::Configuration &configuration = parts_.configuration;
     const Video &video = parts_.video;
-    if (plugin.capabilities & ARHOST_CAPABILITY_REALTIME_SINK)
+    if (plugin.capabilities & ARHOST_SINK_CAPABILITY_REALTIME)
         sink.max_waiting = live_sink_depth; // a window drops frames instead of delaying other outputs
     messages::SinkSetup setup{video.format, video.format.fps, sink.first_sequence(), {}};
     if (configuration.source && configuration.source->fps > 0)
         setup.fps = configuration.source->fps;
     if (video.intrinsics.width > 0)
         setup.intrinsics = video.intrinsics;
-    if (plugin.capabilities & ARHOST_CAPABILITY_RUN_DESCRIPTION)
+    if (plugin.capabilities & ARHOST_SINK_CAPABILITY_RUN_DESCRIPTION)
         setup.run_description = run_description(parts_, assembly_, sink.id);
     std::vector<OptionValue> options = parts_.options.choose(*sink.component, ARHOST_KIND_SINK, output, candidate);
     expect_distinct_files(output, plugin);
@@ -169,8 +170,8 @@ std::vector<int> Outputs::open_sockets(const run_config::ComponentConfiguration 
 void Outputs::expect_distinct_files(const run_config::ComponentConfiguration &output,
                                     const PluginDescription &plugin) {
     if (const auto path = run_config::path_of(output.node))
-        files_.insert_or_assign(
-            &output, run_config::OutputFile{*path, (plugin.capabilities & ARHOST_CAPABILITY_NUMBERED_FILES) != 0});
+        files_.insert_or_assign(&output, run_config::OutputFile{*path, (plugin.capabilities &
+                                                                        ARHOST_SINK_CAPABILITY_NUMBERED_FILES) != 0});
     std::vector<run_config::OutputFile> files = parts_.configuration.report_files();
     for (const auto &[writer, file] : files_)
         files.push_back(file);
@@ -195,7 +196,7 @@ bool Outputs::are_full() const {
 }
 
 Frame::Clock::time_point Outputs::show(Frame &frame) {
-    std::uint32_t inputs = 0;
+    std::uint64_t inputs = 0;
     for (const auto &sink : sinks_)
         inputs |= sink->inputs();
     if (std::ranges::all_of(sinks_, [](const auto &sink) { return sink->closed; }))

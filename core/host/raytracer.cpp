@@ -43,7 +43,7 @@ Raytracer::Raytracer(RunParts &parts, Configuration configuration, std::shared_p
 SlotLayout Raytracer::on_ready(const messages::Ready &ready) {
     const bool is_linear_wanted =
         scene_->integrator == ARHOST_INTEGRATOR_PATH && overlay_format_.compositing == ARHOST_COMPOSITING_LINEAR;
-    if (!(ready.capabilities & ARHOST_CAPABILITY_LINEAR_IMAGES)) {
+    if (!(ready.capabilities & ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES)) {
         overlay_format_.form = ARHOST_IMAGE_FORM_STRAIGHT;
         if (is_linear_wanted)
             component().log(ARHOST_SEVERITY_WARNING,
@@ -51,7 +51,7 @@ SlotLayout Raytracer::on_ready(const messages::Ready &ready) {
                                 " cannot write linear images: the overlay cannot brighten the video, and its shadows "
                                 "have no colour");
     }
-    reads_video_ = reads_video_ && (ready.capabilities & ARHOST_CAPABILITY_VIDEO) != 0;
+    reads_video_ = reads_video_ && (ready.capabilities & ARHOST_RAYTRACER_CAPABILITY_VIDEO) != 0;
     const arhost_frame_format &format = parts_.video.format;
     const RaytracerSlot slot(format.width, format.height, overlay_format_.form);
     has_state_ = ready.state_size > 0;
@@ -75,7 +75,7 @@ void Raytracer::on_disabled(const std::string &reason, bool is_configuration_err
 // Whether the plugin does not support the camera's lens, so that its worker warps the images.
 bool Raytracer::warps_images(const PluginDescription &plugin) const {
     return parts_.video.intrinsics.distortion != ARHOST_DISTORTION_NONE &&
-           !(plugin.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION);
+           !(plugin.capabilities & ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION);
 }
 
 OverlayFormat Raytracer::choose_format(const PluginDescription &plugin) const {
@@ -85,7 +85,7 @@ OverlayFormat Raytracer::choose_format(const PluginDescription &plugin) const {
         configuration_->composite.value_or(is_path ? ARHOST_COMPOSITING_LINEAR : ARHOST_COMPOSITING_SRGB);
     if (!is_path || format.compositing == ARHOST_COMPOSITING_SRGB)
         return format;
-    if (plugin.capabilities & ARHOST_CAPABILITY_LINEAR_IMAGES)
+    if (plugin.capabilities & ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES)
         format.form = ARHOST_IMAGE_FORM_LINEAR;
     return format;
 }
@@ -99,7 +99,7 @@ Component::Create Raytracer::on_hello(const PluginDescription &plugin, std::size
                         plugin.id + " does not support lens distortion: its worker warps the rendered images, which "
                                     "costs sharpness and time");
     overlay_format_ = choose_format(plugin);
-    reads_video_ = (plugin.capabilities & ARHOST_CAPABILITY_VIDEO) != 0 && !warps_images(plugin);
+    reads_video_ = (plugin.capabilities & ARHOST_RAYTRACER_CAPABILITY_VIDEO) != 0 && !warps_images(plugin);
     return {{std::move(options), messages::RaytracerSetup{video.format.width, video.format.height, video.intrinsics,
                                                           overlay_format_.form, overlay_format_.compositing,
                                                           reads_video_ ? std::optional(video.format) : std::nullopt}},
@@ -137,7 +137,7 @@ void Raytracer::render(Frame &frame) {
     command.camera = frame.record.camera;
     if (frame.quality.scale < 1) {
         const auto [width, height] = overlay_size(parts_.video.format, frame.quality);
-        command.camera.intrinsics = shading::scaled(frame.record.camera.intrinsics, width, height);
+        command.camera.intrinsics = arhost_scaled_intrinsics(frame.record.camera.intrinsics, width, height);
     }
     if (frame.anchors) {
         write_anchors(frame);
@@ -208,10 +208,10 @@ void Raytracer::start_quality() {
     const PluginDescription &plugin = component().description();
     if (std::exchange(adapted_plugin_, plugin.id) != plugin.id)
         full_samples_.reset();
-    const auto supports = [&](std::uint32_t capability) { return (plugin.capabilities & capability) != 0; };
+    const auto supports = [&](std::uint64_t capability) { return (plugin.capabilities & capability) != 0; };
     QualityController::Limits limits{.target_fps = run.target_fps};
     // If the worker warps the images because the plugin does not support lenses, they must have full size.
-    if (supports(ARHOST_CAPABILITY_SCALED_IMAGES) && !warps_images(plugin))
+    if (supports(ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES) && !warps_images(plugin))
         limits.min_scale = run.min_scale;
     limits.max_samples = full_samples_.value_or(0);
     limits.min_samples = std::min(run.min_samples, limits.max_samples);

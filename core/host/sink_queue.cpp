@@ -34,7 +34,7 @@ void SinkQueue::offer(OutputFramePointer frame) {
     }
 }
 
-void SinkQueue::set_inputs(std::uint32_t inputs) {
+void SinkQueue::set_inputs(std::uint64_t inputs) {
     inputs_ = inputs;
     std::erase_if(waiting_, [&](const OutputFramePointer &frame) { return (frame->inputs & inputs) != inputs; });
     if (is_single && empty())

@@ -36,10 +36,10 @@ public:
     std::uint64_t first_message = 0; // messages after this number are about this output
 
     void offer(OutputFramePointer frame);
-    // Sets the images that the sink reads (ARHOST_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT), and removes waiting frames
-    // that lack them.
-    void set_inputs(std::uint32_t inputs);
-    std::uint32_t inputs() const { return closed ? 0 : inputs_; }
+    // Sets the images that the sink reads (ARHOST_SINK_CAPABILITY_VIDEO_INPUT, _OVERLAY_INPUT), and removes waiting
+    // frames that lack them.
+    void set_inputs(std::uint64_t inputs);
+    std::uint64_t inputs() const { return closed ? 0 : inputs_; }
     bool awaits_its_frame() const { return is_single && !ending; }
     void pump(); // submits waiting frames to the sink
     // To be called by the component's callbacks of the same names.
@@ -57,7 +57,7 @@ private:
     static constexpr std::size_t max_in_flight = 2;
     Statistics &statistics_;
     std::deque<OutputFramePointer> waiting_, unconfirmed_;
-    std::uint32_t inputs_ = 0;
+    std::uint64_t inputs_ = 0;
     std::uint64_t next_sequence_ = 0; // number of the frame that follows the last confirmed one
 };
 

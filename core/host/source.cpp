@@ -78,7 +78,7 @@ SlotLayout Source::on_ready(const messages::Ready &ready) {
     parts_.video.frame_count = ready.frame_count;
     parts_.flow.set_rate(format.fps);
     const run_config::SourceConfiguration &source = *parts_.configuration.source;
-    const bool is_live = (component_->description().capabilities & ARHOST_CAPABILITY_LIVE) != 0;
+    const bool is_live = (component_->description().capabilities & ARHOST_SOURCE_CAPABILITY_LIVE) != 0;
     if (source.conform && !checks_)
         checks_.emplace(contracts::SourceChecks::Rate{is_live ? 0 : format.fps, source.fps > 0, parts_.live()},
                         parts_.now_ns());
@@ -102,6 +102,7 @@ void Source::set_intrinsics(const messages::Ready &ready) {
                                         "calibration.yaml}' (docs/camera.md)");
     if (const std::string problem = camera::problem_with_lens(intrinsics); !problem.empty())
         node.fail(problem);
+    intrinsics.coefficient_count = std::min(intrinsics.coefficient_count, camera::untilted_coefficients);
     if (configuration.tracker || configuration.trajectory) {
         try {
             camera::check_size(intrinsics, format.width, format.height);
@@ -205,7 +206,8 @@ void Source::on_lost(const std::vector<Command> &unanswered) {
     flow.on_source_lost(sequences_of(unanswered));
     const PluginDescription &plugin = component_->description(); // empty if the worker died before its hello message
     if (flow.next_read() > 0 && !plugin.id.empty() &&
-        !(plugin.capabilities & (ARHOST_CAPABILITY_SEEK | ARHOST_CAPABILITY_LIVE)) && !flow.input_has_ended()) {
+        !(plugin.capabilities & (ARHOST_SOURCE_CAPABILITY_SEEK | ARHOST_SOURCE_CAPABILITY_LIVE)) &&
+        !flow.input_has_ended()) {
         flow.on_input_ended();
         parts_.failures.add("source: " + plugin.id + " died, and after a restart it cannot continue at a later frame",
                             false);

@@ -52,7 +52,7 @@ Tracker::Tracker(RunParts &parts, Sightings &sightings, Configuration configurat
 Component::Create Tracker::on_hello(const PluginDescription &plugin, std::size_t candidate) {
     const run_config::TrackerConfiguration &own = *configuration_;
     if (const auto body = std::ranges::find_if(own.targets, [](const auto &target) { return !target.body.empty(); });
-        body != own.targets.end() && !(plugin.capabilities & ARHOST_CAPABILITY_REPORTS_POSES))
+        body != own.targets.end() && !(plugin.capabilities & ARHOST_TRACKER_CAPABILITY_REPORTS_POSES))
         own.node.find("targets").value_or(own.node).fail(
             "the target '" + body->name + "' is a body, but '" + plugin.id +
             "' finds only markers; choose a tracker that reports the poses of bodies");

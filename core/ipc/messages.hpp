@@ -174,7 +174,7 @@ struct Ready {
     std::optional<arhost_frame_format> format;   // set only by a source
     std::uint64_t frame_count = 0;               // set only by a source; 0: unknown
     std::optional<arhost_intrinsics> intrinsics; // set only by a source that knows its camera
-    std::uint32_t capabilities = 0;              // of the instance; set only by a ray tracer or a sink
+    std::uint64_t capabilities = 0;              // of the instance; set only by a ray tracer or a sink
     std::uint64_t state_size = 0;                // of a tracker (the worker's and the plugin's) or a ray tracer
 };
 

@@ -18,10 +18,9 @@ std::string text_or_empty(const char *text) {
 
 std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor &descriptor) {
     std::vector<const arhost_option_descriptor *> all;
-    for (std::uint32_t i = 0; i < descriptor.option_count; ++i)
+    for (std::size_t i = 0; i < descriptor.option_count; ++i)
         all.push_back(reinterpret_cast<const arhost_option_descriptor *>(
-            reinterpret_cast<const std::byte *>(descriptor.options) +
-            std::size_t{i} * descriptor.options->struct_size));
+            reinterpret_cast<const std::byte *>(descriptor.options) + i * descriptor.options->struct_size));
     return all;
 }
 

@@ -26,7 +26,7 @@ struct OptionDeclaration {
 struct PluginDescription {
     arhost_kind kind = 0;
     std::string id, name, version, vendor, licence, description;
-    std::uint32_t capabilities = 0;
+    std::uint64_t capabilities = 0;
     std::vector<OptionDeclaration> options;
     std::vector<std::string> needs;      // elements of sandbox::allowances
     std::vector<std::string> changeable; // keys of the options that arhost_set_option accepts

@@ -45,7 +45,7 @@ private:
 // An output file of a component whose plugin is known.
 struct OutputFile {
     yaml::Node path;
-    bool is_numbered; // the plugin has ARHOST_CAPABILITY_NUMBERED_FILES, so the path may be a pattern
+    bool is_numbered; // the plugin has ARHOST_SINK_CAPABILITY_NUMBERED_FILES, so the path may be a pattern
 };
 
 // Throws yaml::Error if a pattern can produce the name of another output's file.

@@ -85,7 +85,8 @@ std::vector<model::OptionValue> resolve_options(const model::PluginDescription &
             value.reset();
         }
         if (value && declared.type == ARHOST_OPTION_OUTPUT_PATH && is_standard_output(*value) &&
-            !(plugin.capabilities & ARHOST_CAPABILITY_STANDARD_OUTPUT && declared.key == "path"))
+            !(plugin.kind == ARHOST_KIND_SINK && plugin.capabilities & ARHOST_SINK_CAPABILITY_STANDARD_OUTPUT &&
+              declared.key == "path"))
             value->fail(plugin.id + " cannot write to standard output; name a file");
         if (value)
             values.push_back(value_of(declared, *value));

@@ -114,7 +114,8 @@ RecordedFrame frame_of(const Line &line, const nlohmann::json &object) {
                         .missed_count = search->at("missed").get<std::uint32_t>(),
                         .candidate_count = search->contains("candidates") && !search->at("candidates").is_null()
                                                ? search->at("candidates").get<std::int32_t>()
-                                               : -1};
+                                               : -1,
+                        .reserved_for_growth = {}};
     if (const nlohmann::json &camera = object.at("camera"); !camera.is_null()) {
         camera::View view{};
         read_numbers(camera.at("eye"), view.eye_mm);

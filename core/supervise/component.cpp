@@ -399,7 +399,7 @@ void Component::spawn_after(std::chrono::milliseconds delay) {
 
 // A camera that has worked may come back after any time. Sources have no fallback plugin.
 bool Component::may_wait_for_device() const {
-    return description_.kind == ARHOST_KIND_SOURCE && description_.capabilities & ARHOST_CAPABILITY_LIVE &&
+    return description_.kind == ARHOST_KIND_SOURCE && description_.capabilities & ARHOST_SOURCE_CAPABILITY_LIVE &&
            restart_policy_.has_completed_frames();
 }
 

@@ -304,7 +304,7 @@ public:
                      arhost_instance *instance)
         : link_(link), host_(host), descriptor_(*plugin.descriptor),
           raytracer_(*static_cast<const arhost_raytracer *>(plugin.functions)), instance_(instance),
-          supports_lenses_((plugin.descriptor->capabilities & ARHOST_CAPABILITY_LENS_DISTORTION) != 0) {}
+          supports_lenses_((plugin.descriptor->capabilities & ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION) != 0) {}
 
     arhost_status start(const messages::Setup &any, const std::vector<base::UniqueFd> &fds,
                         messages::Ready &ready) override {
@@ -318,12 +318,12 @@ public:
         setup.width = width_ = message.width;
         setup.height = height_ = message.height;
         setup.scene = &arena_.as<arhost_scene>();
-        if (ready.capabilities & ARHOST_CAPABILITY_LINEAR_IMAGES)
+        if (ready.capabilities & ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES)
             form_ = message.form;
         setup.form = form_;
         setup.compositing = message.compositing;
         setup.intrinsics = &message.intrinsics;
-        if (message.video_format && ready.capabilities & ARHOST_CAPABILITY_VIDEO)
+        if (message.video_format && ready.capabilities & ARHOST_RAYTRACER_CAPABILITY_VIDEO)
             setup.video_format = &video_.emplace(*message.video_format).format();
         if (message.intrinsics.distortion != ARHOST_DISTORTION_NONE && !supports_lenses_) {
             require(!video_, "a plugin whose image is warped got video");
@@ -334,7 +334,7 @@ public:
         if (scene::is_moving(*setup.scene))
             motion_.emplace(*setup.scene);
         anchors_.resize(setup.scene->anchors.count);
-        const std::uint32_t missing = scene::needed_capabilities(*setup.scene) & ~ready.capabilities;
+        const std::uint64_t missing = scene::needed_capabilities(*setup.scene) & ~ready.capabilities;
         if (const std::string warning = scene::missing_capabilities_text(descriptor_.id, missing); !warning.empty())
             host_.log(&host_, ARHOST_SEVERITY_WARNING, warning.c_str());
         const arhost_status status = raytracer_.start(instance_, &setup);
@@ -348,7 +348,7 @@ public:
         const std::span<std::byte> output = memory.output.slot(command.slot);
         arhost_image image{};
         image.struct_size = sizeof image;
-        const bool is_scaled = (descriptor_.capabilities & ARHOST_CAPABILITY_SCALED_IMAGES) != 0 && !warp_;
+        const bool is_scaled = (descriptor_.capabilities & ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES) != 0 && !warp_;
         image.width = is_scaled ? command.camera.intrinsics.width : width_;
         image.height = is_scaled ? command.camera.intrinsics.height : height_;
         image.stride = overlay_stride(image.width, form_);
@@ -457,14 +457,14 @@ public:
         output.width = video_format_.width;
         output.height = video_format_.height;
         output.bgr = as_pixels(input) + OutputSlot::image_offset;
-        if (capabilities_ & ARHOST_CAPABILITY_VIDEO_INPUT) {
+        if (capabilities_ & ARHOST_SINK_CAPABILITY_VIDEO_INPUT) {
             const std::span<std::byte> video = input.subspan(slot.video_offset);
             for (std::uint32_t i = 0; i < video_format_.plane_count; ++i)
                 output.video[i] = as_pixels(video) + video_format_.offset[i];
             if (video_format_.has_depth)
                 output.depth_mm = as_depth(video.subspan(video_format_.depth_offset));
         }
-        if (capabilities_ & ARHOST_CAPABILITY_OVERLAY_INPUT) {
+        if (capabilities_ & ARHOST_SINK_CAPABILITY_OVERLAY_INPUT) {
             output.overlay_rgba = as_pixels(input) + slot.overlay_offset;
             output.overlay_stride = overlay_stride(video_format_.width);
         }
@@ -485,7 +485,7 @@ public:
 private:
     const arhost_sink &sink_;
     arhost_instance *instance_;
-    std::uint32_t capabilities_;
+    std::uint64_t capabilities_;
     arhost_frame_format video_format_{};
 };
 

@@ -57,8 +57,10 @@ private:
     static std::int32_t on_cancelled(const arhost_host *host) { return self(host).link_.cancelled(); }
     static const void *on_extension(const arhost_host *host, const char *id) {
         static constexpr arhost_control control = {
-            sizeof control, [](const arhost_host *sink_host, const char *command, arhost_take_answer take,
-                               void *context) { return self(sink_host).sender_.send(command, take, context); }};
+            sizeof control, 0,
+            [](const arhost_host *sink_host, const char *command, arhost_take_answer take, void *context) {
+                return self(sink_host).sender_.send(command, take, context);
+            }};
         return id && std::string_view(id) == ARHOST_CONTROL_EXTENSION && self(host).kind_ == ARHOST_KIND_SINK
                    ? &control
                    : nullptr;

@@ -371,7 +371,7 @@ class _RaytracerAdapter(_Adapter):
 
     @_reporting(STATUS_ERROR_CONFIGURATION)
     def capabilities(self):
-        return STATUS_OK, int(getattr(self.plugin, "capabilities", CAPABILITY_EVERY_SCENE))
+        return STATUS_OK, int(getattr(self.plugin, "capabilities", RAYTRACER_CAPABILITY_EVERY_SCENE))
 
     @_reporting()
     def start(self, width, height, scene, intrinsics, form, compositing, video_format):

@@ -38,27 +38,6 @@ OPTION_TEXT = 4
 OPTION_INPUT_PATH = 5
 OPTION_OUTPUT_PATH = 6
 OPTION_LISTEN = 7
-CAPABILITY_SEEK = 1
-CAPABILITY_LIVE = 2
-CAPABILITY_LENS_DISTORTION = 4
-CAPABILITY_NUMBERED_FILES = 8
-CAPABILITY_REALTIME_SINK = 16
-CAPABILITY_REFLECTION = 32
-CAPABILITY_GLASS = 64
-CAPABILITY_ROUGHNESS = 128
-CAPABILITY_TEXTURES = 256
-CAPABILITY_AREA_LIGHTS = 512
-CAPABILITY_ENVIRONMENT = 1024
-CAPABILITY_MOTION = 2048
-CAPABILITY_EVERY_SCENE = 4064
-CAPABILITY_STANDARD_OUTPUT = 4096
-CAPABILITY_VIDEO_INPUT = 8192
-CAPABILITY_OVERLAY_INPUT = 16384
-CAPABILITY_SCALED_IMAGES = 32768
-CAPABILITY_RUN_DESCRIPTION = 65536
-CAPABILITY_REPORTS_POSES = 131072
-CAPABILITY_LINEAR_IMAGES = 262144
-CAPABILITY_VIDEO = 524288
 OFFER = _struct(12,
     ("struct_size", "u4", 0),
     ("oldest_abi_version", "u4", 4),
@@ -117,7 +96,7 @@ CLOCK_MEDIA = 2
 MAX_PLANES = 3
 MAX_IMAGE_SIDE = 16384
 MAX_NAME = 64
-FRAME_FORMAT = _struct(112,
+FRAME_FORMAT = _struct(176,
     ("struct_size", "u4", 0),
     ("pixel_format", "i4", 4),
     ("width", "u4", 8),
@@ -134,14 +113,15 @@ FRAME_FORMAT = _struct(112,
     ("depth_stride", "u4", 84),
     ("grey_offset", "u8", 88),
     ("depth_offset", "u8", 96),
-    ("byte_size", "u8", 104))
+    ("byte_size", "u8", 104),
+    ("reserved_for_growth", ("u8", (8,)), 112))
 
 # arhost/camera.h
 DISTORTION_NONE = 1
 DISTORTION_BROWN = 2
 DISTORTION_FISHEYE = 3
-MAX_DISTORTION = 12
-INTRINSICS = _struct(152,
+MAX_DISTORTION = 14
+INTRINSICS = _struct(232,
     ("struct_size", "u4", 0),
     ("width", "u4", 4),
     ("height", "u4", 8),
@@ -152,22 +132,26 @@ INTRINSICS = _struct(152,
     ("cy", "f8", 40),
     ("coefficient_count", "u4", 48),
     ("reserved", "u4", 52),
-    ("coefficients", ("f8", (12,)), 56))
-CAMERA = _struct(232,
+    ("coefficients", ("f8", (14,)), 56),
+    ("reserved_for_growth", ("u8", (8,)), 168))
+CAMERA = _struct(376,
     ("struct_size", "u4", 0),
     ("reserved", "u4", 4),
     ("eye", ("f8", (3,)), 8),
     ("look_at", ("f8", (3,)), 32),
     ("up", ("f8", (3,)), 56),
-    ("intrinsics", INTRINSICS, 80))
+    ("intrinsics", INTRINSICS, 80),
+    ("reserved_for_growth", ("u8", (8,)), 312))
 
 # arhost/source.h
-SOURCE_PROPERTIES = _struct(280,
+SOURCE_CAPABILITY_SEEK = 1
+SOURCE_CAPABILITY_LIVE = 2
+SOURCE_PROPERTIES = _struct(424,
     ("struct_size", "u4", 0),
     ("has_intrinsics", "i4", 4),
     ("format", FRAME_FORMAT, 8),
-    ("intrinsics", INTRINSICS, 120),
-    ("frame_count", "u8", 272))
+    ("intrinsics", INTRINSICS, 184),
+    ("frame_count", "u8", 416))
 FRAME_INFO = _struct(224,
     ("struct_size", "u4", 0),
     ("clock", "i4", 4),
@@ -186,6 +170,7 @@ MAX_OBSERVATIONS = 1024
 MAX_FAMILIES = 16
 MAX_FAMILY = 32
 MAX_STATE = 16777216
+TRACKER_CAPABILITY_REPORTS_POSES = 1
 OBSERVATION = _struct(168,
     ("struct_size", "u4", 0),
     ("id", "i4", 4),
@@ -398,6 +383,20 @@ MOVED_OBJECT = _struct(56,
     ("world_from_object", ("f4", (12,)), 8))
 
 # arhost/raytracer.h
+RAYTRACER_CAPABILITY_LENS_DISTORTION = 1
+RAYTRACER_CAPABILITY_SCALED_IMAGES = 2
+RAYTRACER_CAPABILITY_LINEAR_IMAGES = 4
+RAYTRACER_CAPABILITY_VIDEO = 8
+RAYTRACER_CAPABILITY_DEPTH = 16
+RAYTRACER_CAPABILITY_ESTIMATE = 32
+RAYTRACER_CAPABILITY_REFLECTION = 256
+RAYTRACER_CAPABILITY_GLASS = 512
+RAYTRACER_CAPABILITY_ROUGHNESS = 1024
+RAYTRACER_CAPABILITY_TEXTURES = 2048
+RAYTRACER_CAPABILITY_AREA_LIGHTS = 4096
+RAYTRACER_CAPABILITY_ENVIRONMENT = 8192
+RAYTRACER_CAPABILITY_MOTION = 16384
+RAYTRACER_CAPABILITY_EVERY_SCENE = 32512
 IMAGE_FORM_STRAIGHT = 1
 IMAGE_FORM_LINEAR = 2
 COMPOSITING_SRGB = 1
@@ -414,17 +413,24 @@ RENDER_INFO = _struct(40,
     ("reserved", "u4", 36))
 
 # arhost/sink.h
+SINK_CAPABILITY_NUMBERED_FILES = 1
+SINK_CAPABILITY_REALTIME = 2
+SINK_CAPABILITY_STANDARD_OUTPUT = 4
+SINK_CAPABILITY_VIDEO_INPUT = 8
+SINK_CAPABILITY_OVERLAY_INPUT = 16
+SINK_CAPABILITY_RUN_DESCRIPTION = 32
 OVERLAY_RENDERED = 1
 OVERLAY_HELD = 2
 OVERLAY_NONE = 3
-SEARCH = _struct(24,
+SEARCH = _struct(88,
     ("everywhere", "i4", 0),
     ("observation_count", "u4", 4),
     ("unlisted_count", "u4", 8),
     ("expected_count", "u4", 12),
     ("missed_count", "u4", 16),
-    ("candidate_count", "i4", 20))
-RECORD = _struct(1048,
+    ("candidate_count", "i4", 20),
+    ("reserved_for_growth", ("u4", (16,)), 24))
+RECORD = _struct(1256,
     ("struct_size", "u4", 0),
     ("clock", "i4", 4),
     ("sequence", "u8", 8),
@@ -436,13 +442,13 @@ RECORD = _struct(1048,
     ("truth_target", "S64", 40),
     ("true_mt", ("f8", (16,)), 104),
     ("camera", CAMERA, 232),
-    ("overlay_scale", "f8", 464),
-    ("overlay_samples", "u4", 472),
-    ("observation_count", "u4", 476),
-    ("targets", "u8", 480),
-    ("observations", "u8", 488),
-    ("families", ("S32", (16,)), 496),
-    ("search", SEARCH, 1008),
-    ("expected", "u8", 1032),
-    ("expected_count", "u4", 1040),
-    ("reserved", "u4", 1044))
+    ("overlay_scale", "f8", 608),
+    ("overlay_samples", "u4", 616),
+    ("observation_count", "u4", 620),
+    ("targets", "u8", 624),
+    ("observations", "u8", 632),
+    ("families", ("S32", (16,)), 640),
+    ("search", SEARCH, 1152),
+    ("expected", "u8", 1240),
+    ("expected_count", "u4", 1248),
+    ("reserved", "u4", 1252))

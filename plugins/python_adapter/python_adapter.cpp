@@ -35,7 +35,7 @@
 #define METHOD "render"
 #define ADAPTER "_RaytracerAdapter"
 // A script declares its own: the attribute `capabilities`.
-#define CAPABILITIES (ARHOST_CAPABILITY_EVERY_SCENE | ARHOST_CAPABILITY_LINEAR_IMAGES | ARHOST_CAPABILITY_VIDEO)
+#define CAPABILITIES (ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE | ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES | ARHOST_RAYTRACER_CAPABILITY_VIDEO)
 #else
 #define KIND ARHOST_KIND_SINK
 #define METHOD "write"
@@ -277,8 +277,7 @@ public:
                     .value.get() == Py_True)
                 lister_ = this;
 #if defined(KIND_RAYTRACER)
-            capabilities_ =
-                static_cast<std::uint32_t>(PyLong_AsUnsignedLongMask(call("capabilities", "").value.get()));
+            capabilities_ = PyLong_AsUnsignedLongLongMask(call("capabilities", "").value.get());
 #endif
         } catch (...) {
             end();
@@ -301,7 +300,7 @@ public:
 
     // Returns the extension of arhost/devices.h while there is an instance whose class has a method `devices`.
     static const void *get_extension(const char *id) {
-        static constexpr arhost_devices functions = {sizeof functions, list_devices};
+        static constexpr arhost_devices functions = {sizeof functions, 0, list_devices};
         return lister_ && std::string_view(id) == ARHOST_DEVICES_EXTENSION ? &functions : nullptr;
     }
 
@@ -376,7 +375,7 @@ public:
 
     // ray tracers
 #if defined(KIND_RAYTRACER)
-    std::uint32_t capabilities() const {
+    std::uint64_t capabilities() const {
         return capabilities_;
     }
 #endif
@@ -509,7 +508,7 @@ private:
     std::uint64_t state_size_ = 0; // of a tracker or a ray tracer
     Object capsule_, adapter_;
 #if defined(KIND_RAYTRACER)
-    std::uint32_t capabilities_ = 0;
+    std::uint64_t capabilities_ = 0;
 #endif
 };
 

@@ -107,8 +107,9 @@ constexpr arhost_descriptor descriptor = {
     .vendor = "arhost",
     .licence = "Apache-2.0",
     .description = "CPU ray tracer that traces packets of 16 rays with Intel Embree.",
-    .capabilities = ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE |
-                    ARHOST_CAPABILITY_SCALED_IMAGES | ARHOST_CAPABILITY_LINEAR_IMAGES | ARHOST_CAPABILITY_VIDEO,
+    .capabilities = ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION | ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE |
+                    ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES | ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES |
+                    ARHOST_RAYTRACER_CAPABILITY_VIDEO,
     .option_count = std::size(options),
     .options = options,
     .needs = nullptr,

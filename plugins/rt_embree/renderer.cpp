@@ -173,7 +173,7 @@ void Renderer::set_size(const arhost_camera &camera) {
     if ((width == intrinsics_.width && height == intrinsics_.height) || width < 1 || height < 1 ||
         width > full_intrinsics_.width || height > full_intrinsics_.height)
         return;
-    intrinsics_ = arhost::shading::scaled(full_intrinsics_, width, height);
+    intrinsics_ = arhost_scaled_intrinsics(full_intrinsics_, width, height);
     ray_table_ = RayTable(intrinsics_, ray_table_.rays().has_derivatives, threads_);
     if (!history_.empty())
         history_.resize(sum_rows * ray_table_.tiles().size() * tile_pixels);

@@ -112,7 +112,7 @@ struct Frame {
     std::uint32_t irradiance_texture, first_random;
     std::uint32_t is_linear, has_several_real, has_video, video_texture;
     float focal_length[2], principal_point[2];
-    float lens[ARHOST_MAX_DISTORTION];
+    float lens[12]; // all but the tilt, which is 0
     std::uint32_t distortion;
     float max_radius_squared, least_irradiance;
     std::uint32_t blends_codes;

@@ -194,8 +194,8 @@ constexpr arhost_descriptor descriptor = {
     .vendor = "arhost",
     .licence = "Apache-2.0",
     .description = "Ray tracer for any Vulkan 1.1 GPU; renders the same images as rt_embree.",
-    .capabilities = ARHOST_CAPABILITY_LENS_DISTORTION | ARHOST_CAPABILITY_EVERY_SCENE |
-                    ARHOST_CAPABILITY_LINEAR_IMAGES | ARHOST_CAPABILITY_VIDEO,
+    .capabilities = ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION | ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE |
+                    ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES | ARHOST_RAYTRACER_CAPABILITY_VIDEO,
     .option_count = std::size(options),
     .options = options,
     .needs = needs,

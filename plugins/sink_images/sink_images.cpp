@@ -68,12 +68,12 @@ public:
                           "every: is only allowed if 'path' is numbered, such as out/frame_%05d.png");
     }
 
-    std::uint32_t capabilities() const {
-        std::uint32_t capabilities = ARHOST_CAPABILITY_NUMBERED_FILES;
+    std::uint64_t capabilities() const {
+        std::uint64_t capabilities = ARHOST_SINK_CAPABILITY_NUMBERED_FILES;
         if (format_ == PixelFormat::rgba8)
-            capabilities |= ARHOST_CAPABILITY_OVERLAY_INPUT;
+            capabilities |= ARHOST_SINK_CAPABILITY_OVERLAY_INPUT;
         if (format_ == PixelFormat::depth16)
-            capabilities |= ARHOST_CAPABILITY_VIDEO_INPUT;
+            capabilities |= ARHOST_SINK_CAPABILITY_VIDEO_INPUT;
         return capabilities;
     }
 
@@ -206,8 +206,8 @@ constexpr arhost_descriptor descriptor = {
     .vendor = "arhost",
     .licence = "Apache-2.0",
     .description = "Writes frames as numbered PNG or JPEG files, or one frame as a single file.",
-    .capabilities =
-        ARHOST_CAPABILITY_NUMBERED_FILES | ARHOST_CAPABILITY_VIDEO_INPUT | ARHOST_CAPABILITY_OVERLAY_INPUT,
+    .capabilities = ARHOST_SINK_CAPABILITY_NUMBERED_FILES | ARHOST_SINK_CAPABILITY_VIDEO_INPUT |
+                    ARHOST_SINK_CAPABILITY_OVERLAY_INPUT,
     .option_count = std::size(options),
     .options = options,
     .needs = nullptr,

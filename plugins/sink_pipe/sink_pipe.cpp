@@ -53,9 +53,9 @@ public:
                           "content: an overlay has transparent pixels, so it needs 'format: rgba' or 'format: bgra'");
     }
 
-    std::uint32_t capabilities() const {
-        return ARHOST_CAPABILITY_STANDARD_OUTPUT |
-               (writes_overlay_ ? std::uint32_t{ARHOST_CAPABILITY_OVERLAY_INPUT} : 0);
+    std::uint64_t capabilities() const {
+        return ARHOST_SINK_CAPABILITY_STANDARD_OUTPUT |
+               (writes_overlay_ ? std::uint64_t{ARHOST_SINK_CAPABILITY_OVERLAY_INPUT} : 0);
     }
 
     void start(const arhost_sink_setup &setup) {
@@ -184,7 +184,7 @@ constexpr arhost_descriptor descriptor = {
     .vendor = "arhost",
     .licence = "Apache-2.0",
     .description = "Writes uncompressed video (Y4M or pixels) to a FIFO or standard output, for other programs.",
-    .capabilities = ARHOST_CAPABILITY_STANDARD_OUTPUT | ARHOST_CAPABILITY_OVERLAY_INPUT,
+    .capabilities = ARHOST_SINK_CAPABILITY_STANDARD_OUTPUT | ARHOST_SINK_CAPABILITY_OVERLAY_INPUT,
     .option_count = std::size(options),
     .options = options,
     .needs = nullptr,

@@ -97,7 +97,7 @@ constexpr arhost_descriptor descriptor = {
     .licence = "Apache-2.0",
     .description =
         "Shows the live picture and the state of the run in a browser, and passes its commands to the host.",
-    .capabilities = ARHOST_CAPABILITY_REALTIME_SINK,
+    .capabilities = ARHOST_SINK_CAPABILITY_REALTIME,
     .option_count = std::size(options),
     .options = options,
     .needs = needs,

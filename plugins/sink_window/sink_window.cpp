@@ -57,9 +57,9 @@ public:
           debug_view_(options),
           commands_(host, [this](const std::string &text, bool is_error) { show(text, is_error); }) {}
 
-    std::uint32_t capabilities() const {
-        return ARHOST_CAPABILITY_REALTIME_SINK |
-               (shows_overlay_ ? std::uint32_t{ARHOST_CAPABILITY_OVERLAY_INPUT} : 0);
+    std::uint64_t capabilities() const {
+        return ARHOST_SINK_CAPABILITY_REALTIME |
+               (shows_overlay_ ? std::uint64_t{ARHOST_SINK_CAPABILITY_OVERLAY_INPUT} : 0);
     }
 
     void start(const arhost_sink_setup &setup) {
@@ -281,7 +281,7 @@ constexpr arhost_descriptor descriptor = {
     .vendor = "arhost",
     .licence = "Apache-2.0",
     .description = "Shows frames in a window.",
-    .capabilities = ARHOST_CAPABILITY_REALTIME_SINK | ARHOST_CAPABILITY_OVERLAY_INPUT,
+    .capabilities = ARHOST_SINK_CAPABILITY_REALTIME | ARHOST_SINK_CAPABILITY_OVERLAY_INPUT,
     .option_count = std::size(options),
     .options = options,
     .needs = needs,

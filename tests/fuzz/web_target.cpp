@@ -19,7 +19,7 @@ namespace arhost::fuzz {
 namespace {
 
 // Answers each command at once.
-const arhost_control control{sizeof control,
+const arhost_control control{sizeof control, 0,
                              [](const arhost_host *, const char *, arhost_take_answer take, void *context) {
                                  take(context, R"({"ok":true})");
                                  return arhost_status{ARHOST_STATUS_OK};

@@ -25,7 +25,7 @@ struct LensCase {
 };
 
 inline arhost_intrinsics intrinsics_of(arhost_distortion distortion, const std::vector<double> &coefficients) {
-    arhost_intrinsics intrinsics{sizeof intrinsics, 1280, 720, distortion, 900, 910, 652, 349, 0, 0, {}};
+    arhost_intrinsics intrinsics{sizeof intrinsics, 1280, 720, distortion, 900, 910, 652, 349, 0, 0, {}, {}};
     intrinsics.coefficient_count = static_cast<std::uint32_t>(coefficients.size());
     std::copy(coefficients.begin(), coefficients.end(), intrinsics.coefficients);
     return intrinsics;

@@ -39,27 +39,6 @@ OPTION_TEXT: int
 OPTION_INPUT_PATH: int
 OPTION_OUTPUT_PATH: int
 OPTION_LISTEN: int
-CAPABILITY_SEEK: int
-CAPABILITY_LIVE: int
-CAPABILITY_LENS_DISTORTION: int
-CAPABILITY_NUMBERED_FILES: int
-CAPABILITY_REALTIME_SINK: int
-CAPABILITY_REFLECTION: int
-CAPABILITY_GLASS: int
-CAPABILITY_ROUGHNESS: int
-CAPABILITY_TEXTURES: int
-CAPABILITY_AREA_LIGHTS: int
-CAPABILITY_ENVIRONMENT: int
-CAPABILITY_MOTION: int
-CAPABILITY_EVERY_SCENE: int
-CAPABILITY_STANDARD_OUTPUT: int
-CAPABILITY_VIDEO_INPUT: int
-CAPABILITY_OVERLAY_INPUT: int
-CAPABILITY_SCALED_IMAGES: int
-CAPABILITY_RUN_DESCRIPTION: int
-CAPABILITY_REPORTS_POSES: int
-CAPABILITY_LINEAR_IMAGES: int
-CAPABILITY_VIDEO: int
 OFFER: np.dtype[np.void]
 class Offer:
     struct_size: int
@@ -138,6 +117,7 @@ class FrameFormat:
     grey_offset: int
     depth_offset: int
     byte_size: int
+    reserved_for_growth: np.ndarray
 
 # arhost/camera.h
 DISTORTION_NONE: int
@@ -157,6 +137,7 @@ class Intrinsics:
     coefficient_count: int
     reserved: int
     coefficients: np.ndarray
+    reserved_for_growth: np.ndarray
 CAMERA: np.dtype[np.void]
 class Camera:
     struct_size: int
@@ -165,8 +146,11 @@ class Camera:
     look_at: np.ndarray
     up: np.ndarray
     intrinsics: Intrinsics
+    reserved_for_growth: np.ndarray
 
 # arhost/source.h
+SOURCE_CAPABILITY_SEEK: int
+SOURCE_CAPABILITY_LIVE: int
 SOURCE_PROPERTIES: np.dtype[np.void]
 class SourceProperties:
     struct_size: int
@@ -193,6 +177,7 @@ MAX_OBSERVATIONS: int
 MAX_FAMILIES: int
 MAX_FAMILY: int
 MAX_STATE: int
+TRACKER_CAPABILITY_REPORTS_POSES: int
 OBSERVATION: np.dtype[np.void]
 class Observation:
     id: int
@@ -425,6 +410,20 @@ class MovedObject:
     world_from_object: np.ndarray
 
 # arhost/raytracer.h
+RAYTRACER_CAPABILITY_LENS_DISTORTION: int
+RAYTRACER_CAPABILITY_SCALED_IMAGES: int
+RAYTRACER_CAPABILITY_LINEAR_IMAGES: int
+RAYTRACER_CAPABILITY_VIDEO: int
+RAYTRACER_CAPABILITY_DEPTH: int
+RAYTRACER_CAPABILITY_ESTIMATE: int
+RAYTRACER_CAPABILITY_REFLECTION: int
+RAYTRACER_CAPABILITY_GLASS: int
+RAYTRACER_CAPABILITY_ROUGHNESS: int
+RAYTRACER_CAPABILITY_TEXTURES: int
+RAYTRACER_CAPABILITY_AREA_LIGHTS: int
+RAYTRACER_CAPABILITY_ENVIRONMENT: int
+RAYTRACER_CAPABILITY_MOTION: int
+RAYTRACER_CAPABILITY_EVERY_SCENE: int
 IMAGE_FORM_STRAIGHT: int
 IMAGE_FORM_LINEAR: int
 COMPOSITING_SRGB: int
@@ -442,6 +441,12 @@ class RenderInfo:
     reserved: int
 
 # arhost/sink.h
+SINK_CAPABILITY_NUMBERED_FILES: int
+SINK_CAPABILITY_REALTIME: int
+SINK_CAPABILITY_STANDARD_OUTPUT: int
+SINK_CAPABILITY_VIDEO_INPUT: int
+SINK_CAPABILITY_OVERLAY_INPUT: int
+SINK_CAPABILITY_RUN_DESCRIPTION: int
 OVERLAY_RENDERED: int
 OVERLAY_HELD: int
 OVERLAY_NONE: int
@@ -453,6 +458,7 @@ class Search:
     expected_count: int
     missed_count: int
     candidate_count: int
+    reserved_for_growth: np.ndarray
 RECORD: np.dtype[np.void]
 class Record:
     struct_size: int

@@ -67,7 +67,7 @@ arhost_status negotiate_as(const arhost_offer *offer, arhost_answer *answer, con
     named = descriptor;
     named.id = library_name().c_str();
     static const arhost_plugin plugin = {
-        sizeof plugin, &named, functions, detail::create<T>, detail::destroy<T>, detail::no_extension};
+        sizeof plugin, 0, &named, functions, detail::create<T>, detail::destroy<T>, detail::no_extension};
     return negotiate(offer, answer, plugin);
 }
 

@@ -720,7 +720,7 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         const std::uint32_t width = image->width * self.fineness, height = image->height * self.fineness;
         const std::uint32_t stride = (4 * width + 63) / 64 * 64;
         std::vector<std::uint8_t> bytes(std::size_t{stride} * height);
-        const arhost_image other{sizeof other, stride, width, height, bytes.data(), nullptr};
+        const arhost_image other{sizeof other, stride, width, height, bytes.data(), nullptr, nullptr};
         embree_functions().render(self.other, &modified, &other, info);
         for (std::uint32_t y = 0; y < image->height; ++y)
             for (std::uint32_t x = 0; x < image->width; ++x)
@@ -760,9 +760,9 @@ arhost_status list_devices(const arhost_host *, arhost_take_device take, void *c
     if (has("devices_leak"))
         (void)::dup(0);
     double rates[] = {30, 15};
-    arhost_device_size size{sizeof size, 640, 480, 2, 0, rates};
-    const arhost_device_format format{sizeof format, 1, 0, "yuyv", &size};
-    arhost_device_control control{sizeof control, ARHOST_DEVICE_CONTROL_INTEGER, 1, "gain", 0, 9, 1, 5, list};
+    arhost_device_size size{sizeof size, 640, 480, 2, 0, 0, rates};
+    const arhost_device_format format{sizeof format, 1, 0, 0, "yuyv", &size};
+    arhost_device_control control{sizeof control, ARHOST_DEVICE_CONTROL_INTEGER, 1, 0, "gain", 0, 9, 1, 5, list};
     if (has("device_infinite_rate"))
         rates[0] = std::numeric_limits<double>::infinity();
     if (has("device_slowest_rate_first"))
@@ -803,22 +803,23 @@ arhost_status set_option(arhost_instance *, const arhost_option *) {
 
 const void *get_extension(const char *id) {
     static const char *const keys[] = {"samples", "no_such_option", nullptr};
-    static const arhost_set_option changes = {sizeof changes, keys,
+    static const arhost_set_option changes = {sizeof changes, 0, keys,
                                               has("set_option_without_function") ? nullptr : set_option};
     if (!std::strcmp(id, ARHOST_SET_OPTION_EXTENSION))
         return library_name().find("set_option") != std::string::npos ? &changes : nullptr;
-    static const arhost_devices devices = {sizeof devices, list_devices};
+    static const arhost_devices devices = {sizeof devices, 0, list_devices};
     if (!std::strcmp(id, ARHOST_DEVICES_EXTENSION))
         return library_name().find("device") != std::string::npos ? &devices : nullptr;
     return has("returns_any_extension") ? &library_name() : nullptr;
 }
 
-std::uint32_t capabilities(arhost_instance *) {
-    return ARHOST_CAPABILITY_LENS_DISTORTION;
+std::uint64_t capabilities(arhost_instance *) {
+    return ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION;
 }
 
 const arhost_plugin &wrong_plugin() {
     static const arhost_raytracer functions = {sizeof functions,
+                                               0,
                                                start,
                                                has("no_render") ? nullptr : render,
                                                stop,
@@ -846,17 +847,20 @@ const arhost_plugin &wrong_plugin() {
     static constexpr const char *unknown[] = {"bluetooth", nullptr};
     if (has("unknown_need"))
         descriptor.needs = unknown;
-    if (has("capability_of_other_kind"))
-        descriptor.capabilities |= ARHOST_CAPABILITY_LIVE;
     if (has("unknown_capability"))
-        descriptor.capabilities |= 1u << 31;
+        descriptor.capabilities |= std::uint64_t{1} << 63;
     if (has("undeclared_video"))
-        descriptor.capabilities &= ~ARHOST_CAPABILITY_VIDEO;
+        descriptor.capabilities &= ~ARHOST_RAYTRACER_CAPABILITY_VIDEO;
     static bool was_called = false;
     if (has("withdraws_a_capability") && std::exchange(was_called, true))
-        descriptor.capabilities &= ~ARHOST_CAPABILITY_LENS_DISTORTION;
-    static const arhost_plugin plugin = {
-        sizeof plugin, &descriptor, &functions, create, destroy, has("no_get_extension") ? nullptr : get_extension};
+        descriptor.capabilities &= ~ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION;
+    static const arhost_plugin plugin = {sizeof plugin,
+                                         0,
+                                         &descriptor,
+                                         &functions,
+                                         create,
+                                         destroy,
+                                         has("no_get_extension") ? nullptr : get_extension};
     return plugin;
 }
 
@@ -878,5 +882,5 @@ extern "C" {
 #ifdef EXPORTS_MORE
 ARHOST_EXPORT int leaked_symbol = 1;
 #endif
-extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, negotiate};
+extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, 0, negotiate};
 }

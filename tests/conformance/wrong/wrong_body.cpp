@@ -78,7 +78,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "arhost",
                                           "Apache-2.0",
                                           "Reports a body at a fixed place.",
-                                          ARHOST_CAPABILITY_REPORTS_POSES,
+                                          ARHOST_TRACKER_CAPABILITY_REPORTS_POSES,
                                           0,
                                           nullptr,
                                           nullptr};
@@ -87,7 +87,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
 
 extern "C" {
 extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {
-    sizeof arhost_entry, [](const arhost_offer *offer, arhost_answer *answer) {
+    sizeof arhost_entry, 0, [](const arhost_offer *offer, arhost_answer *answer) {
         return negotiate_as<Bodies>(offer, answer, descriptor, &detail::tracker_functions<Bodies>);
     }};
 }

@@ -298,7 +298,7 @@ const arhost_plugin &black_video() {
 
 extern "C" {
 extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {
-    sizeof arhost_entry, [](const arhost_offer *offer, arhost_answer *answer) {
+    sizeof arhost_entry, 0, [](const arhost_offer *offer, arhost_answer *answer) {
         if (has("blackens_a_video_frame"))
             return negotiate(offer, answer, black_video());
         static arhost_sink functions = detail::sink_functions<Files>;

@@ -230,7 +230,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "arhost",
                                           "Apache-2.0",
                                           "A small pattern that moves.",
-                                          ARHOST_CAPABILITY_SEEK,
+                                          ARHOST_SOURCE_CAPABILITY_SEEK,
                                           std::size(options),
                                           options,
                                           nullptr};
@@ -239,7 +239,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
 
 extern "C" {
 extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {
-    sizeof arhost_entry, [](const arhost_offer *offer, arhost_answer *answer) {
+    sizeof arhost_entry, 0, [](const arhost_offer *offer, arhost_answer *answer) {
         static arhost_source functions = detail::source_functions<Pattern>;
         if (has("no_read"))
             functions.read = nullptr;

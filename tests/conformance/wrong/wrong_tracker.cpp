@@ -550,11 +550,12 @@ const void *get_extension(const char *) {
 }
 
 const arhost_plugin &wrong_plugin() {
-    static const arhost_tracker functions = {sizeof functions, start,  has("no_track") ? nullptr : track, stop,
+    static const arhost_tracker functions = {sizeof functions, 0,      start, has("no_track") ? nullptr : track, stop,
                                              state_size,       nullptr};
     static arhost_descriptor descriptor = *real().descriptor;
     descriptor.id = library_name().c_str();
-    static constexpr arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};
+    static constexpr arhost_plugin plugin = {sizeof plugin, 0,       &descriptor,  &functions,
+                                             create,        destroy, get_extension};
     return plugin;
 }
 
@@ -571,5 +572,5 @@ arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
 } // namespace
 
 extern "C" {
-extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, negotiate};
+extern ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, 0, negotiate};
 }

@@ -64,36 +64,15 @@ STRUCT(arhost_option_descriptor, 56,
 STRUCT(arhost_option, 40,
        FIELD(struct_size, 0, 4) FIELD(type, 4, 4) FIELD(key, 8, 8) FIELD(integer, 16, 8) FIELD(real, 24, 8)
        FIELD(text, 32, 8))
-VALUE(ARHOST_CAPABILITY_SEEK, 1);
-VALUE(ARHOST_CAPABILITY_LIVE, 2);
-VALUE(ARHOST_CAPABILITY_LENS_DISTORTION, 4);
-VALUE(ARHOST_CAPABILITY_NUMBERED_FILES, 8);
-VALUE(ARHOST_CAPABILITY_REALTIME_SINK, 16);
-VALUE(ARHOST_CAPABILITY_REFLECTION, 32);
-VALUE(ARHOST_CAPABILITY_GLASS, 64);
-VALUE(ARHOST_CAPABILITY_ROUGHNESS, 128);
-VALUE(ARHOST_CAPABILITY_TEXTURES, 256);
-VALUE(ARHOST_CAPABILITY_AREA_LIGHTS, 512);
-VALUE(ARHOST_CAPABILITY_ENVIRONMENT, 1024);
-VALUE(ARHOST_CAPABILITY_MOTION, 2048);
-VALUE(ARHOST_CAPABILITY_EVERY_SCENE, 4064);
-VALUE(ARHOST_CAPABILITY_STANDARD_OUTPUT, 4096);
-VALUE(ARHOST_CAPABILITY_VIDEO_INPUT, 8192);
-VALUE(ARHOST_CAPABILITY_OVERLAY_INPUT, 16384);
-VALUE(ARHOST_CAPABILITY_SCALED_IMAGES, 32768);
-VALUE(ARHOST_CAPABILITY_RUN_DESCRIPTION, 65536);
-VALUE(ARHOST_CAPABILITY_REPORTS_POSES, 131072);
-VALUE(ARHOST_CAPABILITY_LINEAR_IMAGES, 262144);
-VALUE(ARHOST_CAPABILITY_VIDEO, 524288);
 
-STRUCT(arhost_descriptor, 80,
+STRUCT(arhost_descriptor, 88,
        FIELD(struct_size, 0, 4) FIELD(kind, 4, 4) FIELD(id, 8, 8) FIELD(name, 16, 8) FIELD(version, 24, 8)
-       FIELD(vendor, 32, 8) FIELD(licence, 40, 8) FIELD(description, 48, 8) FIELD(capabilities, 56, 4)
-       FIELD(option_count, 60, 4) FIELD(options, 64, 8) FIELD(needs, 72, 8))
+       FIELD(vendor, 32, 8) FIELD(licence, 40, 8) FIELD(description, 48, 8) FIELD(capabilities, 56, 8)
+       FIELD(option_count, 64, 8) FIELD(options, 72, 8) FIELD(needs, 80, 8))
 
 STRUCT(arhost_plugin, 48,
-       FIELD(struct_size, 0, 4) FIELD(descriptor, 8, 8) FIELD(functions, 16, 8) FIELD(create, 24, 8)
-       FIELD(destroy, 32, 8) FIELD(get_extension, 40, 8))
+       FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(descriptor, 8, 8) FIELD(functions, 16, 8)
+       FIELD(create, 24, 8) FIELD(destroy, 32, 8) FIELD(get_extension, 40, 8))
 
 STRUCT(arhost_offer, 12,
        FIELD(struct_size, 0, 4) FIELD(oldest_abi_version, 4, 4) FIELD(newest_abi_version, 8, 4))
@@ -102,7 +81,7 @@ STRUCT(arhost_answer, 16,
        FIELD(struct_size, 0, 4) FIELD(abi_version, 4, 4) FIELD(plugin, 8, 8))
 
 STRUCT(arhost_entry_point, 16,
-       FIELD(struct_size, 0, 4) FIELD(negotiate, 8, 8))
+       FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(negotiate, 8, 8))
 
 /* arhost/devices.h */
 VALUE(ARHOST_MAX_DEVICES, 64);
@@ -124,11 +103,11 @@ VALUE(ARHOST_DEVICE_STATE_UNUSABLE, 4);
 
 STRUCT(arhost_device_size, 32,
        FIELD(struct_size, 0, 4) FIELD(width, 4, 4) FIELD(height, 8, 4) FIELD(rate_count, 12, 4)
-       FIELD(is_rate_range, 16, 4) FIELD(rates, 24, 8))
+       FIELD(is_rate_range, 16, 4) FIELD(reserved, 20, 4) FIELD(rates, 24, 8))
 
 STRUCT(arhost_device_format, 32,
-       FIELD(struct_size, 0, 4) FIELD(size_count, 4, 4) FIELD(is_size_range, 8, 4) FIELD(pixel_format, 16, 8)
-       FIELD(sizes, 24, 8))
+       FIELD(struct_size, 0, 4) FIELD(size_count, 4, 4) FIELD(is_size_range, 8, 4) FIELD(reserved, 12, 4)
+       FIELD(pixel_format, 16, 8) FIELD(sizes, 24, 8))
 VALUE(ARHOST_DEVICE_CONTROL_INTEGER, 1);
 VALUE(ARHOST_DEVICE_CONTROL_BOOLEAN, 2);
 VALUE(ARHOST_DEVICE_CONTROL_MENU, 3);
@@ -136,34 +115,34 @@ VALUE(ARHOST_DEVICE_CONTROL_BITMASK, 4);
 VALUE(ARHOST_DEVICE_CONTROL_BUTTON, 5);
 
 STRUCT(arhost_device_control, 64,
-       FIELD(struct_size, 0, 4) FIELD(type, 4, 4) FIELD(has_value, 8, 4) FIELD(name, 16, 8) FIELD(minimum, 24, 8)
-       FIELD(maximum, 32, 8) FIELD(step, 40, 8) FIELD(default_value, 48, 8) FIELD(value, 56, 8))
+       FIELD(struct_size, 0, 4) FIELD(type, 4, 4) FIELD(has_value, 8, 4) FIELD(reserved, 12, 4) FIELD(name, 16, 8)
+       FIELD(minimum, 24, 8) FIELD(maximum, 32, 8) FIELD(step, 40, 8) FIELD(default_value, 48, 8) FIELD(value, 56, 8))
 
 STRUCT(arhost_device, 104,
        FIELD(struct_size, 0, 4) FIELD(index, 4, 4) FIELD(kind, 8, 4) FIELD(state, 12, 4) FIELD(is_default, 16, 4)
        FIELD(format_count, 20, 4) FIELD(control_count, 24, 4) FIELD(width, 28, 4) FIELD(height, 32, 4)
-       FIELD(rate, 40, 8) FIELD(name, 48, 8) FIELD(path, 56, 8) FIELD(serial, 64, 8) FIELD(abilities, 72, 8)
-       FIELD(problem, 80, 8) FIELD(formats, 88, 8) FIELD(controls, 96, 8))
+       FIELD(reserved, 36, 4) FIELD(rate, 40, 8) FIELD(name, 48, 8) FIELD(path, 56, 8) FIELD(serial, 64, 8)
+       FIELD(abilities, 72, 8) FIELD(problem, 80, 8) FIELD(formats, 88, 8) FIELD(controls, 96, 8))
 
 STRUCT(arhost_devices, 16,
-       FIELD(struct_size, 0, 4) FIELD(list, 8, 8))
+       FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(list, 8, 8))
 
 /* arhost/control.h */
 
 STRUCT(arhost_control, 16,
-       FIELD(struct_size, 0, 4) FIELD(send, 8, 8))
+       FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(send, 8, 8))
 VALUE(ARHOST_MAX_COMMAND_SIZE, 16384);
 VALUE(ARHOST_MAX_PENDING_COMMANDS, 8);
 
 STRUCT(arhost_set_option, 24,
-       FIELD(struct_size, 0, 4) FIELD(keys, 8, 8) FIELD(set, 16, 8))
+       FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(keys, 8, 8) FIELD(set, 16, 8))
 
 /* arhost/counters.h */
 VALUE(ARHOST_MAX_COUNTERS, 32);
 VALUE(ARHOST_MAX_COUNTER_NAME, 63);
 
 STRUCT(arhost_counters, 16,
-       FIELD(struct_size, 0, 4) FIELD(list, 8, 8))
+       FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(list, 8, 8))
 
 /* arhost/frame.h */
 VALUE(ARHOST_PIXEL_FORMAT_GREY8, 1);
@@ -184,12 +163,12 @@ VALUE(ARHOST_MAX_PLANES, 3);
 VALUE(ARHOST_MAX_IMAGE_SIDE, 16384);
 VALUE(ARHOST_MAX_NAME, 64);
 
-STRUCT(arhost_frame_format, 112,
+STRUCT(arhost_frame_format, 176,
        FIELD(struct_size, 0, 4) FIELD(pixel_format, 4, 4) FIELD(width, 8, 4) FIELD(height, 12, 4)
        FIELD(yuv_matrix, 16, 4) FIELD(yuv_range, 20, 4) FIELD(fps, 24, 8) FIELD(has_depth, 32, 4)
        FIELD(transfer, 36, 4) FIELD(plane_count, 40, 4) FIELD(stride, 44, 12) FIELD(offset, 56, 24)
        FIELD(grey_stride, 80, 4) FIELD(depth_stride, 84, 4) FIELD(grey_offset, 88, 8) FIELD(depth_offset, 96, 8)
-       FIELD(byte_size, 104, 8))
+       FIELD(byte_size, 104, 8) FIELD(reserved_for_growth, 112, 64))
 
 STRUCT(arhost_frame, 72,
        FIELD(struct_size, 0, 4) FIELD(clock, 4, 4) FIELD(format, 8, 8) FIELD(plane, 16, 24) FIELD(grey, 40, 8)
@@ -199,26 +178,28 @@ STRUCT(arhost_frame, 72,
 VALUE(ARHOST_DISTORTION_NONE, 1);
 VALUE(ARHOST_DISTORTION_BROWN, 2);
 VALUE(ARHOST_DISTORTION_FISHEYE, 3);
-VALUE(ARHOST_MAX_DISTORTION, 12);
+VALUE(ARHOST_MAX_DISTORTION, 14);
 
-STRUCT(arhost_intrinsics, 152,
+STRUCT(arhost_intrinsics, 232,
        FIELD(struct_size, 0, 4) FIELD(width, 4, 4) FIELD(height, 8, 4) FIELD(distortion, 12, 4) FIELD(fx, 16, 8)
        FIELD(fy, 24, 8) FIELD(cx, 32, 8) FIELD(cy, 40, 8) FIELD(coefficient_count, 48, 4) FIELD(reserved, 52, 4)
-       FIELD(coefficients, 56, 96))
+       FIELD(coefficients, 56, 112) FIELD(reserved_for_growth, 168, 64))
 
-STRUCT(arhost_camera, 232,
+STRUCT(arhost_camera, 376,
        FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(eye, 8, 24) FIELD(look_at, 32, 24) FIELD(up, 56, 24)
-       FIELD(intrinsics, 80, 152))
+       FIELD(intrinsics, 80, 232) FIELD(reserved_for_growth, 312, 64))
 
 /* arhost/source.h */
+VALUE(ARHOST_SOURCE_CAPABILITY_SEEK, 1);
+VALUE(ARHOST_SOURCE_CAPABILITY_LIVE, 2);
 
 STRUCT(arhost_source_setup, 40,
        FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(first_sequence, 8, 8) FIELD(fps, 16, 8)
-       FIELD(paced, 24, 4) FIELD(intrinsics, 32, 8))
+       FIELD(paced, 24, 4) FIELD(reserved_2, 28, 4) FIELD(intrinsics, 32, 8))
 
-STRUCT(arhost_source_properties, 280,
-       FIELD(struct_size, 0, 4) FIELD(has_intrinsics, 4, 4) FIELD(format, 8, 112) FIELD(intrinsics, 120, 152)
-       FIELD(frame_count, 272, 8))
+STRUCT(arhost_source_properties, 424,
+       FIELD(struct_size, 0, 4) FIELD(has_intrinsics, 4, 4) FIELD(format, 8, 176) FIELD(intrinsics, 184, 232)
+       FIELD(frame_count, 416, 8))
 
 STRUCT(arhost_frame_buffer, 64,
        FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(format, 8, 8) FIELD(plane, 16, 24) FIELD(grey, 40, 8)
@@ -230,7 +211,7 @@ STRUCT(arhost_frame_info, 224,
        FIELD(true_mt, 96, 128))
 
 STRUCT(arhost_source, 32,
-       FIELD(struct_size, 0, 4) FIELD(start, 8, 8) FIELD(read, 16, 8) FIELD(stop, 24, 8))
+       FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(start, 8, 8) FIELD(read, 16, 8) FIELD(stop, 24, 8))
 
 /* arhost/tracker.h */
 VALUE(ARHOST_MAX_TARGETS, 1024);
@@ -239,6 +220,7 @@ VALUE(ARHOST_MAX_OBSERVATIONS, 1024);
 VALUE(ARHOST_MAX_FAMILIES, 16);
 VALUE(ARHOST_MAX_FAMILY, 32);
 VALUE(ARHOST_MAX_STATE, 16777216);
+VALUE(ARHOST_TRACKER_CAPABILITY_REPORTS_POSES, 1);
 
 STRUCT(arhost_target_config, 24,
        FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(name, 8, 8) FIELD(body, 16, 8))
@@ -283,8 +265,8 @@ STRUCT(arhost_track_request, 56,
        FIELD(reserved, 52, 4))
 
 STRUCT(arhost_tracker, 48,
-       FIELD(struct_size, 0, 4) FIELD(start, 8, 8) FIELD(track, 16, 8) FIELD(stop, 24, 8) FIELD(state_size, 32, 8)
-       FIELD(aspect, 40, 8))
+       FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(start, 8, 8) FIELD(track, 16, 8) FIELD(stop, 24, 8)
+       FIELD(state_size, 32, 8) FIELD(aspect, 40, 8))
 
 /* arhost/scene.h */
 VALUE(ARHOST_SCENE_MAGIC, 0x435354534f485241);
@@ -399,6 +381,20 @@ STRUCT(arhost_motion, 32,
        FIELD(deformed_count, 24, 4) FIELD(reserved, 28, 4))
 
 /* arhost/raytracer.h */
+VALUE(ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION, 1);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES, 2);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES, 4);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_VIDEO, 8);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_DEPTH, 16);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_ESTIMATE, 32);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_REFLECTION, 256);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_GLASS, 512);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS, 1024);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_TEXTURES, 2048);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_AREA_LIGHTS, 4096);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_ENVIRONMENT, 8192);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_MOTION, 16384);
+VALUE(ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE, 32512);
 VALUE(ARHOST_IMAGE_FORM_STRAIGHT, 1);
 VALUE(ARHOST_IMAGE_FORM_LINEAR, 2);
 VALUE(ARHOST_COMPOSITING_SRGB, 1);
@@ -408,14 +404,14 @@ STRUCT(arhost_raytracer_setup, 48,
        FIELD(struct_size, 0, 4) FIELD(width, 4, 4) FIELD(height, 8, 4) FIELD(form, 12, 4) FIELD(scene, 16, 8)
        FIELD(intrinsics, 24, 8) FIELD(compositing, 32, 4) FIELD(reserved, 36, 4) FIELD(video_format, 40, 8))
 
-STRUCT(arhost_render_request, 296,
+STRUCT(arhost_render_request, 448,
        FIELD(struct_size, 0, 4) FIELD(max_samples, 4, 4) FIELD(sequence, 8, 8) FIELD(time_s, 16, 8)
-       FIELD(camera, 24, 232) FIELD(motion, 256, 8) FIELD(video, 264, 8) FIELD(state_before, 272, 8)
-       FIELD(state_after, 280, 8) FIELD(state_size, 288, 8))
+       FIELD(camera, 24, 376) FIELD(motion, 400, 8) FIELD(video, 408, 8) FIELD(state_before, 416, 8)
+       FIELD(state_after, 424, 8) FIELD(state_size, 432, 8) FIELD(estimate, 440, 8))
 
-STRUCT(arhost_image, 32,
+STRUCT(arhost_image, 40,
        FIELD(struct_size, 0, 4) FIELD(stride, 4, 4) FIELD(width, 8, 4) FIELD(height, 12, 4) FIELD(rgba, 16, 8)
-       FIELD(linear, 24, 8))
+       FIELD(linear, 24, 8) FIELD(depth_mm, 32, 8))
 
 STRUCT(arhost_render_info, 40,
        FIELD(struct_size, 0, 4) FIELD(has_region, 4, 4) FIELD(region_x, 8, 4) FIELD(region_y, 12, 4)
@@ -423,10 +419,16 @@ STRUCT(arhost_render_info, 40,
        FIELD(reserved, 36, 4))
 
 STRUCT(arhost_raytracer, 48,
-       FIELD(struct_size, 0, 4) FIELD(start, 8, 8) FIELD(render, 16, 8) FIELD(stop, 24, 8) FIELD(capabilities, 32, 8)
-       FIELD(state_size, 40, 8))
+       FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(start, 8, 8) FIELD(render, 16, 8) FIELD(stop, 24, 8)
+       FIELD(capabilities, 32, 8) FIELD(state_size, 40, 8))
 
 /* arhost/sink.h */
+VALUE(ARHOST_SINK_CAPABILITY_NUMBERED_FILES, 1);
+VALUE(ARHOST_SINK_CAPABILITY_REALTIME, 2);
+VALUE(ARHOST_SINK_CAPABILITY_STANDARD_OUTPUT, 4);
+VALUE(ARHOST_SINK_CAPABILITY_VIDEO_INPUT, 8);
+VALUE(ARHOST_SINK_CAPABILITY_OVERLAY_INPUT, 16);
+VALUE(ARHOST_SINK_CAPABILITY_RUN_DESCRIPTION, 32);
 
 STRUCT(arhost_sink_setup, 56,
        FIELD(struct_size, 0, 4) FIELD(width, 4, 4) FIELD(height, 8, 4) FIELD(reserved, 12, 4) FIELD(fps, 16, 8)
@@ -435,17 +437,18 @@ VALUE(ARHOST_OVERLAY_RENDERED, 1);
 VALUE(ARHOST_OVERLAY_HELD, 2);
 VALUE(ARHOST_OVERLAY_NONE, 3);
 
-STRUCT(arhost_search, 24,
+STRUCT(arhost_search, 88,
        FIELD(everywhere, 0, 4) FIELD(observation_count, 4, 4) FIELD(unlisted_count, 8, 4)
-       FIELD(expected_count, 12, 4) FIELD(missed_count, 16, 4) FIELD(candidate_count, 20, 4))
+       FIELD(expected_count, 12, 4) FIELD(missed_count, 16, 4) FIELD(candidate_count, 20, 4)
+       FIELD(reserved_for_growth, 24, 64))
 
-STRUCT(arhost_record, 1048,
+STRUCT(arhost_record, 1256,
        FIELD(struct_size, 0, 4) FIELD(clock, 4, 4) FIELD(sequence, 8, 8) FIELD(capture_ns, 16, 8)
        FIELD(overlay, 24, 4) FIELD(has_camera, 28, 4) FIELD(has_truth, 32, 4) FIELD(target_count, 36, 4)
-       FIELD(truth_target, 40, 64) FIELD(true_mt, 104, 128) FIELD(camera, 232, 232) FIELD(overlay_scale, 464, 8)
-       FIELD(overlay_samples, 472, 4) FIELD(observation_count, 476, 4) FIELD(targets, 480, 8)
-       FIELD(observations, 488, 8) FIELD(families, 496, 512) FIELD(search, 1008, 24) FIELD(expected, 1032, 8)
-       FIELD(expected_count, 1040, 4) FIELD(reserved, 1044, 4))
+       FIELD(truth_target, 40, 64) FIELD(true_mt, 104, 128) FIELD(camera, 232, 376) FIELD(overlay_scale, 608, 8)
+       FIELD(overlay_samples, 616, 4) FIELD(observation_count, 620, 4) FIELD(targets, 624, 8)
+       FIELD(observations, 632, 8) FIELD(families, 640, 512) FIELD(search, 1152, 88) FIELD(expected, 1240, 8)
+       FIELD(expected_count, 1248, 4) FIELD(reserved, 1252, 4))
 
 STRUCT(arhost_output, 80,
        FIELD(struct_size, 0, 4) FIELD(stride, 4, 4) FIELD(width, 8, 4) FIELD(height, 12, 4) FIELD(bgr, 16, 8)
@@ -453,5 +456,5 @@ STRUCT(arhost_output, 80,
        FIELD(overlay_stride, 72, 4) FIELD(reserved, 76, 4))
 
 STRUCT(arhost_sink, 48,
-       FIELD(struct_size, 0, 4) FIELD(start, 8, 8) FIELD(write, 16, 8) FIELD(idle, 24, 8) FIELD(stop, 32, 8)
-       FIELD(capabilities, 40, 8))
+       FIELD(struct_size, 0, 4) FIELD(reserved, 4, 4) FIELD(start, 8, 8) FIELD(write, 16, 8) FIELD(idle, 24, 8)
+       FIELD(stop, 32, 8) FIELD(capabilities, 40, 8))

@@ -93,6 +93,17 @@ TEST(Lens, DoesNotProjectPointsBehindTheCamera) {
     EXPECT_FALSE(project(intrinsics, {10, 10, -500}));
 }
 
+TEST(Lens, IsRefusedIfItsSensorIsTilted) {
+    std::vector<double> coefficients(ARHOST_MAX_DISTORTION);
+    EXPECT_EQ(problem_with_lens(lens(ARHOST_DISTORTION_BROWN, coefficients)), "");
+    for (const std::size_t tilt : {12, 13}) {
+        coefficients.assign(ARHOST_MAX_DISTORTION, 0);
+        coefficients[tilt] = 0.01;
+        EXPECT_EQ(problem_with_lens(lens(ARHOST_DISTORTION_BROWN, coefficients)),
+                  "a tilted sensor (tauX, tauY) is not supported; calibrate without CALIB_TILTED_MODEL");
+    }
+}
+
 TEST(Lens, IsRefusedIfItDistortsTheImagesCentre) {
     EXPECT_EQ(problem_with_lens(lens(ARHOST_DISTORTION_NONE, {})), "");
     EXPECT_EQ(problem_with_lens(lens(ARHOST_DISTORTION_BROWN, {-0.4, 0.2, 0.002, -0.001, -0.1})), "");
@@ -100,7 +111,7 @@ TEST(Lens, IsRefusedIfItDistortsTheImagesCentre) {
         << "rational models have large coefficients that compensate each other";
     EXPECT_EQ(problem_with_lens(lens(ARHOST_DISTORTION_FISHEYE, {0.1, -0.05, 0.01, -0.002})), "");
     for (const arhost_distortion model : {ARHOST_DISTORTION_BROWN, ARHOST_DISTORTION_FISHEYE})
-        for (std::size_t i = 0; i < (model == ARHOST_DISTORTION_BROWN ? ARHOST_MAX_DISTORTION : 4); ++i)
+        for (std::size_t i = 0; i < (model == ARHOST_DISTORTION_BROWN ? untilted_coefficients : 4); ++i)
             for (const double coefficient : {1e30, -1e30, 1e300, std::numeric_limits<double>::quiet_NaN()}) {
                 std::vector<double> coefficients(i + 1);
                 coefficients.back() = coefficient;

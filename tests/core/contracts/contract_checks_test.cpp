@@ -17,7 +17,7 @@ using testing::HasSubstr;
 namespace {
 
 constexpr arhost_intrinsics lens{
-    sizeof(arhost_intrinsics), 640, 480, ARHOST_DISTORTION_NONE, 600, 610, 330, 235, 0, 0, {}};
+    sizeof(arhost_intrinsics), 640, 480, ARHOST_DISTORTION_NONE, 600, 610, 330, 235, 0, 0, {}, {}};
 arhost_observation observation(std::int32_t id, double left_px = 100) {
     return {sizeof(arhost_observation),
             id,
@@ -86,7 +86,7 @@ struct View {
                                *role);
         return std::move(builder).build();
     }
-    arhost_camera camera{sizeof(arhost_camera), 0, {0, -200, 0}, {0, 0, 0}, {0, 0, 1}, lens};
+    arhost_camera camera{sizeof(arhost_camera), 0, {0, -200, 0}, {0, 0, 0}, {0, 0, 1}, lens, {}};
     scene::Arena scene;
     std::vector<std::uint8_t> pixels;
 

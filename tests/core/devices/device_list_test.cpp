@@ -15,10 +15,10 @@ namespace {
 // A camera in the C structs of the ABI, and the structs that it refers to.
 struct Camera {
     std::vector<double> rates = {30, 15};
-    arhost_device_size size{sizeof(arhost_device_size), 640, 480, 2, 0, rates.data()};
-    arhost_device_format format{sizeof(arhost_device_format), 1, 0, "yuyv", &size};
+    arhost_device_size size{sizeof(arhost_device_size), 640, 480, 2, 0, 0, rates.data()};
+    arhost_device_format format{sizeof(arhost_device_format), 1, 0, 0, "yuyv", &size};
     arhost_device_control control{
-        sizeof(arhost_device_control), ARHOST_DEVICE_CONTROL_INTEGER, 1, "gain", 0, 9, 1, 4, 5};
+        sizeof(arhost_device_control), ARHOST_DEVICE_CONTROL_INTEGER, 1, 0, "gain", 0, 9, 1, 4, 5};
     arhost_device device{sizeof(arhost_device),
                          0,
                          ARHOST_DEVICE_CAMERA,
@@ -26,6 +26,7 @@ struct Camera {
                          0,
                          1,
                          1,
+                         0,
                          0,
                          0,
                          0,

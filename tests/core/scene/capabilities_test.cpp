@@ -18,7 +18,7 @@ ArenaBuilder ball(const arhost_material &material, arhost_role role = ARHOST_ROL
     return builder;
 }
 
-std::uint32_t needed(ArenaBuilder builder) {
+std::uint64_t needed(ArenaBuilder builder) {
     const Arena arena = std::move(builder).build();
     EXPECT_EQ(validate(arena.bytes()), "");
     return needed_capabilities(arena.scene());
@@ -27,11 +27,11 @@ std::uint32_t needed(ArenaBuilder builder) {
 TEST(Capabilities, DependOnTheModelsOfMaterials) {
     const std::pair<arhost_material_model, std::uint32_t> models[] = {
         {ARHOST_MATERIAL_DIFFUSE, 0},
-        {ARHOST_MATERIAL_SPECULAR, ARHOST_CAPABILITY_REFLECTION},
-        {ARHOST_MATERIAL_MIRROR, ARHOST_CAPABILITY_REFLECTION},
-        {ARHOST_MATERIAL_METAL, ARHOST_CAPABILITY_REFLECTION},
-        {ARHOST_MATERIAL_GLASS, ARHOST_CAPABILITY_GLASS},
-        {ARHOST_MATERIAL_METALLIC_ROUGHNESS, ARHOST_CAPABILITY_ROUGHNESS}};
+        {ARHOST_MATERIAL_SPECULAR, ARHOST_RAYTRACER_CAPABILITY_REFLECTION},
+        {ARHOST_MATERIAL_MIRROR, ARHOST_RAYTRACER_CAPABILITY_REFLECTION},
+        {ARHOST_MATERIAL_METAL, ARHOST_RAYTRACER_CAPABILITY_REFLECTION},
+        {ARHOST_MATERIAL_GLASS, ARHOST_RAYTRACER_CAPABILITY_GLASS},
+        {ARHOST_MATERIAL_METALLIC_ROUGHNESS, ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS}};
     for (const auto &[model, expected] : models) {
         EXPECT_EQ(needed(ball(make_material(model))), expected) << model;
         EXPECT_EQ(needed(ball(make_material(model), ARHOST_ROLE_CATCHER)), expected) << model;
@@ -43,7 +43,7 @@ TEST(Capabilities, IncludeOccludersThatMirrorsShow) {
     ArenaBuilder builder = ball(make_material(ARHOST_MATERIAL_MIRROR));
     builder.add_object("post", builder.add_spheres({{30, 0, 0, 10}}),
                        builder.add_material(make_material(ARHOST_MATERIAL_GLASS)), ARHOST_ROLE_OCCLUDER);
-    EXPECT_EQ(needed(std::move(builder)), ARHOST_CAPABILITY_REFLECTION | ARHOST_CAPABILITY_GLASS);
+    EXPECT_EQ(needed(std::move(builder)), ARHOST_RAYTRACER_CAPABILITY_REFLECTION | ARHOST_RAYTRACER_CAPABILITY_GLASS);
 }
 
 TEST(Capabilities, IgnoreMaterialsThatNoObjectUses) {
@@ -64,15 +64,16 @@ TEST(Capabilities, IncludeTextures) {
     material.colour_texture = builder.add_texture("texel", texel(ARHOST_TEXEL_SRGB8, 4));
     const TriangleMesh mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {}, {{0, 0}, {1, 0}, {0, 1}}, {{0, 1, 2}}};
     builder.add_object("triangle", builder.add_triangles(mesh), builder.add_material(material));
-    EXPECT_EQ(needed(std::move(builder)), ARHOST_CAPABILITY_TEXTURES);
+    EXPECT_EQ(needed(std::move(builder)), ARHOST_RAYTRACER_CAPABILITY_TEXTURES);
 }
 
 TEST(Capabilities, IncludeAreaLights) {
-    for (const auto &[type, expected] : {std::pair{ARHOST_LIGHT_POINT, 0u},
-                                         {ARHOST_LIGHT_DIRECTIONAL, 0u},
-                                         {ARHOST_LIGHT_SPOT, 0u},
-                                         {ARHOST_LIGHT_RECTANGLE, std::uint32_t{ARHOST_CAPABILITY_AREA_LIGHTS}},
-                                         {ARHOST_LIGHT_SPHERE, std::uint32_t{ARHOST_CAPABILITY_AREA_LIGHTS}}}) {
+    for (const auto &[type, expected] :
+         {std::pair{ARHOST_LIGHT_POINT, 0u},
+          {ARHOST_LIGHT_DIRECTIONAL, 0u},
+          {ARHOST_LIGHT_SPOT, 0u},
+          {ARHOST_LIGHT_RECTANGLE, std::uint64_t{ARHOST_RAYTRACER_CAPABILITY_AREA_LIGHTS}},
+          {ARHOST_LIGHT_SPHERE, std::uint64_t{ARHOST_RAYTRACER_CAPABILITY_AREA_LIGHTS}}}) {
         ArenaBuilder builder;
         builder.add_light(make_light(type));
         EXPECT_EQ(needed(std::move(builder)), expected) << type;
@@ -83,7 +84,7 @@ TEST(Capabilities, IncludeTheEnvironment) {
     ArenaBuilder builder;
     builder.environment.texture = builder.add_texture("texel", texel(ARHOST_TEXEL_RGBA32F, 16));
     builder.environment.rows = builder.environment.columns = {1};
-    EXPECT_EQ(needed(std::move(builder)), ARHOST_CAPABILITY_ENVIRONMENT);
+    EXPECT_EQ(needed(std::move(builder)), ARHOST_RAYTRACER_CAPABILITY_ENVIRONMENT);
 }
 
 TEST(Capabilities, IncludeMotionOnlyOfAnimatedScenes) {
@@ -99,36 +100,38 @@ TEST(Capabilities, IncludeMotionOnlyOfAnimatedScenes) {
                            builder.add_material(make_material(ARHOST_MATERIAL_DIFFUSE)), ARHOST_ROLE_VIRTUAL,
                            glm::mat4x3(1), motion);
         const Arena arena = std::move(builder).build();
-        EXPECT_EQ(needed_capabilities(arena.scene()), duration_s > 0 ? ARHOST_CAPABILITY_MOTION : 0);
+        EXPECT_EQ(needed_capabilities(arena.scene()), duration_s > 0 ? ARHOST_RAYTRACER_CAPABILITY_MOTION : 0);
     }
 }
 
 TEST(Capabilities, EverySceneHasABitForEachPart) {
     std::uint32_t all = 0;
-    for (std::uint32_t bit = ARHOST_CAPABILITY_REFLECTION; bit <= ARHOST_CAPABILITY_MOTION; bit <<= 1) {
+    for (std::uint32_t bit = ARHOST_RAYTRACER_CAPABILITY_REFLECTION; bit <= ARHOST_RAYTRACER_CAPABILITY_MOTION;
+         bit <<= 1) {
         EXPECT_NE(missing_capabilities_text("rt", bit), "");
         all |= bit;
     }
-    EXPECT_EQ(ARHOST_CAPABILITY_EVERY_SCENE, all);
+    EXPECT_EQ(ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE, all);
 }
 
 TEST(Capabilities, TheWarningNamesThePluginAndTheParts) {
-    EXPECT_EQ(missing_capabilities_text("rt_small", ARHOST_CAPABILITY_GLASS | ARHOST_CAPABILITY_MOTION),
-              "rt_small does not support parts of the scene: glass, motion. The image will lack them; use another "
-              "ray tracer or a simpler scene");
-    EXPECT_EQ(missing_capabilities_text("rt_small", ARHOST_CAPABILITY_LENS_DISTORTION), "");
+    EXPECT_EQ(
+        missing_capabilities_text("rt_small", ARHOST_RAYTRACER_CAPABILITY_GLASS | ARHOST_RAYTRACER_CAPABILITY_MOTION),
+        "rt_small does not support parts of the scene: glass, motion. The image will lack them; use another "
+        "ray tracer or a simpler scene");
+    EXPECT_EQ(missing_capabilities_text("rt_small", ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION), "");
 }
 
 TEST(Capabilities, AnInstanceMayHaveFewerThanItsDescriptor) {
     arhost_descriptor descriptor{};
-    descriptor.capabilities = ARHOST_CAPABILITY_EVERY_SCENE;
+    descriptor.capabilities = ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE;
     arhost_raytracer functions{};
     functions.struct_size = sizeof functions;
-    EXPECT_EQ(capabilities_of(descriptor, functions, nullptr), ARHOST_CAPABILITY_EVERY_SCENE);
-    functions.capabilities = [](arhost_instance *) { return std::uint32_t{ARHOST_CAPABILITY_GLASS}; };
-    EXPECT_EQ(capabilities_of(descriptor, functions, nullptr), ARHOST_CAPABILITY_GLASS);
+    EXPECT_EQ(capabilities_of(descriptor, functions, nullptr), ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE);
+    functions.capabilities = [](arhost_instance *) { return std::uint64_t{ARHOST_RAYTRACER_CAPABILITY_GLASS}; };
+    EXPECT_EQ(capabilities_of(descriptor, functions, nullptr), ARHOST_RAYTRACER_CAPABILITY_GLASS);
     functions.struct_size = offsetof(arhost_raytracer, capabilities); // built against an older header
-    EXPECT_EQ(capabilities_of(descriptor, functions, nullptr), ARHOST_CAPABILITY_EVERY_SCENE);
+    EXPECT_EQ(capabilities_of(descriptor, functions, nullptr), ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE);
 }
 
 } // namespace

@@ -17,7 +17,7 @@ namespace {
 
 arhost_intrinsics lens(arhost_distortion distortion, std::vector<double> k) {
     arhost_intrinsics in{sizeof in, 320, 240, distortion, 260, 250, 172.3, 97.6, static_cast<std::uint32_t>(k.size()),
-                         0,         {}};
+                         0,         {},  {}};
     std::copy(k.begin(), k.end(), in.coefficients);
     return in;
 }
@@ -38,7 +38,7 @@ void draw_disc(const arhost_image &image, double x0, double y0, double radius) {
 // The image that LensWarp writes. Its old content must be replaced.
 struct LensImage {
     std::vector<std::uint8_t> bytes = std::vector<std::uint8_t>(std::size_t{1344} * height, 77);
-    arhost_image image{sizeof image, 1344, width, height, bytes.data(), nullptr};
+    arhost_image image{sizeof image, 1344, width, height, bytes.data(), nullptr, nullptr};
     const std::uint8_t *at(std::uint32_t x, std::uint32_t y) const { return &bytes[std::size_t{y} * 1344 + 4 * x]; }
 };
 

@@ -23,6 +23,7 @@ struct Seen {
 
 constexpr arhost_tracker tracker_functions = {
     sizeof(arhost_tracker),
+    0,
     [](arhost_instance *, const arhost_tracker_setup *) -> arhost_status { return ARHOST_STATUS_OK; },
     [](arhost_instance *, const arhost_track_request *request, arhost_tracker_result *) -> arhost_status {
         const arhost_frame *frame = request->frame;
@@ -113,6 +114,7 @@ std::uint64_t declared_size = 0;
 
 constexpr arhost_raytracer raytracer_functions = {
     sizeof(arhost_raytracer),
+    0,
     [](arhost_instance *, const arhost_raytracer_setup *) -> arhost_status { return ARHOST_STATUS_OK; },
     [](arhost_instance *, const arhost_render_request *request, const arhost_image *,
        arhost_render_info *) -> arhost_status {

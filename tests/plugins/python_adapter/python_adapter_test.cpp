@@ -582,8 +582,8 @@ TEST_F(PythonAdapter, NamesAWrongPythonhome) {
 TEST_F(PythonAdapter, TheRayTracersScriptDeclaresItsCapabilities) {
     for (const auto &[declaration, warns] :
          {std::pair{"pass", false},
-          {"capabilities = arhost.CAPABILITY_MOTION", true},
-          {"capabilities = arhost.CAPABILITY_GLASS | arhost.CAPABILITY_MOTION", false}}) {
+          {"capabilities = arhost.RAYTRACER_CAPABILITY_MOTION", true},
+          {"capabilities = arhost.RAYTRACER_CAPABILITY_GLASS | arhost.RAYTRACER_CAPABILITY_MOTION", false}}) {
         ArhostRun run(raytracer);
         run.write("script.py", std::string("import arhost\n"
                                            "class T:\n"
@@ -615,7 +615,7 @@ TEST_F(PythonAdapter, ARayTracersScriptWritesLinearImagesAndReadsTheVideo) {
 import arhost, numpy as np
 def light(code): return code / 255 / 12.92 if code <= 10 else ((code / 255 + 0.055) / 1.055) ** 2.4
 class Tracer:
-    capabilities = arhost.CAPABILITY_EVERY_SCENE | arhost.CAPABILITY_LINEAR_IMAGES | arhost.CAPABILITY_VIDEO
+    capabilities = arhost.RAYTRACER_CAPABILITY_EVERY_SCENE | arhost.RAYTRACER_CAPABILITY_LINEAR_IMAGES | arhost.RAYTRACER_CAPABILITY_VIDEO
     def __init__(self, host): pass
     def start(self, setup):
         assert (setup.form, setup.compositing) == (arhost.IMAGE_FORM_LINEAR, arhost.COMPOSITING_LINEAR)
@@ -684,7 +684,7 @@ class Tracker:
         return [arhost.Observation(3, [[20, 15], [40, 15], [40, 35], [20, 35]])]
 class Tracer:
     def __init__(self, host): pass
-    capabilities = arhost.CAPABILITY_EVERY_SCENE | arhost.CAPABILITY_VIDEO
+    capabilities = arhost.RAYTRACER_CAPABILITY_EVERY_SCENE | arhost.RAYTRACER_CAPABILITY_VIDEO
     def start(self, setup):
         check("RaytracerSetup", setup), check("Scene", setup.scene), check("FrameFormat", setup.video_format)
     def render(self, request, image):

@@ -26,8 +26,13 @@ public:
           buffer_(std::size_t{stride_} * height) {}
 
     arhost_image image() {
-        return {
-            sizeof(arhost_image), stride_, width, height, nullptr, reinterpret_cast<std::uint16_t *>(buffer_.data())};
+        return {sizeof(arhost_image),
+                stride_,
+                width,
+                height,
+                nullptr,
+                reinterpret_cast<std::uint16_t *>(buffer_.data()),
+                nullptr};
     }
     LinearPixel at(std::uint32_t x, std::uint32_t y) const {
         LinearPixel pixel;
@@ -124,7 +129,8 @@ public:
                                             video ? &video->frame() : nullptr,
                                             nullptr,
                                             nullptr,
-                                            0};
+                                            0,
+                                            nullptr};
         LinearPicture picture(camera.intrinsics);
         const arhost_image image = picture.image();
         EXPECT_EQ(functions().render(tracer_.plugin().instance(), &request, &image, &picture.info), ARHOST_STATUS_OK)

@@ -13,7 +13,8 @@ namespace {
 arhost_intrinsics intrinsics(arhost_distortion distortion, std::vector<double> k, std::uint32_t width = 643,
                              std::uint32_t height = 477) {
     arhost_intrinsics in{
-        sizeof in, width, height, distortion, 560, 540, 301.5, 262.25, static_cast<std::uint32_t>(k.size()), 0, {}};
+        sizeof in, width, height, distortion, 560, 540, 301.5, 262.25, static_cast<std::uint32_t>(k.size()),
+        0,         {},    {}};
     std::copy(k.begin(), k.end(), in.coefficients);
     return in;
 }

@@ -128,8 +128,8 @@ TEST(ScaledImage, EqualsThatOfARendererOfThisSize) {
     const std::vector<Pixel> full_size = tracer.render(opencv_axes(full)).pixels();
     for (const double scale : {0.5, 0.71, 0.1}) {
         const arhost_intrinsics small =
-            shading::scaled(full, static_cast<std::uint32_t>(std::lround(scale * full.width)),
-                            static_cast<std::uint32_t>(std::lround(scale * full.height)));
+            arhost_scaled_intrinsics(full, static_cast<std::uint32_t>(std::lround(scale * full.width)),
+                                     static_cast<std::uint32_t>(std::lround(scale * full.height)));
         ASSERT_EQ(tracer.start(full), ARHOST_STATUS_OK);
         const std::vector<Pixel> scaled = tracer.render_next(opencv_axes(small)).pixels();
         EXPECT_EQ(tracer.render_next(opencv_axes(full)).pixels(), full_size)
@@ -141,9 +141,9 @@ TEST(ScaledImage, EqualsThatOfARendererOfThisSize) {
 TEST(ScaledImage, MustBeTheScaledViewAndNotLarger) {
     Tracer tracer(one_sphere({0, 0, 300, 60}));
     ASSERT_EQ(tracer.start(pinhole()), ARHOST_STATUS_OK);
-    arhost_intrinsics wrong = shading::scaled(pinhole(), 100, 75);
+    arhost_intrinsics wrong = arhost_scaled_intrinsics(pinhole(), 100, 75);
     wrong.fx *= 1.01;
-    for (const arhost_intrinsics &in : {wrong, shading::scaled(pinhole(), 201, 150)}) {
+    for (const arhost_intrinsics &in : {wrong, arhost_scaled_intrinsics(pinhole(), 201, 150)}) {
         Picture picture(in);
         EXPECT_EQ(tracer.try_render(opencv_axes(in), picture), ARHOST_STATUS_ERROR_INVALID_ARGUMENT);
     }
@@ -910,7 +910,7 @@ TEST(Plugin, DeclaresLensDistortionSupport) {
     const arhost_descriptor &descriptor = PluginUnderTest("rt_embree").descriptor();
     EXPECT_EQ(descriptor.kind, ARHOST_KIND_RAYTRACER);
     EXPECT_STREQ(descriptor.id, "rt_embree");
-    EXPECT_TRUE(descriptor.capabilities & ARHOST_CAPABILITY_LENS_DISTORTION);
+    EXPECT_TRUE(descriptor.capabilities & ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION);
 }
 
 TEST(Plugin, CanBeRestartedAfterStop) {

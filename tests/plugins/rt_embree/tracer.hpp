@@ -35,7 +35,8 @@ inline arhost_intrinsics pinhole(std::uint32_t width = 200, std::uint32_t height
             .cy = (height - 1) / 2.0,
             .coefficient_count = 0,
             .reserved = 0,
-            .coefficients = {}};
+            .coefficients = {},
+            .reserved_for_growth = {}};
 }
 inline arhost_intrinsics with_lens(arhost_intrinsics in, arhost_distortion distortion,
                                    const std::vector<double> &coefficients) {
@@ -47,7 +48,7 @@ inline arhost_intrinsics with_lens(arhost_intrinsics in, arhost_distortion disto
 
 inline arhost_camera camera(std::array<double, 3> eye, std::array<double, 3> look_at, std::array<double, 3> up,
                             const arhost_intrinsics &intrinsics = pinhole()) {
-    arhost_camera c{sizeof c, 0, {}, {}, {}, intrinsics};
+    arhost_camera c{sizeof c, 0, {}, {}, {}, intrinsics, {}};
     std::copy(eye.begin(), eye.end(), c.eye);
     std::copy(look_at.begin(), look_at.end(), c.look_at);
     std::copy(up.begin(), up.end(), c.up);
@@ -71,7 +72,7 @@ public:
         : width(in.width), height(in.height), stride_((4 * width + 63) / 64 * 64 + 64),
           buffer_(std::size_t{stride_} * height) {}
 
-    arhost_image image() { return {sizeof(arhost_image), stride_, width, height, buffer_.data(), nullptr}; }
+    arhost_image image() { return {sizeof(arhost_image), stride_, width, height, buffer_.data(), nullptr, nullptr}; }
     Pixel at(std::uint32_t x, std::uint32_t y) const {
         const std::uint8_t *p = buffer_.data() + std::size_t{stride_} * y + 4 * x;
         return {p[0], p[1], p[2], p[3]};
@@ -174,7 +175,8 @@ public:
         return status;
     }
     arhost_status try_render(const arhost_camera &camera, Picture &picture, const arhost_motion *motion = nullptr) {
-        const arhost_render_request request{sizeof request, 0, 0, 0, camera, motion, nullptr, nullptr, nullptr, 0};
+        const arhost_render_request request{sizeof request, 0,       0,       0, camera, motion,
+                                            nullptr,        nullptr, nullptr, 0, nullptr};
         const arhost_image image = picture.image();
         return functions().render(plugin_.instance(), &request, &image, &picture.info);
     }

@@ -91,12 +91,14 @@ inline LongRun long_run(const std::vector<std::filesystem::path> &scenes, int ch
                                                 nullptr,
                                                 nullptr,
                                                 nullptr,
-                                                0};
+                                                0,
+                                                nullptr};
             const arhost_image image{sizeof image,
                                      4 * intrinsics.width,
                                      intrinsics.width,
                                      intrinsics.height,
                                      memory.get() + static_cast<std::size_t>(i) % slots * size,
+                                     nullptr,
                                      nullptr};
             arhost_render_info info{};
             info.struct_size = sizeof info;

@@ -293,8 +293,8 @@ TEST_P(PathIntegratorOnEachPath, ValidationReportsNothing) {
 
 TEST(PathIntegratorPlugin, DeclaresLinearImagesAndVideo) {
     const PluginUnderTest plugin("rt_vulkan");
-    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_CAPABILITY_LINEAR_IMAGES);
-    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_CAPABILITY_VIDEO);
+    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES);
+    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_RAYTRACER_CAPABILITY_VIDEO);
 }
 
 TEST(PathIntegratorPlugin, RejectsLinearImagesOfTheOtherIntegrator) {

@@ -329,7 +329,7 @@ TEST(Image, IsWrittenInPlaceIfTheDeviceImportsItsMemory) {
         pictures.emplace_back(small);
     while (reinterpret_cast<std::uintptr_t>(pictures.back().image().rgba) % 4096 == 0);
     Picture &copied = pictures.back();
-    const arhost_image in_place{sizeof in_place, stride, small.width, small.height, memory, nullptr};
+    const arhost_image in_place{sizeof in_place, stride, small.width, small.height, memory, nullptr, nullptr};
     const rt_vulkan::Rectangle drawn = renderer.render(view, in_place);
     if (!renderer.wrote_in_place() && parts.device.properties.deviceType != VK_PHYSICAL_DEVICE_TYPE_CPU)
         GTEST_SKIP() << parts.device.name << " does not import shared memory"; // such as AMD's Linux driver
@@ -621,7 +621,7 @@ TEST(InvalidInput, CancelledCallsFail) {
 
 TEST(Plugin, DeclaresLensDistortionAndGpuUse) {
     const PluginUnderTest plugin("rt_vulkan");
-    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_CAPABILITY_LENS_DISTORTION);
+    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION);
     ASSERT_NE(plugin.descriptor().needs, nullptr);
     EXPECT_STREQ(plugin.descriptor().needs[0], "gpu");
 }

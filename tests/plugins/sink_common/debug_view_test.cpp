@@ -132,7 +132,7 @@ TEST_F(DebugViewTest, MagnifiesTheResiduals) {
 TEST_F(DebugViewTest, DrawsExpectedPlacesAndMissedMarkers) {
     test::TrackedRecord record{test::make_record(0), {}, {}};
     record.expected = {expected_at(100, 150, 20), expected_at(300, 150, 20)};
-    record.fields.search = {0, 1, 0, 2, 1, 0};
+    record.fields.search = {0, 1, 0, 2, 1, 0, {}};
     const Black drawn = draw(record);
     for (const double left : {100.0, 300.0}) {
         EXPECT_TRUE(has(drawn.at(left - 20, 130), cyan)) << left;
@@ -150,7 +150,7 @@ TEST_F(DebugViewTest, DrawsExpectedPlacesAndMissedMarkers) {
 TEST_F(DebugViewTest, TheRecordOfAReplayHasNumbersWithoutPlaces) {
     test::TrackedRecord record{test::make_record(0), {}, {}};
     const Black before = draw(record);
-    record.fields.search = {0, 1, 0, 2, 1, 0};
+    record.fields.search = {0, 1, 0, 2, 1, 0, {}};
     const Black drawn = draw(record);
     EXPECT_NE(drawn.bgr, before.bgr) << "the box has a row more";
     const std::size_t below_the_box = std::size_t{stride} * 100;
@@ -166,7 +166,7 @@ TEST_F(DebugViewTest, SurvivesPlacesFarOutsideTheFrame) {
         record.add_observation(1, corners_px).projected_px[0][0] = -far;
         record.add_observation(2, corners_px, false);
         record.expected = {expected_at(far, 10, 20), expected_at(10, far, std::abs(far))};
-        record.fields.search = {0, 1, 0, 2, 2, 0};
+        record.fields.search = {0, 1, 0, 2, 2, 0, {}};
         EXPECT_TRUE(has(draw(record).at(200, 150), yellow, 0.6)) << far;
     }
 }

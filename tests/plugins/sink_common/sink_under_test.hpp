@@ -165,7 +165,7 @@ public:
         return functions().start(plugin_.instance(), &setup);
     }
     const arhost_frame_format &video_format() const { return format_; }
-    std::uint32_t capabilities() const {
+    std::uint64_t capabilities() const {
         return functions().capabilities ? functions().capabilities(plugin_.instance()) : descriptor().capabilities;
     }
     arhost_status write(const Picture &picture, const arhost_record &record, const OverlayPicture *overlay = nullptr,

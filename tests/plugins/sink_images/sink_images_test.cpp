@@ -57,7 +57,7 @@ TEST_F(SinkImages, AnOverlayKeepsItsAlpha) {
     OverlayPicture overlay(width, height);
     for (const std::string name : {"%d.png", "last.png"}) { // written at once; kept until the end
         SinkUnderTest s = sink(name, {{"content", "overlay"}});
-        EXPECT_EQ(s.capabilities(), ARHOST_CAPABILITY_NUMBERED_FILES | ARHOST_CAPABILITY_OVERLAY_INPUT);
+        EXPECT_EQ(s.capabilities(), ARHOST_SINK_CAPABILITY_NUMBERED_FILES | ARHOST_SINK_CAPABILITY_OVERLAY_INPUT);
         ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK) << s.log();
         ASSERT_EQ(s.write(Picture(width, height, 0), make_record(0), &overlay), ARHOST_STATUS_OK) << s.log();
         ASSERT_EQ(s.stop(), ARHOST_STATUS_OK) << s.log();
@@ -76,7 +76,7 @@ TEST_F(SinkImages, AnOverlayKeepsItsAlpha) {
 
 TEST_F(SinkImages, DepthIsWrittenWith16Bits) {
     SinkUnderTest s = sink("depth_%d.png", {{"content", "depth"}});
-    EXPECT_EQ(s.capabilities(), ARHOST_CAPABILITY_NUMBERED_FILES | ARHOST_CAPABILITY_VIDEO_INPUT);
+    EXPECT_EQ(s.capabilities(), ARHOST_SINK_CAPABILITY_NUMBERED_FILES | ARHOST_SINK_CAPABILITY_VIDEO_INPUT);
     s.has_depth = true;
     ASSERT_EQ(s.start(width, height), ARHOST_STATUS_OK) << s.log();
     const std::size_t stride = s.video_format().depth_stride / 2;
@@ -103,7 +103,7 @@ TEST_F(SinkImages, ContentsThatCannotBeWrittenAreRejected) {
 }
 
 TEST_F(SinkImages, FramesNeedNoFurtherInputs) {
-    EXPECT_EQ(sink("%d.png").capabilities(), ARHOST_CAPABILITY_NUMBERED_FILES);
+    EXPECT_EQ(sink("%d.png").capabilities(), ARHOST_SINK_CAPABILITY_NUMBERED_FILES);
 }
 
 // ---- Numbered images -------------------------------------------------------------------------------

@@ -94,7 +94,7 @@ TEST_F(SinkPipe, WritesTheOverlayAloneWithItsAlpha) {
                     expected += static_cast<char>(overlay.pixel(x, y)[*c - '0']);
         std::future<std::string> received = read_all(fifo);
         SinkUnderTest sink("sink_pipe", {{"path", path}, {"format", format}, {"content", "overlay"}});
-        EXPECT_EQ(sink.capabilities(), ARHOST_CAPABILITY_STANDARD_OUTPUT | ARHOST_CAPABILITY_OVERLAY_INPUT);
+        EXPECT_EQ(sink.capabilities(), ARHOST_SINK_CAPABILITY_STANDARD_OUTPUT | ARHOST_SINK_CAPABILITY_OVERLAY_INPUT);
         ASSERT_EQ(sink.start(13, 7), ARHOST_STATUS_OK) << sink.log();
         EXPECT_EQ(sink.write(Picture(13, 7, 0), make_record(0), &overlay), ARHOST_STATUS_OK);
         EXPECT_EQ(sink.stop(), ARHOST_STATUS_OK);

@@ -182,7 +182,7 @@ TEST_F(SinkWindow, ShowsEachFramePixelForPixel) {
 TEST_F(SinkWindow, ShowsTheOverlayAloneOverBlack) {
     constexpr std::uint32_t width = 120, height = 90;
     SinkUnderTest &sink = start(width, height, {{"content", "overlay"}});
-    EXPECT_EQ(sink.capabilities(), ARHOST_CAPABILITY_REALTIME_SINK | ARHOST_CAPABILITY_OVERLAY_INPUT);
+    EXPECT_EQ(sink.capabilities(), ARHOST_SINK_CAPABILITY_REALTIME | ARHOST_SINK_CAPABILITY_OVERLAY_INPUT);
     OverlayPicture overlay(width, height);
     ASSERT_EQ(sink.write(Picture(width, height, 0), make_record(0), &overlay), ARHOST_STATUS_OK) << sink.log();
     double worst = 255;
@@ -469,7 +469,7 @@ TEST(SinkWindowWithoutScreen, NamesWhatIsMissingAndWhatToTry) {
 
 TEST(SinkWindowWithoutScreen, DeclaresDisplayNeedsAndRealtimeCapability) {
     const SinkUnderTest sink("sink_window", {});
-    EXPECT_EQ(sink.descriptor().capabilities, ARHOST_CAPABILITY_REALTIME_SINK | ARHOST_CAPABILITY_OVERLAY_INPUT);
-    EXPECT_EQ(sink.capabilities(), std::uint32_t{ARHOST_CAPABILITY_REALTIME_SINK}) << "a frame needs no overlay";
+    EXPECT_EQ(sink.descriptor().capabilities, ARHOST_SINK_CAPABILITY_REALTIME | ARHOST_SINK_CAPABILITY_OVERLAY_INPUT);
+    EXPECT_EQ(sink.capabilities(), std::uint64_t{ARHOST_SINK_CAPABILITY_REALTIME}) << "a frame needs no overlay";
     EXPECT_NE(sink.functions().idle, nullptr);
 }

@@ -67,6 +67,7 @@ public:
                                         .first_sequence = 0,
                                         .fps = fps,
                                         .paced = paced,
+                                        .reserved_2 = 0,
                                         .intrinsics = camera};
         properties_.struct_size = sizeof properties_;
         properties_.format.struct_size = sizeof properties_.format;
@@ -577,7 +578,7 @@ TEST(SourceSynthetic, RejectsInvalidOptionsByName) {
 
 TEST(SourceSynthetic, DeclaresThatItCanSeek) {
     const PluginUnderTest plugin("source_synthetic");
-    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_CAPABILITY_SEEK);
+    EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_SOURCE_CAPABILITY_SEEK);
     EXPECT_STREQ(plugin.descriptor().id, "source_synthetic");
 }
 

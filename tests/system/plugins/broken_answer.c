@@ -6,4 +6,4 @@ static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer)
     answer->abi_version = offer->newest_abi_version;
     return ARHOST_STATUS_OK;
 }
-ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), 0, negotiate};

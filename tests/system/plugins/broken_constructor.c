@@ -7,4 +7,4 @@ __attribute__((constructor)) static void die(void) {
     signal(SIGSEGV, SIG_DFL);
     raise(SIGSEGV);
 }
-ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), 0};
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), 0, 0};

@@ -4,4 +4,4 @@
 
 extern arhost_status arhost_test_nowhere(const arhost_offer *offer, arhost_answer *answer);
 
-ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), arhost_test_nowhere};
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), 0, arhost_test_nowhere};

@@ -936,8 +936,9 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              sizeof options / sizeof *options,
                                              options,
                                              NULL};
-static const arhost_tracker functions = {sizeof(arhost_tracker), start, track, stop, NULL, NULL};
-static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
+static const arhost_tracker functions = {sizeof(arhost_tracker), 0, start, track, stop, NULL, NULL};
+static const arhost_plugin plugin = {sizeof(arhost_plugin), 0, &descriptor, &functions, create, destroy,
+                                     get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     (void)offer;
@@ -946,4 +947,4 @@ static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer)
     return ARHOST_STATUS_OK;
 }
 
-ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), 0, negotiate};

@@ -172,12 +172,13 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              "arhost",
                                              "Apache-2.0",
                                              "Attempts attacks on the host, for tests.",
-                                             ARHOST_CAPABILITY_SEEK,
+                                             ARHOST_SOURCE_CAPABILITY_SEEK,
                                              sizeof options / sizeof *options,
                                              options,
                                              NULL};
-static const arhost_source functions = {sizeof(arhost_source), start, read_frame, stop};
-static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
+static const arhost_source functions = {sizeof(arhost_source), 0, start, read_frame, stop};
+static const arhost_plugin plugin = {sizeof(arhost_plugin), 0, &descriptor, &functions, create, destroy,
+                                     get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     (void)offer;
@@ -186,4 +187,4 @@ static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer)
     return ARHOST_STATUS_OK;
 }
 
-ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), 0, negotiate};

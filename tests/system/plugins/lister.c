@@ -75,17 +75,17 @@ static inline arhost_status list_gpu(const arhost_host *host, arhost_take_device
 /* Lists cameras and displays in every state. /dev/full and /dev/null stand for nodes of cameras. */
 static inline arhost_status list_cameras(const arhost_host *host, arhost_take_device take, void *context) {
     static const double rates[] = {30, 30000. / 1001, 7.5}, ends[] = {60, 1};
-    static const arhost_device_size sizes[] = {{sizeof(arhost_device_size), 640, 480, 3, 0, rates},
-                                               {sizeof(arhost_device_size), 1280, 720, 1, 0, rates}};
-    static const arhost_device_size range[] = {{sizeof(arhost_device_size), 32, 24, 2, 1, ends},
-                                               {sizeof(arhost_device_size), 4096, 3072, 0, 0, NULL}};
-    static const arhost_device_format formats[] = {{sizeof(arhost_device_format), 2, 0, "yuyv", sizes},
-                                                   {sizeof(arhost_device_format), 2, 1, "grey", range},
-                                                   {sizeof(arhost_device_format), 0, 0, "mjpeg", NULL}};
+    static const arhost_device_size sizes[] = {{sizeof(arhost_device_size), 640, 480, 3, 0, 0, rates},
+                                               {sizeof(arhost_device_size), 1280, 720, 1, 0, 0, rates}};
+    static const arhost_device_size range[] = {{sizeof(arhost_device_size), 32, 24, 2, 1, 0, ends},
+                                               {sizeof(arhost_device_size), 4096, 3072, 0, 0, 0, NULL}};
+    static const arhost_device_format formats[] = {{sizeof(arhost_device_format), 2, 0, 0, "yuyv", sizes},
+                                                   {sizeof(arhost_device_format), 2, 1, 0, "grey", range},
+                                                   {sizeof(arhost_device_format), 0, 0, 0, "mjpeg", NULL}};
     static const arhost_device_control controls[] = {
-        {sizeof(arhost_device_control), ARHOST_DEVICE_CONTROL_INTEGER, 1, "gain", -16, 16, 4, 0, 8},
-        {sizeof(arhost_device_control), ARHOST_DEVICE_CONTROL_BOOLEAN, 0, "mute", 0, 1, 1, 1, 0},
-        {sizeof(arhost_device_control), ARHOST_DEVICE_CONTROL_BUTTON, 0, "reset", 0, 0, 0, 0, 0}};
+        {sizeof(arhost_device_control), ARHOST_DEVICE_CONTROL_INTEGER, 1, 0, "gain", -16, 16, 4, 0, 8},
+        {sizeof(arhost_device_control), ARHOST_DEVICE_CONTROL_BOOLEAN, 0, 0, "mute", 0, 1, 1, 1, 0},
+        {sizeof(arhost_device_control), ARHOST_DEVICE_CONTROL_BUTTON, 0, 0, "reset", 0, 0, 0, 0, 0}};
     arhost_device device;
     (void)host;
     memset(&device, 0, sizeof device);
@@ -156,7 +156,7 @@ static void destroy(arhost_instance *self) {
     (void)self;
 }
 static const void *get_extension(const char *id) {
-    static const arhost_devices devices = {sizeof(arhost_devices), LIST};
+    static const arhost_devices devices = {sizeof(arhost_devices), 0, LIST};
     return strcmp(id, ARHOST_DEVICES_EXTENSION) == 0 ? &devices : NULL;
 }
 static arhost_status start(arhost_instance *self, const arhost_sink_setup *setup) {
@@ -168,8 +168,9 @@ static arhost_status write_frame(arhost_instance *self, const arhost_output *out
 static arhost_status stop(arhost_instance *self) {
     return (void)self, ARHOST_STATUS_OK;
 }
-static const arhost_sink functions = {sizeof(arhost_sink), start, write_frame, NULL, stop, NULL};
-static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
+static const arhost_sink functions = {sizeof(arhost_sink), 0, start, write_frame, NULL, stop, NULL};
+static const arhost_plugin plugin = {sizeof(arhost_plugin), 0, &descriptor, &functions, create, destroy,
+                                     get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     const uint32_t spoken = ARHOST_ABI_VERSION;
@@ -180,4 +181,4 @@ static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer)
     return ARHOST_STATUS_OK;
 }
 
-ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), 0, negotiate};

@@ -43,12 +43,13 @@ static arhost_status write_frame(arhost_instance *self, const arhost_output *out
 static arhost_status stop(arhost_instance *self) {
     return (void)self, ARHOST_STATUS_OK;
 }
-static const arhost_sink functions = {sizeof(arhost_sink), start, write_frame, 0, stop, 0};
-static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
+static const arhost_sink functions = {sizeof(arhost_sink), 0, start, write_frame, 0, stop, 0};
+static const arhost_plugin plugin = {sizeof(arhost_plugin), 0, &descriptor, &functions, create, destroy,
+                                     get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     answer->abi_version = offer->newest_abi_version;
     answer->plugin = &plugin;
     return ARHOST_STATUS_OK;
 }
-ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), 0, negotiate};

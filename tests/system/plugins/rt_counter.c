@@ -180,8 +180,9 @@ static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              sizeof options / sizeof *options,
                                              options,
                                              NULL};
-static const arhost_raytracer functions = {sizeof(arhost_raytracer), start, render, stop, NULL, state_size};
-static const arhost_plugin plugin = {sizeof(arhost_plugin), &descriptor, &functions, create, destroy, get_extension};
+static const arhost_raytracer functions = {sizeof(arhost_raytracer), 0, start, render, stop, NULL, state_size};
+static const arhost_plugin plugin = {sizeof(arhost_plugin), 0, &descriptor, &functions, create, destroy,
+                                     get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     const uint32_t spoken = ARHOST_ABI_VERSION;
@@ -192,4 +193,4 @@ static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer)
     return ARHOST_STATUS_OK;
 }
 
-ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), negotiate};
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof(arhost_entry_point), 0, negotiate};

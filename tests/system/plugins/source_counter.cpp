@@ -119,7 +119,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "arhost",
                                           "Apache-2.0",
                                           "Numbered frames, for tests.",
-                                          ARHOST_CAPABILITY_SEEK,
+                                          ARHOST_SOURCE_CAPABILITY_SEEK,
                                           std::size(options),
                                           options,
                                           nullptr};

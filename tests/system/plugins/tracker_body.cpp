@@ -85,7 +85,7 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "arhost",
                                           "Apache-2.0",
                                           "Reports the poses of bodies, for tests.",
-                                          ARHOST_CAPABILITY_REPORTS_POSES,
+                                          ARHOST_TRACKER_CAPABILITY_REPORTS_POSES,
                                           std::size(options),
                                           options,
                                           nullptr};

@@ -348,13 +348,13 @@ inline void report(const Device &d, arhost_take_device take, void *context) {
         auto &list = sizes.emplace_back();
         for (const DeviceSize &s : f.sizes)
             list.push_back({sizeof(arhost_device_size), s.width, s.height, static_cast<std::uint32_t>(s.rates.size()),
-                            s.is_rate_range, s.rates.data()});
-        formats.push_back({sizeof(arhost_device_format), static_cast<std::uint32_t>(list.size()), f.is_size_range,
+                            s.is_rate_range, 0, s.rates.data()});
+        formats.push_back({sizeof(arhost_device_format), static_cast<std::uint32_t>(list.size()), f.is_size_range, 0,
                            f.pixel_format.c_str(), list.data()});
     }
     std::vector<arhost_device_control> controls;
     for (const DeviceControl &c : d.controls)
-        controls.push_back({sizeof(arhost_device_control), c.type, c.value.has_value(), c.name.c_str(), c.minimum,
+        controls.push_back({sizeof(arhost_device_control), c.type, c.value.has_value(), 0, c.name.c_str(), c.minimum,
                             c.maximum, c.step, c.default_value, c.value.value_or(0)});
     const arhost_device device{sizeof device,
                                d.index,
@@ -365,6 +365,7 @@ inline void report(const Device &d, arhost_take_device take, void *context) {
                                static_cast<std::uint32_t>(controls.size()),
                                d.width,
                                d.height,
+                               0,
                                d.rate,
                                d.name.c_str(),
                                or_null(d.path),
@@ -384,7 +385,7 @@ arhost_status list_devices(const arhost_host *host, arhost_take_device take, voi
     });
 }
 template <ListsDevices T>
-inline constexpr arhost_devices devices_functions = {sizeof(arhost_devices), list_devices<T>};
+inline constexpr arhost_devices devices_functions = {sizeof(arhost_devices), 0, list_devices<T>};
 
 // A plugin class accepts changes of options while it runs if it has a static member `changeable`, an array of keys
 // that ends with nullptr, and a member function `set(const Options &)`, whose argument contains the changed option
@@ -396,7 +397,7 @@ concept AcceptsChanges = requires(T &plugin, const Options &changed) {
 };
 template <AcceptsChanges T>
 inline constexpr arhost_set_option set_option_functions = {
-    sizeof(arhost_set_option), T::changeable, [](arhost_instance *i, const arhost_option *option) {
+    sizeof(arhost_set_option), 0, T::changeable, [](arhost_instance *i, const arhost_option *option) {
         return with<T>(i, [&](T &p) { return p.set(Options(option, 1)), ARHOST_STATUS_OK; });
     }};
 
@@ -406,7 +407,7 @@ concept Counts = requires(T &plugin) {
 };
 template <Counts T>
 inline constexpr arhost_counters counters_functions = {
-    sizeof(arhost_counters), [](arhost_instance *i, arhost_take_counter take, void *context) {
+    sizeof(arhost_counters), 0, [](arhost_instance *i, arhost_take_counter take, void *context) {
         with<T>(i, [&](T &p) {
             for (const CounterValue &counter : p.counters())
                 take(context, counter.name, counter.value);
@@ -442,7 +443,7 @@ template <class T> const void *get_extension(const char *id) {
 // arhost_status, because they may return ARHOST_STATUS_END.
 template <class T>
 inline constexpr arhost_source source_functions = {
-    sizeof(arhost_source),
+    sizeof(arhost_source), 0,
     [](arhost_instance *i, const arhost_source_setup *setup, arhost_source_properties *properties) {
         return with<T>(i, [&](T &p) { return p.start(*setup, *properties), ARHOST_STATUS_OK; });
     },
@@ -486,7 +487,7 @@ template <class T> constexpr arhost_tracker make_tracker_functions() {
 template <class T> inline constexpr arhost_tracker tracker_functions = make_tracker_functions<T>();
 
 // `capabilities` is an optional member of the plugin class.
-template <class T> std::uint32_t capabilities_of(arhost_instance *instance) {
+template <class T> std::uint64_t capabilities_of(arhost_instance *instance) {
     return instance_of<T>(instance).plugin.capabilities();
 }
 
@@ -545,11 +546,15 @@ inline arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer,
 
 // Defines arhost_entry for a plugin class and its arhost_descriptor. Use once per shared object, at global scope.
 #define ARHOST_PLUGIN_OF_KIND(Class, descriptor_object, functions_object)                                            \
-    static constexpr arhost_plugin arhost_plugin_object = {                                                          \
-        sizeof(arhost_plugin),         &(descriptor_object),           &arhost::detail::functions_object<Class>,     \
-        arhost::detail::create<Class>, arhost::detail::destroy<Class>, arhost::detail::get_extension<Class>};        \
+    static constexpr arhost_plugin arhost_plugin_object = {sizeof(arhost_plugin),                                    \
+                                                           0,                                                        \
+                                                           &(descriptor_object),                                     \
+                                                           &arhost::detail::functions_object<Class>,                 \
+                                                           arhost::detail::create<Class>,                            \
+                                                           arhost::detail::destroy<Class>,                           \
+                                                           arhost::detail::get_extension<Class>};                    \
     extern "C" ARHOST_EXPORT const arhost_entry_point arhost_entry = {                                               \
-        sizeof(arhost_entry_point), [](const arhost_offer *offer, arhost_answer *answer) {                           \
+        sizeof(arhost_entry_point), 0, [](const arhost_offer *offer, arhost_answer *answer) {                        \
             return arhost::negotiate(offer, answer, arhost_plugin_object);                                           \
         }};
 

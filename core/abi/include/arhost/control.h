@@ -29,6 +29,7 @@ typedef void (*arhost_take_answer)(void *context, const char *answer);
 /* Returned by host->get_extension(host, ARHOST_CONTROL_EXTENSION) for a sink; NULL for plugins of other kinds. */
 typedef struct arhost_control {
     uint32_t struct_size;
+    uint32_t reserved; /* 0 */
 
     /* [any] Sends a command, such as {"command": "freeze"}, and returns at once. Allowed in the state `started`.
      * `take` may be NULL. It is called once, unless the plugin is stopped before the answer arrives. Answers may
@@ -48,6 +49,7 @@ enum { ARHOST_MAX_COMMAND_SIZE = 16384, ARHOST_MAX_PENDING_COMMANDS = 8 };
  * loaded. */
 typedef struct arhost_set_option {
     uint32_t struct_size;
+    uint32_t reserved; /* 0 */
 
     /* The keys of the options that `set` accepts: a NULL-terminated list of keys of the descriptor's options. Options
      * that contain paths or addresses cannot be changed. */

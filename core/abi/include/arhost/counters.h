@@ -25,6 +25,7 @@ typedef void (*arhost_take_counter)(void *context, const char *name, uint64_t va
  * loaded. */
 typedef struct arhost_counters {
     uint32_t struct_size;
+    uint32_t reserved; /* 0 */
 
     /* [worker, started] Passes each counter to `take`, including those that are 0. Every call must pass the same
      * names, at most ARHOST_MAX_COUNTERS. The worker calls `list` between two frames a few times per second, after

@@ -57,6 +57,7 @@ typedef struct arhost_device_size {
     uint32_t width, height; /* px; at least 1 */
     uint32_t rate_count;    /* 0: unknown */
     int32_t is_rate_range;  /* non-zero: `rates` contains the two ends of a range */
+    uint32_t reserved;      /* 0 */
     const double *rates;    /* [rate_count] frames per second, finite and above 0, highest first */
 } arhost_device_size;
 
@@ -65,6 +66,7 @@ typedef struct arhost_device_format {
     uint32_t struct_size;
     uint32_t size_count;             /* 0: unknown */
     int32_t is_size_range;           /* non-zero: `sizes` contains the smallest and the largest size of a range */
+    uint32_t reserved;               /* 0 */
     const char *pixel_format;        /* the value for the plugin's option, "yuyv"; not empty */
     const arhost_device_size *sizes; /* [size_count] */
 } arhost_device_format;
@@ -83,6 +85,7 @@ typedef struct arhost_device_control {
     uint32_t struct_size;
     arhost_device_control_type type;
     int32_t has_value;     /* 0: `value` cannot be read */
+    uint32_t reserved;     /* 0 */
     const char *name;      /* the name in the plugin's options, "white_balance_temperature"; not empty */
     int64_t minimum;       /* at most `maximum` */
     int64_t maximum;       /* bitmask: all bits that may be set */
@@ -100,6 +103,7 @@ typedef struct arhost_device {
     int32_t is_default; /* non-zero: used if the user selects no device; at most one device is the default */
     uint32_t format_count, control_count; /* cameras */
     uint32_t width, height;               /* displays: resolution in px; 0: unknown */
+    uint32_t reserved;                    /* 0 */
     double rate;                          /* displays: refreshes per second; 0: unknown */
     const char *name;                     /* display name reported by the driver; neither NULL nor empty */
     const char *path;                     /* the device node, "/dev/video0"; not NULL if BUSY or FORBIDDEN */
@@ -118,6 +122,7 @@ typedef void (*arhost_take_device)(void *context, const arhost_device *device);
 /* Static storage: valid as long as the library is loaded. */
 typedef struct arhost_devices {
     uint32_t struct_size;
+    uint32_t reserved; /* 0 */
 
     /* [worker, negotiated or created] Calls `take` once per device, in order of `index`. Also lists devices that
      * exist but cannot be opened. Must not change settings of a device, nor take a device away from another program.

@@ -68,11 +68,12 @@ typedef struct arhost_frame_format {
     uint32_t stride[ARHOST_MAX_PLANES]; /* bytes per row, a multiple of 64 */
     uint64_t offset[ARHOST_MAX_PLANES]; /* bytes from the start of the slot, a multiple of 64 */
     uint32_t grey_stride;
-    uint32_t depth_stride; /* bytes per row, a multiple of 64; 0 without depth */
-    uint64_t grey_offset;  /* offset of the grey plane: plane 0 if that is luma, otherwise a separate plane,
-                             which the worker fills once for all trackers */
-    uint64_t depth_offset; /* bytes from the start of the slot, a multiple of 64; 0 without depth */
-    uint64_t byte_size;    /* size of a slot */
+    uint32_t depth_stride;           /* bytes per row, a multiple of 64; 0 without depth */
+    uint64_t grey_offset;            /* offset of the grey plane: plane 0 if that is luma, otherwise a separate plane,
+                                       which the worker fills once for all trackers */
+    uint64_t depth_offset;           /* bytes from the start of the slot, a multiple of 64; 0 without depth */
+    uint64_t byte_size;              /* size of a slot */
+    uint64_t reserved_for_growth[8]; /* 0: other structs contain this one by value */
 } arhost_frame_format;
 
 /* Computes `plane_count` and all later fields from the fields before `plane_count`. Returns 1, or 0 if one of the

@@ -130,7 +130,7 @@ enum {
     ARHOST_OPTION_TEXT = 4,       /* arhost_option.text */
     ARHOST_OPTION_INPUT_PATH = 5, /* arhost_option.text; absolute, resolved against the configuration's folder */
     /* arhost_option.text; absolute, resolved against the working directory; or "-", see
-     * ARHOST_CAPABILITY_STANDARD_OUTPUT */
+     * ARHOST_SINK_CAPABILITY_STANDARD_OUTPUT */
     ARHOST_OPTION_OUTPUT_PATH = 6,
     /* arhost_option.integer: the descriptor of a listening, non-blocking stream socket; -1: none. The worker owns the
      * descriptor, which stays open until the process ends. The host opens the socket, so the plugin needs no
@@ -174,43 +174,6 @@ static inline const arhost_option *arhost_find_option(const arhost_option *optio
     return NULL; /* NOLINT(modernize-use-nullptr): C has no nullptr */
 }
 
-/* Optional capabilities: bits of arhost_descriptor.capabilities. */
-enum {
-    ARHOST_CAPABILITY_SEEK = 1 << 0, /* source: can start at any frame; frame N is the same for every start */
-    ARHOST_CAPABILITY_LIVE = 1 << 1, /* source: a camera; frames not read in time are lost */
-    ARHOST_CAPABILITY_LENS_DISTORTION = 1 << 2, /* raytracer: applies the lens distortion of arhost_intrinsics */
-    /* sink: if the option `path` contains %d or %0Nd, it writes one numbered file per frame; without this capability,
-     * the host treats the path as the name of a single file */
-    ARHOST_CAPABILITY_NUMBERED_FILES = 1 << 3,
-    ARHOST_CAPABILITY_REALTIME_SINK = 1 << 4, /* sink: needs only the latest frame */
-    /* raytracer: the features of a scene that it renders, in addition to diffuse materials and point, directional and
-     * spot lights. It should also accept scenes with other features: it shades other materials as diffuse, ignores
-     * textures and the environment, ignores area lights or treats them as point lights, and leaves moving objects
-     * where they are at time 0. The worker then warns the user. If an incomplete image is useless, `start` may reject
-     * the scene with ARHOST_STATUS_ERROR_UNSUPPORTED. */
-    ARHOST_CAPABILITY_REFLECTION = 1 << 5,   /* the materials SPECULAR, MIRROR and METAL */
-    ARHOST_CAPABILITY_GLASS = 1 << 6,        /* the material GLASS */
-    ARHOST_CAPABILITY_ROUGHNESS = 1 << 7,    /* the material METALLIC_ROUGHNESS */
-    ARHOST_CAPABILITY_TEXTURES = 1 << 8,     /* textures of materials */
-    ARHOST_CAPABILITY_AREA_LIGHTS = 1 << 9,  /* rectangles and spheres */
-    ARHOST_CAPABILITY_ENVIRONMENT = 1 << 10, /* the environment map */
-    ARHOST_CAPABILITY_MOTION = 1 << 11,      /* arhost_motion */
-    ARHOST_CAPABILITY_EVERY_SCENE = 0xfe0,   /* all bits from REFLECTION to MOTION */
-    /* sink: accepts "-" as the option `path`, and then writes to standard output, descriptor 1. Without this
-     * capability, the host rejects "-" as the path of an output. */
-    ARHOST_CAPABILITY_STANDARD_OUTPUT = 1 << 12,
-    ARHOST_CAPABILITY_VIDEO_INPUT = 1 << 13,   /* sink: reads arhost_output.video and depth_mm */
-    ARHOST_CAPABILITY_OVERLAY_INPUT = 1 << 14, /* sink: reads arhost_output.overlay_rgba */
-    /* raytracer: renders images of any size up to that in arhost_raytracer_setup. In each call of `render`,
-     * arhost_image contains the size. The intrinsics for this size are those that arhost::shading::scaled() returns
-     * (arhost/shading/lens.hpp). */
-    ARHOST_CAPABILITY_SCALED_IMAGES = 1 << 15,
-    ARHOST_CAPABILITY_RUN_DESCRIPTION = 1 << 16, /* sink: reads arhost_sink_setup.run_description */
-    ARHOST_CAPABILITY_REPORTS_POSES = 1 << 17,   /* tracker: reports the poses of bodies (arhost_body_pose) */
-    ARHOST_CAPABILITY_LINEAR_IMAGES = 1 << 18,   /* raytracer: can write images of ARHOST_IMAGE_FORM_LINEAR */
-    ARHOST_CAPABILITY_VIDEO = 1 << 19            /* raytracer: reads arhost_render_request.video */
-};
-
 /* Describes the plugin. Static storage: valid as long as the library is loaded. Each string may have up to 4,096
  * bytes, the whole descriptor as JSON up to 127 KiB. */
 typedef struct arhost_descriptor {
@@ -222,8 +185,10 @@ typedef struct arhost_descriptor {
     const char *vendor;
     const char *licence;     /* SPDX identifier */
     const char *description; /* one sentence */
-    uint32_t capabilities;   /* ARHOST_CAPABILITY_SEEK | … */
-    uint32_t option_count;
+    /* Optional abilities, as bits that the header of each kind defines: arhost_source_capabilities,
+     * arhost_tracker_capabilities, arhost_raytracer_capabilities or arhost_sink_capabilities. */
+    uint64_t capabilities;
+    uint64_t option_count;
     const arhost_option_descriptor *options; /* option_count elements; may be NULL if there are none */
     /* Permissions that the plugin needs from the sandbox: a NULL-terminated list; NULL: none. "video" (/dev/video*),
      * "usb", "gpu", "display" (X or Wayland, and the GPU), "network", "listen" (accept connections on its sockets),
@@ -240,6 +205,7 @@ typedef struct arhost_instance arhost_instance;
  * NULL, unless the function is documented as optional. */
 typedef struct arhost_plugin {
     uint32_t struct_size;
+    uint32_t reserved; /* 0 */
     const arhost_descriptor *descriptor;
 
     /* The function table of descriptor->kind: arhost_source, arhost_tracker, arhost_raytracer or arhost_sink. */
@@ -274,6 +240,7 @@ typedef struct arhost_answer {
 
 typedef struct arhost_entry_point {
     uint32_t struct_size;
+    uint32_t reserved; /* 0 */
     /* [worker, loaded] Returns ARHOST_STATUS_OK and sets answer->abi_version, within the offered range, and
      * answer->plugin; or returns ARHOST_STATUS_ERROR_UNSUPPORTED if the plugin supports no offered version. The
      * loader rejects a plugin that returns success with a NULL plugin or a version out of range. */

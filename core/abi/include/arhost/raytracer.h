@@ -15,12 +15,41 @@
 extern "C" {
 #endif
 
+/* Bits of arhost_descriptor.capabilities. */
+typedef uint64_t arhost_raytracer_capabilities;
+/* Applies the lens distortion of arhost_intrinsics. */
+#define ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION 0x1ull
+/* Renders images of any size up to that in arhost_raytracer_setup. In each call of `render`, arhost_image contains
+ * the size. The intrinsics for this size are those that arhost_scaled_intrinsics returns. */
+#define ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES 0x2ull
+/* Can write images of ARHOST_IMAGE_FORM_LINEAR. */
+#define ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES 0x4ull
+/* Reads arhost_render_request.video. */
+#define ARHOST_RAYTRACER_CAPABILITY_VIDEO 0x8ull
+/* Writes arhost_image.depth_mm. */
+#define ARHOST_RAYTRACER_CAPABILITY_DEPTH 0x10ull
+/* Reserved: reads arhost_render_request.estimate. */
+#define ARHOST_RAYTRACER_CAPABILITY_ESTIMATE 0x20ull
+/* The features of a scene that the ray tracer renders, in addition to diffuse materials and point, directional and
+ * spot lights. It should also accept scenes with other features: it shades other materials as diffuse, ignores
+ * textures and the environment, ignores area lights or treats them as point lights, and leaves moving objects where
+ * they are at time 0. The worker then warns the user. If an incomplete image is useless, `start` may reject the scene
+ * with ARHOST_STATUS_ERROR_UNSUPPORTED. */
+#define ARHOST_RAYTRACER_CAPABILITY_REFLECTION 0x100ull   /* the materials SPECULAR, MIRROR and METAL */
+#define ARHOST_RAYTRACER_CAPABILITY_GLASS 0x200ull        /* the material GLASS */
+#define ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS 0x400ull    /* the material METALLIC_ROUGHNESS */
+#define ARHOST_RAYTRACER_CAPABILITY_TEXTURES 0x800ull     /* textures of materials */
+#define ARHOST_RAYTRACER_CAPABILITY_AREA_LIGHTS 0x1000ull /* rectangles and spheres */
+#define ARHOST_RAYTRACER_CAPABILITY_ENVIRONMENT 0x2000ull /* the environment map */
+#define ARHOST_RAYTRACER_CAPABILITY_MOTION 0x4000ull      /* arhost_motion */
+#define ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE 0x7f00ull /* all bits from REFLECTION to MOTION */
+
 /* The meaning of the pixels of an image. */
 typedef int32_t arhost_image_form;
 enum {
     ARHOST_IMAGE_FORM_STRAIGHT = 1, /* arhost_image.rgba: colour and alpha, 8 bits each */
     /* arhost_image.linear: added light and transmittance, both per channel. Only with
-     * ARHOST_CAPABILITY_LINEAR_IMAGES */
+     * ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES */
     ARHOST_IMAGE_FORM_LINEAR = 2
 };
 
@@ -33,12 +62,12 @@ enum {
 
 typedef struct arhost_raytracer_setup {
     uint32_t struct_size;
-    uint32_t width, height;    /* size of the images, px; with ARHOST_CAPABILITY_SCALED_IMAGES, the maximum size (see
-                                  arhost_image) */
+    uint32_t width, height;    /* size of the images, px; with ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES, the maximum
+                                  size (see arhost_image) */
     arhost_image_form form;    /* of every image until `stop` */
     const arhost_scene *scene; /* read-only, valid until `stop`; validated by the host */
-    const arhost_intrinsics *intrinsics; /* the same in every request, except with ARHOST_CAPABILITY_SCALED_IMAGES;
-                                            precompute ray tables here */
+    const arhost_intrinsics *intrinsics; /* the same in every request, except with
+                                            ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES; precompute ray tables here */
     arhost_compositing compositing;
     uint32_t reserved;                       /* 0 */
     const arhost_frame_format *video_format; /* of every arhost_render_request.video; NULL: there is no video */
@@ -54,7 +83,8 @@ typedef struct arhost_render_request {
     const arhost_motion *motion; /* NULL if no object moves or deforms */
     /* The frame under the overlay, without virtual objects, for mirrors, glass and the light that real surfaces
      * reflect. Its codes are sRGB (`transfer` of its format), its intrinsics those of the setup. Only with
-     * ARHOST_CAPABILITY_VIDEO; else NULL. Also NULL if the worker warps the image (ARHOST_CAPABILITY_LENS_DISTORTION)
+     * ARHOST_RAYTRACER_CAPABILITY_VIDEO; else NULL. Also NULL if the worker warps the image
+     * (ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION)
      */
     const arhost_frame *video;
     /* Memory of the ray tracer that survives the end of the worker process, because the host keeps it: accumulated
@@ -67,6 +97,9 @@ typedef struct arhost_render_request {
     const void *state_before;
     void *state_after;
     uint64_t state_size; /* bytes of each; 0 if both are NULL */
+    /* Reserved for what is known of the room: light, depth and exposure. NULL without
+     * ARHOST_RAYTRACER_CAPABILITY_ESTIMATE, and in this version always. */
+    const void *estimate;
 } arhost_render_request;
 
 /* The image to write, top row first. Write every pixel and nothing else; leave the bytes after the last row
@@ -87,13 +120,20 @@ typedef struct arhost_render_request {
  * light from 0 to 1. A pixel that virtual objects do not affect is exactly (0, 0, 0, 0; 1, 1, 1, 0). On virtual
  * objects, the transmittance is 0, at their edges the share of the pixel that they leave free. On a catcher, it is
  * the light that arrives with the virtual objects divided by the light that arrives without them; it exceeds 1 where
- * they reflect light onto the catcher. All values are finite and not negative. */
+ * they reflect light onto the catcher. All values are finite and not negative.
+ *
+ * depth_mm: for each pixel, the distance in mm along the camera's optical axis, like arhost_frame.depth_mm, from the
+ * camera to the nearest virtual object that the pixel shows; infinity where it shows none, also on catchers and
+ * shadows. */
 typedef struct arhost_image {
     uint32_t struct_size;
     uint32_t stride; /* bytes per row, a multiple of 64 */
     uint32_t width, height;
     uint8_t *rgba;    /* NULL unless the form is ARHOST_IMAGE_FORM_STRAIGHT */
     uint16_t *linear; /* NULL unless the form is ARHOST_IMAGE_FORM_LINEAR */
+    /* NULL without ARHOST_RAYTRACER_CAPABILITY_DEPTH, and if nobody needs the depth, as in this version always.
+     * Element x of row y is at y · width + x. */
+    float *depth_mm;
 } arhost_image;
 
 /* Optional results of `render`. The worker sets all fields except struct_size to 0; leave fields that do not apply at
@@ -114,6 +154,7 @@ typedef struct arhost_render_info {
 
 typedef struct arhost_raytracer {
     uint32_t struct_size;
+    uint32_t reserved; /* 0 */
 
     /* [worker, created] Builds acceleration structures and compiles shaders, and reports progress meanwhile. May be
      * called again after `stop`, with another scene and image size. */
@@ -130,7 +171,7 @@ typedef struct arhost_raytracer {
 
     /* [worker, created] Optional: may be NULL. Returns the capabilities of this instance, if they depend on its
      * options: the descriptor's, of which it may clear bits of …_EVERY_SCENE, …_LINEAR_IMAGES and …_VIDEO. */
-    uint32_t (*capabilities)(arhost_instance *instance);
+    arhost_raytracer_capabilities (*capabilities)(arhost_instance *instance);
 
     /* [worker, started] Optional; NULL: no memory. Called once after each successful `start`. Returns the size in
      * bytes of the memory that the ray tracer needs from image to image (arhost_render_request.state_before) for

@@ -277,8 +277,10 @@ typedef struct arhost_scene {
     float background[3]; /* radiance of secondary rays that hit nothing, if there is no environment; primary rays
                             that hit nothing give alpha 0 */
     float bounds_min[3], bounds_max[3]; /* world bounding box of all objects at time 0; animation may exceed it */
-    /* Alpha of catchers where a light is fully hidden; defaults 0.6 and 0.3. Partial shadows: shadow_alpha() of
-     * arhost/shading/leaf/alpha.h. */
+    /* Alpha of catchers where a light is fully hidden; defaults 0.6 and 0.3. If opaque and translucent objects hide
+     * the fractions o and t of the light, alpha is 1 − 2·encode(g·L), at least 0, with L = 1 − o·(1 − l(opaque)) −
+     * t·(1 − l(translucent)) and l(alpha) = decode(0.5·(1 − alpha))/g, where encode and decode are those of sRGB and
+     * g = decode(0.5): over mid-grey, the overlay hides the right share of the linear light. */
     float shadow_alpha_opaque, shadow_alpha_translucent;
     uint32_t coloured_shadows; /* non-zero: glass casts coloured shadows on catchers */
     float duration_s;          /* period of the repeating animation, s; 0: no animation */

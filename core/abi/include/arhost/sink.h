@@ -14,6 +14,19 @@
 extern "C" {
 #endif
 
+/* Bits of arhost_descriptor.capabilities. */
+typedef uint64_t arhost_sink_capabilities;
+/* If the option `path` contains %d or %0Nd, the sink writes one numbered file per frame. Without this capability, the
+ * host treats the path as the name of a single file. */
+#define ARHOST_SINK_CAPABILITY_NUMBERED_FILES 0x1ull
+#define ARHOST_SINK_CAPABILITY_REALTIME 0x2ull /* needs only the latest frame */
+/* Accepts "-" as the option `path`, and then writes to standard output, descriptor 1. Without this capability, the
+ * host rejects "-" as the path of an output. */
+#define ARHOST_SINK_CAPABILITY_STANDARD_OUTPUT 0x4ull
+#define ARHOST_SINK_CAPABILITY_VIDEO_INPUT 0x8ull      /* reads arhost_output.video and depth_mm */
+#define ARHOST_SINK_CAPABILITY_OVERLAY_INPUT 0x10ull   /* reads arhost_output.overlay_rgba */
+#define ARHOST_SINK_CAPABILITY_RUN_DESCRIPTION 0x20ull /* reads arhost_sink_setup.run_description */
+
 typedef struct arhost_sink_setup {
     uint32_t struct_size;
     uint32_t width, height; /* size of the frames, px */
@@ -25,7 +38,7 @@ typedef struct arhost_sink_setup {
     const arhost_intrinsics *intrinsics;     /* the same for every camera in the records; NULL if unknown */
     const arhost_frame_format *video_format; /* format of arhost_output.video */
     /* Description of the run, a JSON object (docs/sessions.md): configuration, versions, camera, scene files. NULL
-     * without ARHOST_CAPABILITY_RUN_DESCRIPTION, and if the host does not describe the run. */
+     * without ARHOST_SINK_CAPABILITY_RUN_DESCRIPTION, and if the host does not describe the run. */
     const char *run_description;
 } arhost_sink_setup;
 
@@ -39,12 +52,13 @@ enum {
 
 /* Statistics of the tracker's search for markers in a frame. All 0 if the tracker has not processed the frame. */
 typedef struct arhost_search {
-    int32_t everywhere;         /* arhost_track_request.search_everywhere */
-    uint32_t observation_count; /* markers that the tracker has reported */
-    uint32_t unlisted_count;    /* reported markers that no target lists */
-    uint32_t expected_count;    /* markers that were expected */
-    uint32_t missed_count;      /* expected markers that the tracker has not reported */
-    int32_t candidate_count;    /* arhost_tracker_result.candidate_count */
+    int32_t everywhere;               /* arhost_track_request.search_everywhere */
+    uint32_t observation_count;       /* markers that the tracker has reported */
+    uint32_t unlisted_count;          /* reported markers that no target lists */
+    uint32_t expected_count;          /* markers that were expected */
+    uint32_t missed_count;            /* expected markers that the tracker has not reported */
+    int32_t candidate_count;          /* arhost_tracker_result.candidate_count */
+    uint32_t reserved_for_growth[16]; /* 0: arhost_record contains this struct by value */
 } arhost_search;
 
 /* Metadata of a frame. All numbers that are set are finite. */
@@ -88,12 +102,12 @@ typedef struct arhost_output {
     const uint8_t *bgr;
     const arhost_record *record;
     /* The frame under the overlay, as the source delivered it: one pointer per plane of
-     * arhost_sink_setup.video_format. NULL without ARHOST_CAPABILITY_VIDEO_INPUT. */
+     * arhost_sink_setup.video_format. NULL without ARHOST_SINK_CAPABILITY_VIDEO_INPUT. */
     const uint8_t *video[ARHOST_MAX_PLANES];
     const uint16_t *depth_mm; /* the frame's depth plane (arhost_frame.depth_mm); NULL also without
-                                 ARHOST_CAPABILITY_VIDEO_INPUT */
+                                 ARHOST_SINK_CAPABILITY_VIDEO_INPUT */
     /* The overlay: R, G, B, A bytes with straight alpha, top row first, transparent where there is no overlay. NULL
-     * without ARHOST_CAPABILITY_OVERLAY_INPUT. */
+     * without ARHOST_SINK_CAPABILITY_OVERLAY_INPUT. */
     const uint8_t *overlay_rgba;
     uint32_t overlay_stride; /* bytes per row of overlay_rgba */
     uint32_t reserved;       /* 0 */
@@ -101,6 +115,7 @@ typedef struct arhost_output {
 
 typedef struct arhost_sink {
     uint32_t struct_size;
+    uint32_t reserved; /* 0 */
 
     /* [worker, created] Fails if the output cannot be written. Must leave existing files unchanged until the first
      * `write`, because another component may still reject the run. The output must survive a kill of the process: the
@@ -125,9 +140,9 @@ typedef struct arhost_sink {
     arhost_status (*stop)(arhost_instance *instance);
 
     /* [worker, created] Optional: may be NULL. Returns the capabilities of this instance, if they depend on its
-     * options: the descriptor's capabilities, of which it may clear only ARHOST_CAPABILITY_VIDEO_INPUT and
-     * ARHOST_CAPABILITY_OVERLAY_INPUT. The host copies only the images that its sinks read. */
-    uint32_t (*capabilities)(arhost_instance *instance);
+     * options: the descriptor's capabilities, of which it may clear only ARHOST_SINK_CAPABILITY_VIDEO_INPUT and
+     * ARHOST_SINK_CAPABILITY_OVERLAY_INPUT. The host copies only the images that its sinks read. */
+    arhost_sink_capabilities (*capabilities)(arhost_instance *instance);
 } arhost_sink;
 
 #ifdef __cplusplus

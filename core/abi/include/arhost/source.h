@@ -13,6 +13,11 @@
 extern "C" {
 #endif
 
+/* Bits of arhost_descriptor.capabilities. */
+typedef uint64_t arhost_source_capabilities;
+#define ARHOST_SOURCE_CAPABILITY_SEEK 0x1ull /* can start at any frame; frame N is the same for every start */
+#define ARHOST_SOURCE_CAPABILITY_LIVE 0x2ull /* a camera; frames not read in time are lost */
+
 typedef struct arhost_source_setup {
     uint32_t struct_size;
     uint32_t reserved;       /* 0 */
@@ -25,6 +30,7 @@ typedef struct arhost_source_setup {
     int32_t paced; /* Matters only for sources that are not cameras. Non-zero (mode live): deliver frames in real
                       time and drop late frames if necessary. 0 (mode lockstep): deliver every frame, as fast as
                       requested */
+    uint32_t reserved_2; /* 0 */
     /* The configured camera, or NULL. A synthetic source renders with this camera; other sources may check that
      * their frames have its size. */
     const arhost_intrinsics *intrinsics;
@@ -79,6 +85,7 @@ typedef struct arhost_frame_info {
 
 typedef struct arhost_source {
     uint32_t struct_size;
+    uint32_t reserved; /* 0 */
 
     /* [worker, created] Called once; opens the device or file. A source that is not live must deliver the same
      * frames and capture times in every run. */

@@ -7,7 +7,8 @@
  *
  * Most trackers are detectors: they report observations, the markers in a frame with their corners. The worker
  * computes the poses of the targets from them, with their covariances, and follows them from frame to frame. A
- * tracker with ARHOST_CAPABILITY_REPORTS_POSES, such as a motion-capture client, reports the poses of bodies itself.
+ * tracker with ARHOST_TRACKER_CAPABILITY_REPORTS_POSES, such as a motion-capture client, reports the poses of bodies
+ * itself.
  *
  * Marker coordinates: origin at the centre; x right, y up on the upright print, z out of the paper; millimetres.
  * Corners are ordered top-left, top-right, bottom-right, bottom-left on the upright print; with s = half of the side
@@ -35,13 +36,17 @@ enum {
     ARHOST_MAX_STATE = 16777216
 };
 
+/* Bits of arhost_descriptor.capabilities. */
+typedef uint64_t arhost_tracker_capabilities;
+#define ARHOST_TRACKER_CAPABILITY_REPORTS_POSES 0x1ull /* reports the poses of bodies (arhost_body_pose) */
+
 /* A target listed in the configuration. */
 typedef struct arhost_target_config {
     uint32_t struct_size;
     uint32_t reserved; /* 0 */
     const char *name;  /* unique */
-    const char *body;  /* the body that a tracker with ARHOST_CAPABILITY_REPORTS_POSES has to follow; NULL: the target
-                          consists of markers */
+    const char *body; /* the body that a tracker with ARHOST_TRACKER_CAPABILITY_REPORTS_POSES has to follow; NULL: the
+                         target consists of markers */
 } arhost_target_config;
 
 /* A marker of a target. */
@@ -98,7 +103,8 @@ enum {
     ARHOST_TARGET_LOST = 3 /* not seen, pose unknown; `mt` is the last known pose */
 };
 
-/* The pose of a body, from a tracker with ARHOST_CAPABILITY_REPORTS_POSES. The fields are those of arhost_target. */
+/* The pose of a body, from a tracker with ARHOST_TRACKER_CAPABILITY_REPORTS_POSES. The fields are those of
+ * arhost_target. */
 typedef struct arhost_body_pose {
     uint32_t struct_size;
     uint32_t target; /* index in arhost_tracker_setup.targets, of a target with a `body` */
@@ -115,7 +121,7 @@ typedef struct arhost_tracker_result {
     uint32_t observation_count;       /* 0; set by the tracker, at most ARHOST_MAX_OBSERVATIONS */
     arhost_observation *observations; /* ARHOST_MAX_OBSERVATIONS elements */
     arhost_body_pose *poses;          /* arhost_tracker_setup.target_count elements */
-    uint32_t pose_count;              /* 0; set by a tracker with ARHOST_CAPABILITY_REPORTS_POSES */
+    uint32_t pose_count;              /* 0; set by a tracker with ARHOST_TRACKER_CAPABILITY_REPORTS_POSES */
     /* -1: unknown; set by the tracker. Number of quadrilaterals that the tracker has examined, including those that
      * turned out not to be markers; at least observation_count. From this number, the host can tell the user whether
      * the tracker saw no quadrilateral or recognised none as a marker. */
@@ -178,6 +184,7 @@ typedef struct arhost_track_request {
 
 typedef struct arhost_tracker {
     uint32_t struct_size;
+    uint32_t reserved; /* 0 */
 
     /* [worker, created] Called once. Returns ARHOST_STATUS_ERROR_CONFIGURATION if the tracker does not know a family
      * or body, or if a family has no marker with a listed id. Returns ARHOST_STATUS_ERROR_CONFIGURATION or

@@ -85,27 +85,6 @@ pub struct arhost_option {
 }
 const _: () = assert!(size_of::<arhost_option>() == 40);
 unsafe impl Sync for arhost_option {} // a plugin's statics are immutable
-pub const ARHOST_CAPABILITY_SEEK: u32 = 1;
-pub const ARHOST_CAPABILITY_LIVE: u32 = 2;
-pub const ARHOST_CAPABILITY_LENS_DISTORTION: u32 = 4;
-pub const ARHOST_CAPABILITY_NUMBERED_FILES: u32 = 8;
-pub const ARHOST_CAPABILITY_REALTIME_SINK: u32 = 16;
-pub const ARHOST_CAPABILITY_REFLECTION: u32 = 32;
-pub const ARHOST_CAPABILITY_GLASS: u32 = 64;
-pub const ARHOST_CAPABILITY_ROUGHNESS: u32 = 128;
-pub const ARHOST_CAPABILITY_TEXTURES: u32 = 256;
-pub const ARHOST_CAPABILITY_AREA_LIGHTS: u32 = 512;
-pub const ARHOST_CAPABILITY_ENVIRONMENT: u32 = 1024;
-pub const ARHOST_CAPABILITY_MOTION: u32 = 2048;
-pub const ARHOST_CAPABILITY_EVERY_SCENE: u32 = 4064;
-pub const ARHOST_CAPABILITY_STANDARD_OUTPUT: u32 = 4096;
-pub const ARHOST_CAPABILITY_VIDEO_INPUT: u32 = 8192;
-pub const ARHOST_CAPABILITY_OVERLAY_INPUT: u32 = 16384;
-pub const ARHOST_CAPABILITY_SCALED_IMAGES: u32 = 32768;
-pub const ARHOST_CAPABILITY_RUN_DESCRIPTION: u32 = 65536;
-pub const ARHOST_CAPABILITY_REPORTS_POSES: u32 = 131072;
-pub const ARHOST_CAPABILITY_LINEAR_IMAGES: u32 = 262144;
-pub const ARHOST_CAPABILITY_VIDEO: u32 = 524288;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_descriptor {
@@ -117,17 +96,18 @@ pub struct arhost_descriptor {
     pub vendor: *const c_char,
     pub licence: *const c_char,
     pub description: *const c_char,
-    pub capabilities: u32,
-    pub option_count: u32,
+    pub capabilities: u64,
+    pub option_count: u64,
     pub options: *const arhost_option_descriptor,
     pub needs: *const *const c_char,
 }
-const _: () = assert!(size_of::<arhost_descriptor>() == 80);
+const _: () = assert!(size_of::<arhost_descriptor>() == 88);
 unsafe impl Sync for arhost_descriptor {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_plugin {
     pub struct_size: u32,
+    pub reserved: u32,
     pub descriptor: *const arhost_descriptor,
     pub functions: *const c_void,
     pub create: Option<unsafe extern "C" fn(*const arhost_host, *const arhost_option, u32, *mut *mut arhost_instance) -> arhost_status>,
@@ -157,6 +137,7 @@ unsafe impl Sync for arhost_answer {} // a plugin's statics are immutable
 #[derive(Clone, Copy)]
 pub struct arhost_entry_point {
     pub struct_size: u32,
+    pub reserved: u32,
     pub negotiate: Option<unsafe extern "C" fn(*const arhost_offer, *mut arhost_answer) -> arhost_status>,
 }
 const _: () = assert!(size_of::<arhost_entry_point>() == 16);
@@ -191,6 +172,7 @@ pub struct arhost_device_size {
     pub height: u32,
     pub rate_count: u32,
     pub is_rate_range: i32,
+    pub reserved: u32,
     pub rates: *const f64,
 }
 const _: () = assert!(size_of::<arhost_device_size>() == 32);
@@ -201,6 +183,7 @@ pub struct arhost_device_format {
     pub struct_size: u32,
     pub size_count: u32,
     pub is_size_range: i32,
+    pub reserved: u32,
     pub pixel_format: *const c_char,
     pub sizes: *const arhost_device_size,
 }
@@ -218,6 +201,7 @@ pub struct arhost_device_control {
     pub struct_size: u32,
     pub type_: arhost_device_control_type,
     pub has_value: i32,
+    pub reserved: u32,
     pub name: *const c_char,
     pub minimum: i64,
     pub maximum: i64,
@@ -239,6 +223,7 @@ pub struct arhost_device {
     pub control_count: u32,
     pub width: u32,
     pub height: u32,
+    pub reserved: u32,
     pub rate: f64,
     pub name: *const c_char,
     pub path: *const c_char,
@@ -255,6 +240,7 @@ pub type arhost_take_device = Option<unsafe extern "C" fn(*mut c_void, *const ar
 #[derive(Clone, Copy)]
 pub struct arhost_devices {
     pub struct_size: u32,
+    pub reserved: u32,
     pub list: Option<unsafe extern "C" fn(*const arhost_host, arhost_take_device, *mut c_void) -> arhost_status>,
 }
 const _: () = assert!(size_of::<arhost_devices>() == 16);
@@ -268,6 +254,7 @@ pub type arhost_take_answer = Option<unsafe extern "C" fn(*mut c_void, *const c_
 #[derive(Clone, Copy)]
 pub struct arhost_control {
     pub struct_size: u32,
+    pub reserved: u32,
     pub send: Option<unsafe extern "C" fn(*const arhost_host, *const c_char, arhost_take_answer, *mut c_void) -> arhost_status>,
 }
 const _: () = assert!(size_of::<arhost_control>() == 16);
@@ -279,6 +266,7 @@ pub const ARHOST_SET_OPTION_EXTENSION: &[u8] = b"arhost.set_option/1\0";
 #[derive(Clone, Copy)]
 pub struct arhost_set_option {
     pub struct_size: u32,
+    pub reserved: u32,
     pub keys: *const *const c_char,
     pub set: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_option) -> arhost_status>,
 }
@@ -295,6 +283,7 @@ pub type arhost_take_counter = Option<unsafe extern "C" fn(*mut c_void, *const c
 #[derive(Clone, Copy)]
 pub struct arhost_counters {
     pub struct_size: u32,
+    pub reserved: u32,
     pub list: Option<unsafe extern "C" fn(*mut arhost_instance, arhost_take_counter, *mut c_void)>,
 }
 const _: () = assert!(size_of::<arhost_counters>() == 16);
@@ -344,8 +333,9 @@ pub struct arhost_frame_format {
     pub grey_offset: u64,
     pub depth_offset: u64,
     pub byte_size: u64,
+    pub reserved_for_growth: [u64; 8],
 }
-const _: () = assert!(size_of::<arhost_frame_format>() == 112);
+const _: () = assert!(size_of::<arhost_frame_format>() == 176);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_frame {
@@ -367,7 +357,7 @@ pub type arhost_distortion = i32;
 pub const ARHOST_DISTORTION_NONE: arhost_distortion = 1;
 pub const ARHOST_DISTORTION_BROWN: arhost_distortion = 2;
 pub const ARHOST_DISTORTION_FISHEYE: arhost_distortion = 3;
-pub const ARHOST_MAX_DISTORTION: usize = 12;
+pub const ARHOST_MAX_DISTORTION: usize = 14;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_intrinsics {
@@ -382,8 +372,9 @@ pub struct arhost_intrinsics {
     pub coefficient_count: u32,
     pub reserved: u32,
     pub coefficients: [f64; ARHOST_MAX_DISTORTION],
+    pub reserved_for_growth: [u64; 8],
 }
-const _: () = assert!(size_of::<arhost_intrinsics>() == 152);
+const _: () = assert!(size_of::<arhost_intrinsics>() == 232);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_camera {
@@ -393,11 +384,15 @@ pub struct arhost_camera {
     pub look_at: [f64; 3],
     pub up: [f64; 3],
     pub intrinsics: arhost_intrinsics,
+    pub reserved_for_growth: [u64; 8],
 }
-const _: () = assert!(size_of::<arhost_camera>() == 232);
+const _: () = assert!(size_of::<arhost_camera>() == 376);
 
 // ---- arhost/source.h ----
 
+pub type arhost_source_capabilities = u64;
+pub const ARHOST_SOURCE_CAPABILITY_SEEK: u64 = 1;
+pub const ARHOST_SOURCE_CAPABILITY_LIVE: u64 = 2;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_source_setup {
@@ -406,6 +401,7 @@ pub struct arhost_source_setup {
     pub first_sequence: u64,
     pub fps: f64,
     pub paced: i32,
+    pub reserved_2: u32,
     pub intrinsics: *const arhost_intrinsics,
 }
 const _: () = assert!(size_of::<arhost_source_setup>() == 40);
@@ -419,7 +415,7 @@ pub struct arhost_source_properties {
     pub intrinsics: arhost_intrinsics,
     pub frame_count: u64,
 }
-const _: () = assert!(size_of::<arhost_source_properties>() == 280);
+const _: () = assert!(size_of::<arhost_source_properties>() == 424);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_frame_buffer {
@@ -451,6 +447,7 @@ const _: () = assert!(size_of::<arhost_frame_info>() == 224);
 #[derive(Clone, Copy)]
 pub struct arhost_source {
     pub struct_size: u32,
+    pub reserved: u32,
     pub start: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_source_setup, *mut arhost_source_properties) -> arhost_status>,
     pub read: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_frame_buffer, *mut arhost_frame_info) -> arhost_status>,
     pub stop: Option<unsafe extern "C" fn(*mut arhost_instance)>,
@@ -466,6 +463,8 @@ pub const ARHOST_MAX_OBSERVATIONS: usize = 1024;
 pub const ARHOST_MAX_FAMILIES: usize = 16;
 pub const ARHOST_MAX_FAMILY: usize = 32;
 pub const ARHOST_MAX_STATE: usize = 16777216;
+pub type arhost_tracker_capabilities = u64;
+pub const ARHOST_TRACKER_CAPABILITY_REPORTS_POSES: u64 = 1;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_target_config {
@@ -590,6 +589,7 @@ unsafe impl Sync for arhost_track_request {} // a plugin's statics are immutable
 #[derive(Clone, Copy)]
 pub struct arhost_tracker {
     pub struct_size: u32,
+    pub reserved: u32,
     pub start: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_tracker_setup) -> arhost_status>,
     pub track: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_track_request, *mut arhost_tracker_result) -> arhost_status>,
     pub stop: Option<unsafe extern "C" fn(*mut arhost_instance)>,
@@ -862,6 +862,21 @@ unsafe impl Sync for arhost_motion {} // a plugin's statics are immutable
 
 // ---- arhost/raytracer.h ----
 
+pub type arhost_raytracer_capabilities = u64;
+pub const ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION: u64 = 1;
+pub const ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES: u64 = 2;
+pub const ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES: u64 = 4;
+pub const ARHOST_RAYTRACER_CAPABILITY_VIDEO: u64 = 8;
+pub const ARHOST_RAYTRACER_CAPABILITY_DEPTH: u64 = 16;
+pub const ARHOST_RAYTRACER_CAPABILITY_ESTIMATE: u64 = 32;
+pub const ARHOST_RAYTRACER_CAPABILITY_REFLECTION: u64 = 256;
+pub const ARHOST_RAYTRACER_CAPABILITY_GLASS: u64 = 512;
+pub const ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS: u64 = 1024;
+pub const ARHOST_RAYTRACER_CAPABILITY_TEXTURES: u64 = 2048;
+pub const ARHOST_RAYTRACER_CAPABILITY_AREA_LIGHTS: u64 = 4096;
+pub const ARHOST_RAYTRACER_CAPABILITY_ENVIRONMENT: u64 = 8192;
+pub const ARHOST_RAYTRACER_CAPABILITY_MOTION: u64 = 16384;
+pub const ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE: u64 = 32512;
 pub type arhost_image_form = i32;
 pub const ARHOST_IMAGE_FORM_STRAIGHT: arhost_image_form = 1;
 pub const ARHOST_IMAGE_FORM_LINEAR: arhost_image_form = 2;
@@ -896,8 +911,9 @@ pub struct arhost_render_request {
     pub state_before: *const c_void,
     pub state_after: *mut c_void,
     pub state_size: u64,
+    pub estimate: *const c_void,
 }
-const _: () = assert!(size_of::<arhost_render_request>() == 296);
+const _: () = assert!(size_of::<arhost_render_request>() == 448);
 unsafe impl Sync for arhost_render_request {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -908,8 +924,9 @@ pub struct arhost_image {
     pub height: u32,
     pub rgba: *mut u8,
     pub linear: *mut u16,
+    pub depth_mm: *mut f32,
 }
-const _: () = assert!(size_of::<arhost_image>() == 32);
+const _: () = assert!(size_of::<arhost_image>() == 40);
 unsafe impl Sync for arhost_image {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -929,10 +946,11 @@ const _: () = assert!(size_of::<arhost_render_info>() == 40);
 #[derive(Clone, Copy)]
 pub struct arhost_raytracer {
     pub struct_size: u32,
+    pub reserved: u32,
     pub start: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_raytracer_setup) -> arhost_status>,
     pub render: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_render_request, *const arhost_image, *mut arhost_render_info) -> arhost_status>,
     pub stop: Option<unsafe extern "C" fn(*mut arhost_instance)>,
-    pub capabilities: Option<unsafe extern "C" fn(*mut arhost_instance) -> u32>,
+    pub capabilities: Option<unsafe extern "C" fn(*mut arhost_instance) -> arhost_raytracer_capabilities>,
     pub state_size: Option<unsafe extern "C" fn(*mut arhost_instance) -> u64>,
 }
 const _: () = assert!(size_of::<arhost_raytracer>() == 48);
@@ -940,6 +958,13 @@ unsafe impl Sync for arhost_raytracer {} // a plugin's statics are immutable
 
 // ---- arhost/sink.h ----
 
+pub type arhost_sink_capabilities = u64;
+pub const ARHOST_SINK_CAPABILITY_NUMBERED_FILES: u64 = 1;
+pub const ARHOST_SINK_CAPABILITY_REALTIME: u64 = 2;
+pub const ARHOST_SINK_CAPABILITY_STANDARD_OUTPUT: u64 = 4;
+pub const ARHOST_SINK_CAPABILITY_VIDEO_INPUT: u64 = 8;
+pub const ARHOST_SINK_CAPABILITY_OVERLAY_INPUT: u64 = 16;
+pub const ARHOST_SINK_CAPABILITY_RUN_DESCRIPTION: u64 = 32;
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_sink_setup {
@@ -968,8 +993,9 @@ pub struct arhost_search {
     pub expected_count: u32,
     pub missed_count: u32,
     pub candidate_count: i32,
+    pub reserved_for_growth: [u32; 16],
 }
-const _: () = assert!(size_of::<arhost_search>() == 24);
+const _: () = assert!(size_of::<arhost_search>() == 88);
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct arhost_record {
@@ -995,7 +1021,7 @@ pub struct arhost_record {
     pub expected_count: u32,
     pub reserved: u32,
 }
-const _: () = assert!(size_of::<arhost_record>() == 1048);
+const _: () = assert!(size_of::<arhost_record>() == 1256);
 unsafe impl Sync for arhost_record {} // a plugin's statics are immutable
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -1018,11 +1044,12 @@ unsafe impl Sync for arhost_output {} // a plugin's statics are immutable
 #[derive(Clone, Copy)]
 pub struct arhost_sink {
     pub struct_size: u32,
+    pub reserved: u32,
     pub start: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_sink_setup) -> arhost_status>,
     pub write: Option<unsafe extern "C" fn(*mut arhost_instance, *const arhost_output) -> arhost_status>,
     pub idle: Option<unsafe extern "C" fn(*mut arhost_instance) -> arhost_status>,
     pub stop: Option<unsafe extern "C" fn(*mut arhost_instance) -> arhost_status>,
-    pub capabilities: Option<unsafe extern "C" fn(*mut arhost_instance) -> u32>,
+    pub capabilities: Option<unsafe extern "C" fn(*mut arhost_instance) -> arhost_sink_capabilities>,
 }
 const _: () = assert!(size_of::<arhost_sink>() == 48);
 unsafe impl Sync for arhost_sink {} // a plugin's statics are immutable

@@ -243,7 +243,7 @@ macro_rules! plugin {
                 licence: $crate::c_text!(env!("CARGO_PKG_LICENSE")),
                 description: $crate::c_text!($description),
                 capabilities: $capabilities,
-                option_count: OPTIONS.len() as u32,
+                option_count: OPTIONS.len() as u64,
                 options: OPTIONS.as_ptr(),
                 needs: NEEDS.as_ptr(),
             };
@@ -267,6 +267,7 @@ macro_rules! plugin {
             #[no_mangle]
             pub static arhost_entry: $crate::arhost_entry_point = $crate::arhost_entry_point {
                 struct_size: std::mem::size_of::<$crate::arhost_entry_point>() as u32,
+                reserved: 0,
                 negotiate: Some(negotiate),
             };
         };
@@ -399,7 +400,11 @@ unsafe extern "C" fn stop_sink<T: Plugin>(instance: *mut arhost_instance) -> arh
 struct Devices<T>(std::marker::PhantomData<T>);
 impl<T: Plugin> Devices<T> {
     const TABLE: &'static arhost_devices =
-        &arhost_devices { struct_size: std::mem::size_of::<arhost_devices>() as u32, list: Some(list_devices::<T>) };
+        &arhost_devices {
+            struct_size: std::mem::size_of::<arhost_devices>() as u32,
+            reserved: 0,
+            list: Some(list_devices::<T>),
+        };
 }
 unsafe extern "C" fn get_extension<T: Plugin>(id: *const c_char) -> *const c_void {
     if T::DEVICES.is_some() && CStr::from_ptr(id).to_bytes_with_nul() == ARHOST_DEVICES_EXTENSION {
@@ -432,6 +437,7 @@ unsafe fn report(d: &Device, take: unsafe extern "C" fn(*mut c_void, *const arho
     };
     let c_size = |s: &DeviceSize| arhost_device_size {
         struct_size: std::mem::size_of::<arhost_device_size>() as u32,
+        reserved: 0,
         width: s.width,
         height: s.height,
         rate_count: s.rates.len() as u32,
@@ -443,6 +449,7 @@ unsafe fn report(d: &Device, take: unsafe extern "C" fn(*mut c_void, *const arho
     let formats: Vec<arhost_device_format> = (0..d.formats.len())
         .map(|i| arhost_device_format {
             struct_size: std::mem::size_of::<arhost_device_format>() as u32,
+            reserved: 0,
             size_count: sizes[i].len() as u32,
             is_size_range: d.formats[i].is_size_range.into(),
             pixel_format: format_names[i].as_ptr(),
@@ -453,6 +460,7 @@ unsafe fn report(d: &Device, take: unsafe extern "C" fn(*mut c_void, *const arho
     let controls: Vec<arhost_device_control> = (d.controls.iter().zip(&control_names))
         .map(|(c, name)| arhost_device_control {
             struct_size: std::mem::size_of::<arhost_device_control>() as u32,
+            reserved: 0,
             type_: c.type_,
             has_value: c.value.is_some().into(),
             name: name.as_ptr(),
@@ -467,6 +475,7 @@ unsafe fn report(d: &Device, take: unsafe extern "C" fn(*mut c_void, *const arho
     let (abilities, problem) = (c_text(&d.abilities), c_text(&d.problem));
     let device = arhost_device {
         struct_size: std::mem::size_of::<arhost_device>() as u32,
+        reserved: 0,
         index: d.index,
         kind: d.kind,
         state: d.state,
@@ -491,6 +500,7 @@ unsafe fn report(d: &Device, take: unsafe extern "C" fn(*mut c_void, *const arho
 pub const fn plugin_of<T: Plugin>(descriptor: &'static arhost_descriptor, functions: *const c_void) -> arhost_plugin {
     arhost_plugin {
         struct_size: std::mem::size_of::<arhost_plugin>() as u32,
+        reserved: 0,
         descriptor,
         functions,
         create: Some(create::<T>),
@@ -533,6 +543,7 @@ unsafe extern "C" fn read<T: Source>(
 pub const fn source<T: Source>() -> arhost_source {
     arhost_source {
         struct_size: std::mem::size_of::<arhost_source>() as u32,
+        reserved: 0,
         start: Some(start_source::<T>),
         read: Some(read::<T>),
         stop: Some(stop::<T>),
@@ -577,6 +588,7 @@ unsafe extern "C" fn aspect<T: Tracker>(instance: *mut arhost_instance, marker: 
 pub const fn tracker<T: Tracker>() -> arhost_tracker {
     arhost_tracker {
         struct_size: std::mem::size_of::<arhost_tracker>() as u32,
+        reserved: 0,
         start: Some(start_tracker::<T>),
         track: Some(track::<T>),
         stop: Some(stop::<T>),
@@ -613,6 +625,7 @@ unsafe extern "C" fn render<T: Raytracer>(
 pub const fn raytracer<T: Raytracer>() -> arhost_raytracer {
     arhost_raytracer {
         struct_size: std::mem::size_of::<arhost_raytracer>() as u32,
+        reserved: 0,
         start: Some(start_raytracer::<T>),
         render: Some(render::<T>),
         stop: Some(stop::<T>),
@@ -634,6 +647,7 @@ unsafe extern "C" fn write<T: Sink>(instance: *mut arhost_instance, output: *con
 pub const fn sink<T: Sink>() -> arhost_sink {
     arhost_sink {
         struct_size: std::mem::size_of::<arhost_sink>() as u32,
+        reserved: 0,
         start: Some(start_sink::<T>),
         write: Some(write::<T>),
         idle: None,

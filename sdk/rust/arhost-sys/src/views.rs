@@ -75,7 +75,7 @@ impl TrackResult<'_> {
     pub fn set_candidate_count(&mut self, count: u32) {
         self.result.candidate_count = count.min(i32::MAX as u32) as i32;
     }
-    /// Adds the pose of a body, for trackers with `ARHOST_CAPABILITY_REPORTS_POSES`. Returns false, and ignores it, if
+    /// Adds the pose of a body, for trackers with `ARHOST_TRACKER_CAPABILITY_REPORTS_POSES`. Returns false, and ignores it, if
     /// there are already as many as targets.
     pub fn report_pose(&mut self, pose: arhost_body_pose) -> bool {
         let result = &mut *self.result;
@@ -176,7 +176,7 @@ pub fn half_of(number: f32) -> u16 {
 }
 
 impl arhost_render_request {
-    /// The frame under the overlay, only with `ARHOST_CAPABILITY_VIDEO`.
+    /// The frame under the overlay, only with `ARHOST_RAYTRACER_CAPABILITY_VIDEO`.
     pub fn video_frame(&self) -> Option<Frame<'_>> {
         unsafe { self.video.as_ref() }.map(Frame)
     }

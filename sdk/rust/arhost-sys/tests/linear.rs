@@ -37,7 +37,7 @@ impl Raytracer for Mirror {
 
 arhost_sys::plugin! {
     raytracer Mirror, "mirror", "Mirrors the video.",
-    capabilities: ARHOST_CAPABILITY_LINEAR_IMAGES | ARHOST_CAPABILITY_VIDEO,
+    capabilities: ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES | ARHOST_RAYTRACER_CAPABILITY_VIDEO,
     options: []
 }
 

@@ -171,13 +171,13 @@ static const arhost_descriptor descriptor = {
     .vendor = "unknown", /* FILL IN: your name */
     .licence = "NONE",   /* FILL IN: SPDX identifier, e.g. "Apache-2.0" */
     .description = "Brute-force ray tracer.",
-    /* FILL IN: what you implement, such as ARHOST_CAPABILITY_TEXTURES or ARHOST_CAPABILITY_LENS_DISTORTION. arhost warns
+    /* FILL IN: what you implement, such as ARHOST_RAYTRACER_CAPABILITY_TEXTURES or ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION. arhost warns
      * if a scene needs more. */
-    .capabilities = ARHOST_CAPABILITY_REFLECTION | ARHOST_CAPABILITY_MOTION,
+    .capabilities = ARHOST_RAYTRACER_CAPABILITY_REFLECTION | ARHOST_RAYTRACER_CAPABILITY_MOTION,
     .option_count = sizeof options / sizeof *options,
     .options = options,
 };
-static const arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};
+static const arhost_plugin plugin = {sizeof plugin, 0, &descriptor, &functions, create, destroy, get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     const uint32_t version = ARHOST_ABI_VERSION;
@@ -190,4 +190,4 @@ static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer)
     return ARHOST_STATUS_OK;
 }
 
-ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, negotiate};
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, 0, negotiate};

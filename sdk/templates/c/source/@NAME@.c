@@ -114,11 +114,11 @@ static const arhost_descriptor descriptor = {
     .vendor = "unknown", /* FILL IN: your name */
     .licence = "NONE",   /* FILL IN: SPDX identifier, e.g. "Apache-2.0" */
     .description = "Moving gradient.",
-    .capabilities = ARHOST_CAPABILITY_SEEK, /* frame n is the same wherever reading starts */
+    .capabilities = ARHOST_SOURCE_CAPABILITY_SEEK, /* frame n is the same wherever reading starts */
     .option_count = sizeof options / sizeof *options,
     .options = options,
 };
-static const arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};
+static const arhost_plugin plugin = {sizeof plugin, 0, &descriptor, &functions, create, destroy, get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     const uint32_t version = ARHOST_ABI_VERSION;
@@ -131,4 +131,4 @@ static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer)
     return ARHOST_STATUS_OK;
 }
 
-ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, negotiate};
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, 0, negotiate};

@@ -99,7 +99,7 @@ static const arhost_descriptor descriptor = {
     .option_count = sizeof options / sizeof *options,
     .options = options,
 };
-static const arhost_plugin plugin = {sizeof plugin, &descriptor, &functions, create, destroy, get_extension};
+static const arhost_plugin plugin = {sizeof plugin, 0, &descriptor, &functions, create, destroy, get_extension};
 
 static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer) {
     const uint32_t version = ARHOST_ABI_VERSION;
@@ -112,4 +112,4 @@ static arhost_status negotiate(const arhost_offer *offer, arhost_answer *answer)
     return ARHOST_STATUS_OK;
 }
 
-ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, negotiate};
+ARHOST_EXPORT const arhost_entry_point arhost_entry = {sizeof arhost_entry, 0, negotiate};

@@ -108,9 +108,9 @@ constexpr arhost_descriptor descriptor = {
     .vendor = "unknown", // FILL IN: your name
     .licence = "NONE",   // FILL IN: SPDX identifier, e.g. "Apache-2.0"
     .description = "Brute-force ray tracer.",
-    // FILL IN: what you implement, such as ARHOST_CAPABILITY_TEXTURES or ARHOST_CAPABILITY_LENS_DISTORTION. arhost warns if
+    // FILL IN: what you implement, such as ARHOST_RAYTRACER_CAPABILITY_TEXTURES or ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION. arhost warns if
     // a scene needs more.
-    .capabilities = ARHOST_CAPABILITY_REFLECTION | ARHOST_CAPABILITY_MOTION,
+    .capabilities = ARHOST_RAYTRACER_CAPABILITY_REFLECTION | ARHOST_RAYTRACER_CAPABILITY_MOTION,
     .option_count = std::size(options),
     .options = options,
     .needs = nullptr, // permissions from the sandbox: arhost/plugin.h

@@ -338,8 +338,8 @@ def to_bytes(values):
 
 
 class @CLASS@:
-    # FILL IN: what you implement, such as arhost.CAPABILITY_TEXTURES. arhost warns if a scene needs more.
-    capabilities = arhost.CAPABILITY_REFLECTION | arhost.CAPABILITY_MOTION
+    # FILL IN: what you implement, such as arhost.RAYTRACER_CAPABILITY_TEXTURES. arhost warns if a scene needs more.
+    capabilities = arhost.RAYTRACER_CAPABILITY_REFLECTION | arhost.RAYTRACER_CAPABILITY_MOTION
 
     # Further arguments come from the YAML: options: {arguments: '{"colour": [0, 0.5, 1]}'}
     def __init__(self, host):

@@ -32,25 +32,12 @@ inline std::array<double, ARHOST_MAX_DISTORTION> coefficients_of(const arhost_in
     return k;
 }
 inline BrownConrady brown_conrady_of(const arhost_intrinsics &intrinsics) {
-    const auto [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4] = coefficients_of(intrinsics);
+    const auto [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y] = coefficients_of(intrinsics);
     return {k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4};
 }
 inline KannalaBrandt kannala_brandt_of(const arhost_intrinsics &intrinsics) {
     const auto k = coefficients_of(intrinsics);
     return {k[0], k[1], k[2], k[3]};
-}
-
-// Returns the intrinsics of an image with the same view in another size. The edges of both images coincide, so the
-// pixel (x, y) becomes ((x + 0.5)·width/in.width − 0.5, (y + 0.5)·height/in.height − 0.5).
-inline arhost_intrinsics scaled(arhost_intrinsics in, std::uint32_t width, std::uint32_t height) {
-    const double x = static_cast<double>(width) / in.width, y = static_cast<double>(height) / in.height;
-    in.width = width;
-    in.height = height;
-    in.fx *= x;
-    in.fy *= y;
-    in.cx = (in.cx + 0.5) * x - 0.5;
-    in.cy = (in.cy + 0.5) * y - 0.5;
-    return in;
 }
 
 class Lens {

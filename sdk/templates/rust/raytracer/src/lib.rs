@@ -154,9 +154,9 @@ impl Raytracer for @CLASS@ {
 
 plugin! {
     raytracer @CLASS@, "@NAME@", "Brute-force ray tracer.",
-    // FILL IN: what you implement, such as ARHOST_CAPABILITY_TEXTURES or ARHOST_CAPABILITY_LENS_DISTORTION. arhost warns if
+    // FILL IN: what you implement, such as ARHOST_RAYTRACER_CAPABILITY_TEXTURES or ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION. arhost warns if
     // a scene needs more.
-    capabilities: ARHOST_CAPABILITY_REFLECTION | ARHOST_CAPABILITY_MOTION,
+    capabilities: ARHOST_RAYTRACER_CAPABILITY_REFLECTION | ARHOST_RAYTRACER_CAPABILITY_MOTION,
     // arhost validates the configuration against these before it calls `new`.
     options: [
         option!(ARHOST_OPTION_INTEGER, "samples", "1", "Rays per pixel, rounded down to a square number.", 1.0, 64.0),

@@ -75,7 +75,7 @@ impl Source for @CLASS@ {
 
 plugin! {
     source @CLASS@, "@NAME@", "Moving gradient.",
-    capabilities: ARHOST_CAPABILITY_SEEK, // frame n is the same wherever reading starts
+    capabilities: ARHOST_SOURCE_CAPABILITY_SEEK, // frame n is the same wherever reading starts
     // arhost validates the configuration against these before it calls `new`.
     options: [
         option!(ARHOST_OPTION_INTEGER, "width", "640", "Image width in px.", 1.0, 4096.0),
