@@ -20,7 +20,8 @@ void print(const std::string &line) {
 }
 
 void print(const model::PluginDescription &plugin, const std::string &file, bool with_options) {
-    print(fmt::format("{:<18} {:<10} {:<8} {}", plugin.id, model::to_text(plugin.kind), plugin.version, file));
+    print(fmt::format("{:<18} {:<10} {:<8} {}", plugin.short_name(), model::to_text(plugin.kind), plugin.version,
+                      file));
     print(fmt::format("{:<18} {}", "", plugin.description));
     for (const std::string &need : plugin.needs)
         print(fmt::format("{:<18} needs 'allow: [{}]'", "", need));

@@ -85,7 +85,8 @@ void check_scene(const run_config::Configuration &configuration, supervise::Cont
     if (!outcome->empty())
         throw yaml::Error(*outcome);
     for (const model::PluginDescription &plugin : raytracers)
-        if (const std::string text = scene::missing_capabilities_text(plugin.id, needed & ~plugin.capabilities);
+        if (const std::string text =
+                scene::missing_capabilities_text(plugin.short_name(), needed & ~plugin.capabilities);
             !text.empty())
             context.log(ARHOST_SEVERITY_WARNING, "raytracer", text);
 }

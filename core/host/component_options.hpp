@@ -6,6 +6,7 @@
 #include "run_config/configuration.hpp"
 #include "supervise/component.hpp"
 
+#include <filesystem>
 #include <map>
 #include <set>
 #include <string>
@@ -16,7 +17,9 @@ namespace arhost::host {
 class ComponentOptions {
 public:
     struct InUse {
-        std::string path; // configuration path of the component
+        std::string path;              // configuration path of the component
+        std::string component, plugin; // name of the component, id of the plugin
+        std::filesystem::path file;    // of the plugin
         std::vector<model::OptionValue> values;
         std::set<std::string> changed; // keys of the changed options
     };
@@ -24,7 +27,7 @@ public:
     explicit ComponentOptions(const supervise::LogFunction &log) : log_(log) {}
 
     // Returns the options for creating a component's plugin: the configured ones, with the changes applied. Throws
-    // the same exceptions as run_config::options_for.
+    // the same exceptions as run_config::options_for, and if another component runs another plugin with the same id.
     std::vector<model::OptionValue> choose(const supervise::Component &component, arhost_kind kind,
                                            const run_config::ComponentConfiguration &configuration,
                                            std::size_t candidate);
@@ -35,6 +38,8 @@ public:
     void forget(const supervise::Component &component) { in_use_.erase(&component); }
 
 private:
+    void expect_unique(const supervise::Component &component, const yaml::Node &node) const;
+
     const supervise::LogFunction &log_;
     std::map<const supervise::Component *, InUse> in_use_;
 };

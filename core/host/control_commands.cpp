@@ -131,7 +131,7 @@ void Commands::execute(const control::Set &set, const control::Done &done) {
         throw control::Error(
             (set.option.empty() ? "choose an option that can be changed while "
                                 : "'" + base::printable(set.option, 100) + "' cannot be changed while ") +
-            plugin.id + " runs; " + (names.empty() ? "none of its options can" : "these can: " + names));
+            plugin.short_name() + " runs; " + (names.empty() ? "none of its options can" : "these can: " + names));
     }
     OptionValue value;
     try {

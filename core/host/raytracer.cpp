@@ -47,7 +47,7 @@ SlotLayout Raytracer::on_ready(const messages::Ready &ready) {
         overlay_format_.form = ARHOST_IMAGE_FORM_STRAIGHT;
         if (is_linear_wanted)
             component().log(ARHOST_SEVERITY_WARNING,
-                            component().description().id +
+                            component().description().short_name() +
                                 " cannot write linear images: the overlay cannot brighten the video, and its shadows "
                                 "have no colour");
     }
@@ -96,8 +96,9 @@ Component::Create Raytracer::on_hello(const PluginDescription &plugin, std::size
         parts_.options.choose(component(), ARHOST_KIND_RAYTRACER, *configuration_, candidate);
     if (warps_images(plugin))
         component().log(ARHOST_SEVERITY_WARNING,
-                        plugin.id + " does not support lens distortion: its worker warps the rendered images, which "
-                                    "costs sharpness and time");
+                        plugin.short_name() +
+                            " does not support lens distortion: its worker warps the rendered images, which "
+                            "costs sharpness and time");
     overlay_format_ = choose_format(plugin);
     reads_video_ = (plugin.capabilities & ARHOST_RAYTRACER_CAPABILITY_VIDEO) != 0 && !warps_images(plugin);
     return {{std::move(options), messages::RaytracerSetup{video.format.width, video.format.height, video.intrinsics,
@@ -227,7 +228,7 @@ void Raytracer::set_full_samples(std::uint32_t full_samples) {
     full_samples_ = full_samples;
     start_quality();
     if (is_first && full_samples == 0 && quality_->is_lowest() && parts_.configuration.min_scale < 1)
-        component().log(ARHOST_SEVERITY_WARNING, component().description().id +
+        component().log(ARHOST_SEVERITY_WARNING, component().description().short_name() +
                                                      " can render neither smaller images nor fewer samples; "
                                                      "'live.target_fps' has no effect");
 }

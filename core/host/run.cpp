@@ -195,17 +195,17 @@ std::vector<std::string> Run::findings() const {
     const arhost_frame_format &format = parts_.video.format;
     if (const Component *source = assembly_.source().component())
         lines.push_back(fmt::format(
-            "source: {}: {} x {} px{}{}", source->description().id, format.width, format.height,
+            "source: {}: {} x {} px{}{}", source->description().short_name(), format.width, format.height,
             format.fps > 0 ? fmt::format(", {:g} fps", format.fps) : "",
             parts_.video.frame_count > 0 ? ", " + base::count_of(parts_.video.frame_count, "frame") : ""));
     if (const arhost_intrinsics &camera = parts_.video.intrinsics; camera.width > 0)
         lines.push_back(fmt::format("camera: fx {:g} px, fy {:g} px, cx {:g} px, cy {:g} px", camera.fx, camera.fy,
                                     camera.cx, camera.cy));
     if (const Tracker *tracker = assembly_.tracker())
-        lines.push_back(
-            fmt::format("tracker: {}: {}", tracker->component().description().id, describe_targets(targets())));
+        lines.push_back(fmt::format("tracker: {}: {}", tracker->component().description().short_name(),
+                                    describe_targets(targets())));
     if (const Raytracer *raytracer = assembly_.raytracer())
-        lines.push_back(fmt::format("raytracer: {}: {}", raytracer->component().description().id,
+        lines.push_back(fmt::format("raytracer: {}: {}", raytracer->component().description().short_name(),
                                     parts_.configuration.raytracer->scene.string()));
     for (std::size_t i = 0; i < outputs_.sinks().size(); ++i) {
         const auto path = run_config::path_of(parts_.configuration.outputs[i].node);
@@ -213,7 +213,7 @@ std::vector<std::string> Run::findings() const {
         const std::string file = is_stdout ? "standard output" : path ? path->output_path().string() : "";
         std::error_code ignored;
         lines.push_back(fmt::format(
-            "output: {}{}{}", outputs_.sinks()[i]->component->description().id, path ? ": " + file : "",
+            "output: {}{}{}", outputs_.sinks()[i]->component->description().short_name(), path ? ": " + file : "",
             path && std::filesystem::is_regular_file(file, ignored) ? " (a run replaces the existing file)" : ""));
     }
     if (parts_.statistics.frames_in == 0)

@@ -209,7 +209,8 @@ void Source::on_lost(const std::vector<Command> &unanswered) {
         !(plugin.capabilities & (ARHOST_SOURCE_CAPABILITY_SEEK | ARHOST_SOURCE_CAPABILITY_LIVE)) &&
         !flow.input_has_ended()) {
         flow.on_input_ended();
-        parts_.failures.add("source: " + plugin.id + " died, and after a restart it cannot continue at a later frame",
+        parts_.failures.add("source: " + plugin.short_name() +
+                                " died, and after a restart it cannot continue at a later frame",
                             false);
     }
 }

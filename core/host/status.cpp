@@ -97,7 +97,7 @@ template <class Choice> Json names_of(const std::vector<Choice> &choices) {
 
 Json component_json(const Component &component, const ComponentOptions &options) {
     const PluginDescription &plugin = component.description();
-    Json json = {{"name", component.name()},         {"plugin", plugin.id},
+    Json json = {{"name", component.name()},         {"plugin", plugin.short_name()},
                  {"version", plugin.version},        {"state", to_text(component.state())},
                  {"restarts", component.restarts()}, {"sandbox", component.sandbox_level()},
                  {"counters", component.counters()}};

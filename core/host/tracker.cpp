@@ -54,7 +54,7 @@ Component::Create Tracker::on_hello(const PluginDescription &plugin, std::size_t
     if (const auto body = std::ranges::find_if(own.targets, [](const auto &target) { return !target.body.empty(); });
         body != own.targets.end() && !(plugin.capabilities & ARHOST_TRACKER_CAPABILITY_REPORTS_POSES))
         own.node.find("targets").value_or(own.node).fail(
-            "the target '" + body->name + "' is a body, but '" + plugin.id +
+            "the target '" + body->name + "' is a body, but '" + plugin.short_name() +
             "' finds only markers; choose a tracker that reports the poses of bodies");
     return {{parts_.options.choose(component(), ARHOST_KIND_TRACKER, own, candidate),
              messages::TrackerSetup{parts_.video.format, parts_.video.intrinsics, own.full_search_every, own.smooth,

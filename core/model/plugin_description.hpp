@@ -26,6 +26,8 @@ struct OptionDeclaration {
 struct PluginDescription {
     arhost_kind kind = 0;
     std::string id, name, version, vendor, licence, description;
+    // The last part of the id, by which configurations and messages name the plugin: "rt_embree".
+    std::string short_name() const { return id.substr(id.rfind('.') + 1); }
     std::uint64_t capabilities = 0;
     std::vector<OptionDeclaration> options;
     std::vector<std::string> needs;      // elements of sandbox::allowances

@@ -400,12 +400,13 @@ std::vector<model::OptionValue> options_for(const model::PluginDescription &plug
     const bool configured = candidate == 0;
     if (plugin.kind != kind)
         component.node.require(configured ? "plugin" : "fallback")
-            .fail("'" + plugin.id + "' is a " + model::to_text(plugin.kind) + ", not a " + model::to_text(kind));
+            .fail("'" + plugin.short_name() + "' is a " + model::to_text(plugin.kind) + ", not a " +
+                  model::to_text(kind));
     for (const std::string &need : plugin.needs)
         if (component.policy.mode != sandbox::Mode::none && !component.policy.meets(need))
             component.node.require(configured ? "plugin" : "fallback")
-                .fail("'" + plugin.id + "' needs '" + need + "', which the sandbox blocks: add 'allow: [" + need +
-                      "]'" + (need == "usb" ? ", or better 'usb: {vendor: …, product: …}'," : "") + " to " +
+                .fail("'" + plugin.short_name() + "' needs '" + need + "', which the sandbox blocks: add 'allow: [" +
+                      need + "]'" + (need == "usb" ? ", or better 'usb: {vendor: …, product: …}'," : "") + " to " +
                       component.node.path() + " (docs/security.md)");
     const std::optional<yaml::Node> options = configured ? component.options : std::nullopt;
     std::vector<model::OptionValue> values = resolve_options(plugin, options, component.path, component.node, notes);
@@ -422,7 +423,7 @@ std::vector<model::OptionValue> options_for(const model::PluginDescription &plug
         const auto option = options ? options->find(declared.key) : std::nullopt;
         const auto node = declared.key == "path" && component.path ? component.path : option;
         if (node && declared.type == ARHOST_OPTION_INPUT_PATH && is_url(node->text()))
-            node->fail("is a URL, but '" + plugin.id + "' reads only files" +
+            node->fail("is a URL, but '" + plugin.short_name() + "' reads only files" +
                        (kind == ARHOST_KIND_SOURCE
                             ? "; for network cameras write '" + component.node.path() +
                                   ": {plugin: source_network, allow: [network], options: {url: …}}' with this URL"

@@ -68,7 +68,7 @@ std::vector<model::OptionValue> resolve_options(const model::PluginDescription &
     if (path && std::find(keys.begin(), keys.end(), "path") == keys.end())
         unknown.push_back(*path);
     for (const yaml::Node &node : unknown)
-        notes.push_back(node.where() + ": " + node.path() + ": set aside, because " + plugin.id +
+        notes.push_back(node.where() + ": " + node.path() + ": set aside, because " + plugin.short_name() +
                         " has no such option");
 
     std::vector<model::OptionValue> values;
@@ -81,19 +81,19 @@ std::vector<model::OptionValue> resolve_options(const model::PluginDescription &
         }
         if (value && !declared.choices.empty() && value->is_unlike(choices_of(declared))) {
             notes.push_back(value->where() + ": " + value->path() + ": '" + value->text() +
-                            "' is set aside, because " + plugin.id + " has no such choice");
+                            "' is set aside, because " + plugin.short_name() + " has no such choice");
             value.reset();
         }
         if (value && declared.type == ARHOST_OPTION_OUTPUT_PATH && is_standard_output(*value) &&
             !(plugin.kind == ARHOST_KIND_SINK && plugin.capabilities & ARHOST_SINK_CAPABILITY_STANDARD_OUTPUT &&
               declared.key == "path"))
-            value->fail(plugin.id + " cannot write to standard output; name a file");
+            value->fail(plugin.short_name() + " cannot write to standard output; name a file");
         if (value)
             values.push_back(value_of(declared, *value));
         else if (declared.default_value)
-            values.push_back(default_of(declared, plugin.id));
+            values.push_back(default_of(declared, plugin.short_name()));
         else
-            owner.fail(plugin.id + " needs '" + declared.key + "': " + declared.help);
+            owner.fail(plugin.short_name() + " needs '" + declared.key + "': " + declared.help);
     }
     return values;
 }

@@ -330,8 +330,8 @@ void Component::on_died(const Death &death) {
     const std::uint64_t frame = unanswered.empty() ? Crash::no_frame : unanswered.front().sequence;
     const bool crash = !death.clean && configuration_error_.empty();
     if (crash)
-        record_crash(
-            {description_.id.empty() ? plugin().stem().string() : description_.id, death.how, death.log_tail, frame});
+        record_crash({description_.id.empty() ? plugin().stem().string() : description_.short_name(), death.how,
+                      death.log_tail, frame});
     std::string reason = failure_.empty() ? death.how : failure_;
     if (frame != Crash::no_frame)
         reason += ", at frame " + std::to_string(frame);

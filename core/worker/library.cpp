@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <dlfcn.h>
 #include <initializer_list>
+#include <regex>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -70,6 +71,12 @@ void check_kind(const std::filesystem::path &file, const arhost_plugin &plugin) 
     }
 }
 
+// Whether an id has three or more parts, as in "org.arhost.rt_embree".
+bool is_unique_id(const std::string &id) {
+    static const std::regex parts("[A-Za-z0-9_-]+([.][A-Za-z0-9_-]+){2,}");
+    return std::regex_match(id, parts);
+}
+
 // Substrings of dlopen's out-of-memory messages; the message depends on the step that failed.
 constexpr const char *dlopen_memory_errors[] = {"annot allocate ", "cannot create ", "cannot map zero-fill pages",
                                                 "cannot change memory protections", "failed to map segment"};
@@ -126,7 +133,11 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
     if (!plugin->descriptor->id)
         reject(file, "its arhost_descriptor has no id");
     const std::string id = plugin->descriptor->id;
-    if (file.stem() != id && file.stem() != "lib" + id) // some build tools prepend "lib" to the file name
+    if (!is_unique_id(id))
+        reject(file, "its id is '" + id + "'; it must begin with a domain in reverse order, as in 'org.example." +
+                         (id.empty() ? "tracker" : id) + "'");
+    const std::string name = id.substr(id.rfind('.') + 1);
+    if (file.stem() != name && file.stem() != "lib" + name) // some build tools prepend "lib" to the file name
         reject(file, "its id is '" + id + "'; rename the file to match");
     for (const char *const *need = plugin->descriptor->needs; need && *need; ++need)
         if (std::ranges::find(sandbox::allowances, *need) == sandbox::allowances.end())

@@ -290,8 +290,9 @@ int serve_plugin(Link &link, const messages::Open &open) {
         Link::InCall call(link, Call::negotiate);
         plugin = &negotiate(open.plugin, *entry);
     }
-    ::prctl(PR_SET_NAME, plugin->descriptor->id);
-    link.send(messages::Hello{describe_plugin(*plugin), sandbox::to_text(level)});
+    const PluginDescription description = describe_plugin(*plugin);
+    ::prctl(PR_SET_NAME, description.short_name().c_str());
+    link.send(messages::Hello{description, sandbox::to_text(level)});
     PluginHost host(link, plugin->descriptor->kind);
     Message next = link.receive();
     for (; is<messages::ListDevices>(next); next = link.receive())

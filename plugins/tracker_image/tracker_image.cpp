@@ -23,7 +23,7 @@ using arhost::Failure;
 constexpr arhost_descriptor descriptor = {
     .struct_size = sizeof(arhost_descriptor),
     .kind = ARHOST_KIND_TRACKER,
-    .id = "tracker_image",
+    .id = "org.arhost.tracker_image",
     .name = "Pictures",
     .version = "0.1.0",
     .vendor = "arhost",

@@ -415,3 +415,11 @@ TEST(StandardOutput, ThatIsABrokenPipeEndsACommandQuietly) {
         EXPECT_EQ(run.output(), "");
     }
 }
+
+TEST(PluginIds, AreUniqueInARun) {
+    ArhostRun run(replaced(good, "outputs: [", "outputs: [{plugin: other/sink_counter.so, path: other.txt}, "));
+    run.write("scene.yaml", small_scene);
+    std::filesystem::create_directories(run.path("other"));
+    std::filesystem::copy_file(test_plugin_directory() + "/sink_counter.so", run.path("other/sink_counter.so"));
+    run.expect(2, {"have the same id 'org.arhost.test.sink_counter'; use one of them, or change the id of one"});
+}

@@ -78,7 +78,7 @@ RayTracer::RayTracer(const std::string &name, yaml::Node options) {
     const model::PluginDescription plugin = model::describe(*plugin_->descriptor);
     model::check(plugin);
     if (plugin.kind != ARHOST_KIND_RAYTRACER)
-        requested.fail("'" + plugin.id + "' is a " + model::to_text(plugin.kind) + ", not a ray tracer");
+        requested.fail("'" + plugin.short_name() + "' is a " + model::to_text(plugin.kind) + ", not a ray tracer");
     prefer_samples(options, plugin);
     std::vector<std::string> notes;
     const std::vector<model::OptionValue> values =
@@ -91,12 +91,13 @@ RayTracer::RayTracer(const std::string &name, yaml::Node options) {
         passed.push_back({sizeof(arhost_option), v.type, v.key.c_str(), v.integer, v.real, v.text.c_str()});
     expect_ok("create", plugin_->create(&host, passed.data(), static_cast<std::uint32_t>(passed.size()), &instance_));
     if (!instance_)
-        throw std::runtime_error(plugin.id + ": the function create returned ARHOST_STATUS_OK, but no instance");
+        throw std::runtime_error(plugin.short_name() +
+                                 ": the function create returned ARHOST_STATUS_OK, but no instance");
 }
 
 void RayTracer::expect_ok(const char *call, arhost_status status) const {
     if (status != ARHOST_STATUS_OK) // the plugin has logged the reason
-        throw std::runtime_error(std::string(plugin_->descriptor->id) + ": " + call + ": " +
+        throw std::runtime_error(model::describe(*plugin_->descriptor).short_name() + ": " + call + ": " +
                                  model::status_text(status));
 }
 

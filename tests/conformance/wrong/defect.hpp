@@ -25,6 +25,11 @@ inline const std::string &library_name() {
     return name;
 }
 
+inline const char *library_id() {
+    static const std::string id = "org.arhost.test." + library_name();
+    return id.c_str();
+}
+
 inline bool has(std::string_view defect) {
     return library_name().substr(library_name().find('_') + 1) == defect;
 }
@@ -65,7 +70,7 @@ arhost_status negotiate_as(const arhost_offer *offer, arhost_answer *answer, con
                            const void *functions) {
     static arhost_descriptor named;
     named = descriptor;
-    named.id = library_name().c_str();
+    named.id = library_id();
     static const arhost_plugin plugin = {
         sizeof plugin, 0, &named, functions, detail::create<T>, detail::destroy<T>, detail::no_extension};
     return negotiate(offer, answer, plugin);

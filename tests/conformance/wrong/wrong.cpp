@@ -828,7 +828,9 @@ const arhost_plugin &wrong_plugin() {
     static std::vector<arhost_option_descriptor> options(
         embree().descriptor->options, embree().descriptor->options + embree().descriptor->option_count);
     static arhost_descriptor descriptor = *embree().descriptor;
-    descriptor.id = has("id_differs_from_file") ? "rt_other" : library_name().c_str();
+    descriptor.id = has("id_differs_from_file") ? "org.arhost.test.rt_other"
+                    : has("id_without_domain")  ? library_name().c_str()
+                                                : library_id();
     if (has("default_out_of_range"))
         options[0].default_value = "257";
     if (has("no_licence"))

@@ -72,7 +72,7 @@ private:
 
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_TRACKER,
-                                          "wrong_body",
+                                          "org.arhost.test.wrong_body",
                                           "Bodies",
                                           "0.1.0",
                                           "arhost",

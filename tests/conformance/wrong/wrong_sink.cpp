@@ -260,7 +260,7 @@ constexpr arhost_option_descriptor options[] = {
 };
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SINK,
-                                          "wrong_sink",
+                                          "org.arhost.test.wrong_sink",
                                           "Files",
                                           "0.1.0",
                                           "arhost",
@@ -281,7 +281,7 @@ const arhost_plugin &black_video() {
     std::copy_n(video.descriptor->options, named.option_count, video_options);
     video_options[0].default_value = "video.mp4";
     named.options = video_options;
-    named.id = library_name().c_str();
+    named.id = library_id();
     functions.write = [](arhost_instance *instance, const arhost_output *output) {
         arhost_output black = *output;
         const std::vector<std::uint8_t> pixels(std::size_t{output->stride} * output->height);

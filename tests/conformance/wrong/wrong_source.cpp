@@ -224,7 +224,7 @@ constexpr arhost_option_descriptor options[] = {
 };
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SOURCE,
-                                          "wrong_source",
+                                          "org.arhost.test.wrong_source",
                                           "Pattern",
                                           "0.1.0",
                                           "arhost",

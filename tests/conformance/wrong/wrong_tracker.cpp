@@ -553,7 +553,7 @@ const arhost_plugin &wrong_plugin() {
     static const arhost_tracker functions = {sizeof functions, 0,      start, has("no_track") ? nullptr : track, stop,
                                              state_size,       nullptr};
     static arhost_descriptor descriptor = *real().descriptor;
-    descriptor.id = library_name().c_str();
+    descriptor.id = library_id();
     static constexpr arhost_plugin plugin = {sizeof plugin, 0,       &descriptor,  &functions,
                                              create,        destroy, get_extension};
     return plugin;

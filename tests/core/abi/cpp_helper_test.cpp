@@ -43,7 +43,7 @@ public:
 constexpr arhost_option_descriptor options[] = {arhost::option(ARHOST_OPTION_BOOL, "reject", "false", "Fails")};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_TRACKER,
-                                          "thrower",
+                                          "org.arhost.test.thrower",
                                           "Thrower",
                                           "0",
                                           "arhost",

@@ -35,7 +35,7 @@ struct Bench {
     void make(const std::string &plugin, arhost::base::Limits limits = {}, Json options = Json::object()) {
         Component::Callbacks callbacks;
         callbacks.hello = [this, options](const PluginDescription &description, std::size_t) {
-            events.push_back("hello " + description.id);
+            events.push_back("hello " + description.short_name());
             std::vector<OptionValue> values;
             for (const OptionDeclaration &o : description.options)
                 values.push_back(

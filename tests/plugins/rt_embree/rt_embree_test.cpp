@@ -909,7 +909,7 @@ TEST(Render, FailsOnceCancelled) {
 TEST(Plugin, DeclaresLensDistortionSupport) {
     const arhost_descriptor &descriptor = PluginUnderTest("rt_embree").descriptor();
     EXPECT_EQ(descriptor.kind, ARHOST_KIND_RAYTRACER);
-    EXPECT_STREQ(descriptor.id, "rt_embree");
+    EXPECT_STREQ(descriptor.id, "org.arhost.rt_embree");
     EXPECT_TRUE(descriptor.capabilities & ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION);
 }
 

@@ -579,7 +579,7 @@ TEST(SourceSynthetic, RejectsInvalidOptionsByName) {
 TEST(SourceSynthetic, DeclaresThatItCanSeek) {
     const PluginUnderTest plugin("source_synthetic");
     EXPECT_TRUE(plugin.descriptor().capabilities & ARHOST_SOURCE_CAPABILITY_SEEK);
-    EXPECT_STREQ(plugin.descriptor().id, "source_synthetic");
+    EXPECT_STREQ(plugin.descriptor().id, "org.arhost.source_synthetic");
 }
 
 const arhost_intrinsics tiny_camera = camera_of(64, 48, 60, 31.5, 23.5);

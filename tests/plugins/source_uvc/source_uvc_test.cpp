@@ -29,7 +29,7 @@ TEST(UvcRejection, RequiresBothSidesOfASizeOrNeither) {
 TEST(Uvc, DeclaresUsbNeedsAndLiveCapability) {
     SourceUnderTest source("source_uvc");
     const arhost_descriptor &descriptor = source.plugin().descriptor();
-    EXPECT_STREQ(descriptor.id, "source_uvc");
+    EXPECT_STREQ(descriptor.id, "org.arhost.source_uvc");
     EXPECT_EQ(descriptor.capabilities, static_cast<std::uint32_t>(ARHOST_SOURCE_CAPABILITY_LIVE));
     ASSERT_NE(descriptor.needs, nullptr);
     EXPECT_STREQ(descriptor.needs[0], "usb");

@@ -926,7 +926,7 @@ static const arhost_option_descriptor options[] = {
 };
 static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              ARHOST_KIND_TRACKER,
-                                             "hostile",
+                                             "org.arhost.test.hostile",
                                              "Hostile",
                                              "0.1.0",
                                              "arhost",

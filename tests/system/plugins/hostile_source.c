@@ -166,7 +166,7 @@ static const arhost_option_descriptor options[] = {
 };
 static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              ARHOST_KIND_SOURCE,
-                                             "hostile_source",
+                                             "org.arhost.test.hostile_source",
                                              "Hostile source",
                                              "0.1.0",
                                              "arhost",

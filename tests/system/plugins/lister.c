@@ -137,7 +137,7 @@ static inline arhost_status list_cameras(const arhost_host *host, arhost_take_de
 static const char *const needs[] = {"gpu", "network", NULL};
 static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              ARHOST_KIND_SINK,
-                                             ID,
+                                             "org.arhost.test." ID,
                                              "Lister",
                                              "0.1.0",
                                              "arhost",

@@ -13,7 +13,7 @@ static const struct grown options[] = {
 };
 static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              ARHOST_KIND_SINK,
-                                             "newer_options",
+                                             "org.arhost.test.newer_options",
                                              "Newer",
                                              "0.1.0",
                                              "arhost",

@@ -170,7 +170,7 @@ static const arhost_option_descriptor options[] = {
 };
 static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              ARHOST_KIND_RAYTRACER,
-                                             "rt_counter",
+                                             "org.arhost.test.rt_counter",
                                              "Counter",
                                              "0.1.0",
                                              "arhost",

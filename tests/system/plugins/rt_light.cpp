@@ -55,7 +55,7 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_BOOL, "writes_nan", "false", "Writes a NaN in the last pixel"), ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_RAYTRACER,
-                                          "rt_light",
+                                          "org.arhost.test.rt_light",
                                           "Light",
                                           "0.1.0",
                                           "arhost",

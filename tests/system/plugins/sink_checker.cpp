@@ -99,7 +99,7 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_BOOL, "gaps", "false", "Frames may be skipped, as in mode live"), ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SINK,
-                                          ID,
+                                          "org.arhost.test." ID,
                                           "Checker",
                                           "0.1.0",
                                           "arhost",

@@ -75,7 +75,7 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_BOOL, "hang_in_stop", "false", "Never returns from stop"), ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SINK,
-                                          ID,
+                                          "org.arhost.test." ID,
                                           "Counter",
                                           "0.1.0",
                                           "arhost",

@@ -113,7 +113,7 @@ constexpr arhost_option_descriptor options[] = {
     ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SOURCE,
-                                          "source_counter",
+                                          "org.arhost.test.source_counter",
                                           "Counter",
                                           "0.1.0",
                                           "arhost",

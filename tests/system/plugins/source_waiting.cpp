@@ -56,7 +56,7 @@ constexpr arhost_option_descriptor options[] = {
     option(ARHOST_OPTION_TEXT, "back", "", "File that exists once it is plugged in again; empty: never")};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_SOURCE,
-                                          ID,
+                                          "org.arhost.test." ID,
                                           "Waiting",
                                           "0.1.0",
                                           "arhost",

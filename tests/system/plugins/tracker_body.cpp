@@ -79,7 +79,7 @@ constexpr arhost_option_descriptor options[] = {
     ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_TRACKER,
-                                          "tracker_body",
+                                          "org.arhost.test.tracker_body",
                                           "Bodies",
                                           "0.1.0",
                                           "arhost",

@@ -156,7 +156,7 @@ constexpr arhost_option_descriptor options[] = {
     ARHOST_FAULT_OPTIONS};
 constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           ARHOST_KIND_TRACKER,
-                                          "tracker_counter",
+                                          "org.arhost.test.tracker_counter",
                                           "Counter",
                                           "0.1.0",
                                           "arhost",

@@ -179,7 +179,9 @@ static inline const arhost_option *arhost_find_option(const arhost_option *optio
 typedef struct arhost_descriptor {
     uint32_t struct_size;
     arhost_kind kind;
-    const char *id;      /* the file name without ".so": "rt_embree" */
+    /* Unique among all vendors: a domain of the vendor in reverse order, then the file name without ".so", such as
+     * "org.arhost.rt_embree". Three or more parts of a-z, A-Z, 0-9, '-' and '_', separated by dots. */
+    const char *id;
     const char *name;    /* display name: "Embree ray tracer" */
     const char *version; /* version of the plugin, such as "1.2.0" */
     const char *vendor;

@@ -217,7 +217,7 @@ pub trait Sink: Plugin {
 ///
 /// ```ignore
 /// arhost_sys::plugin! {
-///     sink MySink, "my_sink", "Counts frames.",
+///     sink MySink, "org.example", "my_sink", "Counts frames.", // vendor and file name make the id "org.example.my_sink"
 ///     capabilities: 0,
 ///     options: [
 ///         option!(ARHOST_OPTION_INTEGER, "every", "1", "Counts every n-th frame.", 1.0, 1e6),
@@ -228,7 +228,7 @@ pub trait Sink: Plugin {
 /// ```
 #[macro_export]
 macro_rules! plugin {
-    ($kind:ident $type:ty, $id:literal, $description:literal, capabilities: $capabilities:expr,
+    ($kind:ident $type:ty, $vendor:literal, $name:literal, $description:literal, capabilities: $capabilities:expr,
      options: [$($option:expr),* $(,)?] $(, needs: [$($need:literal),* $(,)?])? $(,)?) => {
         const _: () = {
             const NEEDS: &[*const std::os::raw::c_char] = &[$($($crate::c_text!($need),)*)? std::ptr::null()];
@@ -236,8 +236,8 @@ macro_rules! plugin {
             static DESCRIPTOR: $crate::arhost_descriptor = $crate::arhost_descriptor {
                 struct_size: std::mem::size_of::<$crate::arhost_descriptor>() as u32,
                 kind: $crate::kind::$kind,
-                id: $crate::c_text!($id),
-                name: $crate::c_text!($id),
+                id: $crate::c_text!(concat!($vendor, ".", $name)),
+                name: $crate::c_text!($name),
                 version: $crate::c_text!(env!("CARGO_PKG_VERSION")),
                 vendor: $crate::c_text!(env!("CARGO_PKG_AUTHORS")),
                 licence: $crate::c_text!(env!("CARGO_PKG_LICENSE")),

@@ -44,7 +44,7 @@ impl Sink for Window {
     }
 }
 
-arhost_sys::plugin! { sink Window, "window", "Shows nothing.", capabilities: 0, options: [] }
+arhost_sys::plugin! { sink Window, "org.example", "window", "Shows nothing.", capabilities: 0, options: [] }
 
 extern "C" {
     static arhost_entry: arhost_entry_point;

@@ -21,7 +21,7 @@ impl Sink for Window {
 }
 
 arhost_sys::plugin! {
-    sink Window, "window", "Shows nothing.",
+    sink Window, "org.example", "window", "Shows nothing.",
     capabilities: 0,
     options: [],
     needs: ["display", "gpu"]

@@ -165,7 +165,7 @@ static const arhost_raytracer functions = {.struct_size = sizeof functions, .sta
 static const arhost_descriptor descriptor = {
     .struct_size = sizeof descriptor,
     .kind = ARHOST_KIND_RAYTRACER,
-    .id = "@NAME@", /* must equal the file name without ".so" */
+    .id = "org.example.@NAME@", /* FILL IN: your domain in reverse order; ends with the file name */
     .name = "@NAME@",
     .version = "0.1.0",
     .vendor = "unknown", /* FILL IN: your name */

@@ -108,7 +108,7 @@ static const arhost_source functions = {.struct_size = sizeof functions, .start 
 static const arhost_descriptor descriptor = {
     .struct_size = sizeof descriptor,
     .kind = ARHOST_KIND_SOURCE,
-    .id = "@NAME@", /* must equal the file name without ".so" */
+    .id = "org.example.@NAME@", /* FILL IN: your domain in reverse order; ends with the file name */
     .name = "@NAME@",
     .version = "0.1.0",
     .vendor = "unknown", /* FILL IN: your name */

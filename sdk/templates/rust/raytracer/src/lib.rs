@@ -153,7 +153,8 @@ impl Raytracer for @CLASS@ {
 }
 
 plugin! {
-    raytracer @CLASS@, "@NAME@", "Brute-force ray tracer.",
+    // FILL IN: your domain in reverse order.
+    raytracer @CLASS@, "org.example", "@NAME@", "Brute-force ray tracer.",
     // FILL IN: what you implement, such as ARHOST_RAYTRACER_CAPABILITY_TEXTURES or ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION. arhost warns if
     // a scene needs more.
     capabilities: ARHOST_RAYTRACER_CAPABILITY_REFLECTION | ARHOST_RAYTRACER_CAPABILITY_MOTION,

@@ -53,7 +53,8 @@ impl Sink for @CLASS@ {
 }
 
 plugin! {
-    sink @CLASS@, "@NAME@", "Writes each frame as an image (PPM).",
+    // FILL IN: your domain in reverse order.
+    sink @CLASS@, "org.example", "@NAME@", "Writes each frame as an image (PPM).",
     capabilities: 0,
     // arhost validates the configuration against these before it calls `new`.
     options: [

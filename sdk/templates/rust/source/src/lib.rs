@@ -74,7 +74,8 @@ impl Source for @CLASS@ {
 }
 
 plugin! {
-    source @CLASS@, "@NAME@", "Moving gradient.",
+    // FILL IN: your domain in reverse order.
+    source @CLASS@, "org.example", "@NAME@", "Moving gradient.",
     capabilities: ARHOST_SOURCE_CAPABILITY_SEEK, // frame n is the same wherever reading starts
     // arhost validates the configuration against these before it calls `new`.
     options: [

@@ -47,7 +47,8 @@ impl Tracker for @CLASS@ {
 }
 
 plugin! {
-    tracker @CLASS@, "@NAME@", "Detects a bright patch as the marker.",
+    // FILL IN: your domain in reverse order.
+    tracker @CLASS@, "org.example", "@NAME@", "Detects a bright patch as the marker.",
     capabilities: 0,
     // arhost validates the configuration against these before it calls `new`.
     options: [
