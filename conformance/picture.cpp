@@ -56,7 +56,7 @@ std::string GuardedImage::damage() const {
 }
 
 arhost_image Picture::image() {
-    return {sizeof(arhost_image), stride(), width(), height(), pixel(0, 0), nullptr};
+    return {sizeof(arhost_image), stride(), width(), height(), pixel(0, 0), nullptr, nullptr};
 }
 
 Pixel Picture::at(std::uint32_t x, std::uint32_t y) const {
@@ -69,8 +69,13 @@ void Picture::set(std::uint32_t x, std::uint32_t y, const Pixel &value) {
 }
 
 arhost_image LinearPicture::image() {
-    return {
-        sizeof(arhost_image), stride(), width(), height(), nullptr, reinterpret_cast<std::uint16_t *>(pixel(0, 0))};
+    return {sizeof(arhost_image),
+            stride(),
+            width(),
+            height(),
+            nullptr,
+            reinterpret_cast<std::uint16_t *>(pixel(0, 0)),
+            nullptr};
 }
 
 LinearPixel LinearPicture::at(std::uint32_t x, std::uint32_t y) const {

@@ -109,7 +109,7 @@ TEST(LensWarp, ReadsOnlyTheRegionEvenIfItExceedsTheImage) {
 struct LinearLensImage {
     static constexpr std::uint32_t stride = 16 * width + 64;
     std::vector<std::uint16_t> halves = std::vector<std::uint16_t>(std::size_t{stride} / 2 * height, 0x7e00);
-    arhost_image image{sizeof image, stride, width, height, nullptr, halves.data()};
+    arhost_image image{sizeof image, stride, width, height, nullptr, halves.data(), nullptr};
     const LinearPixel &at(std::uint32_t x, std::uint32_t y) const { return linear_row(image, y)[x]; }
 };
 

@@ -36,7 +36,7 @@ impl Raytracer for Mirror {
 }
 
 arhost_sys::plugin! {
-    raytracer Mirror, "mirror", "Mirrors the video.",
+    raytracer Mirror, "org.example", "mirror", "Mirrors the video.",
     capabilities: ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES | ARHOST_RAYTRACER_CAPABILITY_VIDEO,
     options: []
 }
