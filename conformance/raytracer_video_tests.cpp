@@ -5,6 +5,7 @@
 #include "conformance/tracer.hpp"
 
 #include <array>
+#include <cstring>
 
 namespace arhost::conformance {
 namespace {
@@ -44,7 +45,7 @@ Video ramps(arhost_pixel_format format, bool is_dark = false) {
 Picture seen(Context &context, Tracer &tracer) {
     tracer.set_compositing(ARHOST_COMPOSITING_LINEAR);
     return has_capability(context, ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES) ? tracer.render_linear(view()).shown()
-                                                                    : tracer.render(view());
+                                                                              : tracer.render(view());
 }
 
 void expect_mirrored(Context &context, const Video &video, const char *format) {
@@ -117,14 +118,42 @@ void own_frame(Context &context) {
     expect_alike(render(tracer, nullptr), of_none, "restarted without video, the image depends on the video before");
 }
 
-void undeclared(Context &context) {
-    if (has_capability(context, ARHOST_RAYTRACER_CAPABILITY_VIDEO))
-        throw Skip("ARHOST_RAYTRACER_CAPABILITY_VIDEO is declared");
-    const Video video = ramps(ARHOST_PIXEL_FORMAT_BGR8);
-    Tracer without(context, mirror_on_a_table()), with(context, mirror_on_a_table());
-    with.set_video(&video);
-    expect_alike(seen(context, with), seen(context, without),
-                 "it does not declare ARHOST_RAYTRACER_CAPABILITY_VIDEO, but its image depends on the request's video");
+// A white triangle that fills the view, in an environment of one colour.
+scene::ArenaBuilder in_an_environment(const std::array<float, 3> &radiance, bool follows_video) {
+    scene::ArenaBuilder builder = path_scene();
+    builder.add_object(
+        "white", builder.add_triangles({{{-900, 40, -900}, {900, 40, -900}, {0, 40, 900}}, {}, {}, {{0, 1, 2}}}),
+        builder.add_material(diffuse(glm::vec3(0.8f))));
+    const std::array<float, 4> texel{radiance[0], radiance[1], radiance[2], 1};
+    scene::Texture texture{
+        ARHOST_TEXEL_RGBA32F, 1, 1, ARHOST_WRAP_REPEAT, ARHOST_WRAP_CLAMP, scene::Texels::of_size(sizeof texel)};
+    std::memcpy(texture.texels.bytes.get(), texel.data(), sizeof texel);
+    builder.environment.texture = builder.add_texture("sky", std::move(texture));
+    builder.environment.rows = builder.environment.columns = {1};
+    builder.environment.follows_video = follows_video;
+    return builder;
+}
+
+void environment(Context &context) {
+    need_capability(context, ARHOST_RAYTRACER_CAPABILITY_ENVIRONMENT, "ENVIRONMENT");
+    const auto expect_scale = [&](const Video *video, const std::array<float, 3> &scale, const char *violation) {
+        Tracer following(context, in_an_environment({0.5f, 0.5f, 0.5f}, true)),
+            fixed(context, in_an_environment({0.5f * scale[0], 0.5f * scale[1], 0.5f * scale[2]}, false));
+        following.set_video(video);
+        fixed.set_video(video);
+        expect_alike(seen(context, following), seen(context, fixed), violation, 2);
+    };
+    expect_scale(nullptr, {0.18f, 0.18f, 0.18f},
+                 "without video, an environment that follows it is not 0.18 times its map");
+    if (!has_capability(context, ARHOST_RAYTRACER_CAPABILITY_VIDEO))
+        return;
+    const Video video(ARHOST_PIXEL_FORMAT_BGR8, view().intrinsics.width, view().intrinsics.height,
+                      [](std::uint32_t, std::uint32_t) {
+                          return Video::Rgb{220, 188, 137};
+                      });
+    // srgb_decode() of 220, 188 and 137, divided by 255.
+    expect_scale(&video, {0.716f, 0.503f, 0.250f},
+                 "an environment that follows the video does not have its mean colour");
 }
 
 constexpr const char *gate = "raytracer.render";
@@ -134,8 +163,9 @@ constexpr Test tests[] = {
     {"raytracer.video-formats", "Video of every pixel format, YUV matrix and range has its colours.", gate, 20s,
      formats},
     {"raytracer.video-frame", "An image depends on the video of its own request only.", gate, 20s, own_frame},
-    {"raytracer.video-undeclared", "If VIDEO is not declared, video does not change the image.", gate, 20s,
-     undeclared},
+    {"raytracer.video-environment",
+     "Environments that follow the video are multiplied by its mean colour, or by 0.18 without video.", gate, 20s,
+     environment},
 };
 
 } // namespace

@@ -91,6 +91,7 @@ arhost_status Tracer::try_start(const arhost_intrinsics &intrinsics) {
     state_size_ = in_call(instance_.library().calls(), Call::start,
                           [&] { return worker::state_size_of(functions_, instance_.get()); });
     state_before_.reset();
+    state_after_.reset();
     return status;
 }
 
@@ -123,8 +124,8 @@ template <class Image>
 arhost_status Tracer::try_render(const arhost_camera &camera, std::optional<Image> &slot, Image &picture,
                                  arhost_render_info &info, const arhost_motion *motion) {
     arhost_render_request request{
-        sizeof request, max_samples_, sequence_, 0, camera, motion, video_ ? &video_->frame() : nullptr,
-        nullptr, nullptr, 0, nullptr};
+        sizeof request, max_samples_, sequence_, 0,      camera, motion, video_ ? &video_->frame() : nullptr,
+        nullptr,        nullptr,      0,         nullptr};
     if (state_size_ > 0) {
         state_after_ = state_memory(state_size_);
         std::fill_n(state_after_->data(), state_size_, state_filler_);

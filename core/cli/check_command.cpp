@@ -43,7 +43,7 @@ std::vector<model::PluginDescription> check_plugins(const run_config::Configurat
             run_config::options_for(plugins.back(), kind, component, i, notes);
             for (const std::string &note : notes)
                 if (logs_notes || !is_started_by_run)
-                    context.log(ARHOST_SEVERITY_WARNING, plugins.back().id, note);
+                    context.log(ARHOST_SEVERITY_WARNING, plugins.back().short_name(), note);
         }
         return plugins;
     };

@@ -95,14 +95,16 @@ std::pair<ImageView, Region> Compositing::full_size_overlay(const Frame &frame) 
 // Reports a contract violation if a buffer changed after hand-over.
 void Compositing::check_buffers_unmodified(const Frame &frame) {
     const std::uint64_t sequence = frame.record.sequence;
-    const auto check = [&](const char *name, const std::optional<std::size_t> &sample, const Lease &buffer,
-                           const char *problem) {
-        if (sample && buffer)
-            parts_.statistics.contract_checks.add(
-                name, sequence, contracts::sample_hash(buffer.bytes(), sequence) == *sample ? "" : problem);
+    const auto check = [&](const char *name, const std::optional<std::size_t> &sample,
+                           std::span<const std::byte> buffer, const char *problem) {
+        if (sample && !buffer.empty())
+            parts_.statistics.contract_checks.add(name, sequence,
+                                                  contracts::sample_hash(buffer, sequence) == *sample ? "" : problem);
     };
-    check("source.frame-stays", frame.pixels_sample, frame.pixels, "the frame changed after hand-over");
-    check("raytracer.image-stays", frame.overlay_sample, frame.overlay, "the image changed after hand-over");
+    check("source.frame-stays", frame.pixels_sample,
+          frame.pixels ? frame.pixels.bytes() : std::span<const std::byte>(), "the frame changed after hand-over");
+    check("raytracer.image-stays", frame.overlay_sample, overlay_bytes(frame, parts_.video.format),
+          "the image changed after hand-over");
 }
 
 // Measures the age of the picture that the frame shows, and draws the next picture.

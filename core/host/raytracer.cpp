@@ -31,6 +31,13 @@ ImageView overlay_of(const Frame &frame, const arhost_frame_format &format) {
             frame.overlay_format};
 }
 
+std::span<const std::byte> overlay_bytes(const Frame &frame, const arhost_frame_format &format) {
+    if (!frame.overlay)
+        return {};
+    const RaytracerSlot slot(format.width, format.height, frame.overlay_format.form);
+    return frame.overlay.bytes().first(slot.image_size);
+}
+
 Raytracer::Raytracer(RunParts &parts, Configuration configuration, std::shared_ptr<LoadedScene> scene,
                      Abandon abandon)
     : Stage(parts, "raytracer", *configuration, Frame::Stage::to_render, 1, std::move(abandon)),
@@ -41,6 +48,9 @@ Raytracer::Raytracer(RunParts &parts, Configuration configuration, std::shared_p
 }
 
 SlotLayout Raytracer::on_ready(const messages::Ready &ready) {
+    const auto mebibytes = [](std::uint64_t bytes) { return static_cast<double>(bytes) / (1 << 20); };
+    if (ready.state_size > max_raytracer_state) // the worker checks this too
+        throw std::runtime_error("the ray tracer's worker sent an impossible state_size");
     const bool is_linear_wanted =
         scene_->integrator == ARHOST_INTEGRATOR_PATH && overlay_format_.compositing == ARHOST_COMPOSITING_LINEAR;
     if (!(ready.capabilities & ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES)) {
@@ -57,18 +67,20 @@ SlotLayout Raytracer::on_ready(const messages::Ready &ready) {
     has_state_ = ready.state_size > 0;
     max_in_flight_ = parts_.live() || has_state_ ? 1 : 2; // an image needs the state after the previous one
     const SlotLayout layout{slot.byte_size(ready.state_size), has_state_ ? slot_count_with_state : stage_slot_count};
-    const std::uint64_t limit = sandbox::memory_limit(configuration_->policy);
-    if (has_state_ && limit > 0 && (ready.state_size > limit || layout.byte_size() > limit))
+    // The other half is for the worker's own memory.
+    const std::uint64_t limit = sandbox::memory_limit(configuration_->policy) / 2;
+    if (has_state_ && limit > 0 && layout.byte_size() > limit)
         throw std::runtime_error(
-            fmt::format("the ray tracer's state has {} MiB; {} states and images do not fit into "
-                        "the {} MiB that it may use ('memory_mb')",
-                        ready.state_size >> 20, layout.count, limit >> 20));
+            fmt::format("the ray tracer's state has {:.1f} MiB; {} states and images take {:.1f} MiB, "
+                        "more than half of the {} MiB that it may use ('memory_mb')",
+                        mebibytes(ready.state_size), layout.count, mebibytes(layout.byte_size()), limit >> 19));
     if (!continues_state(layout.slot_size))
         state_ = Lease();
     return layout;
 }
 
 void Raytracer::on_disabled(const std::string &reason, bool is_configuration_error) {
+    state_ = Lease();
     parts_.failures.add_disabled("raytracer", configuration_->node, reason, is_configuration_error);
 }
 
@@ -197,7 +209,7 @@ void Raytracer::on_result(const Command &command, const Result &result) {
         const arhost_frame_format &format = parts_.video.format;
         checks->check(statistics.contract_checks, command.sequence, command.camera,
                       region_of(frame->render, format.width, format.height), overlay_of(*frame, format));
-        frame->overlay_sample = contracts::sample_hash(frame->overlay.bytes(), command.sequence);
+        frame->overlay_sample = contracts::sample_hash(overlay_bytes(*frame, format), command.sequence);
     }
 }
 

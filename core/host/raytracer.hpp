@@ -24,6 +24,8 @@ struct LoadedScene {
 std::pair<std::uint32_t, std::uint32_t> overlay_size(const arhost_frame_format &format, const Quality &quality);
 // Returns the overlay in the frame's slot of the ray tracer.
 ImageView overlay_of(const Frame &frame, const arhost_frame_format &format);
+// Returns the bytes of the frame's overlay, without the ray tracer's state; empty without an overlay.
+std::span<const std::byte> overlay_bytes(const Frame &frame, const arhost_frame_format &format);
 
 class Raytracer final : public Stage {
 public:

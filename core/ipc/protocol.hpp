@@ -104,6 +104,9 @@ inline std::uint32_t overlay_stride(std::uint32_t width, arhost_image_form form 
     return (width * (form == ARHOST_IMAGE_FORM_LINEAR ? 16 : 4) + 63) / 64 * 64;
 }
 
+// Bytes; far beyond any memory, so that the sizes of slots and regions do not overflow.
+inline constexpr std::uint64_t max_raytracer_state = std::uint64_t{1} << 40;
+
 // Layout of a slot that a ray tracer's worker writes: the image, then the plugin's state, which only the worker can
 // read.
 class RaytracerSlot {

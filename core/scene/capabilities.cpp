@@ -47,7 +47,7 @@ constexpr std::pair<std::uint64_t, const char *> parts[] = {
     {ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS, "metallic-roughness materials"},
     {ARHOST_RAYTRACER_CAPABILITY_TEXTURES, "textures"},
     {ARHOST_RAYTRACER_CAPABILITY_AREA_LIGHTS, "area lights"},
-    {ARHOST_RAYTRACER_CAPABILITY_ENVIRONMENT, "the environment map"},
+    {ARHOST_RAYTRACER_CAPABILITY_ENVIRONMENT, "the environment map or the default light"},
     {ARHOST_RAYTRACER_CAPABILITY_MOTION, "motion"},
 };
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "worker/library.hpp"
 
+#include "ipc/protocol.hpp"
 #include "model/plugin_description.hpp"
 #include "sandbox/sandbox.hpp"
 
@@ -175,7 +176,11 @@ std::uint64_t state_size_of(const arhost_tracker &tracker, arhost_instance *inst
 std::uint64_t state_size_of(const arhost_raytracer &raytracer, arhost_instance *instance) {
     if (raytracer.struct_size < ARHOST_SIZE_UP_TO(arhost_raytracer, state_size) || !raytracer.state_size)
         return 0;
-    return raytracer.state_size(instance);
+    const std::uint64_t size = raytracer.state_size(instance);
+    if (size > ipc::max_raytracer_state)
+        throw std::runtime_error("the ray tracer's state_size is " + std::to_string(size) + " bytes; the limit is " +
+                                 std::to_string(ipc::max_raytracer_state));
+    return size;
 }
 
 double aspect_of(const arhost_tracker &tracker, arhost_instance *instance, std::uint32_t marker) {

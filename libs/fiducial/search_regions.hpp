@@ -83,9 +83,9 @@ public:
 
     // Verifies the expected markers, the largest first.
     std::vector<arhost_observation> verified_markers(const arhost_track_request &request, const Verify &verify) const;
-    // Does so when the result is needed. If the whole frame is to be searched, another thread verifies them, because
-    // detection does not use all processors all the time. `request`, `verify` and the objects that `verify` uses must
-    // outlive the result.
+    // Verifies them when the result is needed. If the whole frame is to be searched, another thread verifies them,
+    // because detection does not use all processors all the time. `request`, `verify` and the objects that `verify`
+    // uses must outlive the result.
     Verified verified(const arhost_track_request &request, const Verify &verify) const;
 
     // Returns the verified markers, and the markers that the passes detect where the other expected markers should

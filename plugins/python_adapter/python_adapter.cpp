@@ -35,7 +35,9 @@
 #define METHOD "render"
 #define ADAPTER "_RaytracerAdapter"
 // A script declares its own: the attribute `capabilities`.
-#define CAPABILITIES (ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE | ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES | ARHOST_RAYTRACER_CAPABILITY_VIDEO)
+#define CAPABILITIES                                                                                                 \
+    (ARHOST_RAYTRACER_CAPABILITY_EVERY_SCENE | ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES |                           \
+     ARHOST_RAYTRACER_CAPABILITY_VIDEO)
 #else
 #define KIND ARHOST_KIND_SINK
 #define METHOD "write"
@@ -381,11 +383,11 @@ public:
 #endif
     void start(const arhost_raytracer_setup &setup) {
         const GilLock lock;
-        state_size_ = PyLong_AsUnsignedLongLong(
-            call("start", "IINNiiN", setup.width, setup.height, view(setup.scene, setup.scene->byte_size).release(),
-                 view_of(setup.intrinsics).release(), setup.form, setup.compositing,
-                 view_of(setup.video_format).release())
-                .value.get());
+        state_size_ = PyLong_AsUnsignedLongLong(call("start", "IINNiiN", setup.width, setup.height,
+                                                     view(setup.scene, setup.scene->byte_size).release(),
+                                                     view_of(setup.intrinsics).release(), setup.form,
+                                                     setup.compositing, view_of(setup.video_format).release())
+                                                    .value.get());
     }
     void render(const arhost_render_request &request, const arhost_image &image, arhost_render_info &info) {
         const GilLock lock;

@@ -88,8 +88,8 @@ std::array<float, 3> VideoImage::mean() const {
     constexpr std::size_t step = 4;
     std::array<std::array<std::uint32_t, 256>, 3> counts{};
     std::uint32_t count = 0;
-    for (std::size_t y = step / 2; y < height_; y += step)
-        for (std::size_t x = step / 2; x < width_; x += step, ++count)
+    for (std::size_t y = std::min(step / 2, height_ / 2); y < height_; y += step)
+        for (std::size_t x = std::min(step / 2, width_ / 2); x < width_; x += step, ++count)
             for (std::size_t c = 0; c < 3; ++c)
                 ++counts[c][texels_[4 * (y * width_ + x) + c]];
     std::array<double, 3> sum{};

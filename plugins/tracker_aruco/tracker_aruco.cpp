@@ -253,7 +253,7 @@ public:
                 return verify_one(grey, expected, id, family, by);
             };
         };
-        if (looks_closer_ && request.expected_count > 0 &&
+        if (looks_closer_ && refine_edges_ && request.expected_count > 0 &&
             regions.needs_closer_look(request, regions.verified_markers(request, verification(nullptr))))
             refinement.reserve(work_of_closer_look_per_px);
         const fiducial::Verify verify = verification(&refinement);

@@ -165,19 +165,18 @@ private:
                 : name.starts_with("tracker") ? ARHOST_KIND_TRACKER
                 : name == "rt"                ? ARHOST_KIND_RAYTRACER
                                               : ARHOST_KIND_SINK;
-        const arhost_descriptor descriptor = {
-            sizeof descriptor,
-            kind_,
-            name.c_str(),
-            "",
-            "",
-            "",
-            "",
-            "",
-            kind_ == ARHOST_KIND_SOURCE ? std::uint32_t(ARHOST_SOURCE_CAPABILITY_SEEK) : 0u,
-            0,
-            nullptr,
-            nullptr};
+        const arhost_descriptor descriptor = {sizeof descriptor,
+                                              kind_,
+                                              name.c_str(),
+                                              "",
+                                              "",
+                                              "",
+                                              "",
+                                              "",
+                                              kind_ == ARHOST_KIND_SOURCE ? ARHOST_SOURCE_CAPABILITY_SEEK : 0,
+                                              0,
+                                              nullptr,
+                                              nullptr};
         send(messages::Hello{model::describe(descriptor), ""}, {}, input);
     }
 

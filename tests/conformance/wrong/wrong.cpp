@@ -421,6 +421,8 @@ void modify(arhost_scene &scene) {
     if (has("lambert_only"))
         for (arhost_material &material : view<arhost_material>(scene, scene.materials))
             material.model = ARHOST_MATERIAL_DIFFUSE;
+    if (has("ignores_follows_video"))
+        scene.environment.follows_video = 0;
     if (has("untinted_shadows"))
         for (arhost_material &material : view<arhost_material>(scene, scene.materials))
             std::fill_n(material.shadow_attenuation, 3, 1.0f);
@@ -851,8 +853,6 @@ const arhost_plugin &wrong_plugin() {
         descriptor.needs = unknown;
     if (has("unknown_capability"))
         descriptor.capabilities |= std::uint64_t{1} << 63;
-    if (has("undeclared_video"))
-        descriptor.capabilities &= ~ARHOST_RAYTRACER_CAPABILITY_VIDEO;
     static bool was_called = false;
     if (has("withdraws_a_capability") && std::exchange(was_called, true))
         descriptor.capabilities &= ~ARHOST_RAYTRACER_CAPABILITY_LENS_DISTORTION;

@@ -105,8 +105,8 @@ TEST(Capabilities, IncludeMotionOnlyOfAnimatedScenes) {
 }
 
 TEST(Capabilities, EverySceneHasABitForEachPart) {
-    std::uint32_t all = 0;
-    for (std::uint32_t bit = ARHOST_RAYTRACER_CAPABILITY_REFLECTION; bit <= ARHOST_RAYTRACER_CAPABILITY_MOTION;
+    std::uint64_t all = 0;
+    for (std::uint64_t bit = ARHOST_RAYTRACER_CAPABILITY_REFLECTION; bit <= ARHOST_RAYTRACER_CAPABILITY_MOTION;
          bit <<= 1) {
         EXPECT_NE(missing_capabilities_text("rt", bit), "");
         all |= bit;

@@ -18,7 +18,7 @@ struct Model {
 };
 
 arhost_intrinsics intrinsics_of(const Model &model) {
-    arhost_intrinsics in{sizeof in, 640, 480, model.distortion, 560, 540, 301.5, 262.25, 0, 0, {}};
+    arhost_intrinsics in{sizeof in, 640, 480, model.distortion, 560, 540, 301.5, 262.25, 0, 0, {}, {}};
     in.coefficient_count = static_cast<std::uint32_t>(model.coefficients.size());
     std::copy(model.coefficients.begin(), model.coefficients.end(), in.coefficients);
     return in;

@@ -188,13 +188,13 @@ TEST_F(SinkPoses, EveryNumberReadsBackAsTheSameDouble) {
 
 TEST_F(SinkPoses, WritesHowTheTrackerHasSearched) {
     TrackedRecord record = full_record(0);
-    record.fields.search = {1, 5, 1, 6, 2, 9};
+    record.fields.search = {1, 5, 1, 6, 2, 9, {}};
     const Json line = Json::parse(line_of(record));
     EXPECT_THAT(keys_of(line),
                 ElementsAre("frame", "capture_ns", "clock", "overlay", "targets", "search", "camera", "truth"));
     EXPECT_EQ(line["search"].dump(),
               R"({"everywhere":true,"observations":5,"unlisted":1,"expected":6,"missed":2,"candidates":9})");
-    record.fields.search = {0, 0, 0, 3, 3, -1};
+    record.fields.search = {0, 0, 0, 3, 3, -1, {}};
     EXPECT_EQ(Json::parse(line_of(record))["search"].dump(),
               R"({"everywhere":false,"observations":0,"unlisted":0,"expected":3,"missed":3,"candidates":null})");
 }
@@ -361,7 +361,7 @@ TEST_F(SinkPoses, TheReadmeExampleHasTheSameKeys) {
     const Json example = Json::parse(readme.substr(begin, readme.find("```", begin) - begin));
     TrackedRecord record = full_record(0);
     record.fields.has_truth = 0;
-    record.fields.search = {0, 1, 0, 1, 0, 0};
+    record.fields.search = {0, 1, 0, 1, 0, 0, {}};
     std::ranges::copy(record.targets[1].mt_alternative, record.targets[0].mt_alternative);
     const Json line = Json::parse(line_of(record));
     EXPECT_EQ(keys_of(example), keys_of(line));

@@ -30,7 +30,7 @@ TEST(Uvc, DeclaresUsbNeedsAndLiveCapability) {
     SourceUnderTest source("source_uvc");
     const arhost_descriptor &descriptor = source.plugin().descriptor();
     EXPECT_STREQ(descriptor.id, "org.arhost.source_uvc");
-    EXPECT_EQ(descriptor.capabilities, static_cast<std::uint32_t>(ARHOST_SOURCE_CAPABILITY_LIVE));
+    EXPECT_EQ(descriptor.capabilities, ARHOST_SOURCE_CAPABILITY_LIVE);
     ASSERT_NE(descriptor.needs, nullptr);
     EXPECT_STREQ(descriptor.needs[0], "usb");
     EXPECT_EQ(descriptor.needs[1], nullptr);

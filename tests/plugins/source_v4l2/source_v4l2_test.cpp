@@ -63,7 +63,7 @@ TEST(V4l2, DeclaresVideoNeedsAndLiveCapability) {
     SourceUnderTest source("source_v4l2");
     const arhost_descriptor &descriptor = source.plugin().descriptor();
     EXPECT_STREQ(descriptor.id, "org.arhost.source_v4l2");
-    EXPECT_EQ(descriptor.capabilities, static_cast<std::uint32_t>(ARHOST_SOURCE_CAPABILITY_LIVE));
+    EXPECT_EQ(descriptor.capabilities, ARHOST_SOURCE_CAPABILITY_LIVE);
     ASSERT_NE(descriptor.needs, nullptr);
     EXPECT_STREQ(descriptor.needs[0], "video");
     EXPECT_EQ(descriptor.needs[1], nullptr);

@@ -61,7 +61,8 @@ constexpr arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                           "arhost",
                                           "Apache-2.0",
                                           "Mirrors the video in a linear image, for tests.",
-                                          ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES | ARHOST_RAYTRACER_CAPABILITY_VIDEO |
+                                          ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES |
+                                              ARHOST_RAYTRACER_CAPABILITY_VIDEO |
                                               ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES,
                                           std::size(options),
                                           options,

@@ -90,10 +90,10 @@ typedef struct arhost_render_request {
     /* Memory of the ray tracer that survives the end of the worker process, because the host keeps it: accumulated
      * samples, for example. Both pointers are aligned to 4,096 bytes; both are NULL if `state_size` is 0.
      * `state_before`, read-only: the `state_after` of the last accepted call, even if another worker process made
-     * that call. NULL in the first image after a start with another scene or size, and after a swap to another ray
-     * tracer, a fallback, or a restart with another version or another state_size. `state_after`: its initial content
-     * is undefined; write it completely. The host discards it if the call fails, and may discard it even if the call
-     * succeeds. */
+     * that call. NULL in the first image after a start with another scene or size of the setup (store the size of the
+     * image in the state if it may be scaled), and after a swap to another ray tracer, a fallback, or a restart with
+     * another version or another state_size. `state_after`: its initial content is undefined; write it completely.
+     * The host discards it if the call fails, and may discard it even if the call succeeds. */
     const void *state_before;
     void *state_after;
     uint64_t state_size; /* bytes of each; 0 if both are NULL */
