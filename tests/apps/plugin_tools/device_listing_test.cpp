@@ -58,8 +58,8 @@ private:
 
 TEST_F(Probe, DescribesAPluginOrWhyItIsUnusable) {
     std::string level;
-    const supervise::ProbeResult good = supervise::probe(context(), file("source_counter"), {}, &level);
-    EXPECT_EQ(std::get<model::PluginDescription>(good).id, "source_counter");
+    const supervise::ProbeResult good = supervise::probe(context(), file("org.arhost.test.source_counter"), {}, &level);
+    EXPECT_EQ(std::get<model::PluginDescription>(good).id, "org.arhost.test.source_counter");
     EXPECT_NE(level, "");
     EXPECT_THAT(std::get<std::string>(supervise::probe(context(), file("no_plugin"), {})),
                 HasSubstr("is not an arhost plugin"));
