@@ -15,7 +15,7 @@ run_config::Configuration latency_configuration(const Arguments &arguments) {
     root.override_value("mode", "live", "arhost latency");
     root.override_value("tracker",
                         fmt::format("{{plugin: tracker_apriltag, targets: [{{ids: 0-{}, family: tag36h11, side_mm: "
-                                    "100}}]}}",
+                                    "100}}], options: {{closer_look: false}}}}",
                                     latency::TimeCodes::count - 1),
                         "arhost latency");
     override_settings(root, arguments);

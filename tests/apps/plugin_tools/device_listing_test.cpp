@@ -58,7 +58,7 @@ private:
 
 TEST_F(Probe, DescribesAPluginOrWhyItIsUnusable) {
     std::string level;
-    const supervise::ProbeResult good = supervise::probe(context(), file("org.arhost.test.source_counter"), {}, &level);
+    const supervise::ProbeResult good = supervise::probe(context(), file("source_counter"), {}, &level);
     EXPECT_EQ(std::get<model::PluginDescription>(good).id, "org.arhost.test.source_counter");
     EXPECT_NE(level, "");
     EXPECT_THAT(std::get<std::string>(supervise::probe(context(), file("no_plugin"), {})),
