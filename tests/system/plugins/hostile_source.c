@@ -54,7 +54,7 @@ static void report_lens(arhost_source_properties *properties) {
     lens->distortion = ARHOST_DISTORTION_BROWN;
     lens->coefficient_count = ARHOST_MAX_DISTORTION;
     for (i = 0; i < ARHOST_MAX_DISTORTION; ++i)
-        lens->coefficients[i] = 1e30;
+        lens->coefficients[i] = i < 12 ? 1e30 : 0; /* a tilted sensor is refused before the lens is examined */
 }
 
 static arhost_status start(arhost_instance *self, const arhost_source_setup *setup,
