@@ -2,7 +2,6 @@
 #include "host/component_options.hpp"
 
 #include <algorithm>
-#include <ranges>
 
 namespace arhost::host {
 
@@ -36,7 +35,7 @@ std::vector<OptionValue> ComponentOptions::choose(const supervise::Component &co
 // Two files with the same id are two versions or copies of a plugin. A component may run one after the other: its
 // fallback may be an older version.
 void ComponentOptions::expect_unique(const supervise::Component &component, const yaml::Node &node) const {
-    for (const InUse &in_use : in_use_ | std::views::values) {
+    for (const auto &[other, in_use] : in_use_) {
         std::error_code ignored;
         if (in_use.component != component.name() && in_use.plugin == component.description().id &&
             !std::filesystem::equivalent(in_use.file, component.plugin(), ignored))
