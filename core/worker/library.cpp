@@ -9,7 +9,6 @@
 #include <cstddef>
 #include <dlfcn.h>
 #include <initializer_list>
-#include <regex>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -74,8 +73,11 @@ void check_kind(const std::filesystem::path &file, const arhost_plugin &plugin) 
 
 // Whether an id has three or more parts, as in "org.arhost.rt_embree".
 bool is_unique_id(const std::string &id) {
-    static const std::regex parts("[A-Za-z0-9_-]+([.][A-Za-z0-9_-]+){2,}");
-    return std::regex_match(id, parts);
+    constexpr const char *characters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
+    const bool has_empty_part =
+        id.empty() || id.front() == '.' || id.back() == '.' || id.find("..") != std::string::npos;
+    return !has_empty_part && id.find_first_not_of(characters) == std::string::npos &&
+           std::ranges::count(id, '.') >= 2;
 }
 
 // Substrings of dlopen's out-of-memory messages; the message depends on the step that failed.
