@@ -5,7 +5,7 @@ use crate::abi::*;
 use std::borrow::Cow;
 use std::ffi::CStr;
 use std::ops::Deref;
-use std::os::raw::c_char;
+use std::os::raw::{c_char, c_void};
 use std::slice;
 
 /// A frame to read.
@@ -46,13 +46,11 @@ impl TrackRequest<'_> {
     }
     /// What an earlier call wrote to `state_after`; `None` in the first frame.
     pub fn state_before(&self) -> Option<&[u8]> {
-        let before = self.0.state_before.cast::<u8>();
-        unsafe { (!before.is_null()).then(|| slice::from_raw_parts(before, self.0.state_size as usize)) }
+        unsafe { state_before(self.0.state_before, self.0.state_size) }
     }
     /// To be written completely.
     pub fn state_after(&mut self) -> &mut [u8] {
-        let after = self.0.state_after.cast::<u8>();
-        unsafe { if after.is_null() { &mut [] } else { slice::from_raw_parts_mut(after, self.0.state_size as usize) } }
+        unsafe { state_after(self.0.state_after, self.0.state_size) }
     }
 }
 
@@ -175,13 +173,6 @@ pub fn half_of(number: f32) -> u16 {
     sign | half as u16
 }
 
-impl arhost_render_request {
-    /// The frame under the overlay, only with `ARHOST_RAYTRACER_CAPABILITY_VIDEO`.
-    pub fn video_frame(&self) -> Option<Frame<'_>> {
-        unsafe { self.video.as_ref() }.map(Frame)
-    }
-}
-
 /// The image to write, in the form that the setup asks for: straight RGBA8 (sRGB-encoded, alpha exactly 0 where no ray
 /// hit), or linear pixels.
 pub struct Image<'a>(pub(crate) &'a arhost_image);
@@ -230,6 +221,18 @@ impl Deref for Output<'_> {
     type Target = arhost_output;
     fn deref(&self) -> &arhost_output {
         self.0
+    }
+}
+
+unsafe fn state_before<'a>(before: *const c_void, size: u64) -> Option<&'a [u8]> {
+    (!before.is_null()).then(|| slice::from_raw_parts(before.cast(), size as usize))
+}
+
+unsafe fn state_after<'a>(after: *mut c_void, size: u64) -> &'a mut [u8] {
+    if after.is_null() {
+        &mut []
+    } else {
+        slice::from_raw_parts_mut(after.cast(), size as usize)
     }
 }
 
@@ -341,15 +344,17 @@ impl RenderRequest<'_> {
     pub fn motion(&self) -> Option<&arhost_motion> {
         unsafe { self.0.motion.as_ref() }
     }
+    /// The frame under the overlay, only with `ARHOST_RAYTRACER_CAPABILITY_VIDEO`.
+    pub fn video_frame(&self) -> Option<Frame<'_>> {
+        unsafe { self.0.video.as_ref() }.map(Frame)
+    }
     /// What an earlier call wrote to `state_after`; `None` in the first image.
     pub fn state_before(&self) -> Option<&[u8]> {
-        let before = self.0.state_before.cast::<u8>();
-        unsafe { (!before.is_null()).then(|| slice::from_raw_parts(before, self.0.state_size as usize)) }
+        unsafe { state_before(self.0.state_before, self.0.state_size) }
     }
     /// To be written completely.
     pub fn state_after(&mut self) -> &mut [u8] {
-        let after = self.0.state_after.cast::<u8>();
-        unsafe { if after.is_null() { &mut [] } else { slice::from_raw_parts_mut(after, self.0.state_size as usize) } }
+        unsafe { state_after(self.0.state_after, self.0.state_size) }
     }
 }
 

@@ -19,7 +19,7 @@ impl Raytracer for Mirror {
     /// The first pixel of each row adds the code of the video's first pixel in this row, and lets half of it through.
     fn render(
         &mut self,
-        request: &arhost_render_request,
+        request: &mut RenderRequest,
         image: &mut Image,
         _: &mut arhost_render_info,
     ) -> Result<(), Failure> {
