@@ -23,11 +23,15 @@ struct OptionDeclaration {
     std::vector<std::string> choices;
     std::string help;
 };
+// Returns the last part of a plugin's id, by which configurations and messages name the plugin: "rt_embree".
+inline std::string short_name(const std::string &id) {
+    return id.substr(id.rfind('.') + 1);
+}
+
 struct PluginDescription {
     arhost_kind kind = 0;
     std::string id, name, version, vendor, licence, description;
-    // The last part of the id, by which configurations and messages name the plugin: "rt_embree".
-    std::string short_name() const { return id.substr(id.rfind('.') + 1); }
+    std::string short_name() const { return model::short_name(id); }
     std::uint64_t capabilities = 0;
     std::vector<OptionDeclaration> options;
     std::vector<std::string> needs;      // elements of sandbox::allowances

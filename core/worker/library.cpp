@@ -139,7 +139,7 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
     if (!is_unique_id(id))
         reject(file, "its id is '" + id + "'; it must begin with a domain in reverse order, as in 'org.example." +
                          (id.empty() ? "tracker" : id) + "'");
-    const std::string name = id.substr(id.rfind('.') + 1);
+    const std::string name = model::short_name(id);
     if (file.stem() != name && file.stem() != "lib" + name) // some build tools prepend "lib" to the file name
         reject(file, "its id is '" + id + "'; rename the file to match");
     for (const char *const *need = plugin->descriptor->needs; need && *need; ++need)

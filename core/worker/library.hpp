@@ -16,7 +16,7 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
 
 // Returns the size of a started tracker's state. Throws std::runtime_error if it exceeds ARHOST_MAX_STATE.
 std::uint64_t state_size_of(const arhost_tracker &tracker, arhost_instance *instance);
-// Returns the size of a started ray tracer's state, which the host limits.
+// Returns the size of a started ray tracer's state. Throws std::runtime_error if it exceeds ipc::max_raytracer_state.
 std::uint64_t state_size_of(const arhost_raytracer &raytracer, arhost_instance *instance);
 // Returns what arhost_tracker.aspect returns for a marker; 1 if the tracker has no such function. Throws
 // std::runtime_error if the number is invalid.

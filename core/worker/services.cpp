@@ -335,7 +335,7 @@ public:
             motion_.emplace(*setup.scene);
         anchors_.resize(setup.scene->anchors.count);
         const std::uint64_t missing = scene::needed_capabilities(*setup.scene) & ~ready.capabilities;
-        if (const std::string warning = scene::missing_capabilities_text(describe(descriptor_).short_name(), missing);
+        if (const std::string warning = scene::missing_capabilities_text(model::short_name(descriptor_.id), missing);
             !warning.empty())
             host_.log(&host_, ARHOST_SEVERITY_WARNING, warning.c_str());
         const arhost_status status = raytracer_.start(instance_, &setup);

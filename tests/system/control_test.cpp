@@ -148,6 +148,13 @@ Json swap(const std::string &component, const std::string &plugin) {
     return {{"command", "swap"}, {"component", component}, {"plugin", plugin}};
 }
 
+// A run whose second ray tracer is rt_light.
+std::string controlled_with_light() {
+    std::string yaml = controlled("lockstep");
+    const std::string second = "second, plugin: rt_counter";
+    return yaml.replace(yaml.find(second), second.size(), "light, plugin: rt_light");
+}
+
 } // namespace
 
 TEST(Control, StatusDescribesTheRun) {
@@ -228,9 +235,8 @@ TEST(Control, ReplacesTrackerAndRayTracerWithoutLosingAFrame) {
 }
 
 TEST(Control, ReplacesStraightByLinearImagesAndBackWithoutLosingAFrame) {
-    std::string yaml = controlled("lockstep"), scene = small_scene;
-    const std::string second = "second, plugin: rt_counter";
-    ControlledRun run(yaml.replace(yaml.find(second), second.size(), "light, plugin: rt_light"));
+    std::string scene = small_scene;
+    ControlledRun run(controlled_with_light());
     run.write("scene.yaml", scene.replace(scene.find('1'), 1, "2"));
     run.start_and_connect();
     for (int i = 0; i < 2; ++i)
@@ -324,9 +330,8 @@ TEST(Control, LoadsAScene) {
 }
 
 TEST(Control, ASceneOfAnotherIntegratorReplacesTheFormOfImages) {
-    std::string yaml = controlled("lockstep"), path = small_scene;
-    const std::string second = "second, plugin: rt_counter";
-    ControlledRun run(yaml.replace(yaml.find(second), second.size(), "light, plugin: rt_light"));
+    std::string path = small_scene;
+    ControlledRun run(controlled_with_light());
     run.write("other.yaml", path.replace(path.find('1'), 1, "2"));
     run.start_and_connect();
     const auto load = [](const std::string &scene) { return Json{{"command", "load_scene"}, {"scene", scene}}; };
