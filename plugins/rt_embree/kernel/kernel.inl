@@ -207,7 +207,7 @@ template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, c
     const Rectangle &all = tile.pixels;
     Rectangle drawn{all.x1, all.y1, all.x0, all.y0};
     const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();
-    Work work{frame, scratch, 0, Int(all.x0 * 65536 + all.y0) ^ Int(0x51ed270b), 0};
+    Work work{frame, scratch, 0, static_cast<std::uint32_t>(all.x0 * 65536 + all.y0) ^ 0x51ed270bu, 0};
     bool has_light[tile_pixels / lanes];
     for (int i = 0; i < frame.scene.sum_row_count(); ++i)
         __builtin_memset(scratch.sum[i], 0, tile_pixels * sizeof(float));

@@ -11,7 +11,8 @@ enum PhotonDimension : int { target_dimension = 128, origin_dimension, aim_dimen
 
 // Returns the random numbers of a dimension of the photons with these numbers.
 ARHOST_INLINE Pair photon_pair(Int number, int dimension) {
-    return owen_pair(number, hash(Int(dimension)));
+    const PairBits<Int> bits = owen_pair(number, hash(Int(dimension)));
+    return pair_of(bits.u, bits.v);
 }
 
 // Light that leaves a lamp towards a mirror or glass.

@@ -5,10 +5,14 @@
 #pragma once
 #include "trace.inl"
 
-// Returns a 32-bit hash of `x` ("lowbias32" by C. Wellons).
-ARHOST_INLINE Int hash(Int x) {
-    x = (x ^ shift_right_unsigned(x, 16)) * Int(0x7feb352d);
-    x = (x ^ shift_right_unsigned(x, 15)) * Int(static_cast<int>(0x846ca68bu));
+ARHOST_INLINE std::uint32_t shift_right_unsigned(std::uint32_t a, int bits) {
+    return a >> bits;
+}
+
+// Returns a 32-bit hash of `x` ("lowbias32" by C. Wellons). Word: Int, or std::uint32_t for a number of all lanes.
+template <class Word> ARHOST_INLINE Word hash(Word x) {
+    x = (x ^ shift_right_unsigned(x, 16)) * Word(0x7feb352d);
+    x = (x ^ shift_right_unsigned(x, 15)) * Word(static_cast<int>(0x846ca68bu));
     return x ^ shift_right_unsigned(x, 16);
 }
 

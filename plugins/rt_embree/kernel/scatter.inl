@@ -19,12 +19,12 @@ struct Work {
     const Frame &frame;
     Scratch &scratch;
     std::uint32_t deepest; // no queue of a greater depth has rays
-    Int seed;              // seed of the tile's random numbers
+    std::uint32_t seed;    // seed of the tile's random numbers
     std::uint32_t sample;  // index of the current sample among all accumulated ones
 };
 
 ARHOST_INLINE Random random_of(const Work &work, const Paths &paths) {
-    return {paths.pixel ^ Int(static_cast<int>(paths.depth << 12)), work.seed, work.sample};
+    return {paths.pixel ^ Int(static_cast<int>(paths.depth << 12)), Int(static_cast<int>(work.seed)), work.sample};
 }
 
 ARHOST_INLINE void add_radiance(Work &work, const Paths &paths, Vec3 radiance, Bool active) {

@@ -253,6 +253,34 @@ TEST(PathIntegrator, MeanOfOneSampleFramesIsTheConvergedImage) {
     EXPECT_LT(worst, 0.12);
 }
 
+TEST(PathIntegrator, ErrorsOfNeighboursCancel) {
+    const auto make = [] {
+        SceneBuilder scene(path_settings());
+        scene.add_light(bulb({60, 0, 120}, 60, 1));
+        scene.add_mesh("floor", square(2000), diffuse(0.8f, 0.8f, 0.8f));
+        return scene;
+    };
+    constexpr std::uint32_t side = 64, square_side = 4;
+    const arhost_camera view = camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, pinhole(side, side, 60));
+    const LinearPicture converged = rendered(make(), view, {{"samples", "256"}});
+    const LinearPicture noisy = rendered(make(), view, {{"samples", "1"}});
+    double squares_of_pixels = 0, squares_of_means = 0;
+    for (std::uint32_t y = 0; y < side; y += square_side)
+        for (std::uint32_t x = 0; x < side; x += square_side) {
+            double mean = 0;
+            for (std::uint32_t i = 0; i < square_side * square_side; ++i) {
+                const std::uint32_t column = x + i % square_side, row = y + i / square_side;
+                const double error = noisy.value(column, row, 0) - converged.value(column, row, 0);
+                mean += error / (square_side * square_side);
+                squares_of_pixels += error * error / (square_side * square_side);
+            }
+            squares_of_means += mean * mean;
+        }
+    ASSERT_GT(squares_of_pixels, 0);
+    const double of_independent_pixels = 1.0 / square_side;
+    EXPECT_LT(std::sqrt(squares_of_means / squares_of_pixels), 0.6 * of_independent_pixels);
+}
+
 TEST(PathIntegrator, EqualRequestsGiveEqualBytes) {
     const auto make = [] {
         SceneBuilder scene = table(path_settings(0.3f));
