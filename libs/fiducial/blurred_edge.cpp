@@ -123,13 +123,19 @@ bool remove_outliers(std::vector<Pixel> &pixels, double min_error) {
         columns[pixel.column].squares += pixel.residual * pixel.residual;
         ++columns[pixel.column].pixels;
     }
+    const auto exceeds = [](double bound) {
+        return [bound](const Column &column) { return column.mean_square() > bound; };
+    };
+    const double min_square = min_error * min_error;
+    if (std::ranges::none_of(columns, exceeds(min_square))) // saves the median
+        return false;
     std::vector<double> sorted;
     sorted.reserve(columns.size());
     for (const Column &column : columns)
         if (column.pixels > 0)
             sorted.push_back(column.mean_square());
-    const double bound = std::max(max_ratio * median(sorted), min_error * min_error);
-    return std::erase_if(pixels, [&](const Pixel &pixel) { return columns[pixel.column].mean_square() > bound; }) > 0;
+    const auto is_outlier = exceeds(std::max(max_ratio * median(sorted), min_square));
+    return std::erase_if(pixels, [&](const Pixel &pixel) { return is_outlier(columns[pixel.column]); }) > 0;
 }
 
 // Statistics of the derivative of the cost with respect to the offset. Each column contributes one term to it.

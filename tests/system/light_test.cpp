@@ -55,6 +55,42 @@ TEST(LinearImages, KillingWorkersDoesNotChangeThem) {
     EXPECT_EQ(run.stats()["restarts"]["raytracer"], 2);
 }
 
+// The random numbers of frames continue one sequence, and glass shows the video of its frame.
+TEST(LinearImages, KillingRealWorkersEvery20FramesDoesNotChangeThem) {
+    const std::string yaml =
+        "version: 1\n"
+        "source: {plugin: source_synthetic, options: {id: 3, width: 160, height: 120, frames: 120}}\n"
+        "tracker: {plugin: tracker_aruco, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"
+        "raytracer: {plugin: rt_embree, scene: scene.yaml, options: {samples: 1, threads: 2}}\n"
+        "outputs: [{plugin: sink_poses, path: poses.jsonl}, {plugin: sink_images, path: \"%04d.png\"}]\n"
+        "stats: stats.json\nrestart: {first_delay_ms: 1}\n";
+    const std::string scene =
+        "version: 2\naxes: z-up\nbackground: 0.2\n"
+        "lights: [{type: sphere, position: [-160, -140, 260], radius: 20, intensity: 1}]\n"
+        "materials: {paper: {model: diffuse, diffuse: 0.7}, glass: {model: glass, index: 1.5}}\n"
+        "objects:\n- {name: table, plane: {size: 500}, material: paper, role: catcher}\n"
+        "- {name: ball, sphere: {centre: [0, 0, 25], radius: 20}, material: glass}\n";
+    ArhostRun clean(yaml), killed(yaml);
+    for (const ArhostRun *run : {&clean, &killed})
+        run->write("scene.yaml", scene);
+    ASSERT_EQ(clean.run(), 0) << clean.output();
+    killed.start();
+    std::size_t kills = 0;
+    for (std::size_t next = 20; killed.wait_for_lines(next, "poses.jsonl");
+         next = killed.lines("poses.jsonl") + 20)
+        if (const pid_t worker = killed.wait_for_worker(kills++ % 2 == 0 ? "rt_embree" : "tracker_aruco"))
+            send_signal(worker, SIGKILL);
+    ASSERT_EQ(killed.wait(), 0) << killed.output();
+    for (const char *stage : {"raytracer", "tracker"})
+        EXPECT_GE(killed.stats()["restarts"][stage], 2) << stage;
+    EXPECT_EQ(killed.read("poses.jsonl"), clean.read("poses.jsonl"));
+    for (int frame = 0; frame < 120; ++frame) {
+        const std::string name = std::to_string(10000 + frame).substr(1) + ".png";
+        ASSERT_TRUE(clean.exists(name)) << name;
+        ASSERT_EQ(killed.read(name), clean.read(name)) << name;
+    }
+}
+
 TEST(LinearImages, AreNotRequestedFromAPluginWithoutThem) {
     LightRun run({.source = "frames: 30"}, "rt_counter");
     ASSERT_EQ(run.run(), 0) << run.output();
