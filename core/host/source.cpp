@@ -114,7 +114,8 @@ void Source::set_intrinsics(const messages::Ready &ready) {
 }
 
 FrameFlow::Intake Source::intake() const {
-    const bool is_ready = slots_ && has_started();
+    const bool is_ready =
+        slots_ && has_started() && (!component_ || component_->earlier_outputs() < max_earlier_outputs);
     return {is_ready ? FrameFlow::Readiness::ready : FrameFlow::Readiness::down, slots_.get()};
 }
 

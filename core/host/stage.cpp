@@ -37,12 +37,16 @@ Stage::Stage(RunParts &parts, const char *name, const run_config::ComponentConfi
 
 FrameFlow::Intake Stage::intake() const {
     using enum FrameFlow::Readiness;
-    const bool is_disabled = component_->state() == Component::State::disabled;
-    return {.readiness = is_disabled                                 ? disabled
-                         : !running()                                ? down
-                         : component_->in_flight() >= max_in_flight_ ? busy
-                                                                     : ready,
-            .slots = slots_.get()};
+    const auto readiness = [&] {
+        if (component_->state() == Component::State::disabled)
+            return disabled;
+        if (!running())
+            return down;
+        const bool is_busy =
+            component_->in_flight() >= max_in_flight_ || component_->earlier_outputs() >= max_earlier_outputs;
+        return is_busy ? busy : ready;
+    };
+    return {.readiness = readiness(), .slots = slots_.get()};
 }
 
 bool Stage::continues_state(std::uint64_t slot_size) {

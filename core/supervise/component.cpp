@@ -125,6 +125,11 @@ void Component::disable(const std::string &reason) {
     process_->kill_now();
 }
 
+std::size_t Component::earlier_outputs() const {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(earlier_outputs_, [](const auto &region) { return !region.expired(); }));
+}
+
 // Returns the worker's generation number for this memory.
 std::uint32_t Component::attach(const RegionPointer &input) {
     for (const AttachedInput &attached : attached_inputs_)
@@ -313,7 +318,9 @@ void Component::on_died(const Death &death) {
     total_deadline_.cancel();
     counters_of_dead_ = counters();
     counters_.clear();
-    output_.reset();
+    std::erase_if(earlier_outputs_, [](const auto &region) { return region.expired(); });
+    if (output_)
+        earlier_outputs_.push_back(std::exchange(output_, nullptr));
     pending_output_.reset();
     attached_inputs_.clear();
     const std::vector<Command> unanswered(in_flight_.begin(), in_flight_.end());

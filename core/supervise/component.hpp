@@ -101,6 +101,8 @@ public:
 
     // The output slots of the current process; null until the state is `running`.
     const RegionPointer &output() const { return output_; }
+    // The number of regions with output slots of dead processes that are still in use.
+    std::size_t earlier_outputs() const;
 
     std::size_t in_flight() const { return in_flight_.size(); }
     // Sets the ticket and the generations of the command and sends it. First attaches the regions that the worker
@@ -173,6 +175,7 @@ private:
     std::unique_ptr<Process> process_;
     std::shared_ptr<Region> pending_output_;
     RegionPointer output_;
+    std::vector<std::weak_ptr<const Region>> earlier_outputs_;
     struct AttachedInput {
         std::weak_ptr<const Region> region;
         std::uint32_t generation; // generation number in the worker

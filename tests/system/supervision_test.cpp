@@ -435,6 +435,44 @@ TEST(Supervision, ARaytracersStateSurvivesItsWorker) {
     }
 }
 
+namespace {
+
+// Returns how many regions of the ray tracer's memory the host has mapped.
+std::size_t mapped_regions(const ArhostRun &run) {
+    const std::string process = "/proc/" + std::to_string(run.pid());
+    send_signal(run.pid(), SIGSTOP); // the kernel does not write the list in one piece
+    (void)run.eventually([&] { return status_of(run.pid(), "State").starts_with("T"); });
+    std::istringstream maps(read_file(process + "/maps"));
+    send_signal(run.pid(), SIGCONT);
+    std::set<std::string> inodes;
+    std::string addresses, access, offset, device, inode, rest;
+    while (maps >> addresses >> access >> offset >> device >> inode && std::getline(maps, rest))
+        if (rest.find("memfd:arhost-raytracer") != std::string::npos)
+            inodes.insert(inode);
+    return inodes.size();
+}
+
+} // namespace
+
+// The output is so slow that images of more dead workers would wait for it.
+TEST(Supervision, ARaytracerThatDiesAfterEachImagePinsTheMemoryOfTwoDeadWorkers) {
+    constexpr std::size_t frames = 25;
+    ArhostRun run(with_raytracer_state("25", "state_size: 100000, crash_after: 1"));
+    run.write("scene.yaml", small_scene);
+    run.start({"--config", "run.yaml", "--set",
+               "outputs=[{plugin: sink_counter, path: counted.txt, options: {delay_ms: 100}}]", "--set",
+               "restart.proven_after_frames=1"});
+    std::size_t most = 0;
+    (void)run.eventually([&] {
+        most = std::max(most, mapped_regions(run));
+        return false;
+    });
+    EXPECT_EQ(run.wait(), 0) << run.output();
+    EXPECT_EQ(rendered_before(run), numbers(frames));
+    EXPECT_GT(most, 1u);
+    EXPECT_LE(most, 3u);
+}
+
 // The worker dies while it renders frame 20, after it has written state_after.
 TEST(Supervision, AnImageThatKillsItsRaytracerLeavesTheStateAsItWas) {
     ArhostRun run(with_raytracer_state("40", "state_size: 100000, crash_at: 20"));

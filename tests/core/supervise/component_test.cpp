@@ -130,6 +130,23 @@ TEST(Component, ReportsLostCommandsAndGetsNewMemoryAfterADeath) {
     EXPECT_EQ(bench.component->crashes()[0].frame, 2u);
 }
 
+TEST(Component, CountsTheMemoryOfDeadProcessesThatIsInUse) {
+    Bench bench;
+    bench.make("source_counter", {.restart = {.proven_after_frames = 1}}, {{"frames", 100}, {"crash_at", 1}});
+    std::vector<RegionPointer> used;
+    for (std::size_t starts = 1; starts <= 3; ++starts) {
+        ASSERT_TRUE(bench.until("running", starts)) << bench.log;
+        EXPECT_EQ(bench.component->earlier_outputs(), starts - 1);
+        used.push_back(bench.component->output());
+        bench.read(0);
+        bench.read(1);
+    }
+    used.erase(used.begin());
+    EXPECT_EQ(bench.component->earlier_outputs(), 1u);
+    used.clear();
+    EXPECT_EQ(bench.component->earlier_outputs(), 0u);
+}
+
 TEST(Component, IsRestartedIfItsProcessIsStoppedBeyondTheDeadline) {
     Bench bench;
     bench.make("source_counter", {.frame = 200ms, .restart = {.first_delay = 1ms}},

@@ -17,7 +17,7 @@
 
 struct arhost_instance {
     const arhost_host *host;
-    int64_t crash_at, hang_at, hang_until, error_at, error_after, error, answer;
+    int64_t crash_at, crash_after, hang_at, hang_until, error_at, error_after, error, answer;
     int64_t images; /* rendered so far */
     double delay_ms;
     int64_t delay_from, reports_progress, writes_later, device_time_ns;
@@ -33,6 +33,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     self->host = host;
     misbehave_install();
     self->crash_at = arhost_find_option(options, option_count, "crash_at")->integer;
+    self->crash_after = arhost_find_option(options, option_count, "crash_after")->integer;
     self->hang_at = arhost_find_option(options, option_count, "hang_at")->integer;
     self->hang_until = arhost_find_option(options, option_count, "hang_until")->integer;
     self->error_at = arhost_find_option(options, option_count, "error_at")->integer;
@@ -104,14 +105,14 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
     const int64_t number = (int64_t)(request->camera.eye[2] - 500.0 + 0.5);
     const uint64_t shown = request->state_size > 0 ? count(request) : (uint64_t)number;
     uint32_t x, y;
-    if (number == self->crash_at) {
+    if (number == self->crash_at || (self->crash_after >= 0 && self->images >= self->crash_after)) {
         signal(SIGSEGV, SIG_DFL);
         raise(SIGSEGV);
     }
     while (number == self->hang_at || (number > self->hang_at && number < self->hang_until))
         pause();
     if (misbehave_if_requested() || number == self->error_at ||
-        (self->error_after >= 0 && self->images++ >= self->error_after))
+        (self->error_after >= 0 && self->images >= self->error_after))
         return (arhost_status)self->error;
     if (number >= self->delay_from && wait_or_cancel(self)) {
         self->host->log(self->host, ARHOST_SEVERITY_INFO, "cancelled while waiting");
@@ -128,6 +129,7 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
     if (self->writes_later && self->last)
         memset(self->last, 0, (size_t)image->stride * image->height);
     self->last = image->rgba;
+    ++self->images;
     info->has_region = 1;
     info->region_width = info->region_height = 16;
     info->device_time_ns = (uint64_t)self->device_time_ns;
@@ -140,6 +142,8 @@ static void stop(arhost_instance *self) {
 
 static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "crash_at", "-1", 0, 0, NULL, "Crashes at this frame"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "crash_after", "-1", 0, 0, NULL,
+     "Crashes after this many images; -1: never"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "hang_until", "-1", 0, 0, NULL,
      "Also hangs at later frames before this one; -1: none"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "hang_at", "-1", 0, 0, NULL,
