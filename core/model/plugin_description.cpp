@@ -14,7 +14,26 @@ std::string text_or_empty(const char *text) {
     return text ? text : "";
 }
 
+// Whether an id has three or more parts, as in "org.arhost.rt_embree".
+bool is_unique_id(const std::string &id) {
+    constexpr const char *characters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
+    const bool has_empty_part =
+        id.empty() || id.front() == '.' || id.back() == '.' || id.find("..") != std::string::npos;
+    return !has_empty_part && id.find_first_not_of(characters) == std::string::npos &&
+           std::ranges::count(id, '.') >= 2;
+}
+
 } // namespace
+
+std::string problem_with_id(const std::string &id, const std::filesystem::path &file) {
+    if (!is_unique_id(id))
+        return "its id is '" + id + "'; it must begin with a domain in reverse order, as in 'org.example." +
+               (id.empty() ? "tracker" : id) + "'";
+    const std::string name = short_name(id);
+    if (file.stem() != name && file.stem() != "lib" + name) // some build tools prepend "lib" to the file name
+        return "its id is '" + id + "'; rename the file to match";
+    return "";
+}
 
 std::vector<const arhost_option_descriptor *> options_of(const arhost_descriptor &descriptor) {
     std::vector<const arhost_option_descriptor *> all;

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
@@ -27,6 +28,9 @@ struct OptionDeclaration {
 inline std::string short_name(const std::string &id) {
     return id.substr(id.rfind('.') + 1);
 }
+
+// Returns what is wrong with the id of the plugin in `file`; "" if nothing is.
+std::string problem_with_id(const std::string &id, const std::filesystem::path &file);
 
 struct PluginDescription {
     arhost_kind kind = 0;

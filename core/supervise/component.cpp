@@ -215,6 +215,8 @@ void Component::on_hello(const Message &message) {
         messages::Hello hello = parse<messages::Hello>(message);
         description_ = std::move(hello.descriptor);
         sandbox_level_ = std::move(hello.sandbox);
+        if (const std::string problem = problem_with_id(description_.id, plugin()); !problem.empty())
+            throw std::runtime_error(plugin().string() + ": " + problem);
         const Create create = callbacks_.hello(description_, candidate_);
         process_->send(create.message, create.fds);
         set_start_deadline();

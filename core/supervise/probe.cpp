@@ -52,6 +52,8 @@ ProbeResult probe(Context &context, const std::filesystem::path &plugin, const s
         });
     if (!reason.empty())
         return reason;
+    if (const std::string problem = model::problem_with_id(hello.descriptor.id, plugin); !problem.empty())
+        return plugin.string() + ": " + problem;
     if (level)
         *level = hello.sandbox;
     return hello.descriptor;

@@ -71,15 +71,6 @@ void check_kind(const std::filesystem::path &file, const arhost_plugin &plugin) 
     }
 }
 
-// Whether an id has three or more parts, as in "org.arhost.rt_embree".
-bool is_unique_id(const std::string &id) {
-    constexpr const char *characters = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-.";
-    const bool has_empty_part =
-        id.empty() || id.front() == '.' || id.back() == '.' || id.find("..") != std::string::npos;
-    return !has_empty_part && id.find_first_not_of(characters) == std::string::npos &&
-           std::ranges::count(id, '.') >= 2;
-}
-
 // Substrings of dlopen's out-of-memory messages; the message depends on the step that failed.
 constexpr const char *dlopen_memory_errors[] = {"annot allocate ", "cannot create ", "cannot map zero-fill pages",
                                                 "cannot change memory protections", "failed to map segment"};
@@ -135,13 +126,8 @@ const arhost_plugin &negotiate(const std::filesystem::path &file, const arhost_e
         reject(file, "its arhost_descriptor is too small; build it against this arhost's headers");
     if (!plugin->descriptor->id)
         reject(file, "its arhost_descriptor has no id");
-    const std::string id = plugin->descriptor->id;
-    if (!is_unique_id(id))
-        reject(file, "its id is '" + id + "'; it must begin with a domain in reverse order, as in 'org.example." +
-                         (id.empty() ? "tracker" : id) + "'");
-    const std::string name = model::short_name(id);
-    if (file.stem() != name && file.stem() != "lib" + name) // some build tools prepend "lib" to the file name
-        reject(file, "its id is '" + id + "'; rename the file to match");
+    if (const std::string problem = model::problem_with_id(plugin->descriptor->id, file); !problem.empty())
+        reject(file, problem);
     for (const char *const *need = plugin->descriptor->needs; need && *need; ++need)
         if (std::ranges::find(sandbox::allowances, *need) == sandbox::allowances.end())
             reject(file, std::string("it needs '") + *need +

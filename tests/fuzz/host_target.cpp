@@ -165,9 +165,10 @@ private:
                 : name.starts_with("tracker") ? ARHOST_KIND_TRACKER
                 : name == "rt"                ? ARHOST_KIND_RAYTRACER
                                               : ARHOST_KIND_SINK;
+        const std::string id = "org.arhost." + name;
         const arhost_descriptor descriptor = {sizeof descriptor,
                                               kind_,
-                                              name.c_str(),
+                                              id.c_str(),
                                               "",
                                               "",
                                               "",

@@ -65,6 +65,8 @@ TEST_F(Probe, DescribesAPluginOrWhyItIsUnusable) {
                 HasSubstr("is not an arhost plugin"));
     EXPECT_THAT(std::get<std::string>(supervise::probe(context(), file("broken_constructor"), {})),
                 HasSubstr("while its library was loaded"));
+    EXPECT_THAT(std::get<std::string>(supervise::probe(context(), file("broken_name"), {})),
+                HasSubstr("its id is 'org.arhost.rt_embree'; rename the file to match"));
 }
 
 TEST_F(Probe, ListsDevices) {

@@ -16,3 +16,13 @@ TEST(Counters, HaveShortPlainNamesAndALimitedNumber) {
         many["c" + std::to_string(i)] = 0;
     EXPECT_FALSE(are_valid(many));
 }
+
+TEST(PluginIds, HaveThePartsOfADomainAndEndWithTheNameOfTheFile) {
+    for (const char *file : {"/a/rt.so", "librt.so"})
+        EXPECT_EQ(problem_with_id("org.example-1.rt", file), "");
+    for (const char *id :
+         {"", "rt", "org.rt", "org..rt", ".org.rt", "org.example.", "org.exa mple.rt", "org.\xc3\xa9.rt"})
+        EXPECT_NE(problem_with_id(id, "rt.so").find("must begin with a domain"), std::string::npos) << id;
+    EXPECT_EQ(problem_with_id("org.example.other", "rt.so"),
+              "its id is 'org.example.other'; rename the file to match");
+}

@@ -61,7 +61,8 @@ struct Bench {
         callbacks.lost = [this](const std::vector<Command> &unanswered) {
             events.push_back("lost " + std::to_string(unanswered.size()));
         };
-        callbacks.disabled = [this](const std::string &, bool is_configuration_error) {
+        callbacks.disabled = [this](const std::string &reason, bool is_configuration_error) {
+            log += reason;
             events.push_back(is_configuration_error ? "misconfigured" : "disabled");
         };
         callbacks.stopped = [this](arhost_status, const std::string &) { events.push_back("stopped"); };
@@ -223,5 +224,17 @@ TEST(Component, IsDisabledIfItsLibraryIsUnusable) {
         ASSERT_TRUE(bench.until("misconfigured")) << bench.log;
         EXPECT_EQ(bench.component->state(), Component::State::disabled);
         EXPECT_EQ(bench.component->restarts(), 0u);
+    }
+}
+
+TEST(Component, IsDisabledIfItsWorkerReportsAnotherPlugin) {
+    for (const auto &[plugin, problem] :
+         {std::pair{"broken_id", "broken_id.so: its id is 'broken_id'; it must begin with a domain"},
+          {"broken_name", "broken_name.so: its id is 'org.arhost.rt_embree'; rename the file to match"}}) {
+        Bench bench;
+        bench.make(plugin);
+        ASSERT_TRUE(bench.until("misconfigured")) << bench.log;
+        EXPECT_NE(bench.log.find(problem), std::string::npos) << bench.log;
+        EXPECT_EQ(std::ranges::count(bench.events, "running"), 0);
     }
 }
