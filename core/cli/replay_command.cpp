@@ -6,6 +6,7 @@
 #include "cli/session_grants.hpp"
 
 #include <algorithm>
+#include <map>
 
 namespace arhost::cli {
 namespace {
@@ -54,6 +55,17 @@ std::string rendering_of(const yaml::Node &root) {
         if (const auto node = root.find(key))
             text += std::string(key) + ": " + node->to_yaml() + "\n";
     return text;
+}
+
+// Returns the ids of the recorded plugins. Sessions of earlier drafts have only their short names.
+std::map<std::string, std::string> recorded_ids(const yaml::Node &description) {
+    std::map<std::string, std::string> ids;
+    const yaml::Node plugins = description.require("plugins");
+    for (const char *kind : {"tracker", "raytracer"})
+        if (const auto plugin = plugins.find(kind))
+            if (const auto id = plugin->find("id"))
+                ids[kind] = id->text();
+    return ids;
 }
 
 // Chooses the alternative and the scene that were in use when the recording began.
@@ -160,8 +172,10 @@ run_config::Configuration session_configuration(const Arguments &arguments, cons
     Session session = read_session(replay.session);
     const bool is_recorded = arguments.file.empty();
     yaml::Node root = is_recorded ? session.configuration : yaml::Node::load(arguments.file);
-    if (is_recorded)
+    if (is_recorded) {
         remove_grants(root, replay);
+        session.recording.plugin_ids = recorded_ids(session.description);
+    }
     play_video(root, session, is_recorded);
     const std::string recorded = is_recorded ? rendering_of(root) : "";
     override_plugin(root, "tracker", replay.tracker, "--tracker");

@@ -40,7 +40,8 @@ Json camera_json(const arhost_intrinsics &camera) {
 constexpr std::uint64_t max_hashed_bytes = 32 << 20;
 
 Json plugin_json(const Component &component) {
-    return {{"plugin", component.description().short_name()}, {"version", component.description().version}};
+    const PluginDescription &plugin = component.description();
+    return {{"plugin", plugin.short_name()}, {"id", plugin.id}, {"version", plugin.version}};
 }
 
 std::string utc_now() {

@@ -14,6 +14,7 @@ Stage::Stage(RunParts &parts, const char *name, const run_config::ComponentConfi
     : parts_(parts), max_in_flight_(max_in_flight) {
     Component::Callbacks callbacks = parts.callbacks(name, configuration.node);
     callbacks.hello = [this](const PluginDescription &plugin, std::size_t candidate) {
+        compare_with_recorded(plugin);
         return on_hello(plugin, candidate);
     };
     callbacks.ready = [this](const messages::Ready &ready) { return on_ready(ready); };
@@ -33,6 +34,19 @@ Stage::Stage(RunParts &parts, const char *name, const run_config::ComponentConfi
     };
     component_ = std::make_unique<Component>(parts.context, name, configuration.plugins, configuration.limits,
                                              configuration.policy, std::move(callbacks));
+}
+
+// The configuration of a session names plugins by their short names, which plugins of several vendors may have.
+void Stage::compare_with_recorded(const PluginDescription &plugin) const {
+    const auto &recording = parts_.configuration.recording;
+    if (!recording)
+        return;
+    const auto recorded = recording->plugin_ids.find(component_->name());
+    if (recorded != recording->plugin_ids.end() && recorded->second != plugin.id &&
+        short_name(recorded->second) == plugin.short_name())
+        component_->log(ARHOST_SEVERITY_WARNING, "the session was recorded with '" + recorded->second +
+                                                     "', but this plugin is '" + plugin.id +
+                                                     "'; its results may differ");
 }
 
 FrameFlow::Intake Stage::intake() const {

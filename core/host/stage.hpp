@@ -50,6 +50,8 @@ protected:
     Lease state_; // the state that the last accepted call has written (docs/adr/0026)
 
 private:
+    void compare_with_recorded(const model::PluginDescription &plugin) const;
+
     struct StateOwner {
         std::size_t candidate = 0;
         std::string version;

@@ -5,6 +5,8 @@
 
 #include "session/log.hpp"
 
+#include <map>
+#include <string>
 #include <vector>
 
 namespace arhost::run_config {
@@ -15,6 +17,7 @@ struct Recording {
     // True: the run uses the recorded poses, and a frame gets an overlay only if it had one in the recorded run.
     // False: frames are tracked and rendered as in any other run.
     bool repeats_decisions = true;
+    std::map<std::string, std::string> plugin_ids; // of "tracker" and "raytracer", if the session has them
 };
 
 } // namespace arhost::run_config

@@ -236,6 +236,28 @@ TEST(Sessions, AKilledSinkContinuesTheSession) {
         }
 }
 
+TEST(Sessions, AReplayWarnsOfAnotherPluginWithTheRecordedShortName) {
+    ArhostRun run(recording("lockstep", "2"));
+    ASSERT_EQ(run.run(), 0) << run.output();
+    Json description = Json::parse(run.read("take/session.json"));
+    Json &recorded = description["plugins"]["raytracer"];
+    EXPECT_EQ(recorded["id"], "org.arhost.rt_embree");
+    EXPECT_EQ(description["plugins"]["source"]["id"], "org.arhost.source_synthetic");
+    const std::string warning = "the session was recorded with 'org.example.rt_embree', but this plugin is "
+                                "'org.arhost.rt_embree'; its results may differ";
+    recorded["id"] = "org.example.rt_embree";
+    run.write("take/session.json", description.dump());
+    run.expect(replaying(), 0, {warning});
+    recorded["id"] = "org.example.rt_other"; // the configuration chooses the plugin, by its short name
+    run.write("take/session.json", description.dump());
+    run.expect(replaying(), 0, {});
+    EXPECT_THAT(run.output(), Not(HasSubstr("the session was recorded with")));
+    recorded.erase("id"); // as in sessions of earlier drafts
+    run.write("take/session.json", description.dump());
+    run.expect(replaying(), 0, {});
+    EXPECT_THAT(run.output(), Not(HasSubstr("the session was recorded with")));
+}
+
 TEST(Sessions, AnEditedSessionGainsNoPermission) {
     ArhostRun run(recording("lockstep", "2"));
     ASSERT_EQ(run.run(), 0) << run.output();
