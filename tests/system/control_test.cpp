@@ -234,6 +234,30 @@ TEST(Control, ReplacesTrackerAndRayTracerWithoutLosingAFrame) {
     EXPECT_EQ(stats["frames"]["tracked"], stats["frames"]["composited"]) << "no frame may count twice";
 }
 
+// The ray tracer draws how many images it has rendered before.
+TEST(Control, ASwapAndANewSceneBeginWithoutTheStateOfTheRaytracer) {
+    std::string yaml = controlled("lockstep");
+    for (std::size_t at; (at = yaml.find("rt_counter")) != std::string::npos;)
+        yaml.replace(at, std::string("rt_counter").size(), "rt_history");
+    ControlledRun run(yaml);
+    run.start_and_connect();
+    const Json changes[] = {swap("raytracer", "second"),
+                            {{"command", "load_scene"}, {"scene", "other"}},
+                            swap("raytracer", "rt_history")};
+    for (const Json &change : changes) {
+        run.succeed(change);
+        run.wait_for_frames(20); // more than the frames that it does not render
+    }
+    EXPECT_EQ(run.quit(), 0) << run.output();
+    std::uint64_t beginnings = 0, next = 0;
+    for (const CountedLine &line : counted(run)) {
+        beginnings += line.overlay == "0";
+        next = line.overlay == "0" ? 0 : next;
+        ASSERT_EQ(line.overlay, std::to_string(next++)) << "frame " << line.sequence;
+    }
+    EXPECT_EQ(beginnings, 1 + std::size(changes));
+}
+
 TEST(Control, ReplacesStraightByLinearImagesAndBackWithoutLosingAFrame) {
     std::string scene = small_scene;
     ControlledRun run(controlled_with_light());

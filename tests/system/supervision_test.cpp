@@ -491,14 +491,14 @@ TEST(Supervision, AnImageThatARaytracerCannotRenderLeavesItsStateAsItWas) {
 TEST(Supervision, AFallbackBeginsWithoutTheStateOfTheRaytracerThatItReplaces) {
     ArhostRun run(with_raytracer_state("40", "state_size: 8, crash_at: 20"));
     run.write("scene.yaml", small_scene);
-    ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.fallback=rt_counter", "--set",
+    ASSERT_EQ(run.run({"--config", "run.yaml", "--set", "raytracer.fallback=rt_history", "--set",
                        "restart.quarantine_after=1"}),
               1)
         << "frame 20 has crashed two workers\n"
         << run.output();
-    // The fallback has its default options, with which it has no state and draws the numbers of the frames.
-    std::vector<double> expected = numbers(40);
-    expected.erase(expected.begin() + 20);
+    // The fallback has a state of the same size by default.
+    std::vector<double> expected = numbers(20);
+    std::ranges::copy(numbers(19), std::back_inserter(expected));
     EXPECT_EQ(rendered_before(run), expected);
 }
 

@@ -15,12 +15,17 @@
 #include <time.h>
 #include <unistd.h>
 
+#ifndef ID /* rt_history is the same plugin with state by default */
+#define ID "rt_counter"
+#define STATE_SIZE "0"
+#endif
+
 struct arhost_instance {
     const arhost_host *host;
     int64_t crash_at, crash_after, hang_at, hang_until, error_at, error_after, error, answer;
     int64_t images; /* rendered so far */
     double delay_ms;
-    int64_t delay_from, reports_progress, writes_later, device_time_ns;
+    int64_t delay_from, delay_until, reports_progress, writes_later, device_time_ns;
     uint64_t state_size;
     uint8_t *last; /* previous image */
 };
@@ -42,6 +47,7 @@ static arhost_status create(const arhost_host *host, const arhost_option *option
     self->answer = arhost_find_option(options, option_count, "answer")->integer;
     self->delay_ms = arhost_find_option(options, option_count, "delay_ms")->real;
     self->delay_from = arhost_find_option(options, option_count, "delay_from")->integer;
+    self->delay_until = arhost_find_option(options, option_count, "delay_until")->integer;
     self->reports_progress = arhost_find_option(options, option_count, "reports_progress")->integer;
     self->writes_later = arhost_find_option(options, option_count, "writes_later")->integer;
     self->device_time_ns = arhost_find_option(options, option_count, "device_time_ns")->integer;
@@ -114,7 +120,7 @@ static arhost_status render(arhost_instance *self, const arhost_render_request *
     if (misbehave_if_requested() || number == self->error_at ||
         (self->error_after >= 0 && self->images >= self->error_after))
         return (arhost_status)self->error;
-    if (number >= self->delay_from && wait_or_cancel(self)) {
+    if (number >= self->delay_from && (self->delay_until < 0 || number < self->delay_until) && wait_or_cancel(self)) {
         self->host->log(self->host, ARHOST_SEVERITY_INFO, "cancelled while waiting");
         return ARHOST_STATUS_ERROR_CANCELLED;
     }
@@ -160,13 +166,15 @@ static const arhost_option_descriptor options[] = {
      "Delay per frame, in ms"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "delay_from", "0", 0, 0, NULL,
      "First frame with the delay"},
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "delay_until", "-1", 0, 0, NULL,
+     "First frame after them without it; -1: none"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "reports_progress", "false", 0, 0, NULL,
      "Reports progress during the delay"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "writes_later", "false", 0, 0, NULL,
      "Also writes to the previous image"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "device_time_ns", "0", 0, 0, NULL,
      "Reported device time; negative values wrap to huge ones"},
-    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "state_size", "0", 0, 0, NULL,
+    {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "state_size", STATE_SIZE, 0, 0, NULL,
      "Bytes of state: 0, or at least 8"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "reject", "false", 0, 0, NULL, "Fails in create"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "crash_in_create", "false", 0, 0, NULL,
@@ -174,7 +182,7 @@ static const arhost_option_descriptor options[] = {
 };
 static const arhost_descriptor descriptor = {sizeof(arhost_descriptor),
                                              ARHOST_KIND_RAYTRACER,
-                                             "org.arhost.test.rt_counter",
+                                             "org.arhost.test." ID,
                                              "Counter",
                                              "0.1.0",
                                              "arhost",
