@@ -3,6 +3,9 @@
 #include "conformance/expect.hpp"
 #include "conformance/tracer.hpp"
 
+#include <list>
+#include <type_traits>
+
 namespace arhost::conformance {
 namespace {
 
@@ -116,37 +119,86 @@ void frames_before(Context &context) {
         throw Failure("two different cameras give the same image").with("rendered", first);
 }
 
-// A new instance that gets the state of another one continues as that one does.
-void state(Context &context) {
+struct StatefulRequests {
+    const char *name;
+    bool has_video = false, is_scaled = false;
+};
+
+Picture render(Tracer &tracer, const arhost_camera &view, const Picture *) {
+    return tracer.render(view);
+}
+LinearPicture render(Tracer &tracer, const arhost_camera &view, const LinearPicture *) {
+    return tracer.render_linear(view);
+}
+void expect_same(const Picture &actual, const Picture &expected, const std::string &violation) {
+    expect_alike(actual, expected, violation);
+}
+void expect_same(const LinearPicture &actual, const LinearPicture &expected, const std::string &violation) {
+    expect_identical(actual, expected, violation);
+}
+
+// A new instance that gets the state of another one continues as that one does. Image: Picture or LinearPicture.
+template <class Image> void continues_from_state(Context &context, const StatefulRequests &requests) {
     const arhost_camera here = still_life_camera(), there = camera({120, -90, 160}, {0, 0, 10}, {0, 0, 1});
-    Tracer tracer(context, still_life());
-    tracer.start(here.intrinsics);
-    if (tracer.state_size() == 0)
-        throw Skip("it has no state");
+    const auto scene = [] {
+        scene::ArenaBuilder builder = still_life();
+        if (std::is_same_v<Image, LinearPicture>)
+            builder.settings.integrator = ARHOST_INTEGRATOR_PATH;
+        return builder;
+    };
+    std::list<Video> videos;
+    Tracer tracer(context, scene());
     std::vector<std::byte> before;
     std::uint64_t number = 0;
-    for (const arhost_camera *view : {&here, &here, &there, &here}) {
-        const std::string when = fmt::format("in image {}, with the state of the image before it,", number + 1);
+    for (arhost_camera view : {here, here, there, here}) {
+        const std::string when =
+            fmt::format("in image {} of {}, with the state of the image before it,", number + 1, requests.name);
+        if (requests.is_scaled && number % 2 == 1)
+            view.intrinsics = arhost_scaled_intrinsics(here.intrinsics, 80, 60);
+        const Video &video = videos.emplace_back(
+            ARHOST_PIXEL_FORMAT_BGR8, here.intrinsics.width, here.intrinsics.height, [=](auto x, auto) {
+                return Video::Rgb{static_cast<std::uint8_t>(x + 20 * number), 90, 60};
+            });
         const auto next = [&](Tracer &one, std::byte filler) {
+            one.set_full_size(here.intrinsics);
+            if (std::is_same_v<Image, LinearPicture>)
+                one.set_compositing(ARHOST_COMPOSITING_LINEAR);
+            one.set_video(requests.has_video ? &video : nullptr);
             one.set_state(before, number, filler);
-            return one.render(*view);
+            return render(one, view, static_cast<const Image *>(nullptr));
         };
         constexpr std::byte filler{0xa5}, other_filler{0x3c};
-        const Picture expected = next(tracer, filler);
+        const Image expected = next(tracer, filler);
         const std::vector<std::byte> after = tracer.state_after();
-        Tracer other(context, still_life()), with_other_filler(context, still_life());
-        other.start(here.intrinsics);
-        with_other_filler.start(here.intrinsics);
-        expect_alike(next(other, filler), expected, when + " a new instance gives different bytes");
+        Tracer other(context, scene()), with_other_filler(context, scene());
+        expect_same(next(other, filler), expected, when + " a new instance gives different bytes");
         if (other.state_after() != after)
             throw Failure(when + " a new instance writes another state_after");
-        expect_alike(next(with_other_filler, other_filler), expected,
-                     when + " and with other initial content of state_after, a new instance gives different bytes");
+        expect_same(next(with_other_filler, other_filler), expected,
+                    when + " and with other initial content of state_after, a new instance gives different bytes");
         if (with_other_filler.state_after() != after)
             throw Failure(when + " a new instance leaves bytes of state_after unwritten");
         before = after;
         ++number;
     }
+}
+
+void state(Context &context) {
+    Tracer tracer(context, still_life());
+    tracer.start(still_life_camera().intrinsics);
+    if (tracer.state_size() == 0)
+        throw Skip("it has no state");
+    const bool writes_linear = has_capability(context, ARHOST_RAYTRACER_CAPABILITY_LINEAR_IMAGES);
+    continues_from_state<Picture>(context, {"straight images"});
+    if (has_capability(context, ARHOST_RAYTRACER_CAPABILITY_SCALED_IMAGES))
+        continues_from_state<Picture>(context, {.name = "images of two sizes", .is_scaled = true});
+    if (writes_linear)
+        continues_from_state<LinearPicture>(context, {"linear images"});
+    if (!has_capability(context, ARHOST_RAYTRACER_CAPABILITY_VIDEO))
+        return;
+    const StatefulRequests with_video{.name = "images with video", .has_video = true};
+    writes_linear ? continues_from_state<LinearPicture>(context, with_video)
+                  : continues_from_state<Picture>(context, with_video);
 }
 
 void threads(Context &context) {
@@ -221,7 +273,9 @@ constexpr Test tests[] = {
     {"raytracer.deterministic", "The same request gives the same bytes, repeatedly and in another instance.", gate,
      20s, deterministic},
     {"raytracer.frames-before", "An image does not depend on previous frames.", gate, 20s, frames_before},
-    {"raytracer.state", "Image and state_after depend only on the request and state_before.",
+    {"raytracer.state",
+     "Image and state_after depend only on the request and state_before, also for linear images, video and two "
+     "sizes.",
      "raytracer.deterministic", 20s, state},
     {"raytracer.threads", "The image does not depend on the number of threads.", gate, 20s, threads},
     {"raytracer.reference",

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <stdexcept>
 #include <sys/mman.h>
 #include <tuple>
 #include <type_traits>
@@ -90,7 +91,6 @@ arhost_status Tracer::try_start(const arhost_intrinsics &intrinsics) {
     started_ = intrinsics;
     state_size_ = in_call(instance_.library().calls(), Call::start,
                           [&] { return worker::state_size_of(functions_, instance_.get()); });
-    state_before_.reset();
     state_after_.reset();
     return status;
 }
@@ -126,6 +126,8 @@ arhost_status Tracer::try_render(const arhost_camera &camera, std::optional<Imag
     arhost_render_request request{
         sizeof request, max_samples_, sequence_, 0,      camera, motion, video_ ? &video_->frame() : nullptr,
         nullptr,        nullptr,      0,         nullptr};
+    if (state_before_ && state_before_size_ != state_size_)
+        throw std::logic_error("the state is of another setup");
     if (state_size_ > 0) {
         state_after_ = state_memory(state_size_);
         std::fill_n(state_after_->data(), state_size_, state_filler_);
@@ -152,8 +154,9 @@ void Tracer::render(const arhost_camera &camera, std::optional<Image> &slot, Ima
                     const arhost_motion *motion) {
     const arhost_image_form form =
         std::is_same_v<Image, Picture> ? ARHOST_IMAGE_FORM_STRAIGHT : ARHOST_IMAGE_FORM_LINEAR;
-    if (form != std::exchange(form_, form) || !started_ || !same(*started_, camera.intrinsics))
-        start(camera.intrinsics);
+    const arhost_intrinsics &setup = full_size_ ? *full_size_ : camera.intrinsics;
+    if (form != std::exchange(form_, form) || !started_ || !same(*started_, setup))
+        start(setup);
     instance_.expect_ok("render", try_render(camera, slot, picture, info_, motion));
 }
 
@@ -163,6 +166,7 @@ void Tracer::set_state(const std::vector<std::byte> &state, std::uint64_t sequen
     state_before_.reset();
     if (state.empty())
         return;
+    state_before_size_ = state.size();
     state_before_ = state_memory(state.size());
     std::ranges::copy(state, state_before_->data());
     state_before_->seal();

@@ -63,6 +63,8 @@ public:
     // Of later requests; 0: no limit.
     void limit_samples(std::uint32_t max_samples) { max_samples_ = max_samples; }
     void set_sequence(std::uint64_t sequence) { sequence_ = sequence; }
+    // Of later setups, so that requests may be smaller. Without this, a setup has the size of the request.
+    void set_full_size(const arhost_intrinsics &intrinsics) { full_size_ = intrinsics; }
     // Of later images; stops if it differs.
     void set_compositing(arhost_compositing compositing);
     // Of later requests, until it is changed; nullptr: none. Stops if the format differs.
@@ -90,7 +92,7 @@ private:
     Instance instance_;
     std::optional<SealedScene> scene_; // must stay valid from start to stop
     const arhost_raytracer &functions_;
-    std::optional<arhost_intrinsics> started_;
+    std::optional<arhost_intrinsics> started_, full_size_;
     arhost_image_form form_ = ARHOST_IMAGE_FORM_STRAIGHT;
     arhost_compositing compositing_ = ARHOST_COMPOSITING_SRGB;
     const Video *video_ = nullptr;
@@ -99,7 +101,7 @@ private:
     std::optional<LinearPicture> linear_slot_;
     arhost_render_info info_{};
     std::uint32_t max_samples_ = 0;
-    std::uint64_t sequence_ = 0, state_size_ = 0;
+    std::uint64_t sequence_ = 0, state_size_ = 0, state_before_size_ = 0;
     std::byte state_filler_{0xa5};
     std::unique_ptr<GuardedMemory> state_before_, state_after_; // null: none
     std::chrono::nanoseconds duration_{};

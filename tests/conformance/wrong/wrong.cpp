@@ -58,6 +58,7 @@ struct Wrong {
     unsigned users = 0;
     std::uint32_t max_samples = 0;        // of an earlier request
     std::uint32_t images = 0;             // rendered so far
+    std::uint32_t width = 0;              // of the setup
     std::int64_t threads = 0;             // the option
     std::vector<std::uint8_t> last;       // image
     std::vector<std::uint8_t> last_video; // plane 0 of the previous request's video
@@ -527,6 +528,7 @@ arhost_status start(arhost_instance *instance, const arhost_raytracer_setup *set
     arhost_raytracer_setup modified = *setup;
     modified.intrinsics = &intrinsics;
     Wrong &self = wrong(instance);
+    self.width = setup->width;
     SceneCopy copy = make_copy(*setup->scene);
     modify(scene_in(copy));
     modified.scene = &scene_in(copy);
@@ -606,17 +608,21 @@ arhost_status render_linear(const Wrong &self, const arhost_render_request &requ
 // The state of the ray tracers that have one counts the images. Later images are brighter.
 constexpr std::size_t state_bytes = 5000;
 std::uint64_t state_size(arhost_instance *) {
-    constexpr const char *defects[] = {"counts_in_its_state", "counts_in_its_heap", "reads_state_after",
-                                       "writes_half_its_state"};
+    constexpr const char *defects[] = {
+        "counts_in_its_state",       "counts_in_its_heap",        "reads_state_after",       "writes_half_its_state",
+        "counts_linear_in_its_heap", "counts_scaled_in_its_heap", "counts_video_in_its_heap"};
     return std::ranges::any_of(defects, [](const char *defect) { return has(defect); }) ? state_bytes : 0;
 }
 
 // Returns the number of images before this one.
-unsigned count(Wrong &self, const arhost_render_request &request) {
+unsigned count(Wrong &self, const arhost_render_request &request, const arhost_image &image) {
     const auto *before = static_cast<const std::uint8_t *>(request.state_before);
     auto *after = static_cast<std::uint8_t *>(request.state_after);
     unsigned images = before ? before[0] : 0;
-    if (has("counts_in_its_heap") && before)
+    const bool in_heap = has("counts_in_its_heap") || (has("counts_linear_in_its_heap") && image.linear) ||
+                         (has("counts_scaled_in_its_heap") && image.width < self.width) ||
+                         (has("counts_video_in_its_heap") && request.video);
+    if (in_heap && before)
         images = self.images;
     if (has("reads_state_after") && before)
         images += after[0] & 3u;
@@ -657,8 +663,11 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
         modified.sequence = 0;
     const OtherVideo video(self, request->video);
     modified.video = video.frame();
-    if (image->linear)
+    if (image->linear) {
+        if (request->state_size > 0)
+            count(self, *request, *image);
         return render_linear(self, modified, *image, *info);
+    }
     const arhost_moved_object nowhere{0, 1, {1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0}};
     const arhost_motion still{sizeof still, 1, &nowhere, nullptr, 0, 0};
     if ((has("no_motion") || has("lambert_only")) && request->motion)
@@ -686,7 +695,7 @@ arhost_status render(arhost_instance *instance, const arhost_render_request *req
 
     modify(pixels);
     if (request->state_size > 0) {
-        const unsigned images = count(self, *request);
+        const unsigned images = count(self, *request, *image);
         pixels.each_colour([&](double colour, double) { return std::min(1.0, colour + 0.02 * images); });
     }
     if (has("drops_small_objects") && self.is_tiny)
