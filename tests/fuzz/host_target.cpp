@@ -21,6 +21,7 @@
 
 #include <list>
 #include <stdexcept>
+#include <utility>
 
 namespace arhost::fuzz {
 namespace {
@@ -48,8 +49,22 @@ run_config::Configuration make_configuration(const char *mode) {
     return run_config::parse(yaml::Node::parse(text, (scratch() / "run.yaml").string()), scratch() / "plugins");
 }
 
-base::UniqueFd scene_memory() {
-    static const scene::Arena arena = scene::test::full_scene().build();
+// Describes the ray tracer that workers simulate, and the integrator of its scene.
+struct RaytracerTraits {
+    std::uint64_t capabilities = 0, state_size = 0;
+    arhost_integrator integrator = ARHOST_INTEGRATOR_WHITTED;
+};
+
+scene::Arena make_arena(arhost_integrator integrator) {
+    scene::ArenaBuilder builder = scene::test::full_scene();
+    builder.settings.integrator = integrator;
+    return std::move(builder).build();
+}
+
+base::UniqueFd scene_memory(arhost_integrator integrator = ARHOST_INTEGRATOR_WHITTED) {
+    static const scene::Arena whitted = make_arena(ARHOST_INTEGRATOR_WHITTED),
+                              path = make_arena(ARHOST_INTEGRATOR_PATH);
+    const scene::Arena &arena = integrator == ARHOST_INTEGRATOR_PATH ? path : whitted;
     base::UniqueFd fd = base::checked(::memfd_create("arena", MFD_CLOEXEC | MFD_ALLOW_SEALING), "memfd_create");
     if (::write(fd.get(), arena.bytes().data(), arena.bytes().size()) < 0)
         base::throw_errno("write to a memfd");
@@ -72,9 +87,10 @@ base::UniqueFd arbitrary_descriptor(unsigned kind) {
 // The worker side of one connection.
 class Worker {
 public:
-    Worker(pid_t process, Channel channel, base::UniqueFd doorbell, base::UniqueFd output, base::UniqueFd death)
-        : pid(process), channel_(std::move(channel)), doorbell_(std::move(doorbell)), output_(std::move(output)),
-          death_(std::move(death)) {}
+    Worker(pid_t process, Channel channel, base::UniqueFd doorbell, base::UniqueFd output, base::UniqueFd death,
+           const RaytracerTraits &raytracer)
+        : pid(process), raytracer_(raytracer), channel_(std::move(channel)), doorbell_(std::move(doorbell)),
+          output_(std::move(output)), death_(std::move(death)) {}
 
     const pid_t pid;
     int wait_status = 0;
@@ -144,7 +160,7 @@ private:
         if (is<messages::Open>(message))
             say_hello(message, input);
         else if (is<messages::Load>(message))
-            finish(messages::Loaded{}, scene_memory(), input);
+            finish(messages::Loaded{}, scene_memory(raytracer_.integrator), input);
         else if (is<messages::Create>(message))
             send(ready(), {}, input);
         else if (is<messages::Attach>(message))
@@ -174,7 +190,9 @@ private:
                                               "",
                                               "",
                                               "",
-                                              kind_ == ARHOST_KIND_SOURCE ? ARHOST_SOURCE_CAPABILITY_SEEK : 0,
+                                              kind_ == ARHOST_KIND_SOURCE      ? ARHOST_SOURCE_CAPABILITY_SEEK
+                                              : kind_ == ARHOST_KIND_RAYTRACER ? raytracer_.capabilities
+                                                                               : 0,
                                               0,
                                               nullptr,
                                               nullptr};
@@ -191,6 +209,8 @@ private:
     }
 
     messages::Ready ready() const {
+        if (kind_ == ARHOST_KIND_RAYTRACER)
+            return {std::nullopt, 0, std::nullopt, raytracer_.capabilities, raytracer_.state_size};
         if (kind_ != ARHOST_KIND_SOURCE)
             return {};
         arhost_frame_format format{};
@@ -270,6 +290,7 @@ private:
         }
     }
 
+    const RaytracerTraits raytracer_;
     Channel channel_;
     base::UniqueFd doorbell_, output_, death_;
     Mapping host_page_, worker_page_, output_memory_;
@@ -282,6 +303,8 @@ private:
 
 class SimulatedWorkers final : public supervise::Starter {
 public:
+    explicit SimulatedWorkers(const RaytracerTraits &raytracer) : raytracer_(raytracer) {}
+
     supervise::Spawned spawn(const std::filesystem::path &, supervise::Isolation,
                              const supervise::LogFunction &) override {
         supervise::Spawned spawned;
@@ -297,7 +320,8 @@ public:
         spawned.pidfd = base::checked(::eventfd(0, EFD_CLOEXEC), "eventfd");
         spawned.pid = next_pid_++;
         workers_.emplace_back(spawned.pid, std::move(theirs), std::move(doorbell.worker),
-                              base::UniqueFd(pipe_ends[1]), base::checked(::dup(spawned.pidfd.get()), "dup"));
+                              base::UniqueFd(pipe_ends[1]), base::checked(::dup(spawned.pidfd.get()), "dup"),
+                              raytracer_);
         return spawned;
     }
 
@@ -321,6 +345,7 @@ public:
     }
 
 private:
+    const RaytracerTraits raytracer_;
     unsigned turn_ = 0;
     pid_t next_pid_ = 1 << 22; // above the maximum PID of Linux
     std::list<Worker> workers_;
@@ -333,8 +358,13 @@ void run_host(Bytes bytes) {
     static const run_config::Configuration lockstep = make_configuration("lockstep"),
                                            live = make_configuration("live");
     Input input(bytes);
-    const run_config::Configuration &configuration = input.number() % 2 ? live : lockstep;
-    SimulatedWorkers workers;
+    // Bit 0: mode live; 1 and 2: the size of the state; 3 to 6: capabilities of the ray tracer; 7: the integrator.
+    const unsigned traits = input.number();
+    const run_config::Configuration &configuration = traits & 1 ? live : lockstep;
+    constexpr std::uint64_t state_sizes[] = {0, 8, 100'000, max_raytracer_state + 1};
+    SimulatedWorkers workers({.capabilities = traits >> 3 & 0xf,
+                              .state_size = state_sizes[traits >> 1 & 3],
+                              .integrator = traits & 0x80 ? ARHOST_INTEGRATOR_PATH : ARHOST_INTEGRATOR_WHITTED});
     Reactor reactor;
     host::Run run(configuration, {reactor, workers, "", [](arhost_severity, auto &, auto &) {}}, {});
     // This descriptor is always readable, so each iteration of the reactor does one action.
