@@ -31,8 +31,9 @@ using namespace ipc;
 constexpr const char *configuration_text = R"(version: 1
 plugin_path: [plugins]
 source: {plugin: source, conform: true, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
-tracker: {plugin: tracker, fallback: tracker2, targets: [{ids: 0-1, family: tag36h11, side_mm: 80}], hold_frames: 1,
-          conform: true, deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
+tracker: {plugin: tracker, fallback: tracker2, hold_frames: 1, conform: true,
+          targets: [{name: cup, marker: 0, family: tag36h11, side_mm: 80}, {marker: 1, family: tag36h11, side_mm: 80}],
+          deadline_ms: 3600000, start_deadline_ms: 3600000, stop_deadline_ms: 3600000}
 raytracer: {plugin: rt, scene: scene.yaml, conform: true, deadline_ms: 3600000, start_deadline_ms: 3600000,
             stop_deadline_ms: 3600000}
 outputs:
