@@ -76,8 +76,7 @@ TEST(LinearImages, KillingRealWorkersEvery20FramesDoesNotChangeThem) {
     ASSERT_EQ(clean.run(), 0) << clean.output();
     killed.start();
     std::size_t kills = 0;
-    for (std::size_t next = 20; killed.wait_for_lines(next, "poses.jsonl");
-         next = killed.lines("poses.jsonl") + 20)
+    for (std::size_t next = 20; killed.wait_for_lines(next, "poses.jsonl"); next = killed.lines("poses.jsonl") + 20)
         if (const pid_t worker = killed.wait_for_worker(kills++ % 2 == 0 ? "rt_embree" : "tracker_aruco"))
             send_signal(worker, SIGKILL);
     ASSERT_EQ(killed.wait(), 0) << killed.output();
