@@ -186,6 +186,10 @@ struct Frame {
     std::uint32_t first_random; // offset into the random sequences of the path integrator
     PathScene path;
     bool blends_codes; // straight images of the path integrator: the host blends sRGB codes, not linear light
+    // Called after each sample of a tile, on any thread, since a tile may take seconds. False: the image is not
+    // wanted.
+    bool (*goes_on)(const void *context);
+    const void *context;
 };
 
 struct Rectangle {

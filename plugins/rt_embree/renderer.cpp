@@ -80,6 +80,26 @@ float scene_extent(const arhost_scene &arena) {
     return static_cast<float>(std::sqrt(squared));
 }
 
+// The progress of an image, reported from all threads.
+class Progress {
+public:
+    Progress(const arhost::Host &host, std::size_t tiles)
+        : host_(host), tiles_(static_cast<double>(tiles)), slow_image_(host) {}
+
+    void finish_tile() { finished_.fetch_add(1, std::memory_order_relaxed); } // relaxed: no other data depends on it
+    // Returns whether the image is still wanted.
+    bool goes_on() const {
+        slow_image_.report(static_cast<double>(finished_.load(std::memory_order_relaxed)) / tiles_);
+        return !host_.cancelled();
+    }
+
+private:
+    const arhost::Host &host_;
+    const double tiles_;
+    std::atomic<std::size_t> finished_ = 0;
+    mutable arhost::raytracer_common::SlowImage slow_image_;
+};
+
 Rectangle united(const Rectangle &a, const Rectangle &b) {
     return {std::min(a.x0, b.x0), std::min(a.y0, b.y0), std::max(a.x1, b.x1), std::max(a.y1, b.y1)};
 }
@@ -206,7 +226,7 @@ void Renderer::trace_photons(Frame &frame) {
     photons_.resize(count);
     threads_.for_each((count + chunk - 1) / chunk, [&](std::size_t i, std::size_t) {
         const auto first = static_cast<std::uint32_t>(i) * chunk;
-        if (!host_.cancelled())
+        if (frame.goes_on(frame.context))
             kernel_.trace_photons(frame, first, std::min(chunk, count - first), photons_.data() + first);
     });
     photon_map_.build(photons_);
@@ -294,6 +314,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         first_random = static_cast<std::uint32_t>(sequence) * full_samples_;
         samples_ = arhost::raytracer_common::sample_positions(first_random % (1u << 16), samples_per_frame_);
     }
+    Progress progress(host_, tiles.size());
     Frame frame{scene_.view(),
                 ray_table_.rays(),
                 camera_of(pose),
@@ -308,7 +329,9 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
                 image.linear,
                 first_random,
                 path_scene(),
-                blends_codes_};
+                blends_codes_,
+                [](const void *of) { return static_cast<const Progress *>(of)->goes_on(); },
+                &progress};
     if (!history_.empty())
         for (std::size_t i = 0; i < sum_rows; ++i)
             frame.history[i] = history_.data() + i * tiles.size() * tile_pixels;
@@ -317,8 +340,6 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     const RenderTile render_tile = lights_ ? kernel_.render_path_tile : kernel_.render_tile;
     Rectangle drawn{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::max(), 0, 0};
     std::mutex drawn_mutex;
-    std::atomic<std::size_t> finished = 0;
-    arhost::raytracer_common::SlowImage slow_image(host_);
     threads_.for_each(tiles.size(), [&](std::size_t i, std::size_t thread) {
         const Tile &tile = tiles[i];
         const bool visible = std::any_of(windows.begin(), windows.end(), [&](const Window &window) {
@@ -327,7 +348,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         if (!visible || host_.cancelled())
             return clear(image, tile.pixels);
         const Rectangle part = render_tile(frame, tile, *scratch_[thread]);
-        slow_image.report(static_cast<double>(++finished) / static_cast<double>(tiles.size()));
+        progress.finish_tile();
         if (part.x0 < part.x1) {
             std::lock_guard lock(drawn_mutex);
             drawn = united(drawn, part);

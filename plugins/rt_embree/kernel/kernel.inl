@@ -225,6 +225,8 @@ template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, c
             if (has_light[number])
                 Integrator::accumulate(frame, scratch, number * lanes);
         });
+        if (!frame.goes_on(frame.context))
+            break;
     }
     const std::uint32_t count = frame.first_sample + static_cast<std::uint32_t>(frame.sample_count);
     for_each_block(all, [&](int number, int x, int y, int width, int height) {

@@ -221,6 +221,19 @@ TEST(PathIntegrator, EnvironmentFollowsTheVideo) {
     EXPECT_LT(mean_at(lit, 60, 75, transmittance, 4), 0.9) << "the shadow does not depend on the colour";
 }
 
+// A tile with many samples or lamps takes many seconds.
+TEST(PathIntegrator, CanBeCancelledWithinATile) {
+    SceneBuilder scene = table(path_settings(1));
+    scene.add_ball("ball", {0, 0, 40, 30}, diffuse(1, 1, 1));
+    const arhost_camera view = camera({0, 0, 200}, {0, 0, 0}, {0, 1, 0}, pinhole(32, 32, 32));
+    Tracer tracer(std::move(scene), {{"samples", "64"}});
+    ASSERT_EQ(tracer.start(view.intrinsics), ARHOST_STATUS_OK);
+    tracer.plugin().cancel(10);
+    Picture picture(view.intrinsics);
+    EXPECT_EQ(tracer.try_render(view, picture), ARHOST_STATUS_ERROR_CANCELLED);
+    EXPECT_LT(tracer.plugin().cancel_checks(), 20);
+}
+
 TEST(PathIntegrator, MeanOfOneSampleFramesIsTheConvergedImage) {
     const auto make = [] {
         SceneBuilder scene = table(path_settings(0.5f));
