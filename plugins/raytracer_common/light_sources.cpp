@@ -273,7 +273,7 @@ void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 midd
     // Sources nearer than the objects' extent count as if they were that far away.
     std::vector<double> light(count);
     std::vector<double> light_of(arena_.objects.count), area_of(arena_.objects.count);
-    double sum = 0;
+    double sum = 0, of_room = 0;
     for (std::size_t i = 0; i < count; ++i) {
         const float *from = records_.data() + i * source_rows;
         const Vec3 to_middle = middle - vector_of(from + position_row);
@@ -288,9 +288,12 @@ void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 midd
         if (i >= lamps && i < lamps + emissive) {
             light_of[object_of[i - lamps]] += light[i];
             area_of[object_of[i - lamps]] += from[area_row];
+        } else {
+            of_room += light[i];
         }
     }
     light_ = static_cast<float>(sum);
+    light_of_room_ = static_cast<float>(of_room);
     const auto emitters =
         static_cast<std::size_t>(std::ranges::count_if(area_of, [](double area) { return area > 0; }));
     // A small part of the samples is spread evenly, because a surface may be near a source that is far from the
@@ -320,6 +323,15 @@ void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 midd
     for (std::size_t i = 0; i < lamps; ++i)
         lamp_chances_[i] = records_[i * source_rows + chance_row];
     environment_chance_ = environment_radiance_ > 0 ? records_[(count - 1) * source_rows + chance_row] : 0;
+}
+
+float LightSources::least_irradiance(const VideoImage *video) const {
+    const float of_scene = 1e-3f * light_;
+    if (light_of_room_ > 0 || light_ <= 0 || !video)
+        return of_scene;
+    constexpr float reflectance = 0.35f; // mean of rooms, as of the default light of scenes
+    const std::array<float, 3> mean = video->mean();
+    return std::max(of_scene, static_cast<float>(mean_of(mean.data())) / reflectance);
 }
 
 std::vector<float> environment_irradiance(const arhost_scene &arena) {

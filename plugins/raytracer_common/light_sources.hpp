@@ -31,6 +31,8 @@ struct Emitter {
     float ball_radius = 0; // world space, mm; 0: a mesh
 };
 
+class VideoImage;
+
 class LightSources {
 public:
     explicit LightSources(const arhost_scene &arena);
@@ -42,8 +44,10 @@ public:
     std::span<const float> cumulative() const { return cumulative_; }
     std::span<const float> lamp_chances() const { return lamp_chances_; }
     float environment_chance() const { return environment_chance_; }
-    // The light of all sources in the middle of the virtual objects: irradiance / π at perpendicular incidence.
-    float light() const { return light_; }
+    // The change of a catcher's light is relative to at least this irradiance / π, so that a catcher in the dark does
+    // not flicker. In a scene without light from the room, where only virtual objects emit, the video tells how
+    // bright the room is. 0: the scene has no light. `video`: NULL if it is unknown.
+    float least_irradiance(const VideoImage *video) const;
     std::span<const Emitter> emitters() const { return emitters_; } // one per object
     // Spheres that contain the visible virtual objects, at most max_spheres.
     static constexpr std::size_t max_spheres = 16;
@@ -62,7 +66,10 @@ private:
     float environment_radiance_ = 0; // mean over all directions
     std::vector<float> records_, cumulative_, lamp_chances_;
     std::vector<Emitter> emitters_;
-    float environment_chance_ = 0, light_ = 0;
+    float environment_chance_ = 0;
+    // Light in the middle of the virtual objects, of all sources, and of lamps and environment only: irradiance / π
+    // at perpendicular incidence.
+    float light_ = 0, light_of_room_ = 0;
     std::vector<std::array<float, 4>> spheres_, specular_spheres_;
 };
 

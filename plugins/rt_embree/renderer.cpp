@@ -258,7 +258,7 @@ PathScene Renderer::path_scene() const {
     path.spheres = reinterpret_cast<const float *>(lights_->spheres().data()); // there may be none
     path.sphere_count = static_cast<std::int32_t>(lights_->spheres().size());
     path.max_radiance = max_radiance_;
-    path.least_irradiance = 1e-3f * lights_->light();
+    path.least_irradiance = lights_->least_irradiance(has_video_ ? &video_ : nullptr);
     if (!has_video_)
         return path;
     const arhost_intrinsics &of = full_intrinsics_;

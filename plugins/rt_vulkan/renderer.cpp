@@ -441,9 +441,11 @@ void Renderer::set_video(const arhost_frame *video) {
         video_image_.set(*video);
         std::memcpy(video_.mapped().data(), video_image_.texels(), scene_.video_size());
     }
-    std::ranges::copy(
-        arhost::raytracer_common::environment_scale(scene_.environment(), frame_.has_video ? &video_image_ : nullptr),
-        frame_.environment_intensity);
+    const arhost::raytracer_common::VideoImage *known = frame_.has_video ? &video_image_ : nullptr;
+    std::ranges::copy(arhost::raytracer_common::environment_scale(scene_.environment(), known),
+                      frame_.environment_intensity);
+    if (is_path_)
+        frame_.least_irradiance = scene_.lights().least_irradiance(known);
 }
 
 Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &image, const arhost_motion *motion,

@@ -514,7 +514,6 @@ void SceneData::write_lights(Frame &frame) const {
     frame.first_source = first_source_;
     frame.first_cumulative = first_source_ + max_sources_ * arhost::raytracer_common::source_rows;
     frame.environment_chance = light_sources_->environment_chance();
-    frame.least_irradiance = 1e-3f * light_sources_->light();
 }
 
 // Fills `tables_` in the order that scene.glsl expects: sRGB encoding, sRGB decoding, environment.

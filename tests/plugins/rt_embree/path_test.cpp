@@ -221,6 +221,23 @@ TEST(PathIntegrator, EnvironmentFollowsTheVideo) {
     EXPECT_LT(mean_at(lit, 60, 75, transmittance, 4), 0.9) << "the shadow does not depend on the colour";
 }
 
+// Where only virtual objects emit light, the brightness of the room is known from its video only.
+TEST(PathIntegrator, EmissiveBallLightsACatcherOfTheFilmedRoom) {
+    constexpr double radius = 15, height = 50, radiance = 4, reflectance = 0.35;
+    SceneBuilder scene = table(path_settings());
+    scene.add_ball("ball", {0, 0, height, radius}, emissive(radiance));
+    const arhost_camera view = from_above();
+    const Video video(view.intrinsics);
+    const LinearPicture picture = rendered(std::move(scene), view, {{"samples", "64"}}, 0, &video);
+    raytracer_common::VideoImage image;
+    image.set(video.frame());
+    const std::array<float, 3> mean = image.mean();
+    const double of_room = (double{mean[0]} + mean[1] + mean[2]) / 3 / reflectance;
+    const double distance = on_the_floor(60, 75).x, squared = distance * distance + height * height;
+    const double form_factor = radius * radius / squared * height / std::sqrt(squared);
+    EXPECT_NEAR(mean_at(picture, 60, 75, transmittance), 1 + radiance * form_factor / of_room, 0.02);
+}
+
 // A tile with many samples or lamps takes many seconds.
 TEST(PathIntegrator, CanBeCancelledWithinATile) {
     SceneBuilder scene = table(path_settings(1));
