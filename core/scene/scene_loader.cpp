@@ -378,8 +378,7 @@ arhost_light light_of(const Node &node, arhost_axes axes) {
     } else if (type == "spot") {
         node.allow_keys(
             {"type", "position", "intensity", "falloff", "direction", "inner_degrees", "outer_degrees", "radius"});
-        if (const auto radius = node.find("radius"))
-            light.radius = static_cast<float>(length_of(*radius));
+        light.radius = real_or(node, "radius", 0, coordinate_limit_mm, 0);
         set(light.direction, direction_of(node.require("direction")));
         const double outer = node.require("outer_degrees").real(0, 180);
         const auto inner = node.find("inner_degrees");

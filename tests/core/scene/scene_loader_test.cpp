@@ -229,7 +229,7 @@ TEST(SceneFile, DescribesLightsOfEveryType) {
         load(start + "lights:\n"
                      "  - {type: directional, direction: [0, 0, -2], intensity: 1}\n"
                      "  - {type: spot, position: [0, 0, 9], direction: [0, 1, 0], inner_degrees: 30, outer_degrees: "
-                     "60, intensity: 1, falloff: inverse-square}\n"
+                     "60, intensity: 1, falloff: inverse-square, radius: 0}\n"
                      "  - {type: rectangle, position: [0, 0, 9], direction: [0, 1, 0], size: [4, 6], intensity: 1}\n"
                      "  - {type: sphere, position: [0, 0, 9], radius: 3, intensity: 1}\n"
                      "objects: []\n");
@@ -237,6 +237,7 @@ TEST(SceneFile, DescribesLightsOfEveryType) {
     EXPECT_THAT(light(arena, 0).direction, ElementsAre(0, 0, -1));
     EXPECT_FLOAT_EQ(light(arena, 1).cosine_outer, 0.5f);
     EXPECT_FLOAT_EQ(light(arena, 1).cosine_inner, std::sqrt(0.75f));
+    EXPECT_EQ(light(arena, 1).radius, 0);
     EXPECT_THAT(light(arena, 2).axis_u, ElementsAre(-2, 0, 0)); // the width is horizontal
     EXPECT_THAT(light(arena, 2).axis_v, ElementsAre(0, 0, 3));
     EXPECT_EQ(light(arena, 3).radius, 3);
