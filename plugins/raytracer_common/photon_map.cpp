@@ -14,7 +14,7 @@ namespace arhost::raytracer_common {
 namespace {
 
 std::int32_t cell_at(float position, float low, float side) {
-    return static_cast<std::int32_t>(std::min((position - low) / side, 1e9f));
+    return static_cast<std::int32_t>(std::clamp((position - low) / side, -1e9f, 1e9f));
 }
 
 void sort(std::span<const Photon> photons, const std::array<float, 3> &low, PhotonGrid &grid) {

@@ -207,14 +207,21 @@ ARHOST_INLINE NearCells cells_near(const Photons &photons, const PhotonGrid &gri
     return cells;
 }
 
+// An estimate reads at most about this many photons, evenly spread over the cells. It needs far fewer, but one cell
+// of the finest grid may hold almost all photons, if the others lie far away.
+constexpr float most_photons = 1024;
+
+// `jitter`: 0 to 1, chooses which photons are read if there are too many.
 template <class Weight>
 ARHOST_INLINE Vec3 photon_density(const Photons &photons, const PhotonGrid &grid, const NearCells &cells,
-                                  const Surface &s, Bool active, Weight weight) {
+                                  const Surface &s, Float jitter, Bool active, Weight weight) {
+    const Int step = to_int(to_float(cells.count) * Float(1 / most_photons)) + Int(1),
+              skipped = to_int(jitter * to_float(step));
     const Float radius_squared(grid.radius * grid.radius), scale(2 / (3.14159265f * grid.radius * grid.radius));
     const Float inverse_cell(0.5f / grid.radius);
     Vec3 sum = black();
     for (int i = 0; i < 8; ++i)
-        for (Int next = cells.first[i];; next = next + Int(1)) {
+        for (Int next = cells.first[i] + skipped;; next = next + step) {
             const Bool here = active & (next < cells.end[i]);
             if (!any(here))
                 break;
@@ -237,7 +244,7 @@ ARHOST_INLINE Vec3 photon_density(const Photons &photons, const PhotonGrid &grid
             const Float kernel = scale * (Float(1.0f) - squared * (Float(1.0f) / radius_squared));
             sum = sum + select(counts, Vec3{value(6), value(7), value(8)} * weight(to_light) * kernel, black());
         }
-    return sum;
+    return sum * to_float(step);
 }
 
 // Returns the light that photons bring to the surfaces: the sum of weight(direction to the light) · irradiance / π.
@@ -263,7 +270,7 @@ ARHOST_INLINE Vec3 photon_light(const Work &work, const Paths &paths, const Surf
         const Bool dense = active & (limit < cells.count) & bool_of(level + 1 < photons.level_count);
         const Bool here = active & ~dense;
         if (any(here))
-            sum = sum + photon_density(photons, grid, cells, s, here, weight);
+            sum = sum + photon_density(photons, grid, cells, s, jitter, here, weight);
         active = dense;
     }
     return sum * Float(static_cast<float>(work.frame.sample_count) / static_cast<float>(estimates));

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -161,6 +162,23 @@ TEST(PathIntegrator, GlassFocusesTheLightOfALampOntoACatcher) {
 
 // A pane with parallel faces shifts the light, and reflects twice F = 4 % of it, with the reflections inside
 // 2F/(1+F).
+// Photons that land far away make the cells of the photon map large, so that one holds all photons near the table.
+TEST(PathIntegrator, DistantObjectDoesNotSlowDownACaustic) {
+    const auto render_time = [](float distance) {
+        SceneBuilder scene = table(path_settings());
+        scene.add_light(placed(ARHOST_LIGHT_POINT, {-100, 0, 200}, 1e4f, ARHOST_FALLOFF_INVERSE_SQUARE));
+        scene.add_ball("ball", {0, 0, 25, 20}, mirror(1));
+        scene.add_mesh("wall",
+                       quad({-distance, -distance, -distance}, {-distance, distance, -distance},
+                            {-distance, distance, distance}, {-distance, -distance, distance}),
+                       diffuse(0.5f, 0.5f, 0.5f));
+        const auto begin = std::chrono::steady_clock::now();
+        rendered(std::move(scene), from_the_side(pinhole(60, 45, 60)), {{"samples", "16"}});
+        return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    };
+    EXPECT_LT(render_time(1e8f), 10 * render_time(500) + 0.5);
+}
+
 TEST(PathIntegrator, PaneOfGlassLosesTheReflectedLight) {
     SceneBuilder scene = table(path_settings(0, 16), 0); // a black table: the pane reflects no light back onto it
     scene.add_light(sun());
