@@ -55,8 +55,8 @@ public:
     Frame frame() const;
     // Sets the fields that depend on where the light sources and the virtual objects are. Only with the path
     // integrator.
-    const arhost::raytracer_common::LightSources &lights() const { return *light_sources_; } // path integrator only
     void write_lights(Frame &frame) const;
+    const arhost::raytracer_common::LightSources &lights() const { return *light_sources_; } // path integrator only
     const arhost_environment &environment() const { return arena_.environment; }
     bool has_glass() const { return has_glass_; }
     bool has_catchers() const { return has_catchers_; }
