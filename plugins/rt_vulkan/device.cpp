@@ -221,7 +221,7 @@ void Submission::end(VkCommandBuffer commands) const {
     check(device_.functions().vkEndCommandBuffer(commands), "recording GPU commands");
 }
 
-void Submission::run(std::span<const VkCommandBuffer> commands) const {
+void Submission::run(std::span<const VkCommandBuffer> commands, const std::function<void()> &waiting) const {
     const VolkDeviceTable &vk = device_.functions();
     const VkFence fence = fence_.get();
     check(vk.vkResetFences(device_.handle(), 1, &fence), "resetting a fence");
@@ -229,7 +229,10 @@ void Submission::run(std::span<const VkCommandBuffer> commands) const {
                             .commandBufferCount = static_cast<std::uint32_t>(commands.size()),
                             .pCommandBuffers = commands.data()};
     check(vk.vkQueueSubmit(device_.queue(), 1, &info, fence), "submitting GPU commands");
-    const VkResult result = vk.vkWaitForFences(device_.handle(), 1, &fence, VK_TRUE, UINT64_MAX);
+    constexpr std::uint64_t interval_ns = 100'000'000;
+    VkResult result = VK_TIMEOUT;
+    while ((result = vk.vkWaitForFences(device_.handle(), 1, &fence, VK_TRUE, interval_ns)) == VK_TIMEOUT)
+        waiting();
     if (result != VK_SUCCESS)
         vk.vkDeviceWaitIdle(device_.handle()); // the caller will destroy objects that the commands may still use
     check(result, "waiting for the GPU");

@@ -6,6 +6,7 @@
 #include "instance.hpp"
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <utility>
 
@@ -121,7 +122,9 @@ public:
     void free(VkCommandBuffer commands) const;
     void begin(VkCommandBuffer commands, VkCommandBufferUsageFlags flags = 0) const;
     void end(VkCommandBuffer commands) const;
-    void run(std::span<const VkCommandBuffer> commands) const;
+    // Calls `waiting` every 100 ms until the work is complete.
+    void run(
+        std::span<const VkCommandBuffer> commands, const std::function<void()> &waiting = [] {}) const;
     void run(VkCommandBuffer commands) const { run({&commands, 1}); }
 
 private:

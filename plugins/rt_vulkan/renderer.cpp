@@ -506,14 +506,15 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
 void Renderer::trace(std::vector<VkCommandBuffer> commands, Target &target) {
     arhost::raytracer_common::SlowImage slow_image(host_);
     for (Rows rows{}; rows.first < intrinsics_.height; rows.first += rows.count) {
-        slow_image.report(static_cast<double>(rows.first) / intrinsics_.height);
+        const auto report = [&] { slow_image.report(static_cast<double>(rows.first) / intrinsics_.height); };
+        report();
         if (rows.first > 0 && host_.cancelled())
             throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while tracing the image");
         rows.count = std::min(bands_.rows(), intrinsics_.height - rows.first);
         record(target, rows);
         commands.push_back(target.commands);
         const auto begin = std::chrono::steady_clock::now();
-        submission_.run(commands);
+        submission_.run(commands, report);
         bands_.record(rows.count, std::chrono::steady_clock::now() - begin);
         commands.clear();
     }

@@ -163,6 +163,7 @@ public:
     void cancel(int after = 0) { cancelled_after_ = cancel_checks_ + after; }
     // The number of calls of `cancelled`.
     int cancel_checks() const { return cancel_checks_; }
+    int progress_reports() const { return progress_reports_; }
     void reset_cancel() { cancelled_after_ = std::numeric_limits<int>::max(); }
 
     // Returns all log messages so far, one per line, in the format "severity text".
@@ -187,7 +188,7 @@ private:
         std::lock_guard lock(self(host).mutex_);
         self(host).log_ += std::to_string(severity) + " " + text + "\n";
     }
-    static void on_progress(const arhost_host *, double, const char *) {}
+    static void on_progress(const arhost_host *host, double, const char *) { ++self(host).progress_reports_; }
     static int32_t on_cancelled(const arhost_host *host) {
         return self(host).cancel_checks_++ >= self(host).cancelled_after_;
     }
@@ -199,7 +200,7 @@ private:
     arhost_instance *instance_ = nullptr;
     mutable std::mutex mutex_;
     std::string log_;
-    std::atomic<int> cancel_checks_{0}, cancelled_after_{std::numeric_limits<int>::max()};
+    std::atomic<int> progress_reports_{0}, cancel_checks_{0}, cancelled_after_{std::numeric_limits<int>::max()};
 };
 
 } // namespace arhost::test

@@ -4,6 +4,7 @@
 // layer reads it at each call that can fail; N counts the calls on one device, from 1:
 //   submit:N    The Nth vkQueueSubmit reports that the device is lost, without submitting the work.
 //   wait:N      The Nth vkWaitForFences waits for the work and then reports that the device is lost.
+//   slow        The first three vkWaitForFences last until their timeouts.
 //   allocate:N  The Nth and all later calls of vkAllocateMemory report that the device is out of memory.
 //   pipelines:N The Nth and all later calls that create a ray tracing pipeline fail.
 //   device-with:EXTENSION  vkCreateDevice fails if it enables EXTENSION.
@@ -16,12 +17,14 @@
 //   ARHOST_TEST_VULKAN_IS_OLD=first       The device that is queried first supports only Vulkan 1.0.
 #include <vulkan/vk_layer.h>
 
+#include <chrono>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <map>
 #include <mutex>
 #include <string>
+#include <thread>
 
 namespace {
 
@@ -38,7 +41,7 @@ struct NextInstance {
 struct NextDevice {
     VkDevice handle;
     PFN_vkGetDeviceProcAddr get;
-    std::uint64_t submits = 0, waits = 0, allocations = 0, pipelines = 0;
+    std::uint64_t submits = 0, waits = 0, slow_waits = 0, allocations = 0, pipelines = 0;
     bool lost = false;
 };
 
@@ -155,6 +158,11 @@ VKAPI_ATTR VkResult VKAPI_CALL wait_for_fences(VkDevice handle, std::uint32_t co
     NextDevice &device = devices.at(key_of(handle));
     if (device.lost)
         return VK_ERROR_DEVICE_LOST;
+    const char *failure = std::getenv("ARHOST_TEST_VULKAN_FAILS");
+    if (failure && !std::strcmp(failure, "slow") && timeout_ns != UINT64_MAX && ++device.slow_waits <= 3) {
+        std::this_thread::sleep_for(std::chrono::nanoseconds(timeout_ns));
+        return VK_TIMEOUT;
+    }
     // Only simulates the loss, so the device continues to work. Waits for it, so that the caller does not destroy
     // objects in use.
     const VkResult result =

@@ -192,6 +192,14 @@ TEST_P(FailingDevice, ReportsLossInMidRun) {
     expect_recovery();
 }
 
+TEST_P(FailingDevice, ReportsProgressDuringASlowBand) {
+    ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->log();
+    const int before = tracer_->plugin().progress_reports();
+    inject_failure("slow");
+    EXPECT_EQ(render(), ARHOST_STATUS_OK);
+    EXPECT_GE(tracer_->plugin().progress_reports() - before, 2);
+}
+
 TEST_P(FailingDevice, LossAtTheFirstImageEndsCleanly) {
     ASSERT_EQ(start(), ARHOST_STATUS_OK) << tracer_->log();
     inject_failure("wait:1");
