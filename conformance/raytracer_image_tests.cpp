@@ -276,7 +276,7 @@ constexpr Test tests[] = {
     {"raytracer.state",
      "Image and state_after depend only on the request and state_before, also for linear images, video and two "
      "sizes.",
-     "raytracer.deterministic", 20s, state},
+     "raytracer.deterministic", 60s, state},
     {"raytracer.threads", "The image does not depend on the number of threads.", gate, 20s, threads},
     {"raytracer.reference",
      "The image matches that of the reference ray tracer: a PSNR of 40 dB inside objects, equal alpha except at "

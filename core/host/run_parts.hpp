@@ -54,8 +54,8 @@ std::vector<std::uint64_t> sequences_of(const std::vector<ipc::Command> &command
 constexpr std::uint32_t source_slot_count = 8, stage_slot_count = 4;
 // Slots of a ray tracer with state, which may be large: the previous state, the next one, and an image to composite.
 constexpr std::uint32_t slot_count_with_state = 3;
-// A worker gets no frames while frames or the state hold memory of so many dead predecessors. Otherwise, a plugin
-// that dies after each frame would pin more and more memory.
+// A worker gets no frames while frames or the state hold regions of so many dead workers. Otherwise, a plugin that
+// dies after each frame would pin more and more memory.
 constexpr std::size_t max_earlier_outputs = 2;
 constexpr std::size_t live_sink_depth = 3;
 

@@ -37,13 +37,13 @@ Stage::Stage(RunParts &parts, const char *name, const run_config::ComponentConfi
 }
 
 // The configuration of a session names plugins by their short names, which plugins of several vendors may have.
-void Stage::compare_with_recorded(const PluginDescription &plugin) const {
+void Stage::compare_with_recorded(const PluginDescription &plugin) {
     const auto &recording = parts_.configuration.recording;
     if (!recording)
         return;
     const auto recorded = recording->plugin_ids.find(component_->name());
     if (recorded != recording->plugin_ids.end() && recorded->second != plugin.id &&
-        short_name(recorded->second) == plugin.short_name())
+        short_name(recorded->second) == plugin.short_name() && std::exchange(warned_of_, plugin.id) != plugin.id)
         component_->log(ARHOST_SEVERITY_WARNING, "the session was recorded with '" + recorded->second +
                                                      "', but this plugin is '" + plugin.id +
                                                      "'; its results may differ");

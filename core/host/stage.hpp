@@ -50,7 +50,8 @@ protected:
     Lease state_; // the state that the last accepted call has written (docs/adr/0026)
 
 private:
-    void compare_with_recorded(const model::PluginDescription &plugin) const;
+    void compare_with_recorded(const model::PluginDescription &plugin);
+    std::string warned_of_; // the id of the plugin that compare_with_recorded() has warned of last
 
     struct StateOwner {
         std::size_t candidate = 0;

@@ -327,11 +327,11 @@ void LightSources::choose(const std::vector<std::uint32_t> &object_of, Vec3 midd
 
 float LightSources::least_irradiance(const VideoImage *video) const {
     const float of_scene = 1e-3f * light_;
-    if (light_of_room_ > 0 || light_ <= 0 || !video)
+    if (light_of_room_ > 0 || !video)
         return of_scene;
-    constexpr float reflectance = 0.35f; // mean of rooms, as of the default light of scenes
+    constexpr float mean_reflectance = 0.35f; // of rooms, as of the default light of scenes
     const std::array<float, 3> mean = video->mean();
-    return std::max(of_scene, static_cast<float>(mean_of(mean.data())) / reflectance);
+    return std::max(of_scene, static_cast<float>(mean_of(mean.data())) / mean_reflectance);
 }
 
 std::vector<float> environment_irradiance(const arhost_scene &arena) {

@@ -18,6 +18,8 @@
 namespace arhost::raytracer_common {
 
 // Where an object is, and the shape of a deforming one.
+class VideoImage;
+
 struct PlacedObject {
     const float *world_from_object; // column-major 3×4
     const float *positions;         // of the vertices; NULL: those of the arena
@@ -30,8 +32,6 @@ struct Emitter {
     float density = 0;     // chance of a light sample per mm² of the mesh, or that of the ball; 0: it is not sampled
     float ball_radius = 0; // world space, mm; 0: a mesh
 };
-
-class VideoImage;
 
 class LightSources {
 public:
@@ -46,7 +46,8 @@ public:
     float environment_chance() const { return environment_chance_; }
     // The change of a catcher's light is relative to at least this irradiance / π, so that a catcher in the dark does
     // not flicker. In a scene without light from the room, where only virtual objects emit, the video tells how
-    // bright the room is. 0: the scene has no light. `video`: NULL if it is unknown.
+    // bright the room is, if it reflects 35 % of its light. 0: neither lamps, environment, sampled emissive surfaces
+    // nor a video give light. `video`: NULL if it is unknown.
     float least_irradiance(const VideoImage *video) const;
     std::span<const Emitter> emitters() const { return emitters_; } // one per object
     // Spheres that contain the visible virtual objects, at most max_spheres.

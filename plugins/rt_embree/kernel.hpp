@@ -157,7 +157,7 @@ struct PathScene {
     std::int32_t sphere_count;
     float max_radiance; // bound of each sample
     // The change of a catcher's light is relative to at least this irradiance / π, so that a catcher in the dark does
-    // not flicker. 0: the scene has no light, and catchers do not change.
+    // not flicker (LightSources::least_irradiance). 0: catchers do not change.
     float least_irradiance;
     Video video;
     Caustics caustics;
@@ -186,10 +186,10 @@ struct Frame {
     std::uint32_t first_random; // offset into the random sequences of the path integrator
     PathScene path;
     bool blends_codes; // straight images of the path integrator: the host blends sRGB codes, not linear light
-    // Called after each sample of a tile, on any thread, since a tile may take seconds. False: the image is not
-    // wanted.
-    bool (*goes_on)(const void *context);
-    const void *context;
+    // Called on any thread after each sample of a tile and before each chunk of photons, because a tile may take
+    // seconds. Reports progress; returns whether the image is still wanted.
+    bool (*goes_on)(const void *progress);
+    const void *progress;
 };
 
 struct Rectangle {

@@ -226,9 +226,11 @@ void Renderer::trace_photons(Frame &frame) {
     photons_.resize(count);
     threads_.for_each((count + chunk - 1) / chunk, [&](std::size_t i, std::size_t) {
         const auto first = static_cast<std::uint32_t>(i) * chunk;
-        if (frame.goes_on(frame.context))
+        if (frame.goes_on(frame.progress))
             kernel_.trace_photons(frame, first, std::min(chunk, count - first), photons_.data() + first);
     });
+    if (!frame.goes_on(frame.progress))
+        return;
     photon_map_.build(photons_);
     Photons &photons = frame.path.photons;
     if (photon_map_.photons().empty())

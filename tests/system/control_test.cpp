@@ -246,7 +246,7 @@ TEST(Control, ASwapAndANewSceneBeginWithoutTheStateOfTheRaytracer) {
                             swap("raytracer", "rt_history")};
     for (const Json &change : changes) {
         run.succeed(change);
-        run.wait_for_frames(20); // more than the frames that it does not render
+        run.wait_for_frames(20); // more than pass before the new ray tracer renders
     }
     EXPECT_EQ(run.quit(), 0) << run.output();
     std::uint64_t beginnings = 0, next = 0;

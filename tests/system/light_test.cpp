@@ -59,7 +59,7 @@ TEST(LinearImages, KillingWorkersDoesNotChangeThem) {
 TEST(LinearImages, KillingRealWorkersEvery20FramesDoesNotChangeThem) {
     const std::string yaml =
         "version: 1\n"
-        "source: {plugin: source_synthetic, options: {id: 3, width: 160, height: 120, frames: 120}}\n"
+        "source: {plugin: source_synthetic, options: {id: 3, width: 160, height: 120, frames: 240}}\n"
         "tracker: {plugin: tracker_aruco, targets: [{marker: 3, family: tag36h11, side_mm: 80}]}\n"
         "raytracer: {plugin: rt_embree, scene: scene.yaml, options: {samples: 1, threads: 2}}\n"
         "outputs: [{plugin: sink_poses, path: poses.jsonl}, {plugin: sink_images, path: \"%04d.png\"}]\n"
@@ -83,7 +83,7 @@ TEST(LinearImages, KillingRealWorkersEvery20FramesDoesNotChangeThem) {
     for (const char *stage : {"raytracer", "tracker"})
         EXPECT_GE(killed.stats()["restarts"][stage], 2) << stage;
     EXPECT_EQ(killed.read("poses.jsonl"), clean.read("poses.jsonl"));
-    for (int frame = 0; frame < 120; ++frame) {
+    for (int frame = 0; frame < 240; ++frame) {
         const std::string name = std::to_string(10000 + frame).substr(1) + ".png";
         ASSERT_TRUE(clean.exists(name)) << name;
         ASSERT_EQ(killed.read(name), clean.read(name)) << name;

@@ -41,8 +41,8 @@ TEST(Live, ASlowRayTracerDropsFramesAndCountsThem) {
 // The ray tracer draws how many images it has rendered before. Those that frames have overtaken do not count.
 TEST(Live, AnImageThatIsLateLeavesTheStateAsItWas) {
     CountingRun run({.mode = "live",
-                     .source = "frames: 90",
-                     .raytracer = "state_size: 8, delay_ms: 1000, delay_from: 10, delay_until: 20",
+                     .source = "frames: 150",
+                     .raytracer = "state_size: 8, delay_ms: 1000, delay_from: 10, delay_until: 40",
                      .more = "live: {max_latency_ms: 300}\n"});
     ASSERT_EQ(run.run(), 0) << run.output();
     std::uint64_t images = 0, last = 0;
@@ -53,7 +53,7 @@ TEST(Live, AnImageThatIsLateLeavesTheStateAsItWas) {
         }
     const auto stats = run.stats();
     EXPECT_GE(stats["frames"]["dropped"].value("late", 0), 1) << stats.dump(1);
-    EXPECT_GE(last, 20u) << "no image follows the late one";
+    EXPECT_GE(last, 40u) << "no image follows the late one";
 }
 
 TEST(Live, CancelsAnUnneededImageAtTheEnd) {

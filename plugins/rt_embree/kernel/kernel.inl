@@ -207,7 +207,8 @@ template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, c
     const Rectangle &all = tile.pixels;
     Rectangle drawn{all.x1, all.y1, all.x0, all.y0};
     const float *rays = frame.rays.blocks + tile.first_block * frame.rays.block_size();
-    Work work{frame, scratch, 0, static_cast<std::uint32_t>(all.x0 * 65536 + all.y0) ^ 0x51ed270bu, 0};
+    Work work{frame, scratch, 0,
+              (static_cast<std::uint32_t>(all.x0) * 65536u + static_cast<std::uint32_t>(all.y0)) ^ 0x51ed270bu, 0};
     bool has_light[tile_pixels / lanes];
     for (int i = 0; i < frame.scene.sum_row_count(); ++i)
         __builtin_memset(scratch.sum[i], 0, tile_pixels * sizeof(float));
@@ -225,7 +226,7 @@ template <class Integrator> ARHOST_INLINE Rectangle render(const Frame &frame, c
             if (has_light[number])
                 Integrator::accumulate(frame, scratch, number * lanes);
         });
-        if (!frame.goes_on(frame.context))
+        if (!frame.goes_on(frame.progress))
             break;
     }
     const std::uint32_t count = frame.first_sample + static_cast<std::uint32_t>(frame.sample_count);

@@ -4,8 +4,9 @@
 // Scrambling, JCGT 9(4), 2020) of samples, which each pixel shifts by the bits of a pair of another such sequence of
 // pixels in Z order (A. Ahmed and P. Wonka, Screen-space Blue-noise Diffusion of Monte Carlo Sampling Error via
 // Hierarchical Ordering of Pixels, ACM TOG 39(6), 2020). Each tile, vertex and dimension has its own scramblings. So
-// the pairs of any 2^k successive samples of a pixel, beginning at a multiple of 2^k, are a (0, k, 2)-net, as are
-// those of one sample of the pixels of a square of 2^(k/2) px, so that errors of neighbours differ.
+// the pairs of any 2^k successive samples of a pixel, beginning at a multiple of 2^k, are a (0, k, 2)-net. So are the
+// pairs of one sample of all pixels of an aligned square of 2^(k/2) px in a tile of full width, for even k; therefore
+// the errors of neighbours differ.
 #pragma once
 #include "scatter.inl"
 
@@ -71,8 +72,8 @@ template <class Word> ARHOST_INLINE PairBits<Word> owen_pair(Word index, Word se
 }
 
 // Returns the number in Z order of a pixel of a tile: bits 2i and 2i + 1 are bit i of its column and of its row.
-// `pixel` counts rows of blocks of 4×4 px, of which whole tiles have eight; the result is only a permutation in
-// others.
+// `pixel`: the number of the pixel if blocks of 4×4 px follow each other row by row, eight in a row. Narrower tiles
+// have fewer in a row; there, the result is a permutation, but not the Z order.
 ARHOST_INLINE Int z_order_of(Int pixel) {
     return (pixel & Int(0x219)) | ((pixel & Int(0x22)) << Int(1)) | (shift_right_unsigned(pixel, 1) & Int(0x82)) |
            (shift_right_unsigned(pixel, 2) & Int(0x20)) | ((pixel & Int(0x40)) << Int(2));

@@ -211,12 +211,12 @@ ARHOST_INLINE NearCells cells_near(const Photons &photons, const PhotonGrid &gri
 // of the finest grid may hold almost all photons, if the others lie far away.
 constexpr float most_photons = 1024;
 
-// `jitter`: 0 to 1, chooses which photons are read if there are too many.
+// `phase`: 0 to 1, chooses which photons are read if there are too many.
 template <class Weight>
 ARHOST_INLINE Vec3 photon_density(const Photons &photons, const PhotonGrid &grid, const NearCells &cells,
-                                  const Surface &s, Float jitter, Bool active, Weight weight) {
+                                  const Surface &s, Float phase, Bool active, Weight weight) {
     const Int step = to_int(to_float(cells.count) * Float(1 / most_photons)) + Int(1),
-              skipped = to_int(jitter * to_float(step));
+              skipped = to_int(phase * to_float(step));
     const Float radius_squared(grid.radius * grid.radius), scale(2 / (3.14159265f * grid.radius * grid.radius));
     const Float inverse_cell(0.5f / grid.radius);
     Vec3 sum = black();
@@ -258,10 +258,10 @@ ARHOST_INLINE Vec3 photon_light(const Work &work, const Paths &paths, const Surf
     if ((work.sample - work.frame.first_random) % static_cast<std::uint32_t>(step) != 0)
         return black();
     const std::int32_t estimates = (work.frame.sample_count + step - 1) / step;
-    const Float jitter = path_pair(work, paths, photon_dimension, 0, 1).u; // hides where the radius changes
-    // The cells cover 16/π times the area of the density estimate.
+    const Pair random = path_pair(work, paths, photon_dimension, 0, 1);
+    // The cells cover 16/π times the area of the density estimate. A random limit hides where the radius changes.
     constexpr float enough = 5 * static_cast<float>(arhost::raytracer_common::PhotonMap::photons_per_estimate);
-    const Int limit = to_int(Float(enough) * (Float(1.0f) + Float(3.0f) * jitter));
+    const Int limit = to_int(Float(enough) * (Float(1.0f) + Float(3.0f) * random.u));
     Vec3 sum = black();
     for (std::int32_t level = 0; level < photons.level_count && any(active); ++level) {
         const PhotonGrid &grid = photons.levels[level];
@@ -270,7 +270,7 @@ ARHOST_INLINE Vec3 photon_light(const Work &work, const Paths &paths, const Surf
         const Bool dense = active & (limit < cells.count) & bool_of(level + 1 < photons.level_count);
         const Bool here = active & ~dense;
         if (any(here))
-            sum = sum + photon_density(photons, grid, cells, s, jitter, here, weight);
+            sum = sum + photon_density(photons, grid, cells, s, random.v, here, weight);
         active = dense;
     }
     return sum * Float(static_cast<float>(work.frame.sample_count) / static_cast<float>(estimates));

@@ -34,7 +34,7 @@ uvec2 owen_pair(uint index, uint seed) {
                  bitfieldReverse(nested_permutation(pascal_of(shuffled), hash(seed))));
 }
 
-// Returns the number in Z order of a pixel of a tile.
+// Returns the number in Z order of a pixel of a tile of full width; in others, a permutation of the numbers.
 uint z_order_of(uint pixel) {
     return (pixel & 0x219u) | ((pixel & 0x22u) << 1) | ((pixel >> 1) & 0x82u) | ((pixel >> 2) & 0x20u) |
            ((pixel & 0x40u) << 2);

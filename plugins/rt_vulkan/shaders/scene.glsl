@@ -136,7 +136,7 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     vec4 lens[3]; // the distortion's coefficients
     uint distortion;
     float max_radius_squared; // of (x/z, y/z) in the picture; the lens model is not valid beyond
-    float least_irradiance;   // bound of a catcher's light without virtual objects; 0: there is no light
+    float least_irradiance;   // bound of a catcher's light without virtual objects; 0: catchers do not change
     uint blends_codes;        // whether straight images are blended in sRGB
 }
 frame;

@@ -167,7 +167,7 @@ static const arhost_option_descriptor options[] = {
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "delay_from", "0", 0, 0, NULL,
      "First frame with the delay"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_INTEGER, "delay_until", "-1", 0, 0, NULL,
-     "First frame after them without it; -1: none"},
+     "First later frame without the delay; -1: none"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "reports_progress", "false", 0, 0, NULL,
      "Reports progress during the delay"},
     {sizeof(arhost_option_descriptor), ARHOST_OPTION_BOOL, "writes_later", "false", 0, 0, NULL,
