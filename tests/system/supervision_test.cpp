@@ -7,6 +7,8 @@
 
 #include <cmath>
 
+#include <algorithm>
+#include <array>
 #include <cctype>
 #include <iterator>
 #include <map>
@@ -534,12 +536,14 @@ TEST(Supervision, SurvivesRandomKillsAndStops) {
     run.start();
     run.wait_for_lines(20);
     std::minstd_rand random(7);
-    const std::string plugins[] = {"source_counter", "tracker_counter", "rt_counter", "sink_counter"};
+    std::array<std::string, 4> plugins{"source_counter", "tracker_counter", "rt_counter", "sink_counter"};
     int faults = 0;
     while (run.running()) {
-        // Up to three faults in quick succession: a worker that fails five times in a row is disabled.
-        for (std::uint32_t burst = 1 + random() % 3; burst > 0; --burst) {
-            if (const pid_t worker = run.worker(plugins[random() % 4])) {
+        // Up to three faults in quick succession, each of another plugin: two workers that die at the same frame of a
+        // component take its overlay away.
+        std::ranges::shuffle(plugins, random);
+        for (std::uint32_t fault = 1 + random() % 3; fault > 0; --fault) {
+            if (const pid_t worker = run.worker(plugins[fault])) {
                 if (random() % 4 == 0) {
                     send_signal(worker, SIGSTOP);
                     std::this_thread::sleep_for(std::chrono::milliseconds(random() % 20));
