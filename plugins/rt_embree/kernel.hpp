@@ -70,8 +70,20 @@ enum SumRow : int {
     // colour channel. Otherwise, the rows are the part that opaque objects hide, the part that translucent objects
     // hide, and 0.
     hidden_row,
-    change_row = hidden_row, // path integrator: three rows, the change of a catcher's light relative to its light
-    sum_rows = hidden_row + 3
+    // Path integrator, instead of the rows from caught_row on. Three rows each: the change of a catcher's diffuse
+    // light relative to its light without virtual objects, and the light that it mirrors only without them.
+    change_row = caught_row,
+    covered_row = change_row + 3,
+    sum_rows = covered_row + 3
+};
+
+// The planes of Scratch::radiance, the results of a sample. The integrator `whitted` uses only the first.
+enum Plane : int {
+    object_plane,   // linear radiance of virtual objects
+    change_plane,   // as change_row
+    mirrored_plane, // light of virtual objects that a glossy catcher mirrors; part of light_row
+    covered_plane,  // as covered_row
+    plane_count
 };
 
 struct Scene {
@@ -118,7 +130,8 @@ struct Video {
     float fx, fy, cx, cy;
     arhost_distortion distortion;
     float coefficients[ARHOST_MAX_DISTORTION];
-    float max_radius_squared; // of (x/z, y/z) in the picture; the lens model is not valid beyond
+    float max_radius_squared;        // of (x/z, y/z) in the picture; the lens model is not valid beyond
+    float pixel_width, pixel_height; // of the overlay's pixels, whose grid covers the video, relative to its size
 };
 
 // The mirrors and glass objects towards which lamps send photons.
@@ -217,8 +230,7 @@ struct RayQueue {
 
 // A thread's working memory for one tile. The arrays have one value per pixel, in the order of Rays::blocks.
 struct Scratch {
-    // Linear radiance of the current sample. Path integrator: then, from index tile_pixels on, the change of a
-    // catcher's light.
+    // Results of the current sample, per colour channel: plane_count planes of tile_pixels each.
     float *radiance[3];
     float *sum[sum_rows]; // sums over all samples
     RayQueue *queues;     // one queue per depth, from 0 to Scene::max_depth

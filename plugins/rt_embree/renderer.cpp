@@ -125,17 +125,17 @@ Kernel choose_kernel(const std::string &instruction_set) {
 }
 
 ScratchMemory::ScratchMemory(std::uint32_t max_depth) : queues_(max_depth + 1) {
-    // The first queue holds up to two rays per pixel, because glass reflects and refracts. All other queues hold
-    // fewer than three packets (trace_queued_rays() in scatter.inl). Whole packets are read even from partly filled
-    // queues, so each row needs space for one more packet.
+    // The first queue holds up to two rays per pixel, because glass reflects and refracts, and glossy catchers
+    // scatter two. All other queues hold fewer than three packets (trace_queued_rays() in scatter.inl). Whole packets
+    // are read even from partly filled queues, so each row needs space for one more packet.
     constexpr std::int32_t packet = 16, first_capacity = 2 * tile_pixels + packet, capacity = 4 * packet;
-    constexpr int pixel_rows = 2 * 3 + sum_rows;
+    constexpr int pixel_rows = plane_count * 3 + sum_rows;
     storage_.resize(std::size_t{pixel_rows} * tile_pixels +
                     std::size_t{RayQueue::rows} * (first_capacity + std::size_t{max_depth} * capacity));
     float *next = storage_.data();
     const auto take = [&](std::int32_t count) { return std::exchange(next, next + count); };
     for (float *&row : scratch_.radiance)
-        row = take(2 * tile_pixels);
+        row = take(plane_count * tile_pixels);
     for (float *&row : scratch_.sum)
         row = take(tile_pixels);
     for (std::uint32_t depth = 0; depth <= max_depth; ++depth) {
@@ -277,6 +277,8 @@ PathScene Renderer::path_scene() const {
     path.video.distortion = of.distortion;
     std::copy_n(of.coefficients, of.coefficient_count, path.video.coefficients);
     path.video.max_radius_squared = max_radius_squared_;
+    path.video.pixel_width = 1 / static_cast<float>(intrinsics_.width);
+    path.video.pixel_height = 1 / static_cast<float>(intrinsics_.height);
     return path;
 }
 

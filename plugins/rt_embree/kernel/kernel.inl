@@ -192,7 +192,7 @@ struct Path {
     }
     static ARHOST_INLINE bool write(const Frame &frame, const Scratch &scratch, int first_pixel, std::uint32_t count,
                                     int x, int y, int width, int height) {
-        const LinearBlock linear = linear_mean(frame, scratch, first_pixel, count);
+        const LinearBlock linear = linear_mean(frame, scratch, first_pixel, count, x, y);
         if (frame.linear)
             return write_linear(frame, x, y, width, height, linear);
         const Int pixels = straight_of(frame, linear);

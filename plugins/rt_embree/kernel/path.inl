@@ -107,6 +107,9 @@ ARHOST_INLINE void shade_path(Work &work, const RTCRayHit16 &rays, Bool active, 
         if (!any(active))
             return;
     }
+    if (paths.depth == 1)
+        if (const Bool mirrored = active & is_mirrored(paths); any(mirrored))
+            add_covered(work, paths, rays.ray, mirrored);
     const Bool emits = active & (largest(s.emission) > Float(0.0f));
     if (any(emits)) {
         const Float inverse_density =
@@ -156,18 +159,13 @@ ARHOST_INLINE void trace_path_packet(Work &work, std::uint32_t depth) {
 ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, Bool active) {
     const Scene &scene = work.frame.scene;
     const Vec3 eye = splat(work.frame.camera.eye);
-    for (float *plane : work.scratch.radiance) {
-        store(plane + first_pixel, Float(0.0f));
-        store(plane + tile_pixels + first_pixel, Float(0.0f));
-    }
+    for (float *planes : work.scratch.radiance)
+        for (int plane = 0; plane < plane_count; ++plane)
+            store(planes + plane * tile_pixels + first_pixel, Float(0.0f));
     const PrimaryHits hits = trace_primary(scene, eye, direction, active);
     const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0, Float(0.0f)};
-    if (any(hits.caught)) {
-        Paths of_catcher = paths;
-        of_catcher.pixel = paths.pixel + Int(tile_pixels);
-        of_catcher.first_pixel = first_pixel + tile_pixels;
-        change_catcher(work, of_catcher, hits.catcher_rays, hits.caught);
-    }
+    if (any(hits.caught))
+        change_catcher(work, in_plane(paths, change_plane), hits.catcher_rays, hits.caught);
     if (!any(hits.is_virtual))
         return any(hits.caught);
     add_to_sum(work.scratch, coverage_row, first_pixel, select(hits.is_virtual, Float(1.0f), Float(0.0f)));
@@ -183,12 +181,17 @@ ARHOST_INLINE void accumulate_path(const Frame &frame, Scratch &scratch, int fir
         const Float value = load(from);
         return select(abs(value) < Float(1e30f), min(max(value, -bound), bound), Float(0.0f)); // NaN: 0
     };
-    for (int i = 0; i < 3; ++i) {
-        const float *radiance = scratch.radiance[i] + first_pixel;
-        add_to_sum(scratch, light_row + i, first_pixel, bounded(radiance));
-        if (frame.scene.has_catchers)
-            add_to_sum(scratch, change_row + i, first_pixel, bounded(radiance + tile_pixels));
-    }
+    const auto add = [&](int row, Plane plane) __attribute__((always_inline)) {
+        for (int i = 0; i < 3; ++i)
+            add_to_sum(scratch, row + i, first_pixel,
+                       bounded(scratch.radiance[i] + plane * tile_pixels + first_pixel));
+    };
+    add(light_row, object_plane);
+    if (!frame.scene.has_catchers)
+        return;
+    add(change_row, change_plane);
+    add(light_row, mirrored_plane);
+    add(covered_row, covered_plane);
 }
 
 // Returns the bits of a half-precision float, rounded to nearest, ties to even. `a`: 0 to 65504.
@@ -205,8 +208,37 @@ struct LinearBlock {
     Vec3 added, transmittance;
 };
 
+// Returns the light of the video at the pixels of the block whose first pixel is (x, y).
+ARHOST_INLINE Vec3 video_at(const Frame &frame, int x, int y) {
+    const Video &video = frame.path.video;
+    const Float column = to_float(lane_numbers() & Int(block - 1)) + Float(static_cast<float>(x) + 0.5f),
+                row = to_float(lane_numbers() >> Int(2)) + Float(static_cast<float>(y) + 0.5f);
+    return sample_texture(frame.scene, video.image, column * Float(video.pixel_width),
+                          row * Float(video.pixel_height))
+        .colour;
+}
+
+// Removes the light that catchers mirror only without virtual objects. It is part of the video, so that the
+// transmittance applies to it, too. `covered`: its mean over the samples, `uncovered`: the catchers' share of them.
+ARHOST_INLINE void remove_covered(const Frame &frame, Vec3 covered, Float uncovered, int x, int y,
+                                  LinearBlock &linear) {
+    if (!any(largest(covered) > Float(0.0f)))
+        return;
+    covered = covered * (Float(1.0f) / max(uncovered, Float(1e-3f)));
+    if (!frame.path.video.image.texels) {
+        linear.added = linear.added - linear.transmittance * covered;
+        return;
+    }
+    const Vec3 video = video_at(frame, x, y);
+    const auto remaining = [](Float part, Float whole) __attribute__((always_inline)) {
+        return max(Float(1.0f) - part / max(whole, Float(1e-6f)), Float(0.0f));
+    };
+    linear.transmittance = linear.transmittance * Vec3{remaining(covered.x, video.x), remaining(covered.y, video.y),
+                                                       remaining(covered.z, video.z)};
+}
+
 ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch, int first_pixel,
-                                      std::uint32_t count) {
+                                      std::uint32_t count, int x, int y) {
     const Float samples(static_cast<float>(count));
     const auto mean = [&](int row) __attribute__((always_inline)) {
         return load(scratch.sum[row] + first_pixel) / samples; // exactly 1 if all samples are covered
@@ -220,9 +252,12 @@ ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch
     const auto bounded = [](Float a) __attribute__((always_inline)) {
         return min(max(a, Float(0.0f)), Float(65504.0f));
     };
-    linear.added = {bounded(linear.added.x), bounded(linear.added.y), bounded(linear.added.z)};
     linear.transmittance = {bounded(linear.transmittance.x), bounded(linear.transmittance.y),
                             bounded(linear.transmittance.z)};
+    if (frame.scene.has_catchers)
+        remove_covered(frame, {mean(covered_row), mean(covered_row + 1), mean(covered_row + 2)}, uncovered, x, y,
+                       linear);
+    linear.added = {bounded(linear.added.x), bounded(linear.added.y), bounded(linear.added.z)};
     return linear;
 }
 

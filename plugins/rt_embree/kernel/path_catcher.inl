@@ -5,9 +5,17 @@
 #include "path_lights.inl"
 #include "photons.inl"
 
-// Paths that change a catcher have the pixel number of the change, which follows all radiances.
+// Returns paths whose radiance is added to another plane. The planes also have different random numbers.
+ARHOST_INLINE Paths in_plane(Paths paths, Plane plane) {
+    paths.pixel = (paths.pixel & Int(tile_pixels - 1)) + Int(plane * tile_pixels);
+    paths.first_pixel = (paths.first_pixel & (tile_pixels - 1)) + plane * tile_pixels;
+    return paths;
+}
 ARHOST_INLINE Bool changes_catcher(const Paths &paths) {
-    return paths.pixel >= Int(tile_pixels);
+    return paths.pixel >= Int(change_plane * tile_pixels);
+}
+ARHOST_INLINE Bool is_mirrored(const Paths &paths) {
+    return paths.pixel >= Int(mirrored_plane * tile_pixels);
 }
 
 // Returns whether a ray can meet a virtual object. `end`: in lengths of `to`.
@@ -100,6 +108,25 @@ ARHOST_INLINE Bounce sample_virtual(const Work &work, const Paths &paths, const 
                               density, Float(0.0f))};
 }
 
+// Returns the lanes whose gloss can mirror at least 1/256 of the virtual objects' radiance: the reflectance, times an
+// upper bound of the share of the reflected rays that meet the bounding spheres.
+ARHOST_INLINE Bool mirrors_virtual(const PathScene &path, const Surface &s, Vec3 to_eye) {
+    const Vec3 middle = mirror_direction(-to_eye, s.normal);
+    Float share(0.0f);
+    for (std::int32_t i = 0; i < path.sphere_count; ++i) {
+        const SphereCone cone = cone_of(path.spheres + 4 * i, s);
+        const Float along = dot(middle, cone.axis);
+        const Vec3 across = middle - cone.axis * along;
+        const Float sine = sqrt(max(Float(1.0f) - cone.cosine * cone.cosine, Float(0.0f)));
+        const Vec3 edge = cone.axis * cone.cosine + across * (sine / max(length(across), Float(1e-6f)));
+        const Vec3 densest = select(cone.is_wide | (along >= cone.cosine), middle, edge); // direction in the cone
+        const Float density =
+            ggx_reflection_density(dot(s.normal, to_eye), dot(s.normal, normalize(densest + to_eye)), s.alpha);
+        share = share + min(density * cone.slope * Float(6.28318531f), Float(1.0f));
+    }
+    return s.is_rough & (largest(schlick(s.specular, dot(s.normal, to_eye))) * share >= Float(1.0f / 256));
+}
+
 // Returns the lanes in which virtual objects hide a lamp's or the environment's sample from a real surface.
 ARHOST_INLINE Bool is_hidden(const Work &work, const Surface &s, const SourceSample &sample, Bool active) {
     active = active & can_meet_virtual(work.frame.path, s.position, sample.to_light, sample.t_far);
@@ -112,7 +139,7 @@ ARHOST_INLINE Vec3 photon_irradiance(const Work &work, const Paths &paths, const
 }
 
 // Adds the change of a catcher's light, relative to its light without virtual objects: minus the light that they
-// hide, plus the light that they send.
+// hide, plus the light that they send. Of its gloss, adds these two in absolute terms.
 ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHit16 &rays, Bool active) {
     const Frame &frame = work.frame;
     const Surface s = surface_at(frame.scene, rays, active);
@@ -123,29 +150,56 @@ ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHi
     };
     Paths relative = paths;
     relative.throughput = {inverse(before.x), inverse(before.y), inverse(before.z)};
+    if (s.any_rough) // metals have only a gloss
+        relative.throughput = select(s.is_rough & (largest(s.diffuse) == Float(0.0f)), black(), relative.throughput);
     const bool bounces = frame.scene.max_depth > 0;
     const Float form_factors = form_factors_of(frame.path, s);
     const auto bounce_density = [&](Vec3 direction) __attribute__((always_inline)) {
         return bounces ? virtual_density(frame.path, s, direction, form_factors) * bounce_chance(form_factors)
                        : Float(0.0f);
     };
-    Vec3 change = black();
+    const Vec3 to_eye = -normalize(direction_of(rays.ray));
+    Bool mirrors = bool_of(false);
+    if (bounces && s.any_rough)
+        mirrors = active & mirrors_virtual(frame.path, s, to_eye);
+    const auto mirrored_light = [&](const SourceSample &sample) __attribute__((always_inline)) {
+        const Float density = scattering_density(s, to_eye, sample.direction, Float(1.0f));
+        const Float weight = balance_weight(sample.density, select(mirrors, density, Float(0.0f)));
+        return gloss(s, to_eye, sample.direction) * sample.light * weight;
+    };
+    Vec3 change = black(), mirrored = black(), covered = black();
     const int count = frame.light_samples;
     for (int i = 0; i < count; ++i) {
         const SourceSample sample = sample_source(work, paths, s, i, count);
         const Float cosine = lambert(s.normal, sample.direction);
         const Bool facing = active & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
         const Bool real = facing & ~sample.is_virtual, emitter = facing & sample.is_virtual;
-        if (any(real))
-            change = change - select(is_hidden(work, s, sample, real), sample.light * cosine, black());
+        if (any(real)) {
+            const Bool hidden = is_hidden(work, s, sample, real);
+            change = change - select(hidden, sample.light * cosine, black());
+            if (s.any_rough && any(hidden))
+                covered = covered + select(hidden, mirrored_light(sample), black());
+        }
         if (any(emitter)) {
             const Float weight = balance_weight(sample.density, bounce_density(sample.direction));
-            change = change +
-                     select(is_visible(frame.scene, s, sample, emitter), sample.light * (cosine * weight), black());
+            const Bool visible = is_visible(frame.scene, s, sample, emitter);
+            change = change + select(visible, sample.light * (cosine * weight), black());
+            if (s.any_rough && any(visible))
+                mirrored = mirrored + select(visible, mirrored_light(sample), black());
         }
     }
     change = change + photon_irradiance(work, paths, s, active);
     add_radiance(work, relative, change, active);
+    const Paths of_gloss = in_plane(paths, mirrored_plane);
+    if (s.any_rough) {
+        add_radiance(work, of_gloss, mirrored, active);
+        add_radiance(work, in_plane(paths, covered_plane), covered, active);
+    }
+    if (any(mirrors)) {
+        const RoughReflection ray = sample_rough(s, to_eye, path_pair(work, of_gloss, scatter_dimension, 0, 1));
+        enqueue(work, of_gloss, s, ray,
+                mirrors & can_meet_virtual(frame.path, s.position, ray.direction, Float(far_away)));
+    }
     if (!bounces)
         return;
     const Bounce bounce = sample_virtual(work, paths, s, form_factors);
@@ -186,26 +240,31 @@ ARHOST_INLINE Filmed filmed_towards(const Frame &frame, Vec3 to_point) {
     return {inside, sample_texture(frame.scene, video.image, x / width, y / height).colour};
 }
 
+// Returns the light of real surfaces that the video shows. `inside`: the lanes in which it shows them.
+ARHOST_INLINE Filmed filmed_surface(const Frame &frame, const Surface &s, Bool active) {
+    if (!frame.path.video.image.texels || !any(active))
+        return {bool_of(false), black()};
+    const Vec3 eye = splat(frame.camera.eye), to_point = s.position - eye;
+    Filmed filmed = filmed_towards(frame, to_point);
+    // The video shows the side of the surface that faces the camera.
+    filmed.inside = active & filmed.inside & (dot(s.geometric_normal, to_point) < Float(0.0f));
+    if (frame.scene.has_several_real && any(filmed.inside)) { // the video shows a nearer real surface
+        RTCRay16 ray;
+        const Float end = Float(1.0f) - s.offset * Float(4.0f) / max(length(to_point), Float(1e-20f));
+        set_ray(ray, eye, to_point, end, Int(catcher_mask | occluder_mask));
+        filmed.inside = filmed.inside & ~blocked(frame.scene, ray, filmed.inside);
+    }
+    return filmed;
+}
+
 // Adds the light of real surfaces that the video shows, with the shadows of virtual objects on them. Returns the
 // lanes whose light it has added.
 ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, Bool active) {
     const Frame &frame = work.frame;
-    if (!frame.path.video.image.texels || !any(active))
-        return bool_of(false);
-    const Vec3 eye = splat(frame.camera.eye), to_point = s.position - eye;
-    const Filmed filmed = filmed_towards(frame, to_point);
-    // The video shows the side of the surface that faces the camera.
-    active = active & filmed.inside & (dot(s.geometric_normal, to_point) < Float(0.0f));
+    const Filmed filmed = filmed_surface(frame, s, active);
+    active = filmed.inside;
     if (!any(active))
         return active;
-    if (frame.scene.has_several_real) { // the video shows a nearer real surface
-        RTCRay16 ray;
-        const Float end = Float(1.0f) - s.offset * Float(4.0f) / max(length(to_point), Float(1e-20f));
-        set_ray(ray, eye, to_point, end, Int(catcher_mask | occluder_mask));
-        active = active & ~blocked(frame.scene, ray, active);
-        if (!any(active))
-            return active;
-    }
     const Vec3 before = irradiance_without_objects(frame, s);
     Vec3 change = photon_irradiance(work, paths, s, active);
     // The eye sees these surfaces in mirrors and glass, so they get as many light samples as those that it sees
@@ -251,4 +310,26 @@ ARHOST_INLINE Vec3 environment_towards(const Work &work, const Paths &paths, Vec
     const Float density = environment_source_density(frame, direction) *
                           Float(static_cast<float>(source_samples(frame, paths.depth - 1)));
     return light * select(weighted, balance_weight_of_ray(density, paths.inverse_density), Float(1.0f));
+}
+
+// Adds the light that glossy catchers mirror without virtual objects, along rays that meet virtual objects: that of a
+// real surface, or of the environment and of lamps.
+ARHOST_INLINE void add_covered(Work &work, const Paths &paths, const RTCRay16 &ray, Bool active) {
+    const Frame &frame = work.frame;
+    const Vec3 origin = origin_of(ray), direction = direction_of(ray);
+    RTCRayHit16 behind;
+    set_ray(behind.ray, origin, direction, Float(far_away), Int(catcher_mask | occluder_mask));
+    const Bool hit = trace(frame.scene, frame.scene.root, make_query(Coherence::incoherent), behind, active);
+    Vec3 light = environment_towards(work, paths, direction, active & ~hit);
+    if (any(hit)) {
+        const Surface s = surface_at(frame.scene, behind, hit);
+        const Filmed filmed = filmed_surface(frame, s, hit);
+        light = select(
+            hit, select(filmed.inside, filmed.light, s.emission + s.diffuse * irradiance_without_objects(frame, s)),
+            light);
+    }
+    if (frame.scene.has_area_lights) // except those before the virtual object
+        light = light + lamps_towards(work, paths, origin, direction, load(behind.ray.tfar)) -
+                lamps_towards(work, paths, origin, direction, load(ray.tfar));
+    add_radiance(work, in_plane(paths, covered_plane), light, active);
 }

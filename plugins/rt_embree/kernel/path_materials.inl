@@ -35,6 +35,14 @@ ARHOST_INLINE Vec3 scattering(const Surface &s, Vec3 to_eye, Vec3 to_light) {
     return scattered;
 }
 
+// Returns the part of scattering() that the specular lobe of a rough surface reflects.
+ARHOST_INLINE Vec3 gloss(const Surface &s, Vec3 to_eye, Vec3 to_light) {
+    const Vec3 half_vector = normalize(to_light + to_eye);
+    const Float lobe =
+        ggx_lobe(lambert(s.normal, to_light), dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+    return select(s.is_rough, schlick(s.specular, dot(to_eye, half_vector)) * lobe, black());
+}
+
 // Density per steradian of the rays that a lit surface scatters.
 ARHOST_INLINE Float scattering_density(const Surface &s, Vec3 to_eye, Vec3 to_light, Float chance) {
     Float density = lambert(s.normal, to_light) * Float(0.318309886f) * (Float(1.0f) - chance);

@@ -162,21 +162,32 @@ ARHOST_INLINE void scatter_in_glass(Work &work, const Paths &paths, const Surfac
                 reflected_throughput, reflects);
 }
 
-// Queues rays that are reflected off a randomly sampled microfacet.
-ARHOST_INLINE void scatter_rough(Work &work, const Paths &paths, const Surface &s, Vec3 to_eye, Bool active) {
-    const Pair uv = pair(random_of(work, paths), rough_purpose, 0, 1);
+// A ray that is reflected off a randomly sampled microfacet.
+struct RoughReflection {
+    Vec3 direction, reflectance;
+    Float density; // per steradian
+    Bool leaves;   // the ray goes away from the surface
+};
+ARHOST_INLINE RoughReflection sample_rough(const Surface &s, Vec3 to_eye, Pair uv) {
     const Vec3 half_vector = ggx_half_vector(s.normal, to_eye, s.alpha, uv.u, uv.v);
     const Vec3 direction = mirror_direction(-to_eye, half_vector);
     const Float cosine = dot(direction, s.normal);
     // Sampling visible normals already accounts for the masking of `to_eye`.
-    const Vec3 reflectance = schlick(s.specular, dot(to_eye, half_vector)) * ggx_masking(cosine, s.alpha);
-    const Vec3 throughput = paths.throughput * reflectance;
-    const Float density = ggx_reflection_density(dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
-    active = active & (cosine > Float(0.0f)) & (dot(direction, s.geometric_normal) > Float(0.0f)) &
-             (largest(throughput) > Float(min_throughput));
+    return {direction, schlick(s.specular, dot(to_eye, half_vector)) * ggx_masking(cosine, s.alpha),
+            ggx_reflection_density(dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha),
+            (cosine > Float(0.0f)) & (dot(direction, s.geometric_normal) > Float(0.0f))};
+}
+
+ARHOST_INLINE void enqueue(Work &work, const Paths &from, const Surface &s, const RoughReflection &ray, Bool active) {
+    const Vec3 throughput = from.throughput * ray.reflectance;
+    active = active & ray.leaves & (largest(throughput) > Float(min_throughput));
     if (any(active))
-        enqueue(work, paths, s.position + s.geometric_normal * s.offset, direction, throughput, active,
-                Float(1.0f) / max(density, Float(1e-30f)));
+        enqueue(work, from, s.position + s.geometric_normal * s.offset, ray.direction, throughput, active,
+                Float(1.0f) / max(ray.density, Float(1e-30f)));
+}
+
+ARHOST_INLINE void scatter_rough(Work &work, const Paths &paths, const Surface &s, Vec3 to_eye, Bool active) {
+    enqueue(work, paths, s, sample_rough(s, to_eye, pair(random_of(work, paths), rough_purpose, 0, 1)), active);
 }
 
 // Adds the radiance of the hit surfaces and queues their secondary rays.

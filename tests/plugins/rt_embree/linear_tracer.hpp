@@ -6,6 +6,7 @@
 #include "pixels/linear.hpp"
 #include "tracer.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <optional>
@@ -78,6 +79,8 @@ public:
         frame_.format = &format_;
         frame_.plane[0] = bytes_.data();
     }
+    // One grey everywhere.
+    Video(const arhost_intrinsics &in, std::uint8_t code) : Video(in) { std::ranges::fill(bytes_, code); }
     Video(const Video &) = delete;
     Video &operator=(const Video &) = delete;
     const arhost_frame_format &format() const { return format_; }

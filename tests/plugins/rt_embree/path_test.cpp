@@ -199,6 +199,94 @@ TEST(PathIntegrator, ShowsTheFilmedTableInAMirror) {
     EXPECT_NEAR(mean_at(picture, x, y, 2, 1), blue, 0.01);
 }
 
+// A table below a ball. The middle of the picture shows where the table mirrors the middle of the ball.
+constexpr glm::vec4 mirrored_ball(0, 60, 60, 20);
+SceneBuilder table_below_a_ball(const scene::Settings &settings, const arhost_material &of_table,
+                                const arhost_material &of_ball) {
+    SceneBuilder scene(settings);
+    scene.add_mesh("table", square(2000), of_table, ARHOST_ROLE_CATCHER);
+    scene.add_ball("ball", mirrored_ball, of_ball);
+    return scene;
+}
+constexpr double eye_y = -150, eye_z = 110, mirrored_y = eye_y + (60 - eye_y) * eye_z / (eye_z + 60);
+arhost_camera at_the_mirrored_ball() {
+    return camera({0, eye_y, eye_z}, {0, mirrored_y, 0}, {0, 0, 1});
+}
+// Reflectance of a dielectric of the index 1.5 where the middle of the picture shows the table.
+double mirrored_share() {
+    const double cosine = eye_z / std::hypot(mirrored_y - eye_y, eye_z);
+    return 0.04 + 0.96 * std::pow(1 - cosine, 5);
+}
+arhost_material lacquer(float roughness, float albedo = 0.5f) {
+    return metallic_roughness({albedo, albedo, albedo}, 0, roughness);
+}
+constexpr std::uint8_t video_code = 188;
+// Mean of the picture over a grey video.
+double composite_at(const LinearPicture &picture, std::uint32_t x, std::uint32_t y, int half = 2) {
+    return mean_at(picture, x, y, 0, half) +
+           mean_at(picture, x, y, transmittance, half) * shading::srgb_decode(video_code / 255.0);
+}
+
+TEST(PathIntegrator, LacqueredTableMirrorsAnEmissiveBall) {
+    constexpr float radiance = 4;
+    const auto render = [](const arhost_material &of_table, const char *light_samples) {
+        SceneBuilder scene = table_below_a_ball(path_settings(), of_table, emissive(radiance));
+        scene.add_light(sun(0.6f, 0, -0.8f));
+        return rendered(std::move(scene), at_the_mirrored_ball(),
+                        {{"samples", "64"}, {"light_samples", light_samples}});
+    };
+    for (const char *light_samples : {"1", "8"}) {
+        const LinearPicture picture = render(lacquer(0), light_samples);
+        const double expected = mirrored_share() * radiance;
+        EXPECT_NEAR(mean_at(picture, 100, 75, 0), expected, 0.02 * expected);
+        EXPECT_LT(picture.value(20, 75, 0), 1e-3) << "beside the mirrored ball";
+        const LinearPicture matt = render(diffuse(0.5f, 0.5f, 0.5f), light_samples);
+        EXPECT_EQ(matt.value(100, 75, 0), 0);
+        EXPECT_EQ(matt.value(100, 75, transmittance), picture.value(100, 75, transmittance));
+    }
+}
+
+TEST(PathIntegrator, BlackBallHidesTheMirroredSurroundings) {
+    const arhost_camera view = at_the_mirrored_ball();
+    const Video video(view.intrinsics, video_code);
+    const auto render = [&](const arhost_material &of_table, const Video *under) {
+        return rendered(table_below_a_ball(path_settings(1), of_table, diffuse(0, 0, 0)), view, {{"samples", "64"}},
+                        0, under);
+    };
+    const LinearPicture matt = render(diffuse(0.5f, 0.5f, 0.5f), &video), picture = render(lacquer(0), &video);
+    const double remaining = mean_at(matt, 100, 75, transmittance);
+    EXPECT_NEAR(composite_at(picture, 100, 75),
+                remaining * (shading::srgb_decode(video_code / 255.0) - mirrored_share()), 0.003);
+    EXPECT_EQ(picture.value(100, 75, 0), 0);
+    EXPECT_NEAR(composite_at(picture, 20, 75), composite_at(matt, 20, 75), 1e-3) << "beside the mirrored ball";
+    const LinearPicture without_video = render(lacquer(0), nullptr);
+    EXPECT_EQ(without_video.value(100, 75, 0), 0);
+    EXPECT_EQ(without_video.value(100, 75, transmittance), matt.value(100, 75, transmittance));
+}
+
+TEST(PathIntegrator, GlossDoesNotChangeAFurnace) {
+    const LinearPicture picture =
+        rendered(table_below_a_ball(path_settings(1, 64), lacquer(0.3f, 1), diffuse(1, 1, 1)), at_the_mirrored_ball(),
+                 {{"samples", "128"}});
+    EXPECT_NEAR(mean_at(picture, 100, 75, 0, 8) + mean_at(picture, 100, 75, transmittance, 8), 1, 0.01);
+}
+
+// A lamp that the table mirrors without the ball is found by light samples and by scattered rays.
+TEST(PathIntegrator, BallHidesTheHighlightOfALamp) {
+    const arhost_camera view = at_the_mirrored_ball();
+    const Video video(view.intrinsics, video_code);
+    const auto render = [&](const char *light_samples, const char *samples) {
+        SceneBuilder scene = table_below_a_ball(path_settings(0.2f), lacquer(0.3f), diffuse(0.5f, 0.5f, 0.5f));
+        scene.add_light(bulb({0, 160, 130}, 40, 4000, ARHOST_FALLOFF_INVERSE_SQUARE));
+        return composite_at(rendered(std::move(scene), view,
+                                     {{"light_samples", light_samples}, {"samples", samples}, {"max_radiance", "0"}},
+                                     0, &video),
+                            100, 75, 12);
+    };
+    const double few = render("1", "256"), many = render("16", "64");
+    EXPECT_NEAR(few, many, 0.01 * many);
+}
+
 TEST(PathIntegrator, EnvironmentFollowsTheVideo) {
     const auto make = [] {
         SceneBuilder scene = table(path_settings());
@@ -429,6 +517,12 @@ INSTANTIATE_TEST_SUITE_P(
                      scene.add_ball("ball", {0, 0, 20, 20}, emissive(1e6f));
                      scene.add_mesh("table", square(500), diffuse(1, 1, 1), ARHOST_ROLE_CATCHER);
                      scene.add_light(sun());
+                 }},
+        OddScene{"HugeEmissionInARealMirror",
+                 [](SceneBuilder &scene) {
+                     scene.add_ball("ball", {0, 0, 30, 20}, emissive(1e6f));
+                     scene.add_mesh("mirror", square(500), metallic_roughness({1, 1, 1}, 1, 0), ARHOST_ROLE_CATCHER);
+                     scene.add_light(bulb({0, 100, 100}, 20, 1e6f));
                  }},
         OddScene{"DistantWallThatCatchesPhotons", // one cell then holds all photons near the table
                  [](SceneBuilder &scene) {
