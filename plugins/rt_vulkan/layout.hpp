@@ -83,7 +83,7 @@ struct Primitive {
 };
 
 struct Sums {
-    float light[3], coverage, hidden[3], irradiance, caught, unused[3];
+    float light[3], coverage, hidden[3], irradiance, covered[3], caught;
 };
 
 inline constexpr std::uint32_t max_samples = 256; // per pixel and frame
@@ -147,7 +147,7 @@ enum Binding : std::uint32_t {
 struct Specialization {
     std::int32_t stack_capacity;
     std::uint32_t has_glass, has_catchers, has_holes; // 0 or 1
-    std::uint32_t ray_dimensions, has_textures, has_area_lights, may_have_video;
+    std::uint32_t ray_dimensions, has_textures, has_area_lights, may_have_video, has_gloss;
 };
 
 } // namespace rt_vulkan

@@ -292,8 +292,9 @@ void Renderer::write_descriptor_set() {
 
 void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
     // If glass spawns two rays, up to one ray per depth waits on the stack. With the path integrator, glass spawns
-    // two rays at the first hit only.
-    const bool branches = scene_.has_glass() && (is_path_ || !settings_.single_path);
+    // two rays at the first hit only, and so do glossy catchers.
+    const bool mirrors = is_path_ && scene_.has_gloss();
+    const bool branches = mirrors || (scene_.has_glass() && (is_path_ || !settings_.single_path));
     const Specialization constants{!branches  ? 1
                                    : is_path_ ? 2
                                               : static_cast<std::int32_t>(max_depth) + 1,
@@ -303,7 +304,8 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
                                    ray_dimensions_,
                                    scene_.has_textures(),
                                    scene_.has_area_lights(),
-                                   scene_.video_size() > 0};
+                                   scene_.video_size() > 0,
+                                   mirrors};
     const Heartbeat heartbeat(host_, "compiling the shader");
     pipeline_.emplace(device_, shaders, layout_.get(), constants);
     // Lavapipe compiles a shader when it is first dispatched. Therefore this runs the shader once for a frame of

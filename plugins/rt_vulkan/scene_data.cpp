@@ -320,6 +320,7 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
     set_transform(object, mesh, from.world_from_object);
     has_glass_ |= is_glass;
     has_catchers_ |= from.role == ARHOST_ROLE_CATCHER;
+    has_gloss_ |= from.role == ARHOST_ROLE_CATCHER && material.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS;
     has_several_real_ |= from.role != ARHOST_ROLE_VIRTUAL && has_real_;
     has_real_ |= from.role != ARHOST_ROLE_VIRTUAL;
     has_holes_ |= (object.flags & rt_vulkan::has_holes) != 0;

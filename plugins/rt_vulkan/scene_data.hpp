@@ -61,6 +61,7 @@ public:
     bool has_glass() const { return has_glass_; }
     bool has_catchers() const { return has_catchers_; }
     bool has_holes() const { return has_holes_; }
+    bool has_gloss() const { return has_gloss_; } // whether a catcher may mirror
     bool has_area_lights() const { return has_area_lights_; }
     bool has_textures() const { return arena_.textures.count > 0; } // including the environment
 
@@ -119,7 +120,7 @@ private:
 
     std::size_t moving_nodes_ = 0, moving_primitives_ = 0, moving_attributes_ = 0;
     std::uint32_t solid_objects_ = 0, environment_rows_ = 0, environment_columns_ = 0;
-    bool anything_moves_ = false, has_glass_ = false, has_catchers_ = false, has_holes_ = false,
+    bool anything_moves_ = false, has_glass_ = false, has_catchers_ = false, has_holes_ = false, has_gloss_ = false,
          has_area_lights_ = false, has_real_ = false, has_several_real_ = false;
     std::uint64_t rebuilds_ = 0;
 };

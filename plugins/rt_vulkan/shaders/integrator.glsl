@@ -19,7 +19,7 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
     vec3 light = vec3(0.0);
     stack_size = 0;
     int stage = PRIMARY_STAGE;
-    Path path = Path(frame.eye, direction, vec3(1.0), 0.0, 0u);
+    Path path = Path(frame.eye, direction, vec3(1.0), 0.0, 0u, OBJECT_PLANE);
     Ray ray = Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK);
     for (;;) {
         Hit hit = trace(ray, false, stage == CATCHER_STAGE);
@@ -80,7 +80,7 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
 // Edges thus have no halo on any background.
 uint shade_pixel(uvec2 position) {
     uint pixel = position.y * frame.width + position.x;
-    Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, 0.0, 0.0, 0.0, 0.0);
+    Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), 0.0);
     for (uint i = 0u; i < frame.sample_count; ++i) {
         vec3 direction;
         if (direction_of(pixel, frame.samples[i].xy, direction))

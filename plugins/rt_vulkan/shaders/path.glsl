@@ -93,8 +93,9 @@ void scatter_path(Path path, Surface s, vec3 direction, uint material, Random ra
 
 // Returns the light of sampled light sources that a lit surface reflects to the eye. For a real surface, returns the
 // change of its irradiance (divided by π) by virtual objects: minus the light that they hide, plus that of emissive
-// ones, which a filmed surface ignores. `scatters`: whether a scattered ray follows.
-vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatters, Random random) {
+// ones, which a filmed surface ignores. Adds the light of a catcher's gloss to `mirrored` and `covered`. `scatters`:
+// whether a scattered ray follows; `mirrors`: whether one of the gloss does.
+vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatters, bool mirrors, Random random) {
     // The eye sees filmed surfaces in mirrors and glass, so they get as many samples as those that it sees directly.
     uint count = source_samples(receiver == FILMED_SURFACE ? depth - 1u : depth);
     float specular = receiver == LIT_SURFACE ? specular_chance(s, to_eye) : 0.0;
@@ -116,6 +117,14 @@ vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatte
         else if (scatters && receiver == CATCHER_SURFACE)
             other_density = bounce_density(s, source.direction, form_factors);
         float weight = balance_weight(source.density, other_density);
+        if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough) {
+            float density = mirrors ? scattering_density(s, to_eye, source.direction, 1.0) : 0.0;
+            vec3 light = gloss(s, to_eye, source.direction) * source.light * balance_weight(source.density, density);
+            if (hides)
+                covered += (vec3(1.0) - transmittance) * light;
+            else
+                mirrored += transmittance * light;
+        }
         if (hides)
             sum -= (vec3(1.0) - transmittance * (visible.is_tinted ? weight : 1.0)) * source.light * cosine;
         else if (receiver == CATCHER_SURFACE)
@@ -136,28 +145,37 @@ float reciprocal(float irradiance) {
 float bounded(float value) {
     return abs(value) < 1e30 ? clamp(value, -frame.max_radiance, frame.max_radiance) : 0.0; // NaN: 0
 }
+vec3 bounded(vec3 rgb) {
+    return vec3(bounded(rgb.x), bounded(rgb.y), bounded(rgb.z));
+}
 
-// Returns the light that a ray brings to its origin, without that of the rays it pushes. `of_catcher`: the path began
-// at a catcher.
-vec3 light_along(Path path, Ray ray, Hit hit, int stage, bool of_catcher, Random random) {
-    bool is_hit = hit.object != NONE, is_bounce = of_catcher && path.depth == 1u;
+// Returns the light that a ray brings to its origin, without that of the rays it pushes.
+vec3 light_along(Path path, Ray ray, Hit hit, int stage, Random random) {
+    bool is_covered = has_gloss && path.plane == COVERED_PLANE, is_mirrored = has_gloss && path.plane == MIRRORED_PLANE;
+    bool is_hit = hit.object != NONE, is_bounce = path.plane != OBJECT_PLANE && path.depth == 1u && !is_covered;
     vec3 sum = vec3(0.0);
     if (is_bounce && !is_hit) // the light of a catcher changes only where it sees a virtual object
         return sum;
-    if (has_area_lights && path.depth > 0u && !is_bounce)
+    if (has_area_lights && path.depth > 0u && (!is_bounce || is_mirrored))
         sum = arriving_from_area_lights(ray.origin, ray.direction, hit.t, path.inverse_density, path.depth);
     Surface s;
     if (is_hit) {
         s = surface_at(ray, hit, true);
         if (is_bounce && s.is_real)
-            return sum;
+            return vec3(0.0);
+    }
+    if (is_bounce && is_mirrored) { // another ray finds what the virtual object covers, except lamps before the object
+        covered -= path.throughput * sum;
+        sum = vec3(0.0);
+        stack[stack_size] = path;
+        stack[stack_size++].plane = COVERED_PLANE;
     }
     // Rays that only mirrors and glass have scattered see the video also where it shows the environment, which is
     // nearer than infinity there.
     vec3 video;
     bool is_filmed = false;
     if (may_have_video && frame.has_video != 0u && path.depth > 0u &&
-        (is_hit ? s.is_real : path.inverse_density == 0.0 && !of_catcher)) {
+        (is_hit ? s.is_real : path.inverse_density == 0.0 && path.plane == OBJECT_PLANE)) {
         vec3 to_point = is_hit ? s.position - frame.eye : ray.direction;
         float end = is_hit ? 1.0 - s.offset * 4.0 / max(length(to_point), 1e-20) : INFINITY;
         // The video shows the side of the surface that faces the camera. A bright video may be saturated.
@@ -171,27 +189,40 @@ vec3 light_along(Path path, Ray ray, Hit hit, int stage, bool of_catcher, Random
                                 : arriving_from_environment(ray.direction, path.inverse_density,
                                                             frame.environment_chance *
                                                                 float(source_samples(path.depth - 1u))));
+    if (is_covered && is_filmed)
+        return sum + video;
     vec3 direction = normalize(ray.direction);
     uint material = objects[hit.object].material;
     int receiver = stage == CATCHER_STAGE ? CATCHER_SURFACE : is_filmed ? FILMED_SURFACE : LIT_SURFACE;
     bool is_lit = materials[material].model != MIRROR && materials[material].model != GLASS;
     bool scatters = path.depth < frame.max_depth;
-    vec3 relative = vec3(1.0); // factor of the reflected light
-    if (receiver != LIT_SURFACE) {
-        vec3 before = irradiance_without_objects(s);
-        relative = vec3(reciprocal(before.x), reciprocal(before.y), reciprocal(before.z));
-    } else if (is_lit) {
+    vec3 relative = vec3(1.0), before = vec3(0.0); // relative: factor of the reflected light
+    if (is_lit && (receiver == LIT_SURFACE || (has_gloss && receiver == CATCHER_SURFACE)))
         add_material(s, hit);
-        if (largest(s.emission) > 0.0)
-            sum += s.emission * (path.depth > 0u ? balance_weight_of_ray(density_of_emitter(s, hit, direction, path.depth),
-                                                                         max(path.inverse_density, 0.0))
-                                                 : 1.0);
+    if (receiver != LIT_SURFACE || is_covered)
+        before = irradiance_without_objects(s);
+    if (is_covered)
+        return sum + s.emission + s.diffuse * before;
+    bool mirrors = false;
+    if (receiver != LIT_SURFACE) {
+        relative = vec3(reciprocal(before.x), reciprocal(before.y), reciprocal(before.z));
+    } else if (largest(s.emission) > 0.0) {
+        sum += s.emission * (path.depth > 0u ? balance_weight_of_ray(density_of_emitter(s, hit, direction, path.depth),
+                                                                     max(path.inverse_density, 0.0))
+                                             : 1.0);
+    }
+    if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough) {
+        if (largest(s.diffuse) == 0.0) // metals have only a gloss
+            relative = vec3(0.0);
+        mirrors = scatters && mirrors_virtual(s, -direction);
     }
     vec3 reflected = vec3(0.0);
     if (receiver != LIT_SURFACE || is_lit)
-        reflected = sampled_light(receiver, s, -direction, path.depth, scatters, random) * relative;
+        reflected = sampled_light(receiver, s, -direction, path.depth, scatters, mirrors, random) * relative;
     if (receiver == FILMED_SURFACE)
         return sum + video * (vec3(1.0) + reflected);
+    if (mirrors) // pushed first: when it is popped, the stack has space for the ray behind a virtual object
+        push_mirrored(path, s, -direction, random);
     if (scatters && receiver == CATCHER_SURFACE)
         push_bounce(path, s, relative, random);
     else if (scatters)
@@ -203,10 +234,11 @@ vec3 light_along(Path path, Ray ray, Hit hit, int stage, bool of_catcher, Random
 // trace() handles all kinds of rays that find surfaces.
 void trace_sample(vec3 direction, Random random, inout Sums sums) {
     vec3 light = vec3(0.0);
+    mirrored = covered = vec3(0.0);
     stack_size = 0;
     int stage = PRIMARY_STAGE;
     bool of_catcher = false;
-    Path path = Path(frame.eye, direction, vec3(1.0), 0.0, 0u);
+    Path path = Path(frame.eye, direction, vec3(1.0), 0.0, 0u, OBJECT_PLANE);
     Ray ray = Ray(frame.eye, direction, INFINITY, OPAQUE_MASK | GLASS_MASK | OCCLUDER_MASK);
     for (;;) {
         Hit hit = trace(ray, false, stage == CATCHER_STAGE);
@@ -226,21 +258,44 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
             if (!is_hit)
                 return;
             of_catcher = true;
-            random.pixel += 1024u; // as in rt_embree, where the changes of a tile's catchers follow its radiances
+            path.plane = CHANGE_PLANE;
         }
-        Random of_vertex = Random(random.pixel + (path.depth << 12), random.seed, random.number);
-        light += path.throughput * light_along(path, ray, hit, stage, of_catcher, of_vertex);
+        Random of_vertex = Random(random.pixel + path.plane * TILE_PIXELS + (path.depth << 12), random.seed, random.number);
+        vec3 arriving = path.throughput * light_along(path, ray, hit, stage, of_vertex);
+        if (has_gloss && path.plane == MIRRORED_PLANE)
+            mirrored += arriving;
+        else if (has_gloss && path.plane == COVERED_PLANE)
+            covered += arriving;
+        else
+            light += arriving;
         if (stack_size == 0)
             break;
         path = stack[--stack_size];
-        ray = Ray(path.origin, path.direction, INFINITY, ALL_MASKS);
+        ray = Ray(path.origin, path.direction, INFINITY,
+                  has_gloss && path.plane == COVERED_PLANE ? CATCHER_MASK | OCCLUDER_MASK : ALL_MASKS);
         stage = PATH_STAGE;
     }
-    light = vec3(bounded(light.x), bounded(light.y), bounded(light.z));
-    if (of_catcher)
+    light = bounded(light);
+    if (of_catcher) {
         sums.hidden += light;
-    else
+        sums.light += bounded(mirrored);
+        sums.covered += bounded(covered);
+    } else {
         sums.light += light;
+    }
+}
+
+// Removes the light that catchers mirror only without virtual objects. It is part of the video, so that the
+// transmittance applies to it, too. `light`: its mean over the samples that hit no virtual object.
+void remove_covered(vec3 light, uvec2 position, inout vec3 added, inout vec3 transmittance) {
+    transmittance = max(transmittance, 0.0);
+    if (may_have_video && frame.has_video != 0u) {
+        vec2 at = (vec2(position) + 0.5) / vec2(frame.width, frame.height);
+        vec3 video = sample_texture(frame.video_texture, at).rgb;
+        transmittance *= max(vec3(1.0) - light / max(video, vec3(1e-6)), 0.0);
+    } else {
+        added -= transmittance * light;
+    }
 }
 
 // Returns the bits of a half-precision float, rounded to nearest, ties to even; packHalf2x16() may round otherwise.
@@ -260,7 +315,7 @@ void write_pixel(uvec2 position) {
     if (position.x >= frame.width || position.y >= frame.height)
         return;
     uint pixel = position.y * frame.width + position.x;
-    Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, 0.0, 0.0, 0.0, 0.0);
+    Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), 0.0);
     for (uint i = 0u; i < frame.sample_count; ++i) {
         vec3 direction;
         if (direction_of(pixel, frame.samples[i].xy, direction))
@@ -271,12 +326,15 @@ void write_pixel(uvec2 position) {
             sums.light += history[pixel].light;
             sums.coverage += history[pixel].coverage;
             sums.hidden += history[pixel].hidden;
+            sums.covered += history[pixel].covered;
         }
         history[pixel] = sums;
     }
     float count = float(frame.first_sample + frame.sample_count);
     float coverage = sums.coverage == count ? 1.0 : sums.coverage / count; // GLSL's division may round otherwise
     vec3 added = sums.light / count, transmittance = vec3(1.0 - coverage) + sums.hidden / count;
+    if (has_gloss && largest(sums.covered) > 0.0)
+        remove_covered(sums.covered / (count * max(1.0 - coverage, 1e-3)), position, added, transmittance);
     if (frame.is_linear != 0u) {
         uvec4 halves = uvec4(halves_of(added), halves_of(transmittance));
         for (uint i = 0u; i < 4u; ++i)

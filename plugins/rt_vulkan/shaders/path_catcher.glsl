@@ -83,6 +83,39 @@ void push_bounce(Path path, Surface s, vec3 throughput, Random random) {
              1.0 / max(density, 1e-30));
 }
 
+// The light of the current sample in MIRRORED_PLANE and COVERED_PLANE.
+vec3 mirrored, covered;
+
+// Returns whether the gloss can mirror at least 1/256 of the virtual objects' radiance: the reflectance, times an upper
+// bound of the share of the reflected rays that meet the bounding spheres.
+bool mirrors_virtual(Surface s, vec3 to_eye) {
+    vec3 middle = mirror_direction(-to_eye, s.normal);
+    float share = 0.0;
+    for (uint i = 0u; i < frame.sphere_count; ++i) {
+        SphereCone cone = cone_of(frame.spheres[i], s);
+        float along = dot(middle, cone.axis);
+        vec3 densest = middle; // direction in the cone
+        if (!cone.is_wide && along < cone.cosine) {
+            vec3 across = middle - cone.axis * along;
+            float sine = sqrt(max(1.0 - cone.cosine * cone.cosine, 0.0));
+            densest = cone.axis * cone.cosine + across * (sine / max(length(across), 1e-6));
+        }
+        float density = ggx_reflection_density(dot(s.normal, to_eye), dot(s.normal, normalize(densest + to_eye)), s.alpha);
+        share += min(density * cone.slope * 6.28318531, 1.0);
+    }
+    return largest(schlick(s.specular, dot(s.normal, to_eye))) * share >= 1.0 / 256.0;
+}
+
+// Pushes a ray that the gloss of a catcher reflects, if it can meet a virtual object.
+void push_mirrored(Path path, Surface s, vec3 to_eye, Random random) {
+    path.plane = MIRRORED_PLANE;
+    random.pixel += (MIRRORED_PLANE - CHANGE_PLANE) * TILE_PIXELS;
+    int before = stack_size;
+    scatter_rough(path, s, to_eye, path_pair(random, SCATTER_DIMENSION, 0u, 1u));
+    if (stack_size > before && !can_meet_virtual(s.position, stack[before].direction, INFINITY))
+        stack_size = before;
+}
+
 // Finds the light of the video in a direction from the camera's eye, which may have any length. Returns false if the
 // video does not show it.
 bool filmed_towards(vec3 to_point, out vec3 light) {

@@ -128,6 +128,13 @@ vec3 scattering(Surface s, vec3 to_eye, vec3 to_light) {
     return s.diffuse * cosine;
 }
 
+// Returns the part of scattering() that the specular lobe of a rough surface reflects.
+vec3 gloss(Surface s, vec3 to_eye, vec3 to_light) {
+    vec3 half_vector = normalize(to_light + to_eye);
+    return schlick(s.specular, dot(to_eye, half_vector)) *
+           ggx_lobe(lambert(s.normal, to_light), dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+}
+
 // Density per steradian of the rays that a lit surface scatters. `chance`: result of specular_chance().
 float scattering_density(Surface s, vec3 to_eye, vec3 to_light, float chance) {
     if (!(dot(to_light, s.geometric_normal) > 0.0))

@@ -7,6 +7,7 @@
 
 const uint SOURCE_DIMENSION = 64u, LIGHT_DIMENSION = 65u, SCATTER_DIMENSION = 66u, CHOICE_DIMENSION = 67u,
            ROULETTE_DIMENSION = 68u;
+const uint TILE_PIXELS = 1024u;
 
 // Permutes the numbers so that bit i of the result depends on the bits 0 to i of `x` only (S. Laine and T. Karras,
 // Stratified Sampling for Stochastic Transparency, EGSR 2011; constants of Burley).
@@ -41,7 +42,7 @@ uint z_order_of(uint pixel) {
 }
 
 // Returns pair `index` of the `count` pairs that a sample needs for a dimension of a vertex. `random.pixel`: the number
-// of the pixel in its tile; bit 10 is set for changes of the light of catchers, and the bits from 12 on are the vertex.
+// of the pixel in its tile, plus TILE_PIXELS times the plane; the bits from 12 on are the vertex.
 vec2 path_pair(Random random, uint dimension, uint index, uint count) {
     uint vertex = random.pixel & ~4095u, number = random.pixel & 4095u;
     uint seed = hash(hash(hash(random.seed) + vertex) + dimension);

@@ -2,6 +2,12 @@
 //
 // Secondary rays. They wait on a stack, because shaders cannot recurse. Equivalent to rt_embree's kernel/scatter.inl.
 
+// The results of a sample. The integrator `whitted` uses only the first.
+const uint OBJECT_PLANE = 0u, // radiance of virtual objects
+    CHANGE_PLANE = 1u,        // change of a catcher's diffuse light
+    MIRRORED_PLANE = 2u,      // light of virtual objects that a glossy catcher mirrors
+    COVERED_PLANE = 3u;       // light that it mirrors only without them
+
 // A ray, and the throughput of the path from the pixel to this ray.
 struct Path {
     vec3 origin, direction, throughput;
@@ -9,13 +15,14 @@ struct Path {
     // negative if mirrors or glass have reflected or refracted the path since.
     float inverse_density;
     uint depth; // number of bounces so far
+    uint plane; // to which the radiance is added
 };
 
 Path stack[stack_capacity];
 int stack_size;
 
 void push(Path from, vec3 origin, vec3 direction, vec3 throughput, float inverse_density) {
-    stack[stack_size++] = Path(origin, direction, throughput, inverse_density, from.depth + 1u);
+    stack[stack_size++] = Path(origin, direction, throughput, inverse_density, from.depth + 1u, from.plane);
 }
 
 // Reflected rays below this throughput are invisible.
@@ -96,8 +103,7 @@ vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Rando
 }
 
 // Pushes a ray that is reflected off a randomly sampled microfacet.
-void scatter_rough(Path path, Surface s, vec3 to_eye, Random random) {
-    vec2 sample_uv = pair(random, ROUGH_PURPOSE, 0u, 1u);
+void scatter_rough(Path path, Surface s, vec3 to_eye, vec2 sample_uv) {
     vec3 half_vector = ggx_half_vector(s.normal, to_eye, s.alpha, sample_uv.x, sample_uv.y);
     vec3 direction = mirror_direction(-to_eye, half_vector);
     float cosine = dot(direction, s.normal);
@@ -121,6 +127,6 @@ vec3 scatter(Path path, Surface s, vec3 direction, uint material, Random random)
     else if (has_glass && model == GLASS)
         return scatter_in_glass(path, s, direction, material, random);
     else if (model == METALLIC_ROUGHNESS)
-        scatter_rough(path, s, -direction, random);
+        scatter_rough(path, s, -direction, pair(random, ROUGH_PURPOSE, 0u, 1u));
     return vec3(0.0);
 }

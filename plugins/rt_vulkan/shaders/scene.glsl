@@ -28,6 +28,7 @@ layout(constant_id = 4) const uint ray_dimensions = 2u;
 layout(constant_id = 5) const bool has_textures = true; // whether the scene has textures
 layout(constant_id = 6) const bool has_area_lights = true;
 layout(constant_id = 7) const bool may_have_video = true; // whether any image has a video
+layout(constant_id = 8) const bool has_gloss = true; // path integrator: whether a catcher may mirror virtual objects
 
 struct Object {
     mat4x3 object_from_world;
@@ -189,8 +190,8 @@ struct Sums {
     // Path integrator: the change of the catcher's light relative to its light without virtual objects.
     vec3 hidden;
     float irradiance; // irradiance of the catcher without shadows
+    vec3 covered;     // path integrator: the light that the catcher mirrors only without virtual objects
     float caught;     // number of samples that hit a catcher
-    float unused, unused_2, unused_3;
 };
 layout(std430, set = 0, binding = 12) buffer History {
     Sums history[]; // sums of all earlier samples

@@ -96,6 +96,16 @@ SceneBuilder desk_with_lamps() {
     builder.add_light(sun(0.6f, 0, -0.8f));
     return builder;
 }
+// The desk mirrors the balls and hides the mirrored box and lamp behind them.
+SceneBuilder lacquered_desk() {
+    SceneBuilder builder(path_settings(glm::vec3(0.4f)));
+    builder.add_mesh("desk", square(90), metallic_roughness({0.6f, 0.6f, 0.6f}, 0, 0.25f), ARHOST_ROLE_CATCHER);
+    builder.add_mesh("box", moved(cube(10), {5, 50, 10}), diffuse(0.6f, 0.6f, 0.6f), ARHOST_ROLE_OCCLUDER);
+    builder.add_ball("ball", {0, 0, 25, 20}, diffuse(0.8f, 0.2f, 0.1f));
+    builder.add_ball("bulb", {40, 10, 25, 6}, emissive(4, 3, 1));
+    builder.add_light(bulb({-20, 180, 130}, 20, 1500, ARHOST_FALLOFF_INVERSE_SQUARE));
+    return builder;
+}
 SceneBuilder desk_with_glass() {
     SceneBuilder builder = desk(mirror(0.9f));
     add_environment(builder,
@@ -152,6 +162,12 @@ TEST_F(PathIntegrator, ScattersLightInGlassAndMetalAsRtEmbreeDoes) {
 
 TEST_F(PathIntegrator, ChangesCatchersAsRtEmbreeDoes) {
     expect_rt_embrees_picture(&desk_with_lamps, from_the_side(small), {{"samples", "64"}, {"max_radiance", "0"}});
+}
+
+TEST_F(PathIntegrator, MirrorsInALacqueredDeskAsRtEmbreeDoes) {
+    const Video video(small);
+    expect_rt_embrees_picture(&lacquered_desk, from_the_side(small), {{"samples", "64"}, {"max_radiance", "0"}},
+                              "plain", &video);
 }
 
 TEST_F(PathIntegrator, LeavesOtherPixelsUntouched) {
