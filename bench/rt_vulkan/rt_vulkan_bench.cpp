@@ -83,7 +83,7 @@ double median(std::vector<double> values) {
 class ImageMemory {
 public:
     explicit ImageMemory(const arhost_intrinsics &in)
-        : image_{sizeof image_, 4 * in.width, in.width, in.height, nullptr, nullptr},
+        : image_{sizeof image_, 4 * in.width, in.width, in.height, nullptr, nullptr, nullptr},
           bytes_(static_cast<std::uint8_t *>(
                      std::aligned_alloc(4096, (4ul * in.width * in.height + 4095) / 4096 * 4096)),
                  &std::free) {
