@@ -31,6 +31,7 @@ class Room:
     name: str
     table: str  # a surface of render.py
     lamps: list
+    table_roughness: float = 0  # of its gloss, as arhost gets it; 0: matt
     walls: tuple = ()  # albedo; (): outdoors
     sky: float = 0  # radiance of an overcast sky at the zenith
 
@@ -74,7 +75,7 @@ ROOMS = [
          walls=(0.35, 0.33, 0.30)),
     Room("overcast", "stone", [], sky=1.1),
     Room("spot", "lacquer", [Lamp("spot", (-330, 220, 900), 34, (1.0, 0.86, 0.68), (0, 20, 0), radius=40, outer_degrees=24,
-                                  blend=0.35)], walls=(0.5, 0.48, 0.45)),
+                                  blend=0.35)], table_roughness=0.3, walls=(0.5, 0.48, 0.45)),
 ]
 
 # Azimuth (0: from the front) and elevation in degrees, distance in mm, of the camera from LOOK_AT.

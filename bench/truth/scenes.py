@@ -57,11 +57,13 @@ def objects(bunny):
     return lines
 
 
-def scene(light, bunny):
+def scene(light, bunny, table_roughness=0):
     """The virtual objects on a table, in `light`: lines of YAML."""
     size, centre = rooms.TABLE_SIZE, rooms.TABLE_CENTRE
     table = f"{{name: table, plane: {{size: {numbers(size)}, centre: {numbers((*centre, 0))}}}, material: table, role: catcher}}"
-    return "\n".join(["axes: z-up", "max_depth: 16", *light, "materials:", "  table: {model: diffuse, diffuse: 0.33}",
+    surface = (f"{{model: metallic-roughness, colour: 0.33, metallic: 0, roughness: {table_roughness}}}" if table_roughness
+               else "{model: diffuse, diffuse: 0.33}")
+    return "\n".join(["axes: z-up", "max_depth: 16", *light, "materials:", f"  table: {surface}",
                       *(f"  {name}: {material(spec)}" for name, spec in rooms.MATERIALS.items()), "objects:",
                       *("  - " + each for each in [table, *objects(bunny)])]) + "\n"
 

@@ -92,7 +92,7 @@ def write_trajectory(file, views):
                                   "up": camera.up}) + "\n")
 
 
-def augmented(room, rig, light):
+def augmented(room, rig, light, table_roughness=0):
     """arhost's pictures, as codes, by view."""
     folder = os.path.join(FOLDER, room.name, rig)
     shutil.rmtree(folder, ignore_errors=True)
@@ -100,7 +100,7 @@ def augmented(room, rig, light):
     scenes.write_hdr(load(room, "probe", 0), os.path.join(folder, "environment.hdr"))
     bunny = os.path.join(FOLDER, "bunny.obj")
     with open(os.path.join(folder, "scene.yaml"), "w", encoding="utf-8") as out:
-        out.write(scenes.scene(light, bunny if os.path.exists(bunny) else None))
+        out.write(scenes.scene(light, bunny if os.path.exists(bunny) else None, table_roughness))
     write_trajectory(os.path.join(folder, "cameras.jsonl"), VIEWS)
     for view in VIEWS:
         Image.fromarray(measure.photo(load(room, "plate", view), room.name, view)).save(os.path.join(folder, f"plate-{view}.png"))
@@ -126,7 +126,8 @@ def rows_of(room):
     return {"nothing": photos, "demo lamp": augmented(room, "demo", scenes.demo_light()),
             "default light": augmented(room, "default", scenes.default_light()),
             "whitted": augmented(room, "whitted", scenes.known_light(room, "whitted")),
-            "known light": augmented(room, "known", scenes.known_light(room, "path")), "Blender's catcher": catchers,
+            "known light": augmented(room, "known", scenes.known_light(room, "path"), room.table_roughness),
+            "Blender's catcher": catchers,
             "floor": [measure.photo(load(room, "again", view), room.name, view) for view in VIEWS]}
 
 
