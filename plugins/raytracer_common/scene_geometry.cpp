@@ -13,6 +13,13 @@ bool is_identity(const float *world_from_object) {
     return std::equal(identity, identity + 12, world_from_object);
 }
 
+float scene_extent(const arhost_scene &arena) {
+    double squared = 0;
+    for (int i = 0; i < 3; ++i)
+        squared += std::pow(double{arena.bounds_max[i]} - arena.bounds_min[i], 2);
+    return static_cast<float>(std::sqrt(squared));
+}
+
 float quantized_alpha(float alpha) {
     return static_cast<float>(shading::code_8bit(double{alpha}) / 255);
 }

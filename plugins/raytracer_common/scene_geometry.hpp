@@ -22,6 +22,8 @@ template <class T> std::span<const T> elements(const arhost_scene &arena, const 
     return {reinterpret_cast<const T *>(bytes(arena) + buffer.offset), buffer.count};
 }
 
+float scene_extent(const arhost_scene &arena); // length of the diagonal of the scene's bounds, mm
+
 // Here and below, `world_from_object` is a 3×4 matrix, column-major.
 bool is_identity(const float *world_from_object);
 

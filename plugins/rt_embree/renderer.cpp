@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "renderer.hpp"
 
+#include "raytracer_common/scene_geometry.hpp"
 #include "raytracer_common/slow_image.hpp"
 #include "raytracer_common/view.hpp"
 
@@ -71,13 +72,6 @@ void clear(const arhost_image &image, const Rectangle &pixels) {
         else
             std::memset(image.rgba + std::size_t{image.stride} * y + std::size_t{4} * pixels.x0, 0,
                         std::size_t{4} * (pixels.x1 - pixels.x0));
-}
-
-float scene_extent(const arhost_scene &arena) {
-    double squared = 0;
-    for (int i = 0; i < 3; ++i)
-        squared += std::pow(double{arena.bounds_max[i]} - arena.bounds_min[i], 2);
-    return static_cast<float>(std::sqrt(squared));
 }
 
 // The progress of an image, reported from all threads.
@@ -220,7 +214,7 @@ void Renderer::trace_photons(Frame &frame) {
     caustics.chances = photon_targets_.chances().data();
     caustics.sphere_count = static_cast<std::int32_t>(photon_targets_.spheres().size());
     caustics.lamp_count = static_cast<std::int32_t>(frame.scene.light_count);
-    caustics.scene_extent = scene_extent(scene_.arena());
+    caustics.scene_extent = arhost::raytracer_common::scene_extent(scene_.arena());
     caustics.photon_count = count;
     caustics.first_number = frame.first_random * photons_per_sample_;
     photons_.resize(count);

@@ -5,6 +5,7 @@
 #pragma once
 
 #include "raytracer_common/light_sources.hpp"
+#include "raytracer_common/photon_map.hpp"
 
 #include <arhost/camera.h>
 #include <arhost/scene.h>
@@ -87,6 +88,15 @@ struct Sums {
 };
 
 inline constexpr std::uint32_t max_samples = 256; // per pixel and frame
+inline constexpr std::uint32_t photons_per_row = 1024;
+
+// A grid of raytracer_common/photon_map.hpp. The first two members are indices into the buffer of photons, which
+// contains nine floats for each photon, and then the numbers and starts of the grids.
+struct PhotonGrid {
+    std::uint32_t first_number, first_start;
+    std::uint32_t bucket_mask; // number of buckets − 1
+    float radius;              // mm
+};
 
 struct Frame {
     float eye[3];
@@ -116,11 +126,19 @@ struct Frame {
     std::uint32_t distortion;
     float max_radius_squared, least_irradiance;
     std::uint32_t blends_codes;
+    // Photons.
+    float photon_low[3];
+    std::uint32_t photon_level_count;
+    PhotonGrid photon_grids[arhost::raytracer_common::PhotonMap::max_levels];
+    float targets[arhost::raytracer_common::LightSources::max_spheres][4];
+    std::uint32_t target_count, first_target, first_target_chance;
+    float scene_extent;
+    std::uint32_t photon_count, first_photon, unused_2[2];
 };
 
 static_assert(sizeof(Object) == 208 && sizeof(Material) == 176 && sizeof(Light) == 80 && sizeof(Texture) == 32 &&
               sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Sums) == 48 &&
-              sizeof(Frame) == 608 + 16 * max_samples);
+              sizeof(Frame) == 1008 + 16 * max_samples);
 
 // The bindings of the descriptor set, from 0.
 enum Binding : std::uint32_t {
@@ -139,6 +157,7 @@ enum Binding : std::uint32_t {
     history_binding,
     image_binding,
     drawn_binding,
+    photons_binding,
     binding_count,                    // number of buffers
     top_level_binding = binding_count // the acceleration structure, on hardware paths
 };
@@ -147,7 +166,7 @@ enum Binding : std::uint32_t {
 struct Specialization {
     std::int32_t stack_capacity;
     std::uint32_t has_glass, has_catchers, has_holes; // 0 or 1
-    std::uint32_t ray_dimensions, has_textures, has_area_lights, may_have_video, has_gloss;
+    std::uint32_t ray_dimensions, has_textures, has_area_lights, may_have_video, has_gloss, has_photons;
 };
 
 } // namespace rt_vulkan

@@ -73,6 +73,7 @@ public:
         settings_.light_samples = static_cast<std::uint32_t>(options.integer("light_samples"));
         settings_.accumulate = options.boolean("accumulate");
         settings_.single_path = options.text("glass") == "path";
+        settings_.photons = static_cast<std::uint32_t>(options.integer("photons"));
         if (const double bound = options.real("max_radiance"); bound > 0)
             settings_.max_radiance = static_cast<float>(bound);
         else
@@ -182,6 +183,9 @@ constexpr arhost_option_descriptor options[] = {
                    "Path integrator: bound of each sample's radiance, in multiples of white, so that single bright "
                    "paths make no fireflies; 0: none.",
                    0, 1e6),
+    arhost::option(ARHOST_OPTION_INTEGER, "photons", "16384",
+                   "Path integrator: light rays from lamps to mirrors and glass per frame and sample, for caustics.",
+                   0, 1 << 20),
     arhost::option(ARHOST_OPTION_BOOL, "validate", "false",
                    "Enable Vulkan's validation layers and log their messages; slow.")};
 

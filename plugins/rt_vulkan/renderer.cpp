@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <condition_variable>
@@ -13,11 +14,13 @@
 #include <limits>
 #include <mutex>
 #include <thread>
+#include <utility>
 
 namespace rt_vulkan {
 namespace {
 
 using arhost::Failure;
+using arhost::raytracer_common::Photon, arhost::raytracer_common::PhotonMap;
 
 static_assert(Bands::unit % group_side == 0); // a work group never covers two bands
 
@@ -47,6 +50,8 @@ const char *contents_of(Binding binding) {
     case history_binding:
     case image_binding:
         return "images of this size";
+    case photons_binding:
+        return "the photons";
     default:
         return "the scene's objects, materials or lights";
     }
@@ -85,6 +90,43 @@ std::chrono::milliseconds max_band_time(const PhysicalDevice &device) {
     return std::chrono::milliseconds(device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? 250 : 100);
 }
 
+constexpr std::uint32_t max_photons = 1 << 20; // of an image
+
+std::uint32_t photon_count(const Settings &settings, std::uint32_t samples) {
+    return static_cast<std::uint32_t>(
+        std::min<std::uint64_t>(std::uint64_t{settings.photons} * samples, max_photons));
+}
+
+std::uint32_t photon_rows(std::uint32_t photons) {
+    return (photons + photons_per_row - 1) / photons_per_row;
+}
+
+// Returns the size of the buffer of photons in bytes: the photons, and their numbers and starts in each grid.
+std::size_t photon_buffer_size(std::size_t count) {
+    return count ? sizeof(Photon) * count +
+                       sizeof(std::int32_t) * PhotonMap::max_levels * (count + std::bit_ceil(2 * count) + 1)
+                 : 0;
+}
+
+// Writes the photons and their grids to `to`, and sets the frame's fields of the grids. Returns the number of bytes.
+std::size_t write_photons(const PhotonMap &map, std::span<std::byte> to, Frame &frame) {
+    std::size_t size = 0;
+    const auto write = [&](const auto &part) {
+        const Bytes bytes = std::as_bytes(std::span(part));
+        std::ranges::copy(bytes, to.subspan(size).begin());
+        return static_cast<std::uint32_t>(std::exchange(size, size + bytes.size()) / sizeof(std::uint32_t));
+    };
+    write(map.photons());
+    std::ranges::copy(map.low(), frame.photon_low);
+    frame.photon_level_count = static_cast<std::uint32_t>(map.levels().size());
+    for (std::size_t i = 0; i < map.levels().size(); ++i) {
+        const arhost::raytracer_common::PhotonGrid &grid = map.levels()[i];
+        frame.photon_grids[i] = {write(grid.numbers), write(grid.starts),
+                                 static_cast<std::uint32_t>(grid.starts.size() - 2), grid.radius};
+    }
+    return size;
+}
+
 // Reports progress to the host while the driver works, so that the host does not assume a hang. Stops reporting after
 // a timeout, because the driver itself may hang.
 class Heartbeat {
@@ -116,7 +158,10 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
       stage_(shaders.pipeline_stage()), device_(checked(physical), shaders.path), submission_(device_),
       scene_(setup, shaders.path == Path::plain, host),
       samples_(arhost::raytracer_common::sample_positions(settings.samples)),
-      bands_(intrinsics_.height, settings.max_band_time.value_or(max_band_time(physical))) {
+      bands_(intrinsics_.height, settings.max_band_time.value_or(max_band_time(physical))),
+      photon_bands_(photon_rows(max_photons), settings.max_band_time.value_or(max_band_time(physical))) {
+    if (!is_path_ || !scene_.may_have_photons())
+        settings_.photons = 0;
     frame_ = scene_.frame();
     frame_.width = intrinsics_.width;
     frame_.height = intrinsics_.height;
@@ -150,6 +195,11 @@ Renderer::Renderer(const arhost_raytracer_setup &setup, const Settings &settings
                                                 timestamps_.get(), begun);
         submission_.end(start_timestamps_);
     }
+    preparation_ = submission_.new_commands();
+    submission_.begin(preparation_);
+    record_preparation(preparation_);
+    submission_.end(preparation_);
+    photon_commands_ = submission_.new_commands();
     scene_.release_static_parts();
 }
 
@@ -157,13 +207,15 @@ void Renderer::set_samples(std::uint32_t samples, std::uint32_t full_samples) {
     full_samples_ = full_samples;
     if (samples == settings_.samples)
         return;
-    if (samples > 1 && !frame_.has_slopes) {
+    settings_.samples = samples;
+    const bool needs_slopes = samples > 1 && !frame_.has_slopes;
+    if (needs_slopes)
         make_rays(true);
+    if (make_photon_buffers() || needs_slopes) {
         write_descriptor_set();
         for (Target &target : targets_)
             target.recorded = {}; // the update of the descriptor set invalidates the commands
     }
-    settings_.samples = samples;
     samples_ = arhost::raytracer_common::sample_positions(samples);
     bands_.restart(); // the next image may take much longer than the last one
     history_camera_.reset();
@@ -203,6 +255,18 @@ void Renderer::make_rays(bool has_slopes) {
     frame_.has_slopes = has_slopes;
 }
 
+// Makes the buffers of photons if they do not exist or are too small. Returns whether it has made them.
+bool Renderer::make_photon_buffers() {
+    const std::size_t size = photon_buffer_size(photon_count(settings_, settings_.samples));
+    if (buffers_[photons_binding] && size <= photons_.size())
+        return false;
+    buffers_[photons_binding] = make_buffer(photons_binding, {}, size);
+    if (size)
+        photons_ = Buffer(device_, size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
+                          Buffer::Place::host_read);
+    return true;
+}
+
 void Renderer::make_buffers(Path path) {
     const std::size_t pixels = std::size_t{intrinsics_.width} * intrinsics_.height;
     std::size_t moving_size = 0;
@@ -214,6 +278,7 @@ void Renderer::make_buffers(Path path) {
         moving_size += scene_.moving_part(binding).size();
     }
     make_rays(settings_.samples > 1 || settings_.accumulate || is_path_);
+    make_photon_buffers();
     buffers_[history_binding] = make_buffer(history_binding, {}, settings_.accumulate ? sizeof(Sums) * pixels : 0);
     buffers_[image_binding] = make_buffer(image_binding, {}, pixel_size_ * pixels);
     buffers_[drawn_binding] = make_buffer(drawn_binding, {}, drawn_size);
@@ -305,15 +370,22 @@ void Renderer::make_pipeline(const Shaders &shaders, std::uint32_t max_depth) {
                                    scene_.has_textures(),
                                    scene_.has_area_lights(),
                                    scene_.video_size() > 0,
-                                   mirrors};
+                                   mirrors,
+                                   settings_.photons > 0};
     const Heartbeat heartbeat(host_, "compiling the shader");
     pipeline_.emplace(device_, shaders, layout_.get(), constants);
-    // Lavapipe compiles a shader when it is first dispatched. Therefore this runs the shader once for a frame of
-    // width 0, which traces no pixel.
+    if (settings_.photons > 0)
+        photon_pipeline_.emplace(device_, photon_shaders_of(shaders.path), layout_.get(), constants);
+    // Lavapipe compiles a shader when it is first dispatched. Therefore this runs the shaders once for a frame of
+    // width 0 and without photons, which traces nothing.
     const VkCommandBuffer commands = submission_.new_commands();
     std::memset(buffers_[frame_binding].mapped().data(), 0, sizeof(Frame));
     submission_.begin(commands, VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT);
     pipeline_->record(commands, set_, 1, {0, 1});
+    if (photon_pipeline_) {
+        barrier(device_.functions(), commands, stage_, VK_ACCESS_SHADER_READ_BIT, stage_, VK_ACCESS_SHADER_WRITE_BIT);
+        photon_pipeline_->record(commands, set_, 1, {0, 1});
+    }
     submission_.end(commands);
     submission_.run(commands);
     submission_.free(commands);
@@ -353,9 +425,7 @@ void Renderer::record(Target &target, Rows rows) const {
         return;
     target.recorded = {};
     submission_.begin(target.commands);
-    if (rows.first == 0)
-        record_preparation(target.commands);
-    else // all bands read and extend the bounding rectangle of drawn pixels
+    if (rows.first > 0) // all bands read and extend the bounding rectangle of drawn pixels
         barrier(device_.functions(), target.commands, stage_, VK_ACCESS_SHADER_WRITE_BIT, stage_,
                 VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
     pipeline_->record(target.commands, set_, intrinsics_.width, rows);
@@ -410,6 +480,33 @@ void Renderer::record_copy(const Target &target) const {
             VK_ACCESS_HOST_READ_BIT);
     if (timestamps_.get())
         vk.vkCmdWriteTimestamp(commands, VK_PIPELINE_STAGE_BOTTOM_OF_PIPE_BIT, timestamps_.get(), copied);
+}
+
+// Records commands that trace rows of photons. The last ones also copy all photons to the host.
+void Renderer::record_photons(Rows rows, bool is_last) const {
+    const VolkDeviceTable &vk = device_.functions();
+    submission_.begin(photon_commands_);
+    photon_pipeline_->record(photon_commands_, set_, photons_per_row, rows);
+    if (is_last) {
+        barrier(vk, photon_commands_, stage_, VK_ACCESS_SHADER_WRITE_BIT, VK_PIPELINE_STAGE_TRANSFER_BIT,
+                VK_ACCESS_TRANSFER_READ_BIT | VK_ACCESS_TRANSFER_WRITE_BIT);
+        const VkBufferCopy copy{0, 0, sizeof(Photon) * frame_.photon_count};
+        vk.vkCmdCopyBuffer(photon_commands_, buffers_[photons_binding].get(), photons_.get(), 1, &copy);
+        barrier(vk, photon_commands_, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT,
+                VK_PIPELINE_STAGE_HOST_BIT, VK_ACCESS_HOST_READ_BIT | VK_ACCESS_HOST_WRITE_BIT);
+    }
+    submission_.end(photon_commands_);
+}
+
+// Records commands that give the map of the photons to the device. `size`: bytes.
+void Renderer::record_photon_map(std::size_t size) const {
+    const VolkDeviceTable &vk = device_.functions();
+    submission_.begin(photon_commands_);
+    const VkBufferCopy copy{0, 0, size};
+    vk.vkCmdCopyBuffer(photon_commands_, photons_.get(), buffers_[photons_binding].get(), 1, &copy);
+    barrier(vk, photon_commands_, VK_PIPELINE_STAGE_TRANSFER_BIT, VK_ACCESS_TRANSFER_WRITE_BIT, stage_,
+            VK_ACCESS_SHADER_READ_BIT | VK_ACCESS_SHADER_WRITE_BIT);
+    submission_.end(photon_commands_);
 }
 
 void Renderer::record_shader(VkCommandBuffer commands) const {
@@ -474,6 +571,7 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     }
     if (motion || image_count_ == 0)
         write_moving_parts();
+    commands.push_back(preparation_);
     set_video(video);
 
     if (settings_.accumulate) {
@@ -494,9 +592,16 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
         frame_.samples[i][0] = samples_[i].x;
         frame_.samples[i][1] = samples_[i].y;
     }
-    std::memcpy(buffers_[frame_binding].mapped().data(), &frame_, sizeof frame_);
 
-    trace(std::move(commands), target);
+    arhost::raytracer_common::SlowImage slow_image(host_);
+    trace_photons(commands, [&](double) { slow_image.report(0); });
+    write_frame();
+    const auto commands_of = [&](Rows rows) {
+        record(target, rows);
+        return target.commands;
+    };
+    trace(std::move(commands), intrinsics_.height, bands_, commands_of,
+          [&](double fraction) { slow_image.report(fraction); });
     if (settings_.accumulate) {
         history_samples_ += frame_.sample_count;
         history_camera_ = camera;
@@ -504,21 +609,53 @@ Rectangle Renderer::render(const arhost_camera &camera, const arhost_image &imag
     return read_back(target, image);
 }
 
-// Traces the image band by band. `commands` run before the first band.
-void Renderer::trace(std::vector<VkCommandBuffer> commands, Target &target) {
-    arhost::raytracer_common::SlowImage slow_image(host_);
-    for (Rows rows{}; rows.first < intrinsics_.height; rows.first += rows.count) {
-        const auto report = [&] { slow_image.report(static_cast<double>(rows.first) / intrinsics_.height); };
-        report();
-        if (rows.first > 0 && host_.cancelled())
-            throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while tracing the image");
-        rows.count = std::min(bands_.rows(), intrinsics_.height - rows.first);
-        record(target, rows);
-        commands.push_back(target.commands);
+void Renderer::check_cancelled() const {
+    if (host_.cancelled())
+        throw Failure(ARHOST_STATUS_ERROR_CANCELLED, "cancelled while tracing the image");
+}
+
+void Renderer::write_frame() {
+    std::memcpy(buffers_[frame_binding].mapped().data(), &frame_, sizeof frame_);
+}
+
+// Traces rows of pixels or photons band by band. `commands` run before the first band. record(rows) returns the
+// commands of a band, report(fraction) reports progress.
+void Renderer::trace(std::vector<VkCommandBuffer> commands, std::uint32_t row_count, Bands &bands,
+                     const std::function<VkCommandBuffer(Rows)> &record, const std::function<void(double)> &report) {
+    for (Rows rows{}; rows.first < row_count; rows.first += rows.count) {
+        const auto waiting = [&] { report(static_cast<double>(rows.first) / row_count); };
+        waiting();
+        if (rows.first > 0)
+            check_cancelled();
+        rows.count = std::min(bands.rows(), row_count - rows.first);
+        commands.push_back(record(rows));
         const auto begin = std::chrono::steady_clock::now();
-        submission_.run(commands, report);
-        bands_.record(rows.count, std::chrono::steady_clock::now() - begin);
+        submission_.run(commands, waiting);
+        bands.record(rows.count, std::chrono::steady_clock::now() - begin);
         commands.clear();
+    }
+}
+
+// Sends photons from the lamps to mirrors and glass, and sorts those that arrive on other surfaces. `commands` run
+// before; afterwards, it contains the commands that are to run before the image.
+void Renderer::trace_photons(std::vector<VkCommandBuffer> &commands, const std::function<void(double)> &report) {
+    frame_.photon_level_count = 0;
+    frame_.photon_count = scene_.photon_targets().empty() ? 0 : photon_count(settings_, frame_.sample_count);
+    frame_.first_photon = frame_.first_random * settings_.photons;
+    if (frame_.photon_count == 0)
+        return;
+    write_frame();
+    const std::uint32_t row_count = photon_rows(frame_.photon_count);
+    const auto commands_of = [&](Rows rows) {
+        record_photons(rows, rows.first + rows.count == row_count);
+        return photon_commands_;
+    };
+    trace(std::exchange(commands, {}), row_count, photon_bands_, commands_of, report);
+    check_cancelled();
+    photon_map_.build({reinterpret_cast<const Photon *>(photons_.mapped().data()), frame_.photon_count});
+    if (const std::size_t size = write_photons(photon_map_, photons_.mapped(), frame_)) {
+        record_photon_map(size);
+        commands.push_back(photon_commands_);
     }
 }
 

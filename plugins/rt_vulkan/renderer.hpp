@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Renders images. An image usually needs one submission, whose commands are recorded once per target. Images that
-// take long are split into bands (bands.hpp).
+// Renders images. An image usually needs one submission, whose commands are recorded once per target; with caustics
+// of lamps, another one traces photons before. Images that take long are split into bands (bands.hpp).
 #pragma once
 
 #include "acceleration_structures.hpp"
 #include "bands.hpp"
 #include "camera_data.hpp"
 #include "image_pipeline.hpp"
+#include "raytracer_common/photon_map.hpp"
 #include "raytracer_common/samples.hpp"
 #include "raytracer_common/video.hpp"
 #include "scene_data.hpp"
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -23,6 +25,7 @@ struct Settings {
     bool accumulate = false;                          // average over frames while the camera and scene are static
     bool single_path = false;                         // glass spawns one random ray instead of two
     float max_radiance = 100;                         // path integrator: bound of each sample; infinity: none
+    std::uint32_t photons = 16384;                    // path integrator: per frame and sample
     std::optional<Bands::Milliseconds> max_band_time; // set by tests only; the default depends on the device
 };
 
@@ -71,6 +74,7 @@ private:
         Rows recorded{}; // the rows that `commands` trace
     };
     void make_rays(bool has_slopes);
+    bool make_photon_buffers();
     void make_buffers(Path path);
     Buffer make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t min_size,
                        VkBufferUsageFlags more_usage = 0);
@@ -83,7 +87,13 @@ private:
     void record(Target &target, Rows rows) const;
     void record_preparation(VkCommandBuffer commands) const;
     void record_copy(const Target &target) const;
-    void trace(std::vector<VkCommandBuffer> commands, Target &target);
+    void record_photons(Rows rows, bool is_last) const;
+    void record_photon_map(std::size_t size) const;
+    void check_cancelled() const;
+    void write_frame();
+    void trace(std::vector<VkCommandBuffer> commands, std::uint32_t row_count, Bands &bands,
+               const std::function<VkCommandBuffer(Rows)> &record, const std::function<void(double)> &report);
+    void trace_photons(std::vector<VkCommandBuffer> &commands, const std::function<void(double)> &report);
     void write_moving_parts();
     void set_lens();
     void set_video(const arhost_frame *video);
@@ -105,17 +115,20 @@ private:
     std::array<Buffer, binding_count> buffers_;
     Buffer moving_; // staging buffer for the moving parts of all buffers
     arhost::raytracer_common::VideoImage video_image_;
-    Buffer video_;                                     // staging buffer for the video; empty if no image has one
-    Buffer drawn_;                                     // bounding rectangle of the drawn pixels, for the host
+    Buffer video_;   // staging buffer for the video; empty if no image has one
+    Buffer drawn_;   // bounding rectangle of the drawn pixels, for the host
+    Buffer photons_; // of the last image, for the host; empty without caustics
+    arhost::raytracer_common::PhotonMap photon_map_;
     std::optional<AccelerationStructures> structures_; // empty on the path `plain`
     QueryPool timestamps_;                             // empty if unsupported
-    VkCommandBuffer start_timestamps_ = VK_NULL_HANDLE;
-    Bands bands_;
+    VkCommandBuffer start_timestamps_ = VK_NULL_HANDLE, preparation_ = VK_NULL_HANDLE,
+                    photon_commands_ = VK_NULL_HANDLE;
+    Bands bands_, photon_bands_;
     DescriptorSetLayout set_layout_;
     DescriptorPool pool_;
     VkDescriptorSet set_ = VK_NULL_HANDLE;
     PipelineLayout layout_;
-    std::optional<ImagePipeline> pipeline_;
+    std::optional<ImagePipeline> pipeline_, photon_pipeline_; // photon_pipeline_: empty without caustics
     std::vector<Target> targets_;
     bool imports_ = true; // false once an import of host memory has failed
     bool wrote_in_place_ = false;

@@ -19,9 +19,11 @@ using arhost::Failure;
 using arhost::raytracer_common::bytes;
 using arhost::raytracer_common::elements;
 using arhost::raytracer_common::is_identity;
+using arhost::raytracer_common::LightSources;
 using arhost::raytracer_common::object_extent;
 using arhost::raytracer_common::PlacedObject;
 using arhost::raytracer_common::quantized_alpha;
+using arhost::raytracer_common::source_rows;
 using arhost::raytracer_common::transform_box;
 
 // A BVH is rebuilt if its SAH cost divided by its cost after the last build exceeds this value. Above it, a rebuild
@@ -319,6 +321,8 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
         object.flags |= has_transform;
     set_transform(object, mesh, from.world_from_object);
     has_glass_ |= is_glass;
+    has_specular_ |= from.role == ARHOST_ROLE_VIRTUAL && (is_glass || material.model == ARHOST_MATERIAL_MIRROR ||
+                                                          material.model == ARHOST_MATERIAL_METAL);
     has_catchers_ |= from.role == ARHOST_ROLE_CATCHER;
     has_gloss_ |= from.role == ARHOST_ROLE_CATCHER && material.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS;
     has_several_real_ |= from.role != ARHOST_ROLE_VIRTUAL && has_real_;
@@ -490,7 +494,8 @@ void SceneData::add_light_sources() {
         placed_.push_back({transforms_[i].data(), nullptr, 3 * sizeof(float), true});
     }
     first_source_ = static_cast<std::uint32_t>(tables_.size());
-    sources_.resize(std::size_t{max_sources_} * (arhost::raytracer_common::source_rows + 1));
+    max_targets_ = static_cast<std::uint32_t>(arena_.lights.count * LightSources::max_spheres);
+    sources_.resize(std::size_t{max_sources_} * (source_rows + 1) + std::size_t{2} * max_targets_);
     light_sources_.emplace(arena_);
     place_lights();
 }
@@ -500,9 +505,13 @@ void SceneData::place_lights() {
     const auto write = [](std::span<const float> from, std::uint32_t *to) {
         std::ranges::transform(from, to, [](float number) { return std::bit_cast<std::uint32_t>(number); });
     };
+    const auto spheres = light_sources_->specular_spheres();
+    photon_targets_.set(arena_, {spheres.begin(), spheres.end()});
     write(light_sources_->records(), sources_.data());
-    write(light_sources_->cumulative(),
-          sources_.data() + std::size_t{max_sources_} * arhost::raytracer_common::source_rows);
+    std::uint32_t *const cumulative = sources_.data() + std::size_t{max_sources_} * source_rows;
+    write(light_sources_->cumulative(), cumulative);
+    write(photon_targets_.cumulative(), cumulative + max_sources_);
+    write(photon_targets_.chances(), cumulative + max_sources_ + max_targets_);
     for (std::size_t i = 0; i < objects_.size(); ++i)
         objects_[i].emitter_density = light_sources_->emitters()[i].density;
 }
@@ -513,8 +522,13 @@ void SceneData::write_lights(Frame &frame) const {
         std::ranges::copy(light_sources_->spheres()[i], frame.spheres[i]);
     frame.source_count = static_cast<std::uint32_t>(light_sources_->cumulative().size());
     frame.first_source = first_source_;
-    frame.first_cumulative = first_source_ + max_sources_ * arhost::raytracer_common::source_rows;
+    frame.first_cumulative = first_source_ + max_sources_ * source_rows;
     frame.environment_chance = light_sources_->environment_chance();
+    frame.target_count = static_cast<std::uint32_t>(photon_targets_.spheres().size());
+    for (std::size_t i = 0; i < frame.target_count; ++i)
+        std::ranges::copy(photon_targets_.spheres()[i], frame.targets[i]);
+    frame.first_target = frame.first_cumulative + max_sources_;
+    frame.first_target_chance = frame.first_target + max_targets_;
 }
 
 // Fills `tables_` in the order that scene.glsl expects: sRGB encoding, sRGB decoding, environment.
@@ -616,6 +630,7 @@ Frame SceneData::frame() const {
     frame.has_several_real = has_several_real_;
     frame.irradiance_texture = irradiance_texture_;
     frame.video_texture = video_texture_;
+    frame.scene_extent = arhost::raytracer_common::scene_extent(arena_);
     if (light_sources_)
         write_lights(frame);
     return frame;

@@ -6,6 +6,7 @@
 
 #include "bvh.hpp"
 #include "raytracer_common/light_sources.hpp"
+#include "raytracer_common/photon_map.hpp"
 
 #include <arhost-cpp/plugin.hpp>
 #include <arhost/motion.h>
@@ -57,13 +58,15 @@ public:
     // integrator.
     void write_lights(Frame &frame) const;
     const arhost::raytracer_common::LightSources &lights() const { return *light_sources_; } // path integrator only
+    const arhost::raytracer_common::PhotonTargets &photon_targets() const { return photon_targets_; }
     const arhost_environment &environment() const { return arena_.environment; }
     bool has_glass() const { return has_glass_; }
     bool has_catchers() const { return has_catchers_; }
     bool has_holes() const { return has_holes_; }
     bool has_gloss() const { return has_gloss_; } // whether a catcher may mirror
     bool has_area_lights() const { return has_area_lights_; }
-    bool has_textures() const { return arena_.textures.count > 0; } // including the environment
+    bool may_have_photons() const { return has_specular_ && arena_.lights.count > 0; } // path integrator only
+    bool has_textures() const { return arena_.textures.count > 0; }                    // including the environment
 
 private:
     // The offsets of a geometry's data in the arrays below.
@@ -112,16 +115,18 @@ private:
     std::optional<arhost::raytracer_common::LightSources> light_sources_;
     std::vector<arhost::raytracer_common::PlacedObject> placed_; // one per object
     std::vector<float> irradiance_;                              // of the environment
-    std::vector<std::uint32_t>
-        sources_; // the end of `tables_`: records of the light sources, then their cumulative chances
-    std::uint32_t first_source_ = 0, max_sources_ = 0, irradiance_texture_ = ARHOST_NONE,
+    arhost::raytracer_common::PhotonTargets photon_targets_;
+    // The end of `tables_`: records of the light sources, then their cumulative chances, and the cumulative and other
+    // chances of the targets of photons.
+    std::vector<std::uint32_t> sources_;
+    std::uint32_t first_source_ = 0, max_sources_ = 0, max_targets_ = 0, irradiance_texture_ = ARHOST_NONE,
                   video_texture_ = ARHOST_NONE;
     std::size_t video_offset_ = 0, video_size_ = 0;
 
     std::size_t moving_nodes_ = 0, moving_primitives_ = 0, moving_attributes_ = 0;
     std::uint32_t solid_objects_ = 0, environment_rows_ = 0, environment_columns_ = 0;
     bool anything_moves_ = false, has_glass_ = false, has_catchers_ = false, has_holes_ = false, has_gloss_ = false,
-         has_area_lights_ = false, has_real_ = false, has_several_real_ = false;
+         has_area_lights_ = false, has_real_ = false, has_several_real_ = false, has_specular_ = false;
     std::uint64_t rebuilds_ = 0;
 };
 

@@ -7,12 +7,17 @@
 #include "spirv/pipeline.rint.h"
 #include "spirv/pipeline.rmiss.h"
 #include "spirv/pipeline_path.rgen.h"
+#include "spirv/pipeline_photons.rgen.h"
 #include "spirv/plain.comp.h"
 #include "spirv/plain_path.comp.h"
+#include "spirv/plain_photons.comp.h"
 #include "spirv/query.comp.h"
 #include "spirv/query_path.comp.h"
+#include "spirv/query_photons.comp.h"
 
 namespace rt_vulkan {
+
+using Words = std::span<const std::uint32_t>;
 
 VkShaderStageFlags Shaders::stage_flags() const {
     VkShaderStageFlags flags = 0;
@@ -27,7 +32,6 @@ VkPipelineStageFlags Shaders::pipeline_stage() const {
 }
 
 Shaders shaders_of(Path path, arhost_integrator integrator) {
-    using Words = std::span<const std::uint32_t>;
     const bool is_path = integrator == ARHOST_INTEGRATOR_PATH;
     if (path == Path::plain)
         return {path, {{VK_SHADER_STAGE_COMPUTE_BIT, is_path ? Words(plain_path_comp) : Words(plain_comp)}}};
@@ -39,6 +43,14 @@ Shaders shaders_of(Path path, arhost_integrator integrator) {
              {VK_SHADER_STAGE_CLOSEST_HIT_BIT_KHR, pipeline_rchit},
              {VK_SHADER_STAGE_ANY_HIT_BIT_KHR, pipeline_rahit},
              {VK_SHADER_STAGE_INTERSECTION_BIT_KHR, pipeline_rint}}};
+}
+
+Shaders photon_shaders_of(Path path) {
+    Shaders shaders = shaders_of(path);
+    shaders.stages[0].words = path == Path::plain   ? Words(plain_photons_comp)
+                              : path == Path::query ? Words(query_photons_comp)
+                                                    : Words(pipeline_photons_rgen);
+    return shaders;
 }
 
 } // namespace rt_vulkan

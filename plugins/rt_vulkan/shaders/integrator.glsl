@@ -7,10 +7,6 @@ float light_samples_of(uint lamp, uint depth) {
     return float(frame.light_samples);
 }
 
-vec3 shadow_of_glass(uint material, float cosine) {
-    return glass_shadow(materials[material].shadow_attenuation, cosine);
-}
-
 const int PRIMARY_STAGE = 1, CATCHER_STAGE = 2, PATH_STAGE = 3;
 
 // Renders a sample and adds it to the pixel's sums. Catchers do not hide the virtual objects behind them, so primary rays

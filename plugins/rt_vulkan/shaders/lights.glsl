@@ -2,11 +2,9 @@
 //
 // Direct light from lamps and the environment, and its occlusion. Equivalent to rt_embree's kernel/lights.inl.
 
-// Each integrator defines these functions.
-// Expected number of light samples of an area light at the vertex of a path after which it has `depth` bounces.
+// Expected number of light samples of an area light at the vertex of a path after which it has `depth` bounces; each
+// integrator defines it.
 float light_samples_of(uint lamp, uint depth);
-// Transmittance of a surface of glass for shadow rays.
-vec3 shadow_of_glass(uint material, float cosine);
 
 // The light that arrives at a surface point from one sampled point of a light source.
 struct LightSample {
@@ -116,16 +114,14 @@ struct Visibility {
 // Traces shadow rays. Real surfaces (catchers and occluders) cast no virtual shadow on each other: the video already
 // shows their shadows. The first ray searches for opaque objects; each further ray leads from one glass surface to
 // the next. A single loop traces all of them, because trace() is inlined and its code is long. `to_light`, `t_max`: as in
-// LightSample; `direction`: unit vector along `to_light`. `through_glass`: false if glass hides the light source.
-Visibility visibility(Surface s, vec3 to_light, float t_max, vec3 direction, bool through_glass) {
+// LightSample; `direction`: unit vector along `to_light`.
+Visibility visibility(Surface s, vec3 to_light, float t_max, vec3 direction) {
     const int max_surfaces = 64; // ignores further surfaces: rays may alternate endlessly between coincident faces
     vec3 lift = s.lift + s.geometric_normal * s.offset, start = s.position + lift;
     bool is_finite_distance = t_max < INFINITY;
     if (is_finite_distance)
         to_light -= lift;
     uint mask = s.is_real ? OPAQUE_MASK : OPAQUE_MASK | CATCHER_MASK | OCCLUDER_MASK;
-    if (!through_glass)
-        mask |= GLASS_MASK;
     Ray ray = Ray(start, to_light, t_max, mask);
     Visibility result = Visibility(false, false, vec3(1.0));
     for (int i = 0; i <= max_surfaces; ++i) {
@@ -133,13 +129,13 @@ Visibility visibility(Surface s, vec3 to_light, float t_max, vec3 direction, boo
         bool is_hit = hit.object != NONE;
         if (i == 0)
             result.unoccluded = !is_hit;
-        if (!has_glass || !through_glass || is_hit == (i == 0))
+        if (!has_glass || is_hit == (i == 0))
             break;
         if (i > 0) {
             result.is_tinted = true;
             Surface glass = surface_at(ray, hit, false);
             uint material = objects[hit.object].material;
-            result.tint *= shadow_of_glass(material, abs(dot(glass.normal, direction))) *
+            result.tint *= glass_shadow(materials[material].shadow_attenuation, abs(dot(glass.normal, direction))) *
                            bouguer(materials[material].extinction, glass.back_face ? glass.distance : 0.0);
             if (!(largest(result.tint) > 1e-3))
                 break;
@@ -299,7 +295,7 @@ DirectLight direct_light(Surface s, vec3 to_eye, bool catches, bool rays_follow,
                 arriving = sample_background(s, sample_uv, point_count);
             if (!(arriving.cosine > 0.0) || !(catches || arriving.irradiance > 0.0))
                 continue;
-            Visibility visible = visibility(s, arriving.to_light, arriving.t_max, arriving.direction, true);
+            Visibility visible = visibility(s, arriving.to_light, arriving.t_max, arriving.direction);
             if (catches)
                 add_shadow(sum, arriving, visible, share);
             else if (visible.unoccluded)

@@ -1,18 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // The path integrator: computes the added light and the transmittance of a pixel. Equivalent to rt_embree's
-// kernel/path.inl, except that there are no photons: the light of lamps passes straight through glass, and rays find
-// lamps in mirrors. A path that starts at a virtual object collects radiance; one that starts at a catcher
-// collects the change of its light, relative to the light without virtual objects.
+// kernel/path.inl. A path that starts at a virtual object collects radiance; one that starts at a catcher collects the
+// change of its light, relative to the light without virtual objects.
 
 // Paths of fewer bounces are not ended at random.
 const uint first_roulette_depth = 2u;
 
 const int PRIMARY_STAGE = 1, CATCHER_STAGE = 2, PATH_STAGE = 3;
-
-// Path.inverse_density of rays that a mirror reflects after a surface has scattered them. They see lamps with full
-// weight, because light samples do not follow mirrors.
-const float behind_mirror = -1e-30;
 
 // The surfaces that receive the light of sampled light sources.
 const int LIT_SURFACE = 1, CATCHER_SURFACE = 2, FILMED_SURFACE = 3;
@@ -30,51 +25,36 @@ bool survives(uint depth, Random random, inout vec3 throughput) {
 
 // Pushes a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly.
 void scatter_path_in_glass(Path path, Surface s, vec3 direction, uint material, float choice, Random random) {
-    vec3 arriving = path.throughput;
-    if (s.back_face)
-        arriving *= bouguer(materials[material].extinction, s.distance);
-    float index = materials[material].index, ratio = s.back_face ? index : 1.0 / index;
-    Refraction refraction = refraction_of(s, direction, ratio);
-    float reflectance = dielectric_reflectance(refraction.cosine, refraction.cosine_squared, ratio);
+    GlassScatter glass = scatter_at_glass(s, direction, material);
+    vec3 arriving = path.throughput * glass.transmittance;
     vec3 by_reflection = arriving * materials[material].reflectivity,
          by_refraction = arriving * materials[material].refraction;
-    bool reflects = choice < reflectance, refracts = !reflects;
+    bool reflects = choice < glass.reflectance, refracts = !reflects;
     if (path.depth == 0u) {
-        by_reflection *= reflectance;
-        by_refraction *= 1.0 - reflectance;
+        by_reflection *= glass.reflectance;
+        by_refraction *= 1.0 - glass.reflectance;
         reflects = true;
-        refracts = reflectance < 1.0;
+        refracts = glass.reflectance < 1.0;
     }
     if (reflects && survives(path.depth, random, by_reflection))
-        push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), by_reflection,
-             -abs(path.inverse_density));
+        push(path, above(s), reflected(s, direction), by_reflection, -abs(path.inverse_density));
     if (refracts && survives(path.depth, random, by_refraction))
-        push(path, s.position - s.geometric_normal * s.offset, refraction.direction, by_refraction,
-             -abs(path.inverse_density));
+        push(path, below(s), glass.refracted, by_refraction, -abs(path.inverse_density));
 }
 
 // Pushes a ray that the surface scatters; in glass at the first hit, two rays.
 void scatter_path(Path path, Surface s, vec3 direction, uint material, Random random) {
-    uint model = materials[material].model;
     vec2 choice = path_pair(random, CHOICE_DIMENSION, 0u, 1u);
-    if (has_glass && model == GLASS) {
+    if (has_glass && materials[material].model == GLASS) {
         scatter_path_in_glass(path, s, direction, material, choice.y, random);
         return;
     }
-    float mirror_chance = 0.0;
-    vec3 mirror_reflectance = materials[material].reflectivity;
-    if (model == MIRROR) {
-        mirror_chance = 1.0;
-    } else if (model == METAL) {
-        mirror_reflectance = schlick(mirror_reflectance, -dot(direction, s.normal));
-        float mirror = luminance(mirror_reflectance);
-        mirror_chance = mirror / max(mirror + luminance(s.diffuse), 1e-6);
-    }
+    vec3 mirror_reflectance;
+    float mirror_chance = mirror_chance_of(s, direction, material, mirror_reflectance);
     if (choice.y < mirror_chance) {
         vec3 throughput = path.throughput * mirror_reflectance * (1.0 / max(mirror_chance, 1e-6));
         if (survives(path.depth, random, throughput))
-            push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), throughput,
-                 path.inverse_density == 0.0 ? 0.0 : behind_mirror);
+            push(path, above(s), reflected(s, direction), throughput, -abs(path.inverse_density));
         return;
     }
     vec3 to_eye = -direction;
@@ -108,9 +88,8 @@ vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatte
         if (!(cosine > 0.0) || !(largest(source.light) > 0.0) || (receiver == FILMED_SURFACE && source.is_virtual) ||
             (hides && !can_meet_virtual(s.position, source.to_light, source.t_max)))
             continue;
-        // Refracted rays find the environment and emissive surfaces behind glass, but hardly ever a small lamp.
-        Visibility visible = visibility(s, source.to_light, source.t_max, source.direction, source.is_lamp);
-        vec3 transmittance = visible.unoccluded ? visible.tint : vec3(0.0);
+        if (is_visible(s, source) == hides)
+            continue;
         float other_density = 0.0; // of scattered rays
         if (scatters && receiver == LIT_SURFACE)
             other_density = scattering_density(s, to_eye, source.direction, specular);
@@ -121,17 +100,17 @@ vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatte
             float density = mirrors ? scattering_density(s, to_eye, source.direction, 1.0) : 0.0;
             vec3 light = gloss(s, to_eye, source.direction) * source.light * balance_weight(source.density, density);
             if (hides)
-                covered += (vec3(1.0) - transmittance) * light;
+                covered += light;
             else
-                mirrored += transmittance * light;
+                mirrored += light;
         }
         if (hides)
-            sum -= (vec3(1.0) - transmittance * (visible.is_tinted ? weight : 1.0)) * source.light * cosine;
+            sum -= source.light * cosine;
         else if (receiver == CATCHER_SURFACE)
-            sum += transmittance * source.light * (cosine * weight);
+            sum += source.light * (cosine * weight);
         else
             sum += (scattering(s, to_eye, source.direction) * weight + highlight(s, to_eye, source.direction)) *
-                   transmittance * source.light;
+                   source.light;
     }
     return sum;
 }
@@ -156,7 +135,8 @@ vec3 light_along(Path path, Ray ray, Hit hit, int stage, Random random) {
     vec3 sum = vec3(0.0);
     if (is_bounce && !is_hit) // the light of a catcher changes only where it sees a virtual object
         return sum;
-    if (has_area_lights && path.depth > 0u && (!is_bounce || is_mirrored))
+    // Photons bring the light of lamps that reaches a scattering surface off mirrors and through glass.
+    if (has_area_lights && path.depth > 0u && (!is_bounce || is_mirrored) && !(path.inverse_density < 0.0))
         sum = arriving_from_area_lights(ray.origin, ray.direction, hit.t, path.inverse_density, path.depth);
     Surface s;
     if (is_hit) {
@@ -216,18 +196,20 @@ vec3 light_along(Path path, Ray ray, Hit hit, int stage, Random random) {
             relative = vec3(0.0);
         mirrors = scatters && mirrors_virtual(s, -direction);
     }
-    vec3 reflected = vec3(0.0);
+    vec3 scattered = vec3(0.0);
     if (receiver != LIT_SURFACE || is_lit)
-        reflected = sampled_light(receiver, s, -direction, path.depth, scatters, mirrors, random) * relative;
+        scattered = (sampled_light(receiver, s, -direction, path.depth, scatters, mirrors, random) +
+                     photon_light(receiver == LIT_SURFACE, s, -direction, random)) *
+                    relative;
     if (receiver == FILMED_SURFACE)
-        return sum + video * (vec3(1.0) + reflected);
+        return sum + video * (vec3(1.0) + scattered);
     if (mirrors) // pushed first: when it is popped, the stack has space for the ray behind a virtual object
         push_mirrored(path, s, -direction, random);
     if (scatters && receiver == CATCHER_SURFACE)
         push_bounce(path, s, relative, random);
     else if (scatters)
         scatter_path(path, s, direction, material, random);
-    return sum + reflected;
+    return sum + scattered;
 }
 
 // Renders a sample and adds it to the pixel's sums. As in the other integrator, a single loop with a single call of

@@ -24,19 +24,13 @@ float light_samples_of(uint lamp, uint depth) {
     return source_field(lamp, CHANCE_ROW) * float(source_samples(depth - 1u));
 }
 
-vec3 shadow_of_glass(uint material, float cosine) {
-    float ratio = 1.0 / materials[material].index;
-    return materials[material].refraction *
-           (1.0 - dielectric_reflectance(cosine, refracted_cosine_squared(cosine, ratio), ratio));
-}
-
 struct SourceSample {
     vec3 to_light;  // vector from the surface to the sampled point; of unit length if the light is infinitely far
     float t_max;    // end of the shadow ray in lengths of `to_light`
     vec3 direction; // unit vector in the direction of `to_light`
     vec3 light;     // irradiance at perpendicular incidence, divided by π and by the number of samples
     float density;  // expected number of samples per steradian; 0 if scattered rays cannot hit the light source
-    bool is_lamp, is_virtual; // both false: the environment
+    bool is_virtual;
 };
 
 // Returns 1 − cosine of the half angle of the cone around a ball whose angular radius has this squared sine.
@@ -49,7 +43,7 @@ float density_in_cone(float slope) {
 
 // Returns light sample `index` of `count`. The samples are spread evenly over the light sources.
 SourceSample sample_source(Surface s, Random random, uint index, uint count) {
-    SourceSample result = SourceSample(s.normal, 1.0, s.normal, vec3(0.0), 0.0, false, false);
+    SourceSample result = SourceSample(s.normal, 1.0, s.normal, vec3(0.0), 0.0, false);
     if (frame.source_count == 0u)
         return result;
     uint source = 0u;
@@ -93,7 +87,6 @@ SourceSample sample_source(Surface s, Random random, uint index, uint count) {
         result.t_max = arriving.t_max;
         result.light = arriving.intensity * (arriving.irradiance * share);
         result.density = arriving.sampling_density;
-        result.is_lamp = source < frame.light_count;
     }
     if (result.is_virtual && result.density > 0.0) { // the radiance is known
         result.light = source_vector(source, INTENSITY_ROW) * (irradiance_of_density(result.density) * share);
@@ -104,46 +97,13 @@ SourceSample sample_source(Surface s, Random random, uint index, uint count) {
     return result;
 }
 
-// The chance that a lit surface scatters a ray by its specular lobe.
-float specular_chance(Surface s, vec3 to_eye) {
-    if (!s.is_rough)
-        return 0.0;
-    float specular = luminance(schlick(s.specular, dot(s.normal, to_eye))), diffuse = luminance(s.diffuse);
-    return diffuse > 0.0 ? clamp(specular / max(specular + diffuse, 1e-6), 0.1, 0.9) : 1.0;
-}
-
-// Returns the highlights of SPECULAR and METAL. Only light samples bring them; scattered rays do not follow this lobe.
-vec3 highlight(Surface s, vec3 to_eye, vec3 to_light) {
-    return !s.is_rough && s.exponent > 0.0 ? s.specular * phong(s.normal, to_light, to_eye, s.exponent) : vec3(0.0);
-}
-
-// Returns π · BSDF · cosine of a lit surface, without highlight().
-vec3 scattering(Surface s, vec3 to_eye, vec3 to_light) {
-    float cosine = lambert(s.normal, to_light);
-    if (s.is_rough) {
-        vec3 half_vector = normalize(to_light + to_eye), fresnel = schlick(s.specular, dot(to_eye, half_vector));
-        float lobe = ggx_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
-        return s.diffuse * (vec3(1.0) - fresnel) * cosine + fresnel * lobe;
-    }
-    return s.diffuse * cosine;
-}
-
-// Returns the part of scattering() that the specular lobe of a rough surface reflects.
-vec3 gloss(Surface s, vec3 to_eye, vec3 to_light) {
-    vec3 half_vector = normalize(to_light + to_eye);
-    return schlick(s.specular, dot(to_eye, half_vector)) *
-           ggx_lobe(lambert(s.normal, to_light), dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
-}
-
-// Density per steradian of the rays that a lit surface scatters. `chance`: result of specular_chance().
-float scattering_density(Surface s, vec3 to_eye, vec3 to_light, float chance) {
-    if (!(dot(to_light, s.geometric_normal) > 0.0))
-        return 0.0;
-    float density = lambert(s.normal, to_light) * 0.318309886 * (1.0 - chance);
-    if (s.is_rough)
-        density += chance * ggx_reflection_density(dot(s.normal, to_eye),
-                                                   dot(s.normal, normalize(to_light + to_eye)), s.alpha);
-    return density;
+// Returns whether a light source is not hidden. Light that passes through glass is not sampled: refracted rays and
+// photons find it. Real surfaces cast no shadow on each other.
+bool is_visible(Surface s, SourceSample source) {
+    vec3 lift = s.lift + s.geometric_normal * s.offset;
+    vec3 to_light = source.t_max < INFINITY ? source.to_light - lift : source.to_light;
+    uint mask = s.is_real ? OPAQUE_MASK | GLASS_MASK : ALL_MASKS;
+    return trace(Ray(s.position + lift, to_light, source.t_max, mask), true, false).object == NONE;
 }
 
 // Expected number of light samples per steradian, at the previous vertex of the path, of an emissive surface that the

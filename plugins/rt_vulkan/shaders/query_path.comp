@@ -15,8 +15,10 @@
 #include "surface.glsl"
 #include "lights.glsl"
 #include "scatter.glsl"
+#include "path_materials.glsl"
 #include "path_lights.glsl"
 #include "path_catcher.glsl"
+#include "photons.glsl"
 #include "pixel.glsl"
 #include "path.glsl"
 

@@ -32,12 +32,18 @@ const float min_throughput = 1e-4;
 vec3 above(Surface s) {
     return s.position + s.geometric_normal * s.offset;
 }
+vec3 below(Surface s) {
+    return s.position - s.geometric_normal * s.offset;
+}
+
+vec3 reflected(Surface s, vec3 direction) {
+    return mirror_direction_off_facet(direction, s.normal, s.geometric_normal);
+}
 
 void push_reflected(Path path, Surface s, vec3 direction, vec3 reflectance) {
     vec3 throughput = path.throughput * reflectance;
     if (largest(throughput) > min_throughput)
-        push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), throughput,
-             -abs(path.inverse_density));
+        push(path, above(s), reflected(s, direction), throughput, -abs(path.inverse_density));
 }
 
 // The refraction of a ray at a surface. `cosine`: cosine of the angle of incidence.
@@ -52,7 +58,7 @@ Refraction refraction_at(vec3 direction, vec3 normal, float ratio) {
 }
 
 // If refraction at the interpolated normal leaves the ray on the wrong side of the surface, the geometric normal is used
-// instead; mirror_direction_off_facet() does the same for reflection.
+// instead; reflected() does the same for reflection.
 Refraction refraction_of(Surface s, vec3 direction, float ratio) {
     Refraction refraction = refraction_at(direction, s.normal, ratio);
     if (dot(refraction.direction, s.geometric_normal) > 0.0 && refraction.cosine_squared > 0.0)
@@ -87,15 +93,13 @@ vec3 scatter_in_glass(Path path, Surface s, vec3 direction, uint material, Rando
     float cutoff = materials[material].importance_cutoff;
     if (refracts) {
         if (path.depth < materials[material].refraction_depth && luminance(refracted_share) > cutoff)
-            push(path, s.position - s.geometric_normal * s.offset, refraction.direction, refracted_share,
-                 -abs(path.inverse_density));
+            push(path, below(s), refraction.direction, refracted_share, -abs(path.inverse_density));
         else
             cut_off += refracted_share * cutoff_colour;
     }
     if (reflects) {
         if (path.depth < materials[material].reflection_depth && luminance(reflected_share) > cutoff)
-            push(path, above(s), mirror_direction_off_facet(direction, s.normal, s.geometric_normal), reflected_share,
-                 -abs(path.inverse_density));
+            push(path, above(s), reflected(s, direction), reflected_share, -abs(path.inverse_density));
         else
             cut_off += reflected_share * cutoff_colour;
     }

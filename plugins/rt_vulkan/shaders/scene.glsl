@@ -29,6 +29,7 @@ layout(constant_id = 5) const bool has_textures = true; // whether the scene has
 layout(constant_id = 6) const bool has_area_lights = true;
 layout(constant_id = 7) const bool may_have_video = true; // whether any image has a video
 layout(constant_id = 8) const bool has_gloss = true; // path integrator: whether a catcher may mirror virtual objects
+layout(constant_id = 9) const bool has_photons = true;    // whether any image has caustics of lamps
 
 struct Object {
     mat4x3 object_from_world;
@@ -104,6 +105,14 @@ struct Primitive {
     float unused_2;
 };
 
+// A grid into which photons are sorted (raytracer_common/photon_map.hpp). The first two members are indices into
+// `photon_words`.
+struct PhotonGrid {
+    uint first_number, first_start;
+    uint bucket_mask; // number of buckets − 1
+    float radius;
+};
+
 layout(std140, set = 0, binding = 0) uniform FrameBlock {
     vec3 eye;
     uint object_count;
@@ -139,6 +148,16 @@ layout(std140, set = 0, binding = 0) uniform FrameBlock {
     float max_radius_squared; // of (x/z, y/z) in the picture; the lens model is not valid beyond
     float least_irradiance;   // bound of a catcher's light without virtual objects; 0: catchers do not change
     uint blends_codes;        // whether straight images are blended in sRGB
+    // Photons.
+    vec3 photon_low;         // corner of cell (0, 0, 0) of all grids, mm
+    uint photon_level_count; // 0: no photon has arrived
+    PhotonGrid photon_grids[6];
+    vec4 targets[16]; // centre and radius of spheres that contain all mirrors and glass, mm
+    uint target_count;
+    uint first_target, first_target_chance; // indices into `tables`: cumulative and other chances (PhotonTargets)
+    float scene_extent;                     // mm: length of the diagonal of the scene's bounds
+    uint photon_count, first_photon;        // of this frame; offset into the random sequence
+    uint unused, unused_2;
 }
 frame;
 
@@ -175,7 +194,8 @@ layout(std430, set = 0, binding = 9) readonly buffer Texels {
     uint texels[];
 };
 layout(std430, set = 0, binding = 10) readonly buffer Tables {
-    // sRGB encoding, sRGB decoding, the environment's cumulative sums, the light sources and their cumulative chances
+    // sRGB encoding, sRGB decoding, the environment's cumulative sums, the light sources and their cumulative chances,
+    // the chances of the targets of photons
     uint tables[];
 };
 layout(std430, set = 0, binding = 11) readonly buffer Rays {

@@ -4,7 +4,7 @@
 // pipeline.rint for spheres, pipeline.rahit for possible holes and back faces, and finally pipeline.rchit or
 // pipeline.rmiss. These shaders do not trace further rays; only the integrator's loop does.
 
-layout(set = 0, binding = 15) uniform accelerationStructureEXT top_level;
+layout(set = 0, binding = 16) uniform accelerationStructureEXT top_level;
 layout(location = 0) rayPayloadEXT Payload payload;
 
 Hit trace(Ray ray, bool any_hit, bool cull_back_faces) {

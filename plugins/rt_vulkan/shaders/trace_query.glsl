@@ -3,7 +3,7 @@
 // Implements trace() with VK_KHR_ray_query. The device traverses its acceleration structures. This shader tests the
 // candidates that the device cannot decide: spheres, and triangles that may have holes or be back faces.
 
-layout(set = 0, binding = 15) uniform accelerationStructureEXT top_level;
+layout(set = 0, binding = 16) uniform accelerationStructureEXT top_level;
 
 Hit trace(Ray ray, bool any_hit, bool cull_back_faces) {
     if (!can_hit(ray))

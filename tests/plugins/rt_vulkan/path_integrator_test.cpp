@@ -111,19 +111,59 @@ SceneBuilder desk_with_glass() {
     add_environment(builder,
                     [](std::uint32_t column) { return glm::vec3(1, 1 + 0.1f * static_cast<float>(column), 1); });
     builder.environment.follows_video = true;
+    builder.add_light(bulb({-60, -40, 120}, 10, 5000, ARHOST_FALLOFF_INVERSE_SQUARE));
     builder.add_ball("glass", {-35, 20, 12, 12}, glass_of(1.5f));
     builder.add_ball("red", {-5, 45, 10, 10}, diffuse(0.8f, 0.2f, 0.1f));
     return builder;
 }
 
-// An emissive square that moves over a desk within a second.
-SceneBuilder moving_lamp() {
+arhost_light coloured(arhost_light lamp, float r, float g, float b) {
+    for (int i = 0; i < 3; ++i)
+        lamp.intensity[i] *= (i == 0 ? r : i == 1 ? g : b);
+    return lamp;
+}
+
+// A mirror, a glass ball and metal, which throw the light of lamps onto a desk and a wall.
+SceneBuilder caustics() {
+    SceneBuilder builder(path_settings(glm::vec3(0.1f)));
+    arhost_material glass = glass_of(1.5f), metal = scene::make_material(ARHOST_MATERIAL_METAL);
+    set3(glass.extinction, 0.02f, 0.005f, 0.01f);
+    set3(metal.diffuse, 0.3f, 0.2f, 0.1f);
+    set3(metal.reflectivity, 0.6f, 0.5f, 0.3f);
+    builder.add_mesh("desk", square(90), diffuse(0.6f, 0.6f, 0.6f), ARHOST_ROLE_CATCHER);
+    builder.add_mesh("wall", quad({-80, 60, 0}, {80, 60, 0}, {80, 60, 80}, {-80, 60, 80}),
+                     metallic_roughness({0.6f, 0.6f, 0.6f}, 0, 0.5f));
+    builder.add_mesh("mirror", quad({-70, 30, 1}, {-60, -30, 1}, {-60, -30, 40}, {-70, 30, 40}), mirror(0.9f));
+    builder.add_ball("glass", {-15, -10, 18, 15}, glass);
+    builder.add_ball("metal", {30, 20, 18, 15}, metal);
+    return builder;
+}
+// Each colour channel shows one type of lamp.
+SceneBuilder caustics_of_wide_lamps() {
+    SceneBuilder builder = caustics();
+    builder.add_light(coloured(round_spot(), 1, 0, 0));
+    builder.add_light(coloured(panel({0, 0, 120}, {20, 10}, 8000, ARHOST_FALLOFF_INVERSE_SQUARE), 0, 1, 0));
+    builder.add_light(coloured(bulb({40, -40, 100}, 15, 1), 0, 0, 1));
+    return builder;
+}
+SceneBuilder caustics_of_small_lamps() {
+    SceneBuilder builder = caustics();
+    builder.add_light(coloured(bulb({40, -40, 100}, 1, 8000, ARHOST_FALLOFF_INVERSE_SQUARE), 1, 0, 0));
+    builder.add_light(coloured(light(-20, -60, 80, 1), 0, 1, 0));
+    builder.add_light(coloured(sun(-0.6f, 0, -0.8f), 0, 0, 1));
+    return builder;
+}
+
+// An emissive square and a mirror that move over a desk within a second.
+SceneBuilder moving_lamp_and_mirror() {
     SceneBuilder builder(path_settings());
     builder.settings.duration_s = 1;
     builder.add_mesh("desk", square(90), diffuse(0.6f, 0.6f, 0.6f));
     builder.add_light(round_spot());
-    builder.add_animated("lamp", square(10, 40), emissive(8, 4, 2),
-                         {.moves = true, .node = builder.add_moving_node({-40, 0, 0}, {40, 0, 0})});
+    const scene::Motion motion{.moves = true, .node = builder.add_moving_node({-40, 0, 0}, {40, 0, 0})};
+    builder.add_animated("lamp", square(10, 40), emissive(8, 4, 2), motion);
+    builder.add_animated("mirror", quad({-35, 20, 1}, {-35, -20, 1}, {-35, -20, 30}, {-35, 20, 30}), mirror(0.9f),
+                         motion);
     return builder;
 }
 
@@ -170,6 +210,36 @@ TEST_F(PathIntegrator, MirrorsInALacqueredDeskAsRtEmbreeDoes) {
                               "plain", &video);
 }
 
+TEST_F(PathIntegrator, ThrowsTheLightOfWideLampsAsRtEmbreeDoes) {
+    expect_rt_embrees_picture(&caustics_of_wide_lamps, from_the_side(small),
+                              {{"samples", "64"}, {"photons", "2048"}});
+}
+
+TEST_F(PathIntegrator, ThrowsTheLightOfSmallLampsAsRtEmbreeDoes) {
+    expect_rt_embrees_picture(&caustics_of_small_lamps, from_the_side(small),
+                              {{"samples", "5"}, {"photons", "100000"}, {"light_samples", "16"}});
+}
+
+TEST_F(PathIntegrator, MoreSamplesBringMorePhotons) {
+    const arhost_camera view = from_the_side(small);
+    const auto picture_of = [&](Tracer &tracer) {
+        Picture picture(small);
+        EXPECT_EQ(tracer.try_render(view, picture), ARHOST_STATUS_OK) << tracer.log();
+        return picture.pixels();
+    };
+    Tracer tracer(caustics_of_small_lamps(), {{"samples", "2"}, {"photons", "2000"}}, "rt_vulkan");
+    ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
+    const auto few = picture_of(tracer);
+    ASSERT_EQ(tracer.plugin().set_text("samples", "8"), ARHOST_STATUS_OK) << tracer.log();
+    const auto many = picture_of(tracer);
+    EXPECT_NE(few, many);
+    Tracer other(caustics_of_small_lamps(), {{"samples", "8"}, {"photons", "2000"}}, "rt_vulkan");
+    ASSERT_EQ(other.start(small), ARHOST_STATUS_OK) << other.log();
+    EXPECT_EQ(picture_of(other), many);
+    ASSERT_EQ(tracer.plugin().set_text("samples", "2"), ARHOST_STATUS_OK) << tracer.log();
+    EXPECT_EQ(picture_of(tracer), few);
+}
+
 TEST_F(PathIntegrator, LeavesOtherPixelsUntouched) {
     LinearTracer tracer(desk_with_lamps(), {{"samples", "4"}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
@@ -209,9 +279,10 @@ TEST_F(PathIntegrator, KeepsEnergyInAFurnace) {
     }
 }
 
-TEST_F(PathIntegrator, FollowsMovingEmitters) {
+TEST_F(PathIntegrator, FollowsMovingEmittersAndMirrors) {
     const Options options{{"samples", "32"}};
-    LinearTracer vulkan(moving_lamp(), options, "rt_vulkan"), embree(moving_lamp(), options, "rt_embree");
+    LinearTracer vulkan(moving_lamp_and_mirror(), options, "rt_vulkan"),
+        embree(moving_lamp_and_mirror(), options, "rt_embree");
     for (LinearTracer *tracer : {&vulkan, &embree})
         ASSERT_EQ(tracer->start(small), ARHOST_STATUS_OK) << tracer->log();
     for (const double time_s : {0.0, 1.0})
@@ -259,10 +330,15 @@ TEST_F(PathIntegrator, LampsShineThroughGlass) {
         LinearTracer tracer(std::move(builder), {{"samples", "4"}}, "rt_vulkan");
         EXPECT_EQ(tracer.start(small), ARHOST_STATUS_OK) << tracer.log();
         const LinearPicture picture = tracer.render(camera({0, -60, 20}, {0, 0, 0}, {0, 0, 1}, small));
-        return std::array{picture.value(24, 18, 0), picture.value(24, 18, 1)};
+        std::array<double, 2> mean{};
+        for (std::uint32_t y = 15; y < 27; ++y)
+            for (std::uint32_t x = 12; x < 36; ++x)
+                for (std::size_t channel : {0, 1})
+                    mean[channel] += double{picture.value(x, y, channel)} / (12 * 24);
+        return mean;
     };
     const auto without = light_of(false), with = light_of(true);
-    EXPECT_GT(without[0], 0.05f);
+    EXPECT_GT(without[0], 0.05);
     EXPECT_NEAR(with[0] / without[0], 0.8, 0.01);
     EXPECT_NEAR(with[1] / without[1], 0.4, 0.01);
 }
@@ -278,7 +354,8 @@ INSTANTIATE_TEST_SUITE_P(Paths, PathIntegratorOnEachPath, testing::Values("plain
 TEST_P(PathIntegratorOnEachPath, ShowsTheVideoInAMirrorAsRtEmbreeDoes) {
     const arhost_intrinsics lens = with_lens(small, ARHOST_DISTORTION_BROWN, {-0.2, 0.05, 0.001, -0.002});
     const Video video(lens);
-    expect_rt_embrees_picture(&desk_with_glass, from_the_side(lens), {{"samples", "64"}}, GetParam(), &video);
+    expect_rt_embrees_picture(&desk_with_glass, from_the_side(lens), {{"samples", "64"}, {"photons", "2048"}},
+                              GetParam(), &video);
 }
 
 TEST_P(PathIntegratorOnEachPath, EqualRequestsGiveEqualBytes) {
@@ -296,7 +373,8 @@ TEST_P(PathIntegratorOnEachPath, ValidationReportsNothing) {
         GTEST_SKIP() << "needs Vulkan's validation layers";
     const Options options{{"validate", "true"}, {"path", GetParam()}};
     const Video video(small);
-    LinearTracer filmed(desk_with_glass(), options, "rt_vulkan"), moving(moving_lamp(), options, "rt_vulkan");
+    LinearTracer filmed(desk_with_glass(), options, "rt_vulkan"),
+        moving(moving_lamp_and_mirror(), options, "rt_vulkan");
     ASSERT_EQ(filmed.start(small, &video), ARHOST_STATUS_OK) << filmed.log();
     ASSERT_EQ(moving.start(small), ARHOST_STATUS_OK) << moving.log();
     for (std::uint64_t i = 0; i < 4; ++i) {

@@ -383,7 +383,7 @@ TEST(Device, IsChosenByNumberNameOrUuid) {
     using rt_vulkan::PhysicalDevice;
     PhysicalDevice usable{};
     usable.properties.apiVersion = VK_API_VERSION_1_1;
-    usable.properties.limits.maxPerStageDescriptorStorageBuffers = 14;
+    usable.properties.limits.maxPerStageDescriptorStorageBuffers = 15;
     std::vector<PhysicalDevice> devices(3, usable);
     devices[0].name = "llvmpipe (LLVM 15)";
     devices[0].uuid = "6d657361000000000000000000000000";
@@ -487,8 +487,8 @@ TEST(Device, RejectsADeviceThatLacksARequirement) {
                 testing::AllOf(HasSubstr(usable.name), HasSubstr("1.1 is required"), HasSubstr("option 'device'")));
     EXPECT_THAT(complaint([](auto &device) { device.queue_family = VK_QUEUE_FAMILY_IGNORED; }),
                 HasSubstr("has no compute queue"));
-    EXPECT_THAT(complaint([](auto &device) { device.properties.limits.maxPerStageDescriptorStorageBuffers = 13; }),
-                HasSubstr("supports 13 storage buffers per stage; 14 are required"));
+    EXPECT_THAT(complaint([](auto &device) { device.properties.limits.maxPerStageDescriptorStorageBuffers = 14; }),
+                HasSubstr("supports 14 storage buffers per stage; 15 are required"));
     EXPECT_THAT(complaint([](auto &device) { device.properties.limits.maxStorageBufferRange = 64; }),
                 HasSubstr("supports at most 1 MiB; reduce their size"));
 }

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// How surfaces scatter light in the path integrator. Equivalent to rt_embree's kernel/path_materials.inl.
+
+// The chance that a lit surface scatters a ray by its specular lobe.
+float specular_chance(Surface s, vec3 to_eye) {
+    if (!s.is_rough)
+        return 0.0;
+    float specular = luminance(schlick(s.specular, dot(s.normal, to_eye))), diffuse = luminance(s.diffuse);
+    return diffuse > 0.0 ? clamp(specular / max(specular + diffuse, 1e-6), 0.1, 0.9) : 1.0;
+}
+
+// Returns the highlights of SPECULAR and METAL. Only light samples bring them; scattered rays do not follow this lobe.
+vec3 highlight(Surface s, vec3 to_eye, vec3 to_light) {
+    return !s.is_rough && s.exponent > 0.0 ? s.specular * phong(s.normal, to_light, to_eye, s.exponent) : vec3(0.0);
+}
+
+// Returns π · BSDF · cosine of a lit surface, without highlight().
+vec3 scattering(Surface s, vec3 to_eye, vec3 to_light) {
+    float cosine = lambert(s.normal, to_light);
+    if (s.is_rough) {
+        vec3 half_vector = normalize(to_light + to_eye), fresnel = schlick(s.specular, dot(to_eye, half_vector));
+        float lobe = ggx_lobe(cosine, dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+        return s.diffuse * (vec3(1.0) - fresnel) * cosine + fresnel * lobe;
+    }
+    return s.diffuse * cosine;
+}
+
+// Returns the part of scattering() that the specular lobe of a rough surface reflects.
+vec3 gloss(Surface s, vec3 to_eye, vec3 to_light) {
+    vec3 half_vector = normalize(to_light + to_eye);
+    return schlick(s.specular, dot(to_eye, half_vector)) *
+           ggx_lobe(lambert(s.normal, to_light), dot(s.normal, to_eye), dot(s.normal, half_vector), s.alpha);
+}
+
+// Density per steradian of the rays that a lit surface scatters. `chance`: result of specular_chance().
+float scattering_density(Surface s, vec3 to_eye, vec3 to_light, float chance) {
+    if (!(dot(to_light, s.geometric_normal) > 0.0))
+        return 0.0;
+    float density = lambert(s.normal, to_light) * 0.318309886 * (1.0 - chance);
+    if (s.is_rough)
+        density += chance * ggx_reflection_density(dot(s.normal, to_eye),
+                                                   dot(s.normal, normalize(to_light + to_eye)), s.alpha);
+    return density;
+}
+
+// The chance that a surface reflects a ray like a mirror; METAL is a mirror over a diffuse surface. `reflectance`: of
+// the mirror.
+float mirror_chance_of(Surface s, vec3 direction, uint material, out vec3 reflectance) {
+    reflectance = materials[material].reflectivity;
+    if (materials[material].model != METAL)
+        return materials[material].model == MIRROR ? 1.0 : 0.0;
+    reflectance = schlick(reflectance, -dot(direction, s.normal));
+    float mirror = luminance(reflectance);
+    return mirror / max(mirror + luminance(s.diffuse), 1e-6);
+}
+
+// Reflection and refraction at glass. `transmittance`: of the way inside to the surface.
+struct GlassScatter {
+    float reflectance;
+    vec3 transmittance, refracted;
+};
+GlassScatter scatter_at_glass(Surface s, vec3 direction, uint material) {
+    float index = materials[material].index, ratio = s.back_face ? index : 1.0 / index;
+    Refraction refraction = refraction_of(s, direction, ratio);
+    return GlassScatter(dielectric_reflectance(refraction.cosine, refraction.cosine_squared, ratio),
+                        s.back_face ? bouguer(materials[material].extinction, s.distance) : vec3(1.0),
+                        refraction.direction);
+}

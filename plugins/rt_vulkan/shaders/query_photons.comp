@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+//
+// Traces a photon with ray queries in a compute shader.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_ray_query : require
+#include "arhost/shading/glsl.h"
+
+#include "scene.glsl"
+#include "random.glsl"
+#include "path_random.glsl"
+#include "texture.glsl"
+#include "hits.glsl"
+#include "trace_query.glsl"
+#include "surface.glsl"
+#include "lights.glsl"
+#include "scatter.glsl"
+#include "path_materials.glsl"
+#include "path_lights.glsl"
+#include "photon_tracing.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+void main() {
+    trace_photon(gl_GlobalInvocationID.xy);
+}
