@@ -163,6 +163,8 @@ EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robus
         view_.has_several_real |= object.role != ARHOST_ROLE_VIRTUAL && (view_.has_catchers || view_.has_occluders);
         view_.has_catchers |= object.role == ARHOST_ROLE_CATCHER;
         view_.has_occluders |= object.role == ARHOST_ROLE_OCCLUDER;
+        view_.has_gloss |= arena.integrator == ARHOST_INTEGRATOR_PATH && object.role == ARHOST_ROLE_CATCHER &&
+                           objects_.back().material->model == ARHOST_MATERIAL_METALLIC_ROUGHNESS;
         view_.has_glass |= mask_of(objects_.back()) == glass_mask;
 
         if (object.deforms) {

@@ -71,10 +71,12 @@ enum SumRow : int {
     // hide, and 0.
     hidden_row,
     // Path integrator, instead of the rows from caught_row on. Three rows each: the change of a catcher's diffuse
-    // light relative to its light without virtual objects, and the light that it mirrors only without them.
+    // light relative to its light without virtual objects; of glossy catchers, the light that they mirror only
+    // without virtual objects, and their diffuse light without them.
     change_row = caught_row,
     covered_row = change_row + 3,
-    sum_rows = covered_row + 3
+    matt_row = covered_row + 3,
+    sum_rows = matt_row + 3
 };
 
 // The planes of Scratch::radiance, the results of a sample. The integrator `whitted` uses only the first.
@@ -103,11 +105,12 @@ struct Scene {
     float shadow_alpha_opaque, shadow_alpha_translucent;
     bool coloured_shadows;
     bool has_catchers, has_occluders, has_glass;
+    bool has_gloss;        // whether a catcher may mirror virtual objects
     bool has_several_real; // several catchers or occluders
     bool has_area_lights;
     bool has_background; // a background that is not black, and no environment
     bool has_instances;
-    int sum_row_count() const { return has_catchers ? sum_rows : caught_row; }
+    int sum_row_count() const { return has_gloss ? sum_rows : has_catchers ? hidden_row + 3 : caught_row; }
     const arhost::shading::Srgb8Table *srgb8;
     const float *linear_of_srgb8; // linear value of each of the 256 sRGB codes
 };

@@ -89,7 +89,8 @@ constexpr arhost_option_descriptor options[] = {
                    "paths make no fireflies; 0: none.",
                    0, 1e6),
     arhost::option(ARHOST_OPTION_INTEGER, "photons", "16384",
-                   "Path integrator: light rays from lamps to mirrors and glass per frame and sample, for caustics.",
+                   "Path integrator: light rays from lamps to mirrors and glass per frame and sample, for caustics; "
+                   "0: none.",
                    0, 1 << 20),
     arhost::option(ARHOST_OPTION_INTEGER, "threads", "0", "Render threads; 0: one per processor.", 0, 256),
     arhost::option(ARHOST_OPTION_BOOL, "robust", "false",

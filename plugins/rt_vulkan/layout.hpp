@@ -84,7 +84,7 @@ struct Primitive {
 };
 
 struct Sums {
-    float light[3], coverage, hidden[3], irradiance, covered[3], caught;
+    float light[3], coverage, hidden[3], irradiance, covered[3], caught, matt[3], unused;
 };
 
 inline constexpr std::uint32_t max_samples = 256; // per pixel and frame
@@ -137,7 +137,7 @@ struct Frame {
 };
 
 static_assert(sizeof(Object) == 208 && sizeof(Material) == 176 && sizeof(Light) == 80 && sizeof(Texture) == 32 &&
-              sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Sums) == 48 &&
+              sizeof(Node) == 32 && sizeof(Primitive) == 48 && sizeof(Sums) == 64 &&
               sizeof(Frame) == 1008 + 16 * max_samples);
 
 // The bindings of the descriptor set, from 0.

@@ -184,7 +184,8 @@ constexpr arhost_option_descriptor options[] = {
                    "paths make no fireflies; 0: none.",
                    0, 1e6),
     arhost::option(ARHOST_OPTION_INTEGER, "photons", "16384",
-                   "Path integrator: light rays from lamps to mirrors and glass per frame and sample, for caustics.",
+                   "Path integrator: light rays from lamps to mirrors and glass per frame and sample, for caustics; "
+                   "0: none.",
                    0, 1 << 20),
     arhost::option(ARHOST_OPTION_BOOL, "validate", "false",
                    "Enable Vulkan's validation layers and log their messages; slow.")};

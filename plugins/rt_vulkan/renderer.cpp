@@ -207,15 +207,13 @@ void Renderer::set_samples(std::uint32_t samples, std::uint32_t full_samples) {
     full_samples_ = full_samples;
     if (samples == settings_.samples)
         return;
-    settings_.samples = samples;
-    const bool needs_slopes = samples > 1 && !frame_.has_slopes;
-    if (needs_slopes)
+    if (samples > 1 && !frame_.has_slopes) {
         make_rays(true);
-    if (make_photon_buffers() || needs_slopes) {
-        write_descriptor_set();
-        for (Target &target : targets_)
-            target.recorded = {}; // the update of the descriptor set invalidates the commands
+        update_descriptor_set();
     }
+    if (make_photon_buffers(samples))
+        update_descriptor_set();
+    settings_.samples = samples;
     samples_ = arhost::raytracer_common::sample_positions(samples);
     bands_.restart(); // the next image may take much longer than the last one
     history_camera_.reset();
@@ -256,15 +254,22 @@ void Renderer::make_rays(bool has_slopes) {
 }
 
 // Makes the buffers of photons if they do not exist or are too small. Returns whether it has made them.
-bool Renderer::make_photon_buffers() {
-    const std::size_t size = photon_buffer_size(photon_count(settings_, settings_.samples));
+bool Renderer::make_photon_buffers(std::uint32_t samples) {
+    const std::size_t size = photon_buffer_size(photon_count(settings_, samples));
     if (buffers_[photons_binding] && size <= photons_.size())
         return false;
-    buffers_[photons_binding] = make_buffer(photons_binding, {}, size);
+    Buffer on_device = make_buffer(photons_binding, {}, size);
     if (size)
         photons_ = Buffer(device_, size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT,
                           Buffer::Place::host_read);
+    buffers_[photons_binding] = std::move(on_device);
     return true;
+}
+
+void Renderer::update_descriptor_set() {
+    write_descriptor_set();
+    for (Target &target : targets_)
+        target.recorded = {}; // the update of the descriptor set invalidates the commands
 }
 
 void Renderer::make_buffers(Path path) {
@@ -278,7 +283,7 @@ void Renderer::make_buffers(Path path) {
         moving_size += scene_.moving_part(binding).size();
     }
     make_rays(settings_.samples > 1 || settings_.accumulate || is_path_);
-    make_photon_buffers();
+    make_photon_buffers(settings_.samples);
     buffers_[history_binding] = make_buffer(history_binding, {}, settings_.accumulate ? sizeof(Sums) * pixels : 0);
     buffers_[image_binding] = make_buffer(image_binding, {}, pixel_size_ * pixels);
     buffers_[drawn_binding] = make_buffer(drawn_binding, {}, drawn_size);
@@ -653,6 +658,7 @@ void Renderer::trace_photons(std::vector<VkCommandBuffer> &commands, const std::
     trace(std::exchange(commands, {}), row_count, photon_bands_, commands_of, report);
     check_cancelled();
     photon_map_.build({reinterpret_cast<const Photon *>(photons_.mapped().data()), frame_.photon_count});
+    check_cancelled();
     if (const std::size_t size = write_photons(photon_map_, photons_.mapped(), frame_)) {
         record_photon_map(size);
         commands.push_back(photon_commands_);

@@ -74,7 +74,8 @@ private:
         Rows recorded{}; // the rows that `commands` trace
     };
     void make_rays(bool has_slopes);
-    bool make_photon_buffers();
+    bool make_photon_buffers(std::uint32_t samples);
+    void update_descriptor_set();
     void make_buffers(Path path);
     Buffer make_buffer(Binding binding, std::span<const Bytes> parts, std::size_t min_size,
                        VkBufferUsageFlags more_usage = 0);

@@ -159,8 +159,9 @@ ARHOST_INLINE void trace_path_packet(Work &work, std::uint32_t depth) {
 ARHOST_INLINE bool primary_path(Work &work, int first_pixel, Vec3 direction, Bool active) {
     const Scene &scene = work.frame.scene;
     const Vec3 eye = splat(work.frame.camera.eye);
+    const int planes_used = scene.has_gloss ? plane_count : mirrored_plane;
     for (float *planes : work.scratch.radiance)
-        for (int plane = 0; plane < plane_count; ++plane)
+        for (int plane = 0; plane < planes_used; ++plane)
             store(planes + plane * tile_pixels + first_pixel, Float(0.0f));
     const PrimaryHits hits = trace_primary(scene, eye, direction, active);
     const Paths paths{lane_numbers() + Int(first_pixel), first_pixel, white(), 0, Float(0.0f)};
@@ -190,6 +191,8 @@ ARHOST_INLINE void accumulate_path(const Frame &frame, Scratch &scratch, int fir
     if (!frame.scene.has_catchers)
         return;
     add(change_row, change_plane);
+    if (!frame.scene.has_gloss)
+        return;
     add(light_row, mirrored_plane);
     add(covered_row, covered_plane);
 }
@@ -219,22 +222,24 @@ ARHOST_INLINE Vec3 video_at(const Frame &frame, int x, int y) {
 }
 
 // Removes the light that catchers mirror only without virtual objects. It is part of the video, so that the
-// transmittance applies to it, too. `covered`: its mean over the samples, `uncovered`: the catchers' share of them.
-ARHOST_INLINE void remove_covered(const Frame &frame, Vec3 covered, Float uncovered, int x, int y,
-                                  LinearBlock &linear) {
+// transmittance applies to it, too. A saturated video shows less than that; there, the catcher's diffuse light
+// remains. `covered`, `matt`: as in SumRow, means over the samples that hit catchers.
+ARHOST_INLINE void remove_covered(const Frame &frame, Vec3 covered, Vec3 matt, int x, int y, LinearBlock &linear) {
     if (!any(largest(covered) > Float(0.0f)))
         return;
-    covered = covered * (Float(1.0f) / max(uncovered, Float(1e-3f)));
     if (!frame.path.video.image.texels) {
         linear.added = linear.added - linear.transmittance * covered;
         return;
     }
     const Vec3 video = video_at(frame, x, y);
-    const auto remaining = [](Float part, Float whole) __attribute__((always_inline)) {
-        return max(Float(1.0f) - part / max(whole, Float(1e-6f)), Float(0.0f));
+    const auto remaining = [](Float part, Float diffuse, Float whole) __attribute__((always_inline)) {
+        const Float saturated = min(max(whole * Float(5.0f) - Float(4.0f), Float(0.0f)), Float(1.0f)); // from 0.8 on
+        const Float least = min(diffuse * saturated / max(whole, Float(1e-6f)), Float(1.0f));
+        return max(Float(1.0f) - part / max(whole, Float(1e-6f)), least);
     };
-    linear.transmittance = linear.transmittance * Vec3{remaining(covered.x, video.x), remaining(covered.y, video.y),
-                                                       remaining(covered.z, video.z)};
+    linear.transmittance =
+        linear.transmittance * Vec3{remaining(covered.x, matt.x, video.x), remaining(covered.y, matt.y, video.y),
+                                    remaining(covered.z, matt.z, video.z)};
 }
 
 ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch, int first_pixel,
@@ -254,9 +259,13 @@ ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch
     };
     linear.transmittance = {bounded(linear.transmittance.x), bounded(linear.transmittance.y),
                             bounded(linear.transmittance.z)};
-    if (frame.scene.has_catchers)
-        remove_covered(frame, {mean(covered_row), mean(covered_row + 1), mean(covered_row + 2)}, uncovered, x, y,
-                       linear);
+    if (frame.scene.has_gloss) {
+        const Float share = Float(1.0f) / max(uncovered, Float(1e-3f));
+        const auto mean_of_catchers = [&](int row) __attribute__((always_inline)) {
+            return Vec3{mean(row), mean(row + 1), mean(row + 2)} * share;
+        };
+        remove_covered(frame, mean_of_catchers(covered_row), mean_of_catchers(matt_row), x, y, linear);
+    }
     linear.added = {bounded(linear.added.x), bounded(linear.added.y), bounded(linear.added.z)};
     return linear;
 }

@@ -108,8 +108,8 @@ ARHOST_INLINE Bounce sample_virtual(const Work &work, const Paths &paths, const 
                               density, Float(0.0f))};
 }
 
-// Returns the lanes whose gloss can mirror at least 1/256 of the virtual objects' radiance: the reflectance, times an
-// upper bound of the share of the reflected rays that meet the bounding spheres.
+// Returns the lanes whose gloss mirrors about 1/256 of the virtual objects' radiance or more: the reflectance, times
+// the share of the reflected rays that meet the bounding spheres, if all were as dense as the densest.
 ARHOST_INLINE Bool mirrors_virtual(const PathScene &path, const Surface &s, Vec3 to_eye) {
     const Vec3 middle = mirror_direction(-to_eye, s.normal);
     Float share(0.0f);
@@ -133,6 +133,14 @@ ARHOST_INLINE Bool is_hidden(const Work &work, const Surface &s, const SourceSam
     return any(active) ? active & ~is_visible(work.frame.scene, s, sample, active) : active;
 }
 
+// Returns the share of a catcher's light that virtual objects can shadow: 1 for dielectrics. Metals only mirror.
+ARHOST_INLINE Float shadowed_share(const Surface &s) {
+    constexpr float dielectric_reflectance = 0.04f;
+    const Float diffuse = luminance(s.diffuse),
+                metallic = max(luminance(s.specular) - Float(dielectric_reflectance), Float(1e-6f));
+    return select(s.is_rough, diffuse / (diffuse + metallic), Float(1.0f));
+}
+
 // Returns the irradiance that photons bring, divided by π.
 ARHOST_INLINE Vec3 photon_irradiance(const Work &work, const Paths &paths, const Surface &s, Bool active) {
     return photon_light(work, paths, s, active, [](Vec3) { return Float(1.0f); });
@@ -150,8 +158,10 @@ ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHi
     };
     Paths relative = paths;
     relative.throughput = {inverse(before.x), inverse(before.y), inverse(before.z)};
-    if (s.any_rough) // metals have only a gloss
-        relative.throughput = select(s.is_rough & (largest(s.diffuse) == Float(0.0f)), black(), relative.throughput);
+    const Bool glossy = active & s.is_rough;
+    const bool any_glossy = s.any_rough && any(glossy);
+    if (any_glossy)
+        relative.throughput = relative.throughput * shadowed_share(s);
     const bool bounces = frame.scene.max_depth > 0;
     const Float form_factors = form_factors_of(frame.path, s);
     const auto bounce_density = [&](Vec3 direction) __attribute__((always_inline)) {
@@ -160,12 +170,17 @@ ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHi
     };
     const Vec3 to_eye = -normalize(direction_of(rays.ray));
     Bool mirrors = bool_of(false);
-    if (bounces && s.any_rough)
-        mirrors = active & mirrors_virtual(frame.path, s, to_eye);
-    const auto mirrored_light = [&](const SourceSample &sample) __attribute__((always_inline)) {
+    if (bounces && any_glossy)
+        mirrors = glossy & mirrors_virtual(frame.path, s, to_eye);
+    // Returns the part of a light sample that the gloss mirrors, unless it mirrors a real surface before the light.
+    const auto mirrored_light = [&](const SourceSample &sample, Bool of) __attribute__((always_inline)) {
+        of = of & glossy;
+        if (!any_glossy || !any(of))
+            return black();
+        of = is_visible(frame.scene, s, sample, Int(catcher_mask | occluder_mask), of);
         const Float density = scattering_density(s, to_eye, sample.direction, Float(1.0f));
         const Float weight = balance_weight(sample.density, select(mirrors, density, Float(0.0f)));
-        return gloss(s, to_eye, sample.direction) * sample.light * weight;
+        return select(of, gloss(s, to_eye, sample.direction) * sample.light * weight, black());
     };
     Vec3 change = black(), mirrored = black(), covered = black();
     const int count = frame.light_samples;
@@ -177,23 +192,31 @@ ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHi
         if (any(real)) {
             const Bool hidden = is_hidden(work, s, sample, real);
             change = change - select(hidden, sample.light * cosine, black());
-            if (s.any_rough && any(hidden))
-                covered = covered + select(hidden, mirrored_light(sample), black());
+            covered = covered + mirrored_light(sample, hidden);
         }
         if (any(emitter)) {
             const Float weight = balance_weight(sample.density, bounce_density(sample.direction));
             const Bool visible = is_visible(frame.scene, s, sample, emitter);
             change = change + select(visible, sample.light * (cosine * weight), black());
-            if (s.any_rough && any(visible))
-                mirrored = mirrored + select(visible, mirrored_light(sample), black());
+            mirrored = mirrored + mirrored_light(sample, visible);
         }
     }
     change = change + photon_irradiance(work, paths, s, active);
     add_radiance(work, relative, change, active);
     const Paths of_gloss = in_plane(paths, mirrored_plane);
-    if (s.any_rough) {
-        add_radiance(work, of_gloss, mirrored, active);
-        add_radiance(work, in_plane(paths, covered_plane), covered, active);
+    if (any_glossy) {
+        // Rays of the gloss do not see lamps behind mirrors and glass.
+        const Vec3 by_photons = photon_light(
+            work, paths, s, glossy, [&](Vec3 to_light) __attribute__((always_inline)) {
+                return gloss(s, to_eye, to_light) * (Float(1.0f) / max(dot(s.normal, to_light), Float(0.01f)));
+            });
+        add_radiance(work, of_gloss, mirrored + by_photons, glossy);
+        add_radiance(work, in_plane(paths, covered_plane), covered, glossy);
+        const Vec3 matt = s.diffuse * before;
+        const int first = paths.first_pixel & (tile_pixels - 1);
+        add_to_sum(work.scratch, matt_row, first, select(glossy, matt.x, Float(0.0f)));
+        add_to_sum(work.scratch, matt_row + 1, first, select(glossy, matt.y, Float(0.0f)));
+        add_to_sum(work.scratch, matt_row + 2, first, select(glossy, matt.z, Float(0.0f)));
     }
     if (any(mirrors)) {
         const RoughReflection ray = sample_rough(s, to_eye, path_pair(work, of_gloss, scatter_dimension, 0, 1));
@@ -203,7 +226,7 @@ ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHi
     if (!bounces)
         return;
     const Bounce bounce = sample_virtual(work, paths, s, form_factors);
-    const Bool sends = active & (bounce.density > Float(0.0f));
+    const Bool sends = active & (bounce.density > Float(0.0f)) & (largest(relative.throughput) > Float(0.0f));
     if (!any(sends))
         return;
     const Float cosine = dot(bounce.direction, s.normal);

@@ -152,14 +152,20 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
     return sample;
 }
 
-// Returns the lanes whose light source is not hidden. Light that passes through glass is not sampled: refracted rays
-// and photons find it. Real surfaces cast no shadow on each other.
-ARHOST_INLINE Bool is_visible(const Scene &scene, const Surface &s, const SourceSample &sample, Bool active) {
+// Returns the lanes in which no object of these masks hides the light source.
+ARHOST_INLINE Bool is_visible(const Scene &scene, const Surface &s, const SourceSample &sample, Int masks,
+                              Bool active) {
     const Vec3 above = s.lift + s.geometric_normal * s.offset;
     const Vec3 to_light = sample.to_light - select(sample.t_far < Float(far_away), above, black());
     RTCRay16 rays;
-    set_ray(rays, s.position + above, to_light, sample.t_far, select(s.is_real, Int(virtual_masks), Int(all_masks)));
+    set_ray(rays, s.position + above, to_light, sample.t_far, masks);
     return active & ~blocked(scene, rays, active);
+}
+
+// Returns the lanes whose light source is not hidden. Light that passes through glass is not sampled: refracted rays
+// and photons find it. Real surfaces cast no shadow on each other.
+ARHOST_INLINE Bool is_visible(const Scene &scene, const Surface &s, const SourceSample &sample, Bool active) {
+    return is_visible(scene, s, sample, select(s.is_real, Int(virtual_masks), Int(all_masks)), active);
 }
 
 // Returns the light of sampled light sources that the surfaces reflect. `scatters`: whether scattered rays follow.

@@ -76,7 +76,7 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
 // Edges thus have no halo on any background.
 uint shade_pixel(uvec2 position) {
     uint pixel = position.y * frame.width + position.x;
-    Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), 0.0);
+    Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0));
     for (uint i = 0u; i < frame.sample_count; ++i) {
         vec3 direction;
         if (direction_of(pixel, frame.samples[i].xy, direction))

@@ -88,7 +88,9 @@ vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatte
         if (!(cosine > 0.0) || !(largest(source.light) > 0.0) || (receiver == FILMED_SURFACE && source.is_virtual) ||
             (hides && !can_meet_virtual(s.position, source.to_light, source.t_max)))
             continue;
-        if (is_visible(s, source) == hides)
+        // Light that passes through glass is not sampled: refracted rays and photons find it. Real surfaces cast no
+        // shadow on each other.
+        if (is_visible(s, source, s.is_real ? OPAQUE_MASK | GLASS_MASK : ALL_MASKS) == hides)
             continue;
         float other_density = 0.0; // of scattered rays
         if (scatters && receiver == LIT_SURFACE)
@@ -96,7 +98,8 @@ vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatte
         else if (scatters && receiver == CATCHER_SURFACE)
             other_density = bounce_density(s, source.direction, form_factors);
         float weight = balance_weight(source.density, other_density);
-        if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough) {
+        if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough &&
+            is_visible(s, source, CATCHER_MASK | OCCLUDER_MASK)) { // else the gloss mirrors a real surface
             float density = mirrors ? scattering_density(s, to_eye, source.direction, 1.0) : 0.0;
             vec3 light = gloss(s, to_eye, source.direction) * source.light * balance_weight(source.density, density);
             if (hides)
@@ -192,22 +195,25 @@ vec3 light_along(Path path, Ray ray, Hit hit, int stage, Random random) {
                                              : 1.0);
     }
     if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough) {
-        if (largest(s.diffuse) == 0.0) // metals have only a gloss
-            relative = vec3(0.0);
+        matt = s.diffuse * before;
+        relative *= shadowed_share(s);
         mirrors = scatters && mirrors_virtual(s, -direction);
     }
     vec3 scattered = vec3(0.0);
-    if (receiver != LIT_SURFACE || is_lit)
-        scattered = (sampled_light(receiver, s, -direction, path.depth, scatters, mirrors, random) +
-                     photon_light(receiver == LIT_SURFACE, s, -direction, random)) *
+    if (receiver != LIT_SURFACE || is_lit) {
+        PhotonLight by_photons = photon_light(receiver != LIT_SURFACE, s, -direction, random);
+        scattered = (sampled_light(receiver, s, -direction, path.depth, scatters, mirrors, random) + by_photons.light) *
                     relative;
+        if (receiver == CATCHER_SURFACE) // rays of the gloss do not see lamps behind mirrors and glass
+            mirrored += by_photons.mirrored;
+    }
     if (receiver == FILMED_SURFACE)
         return sum + video * (vec3(1.0) + scattered);
     if (mirrors) // pushed first: when it is popped, the stack has space for the ray behind a virtual object
         push_mirrored(path, s, -direction, random);
-    if (scatters && receiver == CATCHER_SURFACE)
+    if (scatters && receiver == CATCHER_SURFACE && largest(relative) > 0.0)
         push_bounce(path, s, relative, random);
-    else if (scatters)
+    else if (scatters && receiver != CATCHER_SURFACE)
         scatter_path(path, s, direction, material, random);
     return sum + scattered;
 }
@@ -216,7 +222,7 @@ vec3 light_along(Path path, Ray ray, Hit hit, int stage, Random random) {
 // trace() handles all kinds of rays that find surfaces.
 void trace_sample(vec3 direction, Random random, inout Sums sums) {
     vec3 light = vec3(0.0);
-    mirrored = covered = vec3(0.0);
+    mirrored = covered = matt = vec3(0.0);
     stack_size = 0;
     int stage = PRIMARY_STAGE;
     bool of_catcher = false;
@@ -262,19 +268,22 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
         sums.hidden += light;
         sums.light += bounded(mirrored);
         sums.covered += bounded(covered);
+        sums.matt += matt;
     } else {
         sums.light += light;
     }
 }
 
 // Removes the light that catchers mirror only without virtual objects. It is part of the video, so that the
-// transmittance applies to it, too. `light`: its mean over the samples that hit no virtual object.
-void remove_covered(vec3 light, uvec2 position, inout vec3 added, inout vec3 transmittance) {
+// transmittance applies to it, too. A saturated video shows less than that; there, the catcher's diffuse light remains.
+// `light`, `diffuse`: Sums.covered and Sums.matt, means over the samples that hit no virtual object.
+void remove_covered(vec3 light, vec3 diffuse, uvec2 position, inout vec3 added, inout vec3 transmittance) {
     transmittance = max(transmittance, 0.0);
     if (may_have_video && frame.has_video != 0u) {
         vec2 at = (vec2(position) + 0.5) / vec2(frame.width, frame.height);
-        vec3 video = sample_texture(frame.video_texture, at).rgb;
-        transmittance *= max(vec3(1.0) - light / max(video, vec3(1e-6)), 0.0);
+        vec3 video = max(sample_texture(frame.video_texture, at).rgb, vec3(1e-6));
+        vec3 saturated = clamp(video * 5.0 - 4.0, 0.0, 1.0); // from 0.8 on
+        transmittance *= max(vec3(1.0) - light / video, min(diffuse * saturated / video, 1.0));
     } else {
         added -= transmittance * light;
     }
@@ -297,7 +306,7 @@ void write_pixel(uvec2 position) {
     if (position.x >= frame.width || position.y >= frame.height)
         return;
     uint pixel = position.y * frame.width + position.x;
-    Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), 0.0);
+    Sums sums = Sums(vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0), 0.0, vec3(0.0));
     for (uint i = 0u; i < frame.sample_count; ++i) {
         vec3 direction;
         if (direction_of(pixel, frame.samples[i].xy, direction))
@@ -309,14 +318,17 @@ void write_pixel(uvec2 position) {
             sums.coverage += history[pixel].coverage;
             sums.hidden += history[pixel].hidden;
             sums.covered += history[pixel].covered;
+            sums.matt += history[pixel].matt;
         }
         history[pixel] = sums;
     }
     float count = float(frame.first_sample + frame.sample_count);
     float coverage = sums.coverage == count ? 1.0 : sums.coverage / count; // GLSL's division may round otherwise
     vec3 added = sums.light / count, transmittance = vec3(1.0 - coverage) + sums.hidden / count;
-    if (has_gloss && largest(sums.covered) > 0.0)
-        remove_covered(sums.covered / (count * max(1.0 - coverage, 1e-3)), position, added, transmittance);
+    if (has_gloss && largest(sums.covered) > 0.0) {
+        float caught = count * max(1.0 - coverage, 1e-3);
+        remove_covered(sums.covered / caught, sums.matt / caught, position, added, transmittance);
+    }
     if (frame.is_linear != 0u) {
         uvec4 halves = uvec4(halves_of(added), halves_of(transmittance));
         for (uint i = 0u; i < 4u; ++i)

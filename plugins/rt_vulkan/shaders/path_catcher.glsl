@@ -83,11 +83,18 @@ void push_bounce(Path path, Surface s, vec3 throughput, Random random) {
              1.0 / max(density, 1e-30));
 }
 
-// The light of the current sample in MIRRORED_PLANE and COVERED_PLANE.
-vec3 mirrored, covered;
+// The light of the current sample in MIRRORED_PLANE and COVERED_PLANE, and that of Sums.matt.
+vec3 mirrored, covered, matt;
 
-// Returns whether the gloss can mirror at least 1/256 of the virtual objects' radiance: the reflectance, times an upper
-// bound of the share of the reflected rays that meet the bounding spheres.
+// Returns the share of a catcher's light that virtual objects can shadow: 1 for dielectrics. Metals only mirror.
+float shadowed_share(Surface s) {
+    const float dielectric_reflectance = 0.04;
+    float diffuse = luminance(s.diffuse);
+    return diffuse / (diffuse + max(luminance(s.specular) - dielectric_reflectance, 1e-6));
+}
+
+// Returns whether the gloss mirrors about 1/256 of the virtual objects' radiance or more: the reflectance, times the
+// share of the reflected rays that meet the bounding spheres, if all were as dense as the densest.
 bool mirrors_virtual(Surface s, vec3 to_eye) {
     vec3 middle = mirror_direction(-to_eye, s.normal);
     float share = 0.0;

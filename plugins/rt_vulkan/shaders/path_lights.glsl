@@ -97,12 +97,10 @@ SourceSample sample_source(Surface s, Random random, uint index, uint count) {
     return result;
 }
 
-// Returns whether a light source is not hidden. Light that passes through glass is not sampled: refracted rays and
-// photons find it. Real surfaces cast no shadow on each other.
-bool is_visible(Surface s, SourceSample source) {
+// Returns whether no object of these masks hides a light source.
+bool is_visible(Surface s, SourceSample source, uint mask) {
     vec3 lift = s.lift + s.geometric_normal * s.offset;
     vec3 to_light = source.t_max < INFINITY ? source.to_light - lift : source.to_light;
-    uint mask = s.is_real ? OPAQUE_MASK | GLASS_MASK : ALL_MASKS;
     return trace(Ray(s.position + lift, to_light, source.t_max, mask), true, false).object == NONE;
 }
 

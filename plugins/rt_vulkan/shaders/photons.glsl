@@ -33,20 +33,26 @@ uvec2 bucket_of(PhotonGrid grid, ivec3 cell) {
     return uvec2(photon_words[start], photon_words[start + 1u]);
 }
 
-// Returns the part of a photon's light that the surface reflects to the eye; 1 unless it `reflects`.
-vec3 photon_weight(bool reflects, Surface s, vec3 to_eye, vec3 to_light) {
-    return reflects ? (scattering(s, to_eye, to_light) + highlight(s, to_eye, to_light)) *
-                          (1.0 / max(dot(s.normal, to_light), 0.01))
-                    : vec3(1.0);
+// The light of photons: what a virtual surface reflects to the eye; of a real surface, the irradiance, divided by π, and
+// what its gloss mirrors to the eye.
+struct PhotonLight {
+    vec3 light, mirrored;
+};
+
+PhotonLight light_of_photon(vec3 power, bool is_real, Surface s, vec3 to_eye, vec3 to_light) {
+    vec3 by_cosine = power * (1.0 / max(dot(s.normal, to_light), 0.01));
+    if (!is_real)
+        return PhotonLight((scattering(s, to_eye, to_light) + highlight(s, to_eye, to_light)) * by_cosine, vec3(0.0));
+    return PhotonLight(power, has_gloss && s.is_rough ? gloss(s, to_eye, to_light) * by_cosine : vec3(0.0));
 }
 
 // `count`: number of photons in the buckets of the cells. `phase`: 0 to 1, chooses which photons are read if there are
 // too many.
-vec3 photon_density(PhotonGrid grid, uint count, bool reflects, Surface s, vec3 to_eye, float phase) {
+PhotonLight photon_density(PhotonGrid grid, uint count, bool is_real, Surface s, vec3 to_eye, float phase) {
     uint stride = uint(float(count) * (1.0 / MOST_PHOTONS)) + 1u, skipped = uint(phase * float(stride));
     float radius_squared = grid.radius * grid.radius, scale = 2.0 / (3.14159265 * radius_squared);
     ivec3 lowest = lowest_cell(grid, s);
-    vec3 sum = vec3(0.0);
+    PhotonLight sum = PhotonLight(vec3(0.0), vec3(0.0));
     for (int i = 0; i < 8; ++i) {
         ivec3 cell = next_cell(lowest, i);
         uvec2 bucket = bucket_of(grid, cell);
@@ -57,21 +63,22 @@ vec3 photon_density(PhotonGrid grid, uint count, bool reflects, Surface s, vec3 
             vec3 to_light = -photon_vector(photon, 3u);
             // Cells share buckets, and photons of other surfaces near an edge do not count.
             if (ivec3((position - frame.photon_low) * (0.5 / grid.radius)) == cell && squared < radius_squared &&
-                height * height < radius_squared * 0.09 && dot(to_light, s.geometric_normal) > 0.0)
-                sum += photon_vector(photon, 6u) * photon_weight(reflects, s, to_eye, to_light) *
-                       (scale * (1.0 - squared / radius_squared));
+                height * height < radius_squared * 0.09 && dot(to_light, s.geometric_normal) > 0.0) {
+                vec3 power = photon_vector(photon, 6u) * (scale * (1.0 - squared / radius_squared));
+                PhotonLight more = light_of_photon(power, is_real, s, to_eye, to_light);
+                sum = PhotonLight(sum.light + more.light, sum.mirrored + more.mirrored);
+            }
         }
     }
-    return sum * float(stride);
+    return PhotonLight(sum.light * float(stride), sum.mirrored * float(stride));
 }
 
-// Returns the light of photons that a surface reflects to the eye, or, unless it `reflects`, the irradiance that they
-// bring, divided by π. All samples of a pixel see the same photons, so only some of them make an estimate, for the
-// others too.
-vec3 photon_light(bool reflects, Surface s, vec3 to_eye, Random random) {
+// All samples of a pixel see the same photons, so only some of them make an estimate, for the others too.
+PhotonLight photon_light(bool is_real, Surface s, vec3 to_eye, Random random) {
+    PhotonLight none = PhotonLight(vec3(0.0), vec3(0.0));
     uint samples_per_estimate = frame.sample_count > 8u ? 4u : 1u;
     if (!has_photons || (random.number - frame.first_random) % samples_per_estimate != 0u)
-        return vec3(0.0);
+        return none;
     uint estimates = (frame.sample_count + samples_per_estimate - 1u) / samples_per_estimate;
     // A random limit hides where the radius changes.
     vec2 choice = path_pair(random, PHOTON_DIMENSION, 0u, 1u);
@@ -86,9 +93,11 @@ vec3 photon_light(bool reflects, Surface s, vec3 to_eye, Random random) {
         }
         if (count == 0u)
             break;
-        if (count <= limit || level + 1u == frame.photon_level_count)
-            return photon_density(grid, count, reflects, s, to_eye, choice.y) *
-                   (float(frame.sample_count) / float(estimates));
+        if (count <= limit || level + 1u == frame.photon_level_count) {
+            PhotonLight found = photon_density(grid, count, is_real, s, to_eye, choice.y);
+            float scale = float(frame.sample_count) / float(estimates);
+            return PhotonLight(found.light * scale, found.mirrored * scale);
+        }
     }
-    return vec3(0.0);
+    return none;
 }

@@ -212,6 +212,7 @@ struct Sums {
     float irradiance; // irradiance of the catcher without shadows
     vec3 covered;     // path integrator: the light that the catcher mirrors only without virtual objects
     float caught;     // number of samples that hit a catcher
+    vec3 matt;        // path integrator: the diffuse light of glossy catchers without virtual objects
 };
 layout(std430, set = 0, binding = 12) buffer History {
     Sums history[]; // sums of all earlier samples

@@ -202,9 +202,9 @@ TEST(PathIntegrator, ShowsTheFilmedTableInAMirror) {
 // A table below a ball. The middle of the picture shows where the table mirrors the middle of the ball.
 constexpr glm::vec4 mirrored_ball(0, 60, 60, 20);
 SceneBuilder table_below_a_ball(const scene::Settings &settings, const arhost_material &of_table,
-                                const arhost_material &of_ball) {
+                                const arhost_material &of_ball, arhost_role role_of_table = ARHOST_ROLE_CATCHER) {
     SceneBuilder scene(settings);
-    scene.add_mesh("table", square(2000), of_table, ARHOST_ROLE_CATCHER);
+    scene.add_mesh("table", square(2000), of_table, role_of_table);
     scene.add_ball("ball", mirrored_ball, of_ball);
     return scene;
 }
@@ -271,20 +271,86 @@ TEST(PathIntegrator, GlossDoesNotChangeAFurnace) {
     EXPECT_NEAR(mean_at(picture, 100, 75, 0, 8) + mean_at(picture, 100, 75, transmittance, 8), 1, 0.01);
 }
 
+// Returns a vertical square that faces the camera.
+scene::TriangleMesh card(float y) {
+    return quad({-60, y, 0}, {60, y, 0}, {60, y, 120}, {-60, y, 120});
+}
+
 // A lamp that the table mirrors without the ball is found by light samples and by scattered rays.
 TEST(PathIntegrator, BallHidesTheHighlightOfALamp) {
     const arhost_camera view = at_the_mirrored_ball();
     const Video video(view.intrinsics, video_code);
-    const auto render = [&](const char *light_samples, const char *samples) {
+    const auto render = [&](const char *light_samples, const char *samples, bool lamp_is_behind_a_wall) {
         SceneBuilder scene = table_below_a_ball(path_settings(0.2f), lacquer(0.3f), diffuse(0.5f, 0.5f, 0.5f));
         scene.add_light(bulb({0, 160, 130}, 40, 4000, ARHOST_FALLOFF_INVERSE_SQUARE));
+        if (lamp_is_behind_a_wall)
+            scene.add_mesh("wall", card(90), diffuse(0.5f, 0.5f, 0.5f), ARHOST_ROLE_OCCLUDER);
         return composite_at(rendered(std::move(scene), view,
                                      {{"light_samples", light_samples}, {"samples", samples}, {"max_radiance", "0"}},
                                      0, &video),
                             100, 75, 12);
     };
-    const double few = render("1", "256"), many = render("16", "64");
-    EXPECT_NEAR(few, many, 0.01 * many);
+    for (const bool lamp_is_behind_a_wall : {false, true}) {
+        const double few = render("1", "256", lamp_is_behind_a_wall),
+                     many = render("16", "64", lamp_is_behind_a_wall);
+        EXPECT_NEAR(few, many, 0.01 * many) << lamp_is_behind_a_wall;
+    }
+}
+
+TEST(PathIntegrator, GlossyTableMirrorsNoBallBehindARealObject) {
+    for (const float y : {90.0f, 30.0f}) {
+        SceneBuilder scene = table_below_a_ball(path_settings(), lacquer(0.3f), emissive(4));
+        scene.add_mesh("card", card(y), diffuse(0, 0, 0), ARHOST_ROLE_OCCLUDER);
+        const LinearPicture picture = rendered(std::move(scene), at_the_mirrored_ball(), {{"light_samples", "8"}});
+        const double mirrored = mean_at(picture, 100, 75, 0, 8);
+        if (y > mirrored_ball.y)
+            EXPECT_GT(mirrored, 0.1);
+        else
+            EXPECT_EQ(mirrored, 0);
+    }
+}
+
+// Rays of the gloss do not see lamps in mirrors and glass; photons bring their light.
+TEST(PathIntegrator, GlossyCatcherMirrorsTheLightOfMirrorsAndGlassAsAVirtualObject) {
+    for (const arhost_material &of_ball : {mirror(0.9f), glass_of()}) {
+        const auto render = [&](const arhost_material &ball, arhost_role role_of_table) {
+            SceneBuilder scene = table_below_a_ball(path_settings(), metallic_roughness({0.9f, 0.9f, 0.9f}, 1, 0.4f),
+                                                    ball, role_of_table);
+            scene.add_light(bulb({0, -200, 150}, 20, 50000, ARHOST_FALLOFF_INVERSE_SQUARE));
+            return mean_at(
+                rendered(std::move(scene), at_the_mirrored_ball(), {{"samples", "16"}, {"photons", "32768"}}), 100,
+                75, 0, 12);
+        };
+        const double expected = render(of_ball, ARHOST_ROLE_VIRTUAL) - render(diffuse(0, 0, 0), ARHOST_ROLE_VIRTUAL);
+        EXPECT_GT(expected, 0.01);
+        EXPECT_NEAR(render(of_ball, ARHOST_ROLE_CATCHER), expected, 0.05 * expected);
+    }
+}
+
+// The video cannot show how bright the highlight of a lamp is.
+TEST(PathIntegrator, TableBelowAHiddenSaturatedHighlightKeepsItsColour) {
+    const arhost_camera view = at_the_mirrored_ball();
+    const Video video(view.intrinsics, 255);
+    const auto render = [&](const arhost_material &of_table, arhost_role role_of_table) {
+        SceneBuilder scene = table_below_a_ball(path_settings(), of_table, diffuse(0, 0, 0), role_of_table);
+        scene.add_light(bulb({0, 160, 130}, 30, 30000, ARHOST_FALLOFF_INVERSE_SQUARE)); // behind the ball
+        scene.add_light(sun(0.6f, 0, -0.8f));
+        return rendered(std::move(scene), view, {}, 0, &video);
+    };
+    const double matt = mean_at(render(diffuse(0.5f, 0.5f, 0.5f), ARHOST_ROLE_VIRTUAL), 100, 75, 0);
+    const LinearPicture picture = render(lacquer(0.1f), ARHOST_ROLE_CATCHER);
+    EXPECT_GT(matt, 0.1);
+    EXPECT_NEAR(mean_at(picture, 100, 75, transmittance), matt, 0.1 * matt);
+}
+
+TEST(PathIntegrator, RealMetalHasNoShadow) {
+    for (const float metallic : {1.0f, 0.98f}) {
+        SceneBuilder scene = table_below_a_ball(
+            path_settings(), metallic_roughness({0.9f, 0.9f, 0.9f}, metallic, 0.2f), diffuse(0, 0, 0));
+        scene.add_light(bulb({0, 60, 200}, 10, 30000, ARHOST_FALLOFF_INVERSE_SQUARE)); // above the ball
+        const LinearPicture picture = rendered(std::move(scene), camera({0, 55, 400}, {0, 60, 0}, {0, 1, 0}));
+        EXPECT_NEAR(mean_at(picture, 100, 55, transmittance), metallic, 0.05);
+    }
 }
 
 TEST(PathIntegrator, EnvironmentFollowsTheVideo) {

@@ -82,9 +82,9 @@ SceneBuilder balls_in_an_environment() {
 }
 
 // A desk with a ball that shadows and colours it, one that shines onto it, and an occluder in front.
-SceneBuilder desk(const arhost_material &of_ball) {
+SceneBuilder desk(const arhost_material &of_ball, const arhost_material &of_desk = diffuse(0.6f, 0.6f, 0.6f)) {
     SceneBuilder builder(path_settings(glm::vec3(0.4f)));
-    builder.add_mesh("desk", square(90), diffuse(0.6f, 0.6f, 0.6f), ARHOST_ROLE_CATCHER);
+    builder.add_mesh("desk", square(90), of_desk, ARHOST_ROLE_CATCHER);
     builder.add_mesh("box", moved(cube(10), {-40, -40, 10}), diffuse(0.6f, 0.6f, 0.6f), ARHOST_ROLE_OCCLUDER);
     builder.add_ball("ball", {0, 0, 20, 20}, of_ball);
     builder.add_ball("bulb", {40, -30, 12, 6}, emissive(4, 3, 1));
@@ -106,8 +106,8 @@ SceneBuilder lacquered_desk() {
     builder.add_light(bulb({-20, 180, 130}, 20, 1500, ARHOST_FALLOFF_INVERSE_SQUARE));
     return builder;
 }
-SceneBuilder desk_with_glass() {
-    SceneBuilder builder = desk(mirror(0.9f));
+SceneBuilder lacquered_desk_with_glass() {
+    SceneBuilder builder = desk(mirror(0.9f), metallic_roughness({0.6f, 0.6f, 0.6f}, 0.2f, 0.25f));
     add_environment(builder,
                     [](std::uint32_t column) { return glm::vec3(1, 1 + 0.1f * static_cast<float>(column), 1); });
     builder.environment.follows_video = true;
@@ -204,12 +204,6 @@ TEST_F(PathIntegrator, ChangesCatchersAsRtEmbreeDoes) {
     expect_rt_embrees_picture(&desk_with_lamps, from_the_side(small), {{"samples", "64"}, {"max_radiance", "0"}});
 }
 
-TEST_F(PathIntegrator, MirrorsInALacqueredDeskAsRtEmbreeDoes) {
-    const Video video(small);
-    expect_rt_embrees_picture(&lacquered_desk, from_the_side(small), {{"samples", "64"}, {"max_radiance", "0"}},
-                              "plain", &video);
-}
-
 TEST_F(PathIntegrator, ThrowsTheLightOfWideLampsAsRtEmbreeDoes) {
     expect_rt_embrees_picture(&caustics_of_wide_lamps, from_the_side(small),
                               {{"samples", "64"}, {"photons", "2048"}});
@@ -292,10 +286,10 @@ TEST_F(PathIntegrator, FollowsMovingEmittersAndMirrors) {
 
 TEST_F(PathIntegrator, AccumulatesToRtEmbreesPicture) {
     const Options options{{"samples", "8"}, {"accumulate", "true"}};
-    LinearTracer vulkan(desk_with_lamps(), options, "rt_vulkan"), embree(desk_with_lamps(), options, "rt_embree");
+    LinearTracer vulkan(lacquered_desk(), options, "rt_vulkan"), embree(lacquered_desk(), options, "rt_embree");
     for (LinearTracer *tracer : {&vulkan, &embree}) {
         ASSERT_EQ(tracer->start(small), ARHOST_STATUS_OK) << tracer->log();
-        for (int i = 0; i < 3; ++i)
+        for (int i = 0; i < 7; ++i)
             tracer->render(from_the_side(small));
     }
     expect_like(vulkan.render(from_the_side(small)), embree.render(from_the_side(small)));
@@ -354,13 +348,13 @@ INSTANTIATE_TEST_SUITE_P(Paths, PathIntegratorOnEachPath, testing::Values("plain
 TEST_P(PathIntegratorOnEachPath, ShowsTheVideoInAMirrorAsRtEmbreeDoes) {
     const arhost_intrinsics lens = with_lens(small, ARHOST_DISTORTION_BROWN, {-0.2, 0.05, 0.001, -0.002});
     const Video video(lens);
-    expect_rt_embrees_picture(&desk_with_glass, from_the_side(lens), {{"samples", "64"}, {"photons", "2048"}},
-                              GetParam(), &video);
+    expect_rt_embrees_picture(&lacquered_desk_with_glass, from_the_side(lens),
+                              {{"samples", "64"}, {"photons", "2048"}}, GetParam(), &video);
 }
 
 TEST_P(PathIntegratorOnEachPath, EqualRequestsGiveEqualBytes) {
     const Video video(small);
-    LinearTracer tracer(desk_with_glass(), {{"samples", "2"}, {"path", GetParam()}}, "rt_vulkan");
+    LinearTracer tracer(lacquered_desk_with_glass(), {{"samples", "2"}, {"path", GetParam()}}, "rt_vulkan");
     ASSERT_EQ(tracer.start(small, &video), ARHOST_STATUS_OK) << tracer.log();
     const auto first = tracer.render(from_the_side(small), 7, &video).pixels(); // in bands
     EXPECT_NE(tracer.render(from_the_side(small), 7).pixels(), first) << "the mirror shows the video";
@@ -373,7 +367,7 @@ TEST_P(PathIntegratorOnEachPath, ValidationReportsNothing) {
         GTEST_SKIP() << "needs Vulkan's validation layers";
     const Options options{{"validate", "true"}, {"path", GetParam()}};
     const Video video(small);
-    LinearTracer filmed(desk_with_glass(), options, "rt_vulkan"),
+    LinearTracer filmed(lacquered_desk_with_glass(), options, "rt_vulkan"),
         moving(moving_lamp_and_mirror(), options, "rt_vulkan");
     ASSERT_EQ(filmed.start(small, &video), ARHOST_STATUS_OK) << filmed.log();
     ASSERT_EQ(moving.start(small), ARHOST_STATUS_OK) << moving.log();
