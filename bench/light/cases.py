@@ -33,8 +33,8 @@ def scene(objects, materials, lights=(), environment=None, background=None, dept
         made["lights"] = list(lights)
     if environment:
         made["environment"] = environment
-    if background is not None:
-        made["background"] = background
+    if background is not None or not (lights or environment):  # scenes without any get arhost's default light
+        made["background"] = background or 0
     return made
 
 

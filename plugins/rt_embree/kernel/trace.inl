@@ -71,8 +71,9 @@ ARHOST_INLINE Bool blocked(const Scene &scene, RTCRay16 &rays, Bool active) {
     alignas(64) int valid[lanes];
     active = active & is_valid_ray(origin_of(rays), direction_of(rays));
     store(valid, active);
-    // Embree 3.13.5 hangs in coherent occlusion queries through instances with AVX-512.
-    Query query = make_query(scene.has_instances ? Coherence::incoherent : Coherence::coherent);
+    // The rays of a packet aim at different points of the lights. Besides, Embree 3.13.5 hangs in coherent occlusion
+    // queries through instances with AVX-512.
+    Query query = make_query(Coherence::incoherent);
     occluded16(valid, scene.root, scene.packet_width, query, rays);
     return active & (load(rays.tfar) < Float(0.0f)); // Embree sets −∞ on a hit
 }
