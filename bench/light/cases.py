@@ -157,6 +157,15 @@ def glass_on_checks(name, folder, **light):
                 reference_samples=8192)
 
 
+def frosted_on_checks(name, folder, lights=(), **light):
+    objects = [plane("floor", (0, 0, 0), (360, 360), "checks"), ball("frosted ball", (-45, 40, 10), 40, "frosted 0.3"),
+               cuboid("frosted pane", (60, 45, 0), (90, 80, 6), "frosted 0.5", 15)]
+    materials = {"checks": checkerboard(folder)}
+    materials |= {f"frosted {each}": {"model": "glass", "index": 1.5, "roughness": each} for each in (0.3, 0.5)}
+    return Case(f"frosted glass, {name}", scene(objects, materials, lights, **light), (0, 160, 320), (0, 35, 0), 190,
+                samples=2048, reference_samples=8192)
+
+
 def many_lamps():
     random = np.random.default_rng(1)
     lights = []
@@ -292,6 +301,9 @@ def all_cases(folder, environments):
     name, image, intensity = environments[0]
     hdr = {"image": image, "intensity": intensity}
     yield glass_on_checks(name, folder, environment=hdr)
+    yield frosted_on_checks("constant environment", folder, background=1)
+    yield frosted_on_checks("area lamp", folder, [lamp("rectangle", [20000, 18000, 15000], position=[-90, 200, 80],
+                                                       direction=[0.4, -0.85, -0.35], size=[120, 120])])
     yield many_lamps()
     yield things("directional lamp", [lamp("directional", [1, 0.9, 0.7], direction=[0.4, -0.8, -0.4])])
     yield things("spot lamp, hard", [lamp("spot", 40000, position=[120, 200, 60], direction=[-0.5, -0.8, -0.25],

@@ -85,7 +85,10 @@ def bsdf(material, folder):
         return {"type": "twosided", "bsdf": {"type": "conductor", "material": "none",
                                              "specular_reflectance": rgb(material["reflectivity"])}}
     if model == "glass":
-        return {"type": "dielectric", "int_ior": material["index"], "ext_ior": 1.0}
+        indices = {"int_ior": material["index"], "ext_ior": 1.0}
+        if "roughness" not in material:
+            return {"type": "dielectric", **indices}
+        return {"type": "roughdielectric", "distribution": "ggx", "alpha": material["roughness"] ** 2, **indices}
     return {"type": "metallic-roughness", "metallic": float(material["metallic"]), "roughness": float(material["roughness"]),
             "colour": mi.ScalarColor3f(triple(material["colour"]))}
 

@@ -136,7 +136,8 @@ arhost_material make_material(arhost_material_model model) {
         material.emission_texture = ARHOST_NONE;
     material.exponent = 1;
     copy(glm::vec3(1), material.reflectivity);
-    material.metallic = material.roughness = 1;
+    material.metallic = 1;
+    material.roughness = model == ARHOST_MATERIAL_GLASS ? 0 : 1;
     material.index = 1.5f;
     material.fresnel_exponent = 5; // Schlick's approximation; fresnel_minimum is for a refractive index of 1.5
     material.fresnel_minimum = 0.04f;

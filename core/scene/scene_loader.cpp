@@ -176,11 +176,12 @@ glm::vec3 extinction_of(const Node &glass) {
 }
 
 arhost_material glass_of(const Node &node) {
-    node.allow_keys({"model", "index", "fresnel", "reflection", "refraction", "extinction", "attenuation",
-                     "shadow_attenuation", "cutoff_colour", "importance_cutoff", "reflection_depth",
+    node.allow_keys({"model", "index", "roughness", "fresnel", "reflection", "refraction", "extinction",
+                     "attenuation", "shadow_attenuation", "cutoff_colour", "importance_cutoff", "reflection_depth",
                      "refraction_depth"});
     arhost_material glass = make_material(ARHOST_MATERIAL_GLASS);
     glass.index = real_or(node, "index", 1, 4, glass.index);
+    glass.roughness = real_or(node, "roughness", 0, 1, glass.roughness);
     const float normal_incidence = (glass.index - 1) / (glass.index + 1);
     glass.fresnel_minimum = normal_incidence * normal_incidence;
     if (const auto fresnel = node.find("fresnel")) {

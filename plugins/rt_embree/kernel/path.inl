@@ -25,10 +25,11 @@ ARHOST_INLINE Bool survive(const Work &work, const Paths &paths, Vec3 &throughpu
 // Queues a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly.
 ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &paths, const Surface &s, Vec3 direction,
                                          const arhost_material &material, Float choice, Bool active) {
-    const GlassScatter glass = scatter_at_glass(s, direction, material, active);
+    const Pair uv = material.roughness > 0 ? path_pair(work, paths, facet_dimension, 0, 1) : Pair{};
+    const GlassScatter glass = scatter_at_glass(s, direction, material, uv, active);
     const Vec3 arriving = paths.throughput * glass.transmittance;
-    Vec3 by_reflection = arriving * splat(material.reflectivity),
-         by_refraction = arriving * splat(material.refraction);
+    Vec3 by_reflection = arriving * splat(material.reflectivity) * glass.unmasked_reflected,
+         by_refraction = arriving * splat(material.refraction) * glass.unmasked_refracted;
     Bool reflects = active & (choice < glass.reflectance), refracts = active & ~reflects;
     if (paths.depth == 0) {
         by_reflection = by_reflection * glass.reflectance;
@@ -38,8 +39,7 @@ ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &paths, const S
     }
     reflects = survive(work, paths, by_reflection, reflects);
     if (any(reflects))
-        enqueue(work, paths, s.position + s.geometric_normal * s.offset, reflected(s, direction), by_reflection,
-                reflects);
+        enqueue(work, paths, s.position + s.geometric_normal * s.offset, glass.reflected, by_reflection, reflects);
     refracts = survive(work, paths, by_refraction, refracts);
     if (any(refracts))
         enqueue(work, paths, s.position - s.geometric_normal * s.offset, glass.refracted, by_refraction, refracts);

@@ -61,15 +61,44 @@ ARHOST_INLINE Float metal_mirror_chance(Vec3 reflectance, Vec3 diffuse) {
     return mirror / max(mirror + luminance(diffuse), Float(1e-6f));
 }
 
-// Reflection and refraction at glass. `transmittance`: of the way inside to the surface.
+// Reflection and refraction at glass. `transmittance`: of the way inside to the surface. The `unmasked` shares of the
+// reflected and of the refracted light pass by other microfacets.
 struct GlassScatter {
     Float reflectance;
-    Vec3 transmittance, refracted;
+    Vec3 transmittance, reflected, refracted;
+    Float unmasked_reflected, unmasked_refracted;
 };
-ARHOST_INLINE GlassScatter scatter_at_glass(const Surface &s, Vec3 direction, const arhost_material &glass,
+
+// Returns the share of the light in `direction` that no other microfacet masks; 0 if the direction does not leave to
+// the side of the normals.
+ARHOST_INLINE Float unmasked(Vec3 direction, Vec3 normal, Vec3 geometric_normal, Float alpha) {
+    const Float cosine = dot(direction, normal);
+    const Bool leaves = (cosine > Float(0.0f)) & (dot(direction, geometric_normal) > Float(0.0f));
+    return select(leaves, ggx_masking(cosine, alpha), Float(0.0f));
+}
+
+// `uv`: random numbers that choose the microfacet of rough glass (Walter et al., Microfacet Models for Refraction,
+// EGSR 2007).
+ARHOST_INLINE GlassScatter scatter_at_glass(const Surface &s, Vec3 direction, const arhost_material &glass, Pair uv,
                                             Bool active) {
     const Float ratio = select(s.back_face, Float(glass.index), Float(1 / glass.index));
-    const Refraction refraction = refraction_of(s, direction, ratio, active);
-    return {dielectric_reflectance(refraction.cosine, refraction.cosine_squared, ratio),
-            select(s.back_face, bouguer(splat(glass.extinction), s.distance), white()), refraction.direction};
+    GlassScatter scatter;
+    scatter.transmittance = select(s.back_face, bouguer(splat(glass.extinction), s.distance), white());
+    Refraction refraction;
+    if (glass.roughness > 0) {
+        const Float alpha = ggx_alpha(Float(glass.roughness));
+        const Vec3 facet = ggx_half_vector(s.normal, -direction, alpha, uv.u, uv.v);
+        refraction = refraction_at(direction, facet, ratio);
+        scatter.reflected = mirror_direction(direction, facet);
+        // Sampling visible normals already accounts for the masking of `direction`.
+        scatter.unmasked_reflected = unmasked(scatter.reflected, s.normal, s.geometric_normal, alpha);
+        scatter.unmasked_refracted = unmasked(refraction.direction, -s.normal, -s.geometric_normal, alpha);
+    } else {
+        refraction = refraction_of(s, direction, ratio, active);
+        scatter.reflected = reflected(s, direction);
+        scatter.unmasked_reflected = scatter.unmasked_refracted = Float(1.0f);
+    }
+    scatter.refracted = refraction.direction;
+    scatter.reflectance = dielectric_reflectance(refraction.cosine, refraction.cosine_squared, ratio);
+    return scatter;
 }

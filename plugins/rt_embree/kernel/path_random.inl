@@ -16,7 +16,8 @@ enum Dimension : int {
     scatter_dimension,
     choice_dimension,
     roulette_dimension,
-    photon_dimension
+    photon_dimension,
+    facet_dimension
 };
 
 // Word: Int, or std::uint32_t for a number of all lanes.

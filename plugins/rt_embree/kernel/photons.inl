@@ -7,7 +7,13 @@
 
 using arhost::raytracer_common::Photon;
 
-enum PhotonDimension : int { target_dimension = 128, origin_dimension, aim_dimension, first_bounce_dimension };
+enum PhotonDimension : int {
+    target_dimension = 128,
+    origin_dimension,
+    aim_dimension,
+    first_bounce_dimension,     // one dimension for each bounce, of at most 100
+    first_facet_dimension = 256 // likewise
+};
 
 // Returns the random numbers of a dimension of the photons with these numbers.
 ARHOST_INLINE Pair photon_pair(Int number, int dimension) {
@@ -136,16 +142,19 @@ ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, 
                 next_direction = select(mirrored, reflected(s, direction), next_direction);
                 specular = specular | mirrored;
             } else if (material.model == ARHOST_MATERIAL_GLASS) {
-                const GlassScatter glass = scatter_at_glass(s, direction, material, here);
+                const Pair uv = material.roughness > 0
+                                    ? photon_pair(number, first_facet_dimension + static_cast<int>(bounce))
+                                    : Pair{};
+                const GlassScatter glass = scatter_at_glass(s, direction, material, uv, here);
                 const Bool reflects = here & (choice < glass.reflectance);
                 power = select(here,
                                power * glass.transmittance *
-                                   select(reflects, splat(material.reflectivity), splat(material.refraction)),
+                                   select(reflects, splat(material.reflectivity) * glass.unmasked_reflected,
+                                          splat(material.refraction) * glass.unmasked_refracted),
                                power);
                 next_origin =
                     select(here, select(reflects, above, s.position - s.geometric_normal * s.offset), next_origin);
-                next_direction =
-                    select(here, select(reflects, reflected(s, direction), glass.refracted), next_direction);
+                next_direction = select(here, select(reflects, glass.reflected, glass.refracted), next_direction);
                 specular = specular | here;
             }
         });

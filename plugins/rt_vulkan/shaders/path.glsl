@@ -25,10 +25,11 @@ bool survives(uint depth, Random random, inout vec3 throughput) {
 
 // Pushes a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly.
 void scatter_path_in_glass(Path path, Surface s, vec3 direction, uint material, float choice, Random random) {
-    GlassScatter glass = scatter_at_glass(s, direction, material);
+    vec2 uv = materials[material].roughness > 0.0 ? path_pair(random, FACET_DIMENSION, 0u, 1u) : vec2(0.0);
+    GlassScatter glass = scatter_at_glass(s, direction, material, uv);
     vec3 arriving = path.throughput * glass.transmittance;
-    vec3 by_reflection = arriving * materials[material].reflectivity,
-         by_refraction = arriving * materials[material].refraction;
+    vec3 by_reflection = arriving * materials[material].reflectivity * glass.unmasked_reflected,
+         by_refraction = arriving * materials[material].refraction * glass.unmasked_refracted;
     bool reflects = choice < glass.reflectance, refracts = !reflects;
     if (path.depth == 0u) {
         by_reflection *= glass.reflectance;
@@ -37,7 +38,7 @@ void scatter_path_in_glass(Path path, Surface s, vec3 direction, uint material, 
         refracts = glass.reflectance < 1.0;
     }
     if (reflects && survives(path.depth, random, by_reflection))
-        push(path, above(s), reflected(s, direction), by_reflection, -abs(path.inverse_density));
+        push(path, above(s), glass.reflected, by_reflection, -abs(path.inverse_density));
     if (refracts && survives(path.depth, random, by_refraction))
         push(path, below(s), glass.refracted, by_refraction, -abs(path.inverse_density));
 }

@@ -55,15 +55,42 @@ float mirror_chance_of(Surface s, vec3 direction, uint material, out vec3 reflec
     return mirror / max(mirror + luminance(s.diffuse), 1e-6);
 }
 
-// Reflection and refraction at glass. `transmittance`: of the way inside to the surface.
+// Reflection and refraction at glass. `transmittance`: of the way inside to the surface. The `unmasked` shares of the
+// reflected and of the refracted light pass by other microfacets.
 struct GlassScatter {
     float reflectance;
-    vec3 transmittance, refracted;
+    vec3 transmittance, reflected, refracted;
+    float unmasked_reflected, unmasked_refracted;
 };
-GlassScatter scatter_at_glass(Surface s, vec3 direction, uint material) {
+
+// Returns the share of the light in `direction` that no other microfacet masks; 0 if the direction does not leave to the
+// side of the normals.
+float unmasked(vec3 direction, vec3 normal, vec3 geometric_normal, float alpha) {
+    float cosine = dot(direction, normal);
+    return cosine > 0.0 && dot(direction, geometric_normal) > 0.0 ? ggx_masking(cosine, alpha) : 0.0;
+}
+
+// `uv`: random numbers that choose the microfacet of rough glass (Walter et al., Microfacet Models for Refraction,
+// EGSR 2007).
+GlassScatter scatter_at_glass(Surface s, vec3 direction, uint material, vec2 uv) {
     float index = materials[material].index, ratio = s.back_face ? index : 1.0 / index;
-    Refraction refraction = refraction_of(s, direction, ratio);
-    return GlassScatter(dielectric_reflectance(refraction.cosine, refraction.cosine_squared, ratio),
-                        s.back_face ? bouguer(materials[material].extinction, s.distance) : vec3(1.0),
-                        refraction.direction);
+    GlassScatter glass;
+    glass.transmittance = s.back_face ? bouguer(materials[material].extinction, s.distance) : vec3(1.0);
+    Refraction refraction;
+    if (materials[material].roughness > 0.0) {
+        float alpha = ggx_alpha(materials[material].roughness);
+        vec3 facet = ggx_half_vector(s.normal, -direction, alpha, uv.x, uv.y);
+        refraction = refraction_at(direction, facet, ratio);
+        glass.reflected = mirror_direction(direction, facet);
+        // Sampling visible normals already accounts for the masking of `direction`.
+        glass.unmasked_reflected = unmasked(glass.reflected, s.normal, s.geometric_normal, alpha);
+        glass.unmasked_refracted = unmasked(refraction.direction, -s.normal, -s.geometric_normal, alpha);
+    } else {
+        refraction = refraction_of(s, direction, ratio);
+        glass.reflected = reflected(s, direction);
+        glass.unmasked_reflected = glass.unmasked_refracted = 1.0;
+    }
+    glass.refracted = refraction.direction;
+    glass.reflectance = dielectric_reflectance(refraction.cosine, refraction.cosine_squared, ratio);
+    return glass;
 }

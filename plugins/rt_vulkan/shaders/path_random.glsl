@@ -6,7 +6,7 @@
 // Error via Hierarchical Ordering of Pixels, ACM TOG 39(6), 2020).
 
 const uint SOURCE_DIMENSION = 64u, LIGHT_DIMENSION = 65u, SCATTER_DIMENSION = 66u, CHOICE_DIMENSION = 67u,
-           ROULETTE_DIMENSION = 68u, PHOTON_DIMENSION = 69u;
+           ROULETTE_DIMENSION = 68u, PHOTON_DIMENSION = 69u, FACET_DIMENSION = 70u;
 const uint TILE_PIXELS = 1024u;
 
 // Permutes the numbers so that bit i of the result depends on the bits 0 to i of `x` only (S. Laine and T. Karras,

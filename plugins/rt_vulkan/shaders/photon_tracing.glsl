@@ -8,7 +8,8 @@ layout(std430, set = 0, binding = 15) writeonly buffer PhotonWords {
 };
 
 const uint PHOTONS_PER_ROW = 1024u; // as photons_per_row in layout.hpp
-const uint TARGET_DIMENSION = 128u, ORIGIN_DIMENSION = 129u, AIM_DIMENSION = 130u, FIRST_BOUNCE_DIMENSION = 131u;
+const uint TARGET_DIMENSION = 128u, ORIGIN_DIMENSION = 129u, AIM_DIMENSION = 130u, FIRST_BOUNCE_DIMENSION = 131u,
+           FIRST_FACET_DIMENSION = 256u;
 
 // Returns the random numbers of a dimension of the photon with this number.
 vec2 photon_pair(uint number, uint dimension) {
@@ -101,11 +102,13 @@ void trace_photon(uvec2 position) {
         uint material = objects[hit.object].material;
         float choice = photon_pair(number, FIRST_BOUNCE_DIMENSION + bounce).x;
         if (has_glass && materials[material].model == GLASS) {
-            GlassScatter glass = scatter_at_glass(s, ray.direction, material);
+            vec2 uv = materials[material].roughness > 0.0 ? photon_pair(number, FIRST_FACET_DIMENSION + bounce) : vec2(0.0);
+            GlassScatter glass = scatter_at_glass(s, ray.direction, material, uv);
             bool reflects = choice < glass.reflectance;
-            power *= glass.transmittance * (reflects ? materials[material].reflectivity : materials[material].refraction);
+            power *= glass.transmittance * (reflects ? materials[material].reflectivity * glass.unmasked_reflected
+                                                     : materials[material].refraction * glass.unmasked_refracted);
             ray.origin = reflects ? above(s) : below(s);
-            ray.direction = normalize(reflects ? reflected(s, ray.direction) : glass.refracted);
+            ray.direction = normalize(reflects ? glass.reflected : glass.refracted);
             continue;
         }
         if (materials[material].model == METAL)

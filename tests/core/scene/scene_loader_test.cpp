@@ -183,16 +183,18 @@ TEST(SceneFile, DescribesGlass) {
              "  dragon: {model: glass, index: 1.4, fresnel: {exponent: 1, minimum: 0.1, maximum: 0.9},\n"
              "    attenuation: {colour: [0.8, 0.89, 1], distance_mm: 110}, cutoff_colour: [0.34, 0.55, 0.85],\n"
              "    shadow_attenuation: [0.4, 0.7, 0.4], reflection_depth: 50, refraction_depth: 20,\n"
-             "    importance_cutoff: 0.02, reflection: 0.5, refraction: 0.6}\n"
+             "    importance_cutoff: 0.02, reflection: 0.5, refraction: 0.6, roughness: 0.3}\n"
              "  thick: {model: glass, extinction: [0.1, 0, 2]}\n"
              "  tinted: {model: glass, refraction: [0.5, 1, 0.2]}\nobjects: []\n");
     EXPECT_EQ(material(arena, 1).model, ARHOST_MATERIAL_GLASS);
     const arhost_material &plain = material(arena, 0), &dragon = material(arena, 1);
     EXPECT_EQ(plain.index, 1.5f);
+    EXPECT_EQ(plain.roughness, 0);
     EXPECT_FLOAT_EQ(plain.fresnel_minimum, 0.04f) << "((n − 1)/(n + 1))²";
     EXPECT_EQ(plain.fresnel_exponent, 5);
     EXPECT_THAT(plain.extinction, testing::Each(0.0f));
     EXPECT_THAT(plain.shadow_attenuation, testing::Each(testing::FloatEq(0.6f)));
+    EXPECT_EQ(dragon.roughness, 0.3f);
     EXPECT_EQ(dragon.fresnel_minimum, 0.1f);
     EXPECT_EQ(dragon.fresnel_maximum, 0.9f);
     // exp(−extinction · 110 mm) must equal the colour.
@@ -415,6 +417,9 @@ TEST(SceneErrors, NameFileLineColumnKeyAndFix) {
          "metallic-roughness; did you mean 'diffuse'?"},
         {start + "  red: {model: mirror, diffuse: 1}\n",
          "5:24: materials.red.diffuse: unknown key; known keys: model, reflectivity"},
+        {start + "  red: {model: glass, roughness: 1.5}\n",
+         "5:34: materials.red.roughness: must be 0 to 1, but is 1.5"},
+        {start + "  red: {model: glass, roughness: rough}\n", HasSubstr("materials.red.roughness: must be a number")},
         {start + "  red: {model: diffuse, diffuse: '#ff00'}\n",
          "5:34: materials.red.diffuse: must be '#rrggbb' (sRGB), a number or a list of three (linear light, 0 to 1), "
          "but is '#ff00'"},

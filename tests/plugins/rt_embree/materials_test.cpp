@@ -128,6 +128,14 @@ TEST(Glass, AbsorbsByBouguersLaw) {
     }
 }
 
+TEST(Glass, IgnoresRoughnessWithoutThePathIntegrator) {
+    arhost_material glass = clear_glass();
+    set3(glass.extinction, 0.01f, 0.02f, 0.03f);
+    const Picture clear = ball_in_a_room(1, glass);
+    glass.roughness = 0.5f;
+    EXPECT_EQ(ball_in_a_room(1, glass).pixels(), clear.pixels());
+}
+
 TEST(Glass, ShowsItsCutoffColourForCutOffRays) {
     const auto with = [](auto change, std::uint32_t max_depth = 60) {
         arhost_material glass = clear_glass();

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <random>
 
 namespace arhost::test {
 namespace {
@@ -159,20 +160,106 @@ TEST(PathIntegrator, GlassFocusesTheLightOfALampOntoACatcher) {
     EXPECT_GT(brightest, 4);
 }
 
-// A pane with parallel faces shifts the light, and reflects twice F = 4 % of it, with the reflections inside
-// 2F/(1+F).
-TEST(PathIntegrator, PaneOfGlassLosesTheReflectedLight) {
-    SceneBuilder scene = table(path_settings(0, 16), 0); // a black table: the pane reflects no light back onto it
-    scene.add_light(sun());
+// A pane of glass, 4 mm thick, at the height of 60 mm.
+void add_pane(SceneBuilder &scene, float roughness, float side = 200) {
     scene::TriangleMesh pane = cube(0.5f);
     for (glm::vec3 &position : pane.positions)
-        position = {position.x * 200, position.y * 200, position.z * 4 + 60};
-    scene.add_mesh("pane", pane, glass_of(), ARHOST_ROLE_VIRTUAL, glm::mat4x3(1));
-    // From below the pane, past its lower face.
-    const arhost_camera view = camera({0, -100, 50}, {0, 0, 0}, {0, 0, 1});
-    const LinearPicture picture =
-        rendered(std::move(scene), view, {{"samples", "64"}, {"photons", "16384"}, {"light_samples", "1"}});
-    EXPECT_NEAR(mean_at(picture, 100, 75, transmittance, 8), 1 - 2 * 0.04 / 1.04, 0.015);
+        position = {position.x * side, position.y * side, position.z * 4 + 60};
+    scene.add_mesh("pane", pane, glass_of(1.5f, roughness), ARHOST_ROLE_VIRTUAL, glm::mat4x3(1));
+}
+
+// A pane with parallel faces shifts the light, and reflects twice F = 4 % of it, with the reflections inside
+// 2F/(1+F). A slightly rough one sends as much light to the table below its middle.
+TEST(PathIntegrator, PaneOfGlassLosesTheReflectedLight) {
+    for (const float roughness : {0.0f, 0.15f}) {
+        SceneBuilder scene = table(path_settings(0, 16), 0); // a black table: the pane reflects no light back onto it
+        scene.add_light(sun());
+        add_pane(scene, roughness);
+        // From below the pane, past its lower face.
+        const arhost_camera view = camera({0, -100, 50}, {0, 0, 0}, {0, 0, 1});
+        const LinearPicture picture =
+            rendered(std::move(scene), view, {{"samples", "64"}, {"photons", "16384"}, {"light_samples", "1"}});
+        EXPECT_NEAR(mean_at(picture, 100, 75, transmittance, 8), 1 - 2 * 0.04 / 1.04, 0.015) << roughness;
+    }
+}
+
+// Returns the light that a rough pane in a furnace of radiance 1 sends along its normal, by a random walk whose
+// microfacets are sampled by their distribution (B. Walter et al., Microfacet Models for Refraction, EGSR 2007).
+double light_of_a_rough_pane(double roughness) {
+    constexpr double index = 1.5;
+    constexpr int walks = 200'000;
+    const double alpha = roughness * roughness;
+    std::mt19937 engine;
+    std::uniform_real_distribution<double> random;
+    const auto masking = [alpha](double cosine) {
+        return 2 / (1 + std::sqrt(1 + alpha * alpha * (1 / (cosine * cosine) - 1)));
+    };
+    double sum = 0;
+    for (int i = 0; i < walks; ++i) {
+        glm::dvec3 to_eye(0, 0, 1); // z: along the normal on the side of the eye
+        double weight = 1;
+        for (bool inside = false;;) {
+            const double u = random(engine), turn = 2 * std::numbers::pi * random(engine);
+            const double z = std::sqrt((1 - u) / (1 + (alpha * alpha - 1) * u)), sine = std::sqrt(1 - z * z);
+            const glm::dvec3 facet(sine * std::cos(turn), sine * std::sin(turn), z);
+            const double cosine = glm::dot(to_eye, facet), ratio = inside ? index : 1 / index;
+            if (cosine <= 0) {
+                weight = 0;
+                break;
+            }
+            const double squared = 1 - ratio * ratio * (1 - cosine * cosine);
+            double reflectance = 1;
+            if (squared > 0) {
+                const double refracted = std::sqrt(squared);
+                const double parallel = (cosine - ratio * refracted) / (cosine + ratio * refracted),
+                             perpendicular = (ratio * cosine - refracted) / (ratio * cosine + refracted);
+                reflectance = (parallel * parallel + perpendicular * perpendicular) / 2;
+            }
+            const bool reflects = random(engine) < reflectance;
+            const glm::dvec3 out =
+                reflects ? 2 * cosine * facet - to_eye
+                         : (ratio * cosine - std::sqrt(std::max(squared, 0.0))) * facet - ratio * to_eye;
+            if (reflects ? out.z <= 0 : out.z >= 0) {
+                weight = 0;
+                break;
+            }
+            weight *= masking(to_eye.z) * masking(out.z) * cosine / (to_eye.z * z);
+            if (reflects != inside)
+                break;
+            inside = true;
+            // The ray arrives at the other face from inside.
+            to_eye = reflects ? glm::dvec3(-out.x, -out.y, out.z) : -out;
+        }
+        sum += weight;
+    }
+    return sum / walks;
+}
+
+TEST(PathIntegrator, RoughPaneInAFurnaceLosesTheLightOfFurtherScattering) {
+    for (const float roughness : {0.3f, 0.6f, 1.0f}) {
+        SceneBuilder scene(path_settings(1, 64));
+        add_pane(scene, roughness, 1e5f);
+        const LinearPicture picture = rendered(std::move(scene), from_above(), {{"samples", "64"}});
+        EXPECT_NEAR(mean_at(picture, 100, 75, 0, 8), light_of_a_rough_pane(roughness), 0.01) << roughness;
+    }
+}
+
+// A pane above a floor whose left half shines.
+TEST(PathIntegrator, FrostedPaneBlursWhatIsBehindIt) {
+    const auto render = [](float roughness) {
+        SceneBuilder scene(path_settings());
+        scene.add_mesh("floor", quad({-200, -200, 0}, {0, -200, 0}, {0, 200, 0}, {-200, 200, 0}), emissive(1));
+        add_pane(scene, roughness);
+        return rendered(std::move(scene), from_above());
+    };
+    const LinearPicture clear = render(0), nearly_clear = render(0.01f), frosted = render(0.6f);
+    for (const std::uint32_t x : {60u, 80u, 95u, 105u, 120u, 140u})
+        EXPECT_NEAR(mean_at(nearly_clear, x, 75, 0), mean_at(clear, x, 75, 0), 0.01) << x;
+    EXPECT_GT(mean_at(clear, 95, 75, 0), 0.9);
+    EXPECT_LT(mean_at(clear, 105, 75, 0), 0.01);
+    EXPECT_LT(mean_at(frosted, 95, 75, 0), 0.7);
+    EXPECT_GT(mean_at(frosted, 105, 75, 0), 0.25);
+    EXPECT_GT(mean_at(frosted, 95, 75, 0), mean_at(frosted, 105, 75, 0));
 }
 
 TEST(PathIntegrator, ShowsTheFilmedTableInAMirror) {
@@ -577,6 +664,13 @@ INSTANTIATE_TEST_SUITE_P(
                      scene.add_ball("ball", {0, 0, 20, 20}, glass_of());
                      scene.add_light(bulb({0, 0, 20}, 5, 1e6f, ARHOST_FALLOFF_INVERSE_SQUARE));
                      scene.add_mesh("table", square(500), diffuse(1, 1, 1), ARHOST_ROLE_CATCHER);
+                 }},
+        OddScene{"RoughestGlass",
+                 [](SceneBuilder &scene) {
+                     scene.add_mesh("table", square(500), diffuse(1, 1, 1), ARHOST_ROLE_CATCHER);
+                     scene.add_ball("ball", {0, 0, 20, 20}, glass_of(4, 1));
+                     scene.add_mesh("box", moved(cube(10), {40, 0, 11}), glass_of(1, 1));
+                     scene.add_light(bulb({0, 0, 100}, 20, 1));
                  }},
         OddScene{"HugeEmission",
                  [](SceneBuilder &scene) {

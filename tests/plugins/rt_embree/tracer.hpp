@@ -248,9 +248,10 @@ inline arhost_material shiny(float diffuse_grey, float specular, float exponent)
     material.exponent = exponent;
     return material;
 }
-inline arhost_material glass_of(float index = 1.5f) {
+inline arhost_material glass_of(float index = 1.5f, float roughness = 0) {
     arhost_material material = scene::make_material(ARHOST_MATERIAL_GLASS);
     material.index = index;
+    material.roughness = roughness;
     return material;
 }
 inline arhost_material metallic_roughness(const glm::vec3 &colour, float metallic, float roughness) {

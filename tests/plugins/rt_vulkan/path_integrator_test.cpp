@@ -75,6 +75,7 @@ SceneBuilder balls_in_an_environment() {
     set3(metal.diffuse, 0.3f, 0.2f, 0.1f);
     set3(metal.reflectivity, 0.6f, 0.5f, 0.3f);
     builder.add_ball("glass", {-30, 0, 22, 20}, glass);
+    builder.add_ball("frosted", {-2, -35, 13, 12}, glass_of(1.5f, 0.4f));
     builder.add_ball("metal", {12, 20, 22, 20}, metal);
     builder.add_ball("rough", {35, -20, 17, 15}, metallic_roughness({0.9f, 0.7f, 0.4f}, 1, 0.3f));
     builder.add_mesh("floor", square(90), diffuse(0.5f, 0.6f, 0.4f));
@@ -135,6 +136,7 @@ SceneBuilder caustics() {
                      metallic_roughness({0.6f, 0.6f, 0.6f}, 0, 0.5f));
     builder.add_mesh("mirror", quad({-70, 30, 1}, {-60, -30, 1}, {-60, -30, 40}, {-70, 30, 40}), mirror(0.9f));
     builder.add_ball("glass", {-15, -10, 18, 15}, glass);
+    builder.add_ball("frosted", {-30, 25, 15, 14}, glass_of(1.5f, 0.3f));
     builder.add_ball("metal", {30, 20, 18, 15}, metal);
     return builder;
 }

@@ -107,7 +107,7 @@ typedef struct arhost_material {
     float emission[3];       /* emitted radiance, 0 to 1e6 */
     float alpha_cutoff;      /* alpha test: surface points whose colour_texture alpha is lower are cut out; 0: none */
 
-    /* Metallic-roughness. */
+    /* Metallic-roughness. Glass uses `roughness`, too. */
     float metallic, roughness;           /* 0 to 1 */
     uint32_t metallic_roughness_texture; /* G: roughness, B: metallic */
     uint32_t normal_texture; /* tangent-space normal = 2 · texel − 1: R along +u, G along −v, B outwards */
@@ -115,7 +115,9 @@ typedef struct arhost_material {
 
     /* Glass. Its reflectance is clamp(minimum + (1 − minimum)(1 − c)^exponent, minimum, maximum), or 1 at total
      * internal reflection. c is the cosine of the angle between the normal and the ray on the outside of the glass,
-     * which is either the incident or the refracted ray. */
+     * which is either the incident or the refracted ray. With ARHOST_INTEGRATOR_PATH, the reflectance is Fresnel's,
+     * and glass with a `roughness` above 0 scatters light at microfacets: GGX with alpha = roughness² and Smith's
+     * separable masking. */
     float index;                            /* refractive index relative to the outside, 1 to 4 */
     float fresnel_exponent;                 /* 0.01 to 100 */
     float fresnel_minimum, fresnel_maximum; /* 0 to 1 */
