@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 //
-// Prints frame times of rt_embree, and the times of bare Embree calls for the same primary rays:
-// `rt-embree-bench [threads [instruction_set [primary|diffuse|mirror|glass]]]`.
+// Prints frame times of rt_embree, and the times of bare Embree calls for the same primary rays and for the shadow
+// rays of light samples: `rt-embree-bench [threads [instruction_set [primary|diffuse|mirror|glass|light]]]`.
 #include "bunny.hpp"
 #include "renderer.hpp"
 
@@ -15,6 +15,7 @@
 #include <cstdlib>
 #include <ctime>
 #include <functional>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -40,6 +41,27 @@ Arena scene_of(const TriangleMesh &mesh, const arhost_material &material, bool l
     builder.add_object("bunny", builder.add_triangles(mesh), builder.add_material(material));
     if (lit)
         builder.add_light(lamp());
+    return std::move(builder).build();
+}
+
+// The lamp of time_light_samples(): a horizontal square that shines downwards.
+constexpr float lamp_height = 250, lamp_half_side = 60;
+
+// The bunny on a table below an area lamp.
+Arena room_of(const TriangleMesh &mesh, const arhost_material &material) {
+    ArenaBuilder builder;
+    builder.settings.integrator = ARHOST_INTEGRATOR_PATH;
+    builder.add_object("bunny", builder.add_triangles(mesh), builder.add_material(material));
+    const TriangleMesh table{
+        {{-300, 30, -300}, {-300, 30, 300}, {300, 30, 300}, {300, 30, -300}}, {}, {}, {{0, 1, 2}, {0, 2, 3}}};
+    builder.add_object("table", builder.add_triangles(table), builder.add_material(material));
+    arhost_light light = make_light(ARHOST_LIGHT_RECTANGLE);
+    light.falloff = ARHOST_FALLOFF_INVERSE_SQUARE;
+    light.position[1] = lamp_height;
+    light.axis_u[0] = light.axis_v[2] = lamp_half_side;
+    for (float &channel : light.intensity)
+        channel = 30'000;
+    builder.add_light(light);
     return std::move(builder).build();
 }
 
@@ -172,6 +194,99 @@ Timing time_bare_intersect(const Arena &arena, const rt_embree::Settings &settin
     });
 }
 
+// Times only Embree's occlusion calls for `count` light samples of each pixel that shows a surface, with precomputed
+// rays to random points of the lamp.
+Timing time_bare_shadow_rays(const Arena &arena, const rt_embree::Settings &settings, int count) {
+    const arhost_host host = arhost::bench::printing_host("rt-embree-bench");
+    rt_embree::ThreadPool threads(settings.threads);
+    const rt_embree::RayTable table(intrinsics(), false, threads);
+    const rt_embree::EmbreeScene scene(arena.scene(), threads.thread_count(), settings.robust, arhost::Host(&host));
+    const int packet_width = scene.view().packet_width;
+    const arhost_camera from = camera();
+    std::minstd_rand random(1);
+    std::uniform_real_distribution<float> on_lamp(-lamp_half_side, lamp_half_side);
+    struct Packet {
+        alignas(64) int valid[16];
+        RTCRay16 rays;
+    };
+    std::vector<std::vector<Packet>> tiles;
+    for (const rt_embree::Tile &tile : table.tiles()) {
+        auto &packets = tiles.emplace_back();
+        for (int y = tile.pixels.y0; y < tile.pixels.y1; y += 4)
+            for (int x = tile.pixels.x0; x < tile.pixels.x1; x += 4) {
+                RTCRayHit16 primary{};
+                Packet packet{};
+                for (int i = 0; i < 16; ++i) {
+                    const auto direction =
+                        table.direction(std::min<int>(x + i % 4, width - 1), std::min<int>(y + i / 4, height - 1));
+                    primary.ray.org_x[i] = static_cast<float>(from.eye[0]);
+                    primary.ray.org_y[i] = static_cast<float>(from.eye[1]);
+                    primary.ray.org_z[i] = static_cast<float>(from.eye[2]);
+                    primary.ray.dir_x[i] = direction.x, primary.ray.dir_y[i] = -direction.y;
+                    primary.ray.dir_z[i] = -1;
+                    primary.ray.tfar[i] = INFINITY;
+                    primary.ray.mask[i] = rt_embree::all_masks;
+                    primary.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+                    packet.valid[i] = -1;
+                }
+                rt_embree::Query query = rt_embree::make_query(rt_embree::Coherence::coherent);
+                rt_embree::intersect16(packet.valid, scene.view().root, packet_width, query, primary);
+                for (int sample = 0; sample < count; ++sample) {
+                    packet.rays = primary.ray;
+                    for (int i = 0; i < 16; ++i) {
+                        const float *const origin[] = {primary.ray.org_x, primary.ray.org_y, primary.ray.org_z};
+                        const float *const along[] = {primary.ray.dir_x, primary.ray.dir_y, primary.ray.dir_z};
+                        const float *const normal[] = {primary.hit.Ng_x, primary.hit.Ng_y, primary.hit.Ng_z};
+                        const float target[] = {on_lamp(random), lamp_height, on_lamp(random)};
+                        float *const to_origin[] = {packet.rays.org_x, packet.rays.org_y, packet.rays.org_z};
+                        float *const to_direction[] = {packet.rays.dir_x, packet.rays.dir_y, packet.rays.dir_z};
+                        float cosine = 0, towards_eye = 0;
+                        for (int axis = 0; axis < 3; ++axis) {
+                            const float hit = origin[axis][i] + along[axis][i] * primary.ray.tfar[i] * 0.9999f;
+                            to_origin[axis][i] = hit;
+                            to_direction[axis][i] = target[axis] - hit;
+                            cosine += normal[axis][i] * to_direction[axis][i];
+                            towards_eye -= normal[axis][i] * along[axis][i];
+                        }
+                        packet.rays.tfar[i] = 1;
+                        const bool is_lit =
+                            primary.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID && cosine * towards_eye > 0;
+                        packet.valid[i] = is_lit ? -1 : 0;
+                    }
+                    if (std::any_of(packet.valid, packet.valid + 16, [](int valid) { return valid != 0; }))
+                        packets.push_back(packet);
+                }
+            }
+    }
+    return time_frames([&] {
+        threads.for_each(tiles.size(), [&](std::size_t i, std::size_t) {
+            rt_embree::Query query = rt_embree::make_query(rt_embree::Coherence::incoherent);
+            for (const Packet &packet : tiles[i]) {
+                RTCRay16 rays = packet.rays; // Embree writes tfar
+                rt_embree::occluded16(packet.valid, scene.view().root, packet_width, query, rays);
+            }
+        });
+    });
+}
+
+// Compares a further light sample of the path integrator with its bare shadow ray. Returns whether it takes at most
+// 1.5 times as long.
+bool time_light_samples(const TriangleMesh &mesh, const arhost_material &material, rt_embree::Settings settings) {
+    constexpr int more = 8;
+    const Arena room = room_of(mesh, material);
+    settings.light_samples = 1;
+    const Timing one = Trial(room, settings).time();
+    settings.light_samples = 1 + more;
+    const Timing many = Trial(room, settings).time(), bare = time_bare_shadow_rays(room, settings, more);
+    report("path, 1 light sample", one);
+    report("path, 9 light samples", many);
+    report("8 bare shadow rays", bare);
+    const double ratio = (many.cpu_ms - one.cpu_ms) / bare.cpu_ms;
+    std::printf("a further light sample takes %.2f times as long as a bare shadow ray (CPU time; target: 1.5: %s)\n",
+                ratio, ratio <= 1.5 ? "met" : "MISSED");
+    return ratio <= 1.5;
+}
+
 } // namespace
 
 int main(int argc, char **argv) {
@@ -190,8 +305,9 @@ int main(int argc, char **argv) {
     TriangleMesh flat = mesh;
     flat.normals.clear();
     const std::string only = argc > 3 ? argv[3] : "";
-    if (!only.empty() && only != "primary" && only != "diffuse" && only != "mirror" && only != "glass") {
-        std::fprintf(stderr, "rt-embree-bench: unknown case '%s'; use primary, diffuse, mirror or glass\n",
+    if (!only.empty() && only != "primary" && only != "diffuse" && only != "mirror" && only != "glass" &&
+        only != "light") {
+        std::fprintf(stderr, "rt-embree-bench: unknown case '%s'; use primary, diffuse, mirror, glass or light\n",
                      only.c_str());
         return 2;
     }
@@ -225,4 +341,5 @@ int main(int argc, char **argv) {
     time("diffuse", "diffuse and shadows", diffuse);
     time("mirror", "mirror, up to 10 bounces", mirror);
     time("glass", "glass, ray tree to depth 10", make_material(ARHOST_MATERIAL_GLASS));
+    return selected("light") && !time_light_samples(mesh, diffuse, settings) ? 1 : 0;
 }

@@ -236,13 +236,20 @@ void Renderer::trace_photons(Frame &frame) {
                                                  static_cast<std::int32_t>(from.starts.size() - 2), from.radius};
 }
 
-PathScene Renderer::path_scene() const {
+PathScene Renderer::path_scene() {
     PathScene path{};
     if (!lights_)
         return path;
     path.sources = lights_->records().data();
     path.cumulative = lights_->cumulative().data();
     path.source_count = static_cast<std::int32_t>(lights_->cumulative().size());
+    if (path.source_count <= most_few_sources) {
+        constexpr std::int32_t rows = arhost::raytracer_common::source_rows;
+        for (std::int32_t i = 0; i < path.source_count; ++i)
+            for (std::int32_t row = 0; row < rows; ++row)
+                few_sources_[static_cast<std::size_t>(row * most_few_sources + i)] = path.sources[i * rows + row];
+        path.few_sources = few_sources_.data();
+    }
     path.lamp_chances = lights_->lamp_chances().data();
     path.environment_chance = lights_->environment_chance();
     path.irradiance = {irradiance_.data(),

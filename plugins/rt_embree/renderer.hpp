@@ -11,6 +11,7 @@
 
 #include <arhost-cpp/plugin.hpp>
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -62,7 +63,7 @@ public:
 private:
     void set_size(const arhost_camera &camera);
     void place_lights();
-    PathScene path_scene() const;
+    PathScene path_scene();
     void trace_photons(Frame &frame);
 
     arhost::Host host_;
@@ -80,7 +81,8 @@ private:
 
     // The path integrator; empty with another integrator.
     std::optional<arhost::raytracer_common::LightSources> lights_;
-    std::vector<float> irradiance_; // of the environment
+    std::array<float, arhost::raytracer_common::source_rows * most_few_sources> few_sources_{}; // of PathScene
+    std::vector<float> irradiance_;                                                             // of the environment
     float max_radiance_;
     bool blends_codes_;          // as in Frame
     std::uint32_t full_samples_; // the random numbers of a frame begin at its number times this

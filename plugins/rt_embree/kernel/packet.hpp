@@ -237,6 +237,18 @@ ARHOST_INLINE Float gather(const float *table, Int index) {
     return float_of(gather(reinterpret_cast<const int *>(table), index));
 }
 
+// Returns elements 0 to 15 of a table of 16 elements; with AVX-512 in a few cycles.
+ARHOST_INLINE Float pick(const float *table, Int index) {
+#if defined(__AVX512F__)
+    Int to;
+    to.lane.part = reinterpret_cast<IntPart>(_mm512_maskz_permutexvar_epi32(
+        0xffff, reinterpret_cast<__m512i>(index.lane.part), _mm512_maskz_loadu_epi32(0xffff, table)));
+    return float_of(to);
+#else
+    return gather(table, index);
+#endif
+}
+
 // Loading and storing packets as arrays of 16 values, the layout of Embree's ray packets. These functions copy one
 // register at a time: GCC would copy a whole packet in pieces of half a register, and the processor cannot forward
 // two such stores to one load.

@@ -59,7 +59,8 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
     }
     const Int first = source * Int(source_rows);
     const auto field = [&](int row) __attribute__((always_inline)) {
-        return gather(path.sources + row, first);
+        return path.few_sources ? pick(path.few_sources + most_few_sources * row, source)
+                                : gather(path.sources + row, first);
     };
     const auto vector = [&](int row) __attribute__((always_inline)) {
         return Vec3{field(row), field(row + 1), field(row + 2)};

@@ -97,6 +97,12 @@ SceneBuilder desk_with_lamps() {
     builder.add_light(sun(0.6f, 0, -0.8f));
     return builder;
 }
+SceneBuilder desk_with_a_lit_cube() {
+    SceneBuilder builder(path_settings());
+    builder.add_mesh("desk", square(90), diffuse(0.6f, 0.6f, 0.6f), ARHOST_ROLE_CATCHER);
+    builder.add_mesh("cube", moved(cube(10), {0, 0, 15}), emissive(2, 1, 0.5f));
+    return builder;
+}
 // The desk mirrors the balls and hides the mirrored box and lamp behind them.
 SceneBuilder lacquered_desk() {
     SceneBuilder builder(path_settings(glm::vec3(0.4f)));
@@ -204,6 +210,12 @@ TEST_F(PathIntegrator, ScattersLightInGlassAndMetalAsRtEmbreeDoes) {
 
 TEST_F(PathIntegrator, ChangesCatchersAsRtEmbreeDoes) {
     expect_rt_embrees_picture(&desk_with_lamps, from_the_side(small), {{"samples", "64"}, {"max_radiance", "0"}});
+}
+
+// The brightness of the video tells how much a lamp of a room without known light brightens the desk.
+TEST_F(PathIntegrator, RelatesEmissiveObjectsToTheVideoAsRtEmbreeDoes) {
+    const Video video(small);
+    expect_rt_embrees_picture(&desk_with_a_lit_cube, from_the_side(small), {{"samples", "64"}}, "plain", &video);
 }
 
 TEST_F(PathIntegrator, ThrowsTheLightOfWideLampsAsRtEmbreeDoes) {
