@@ -204,7 +204,7 @@ def caustics(folder):
 
 def catchers(hdr):
     table = plane("table", (0, 0, 0), (400, 400), "table", role="catcher")
-    materials = {"table": matt([0.5, 0.45, 0.4]), "matt": matt([0.6, 0.3, 0.2]), "bright": matt([0.9, 0.75, 0.3]),
+    materials = {"table": matt([0.5, 0.45, 0.4]), "lacquer": rough([0.5, 0.45, 0.4], 0, 0.25), "matt": matt([0.6, 0.3, 0.2]), "bright": matt([0.9, 0.75, 0.3]),
                  "metal": rough([0.9, 0.7, 0.4], 1, 0.35), "light": emissive([3, 2, 1])}
     things_on_it = [ball("matt", (-60, 30, 0), 30, "matt"), ball("metal", (0, 30, -20), 30, "metal"),
                     cuboid("box", (10, 15, 70), (50, 30, 30), "matt", 25)]
@@ -226,8 +226,10 @@ def catchers(hdr):
             ("emissive objects", shining, [], {"background": 0.3}),
             ("environment", things_on_it, [], {"environment": hdr}),
             ("glass and mirror", clear, [], {"background": 0.5}),
-            ("36 balls", many, coloured, {"background": 0.1})):
-        yield Case(f"catcher, {name}", scene([table, *objects], materials, lights, **light), *TABLE_VIEW,
+            ("36 balls", many, coloured, {"background": 0.1}),
+            ("lacquered", shining, sun, {})):  # the table mirrors neither sun nor surroundings, so it only gains light
+        surface = "lacquer" if name == "lacquered" else "table"
+        yield Case(f"catcher, {name}", scene([table | {"material": surface}, *objects], materials, lights, **light), *TABLE_VIEW,
                    reference="difference", samples=1024)
 
 

@@ -16,7 +16,7 @@ template <class T> std::span<const T> view(const arhost_scene &scene, const arho
     return {reinterpret_cast<const T *>(reinterpret_cast<const std::byte *>(&scene) + buffer.offset), buffer.count};
 }
 
-std::uint64_t needed_for(const arhost_material &material) {
+std::uint64_t needed_for(const arhost_material &material, arhost_integrator integrator) {
     std::uint64_t needed = 0;
     switch (material.model) {
     case ARHOST_MATERIAL_SPECULAR:
@@ -26,6 +26,8 @@ std::uint64_t needed_for(const arhost_material &material) {
         break;
     case ARHOST_MATERIAL_GLASS:
         needed = ARHOST_RAYTRACER_CAPABILITY_GLASS;
+        if (material.roughness > 0 && integrator == ARHOST_INTEGRATOR_PATH)
+            needed |= ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS;
         break;
     case ARHOST_MATERIAL_METALLIC_ROUGHNESS:
         needed = ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS;
@@ -44,7 +46,7 @@ std::uint64_t needed_for(const arhost_material &material) {
 constexpr std::pair<std::uint64_t, const char *> parts[] = {
     {ARHOST_RAYTRACER_CAPABILITY_REFLECTION, "reflecting materials"},
     {ARHOST_RAYTRACER_CAPABILITY_GLASS, "glass"},
-    {ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS, "metallic-roughness materials"},
+    {ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS, "rough materials"},
     {ARHOST_RAYTRACER_CAPABILITY_TEXTURES, "textures"},
     {ARHOST_RAYTRACER_CAPABILITY_AREA_LIGHTS, "area lights"},
     {ARHOST_RAYTRACER_CAPABILITY_ENVIRONMENT, "the environment map or the default light"},
@@ -58,7 +60,7 @@ std::uint64_t needed_capabilities(const arhost_scene &scene) {
     const auto materials = view<arhost_material>(scene, scene.materials);
     for (const arhost_object &object : view<arhost_object>(scene, scene.objects)) {
         (object.role == ARHOST_ROLE_OCCLUDER ? needed_for_occluders : needed) |=
-            needed_for(materials[object.material]);
+            needed_for(materials[object.material], scene.integrator);
         if (is_moving(scene) && (object.moves || object.deforms))
             needed |= ARHOST_RAYTRACER_CAPABILITY_MOTION;
     }

@@ -163,7 +163,7 @@ inline constexpr std::int32_t most_few_sources = 16;
 // Input of the path integrator in addition to the scene.
 struct PathScene {
     const float *sources;     // source_count records (raytracer_common/source_record.hpp)
-    const float *few_sources; // of at most most_few_sources: rows of so many columns, one per source; else null
+    const float *few_sources; // source_rows rows of most_few_sources floats; null if there are more sources
     const float *cumulative;  // cumulative chances of the sources
     std::int32_t source_count;
     const float *lamp_chances; // of each lamp of the scene

@@ -199,6 +199,10 @@ void Renderer::place_lights() {
     scene_.set_emitters(lights_->emitters());
     const auto spheres = lights_->specular_spheres();
     photon_targets_.set(scene_.arena(), {spheres.begin(), spheres.end()});
+    constexpr std::size_t rows = arhost::raytracer_common::source_rows;
+    const auto records = lights_->records();
+    for (std::size_t i = 0; i < std::min(records.size(), few_sources_.size()); ++i)
+        few_sources_[i % rows * most_few_sources + i / rows] = records[i];
 }
 
 // Sends photons from the lamps to mirrors and glass.
@@ -236,20 +240,15 @@ void Renderer::trace_photons(Frame &frame) {
                                                  static_cast<std::int32_t>(from.starts.size() - 2), from.radius};
 }
 
-PathScene Renderer::path_scene() {
+PathScene Renderer::path_scene() const {
     PathScene path{};
     if (!lights_)
         return path;
     path.sources = lights_->records().data();
     path.cumulative = lights_->cumulative().data();
     path.source_count = static_cast<std::int32_t>(lights_->cumulative().size());
-    if (path.source_count <= most_few_sources) {
-        constexpr std::int32_t rows = arhost::raytracer_common::source_rows;
-        for (std::int32_t i = 0; i < path.source_count; ++i)
-            for (std::int32_t row = 0; row < rows; ++row)
-                few_sources_[static_cast<std::size_t>(row * most_few_sources + i)] = path.sources[i * rows + row];
+    if (path.source_count <= most_few_sources)
         path.few_sources = few_sources_.data();
-    }
     path.lamp_chances = lights_->lamp_chances().data();
     path.environment_chance = lights_->environment_chance();
     path.irradiance = {irradiance_.data(),

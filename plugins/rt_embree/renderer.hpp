@@ -63,7 +63,7 @@ public:
 private:
     void set_size(const arhost_camera &camera);
     void place_lights();
-    PathScene path_scene();
+    PathScene path_scene() const;
     void trace_photons(Frame &frame);
 
     arhost::Host host_;

@@ -15,6 +15,7 @@
 #include <numeric>
 #include <random>
 #include <set>
+#include <span>
 
 using namespace arhost::test;
 using testing::HasSubstr;
@@ -539,11 +540,11 @@ TEST(Supervision, SurvivesRandomKillsAndStops) {
     std::array<std::string, 4> plugins{"source_counter", "tracker_counter", "rt_counter", "sink_counter"};
     int faults = 0;
     while (run.running()) {
-        // Up to three faults in quick succession, each of another plugin: two workers that die at the same frame of a
-        // component take its overlay away.
+        // Up to three faults in quick succession, each of another plugin, because a frame at which two workers of a
+        // component die has no overlay.
         std::ranges::shuffle(plugins, random);
-        for (std::uint32_t fault = 1 + random() % 3; fault > 0; --fault) {
-            if (const pid_t worker = run.worker(plugins[fault])) {
+        for (const std::string &plugin : std::span(plugins).first(1 + random() % 3)) {
+            if (const pid_t worker = run.worker(plugin)) {
                 if (random() % 4 == 0) {
                     send_signal(worker, SIGSTOP);
                     std::this_thread::sleep_for(std::chrono::milliseconds(random() % 20));

@@ -2,9 +2,9 @@
 //
 // The path integrator: next-event estimation, scattered rays, and multiple importance sampling of both (Veach, Robust
 // Monte Carlo Methods for Light Transport Simulation, 1997). A path that starts at a virtual object collects
-// radiance; one that starts at a catcher collects the change of its light, relative to the light without virtual
-// objects (Debevec, Rendering Synthetic Objects into Real Scenes, SIGGRAPH 1998; residual path integrals, arXiv
-// 2406.16302).
+// radiance; one that starts at a catcher collects the change of its diffuse light, relative to that without virtual
+// objects, or the change of the light that it mirrors (Debevec, Rendering Synthetic Objects into Real Scenes,
+// SIGGRAPH 1998; residual path integrals, arXiv 2406.16302).
 #pragma once
 #include "path_catcher.inl"
 #include "photons.inl"
@@ -223,7 +223,7 @@ ARHOST_INLINE Vec3 video_at(const Frame &frame, int x, int y) {
 
 // Removes the light that catchers mirror only without virtual objects. It is part of the video, so that the
 // transmittance applies to it, too. A saturated video shows less than that; there, the catcher's diffuse light
-// remains. `covered`, `matt`: as in SumRow, means over the samples that hit catchers.
+// remains. `covered`, `matt`: as in SumRow, means over the samples that hit no virtual object.
 ARHOST_INLINE void remove_covered(const Frame &frame, Vec3 covered, Vec3 matt, int x, int y, LinearBlock &linear) {
     if (!any(largest(covered) > Float(0.0f)))
         return;
@@ -261,10 +261,10 @@ ARHOST_INLINE LinearBlock linear_mean(const Frame &frame, const Scratch &scratch
                             bounded(linear.transmittance.z)};
     if (frame.scene.has_gloss) {
         const Float share = Float(1.0f) / max(uncovered, Float(1e-3f));
-        const auto mean_of_catchers = [&](int row) __attribute__((always_inline)) {
+        const auto mean_behind = [&](int row) __attribute__((always_inline)) {
             return Vec3{mean(row), mean(row + 1), mean(row + 2)} * share;
         };
-        remove_covered(frame, mean_of_catchers(covered_row), mean_of_catchers(matt_row), x, y, linear);
+        remove_covered(frame, mean_behind(covered_row), mean_behind(matt_row), x, y, linear);
     }
     linear.added = {bounded(linear.added.x), bounded(linear.added.y), bounded(linear.added.z)};
     return linear;

@@ -133,7 +133,8 @@ ARHOST_INLINE Bool is_hidden(const Work &work, const Surface &s, const SourceSam
     return any(active) ? active & ~is_visible(work.frame.scene, s, sample, active) : active;
 }
 
-// Returns the share of a catcher's light that virtual objects can shadow: 1 for dielectrics. Metals only mirror.
+// Returns the share of a real surface's light that virtual objects can shadow: 1 for dielectrics, unless they are
+// black. Metals only mirror.
 ARHOST_INLINE Float shadowed_share(const Surface &s) {
     constexpr float dielectric_reflectance = 0.04f;
     const Float diffuse = luminance(s.diffuse),
@@ -212,7 +213,7 @@ ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHi
             });
         add_radiance(work, of_gloss, mirrored + by_photons, glossy);
         add_radiance(work, in_plane(paths, covered_plane), covered, glossy);
-        const Vec3 matt = s.diffuse * before;
+        const Vec3 matt = s.diffuse * (white() - schlick(s.specular, dot(s.normal, to_eye))) * before;
         const int first = paths.first_pixel & (tile_pixels - 1);
         add_to_sum(work.scratch, matt_row, first, select(glossy, matt.x, Float(0.0f)));
         add_to_sum(work.scratch, matt_row + 1, first, select(glossy, matt.y, Float(0.0f)));
@@ -305,6 +306,7 @@ ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, 
     const auto part = [least](Float a, Float whole) __attribute__((always_inline)) {
         return least > 0 ? Float(1.0f) + a / max(whole, Float(least)) : Float(1.0f);
     };
+    change = change * shadowed_share(s);
     const Vec3 remaining{part(change.x, before.x), part(change.y, before.y), part(change.z, before.z)};
     add_radiance(work, paths, filmed.light * remaining, active);
     return active;

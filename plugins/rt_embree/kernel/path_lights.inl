@@ -41,6 +41,8 @@ ARHOST_INLINE Float environment_source_density(const Frame &frame, Vec3 directio
     return chance * environment_density_at(environment, equirectangular_u(d), equirectangular_v(d));
 }
 
+static_assert(most_few_sources == lanes); // the table of pick()
+
 // Returns light sample `index` of `count`. The samples are spread evenly over the light sources.
 ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, const Surface &s, int index,
                                          int count) {

@@ -2,7 +2,7 @@
 //
 // The path integrator: computes the added light and the transmittance of a pixel. Equivalent to rt_embree's
 // kernel/path.inl. A path that starts at a virtual object collects radiance; one that starts at a catcher collects the
-// change of its light, relative to the light without virtual objects.
+// change of its diffuse light, relative to that without virtual objects, or the change of the light that it mirrors.
 
 // Paths of fewer bounces are not ended at random.
 const uint first_roulette_depth = 2u;
@@ -181,7 +181,7 @@ vec3 light_along(Path path, Ray ray, Hit hit, int stage, Random random) {
     bool is_lit = materials[material].model != MIRROR && materials[material].model != GLASS;
     bool scatters = path.depth < frame.max_depth;
     vec3 relative = vec3(1.0), before = vec3(0.0); // relative: factor of the reflected light
-    if (is_lit && (receiver == LIT_SURFACE || (has_gloss && receiver == CATCHER_SURFACE)))
+    if (is_lit && (receiver == LIT_SURFACE || has_gloss))
         add_material(s, hit);
     if (receiver != LIT_SURFACE || is_covered)
         before = irradiance_without_objects(s);
@@ -195,9 +195,10 @@ vec3 light_along(Path path, Ray ray, Hit hit, int stage, Random random) {
                                                                      max(path.inverse_density, 0.0))
                                              : 1.0);
     }
-    if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough) {
-        matt = s.diffuse * before;
+    if (has_gloss && receiver != LIT_SURFACE && s.is_rough)
         relative *= shadowed_share(s);
+    if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough) {
+        matt = s.diffuse * (vec3(1.0) - schlick(s.specular, dot(s.normal, -direction))) * before;
         mirrors = scatters && mirrors_virtual(s, -direction);
     }
     vec3 scattered = vec3(0.0);

@@ -86,7 +86,8 @@ void push_bounce(Path path, Surface s, vec3 throughput, Random random) {
 // The light of the current sample in MIRRORED_PLANE and COVERED_PLANE, and that of Sums.matt.
 vec3 mirrored, covered, matt;
 
-// Returns the share of a catcher's light that virtual objects can shadow: 1 for dielectrics. Metals only mirror.
+// Returns the share of a real surface's light that virtual objects can shadow: 1 for dielectrics, unless they are black.
+// Metals only mirror.
 float shadowed_share(Surface s) {
     const float dielectric_reflectance = 0.04;
     float diffuse = luminance(s.diffuse);

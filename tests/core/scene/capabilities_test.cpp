@@ -39,6 +39,19 @@ TEST(Capabilities, DependOnTheModelsOfMaterials) {
     }
 }
 
+TEST(Capabilities, IncludeRoughGlassWithThePathIntegrator) {
+    arhost_material frosted = make_material(ARHOST_MATERIAL_GLASS);
+    frosted.roughness = 0.5f;
+    for (const auto &[integrator, expected] :
+         {std::pair{ARHOST_INTEGRATOR_WHITTED, ARHOST_RAYTRACER_CAPABILITY_GLASS},
+          std::pair{ARHOST_INTEGRATOR_PATH,
+                    ARHOST_RAYTRACER_CAPABILITY_GLASS | ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS}}) {
+        ArenaBuilder builder = ball(frosted);
+        builder.settings.integrator = integrator;
+        EXPECT_EQ(needed(std::move(builder)), expected);
+    }
+}
+
 TEST(Capabilities, IncludeOccludersThatMirrorsShow) {
     ArenaBuilder builder = ball(make_material(ARHOST_MATERIAL_MIRROR));
     builder.add_object("post", builder.add_spheres({{30, 0, 0, 10}}),

@@ -424,20 +424,40 @@ TEST(PathIntegrator, TableBelowAHiddenSaturatedHighlightKeepsItsColour) {
         scene.add_light(sun(0.6f, 0, -0.8f));
         return rendered(std::move(scene), view, {}, 0, &video);
     };
-    const double matt = mean_at(render(diffuse(0.5f, 0.5f, 0.5f), ARHOST_ROLE_VIRTUAL), 100, 75, 0);
+    const double matt = mean_at(render(lacquer(0.1f), ARHOST_ROLE_VIRTUAL), 100, 75, 0);
     const LinearPicture picture = render(lacquer(0.1f), ARHOST_ROLE_CATCHER);
     EXPECT_GT(matt, 0.1);
-    EXPECT_NEAR(mean_at(picture, 100, 75, transmittance), matt, 0.1 * matt);
+    EXPECT_NEAR(mean_at(picture, 100, 75, transmittance), matt, 0.03 * matt);
 }
 
 TEST(PathIntegrator, RealMetalHasNoShadow) {
-    for (const float metallic : {1.0f, 0.98f}) {
+    for (const float metallic : {1.0f, 0.999f}) {
         SceneBuilder scene = table_below_a_ball(
             path_settings(), metallic_roughness({0.9f, 0.9f, 0.9f}, metallic, 0.2f), diffuse(0, 0, 0));
         scene.add_light(bulb({0, 60, 200}, 10, 30000, ARHOST_FALLOFF_INVERSE_SQUARE)); // above the ball
         const LinearPicture picture = rendered(std::move(scene), camera({0, 55, 400}, {0, 60, 0}, {0, 1, 0}));
-        EXPECT_NEAR(mean_at(picture, 100, 55, transmittance), metallic, 0.05);
+        EXPECT_NEAR(mean_at(picture, 100, 55, transmittance), 1, 0.01);
     }
+}
+
+// The kernel reads the records of at most 16 lamps in another way than those of more.
+TEST(PathIntegrator, SeventeenLampsShineLikeSixteen) {
+    const auto render = [](int lamps, const char *instruction_set) {
+        SceneBuilder scene(path_settings());
+        scene.add_mesh("floor", square(100), diffuse(0.5f, 0.5f, 0.5f));
+        for (int i = 0; i < lamps; ++i) {
+            const double angle = 0.3 * i;
+            const float x = 60 * static_cast<float>(std::cos(angle)), y = 60 * static_cast<float>(std::sin(angle));
+            scene.add_light(
+                light(x, y, 50, i < 16 ? 100 * static_cast<float>(i) : 1e-3f, ARHOST_FALLOFF_INVERSE_SQUARE));
+        }
+        return rendered(std::move(scene), from_above(), {{"samples", "16"}, {"instruction_set", instruction_set}});
+    };
+    for (const int lamps : {16, 17})
+        EXPECT_EQ(render(lamps, "base").pixels(), render(lamps, "auto").pixels());
+    const LinearPicture few = render(16, "auto"), many = render(17, "auto");
+    for (const std::uint32_t x : {60u, 100u, 140u})
+        EXPECT_NEAR(mean_at(many, x, 75, 0, 10), mean_at(few, x, 75, 0, 10), 0.02 * mean_at(few, x, 75, 0, 10)) << x;
 }
 
 TEST(PathIntegrator, EnvironmentFollowsTheVideo) {

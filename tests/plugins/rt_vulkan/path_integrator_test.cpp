@@ -300,13 +300,16 @@ TEST_F(PathIntegrator, FollowsMovingEmittersAndMirrors) {
 
 TEST_F(PathIntegrator, AccumulatesToRtEmbreesPicture) {
     const Options options{{"samples", "8"}, {"accumulate", "true"}};
-    LinearTracer vulkan(lacquered_desk(), options, "rt_vulkan"), embree(lacquered_desk(), options, "rt_embree");
-    for (LinearTracer *tracer : {&vulkan, &embree}) {
-        ASSERT_EQ(tracer->start(small), ARHOST_STATUS_OK) << tracer->log();
-        for (int i = 0; i < 7; ++i)
-            tracer->render(from_the_side(small));
+    const Video saturated(small, 255);
+    for (const Video *video : {static_cast<const Video *>(nullptr), &saturated}) {
+        LinearTracer vulkan(lacquered_desk(), options, "rt_vulkan"), embree(lacquered_desk(), options, "rt_embree");
+        for (LinearTracer *tracer : {&vulkan, &embree}) {
+            ASSERT_EQ(tracer->start(small, video), ARHOST_STATUS_OK) << tracer->log();
+            for (int i = 0; i < 7; ++i)
+                tracer->render(from_the_side(small), 0, video);
+        }
+        expect_like(vulkan.render(from_the_side(small), 0, video), embree.render(from_the_side(small), 0, video));
     }
-    expect_like(vulkan.render(from_the_side(small)), embree.render(from_the_side(small)));
 }
 
 TEST_F(PathIntegrator, WritesStraightImages) {

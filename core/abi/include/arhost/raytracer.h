@@ -37,7 +37,7 @@ typedef uint64_t arhost_raytracer_capabilities;
  * with ARHOST_STATUS_ERROR_UNSUPPORTED. */
 #define ARHOST_RAYTRACER_CAPABILITY_REFLECTION 0x100ull   /* the materials SPECULAR, MIRROR and METAL */
 #define ARHOST_RAYTRACER_CAPABILITY_GLASS 0x200ull        /* the material GLASS */
-#define ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS 0x400ull    /* the material METALLIC_ROUGHNESS */
+#define ARHOST_RAYTRACER_CAPABILITY_ROUGHNESS 0x400ull    /* METALLIC_ROUGHNESS, and rough GLASS */
 #define ARHOST_RAYTRACER_CAPABILITY_TEXTURES 0x800ull     /* textures of materials */
 #define ARHOST_RAYTRACER_CAPABILITY_AREA_LIGHTS 0x1000ull /* rectangles and spheres */
 #define ARHOST_RAYTRACER_CAPABILITY_ENVIRONMENT 0x2000ull /* the environment map */
