@@ -204,8 +204,8 @@ def caustics(folder):
 
 def catchers(hdr):
     table = plane("table", (0, 0, 0), (400, 400), "table", role="catcher")
-    materials = {"table": matt([0.5, 0.45, 0.4]), "lacquer": rough([0.5, 0.45, 0.4], 0, 0.25), "matt": matt([0.6, 0.3, 0.2]), "bright": matt([0.9, 0.75, 0.3]),
-                 "metal": rough([0.9, 0.7, 0.4], 1, 0.35), "light": emissive([3, 2, 1])}
+    materials = {"table": matt([0.5, 0.45, 0.4]), "lacquer": rough([0.5, 0.45, 0.4], 0, 0.25), "matt": matt([0.6, 0.3, 0.2]),
+                 "bright": matt([0.9, 0.75, 0.3]), "metal": rough([0.9, 0.7, 0.4], 1, 0.35), "light": emissive([3, 2, 1])}
     things_on_it = [ball("matt", (-60, 30, 0), 30, "matt"), ball("metal", (0, 30, -20), 30, "metal"),
                     cuboid("box", (10, 15, 70), (50, 30, 30), "matt", 25)]
     coloured = [lamp("sphere", [20000, 6000, 3000], position=[-160, 150, 60], radius=12),
