@@ -57,11 +57,6 @@ void for_each_point(const arhost_scene &arena, std::uint32_t number, const Place
     }
 }
 
-bool is_specular(const arhost_material &material) {
-    return material.model == ARHOST_MATERIAL_MIRROR || material.model == ARHOST_MATERIAL_METAL ||
-           material.model == ARHOST_MATERIAL_GLASS;
-}
-
 struct Bounds {
     Vec3 low{std::numeric_limits<double>::max(), std::numeric_limits<double>::max(),
              std::numeric_limits<double>::max()};
@@ -92,6 +87,11 @@ Sphere merged(const Sphere &a, const Sphere &b) {
 }
 
 } // namespace
+
+bool is_specular(const arhost_material &material) {
+    return material.model == ARHOST_MATERIAL_MIRROR || material.model == ARHOST_MATERIAL_METAL ||
+           material.model == ARHOST_MATERIAL_GLASS;
+}
 
 LightSources::LightSources(const arhost_scene &arena) : arena_(arena) {
     if (arena.environment.texture == ARHOST_NONE) {

@@ -33,6 +33,9 @@ struct Emitter {
     float ball_radius = 0; // world space, mm; 0: a mesh
 };
 
+// Whether a material reflects or refracts light without scattering it.
+bool is_specular(const arhost_material &material);
+
 class LightSources {
 public:
     explicit LightSources(const arhost_scene &arena);

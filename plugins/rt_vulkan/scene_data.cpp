@@ -19,6 +19,7 @@ using arhost::Failure;
 using arhost::raytracer_common::bytes;
 using arhost::raytracer_common::elements;
 using arhost::raytracer_common::is_identity;
+using arhost::raytracer_common::is_specular;
 using arhost::raytracer_common::LightSources;
 using arhost::raytracer_common::object_extent;
 using arhost::raytracer_common::PlacedObject;
@@ -321,8 +322,7 @@ void SceneData::add_object(const arhost_object &from, const Mesh &mesh) {
         object.flags |= has_transform;
     set_transform(object, mesh, from.world_from_object);
     has_glass_ |= is_glass;
-    has_specular_ |= from.role == ARHOST_ROLE_VIRTUAL && (is_glass || material.model == ARHOST_MATERIAL_MIRROR ||
-                                                          material.model == ARHOST_MATERIAL_METAL);
+    has_specular_ |= from.role == ARHOST_ROLE_VIRTUAL && is_specular(material);
     has_catchers_ |= from.role == ARHOST_ROLE_CATCHER;
     has_gloss_ |= from.role == ARHOST_ROLE_CATCHER && material.model == ARHOST_MATERIAL_METALLIC_ROUGHNESS;
     has_several_real_ |= from.role != ARHOST_ROLE_VIRTUAL && has_real_;
