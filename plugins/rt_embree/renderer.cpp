@@ -102,12 +102,10 @@ Rectangle united(const Rectangle &a, const Rectangle &b) {
 
 Kernel choose_kernel(const std::string &instruction_set) {
     const auto requested = [&](const char *name) { return instruction_set == name || instruction_set == "auto"; };
-#if defined(ARHOST_HAS_AVX512)
+#if defined(__x86_64__)
     if (requested("avx512") && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
         __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
         return {avx512::render_tile, avx512::render_path_tile, avx512::trace_photons, "avx512"};
-#endif
-#if defined(__x86_64__)
     if (requested("avx2") && __builtin_cpu_supports("avx2"))
         return {avx2::render_tile, avx2::render_path_tile, avx2::trace_photons, "avx2"};
 #endif
