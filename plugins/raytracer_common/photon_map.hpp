@@ -6,6 +6,7 @@
 
 #include <arhost/scene.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <span>
@@ -18,6 +19,14 @@ struct Photon {
     float direction[3]; // unit vector along which the photon arrives
     float power[3];     // irradiance times area (mm²), divided by π; negative red: the photon arrived nowhere
 };
+
+constexpr std::uint32_t max_photons = 1 << 20; // of an image
+
+// Returns the number of photons of an image.
+constexpr std::uint32_t photon_count(std::uint32_t photons_per_sample, std::uint32_t samples) {
+    return static_cast<std::uint32_t>(
+        std::min<std::uint64_t>(std::uint64_t{photons_per_sample} * samples, max_photons));
+}
 
 // A hash table of the cells of a regular grid. Cells share a bucket by chance, so compare the cell of each photon.
 struct PhotonGrid {

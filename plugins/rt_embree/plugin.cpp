@@ -91,7 +91,7 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_INTEGER, "photons", "16384",
                    "Path integrator: light rays from lamps to mirrors and glass per frame and sample, for caustics; "
                    "0: none.",
-                   0, 1 << 20),
+                   0, arhost::raytracer_common::max_photons),
     arhost::option(ARHOST_OPTION_INTEGER, "threads", "0", "Render threads; 0: one per processor.", 0, 256),
     arhost::option(ARHOST_OPTION_BOOL, "robust", "false",
                    "Prevent rays from passing between triangles that share an edge (watertight); about 10 % slower."),

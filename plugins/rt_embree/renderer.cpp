@@ -205,11 +205,10 @@ void Renderer::place_lights() {
 
 // Sends photons from the lamps to mirrors and glass.
 void Renderer::trace_photons(Frame &frame) {
-    constexpr std::uint32_t chunk = 1 << 12, max_photons = 1 << 20;
-    const std::uint64_t wanted = std::uint64_t{photons_per_sample_} * frame.sample_count;
-    if (photon_targets_.empty() || wanted == 0)
+    constexpr std::uint32_t chunk = 1 << 12;
+    const std::uint32_t count = arhost::raytracer_common::photon_count(photons_per_sample_, frame.sample_count);
+    if (photon_targets_.empty() || count == 0)
         return;
-    const auto count = static_cast<std::uint32_t>(std::min<std::uint64_t>(wanted, max_photons));
     Caustics &caustics = frame.path.caustics;
     caustics.spheres = photon_targets_.spheres().data()->data();
     caustics.cumulative = photon_targets_.cumulative().data();

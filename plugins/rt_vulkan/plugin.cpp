@@ -186,7 +186,7 @@ constexpr arhost_option_descriptor options[] = {
     arhost::option(ARHOST_OPTION_INTEGER, "photons", "16384",
                    "Path integrator: light rays from lamps to mirrors and glass per frame and sample, for caustics; "
                    "0: none.",
-                   0, 1 << 20),
+                   0, arhost::raytracer_common::max_photons),
     arhost::option(ARHOST_OPTION_BOOL, "validate", "false",
                    "Enable Vulkan's validation layers and log their messages; slow.")};
 

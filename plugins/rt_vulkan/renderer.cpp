@@ -21,6 +21,7 @@ namespace {
 
 using arhost::Failure;
 using arhost::raytracer_common::Photon, arhost::raytracer_common::PhotonMap;
+using arhost::raytracer_common::photon_count, arhost::raytracer_common::max_photons;
 
 static_assert(Bands::unit % group_side == 0); // a work group never covers two bands
 
@@ -88,13 +89,6 @@ std::byte *pixels_of(const arhost_image &image) {
 // For them, longer bands are better, because lavapipe's threads wait for each other at the end of each band.
 std::chrono::milliseconds max_band_time(const PhysicalDevice &device) {
     return std::chrono::milliseconds(device.properties.deviceType == VK_PHYSICAL_DEVICE_TYPE_CPU ? 250 : 100);
-}
-
-constexpr std::uint32_t max_photons = 1 << 20; // of an image
-
-std::uint32_t photon_count(const Settings &settings, std::uint32_t samples) {
-    return static_cast<std::uint32_t>(
-        std::min<std::uint64_t>(std::uint64_t{settings.photons} * samples, max_photons));
 }
 
 std::uint32_t photon_rows(std::uint32_t photons) {
@@ -255,7 +249,7 @@ void Renderer::make_rays(bool has_slopes) {
 
 // Makes the buffers of photons if they do not exist or are too small. Returns whether it has made them.
 bool Renderer::make_photon_buffers(std::uint32_t samples) {
-    const std::size_t size = photon_buffer_size(photon_count(settings_, samples));
+    const std::size_t size = photon_buffer_size(photon_count(settings_.photons, samples));
     if (buffers_[photons_binding] && size <= photons_.size())
         return false;
     Buffer on_device = make_buffer(photons_binding, {}, size);
@@ -645,7 +639,7 @@ void Renderer::trace(std::vector<VkCommandBuffer> commands, std::uint32_t row_co
 // before; afterwards, it contains the commands that are to run before the image.
 void Renderer::trace_photons(std::vector<VkCommandBuffer> &commands, const std::function<void(double)> &report) {
     frame_.photon_level_count = 0;
-    frame_.photon_count = scene_.photon_targets().empty() ? 0 : photon_count(settings_, frame_.sample_count);
+    frame_.photon_count = scene_.photon_targets().empty() ? 0 : photon_count(settings_.photons, frame_.sample_count);
     frame_.first_photon = frame_.first_random * settings_.photons;
     if (frame_.photon_count == 0)
         return;
