@@ -24,6 +24,7 @@ enum RoleMask : unsigned {
     catcher_mask = 4,
     occluder_mask = 8,
     virtual_masks = opaque_mask | glass_mask,
+    real_masks = catcher_mask | occluder_mask,
     all_masks = 15
 };
 

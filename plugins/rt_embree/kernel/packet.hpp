@@ -14,6 +14,8 @@
 
 #include <arhost/shading/vec3.hpp>
 
+#include <utility>
+
 #if defined(__SSE2__)
 #include <immintrin.h>
 #endif
@@ -33,6 +35,7 @@ inline constexpr int width = 4;
 
 typedef float FloatPart __attribute__((vector_size(4 * width)));
 typedef int IntPart __attribute__((vector_size(4 * width)));
+typedef unsigned UnsignedPart __attribute__((vector_size(4 * width)));
 
 // The registers that hold `count` lanes, as nested halves. An array would be simpler, but GCC keeps arrays in memory,
 // and members in registers.
@@ -167,7 +170,23 @@ ARHOST_INLINE Vec3 vec3(Float x, Float y, Float z) {
     return {x, y, z};
 }
 ARHOST_INLINE Int shift_right_unsigned(Int a, int bits) {
-    return (a >> Int(bits)) & Int(static_cast<int>(~0u >> bits));
+    Int to;
+    apply(
+        [bits](auto a_) __attribute__((always_inline)) {
+            return reinterpret_cast<IntPart>(reinterpret_cast<UnsignedPart>(a_) >> bits);
+        },
+        to.lane, a.lane);
+    return to;
+}
+
+typedef char BytePart __attribute__((vector_size(4 * width)));
+template <int... i> ARHOST_INLINE BytePart reversed_bytes(BytePart a, std::integer_sequence<int, i...>) {
+    return __builtin_shufflevector(a, a, (i ^ 3)...);
+}
+// Reverses the bytes of each lane.
+ARHOST_INLINE Int reversed_bytes(Int a) {
+    using Numbers = std::make_integer_sequence<int, 4 * width>;
+    ARHOST_UNARY(Int, reinterpret_cast<IntPart>(reversed_bytes(reinterpret_cast<BytePart>(a_), Numbers{})));
 }
 
 ARHOST_INLINE FloatPart sqrt_of(FloatPart a) {

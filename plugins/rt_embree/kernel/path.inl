@@ -19,13 +19,13 @@ ARHOST_INLINE Bool survive(const Work &work, const Paths &paths, Vec3 &throughpu
         return active;
     const Float chance = min(max(largest(throughput), Float(0.05f)), Float(1.0f));
     throughput = throughput * (Float(1.0f) / chance);
-    return active & (path_pair(work, paths, roulette_dimension, 0, 1).u < chance);
+    return active & (path_pair(work, paths, roulette_dimension).u < chance);
 }
 
 // Queues a reflected or a refracted ray, chosen at random; both at the first hit, which the eye sees most clearly.
 ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &paths, const Surface &s, Vec3 direction,
                                          const arhost_material &material, Float choice, Bool active) {
-    const Pair uv = material.roughness > 0 ? path_pair(work, paths, facet_dimension, 0, 1) : Pair{};
+    const Pair uv = material.roughness > 0 ? path_pair(work, paths, facet_dimension) : Pair{};
     const GlassScatter glass = scatter_at_glass(s, direction, material, uv, active);
     const Vec3 arriving = paths.throughput * glass.transmittance;
     Vec3 by_reflection = arriving * splat(material.reflectivity) * glass.unmasked_reflected,
@@ -49,7 +49,7 @@ ARHOST_INLINE void scatter_path_in_glass(Work &work, const Paths &paths, const S
 ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit16 &rays, const Surface &s,
                                 Vec3 direction, Bool active) {
     const Vec3 to_eye = -direction;
-    const Pair choice = path_pair(work, paths, choice_dimension, 0, 1);
+    const Pair choice = path_pair(work, paths, choice_dimension);
     Float mirror_chance(0.0f);
     Vec3 mirror_reflectance = black();
     Bool opaque = active;
@@ -78,7 +78,7 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
         return;
     const Float chance = specular_chance(s, to_eye);
     const Bool specular = choice.u < chance;
-    const Pair uv = path_pair(work, paths, scatter_dimension, 0, 1);
+    const Pair uv = path_pair(work, paths, scatter_dimension);
     Vec3 out = cosine_direction(s.normal, uv.u, uv.v);
     if (s.any_rough && any(specular & scatters))
         out = select(specular, mirror_direction(direction, ggx_half_vector(s.normal, to_eye, s.alpha, uv.u, uv.v)),
@@ -96,17 +96,17 @@ ARHOST_INLINE void scatter_path(Work &work, const Paths &paths, const RTCRayHit1
 }
 
 // Adds the light that the hit surfaces send towards the rays' origins, and queues the rays that they scatter.
-ARHOST_INLINE void shade_path(Work &work, const RTCRayHit16 &rays, Bool active, const Paths &paths) {
+ARHOST_INLINE void shade_path(Work &work, const RTCRayHit16 &rays, Bool active, Paths paths) {
     const Scene &scene = work.frame.scene;
     const Surface s = surface_at(scene, rays, active);
     const Vec3 direction = normalize(direction_of(rays.ray));
-    if (paths.depth > 0 && any(active & s.is_real)) {
-        if (paths.depth == 1) // the light of a catcher changes only where it sees a virtual object
-            active = active & ~(s.is_real & changes_catcher(paths));
+    if (paths.depth > 0)
+        active = active & ~(s.is_real & sees_only_virtual(paths));
+    paths.pixel = paths.pixel & Int(filmed_bit - 1);
+    if (paths.depth > 0 && any(active & s.is_real))
         active = active & ~add_filmed(work, s, paths, active & s.is_real);
-        if (!any(active))
-            return;
-    }
+    if (!any(active))
+        return;
     if (paths.depth == 1)
         if (const Bool mirrored = active & is_mirrored(paths); any(mirrored))
             add_covered(work, paths, rays.ray, mirrored);
@@ -123,12 +123,13 @@ ARHOST_INLINE void shade_path(Work &work, const RTCRayHit16 &rays, Bool active, 
     const bool scatters = paths.depth < scene.max_depth;
     const Bool lit = active & s.is_lit;
     if (any(lit)) {
-        const Vec3 by_photons = photon_light(
-            work, paths, s, lit, [&](Vec3 to_light) __attribute__((always_inline)) {
-                return (scattering(s, -direction, to_light) + highlight(s, -direction, to_light)) *
-                       (Float(1.0f) / max(dot(s.normal, to_light), Float(0.01f)));
+        const PhotonLight by_photons = photon_light(
+            work, paths, s, lit, [&](Vec3 power, Vec3 to_light) __attribute__((always_inline)) {
+                const Vec3 scattered = scattering(s, -direction, to_light) + highlight(s, -direction, to_light);
+                return PhotonLight{power * scattered * (Float(1.0f) / max(dot(s.normal, to_light), Float(0.01f))),
+                                   black()};
             });
-        add_radiance(work, paths, by_photons + sampled_light(work, paths, s, -direction, scatters, lit), lit);
+        add_radiance(work, paths, by_photons.light + sampled_light(work, paths, s, -direction, scatters, lit), lit);
     }
     if (scatters)
         scatter_path(work, paths, rays, s, direction, active);
@@ -141,13 +142,13 @@ ARHOST_INLINE void trace_path_packet(Work &work, std::uint32_t depth) {
     RTCRayHit16 rays;
     set_ray(rays.ray, next.origin, next.direction, Float(far_away), Int(all_masks));
     const Bool hit = trace(scene, scene.root, make_query(Coherence::incoherent), rays, next.active);
-    const Bool of_catcher = depth == 0 ? changes_catcher(next.paths) : bool_of(false);
-    const Bool missed = next.active & ~hit & ~of_catcher;
+    const Bool sees_all = next.active & ~sees_only_virtual(next.paths);
+    const Bool missed = sees_all & ~hit;
     if (any(missed))
         add_radiance(work, next.paths, environment_towards(work, next.paths, next.direction, missed), missed);
     if (scene.has_area_lights) {
         const Vec3 light = lamps_towards(work, next.paths, next.origin, next.direction, load(rays.ray.tfar));
-        const Bool lit = next.active & ~of_catcher & (largest(light) > Float(0.0f));
+        const Bool lit = sees_all & (largest(light) > Float(0.0f));
         if (any(lit))
             add_radiance(work, next.paths, light, lit);
     }

@@ -18,6 +18,16 @@ ARHOST_INLINE Bool is_mirrored(const Paths &paths) {
     return paths.pixel >= Int(mirrored_plane * tile_pixels);
 }
 
+// This bit of the pixel number marks rays from surfaces that the eye sees in mirrors and glass, and that the video
+// shows, towards virtual objects.
+constexpr int filmed_bit = plane_count * tile_pixels;
+static_assert((filmed_bit & (filmed_bit - 1)) == 0);
+
+// Returns the lanes whose rays come from a surface that the video shows: they bring light of virtual objects only.
+ARHOST_INLINE Bool sees_only_virtual(const Paths &paths) {
+    return paths.pixel >= Int(paths.depth == 1 ? change_plane * tile_pixels : filmed_bit);
+}
+
 // Returns whether a ray can meet a virtual object. `end`: in lengths of `to`.
 ARHOST_INLINE Bool can_meet_virtual(const PathScene &path, Vec3 origin, Vec3 to, Float end) {
     const Float scale = Float(1.0f) / max(dot(to, to), Float(1e-30f));
@@ -86,11 +96,11 @@ ARHOST_INLINE Float form_factors_of(const PathScene &path, const Surface &s) {
 ARHOST_INLINE Bounce sample_virtual(const Work &work, const Paths &paths, const Surface &s, Float total) {
     const PathScene &path = work.frame.path;
     const Float chance = bounce_chance(total);
-    const Pair choice = path_pair(work, paths, choice_dimension, 0, 1);
+    const Pair choice = path_pair(work, paths, choice_dimension);
     const Bool active = choice.u < chance;
     if (!any(active))
         return {s.normal, Float(0.0f)};
-    const Pair uv = path_pair(work, paths, scatter_dimension, 0, 1);
+    const Pair uv = path_pair(work, paths, scatter_dimension);
     Vec3 direction = cosine_direction(s.normal, uv.u, uv.v);
     Float remaining = choice.v * total;
     Bool searching = active;
@@ -127,10 +137,13 @@ ARHOST_INLINE Bool mirrors_virtual(const PathScene &path, const Surface &s, Vec3
     return s.is_rough & (largest(schlick(s.specular, dot(s.normal, to_eye))) * share >= Float(1.0f / 256));
 }
 
-// Returns the lanes in which virtual objects hide a lamp's or the environment's sample from a real surface.
+// Returns the lanes in which only virtual objects hide a lamp's or the environment's sample from a real surface.
 ARHOST_INLINE Bool is_hidden(const Work &work, const Surface &s, const SourceSample &sample, Bool active) {
+    const Scene &scene = work.frame.scene;
     active = active & can_meet_virtual(work.frame.path, s.position, sample.to_light, sample.t_far);
-    return any(active) ? active & ~is_visible(work.frame.scene, s, sample, active) : active;
+    if (any(active))
+        active = active & ~is_visible(scene, s, sample, Int(virtual_masks), active);
+    return any(active) ? is_visible(scene, s, sample, Int(real_masks), active) : active;
 }
 
 // Returns the share of a real surface's light that virtual objects can shadow: 1 for dielectrics, unless they are
@@ -144,74 +157,113 @@ ARHOST_INLINE Float shadowed_share(const Surface &s) {
 
 // Returns the irradiance that photons bring, divided by π.
 ARHOST_INLINE Vec3 photon_irradiance(const Work &work, const Paths &paths, const Surface &s, Bool active) {
-    return photon_light(work, paths, s, active, [](Vec3) { return Float(1.0f); });
+    return photon_light(work, paths, s, active, [](Vec3 power, Vec3) { return PhotonLight{power, black()}; }).light;
 }
 
-// Adds the change of a catcher's light, relative to its light without virtual objects: minus the light that they
-// hide, plus the light that they send. Of its gloss, adds these two in absolute terms.
-ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHit16 &rays, Bool active) {
+// Returns how virtual objects change the irradiance of real surfaces, divided by π, by light samples: minus the light
+// that they hide, plus that of emissive ones. Calls use(sample, lanes) for each sample that they change.
+template <class Use>
+ARHOST_INLINE Vec3 sampled_change(const Work &work, const Paths &paths, const Surface &s, Float form_factors,
+                                  int count, Bool active, Use use) {
     const Frame &frame = work.frame;
-    const Surface s = surface_at(frame.scene, rays, active);
-    const Vec3 before = irradiance_without_objects(frame, s);
+    const bool bounces = paths.depth < frame.scene.max_depth;
+    const SourcePairs pairs = source_pairs(work, paths);
+    Vec3 change = black();
+    for (int i = 0; i < count; ++i) {
+        const SourceSample sample = sample_source(work, pairs, s, i, count);
+        const Float cosine = lambert(s.normal, sample.direction);
+        const Bool facing = active & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
+        const Bool real = facing & ~sample.is_virtual, emitter = facing & sample.is_virtual;
+        Bool changed = real;
+        if (any(real)) {
+            changed = is_hidden(work, s, sample, real);
+            change = change - select(changed, sample.light * cosine, black());
+        }
+        if (any(emitter)) {
+            const Bool visible = is_visible(frame.scene, s, sample, Int(all_masks), emitter);
+            Float weight(1.0f);
+            if (bounces)
+                weight =
+                    balance_weight(sample.density, virtual_density(frame.path, s, sample.direction, form_factors) *
+                                                       bounce_chance(form_factors));
+            change = change + select(visible, sample.light * (cosine * weight), black());
+            changed = changed | visible;
+        }
+        use(sample, changed);
+    }
+    return change;
+}
+
+// Queues rays from real surfaces towards virtual objects. `throughput`: of the irradiance, divided by π.
+// `more_samples`: the number of the surface's light samples, divided by that of a surface of this depth.
+ARHOST_INLINE void enqueue_bounce(Work &work, const Paths &paths, const Surface &s, Float form_factors,
+                                  Vec3 throughput, float more_samples, Bool active) {
+    if (paths.depth >= work.frame.scene.max_depth)
+        return;
+    const Bounce bounce = sample_virtual(work, paths, s, form_factors);
+    active = active & (bounce.density > Float(0.0f)) & (largest(throughput) > Float(0.0f));
+    if (!any(active))
+        return;
+    const Float cosine = dot(bounce.direction, s.normal);
+    Paths from = paths;
+    if (paths.depth > 0)
+        from.pixel = from.pixel | Int(filmed_bit);
+    enqueue(work, from, s.position + s.geometric_normal * s.offset, bounce.direction,
+            throughput * (cosine * Float(0.318309886f) / max(bounce.density, Float(1e-20f))), active,
+            Float(more_samples) / max(bounce.density, Float(1e-30f)));
+}
+
+// Returns the reciprocal of a real surface's irradiance without virtual objects, for the channels of its light.
+ARHOST_INLINE Vec3 reciprocal(const Frame &frame, Vec3 irradiance) {
     const float least = frame.path.least_irradiance;
     const auto inverse = [least](Float a) __attribute__((always_inline)) {
         return least > 0 ? Float(1.0f) / max(a, Float(least)) : Float(0.0f);
     };
+    return {inverse(irradiance.x), inverse(irradiance.y), inverse(irradiance.z)};
+}
+
+// Adds the change of a catcher's light, relative to its light without virtual objects. Of its gloss, adds the light
+// that virtual objects add and remove in absolute terms.
+ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHit16 &rays, Bool active) {
+    const Frame &frame = work.frame;
+    const Surface s = surface_at(frame.scene, rays, active);
+    const Vec3 before = irradiance_without_objects(frame, s);
     Paths relative = paths;
-    relative.throughput = {inverse(before.x), inverse(before.y), inverse(before.z)};
+    relative.throughput = reciprocal(frame, before);
     const Bool glossy = active & s.is_rough;
     const bool any_glossy = s.any_rough && any(glossy);
     if (any_glossy)
         relative.throughput = relative.throughput * shadowed_share(s);
-    const bool bounces = frame.scene.max_depth > 0;
-    const Float form_factors = form_factors_of(frame.path, s);
-    const auto bounce_density = [&](Vec3 direction) __attribute__((always_inline)) {
-        return bounces ? virtual_density(frame.path, s, direction, form_factors) * bounce_chance(form_factors)
-                       : Float(0.0f);
-    };
     const Vec3 to_eye = -normalize(direction_of(rays.ray));
     Bool mirrors = bool_of(false);
-    if (bounces && any_glossy)
+    if (frame.scene.max_depth > 0 && any_glossy)
         mirrors = glossy & mirrors_virtual(frame.path, s, to_eye);
-    // Returns the part of a light sample that the gloss mirrors, unless it mirrors a real surface before the light.
-    const auto mirrored_light = [&](const SourceSample &sample, Bool of) __attribute__((always_inline)) {
+    const Float form_factors = form_factors_of(frame.path, s);
+    Vec3 mirrored = black(), covered = black();
+    const auto add_to_gloss = [&](const SourceSample &sample, Bool of) __attribute__((always_inline)) {
         of = of & glossy;
         if (!any_glossy || !any(of))
-            return black();
-        of = is_visible(frame.scene, s, sample, Int(catcher_mask | occluder_mask), of);
+            return;
         const Float density = scattering_density(s, to_eye, sample.direction, Float(1.0f));
         const Float weight = balance_weight(sample.density, select(mirrors, density, Float(0.0f)));
-        return select(of, gloss(s, to_eye, sample.direction) * sample.light * weight, black());
+        const Vec3 light = gloss(s, to_eye, sample.direction) * sample.light * weight;
+        mirrored = mirrored + select(of & sample.is_virtual, light, black());
+        covered = covered + select(of & ~sample.is_virtual, light, black());
     };
-    Vec3 change = black(), mirrored = black(), covered = black();
-    const int count = frame.light_samples;
-    for (int i = 0; i < count; ++i) {
-        const SourceSample sample = sample_source(work, paths, s, i, count);
-        const Float cosine = lambert(s.normal, sample.direction);
-        const Bool facing = active & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
-        const Bool real = facing & ~sample.is_virtual, emitter = facing & sample.is_virtual;
-        if (any(real)) {
-            const Bool hidden = is_hidden(work, s, sample, real);
-            change = change - select(hidden, sample.light * cosine, black());
-            covered = covered + mirrored_light(sample, hidden);
-        }
-        if (any(emitter)) {
-            const Float weight = balance_weight(sample.density, bounce_density(sample.direction));
-            const Bool visible = is_visible(frame.scene, s, sample, emitter);
-            change = change + select(visible, sample.light * (cosine * weight), black());
-            mirrored = mirrored + mirrored_light(sample, visible);
-        }
-    }
-    change = change + photon_irradiance(work, paths, s, active);
-    add_radiance(work, relative, change, active);
+    const Vec3 change = sampled_change(work, paths, s, form_factors, frame.light_samples, active, add_to_gloss);
+    // Rays of the gloss do not see lamps behind mirrors and glass.
+    const PhotonLight by_photons = photon_light(
+        work, paths, s, active, [&](Vec3 power, Vec3 to_light) __attribute__((always_inline)) {
+            PhotonLight light{power, black()};
+            if (any_glossy)
+                light.mirrored =
+                    power * gloss(s, to_eye, to_light) * (Float(1.0f) / max(dot(s.normal, to_light), Float(0.01f)));
+            return light;
+        });
+    add_radiance(work, relative, change + by_photons.light, active);
     const Paths of_gloss = in_plane(paths, mirrored_plane);
     if (any_glossy) {
-        // Rays of the gloss do not see lamps behind mirrors and glass.
-        const Vec3 by_photons = photon_light(
-            work, paths, s, glossy, [&](Vec3 to_light) __attribute__((always_inline)) {
-                return gloss(s, to_eye, to_light) * (Float(1.0f) / max(dot(s.normal, to_light), Float(0.01f)));
-            });
-        add_radiance(work, of_gloss, mirrored + by_photons, glossy);
+        add_radiance(work, of_gloss, mirrored + by_photons.mirrored, glossy);
         add_radiance(work, in_plane(paths, covered_plane), covered, glossy);
         const Vec3 matt = s.diffuse * (white() - schlick(s.specular, dot(s.normal, to_eye))) * before;
         const int first = paths.first_pixel & (tile_pixels - 1);
@@ -220,20 +272,11 @@ ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHi
         add_to_sum(work.scratch, matt_row + 2, first, select(glossy, matt.z, Float(0.0f)));
     }
     if (any(mirrors)) {
-        const RoughReflection ray = sample_rough(s, to_eye, path_pair(work, of_gloss, scatter_dimension, 0, 1));
+        const RoughReflection ray = sample_rough(s, to_eye, path_pair(work, of_gloss, scatter_dimension));
         enqueue(work, of_gloss, s, ray,
                 mirrors & can_meet_virtual(frame.path, s.position, ray.direction, Float(far_away)));
     }
-    if (!bounces)
-        return;
-    const Bounce bounce = sample_virtual(work, paths, s, form_factors);
-    const Bool sends = active & (bounce.density > Float(0.0f)) & (largest(relative.throughput) > Float(0.0f));
-    if (!any(sends))
-        return;
-    const Float cosine = dot(bounce.direction, s.normal);
-    enqueue(work, relative, s.position + s.geometric_normal * s.offset, bounce.direction,
-            relative.throughput * (cosine * Float(0.318309886f) / max(bounce.density, Float(1e-20f))), sends,
-            Float(1.0f) / max(bounce.density, Float(1e-30f)));
+    enqueue_bounce(work, relative, s, form_factors, relative.throughput, 1, active);
 }
 
 // The light of the video in some direction.
@@ -275,40 +318,30 @@ ARHOST_INLINE Filmed filmed_surface(const Frame &frame, const Surface &s, Bool a
     if (frame.scene.has_several_real && any(filmed.inside)) { // the video shows a nearer real surface
         RTCRay16 ray;
         const Float end = Float(1.0f) - s.offset * Float(4.0f) / max(length(to_point), Float(1e-20f));
-        set_ray(ray, eye, to_point, end, Int(catcher_mask | occluder_mask));
+        set_ray(ray, eye, to_point, end, Int(real_masks));
         filmed.inside = filmed.inside & ~blocked(frame.scene, ray, filmed.inside);
     }
     return filmed;
 }
 
-// Adds the light of real surfaces that the video shows, with the shadows of virtual objects on them. Returns the
-// lanes whose light it has added.
+// Adds the light of real surfaces that the video shows, as virtual objects change it. Returns the lanes whose light
+// it has added.
 ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, Bool active) {
     const Frame &frame = work.frame;
     const Filmed filmed = filmed_surface(frame, s, active);
     active = filmed.inside;
     if (!any(active))
         return active;
-    const Vec3 before = irradiance_without_objects(frame, s);
-    Vec3 change = photon_irradiance(work, paths, s, active);
+    const Vec3 relative = reciprocal(frame, irradiance_without_objects(frame, s)) * shadowed_share(s);
+    const Float form_factors = form_factors_of(frame.path, s);
     // The eye sees these surfaces in mirrors and glass, so they get as many light samples as those that it sees
     // directly.
     const int count = source_samples(frame, paths.depth - 1);
-    for (int i = 0; i < count; ++i) {
-        const SourceSample sample = sample_source(work, paths, s, i, count);
-        const Float cosine = lambert(s.normal, sample.direction);
-        const Bool facing =
-            active & ~sample.is_virtual & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
-        if (any(facing))
-            change = change - select(is_hidden(work, s, sample, facing), sample.light * cosine, black());
-    }
-    const float least = frame.path.least_irradiance;
-    const auto part = [least](Float a, Float whole) __attribute__((always_inline)) {
-        return least > 0 ? Float(1.0f) + a / max(whole, Float(least)) : Float(1.0f);
-    };
-    change = change * shadowed_share(s);
-    const Vec3 remaining{part(change.x, before.x), part(change.y, before.y), part(change.z, before.z)};
-    add_radiance(work, paths, filmed.light * remaining, active);
+    Vec3 change = sampled_change(work, paths, s, form_factors, count, active, [](const SourceSample &, Bool) {}) +
+                  photon_irradiance(work, paths, s, active);
+    add_radiance(work, paths, filmed.light * (white() + change * relative), active);
+    const float more_samples = static_cast<float>(count) / static_cast<float>(source_samples(frame, paths.depth));
+    enqueue_bounce(work, paths, s, form_factors, paths.throughput * filmed.light * relative, more_samples, active);
     return active;
 }
 
@@ -324,7 +357,7 @@ ARHOST_INLINE Vec3 environment_towards(const Work &work, const Paths &paths, Vec
             is_specular & filmed.inside & (largest(filmed.light) < Float(0.95f)); // the video is not saturated
         if (any(seen)) {
             RTCRay16 ray;
-            set_ray(ray, splat(frame.camera.eye), direction, Float(far_away), Int(catcher_mask | occluder_mask));
+            set_ray(ray, splat(frame.camera.eye), direction, Float(far_away), Int(real_masks));
             seen = seen & ~blocked(frame.scene, ray, seen);
             light = select(seen, filmed.light, light);
         }
@@ -343,7 +376,7 @@ ARHOST_INLINE void add_covered(Work &work, const Paths &paths, const RTCRay16 &r
     const Frame &frame = work.frame;
     const Vec3 origin = origin_of(ray), direction = direction_of(ray);
     RTCRayHit16 behind;
-    set_ray(behind.ray, origin, direction, Float(far_away), Int(catcher_mask | occluder_mask));
+    set_ray(behind.ray, origin, direction, Float(far_away), Int(real_masks));
     const Bool hit = trace(frame.scene, frame.scene.root, make_query(Coherence::incoherent), behind, active);
     Vec3 light = environment_towards(work, paths, direction, active & ~hit);
     if (any(hit)) {

@@ -43,20 +43,32 @@ ARHOST_INLINE Float environment_source_density(const Frame &frame, Vec3 directio
 
 static_assert(most_few_sources == lanes); // the table of pick()
 
+// The random numbers of the light samples at a vertex.
+struct SourcePairs {
+    PathPairs source, point;
+};
+ARHOST_INLINE SourcePairs source_pairs(const Work &work, const Paths &paths) {
+    SourcePairs pairs;
+    if (work.frame.path.source_count > 1)
+        pairs.source = path_pairs(work, paths, source_dimension);
+    if (work.frame.path.source_count > 0)
+        pairs.point = path_pairs(work, paths, light_dimension);
+    return pairs;
+}
+
 // Returns light sample `index` of `count`. The samples are spread evenly over the light sources.
-ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, const Surface &s, int index,
+ARHOST_INLINE SourceSample sample_source(const Work &work, const SourcePairs &pairs, const Surface &s, int index,
                                          int count) {
     const Frame &frame = work.frame;
     const PathScene &path = frame.path;
     SourceSample sample{s.normal, Float(1.0f), s.normal, black(), Float(0.0f), bool_of(false)};
     if (path.source_count == 0)
         return sample;
-    const Pair uv = path_pair(work, paths, light_dimension, index, count);
+    const Pair uv = pairs.point.pair(index, count);
     Int source(0);
     if (path.source_count > 1) {
-        const Float chosen =
-            (path_pair(work, paths, source_dimension, index, count).u + Float(static_cast<float>(index))) *
-            Float(1.0f / static_cast<float>(count));
+        const Float chosen = (pairs.source.pair(index, count).u + Float(static_cast<float>(index))) *
+                             Float(1.0f / static_cast<float>(count));
         source = search(path.cumulative, Int(0), path.source_count, chosen);
     }
     const Int first = source * Int(source_rows);
@@ -79,7 +91,7 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
     };
 
     if (const Bool directional = is(ARHOST_LIGHT_DIRECTIONAL); any(directional)) {
-        sample.to_light = select(directional, -vector(direction_row), sample.to_light);
+        sample.to_light = sample.direction = select(directional, -vector(direction_row), sample.to_light);
         sample.t_far = select(directional, Float(far_away), sample.t_far);
         sample.light = select(directional, intensity * share, sample.light);
     }
@@ -88,22 +100,26 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
         const Float radius = field(radius_row);
         const Bool extended = radius > Float(0.0f);
         const Vec3 to_point = select(extended, vector_to_disc(to_centre, radius, uv.u, uv.v), to_centre);
-        const Float squared = dot(to_point, to_point), cosine = dot(normalize(to_centre), normalize(to_point));
+        const Vec3 direction = normalize(to_point);
+        const Float squared = dot(to_point, to_point), cosine = dot(normalize(to_centre), direction);
         Float light = point_light_falloff(inverse_square, squared) * share;
         if (any(spot))
             light = select(spot,
-                           light * spot_attenuation(-dot(vector(direction_row), normalize(to_point)),
-                                                    field(cosine_inner_row), field(cosine_outer_row)),
+                           light * spot_attenuation(-dot(vector(direction_row), direction), field(cosine_inner_row),
+                                                    field(cosine_outer_row)),
                            light);
         sample.to_light = select(round, to_point, sample.to_light);
+        sample.direction = select(round, direction, sample.direction);
         sample.light = select(round, intensity * light, sample.light);
         sample.density =
             select(round & extended, density_over_area(squared, field(area_row), cosine), sample.density);
     }
     if (const Bool rectangle = is(ARHOST_LIGHT_RECTANGLE); any(rectangle)) {
         const Vec3 to_point = vector_to_rectangle(to_centre, vector(axis_u_row), vector(axis_v_row), uv.u, uv.v);
-        const Float squared = dot(to_point, to_point), cosine = lambert(vector(direction_row), -normalize(to_point));
+        const Vec3 direction = normalize(to_point);
+        const Float squared = dot(to_point, to_point), cosine = lambert(vector(direction_row), -direction);
         sample.to_light = select(rectangle, to_point, sample.to_light);
+        sample.direction = select(rectangle, direction, sample.direction);
         sample.light = select(rectangle, intensity * (point_light_falloff(inverse_square, squared) * cosine * share),
                               sample.light);
         sample.density = select(rectangle, density_over_area(squared, field(area_row), cosine), sample.density);
@@ -113,10 +129,11 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
         const Vec3 edge_1 = vector(axis_u_row), edge_2 = vector(axis_v_row);
         const Float along = sqrt(uv.u); // uniform over the triangle
         const Vec3 to_point = to_centre + edge_1 * (along * (Float(1.0f) - uv.v)) + edge_2 * (along * uv.v);
-        const Float squared = dot(to_point, to_point),
-                    cosine = abs(dot(normalize(cross(edge_1, edge_2)), normalize(to_point)));
+        const Vec3 direction = normalize(to_point);
+        const Float squared = dot(to_point, to_point), cosine = abs(dot(normalize(cross(edge_1, edge_2)), direction));
         const Float density = density_over_area(squared, field(area_row), cosine);
         sample.to_light = select(triangle, to_point, sample.to_light);
+        sample.direction = select(triangle, direction, sample.direction);
         sample.light = select(triangle, emitted(density), sample.light);
         sample.density = select(triangle, density, sample.density);
         sample.t_far = select(triangle, Float(before_surface), sample.t_far);
@@ -133,6 +150,7 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
                     half = sqrt(max(radius * radius - (squared - along * along), Float(0.0f)));
         const Float density = Float(0.159154943f) / max(slope, Float(1e-12f));
         sample.to_light = select(outside, direction * (along - half), sample.to_light);
+        sample.direction = select(outside, direction, sample.direction);
         sample.light = select(outside, emitted(density), sample.light);
         sample.density = select(outside, density, sample.density);
         sample.t_far = select(outside, Float(before_surface), sample.t_far);
@@ -145,17 +163,18 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const Paths &paths, c
         else
             of_environment = sample_background(frame.scene, s, uv, 1);
         sample.to_light = select(environment, of_environment.to_light, sample.to_light);
+        sample.direction = select(environment, of_environment.to_light, sample.direction);
         sample.light =
             select(environment, of_environment.intensity * (of_environment.irradiance * share), sample.light);
         sample.density = select(environment, of_environment.sampling_density, sample.density);
         sample.t_far = select(environment, Float(far_away), sample.t_far);
     }
     sample.density = sample.density * chance;
-    sample.direction = normalize(sample.to_light);
     return sample;
 }
 
-// Returns the lanes in which no object of these masks hides the light source.
+// Returns the lanes in which no object of these masks hides the light source. Light that passes through glass is not
+// sampled: refracted rays and photons find it.
 ARHOST_INLINE Bool is_visible(const Scene &scene, const Surface &s, const SourceSample &sample, Int masks,
                               Bool active) {
     const Vec3 above = s.lift + s.geometric_normal * s.offset;
@@ -165,26 +184,21 @@ ARHOST_INLINE Bool is_visible(const Scene &scene, const Surface &s, const Source
     return active & ~blocked(scene, rays, active);
 }
 
-// Returns the lanes whose light source is not hidden. Light that passes through glass is not sampled: refracted rays
-// and photons find it. Real surfaces cast no shadow on each other.
-ARHOST_INLINE Bool is_visible(const Scene &scene, const Surface &s, const SourceSample &sample, Bool active) {
-    return is_visible(scene, s, sample, select(s.is_real, Int(virtual_masks), Int(all_masks)), active);
-}
-
 // Returns the light of sampled light sources that the surfaces reflect. `scatters`: whether scattered rays follow.
 ARHOST_INLINE Vec3 sampled_light(const Work &work, const Paths &paths, const Surface &s, Vec3 to_eye, bool scatters,
                                  Bool active) {
     const Scene &scene = work.frame.scene;
     const Float chance = specular_chance(s, to_eye);
     const int count = source_samples(work.frame, paths.depth);
+    const SourcePairs pairs = source_pairs(work, paths);
     Vec3 sum = black();
     for (int i = 0; i < count; ++i) {
-        const SourceSample sample = sample_source(work, paths, s, i, count);
+        const SourceSample sample = sample_source(work, pairs, s, i, count);
         const Bool facing =
             active & (dot(s.normal, sample.direction) > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
         if (!any(facing))
             continue;
-        const Bool visible = is_visible(scene, s, sample, facing);
+        const Bool visible = is_visible(scene, s, sample, Int(all_masks), facing);
         Float weight(1.0f);
         if (scatters)
             weight = balance_weight(sample.density, scattering_density(s, to_eye, sample.direction, chance));

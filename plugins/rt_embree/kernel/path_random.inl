@@ -20,6 +20,9 @@ enum Dimension : int {
     facet_dimension
 };
 
+ARHOST_INLINE std::uint32_t reversed_bytes(std::uint32_t x) {
+    return __builtin_bswap32(x);
+}
 // Word: Int, or std::uint32_t for a number of all lanes.
 template <class Word> ARHOST_INLINE Word reversed_bits(Word x) {
     const auto swapped = [](Word a, int distance, int mask) __attribute__((always_inline)) {
@@ -27,9 +30,7 @@ template <class Word> ARHOST_INLINE Word reversed_bits(Word x) {
     };
     x = swapped(x, 1, 0x55555555);
     x = swapped(x, 2, 0x33333333);
-    x = swapped(x, 4, 0x0f0f0f0f);
-    x = swapped(x, 8, 0x00ff00ff);
-    return swapped(x, 16, 0x0000ffff);
+    return reversed_bytes(swapped(x, 4, 0x0f0f0f0f));
 }
 
 // Permutes the numbers so that bit i of the result depends on the bits 0 to i of `x` only (S. Laine and T. Karras,
@@ -80,14 +81,26 @@ ARHOST_INLINE Int z_order_of(Int pixel) {
            (shift_right_unsigned(pixel, 2) & Int(0x20)) | ((pixel & Int(0x40)) << Int(2));
 }
 
-// Returns pair `index` of the `count` pairs that a sample needs for a dimension of the paths' current vertex.
-ARHOST_INLINE Pair path_pair(const Work &work, const Paths &paths, int dimension, int index, int count) {
-    const std::uint32_t i = work.sample * static_cast<std::uint32_t>(count) + static_cast<std::uint32_t>(index);
+// The pairs that the samples need for a dimension of the paths' current vertex.
+struct PathPairs {
+    std::uint32_t sample, seed;
+    PairBits<Int> shift;
+
+    // Returns pair `index` of `count` for each sample.
+    ARHOST_INLINE Pair pair(int index, int count) const {
+        const PairBits<std::uint32_t> bits =
+            owen_pair(sample * static_cast<std::uint32_t>(count) + static_cast<std::uint32_t>(index), seed);
+        return pair_of(Int(static_cast<int>(bits.u)) ^ shift.u, Int(static_cast<int>(bits.v)) ^ shift.v);
+    }
+};
+ARHOST_INLINE PathPairs path_pairs(const Work &work, const Paths &paths, int dimension) {
     const std::uint32_t seed =
         hash(hash(hash(work.seed) + (paths.depth << 12)) + static_cast<std::uint32_t>(dimension));
-    const PairBits<std::uint32_t> sample = owen_pair(i, seed);
     // Pixel numbers above those of a tile are of changes of the light of catchers.
-    const PairBits<Int> shift =
-        owen_pair(z_order_of(paths.pixel), hash(Int(static_cast<int>(seed)) + shift_right_unsigned(paths.pixel, 10)));
-    return pair_of(Int(static_cast<int>(sample.u)) ^ shift.u, Int(static_cast<int>(sample.v)) ^ shift.v);
+    return {work.sample, seed,
+            owen_pair(z_order_of(paths.pixel),
+                      hash(Int(static_cast<int>(seed)) + shift_right_unsigned(paths.pixel, 10)))};
+}
+ARHOST_INLINE Pair path_pair(const Work &work, const Paths &paths, int dimension) {
+    return path_pairs(work, paths, dimension).pair(0, 1);
 }

@@ -220,15 +220,21 @@ ARHOST_INLINE NearCells cells_near(const Photons &photons, const PhotonGrid &gri
 // of the finest grid may hold almost all photons, if the others lie far away.
 constexpr float most_photons = 1024;
 
+// The light of photons: what a surface reflects, or the irradiance of a real surface, divided by π; and what the
+// gloss of a real surface mirrors to the eye.
+struct PhotonLight {
+    Vec3 light, mirrored;
+};
+
 // `phase`: 0 to 1, chooses which photons are read if there are too many.
-template <class Weight>
-ARHOST_INLINE Vec3 photon_density(const Photons &photons, const PhotonGrid &grid, const NearCells &cells,
-                                  const Surface &s, Float phase, Bool active, Weight weight) {
+template <class LightOf>
+ARHOST_INLINE PhotonLight photon_density(const Photons &photons, const PhotonGrid &grid, const NearCells &cells,
+                                         const Surface &s, Float phase, Bool active, LightOf light_of) {
     const Int step = to_int(to_float(cells.count) * Float(1 / most_photons)) + Int(1),
               skipped = to_int(phase * to_float(step));
     const Float radius_squared(grid.radius * grid.radius), scale(2 / (3.14159265f * grid.radius * grid.radius));
     const Float inverse_cell(0.5f / grid.radius);
-    Vec3 sum = black();
+    PhotonLight sum{black(), black()};
     for (int i = 0; i < 8; ++i)
         for (Int next = cells.first[i] + skipped;; next = next + step) {
             const Bool here = active & (next < cells.end[i]);
@@ -251,36 +257,42 @@ ARHOST_INLINE Vec3 photon_density(const Photons &photons, const PhotonGrid &grid
             const Vec3 to_light = -Vec3{value(3), value(4), value(5)};
             const Bool counts = near & (dot(to_light, s.geometric_normal) > Float(0.0f));
             const Float kernel = scale * (Float(1.0f) - squared * (Float(1.0f) / radius_squared));
-            sum = sum + select(counts, Vec3{value(6), value(7), value(8)} * weight(to_light) * kernel, black());
+            const PhotonLight light = light_of(Vec3{value(6), value(7), value(8)} * kernel, to_light);
+            sum.light = sum.light + select(counts, light.light, black());
+            sum.mirrored = sum.mirrored + select(counts, light.mirrored, black());
         }
-    return sum * to_float(step);
+    return {sum.light * to_float(step), sum.mirrored * to_float(step)};
 }
 
-// Returns the light that photons bring to the surfaces: the sum of weight(direction to the light) · irradiance / π.
+// Returns the light that photons bring to the surfaces: the sum of light_of(irradiance / π, direction to the light).
 // All samples of a pixel see the same photons, so only some of them make an estimate, for the others too.
-template <class Weight>
-ARHOST_INLINE Vec3 photon_light(const Work &work, const Paths &paths, const Surface &s, Bool active, Weight weight) {
+template <class LightOf>
+ARHOST_INLINE PhotonLight photon_light(const Work &work, const Paths &paths, const Surface &s, Bool active,
+                                       LightOf light_of) {
     const Photons &photons = work.frame.path.photons;
+    PhotonLight sum{black(), black()};
     if (photons.level_count == 0)
-        return black();
+        return sum;
     const std::int32_t step = work.frame.sample_count > 8 ? 4 : 1;
     if ((work.sample - work.frame.first_random) % static_cast<std::uint32_t>(step) != 0)
-        return black();
+        return sum;
     const std::int32_t estimates = (work.frame.sample_count + step - 1) / step;
-    const Pair random = path_pair(work, paths, photon_dimension, 0, 1);
+    const Pair random = path_pair(work, paths, photon_dimension);
     // The cells cover 16/π times the area of the density estimate. A random limit hides where the radius changes.
     constexpr float enough = 5 * static_cast<float>(arhost::raytracer_common::PhotonMap::photons_per_estimate);
     const Int limit = to_int(Float(enough) * (Float(1.0f) + Float(3.0f) * random.u));
-    Vec3 sum = black();
     for (std::int32_t level = 0; level < photons.level_count && any(active); ++level) {
         const PhotonGrid &grid = photons.levels[level];
         const NearCells cells = cells_near(photons, grid, s);
         active = active & (Int(0) < cells.count);
         const Bool dense = active & (limit < cells.count) & bool_of(level + 1 < photons.level_count);
         const Bool here = active & ~dense;
-        if (any(here))
-            sum = sum + photon_density(photons, grid, cells, s, random.v, here, weight);
+        if (any(here)) {
+            const PhotonLight more = photon_density(photons, grid, cells, s, random.v, here, light_of);
+            sum = {sum.light + more.light, sum.mirrored + more.mirrored};
+        }
         active = dense;
     }
-    return sum * Float(static_cast<float>(work.frame.sample_count) / static_cast<float>(estimates));
+    const Float scale(static_cast<float>(work.frame.sample_count) / static_cast<float>(estimates));
+    return {sum.light * scale, sum.mirrored * scale};
 }

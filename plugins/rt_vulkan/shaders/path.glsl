@@ -74,33 +74,31 @@ void scatter_path(Path path, Surface s, vec3 direction, uint material, Random ra
 
 // Returns the light of sampled light sources that a lit surface reflects to the eye. For a real surface, returns the
 // change of its irradiance (divided by π) by virtual objects: minus the light that they hide, plus that of emissive
-// ones, which a filmed surface ignores. Adds the light of a catcher's gloss to `mirrored` and `covered`. `scatters`:
-// whether a scattered ray follows; `mirrors`: whether one of the gloss does.
+// ones. Adds the light of a catcher's gloss to `mirrored` and `covered`. `scatters`: whether a scattered ray follows;
+// `mirrors`: whether one of the gloss does.
 vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatters, bool mirrors, Random random) {
-    // The eye sees filmed surfaces in mirrors and glass, so they get as many samples as those that it sees directly.
     uint count = source_samples(receiver == FILMED_SURFACE ? depth - 1u : depth);
     float specular = receiver == LIT_SURFACE ? specular_chance(s, to_eye) : 0.0;
-    float form_factors = receiver == CATCHER_SURFACE ? form_factors_of(s) : 0.0;
+    float form_factors = receiver == LIT_SURFACE ? 0.0 : form_factors_of(s);
     vec3 sum = vec3(0.0);
     for (uint i = 0u; i < count; ++i) {
         SourceSample source = sample_source(s, random, i, count);
         float cosine = dot(s.normal, source.direction);
         bool hides = receiver != LIT_SURFACE && !source.is_virtual;
-        if (!(cosine > 0.0) || !(largest(source.light) > 0.0) || (receiver == FILMED_SURFACE && source.is_virtual) ||
-            (hides && !can_meet_virtual(s.position, source.to_light, source.t_max)))
+        if (!(cosine > 0.0) || !(largest(source.light) > 0.0) ||
+            (hides && (!can_meet_virtual(s.position, source.to_light, source.t_max) ||
+                       is_visible(s, source, OPAQUE_MASK | GLASS_MASK))))
             continue;
-        // Light that passes through glass is not sampled: refracted rays and photons find it. Real surfaces cast no
-        // shadow on each other.
-        if (is_visible(s, source, s.is_real ? OPAQUE_MASK | GLASS_MASK : ALL_MASKS) == hides)
+        // Where a real object hides a light source, virtual ones change nothing. Light that passes through glass is not
+        // sampled: refracted rays and photons find it.
+        if (!is_visible(s, source, hides ? CATCHER_MASK | OCCLUDER_MASK : ALL_MASKS))
             continue;
         float other_density = 0.0; // of scattered rays
-        if (scatters && receiver == LIT_SURFACE)
-            other_density = scattering_density(s, to_eye, source.direction, specular);
-        else if (scatters && receiver == CATCHER_SURFACE)
-            other_density = bounce_density(s, source.direction, form_factors);
+        if (scatters)
+            other_density = receiver == LIT_SURFACE ? scattering_density(s, to_eye, source.direction, specular)
+                                                    : bounce_density(s, source.direction, form_factors);
         float weight = balance_weight(source.density, other_density);
-        if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough &&
-            is_visible(s, source, CATCHER_MASK | OCCLUDER_MASK)) { // else the gloss mirrors a real surface
+        if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough) {
             float density = mirrors ? scattering_density(s, to_eye, source.direction, 1.0) : 0.0;
             vec3 light = gloss(s, to_eye, source.direction) * source.light * balance_weight(source.density, density);
             if (hides)
@@ -110,7 +108,7 @@ vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatte
         }
         if (hides)
             sum -= source.light * cosine;
-        else if (receiver == CATCHER_SURFACE)
+        else if (receiver != LIT_SURFACE)
             sum += source.light * (cosine * weight);
         else
             sum += (scattering(s, to_eye, source.direction) * weight + highlight(s, to_eye, source.direction)) *
@@ -132,12 +130,13 @@ vec3 bounded(vec3 rgb) {
     return vec3(bounded(rgb.x), bounded(rgb.y), bounded(rgb.z));
 }
 
-// Returns the light that a ray brings to its origin, without that of the rays it pushes.
-vec3 light_along(Path path, Ray ray, Hit hit, int stage, Random random) {
+// Returns the light that a ray brings to its origin, without that of the rays it pushes. `is_bounce`: the ray comes from
+// a surface that the video shows, and brings light of virtual objects only.
+vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random random) {
     bool is_covered = has_gloss && path.plane == COVERED_PLANE, is_mirrored = has_gloss && path.plane == MIRRORED_PLANE;
-    bool is_hit = hit.object != NONE, is_bounce = path.plane != OBJECT_PLANE && path.depth == 1u && !is_covered;
+    bool is_hit = hit.object != NONE;
     vec3 sum = vec3(0.0);
-    if (is_bounce && !is_hit) // the light of a catcher changes only where it sees a virtual object
+    if (is_bounce && !is_hit)
         return sum;
     // Photons bring the light of lamps that reaches a scattering surface off mirrors and through glass.
     if (has_area_lights && path.depth > 0u && (!is_bounce || is_mirrored) && !(path.inverse_density < 0.0))
@@ -148,7 +147,7 @@ vec3 light_along(Path path, Ray ray, Hit hit, int stage, Random random) {
         if (is_bounce && s.is_real)
             return vec3(0.0);
     }
-    if (is_bounce && is_mirrored) { // another ray finds what the virtual object covers, except lamps before the object
+    if (is_mirrored && path.depth == 1u) { // another ray finds what the virtual object covers, except lamps before the object
         covered -= path.throughput * sum;
         sum = vec3(0.0);
         stack[stack_size] = path;
@@ -209,13 +208,15 @@ vec3 light_along(Path path, Ray ray, Hit hit, int stage, Random random) {
         if (receiver == CATCHER_SURFACE) // rays of the gloss do not see lamps behind mirrors and glass
             mirrored += by_photons.mirrored;
     }
-    if (receiver == FILMED_SURFACE)
-        return sum + video * (vec3(1.0) + scattered);
+    if (receiver == FILMED_SURFACE) {
+        relative *= video;
+        scattered = video * (vec3(1.0) + scattered);
+    }
     if (mirrors) // pushed first: when it is popped, the stack has space for the ray behind a virtual object
         push_mirrored(path, s, -direction, random);
-    if (scatters && receiver == CATCHER_SURFACE && largest(relative) > 0.0)
-        push_bounce(path, s, relative, random);
-    else if (scatters && receiver != CATCHER_SURFACE)
+    if (scatters && receiver != LIT_SURFACE && largest(relative) > 0.0)
+        push_bounce(path, s, path.throughput * relative, random);
+    else if (scatters && receiver == LIT_SURFACE)
         scatter_path(path, s, direction, material, random);
     return sum + scattered;
 }
@@ -250,8 +251,12 @@ void trace_sample(vec3 direction, Random random, inout Sums sums) {
             of_catcher = true;
             path.plane = CHANGE_PLANE;
         }
+        // The light of catchers and filmed surfaces changes only where they see virtual objects.
+        bool is_bounce = path.plane >= FILMED_BIT || (stage == PATH_STAGE && path.depth == 1u &&
+                                                  (path.plane == CHANGE_PLANE || path.plane == MIRRORED_PLANE));
+        path.plane &= FILMED_BIT - 1u;
         Random of_vertex = Random(random.pixel + path.plane * TILE_PIXELS + (path.depth << 12), random.seed, random.number);
-        vec3 arriving = path.throughput * light_along(path, ray, hit, stage, of_vertex);
+        vec3 arriving = path.throughput * light_along(path, is_bounce, ray, hit, stage, of_vertex);
         if (has_gloss && path.plane == MIRRORED_PLANE)
             mirrored += arriving;
         else if (has_gloss && path.plane == COVERED_PLANE)

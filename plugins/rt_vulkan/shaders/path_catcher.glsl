@@ -60,7 +60,7 @@ float bounce_density(Surface s, vec3 direction, float form_factors) {
     return density / max(form_factors, 1e-20) * bounce_chance(form_factors);
 }
 
-// Pushes a ray from a catcher towards the virtual objects. `throughput`: of the light that arrives there.
+// Pushes a ray from a real surface towards the virtual objects. `throughput`: of its irradiance, divided by π.
 void push_bounce(Path path, Surface s, vec3 throughput, Random random) {
     float form_factors = form_factors_of(s);
     vec2 choice = path_pair(random, CHOICE_DIMENSION, 0u, 1u), uv = path_pair(random, SCATTER_DIMENSION, 0u, 1u);
@@ -78,9 +78,14 @@ void push_bounce(Path path, Surface s, vec3 throughput, Random random) {
         remaining -= cone.share;
     }
     float density = bounce_density(s, direction, form_factors), cosine = dot(direction, s.normal);
+    float more_samples = 1.0;
+    if (path.depth > 0u) { // not a catcher, but a surface that the video shows
+        path.plane |= FILMED_BIT;
+        more_samples = float(source_samples(path.depth - 1u)) / float(source_samples(path.depth));
+    }
     if (density > 0.0 && cosine > 0.0 && dot(direction, s.geometric_normal) > 0.0)
         push(path, above(s), direction, throughput * (cosine * 0.318309886 / max(density, 1e-20)),
-             1.0 / max(density, 1e-30));
+             more_samples / max(density, 1e-30));
 }
 
 // The light of the current sample in MIRRORED_PLANE and COVERED_PLANE, and that of Sums.matt.

@@ -7,6 +7,9 @@ const uint OBJECT_PLANE = 0u, // radiance of virtual objects
     CHANGE_PLANE = 1u,        // change of a catcher's diffuse light
     MIRRORED_PLANE = 2u,      // light of virtual objects that a glossy catcher mirrors
     COVERED_PLANE = 3u;       // light that it mirrors only without them
+// This bit of Path::plane marks rays from surfaces that the eye sees in mirrors and glass, and that the video shows,
+// towards virtual objects.
+const uint FILMED_BIT = 4u;
 
 // A ray, and the throughput of the path from the pixel to this ray.
 struct Path {

@@ -286,6 +286,57 @@ TEST(PathIntegrator, ShowsTheFilmedTableInAMirror) {
     EXPECT_NEAR(mean_at(picture, x, y, 2, 1), blue, 0.01);
 }
 
+// The mirror shows a point of the filmed table as the camera sees the same point directly.
+TEST(PathIntegrator, MirrorShowsTheLightOfVirtualObjectsOnTheFilmedTable) {
+    const arhost_camera view = camera({0, -150, 100}, {0, 0, 0}, {0, 0, 1});
+    const Video video(view.intrinsics, 128);
+    const auto pixel_of = [](double y) { // of the table's point (0, y, 0)
+        const double length = std::hypot(150.0, 100.0);
+        return static_cast<std::uint32_t>(std::lround(74.5 - 200 * 100 * y / length / (length + (y * 150) / length)));
+    };
+    const auto expect_equal = [&](SceneBuilder scene, const char *light_samples, std::size_t channel) {
+        scene.add_light(sun(0.6f, 0, -0.8f));
+        scene.add_mesh("mirror", quad({-60, 40, 0}, {60, 40, 0}, {60, 40, 80}, {-60, 40, 80}), mirror(1));
+        const LinearPicture picture =
+            rendered(std::move(scene), view, {{"samples", "256"}, {"light_samples", light_samples}, {"photons", "0"}},
+                     0, &video);
+        const double light = shading::srgb_decode(128 / 255.0),
+                     direct = mean_at(picture, 100, pixel_of(0), transmittance + channel) * light,
+                     mirrored = mean_at(picture, 100, pixel_of(80), channel);
+        EXPECT_GT(direct, 1.1 * light);
+        EXPECT_NEAR(mirrored, direct, 0.02 * direct) << light_samples;
+    };
+    for (const char *light_samples : {"1", "8"}) {
+        SceneBuilder lit = table(path_settings());
+        lit.add_ball("ball", {35, 0, 20, 15}, emissive(4));
+        expect_equal(std::move(lit), light_samples, 0);
+    }
+    SceneBuilder bright = table(path_settings());
+    bright.add_mesh("wall", quad({25, -60, 0}, {25, 39, 0}, {25, 39, 60}, {25, -60, 60}), diffuse(1, 1, 1));
+    expect_equal(std::move(bright), "1", 1);
+}
+
+// The video shows the shadows of real objects.
+TEST(PathIntegrator, VirtualObjectsChangeNothingWhereARealOneHidesTheLamp) {
+    const auto shadow = [](bool has_card, bool lamp_is_virtual) {
+        SceneBuilder scene = table(path_settings());
+        scene.add_light(sun(0, 0.01f, -1));
+        if (lamp_is_virtual)
+            scene.add_ball("lamp", {30, 0, 120, 5}, emissive(200));
+        else
+            scene.add_ball("ball", {0, 0, 20, 10}, diffuse(0, 0, 0));
+        if (has_card)
+            scene.add_mesh("card", quad({-60, -60, 60}, {60, -60, 60}, {60, 60, 60}, {-60, 60, 60}),
+                           diffuse(0.5f, 0.5f, 0.5f), ARHOST_ROLE_OCCLUDER);
+        return mean_at(rendered(std::move(scene), camera({0, -100, 20}, {0, 0, 0}, {0, 0, 1})), 100, 75,
+                       transmittance);
+    };
+    EXPECT_LT(shadow(false, false), 0.1);
+    EXPECT_NEAR(shadow(true, false), 1, 0.01);
+    EXPECT_GT(shadow(false, true), 1.2);
+    EXPECT_EQ(shadow(true, true), 1);
+}
+
 // A table below a ball. The middle of the picture shows where the table mirrors the middle of the ball.
 constexpr glm::vec4 mirrored_ball(0, 60, 60, 20);
 SceneBuilder table_below_a_ball(const scene::Settings &settings, const arhost_material &of_table,
