@@ -225,10 +225,10 @@ inline constexpr std::int32_t tile_side = 32, tile_pixels = tile_side * tile_sid
 // Secondary rays of the same depth that wait to be traced. `values` consists of `rows` arrays, each with space for
 // `capacity` rays.
 struct RayQueue {
-    // The rows are: origin, direction and throughput (three floats each), inverse density, and pixel index (an int's
-    // bits). The inverse density is the reciprocal of the density per steradian of the path's last random direction.
-    // It is 0 if there is no such direction, and negative if mirrors or glass have reflected or refracted the path
-    // since.
+    // The rows are: origin, direction and throughput (three floats each), inverse density, and Paths::pixel (an int's
+    // bits). The inverse density is the reciprocal of the density per steradian of the path's last random direction,
+    // times the `sample_ratio` of enqueue_bounce(). It is 0 if there is no such direction, and negative if mirrors or
+    // glass have reflected or refracted the path since.
     static constexpr int rows = 11;
     float *values;
     std::int32_t count, capacity;

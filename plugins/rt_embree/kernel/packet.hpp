@@ -179,15 +179,22 @@ ARHOST_INLINE Int shift_right_unsigned(Int a, int bits) {
     return to;
 }
 
+// Reverses the bytes of each lane.
+#if defined(__SSE2__) && !defined(__SSSE3__) // SSE2 cannot shuffle bytes
+ARHOST_INLINE Int reversed_bytes(Int a) {
+    a = (shift_right_unsigned(a, 8) & Int(0x00ff00ff)) | ((a & Int(0x00ff00ff)) << Int(8));
+    return shift_right_unsigned(a, 16) | (a << Int(16));
+}
+#else
 typedef char BytePart __attribute__((vector_size(4 * width)));
 template <int... i> ARHOST_INLINE BytePart reversed_bytes(BytePart a, std::integer_sequence<int, i...>) {
     return __builtin_shufflevector(a, a, (i ^ 3)...);
 }
-// Reverses the bytes of each lane.
 ARHOST_INLINE Int reversed_bytes(Int a) {
     using Numbers = std::make_integer_sequence<int, 4 * width>;
     ARHOST_UNARY(Int, reinterpret_cast<IntPart>(reversed_bytes(reinterpret_cast<BytePart>(a_), Numbers{})));
 }
+#endif
 
 ARHOST_INLINE FloatPart sqrt_of(FloatPart a) {
 #if defined(__AVX512F__)

@@ -18,8 +18,7 @@ ARHOST_INLINE Bool is_mirrored(const Paths &paths) {
     return paths.pixel >= Int(mirrored_plane * tile_pixels);
 }
 
-// This bit of the pixel number marks rays from surfaces that the eye sees in mirrors and glass, and that the video
-// shows, towards virtual objects.
+// This bit of the pixel number marks rays towards virtual objects from filmed surfaces that secondary rays hit.
 constexpr int filmed_bit = plane_count * tile_pixels;
 static_assert((filmed_bit & (filmed_bit - 1)) == 0);
 
@@ -137,13 +136,10 @@ ARHOST_INLINE Bool mirrors_virtual(const PathScene &path, const Surface &s, Vec3
     return s.is_rough & (largest(schlick(s.specular, dot(s.normal, to_eye))) * share >= Float(1.0f / 256));
 }
 
-// Returns the lanes in which only virtual objects hide a lamp's or the environment's sample from a real surface.
+// Returns the lanes in which virtual objects hide a lamp's or the environment's sample from a real surface.
 ARHOST_INLINE Bool is_hidden(const Work &work, const Surface &s, const SourceSample &sample, Bool active) {
-    const Scene &scene = work.frame.scene;
     active = active & can_meet_virtual(work.frame.path, s.position, sample.to_light, sample.t_far);
-    if (any(active))
-        active = active & ~is_visible(scene, s, sample, Int(virtual_masks), active);
-    return any(active) ? is_visible(scene, s, sample, Int(real_masks), active) : active;
+    return any(active) ? active & ~is_visible(work.frame.scene, s, sample, Int(virtual_masks), active) : active;
 }
 
 // Returns the share of a real surface's light that virtual objects can shadow: 1 for dielectrics, unless they are
@@ -161,12 +157,14 @@ ARHOST_INLINE Vec3 photon_irradiance(const Work &work, const Paths &paths, const
 }
 
 // Returns how virtual objects change the irradiance of real surfaces, divided by π, by light samples: minus the light
-// that they hide, plus that of emissive ones. Calls use(sample, lanes) for each sample that they change.
+// that they hide, plus that of emissive ones. Calls use(sample, lanes) for each sample that they change and that no
+// real object hides.
 template <class Use>
 ARHOST_INLINE Vec3 sampled_change(const Work &work, const Paths &paths, const Surface &s, Float form_factors,
                                   int count, Bool active, Use use) {
     const Frame &frame = work.frame;
-    const bool bounces = paths.depth < frame.scene.max_depth;
+    const bool bounces = paths.depth < frame.scene.max_depth,
+               may_be_hidden = frame.scene.has_several_real || frame.scene.has_gloss;
     const SourcePairs pairs = source_pairs(work, paths);
     Vec3 change = black();
     for (int i = 0; i < count; ++i) {
@@ -174,10 +172,14 @@ ARHOST_INLINE Vec3 sampled_change(const Work &work, const Paths &paths, const Su
         const Float cosine = lambert(s.normal, sample.direction);
         const Bool facing = active & (cosine > Float(0.0f)) & (largest(sample.light) > Float(0.0f));
         const Bool real = facing & ~sample.is_virtual, emitter = facing & sample.is_virtual;
-        Bool changed = real;
+        Bool changed = bool_of(false);
         if (any(real)) {
-            changed = is_hidden(work, s, sample, real);
-            change = change - select(changed, sample.light * cosine, black());
+            const Bool hidden = is_hidden(work, s, sample, real);
+            changed = hidden;
+            if (may_be_hidden && any(hidden))
+                changed = is_visible(frame.scene, s, sample, Int(real_masks), hidden);
+            // The environment shows real objects, too. In front of a lamp, they already cast a shadow in the video.
+            change = change - select(changed | (hidden & sample.is_environment), sample.light * cosine, black());
         }
         if (any(emitter)) {
             const Bool visible = is_visible(frame.scene, s, sample, Int(all_masks), emitter);
@@ -195,9 +197,9 @@ ARHOST_INLINE Vec3 sampled_change(const Work &work, const Paths &paths, const Su
 }
 
 // Queues rays from real surfaces towards virtual objects. `throughput`: of the irradiance, divided by π.
-// `more_samples`: the number of the surface's light samples, divided by that of a surface of this depth.
+// `sample_ratio`: the number of the surface's light samples, divided by that of a surface of this depth.
 ARHOST_INLINE void enqueue_bounce(Work &work, const Paths &paths, const Surface &s, Float form_factors,
-                                  Vec3 throughput, float more_samples, Bool active) {
+                                  Vec3 throughput, float sample_ratio, Bool active) {
     if (paths.depth >= work.frame.scene.max_depth)
         return;
     const Bounce bounce = sample_virtual(work, paths, s, form_factors);
@@ -210,7 +212,7 @@ ARHOST_INLINE void enqueue_bounce(Work &work, const Paths &paths, const Surface 
         from.pixel = from.pixel | Int(filmed_bit);
     enqueue(work, from, s.position + s.geometric_normal * s.offset, bounce.direction,
             throughput * (cosine * Float(0.318309886f) / max(bounce.density, Float(1e-20f))), active,
-            Float(more_samples) / max(bounce.density, Float(1e-30f)));
+            Float(sample_ratio) / max(bounce.density, Float(1e-30f)));
 }
 
 // Returns the reciprocal of a real surface's irradiance without virtual objects, for the channels of its light.
@@ -337,11 +339,12 @@ ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, 
     // The eye sees these surfaces in mirrors and glass, so they get as many light samples as those that it sees
     // directly.
     const int count = source_samples(frame, paths.depth - 1);
-    Vec3 change = sampled_change(work, paths, s, form_factors, count, active, [](const SourceSample &, Bool) {}) +
-                  photon_irradiance(work, paths, s, active);
+    const Vec3 change =
+        sampled_change(work, paths, s, form_factors, count, active, [](const SourceSample &, Bool) {}) +
+        photon_irradiance(work, paths, s, active);
     add_radiance(work, paths, filmed.light * (white() + change * relative), active);
-    const float more_samples = static_cast<float>(count) / static_cast<float>(source_samples(frame, paths.depth));
-    enqueue_bounce(work, paths, s, form_factors, paths.throughput * filmed.light * relative, more_samples, active);
+    const float sample_ratio = static_cast<float>(count) / static_cast<float>(source_samples(frame, paths.depth));
+    enqueue_bounce(work, paths, s, form_factors, paths.throughput * filmed.light * relative, sample_ratio, active);
     return active;
 }
 

@@ -19,7 +19,7 @@ struct SourceSample {
     Vec3 direction; // unit vector in the direction of `to_light`
     Vec3 light;     // irradiance at perpendicular incidence, divided by π and by the number of samples
     Float density;  // expected number of samples per steradian; 0 if scattered rays cannot hit the light source
-    Bool is_virtual;
+    Bool is_virtual, is_environment;
 };
 
 ARHOST_INLINE Vec3 environment_light(const Frame &frame, Vec3 direction) {
@@ -61,7 +61,9 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const SourcePairs &pa
                                          int count) {
     const Frame &frame = work.frame;
     const PathScene &path = frame.path;
-    SourceSample sample{s.normal, Float(1.0f), s.normal, black(), Float(0.0f), bool_of(false)};
+    constexpr float before_source = 0.9999f; // shadow rays end before an emissive surface, or one that a lamp is in
+    SourceSample sample{s.normal,    Float(before_source), s.normal,      black(),
+                        Float(0.0f), bool_of(false),       bool_of(false)};
     if (path.source_count == 0)
         return sample;
     const Pair uv = pairs.point.pair(index, count);
@@ -124,7 +126,6 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const SourcePairs &pa
                               sample.light);
         sample.density = select(rectangle, density_over_area(squared, field(area_row), cosine), sample.density);
     }
-    constexpr float before_surface = 0.9999f; // the shadow ray ends before the emissive surface itself
     if (const Bool triangle = is(triangle_source); any(triangle)) {
         const Vec3 edge_1 = vector(axis_u_row), edge_2 = vector(axis_v_row);
         const Float along = sqrt(uv.u); // uniform over the triangle
@@ -136,7 +137,6 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const SourcePairs &pa
         sample.direction = select(triangle, direction, sample.direction);
         sample.light = select(triangle, emitted(density), sample.light);
         sample.density = select(triangle, density, sample.density);
-        sample.t_far = select(triangle, Float(before_surface), sample.t_far);
         sample.is_virtual = triangle;
     }
     if (const Bool ball = is(ball_source); any(ball)) {
@@ -153,7 +153,6 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const SourcePairs &pa
         sample.direction = select(outside, direction, sample.direction);
         sample.light = select(outside, emitted(density), sample.light);
         sample.density = select(outside, density, sample.density);
-        sample.t_far = select(outside, Float(before_surface), sample.t_far);
         sample.is_virtual = sample.is_virtual | ball;
     }
     if (const Bool environment = is(environment_source); any(environment)) {
@@ -168,6 +167,7 @@ ARHOST_INLINE SourceSample sample_source(const Work &work, const SourcePairs &pa
             select(environment, of_environment.intensity * (of_environment.irradiance * share), sample.light);
         sample.density = select(environment, of_environment.sampling_density, sample.density);
         sample.t_far = select(environment, Float(far_away), sample.t_far);
+        sample.is_environment = environment;
     }
     sample.density = sample.density * chance;
     return sample;

@@ -7,7 +7,7 @@
 
 // Pixel and throughput of 16 paths.
 struct Paths {
-    Int pixel;                // index of the pixel in the tile
+    Int pixel;                // number of the pixel in the tile, plus tile_pixels · its Plane
     std::int32_t first_pixel; // pixel of lane 0; valid for primary rays only, whose pixels are consecutive
     Vec3 throughput;
     std::uint32_t depth;   // number of bounces so far

@@ -77,6 +77,7 @@ void scatter_path(Path path, Surface s, vec3 direction, uint material, Random ra
 // ones. Adds the light of a catcher's gloss to `mirrored` and `covered`. `scatters`: whether a scattered ray follows;
 // `mirrors`: whether one of the gloss does.
 vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatters, bool mirrors, Random random) {
+    // The eye sees filmed surfaces in mirrors and glass, so they get as many samples as those that it sees directly.
     uint count = source_samples(receiver == FILMED_SURFACE ? depth - 1u : depth);
     float specular = receiver == LIT_SURFACE ? specular_chance(s, to_eye) : 0.0;
     float form_factors = receiver == LIT_SURFACE ? 0.0 : form_factors_of(s);
@@ -89,16 +90,18 @@ vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatte
             (hides && (!can_meet_virtual(s.position, source.to_light, source.t_max) ||
                        is_visible(s, source, OPAQUE_MASK | GLASS_MASK))))
             continue;
-        // Where a real object hides a light source, virtual ones change nothing. Light that passes through glass is not
-        // sampled: refracted rays and photons find it.
-        if (!is_visible(s, source, hides ? CATCHER_MASK | OCCLUDER_MASK : ALL_MASKS))
+        // Light that passes through glass is not sampled: refracted rays and photons find it.
+        bool is_open = (hides && frame.has_several_real == 0u && !has_gloss) ||
+                       is_visible(s, source, hides ? CATCHER_MASK | OCCLUDER_MASK : ALL_MASKS);
+        // The environment shows real objects, too. In front of a lamp, they already cast a shadow in the video.
+        if (!is_open && !(hides && source.is_environment))
             continue;
         float other_density = 0.0; // of scattered rays
-        if (scatters)
+        if (scatters && !hides)
             other_density = receiver == LIT_SURFACE ? scattering_density(s, to_eye, source.direction, specular)
                                                     : bounce_density(s, source.direction, form_factors);
         float weight = balance_weight(source.density, other_density);
-        if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough) {
+        if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough && is_open) {
             float density = mirrors ? scattering_density(s, to_eye, source.direction, 1.0) : 0.0;
             vec3 light = gloss(s, to_eye, source.direction) * source.light * balance_weight(source.density, density);
             if (hides)
@@ -133,7 +136,7 @@ vec3 bounded(vec3 rgb) {
 // Returns the light that a ray brings to its origin, without that of the rays it pushes. `is_bounce`: the ray comes from
 // a surface that the video shows, and brings light of virtual objects only.
 vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random random) {
-    bool is_covered = has_gloss && path.plane == COVERED_PLANE, is_mirrored = has_gloss && path.plane == MIRRORED_PLANE;
+    bool is_covered = has_gloss && path.plane == COVERED_PLANE, is_mirrored = has_gloss && path.plane == MIRRORED_PLANE && path.depth == 1u;
     bool is_hit = hit.object != NONE;
     vec3 sum = vec3(0.0);
     if (is_bounce && !is_hit)
@@ -147,7 +150,7 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
         if (is_bounce && s.is_real)
             return vec3(0.0);
     }
-    if (is_mirrored && path.depth == 1u) { // another ray finds what the virtual object covers, except lamps before the object
+    if (is_mirrored) { // another ray finds what the virtual object covers, except lamps before the object
         covered -= path.throughput * sum;
         sum = vec3(0.0);
         stack[stack_size] = path;
@@ -180,7 +183,7 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
     bool is_lit = materials[material].model != MIRROR && materials[material].model != GLASS;
     bool scatters = path.depth < frame.max_depth;
     vec3 relative = vec3(1.0), before = vec3(0.0); // relative: factor of the reflected light
-    if (is_lit && (receiver == LIT_SURFACE || has_gloss))
+    if (is_lit && (receiver != CATCHER_SURFACE || has_gloss))
         add_material(s, hit);
     if (receiver != LIT_SURFACE || is_covered)
         before = irradiance_without_objects(s);
@@ -194,7 +197,7 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
                                                                      max(path.inverse_density, 0.0))
                                              : 1.0);
     }
-    if (has_gloss && receiver != LIT_SURFACE && s.is_rough)
+    if (receiver != LIT_SURFACE && s.is_rough)
         relative *= shadowed_share(s);
     if (has_gloss && receiver == CATCHER_SURFACE && s.is_rough) {
         matt = s.diffuse * (vec3(1.0) - schlick(s.specular, dot(s.normal, -direction))) * before;

@@ -78,14 +78,14 @@ void push_bounce(Path path, Surface s, vec3 throughput, Random random) {
         remaining -= cone.share;
     }
     float density = bounce_density(s, direction, form_factors), cosine = dot(direction, s.normal);
-    float more_samples = 1.0;
+    float sample_ratio = 1.0; // of the surface's light samples to those of a surface of this depth
     if (path.depth > 0u) { // not a catcher, but a surface that the video shows
         path.plane |= FILMED_BIT;
-        more_samples = float(source_samples(path.depth - 1u)) / float(source_samples(path.depth));
+        sample_ratio = float(source_samples(path.depth - 1u)) / float(source_samples(path.depth));
     }
     if (density > 0.0 && cosine > 0.0 && dot(direction, s.geometric_normal) > 0.0)
         push(path, above(s), direction, throughput * (cosine * 0.318309886 / max(density, 1e-20)),
-             more_samples / max(density, 1e-30));
+             sample_ratio / max(density, 1e-30));
 }
 
 // The light of the current sample in MIRRORED_PLANE and COVERED_PLANE, and that of Sums.matt.

@@ -30,7 +30,7 @@ struct SourceSample {
     vec3 direction; // unit vector in the direction of `to_light`
     vec3 light;     // irradiance at perpendicular incidence, divided by π and by the number of samples
     float density;  // expected number of samples per steradian; 0 if scattered rays cannot hit the light source
-    bool is_virtual;
+    bool is_virtual, is_environment;
 };
 
 // Returns 1 − cosine of the half angle of the cone around a ball whose angular radius has this squared sine.
@@ -43,7 +43,8 @@ float density_in_cone(float slope) {
 
 // Returns light sample `index` of `count`. The samples are spread evenly over the light sources.
 SourceSample sample_source(Surface s, Random random, uint index, uint count) {
-    SourceSample result = SourceSample(s.normal, 1.0, s.normal, vec3(0.0), 0.0, false);
+    const float before_source = 0.9999; // shadow rays end before an emissive surface, or one that a lamp is in
+    SourceSample result = SourceSample(s.normal, before_source, s.normal, vec3(0.0), 0.0, false, false);
     if (frame.source_count == 0u)
         return result;
     uint source = 0u;
@@ -54,7 +55,6 @@ SourceSample sample_source(Surface s, Random random, uint index, uint count) {
     vec2 uv = path_pair(random, LIGHT_DIMENSION, index, count);
     uint type = uint(source_field(source, TYPE_ROW));
     float chance = source_field(source, CHANCE_ROW) * float(count), share = 1.0 / chance;
-    const float before_surface = 0.9999; // the shadow ray ends before the emissive surface itself
     if (type == TRIANGLE_SOURCE) {
         vec3 edge_1 = source_vector(source, AXIS_U_ROW), edge_2 = source_vector(source, AXIS_V_ROW);
         float along = sqrt(uv.x); // uniform over the triangle
@@ -84,14 +84,14 @@ SourceSample sample_source(Surface s, Random random, uint index, uint count) {
         else
             arriving = sample_background(s, uv, 1u);
         result.to_light = arriving.to_light;
-        result.t_max = arriving.t_max;
+        if (!(arriving.t_max < INFINITY))
+            result.t_max = INFINITY;
+        result.is_environment = source >= frame.light_count;
         result.light = arriving.intensity * (arriving.irradiance * share);
         result.density = arriving.sampling_density;
     }
-    if (result.is_virtual && result.density > 0.0) { // the radiance is known
+    if (result.is_virtual && result.density > 0.0) // the radiance is known
         result.light = source_vector(source, INTENSITY_ROW) * (irradiance_of_density(result.density) * share);
-        result.t_max = before_surface;
-    }
     result.density *= chance;
     result.direction = normalize(result.to_light);
     return result;

@@ -7,14 +7,13 @@ const uint OBJECT_PLANE = 0u, // radiance of virtual objects
     CHANGE_PLANE = 1u,        // change of a catcher's diffuse light
     MIRRORED_PLANE = 2u,      // light of virtual objects that a glossy catcher mirrors
     COVERED_PLANE = 3u;       // light that it mirrors only without them
-// This bit of Path::plane marks rays from surfaces that the eye sees in mirrors and glass, and that the video shows,
-// towards virtual objects.
+// This bit of Path::plane marks rays towards virtual objects from filmed surfaces that secondary rays hit.
 const uint FILMED_BIT = 4u;
 
 // A ray, and the throughput of the path from the pixel to this ray.
 struct Path {
     vec3 origin, direction, throughput;
-    // Reciprocal of the density per steradian of the last random direction. It is 0 if there is no such direction, and
+    // Reciprocal of the density per steradian of the last random direction, times `sample_ratio` of push_bounce(). It is 0 if there is no such direction, and
     // negative if mirrors or glass have reflected or refracted the path since.
     float inverse_density;
     uint depth; // number of bounces so far

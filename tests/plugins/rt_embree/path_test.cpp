@@ -337,6 +337,31 @@ TEST(PathIntegrator, VirtualObjectsChangeNothingWhereARealOneHidesTheLamp) {
     EXPECT_EQ(shadow(true, true), 1);
 }
 
+// A lamp in a window lies in the described wall. The wall is part of the surroundings.
+TEST(PathIntegrator, DescribedWallLeavesTheShadowsOfItsWindowAndOfTheSurroundings) {
+    const auto shadow = [](bool has_wall, bool has_window) {
+        SceneBuilder scene = table(path_settings(has_window ? 0 : 1));
+        if (has_wall)
+            scene.add_mesh("wall", quad({-90, 60, 0}, {90, 60, 0}, {90, 60, 180}, {-90, 60, 180}),
+                           diffuse(0.5f, 0.5f, 0.5f), ARHOST_ROLE_CATCHER);
+        if (has_window) {
+            arhost_light window = placed(ARHOST_LIGHT_RECTANGLE, {0, 60, 90}, 30000, ARHOST_FALLOFF_INVERSE_SQUARE);
+            set3(window.direction, 0, -1, 0);
+            set3(window.axis_u, 20, 0, 0);
+            set3(window.axis_v, 0, 0, 20);
+            scene.add_light(window);
+        }
+        scene.add_ball("ball", {0, 20, 40, 15}, diffuse(0, 0, 0));
+        return mean_at(rendered(std::move(scene), camera({0, -100, 20}, {0, 0, 0}, {0, 0, 1})), 100, 75,
+                       transmittance);
+    };
+    for (const bool has_window : {false, true}) {
+        const double expected = shadow(false, has_window);
+        EXPECT_LT(expected, 0.95) << has_window;
+        EXPECT_NEAR(shadow(true, has_window), expected, 0.005) << has_window;
+    }
+}
+
 // A table below a ball. The middle of the picture shows where the table mirrors the middle of the ball.
 constexpr glm::vec4 mirrored_ball(0, 60, 60, 20);
 SceneBuilder table_below_a_ball(const scene::Settings &settings, const arhost_material &of_table,

@@ -118,10 +118,9 @@ inline std::vector<std::string> instruction_sets() {
 #if defined(__x86_64__)
     if (__builtin_cpu_supports("avx2"))
         sets.emplace_back("avx2");
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__) // those builds have no AVX-512
-    if (__builtin_cpu_supports("avx512dq"))
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+        __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl"))
         sets.emplace_back("avx512");
-#endif
 #endif
     return sets;
 }

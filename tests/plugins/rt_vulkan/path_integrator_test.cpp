@@ -103,6 +103,14 @@ SceneBuilder desk_with_a_lit_cube() {
     builder.add_mesh("cube", moved(cube(10), {0, 0, 15}), emissive(2, 1, 0.5f));
     return builder;
 }
+// The ball mirrors a filmed desk and a filmed can of metal.
+SceneBuilder desk_in_a_mirror() {
+    SceneBuilder builder = desk(mirror(0.9f));
+    builder.add_mesh("can", moved(cube(8), {10, -40, 8}), metallic_roughness({0.6f, 0.6f, 0.6f}, 1, 0.3f),
+                     ARHOST_ROLE_OCCLUDER);
+    builder.add_light(bulb({-60, -40, 120}, 10, 5000, ARHOST_FALLOFF_INVERSE_SQUARE));
+    return builder;
+}
 // The desk mirrors the balls and hides the mirrored box and lamp behind them.
 SceneBuilder lacquered_desk() {
     SceneBuilder builder(path_settings(glm::vec3(0.4f)));
@@ -216,6 +224,12 @@ TEST_F(PathIntegrator, ChangesCatchersAsRtEmbreeDoes) {
 TEST_F(PathIntegrator, RelatesEmissiveObjectsToTheVideoAsRtEmbreeDoes) {
     const Video video(small);
     expect_rt_embrees_picture(&desk_with_a_lit_cube, from_the_side(small), {{"samples", "64"}}, "plain", &video);
+}
+
+TEST_F(PathIntegrator, ChangesFilmedSurfacesAsRtEmbreeDoes) {
+    const Video video(small);
+    expect_rt_embrees_picture(&desk_in_a_mirror, from_the_side(small), {{"samples", "64"}, {"light_samples", "4"}},
+                              "plain", &video);
 }
 
 TEST_F(PathIntegrator, ThrowsTheLightOfWideLampsAsRtEmbreeDoes) {
