@@ -270,7 +270,7 @@ Timing time_bare_shadow_rays(const Arena &arena, const rt_embree::Settings &sett
                 rays = packet.rays; // Embree writes tfar
                 if (traces)
                     rt_embree::occluded16(packet.valid, scene.view().root, packet_width, query, rays);
-                asm volatile("" : : "r"(&rays) : "memory"); // the copy is needed
+                asm volatile("" : : "r"(&rays) : "memory"); // keeps the compiler from omitting the copy
             }
         });
     };
