@@ -93,6 +93,22 @@ def table_material(kind):
                         0.5, 0.35, Scale=3.0, Detail=8.0, Distortion=0.6)
     if kind == "cloth":
         return textured(kind, "ShaderNodeTexChecker", (40, 40, 40), [(0.42, 0.38, 0.36), (0.30, 0.24, 0.26)], 0.95, 0.0, Scale=1.0)
+    if kind == "brick":
+        nodes = Nodes(kind).set(Roughness=0.9, Specular_IOR_Level=0.1)
+        brick = nodes.node("ShaderNodeTexBrick", Color1=rgba((0.42, 0.13, 0.07)), Color2=rgba((0.14, 0.05, 0.04)),
+                           Mortar=rgba((0.55, 0.52, 0.46)), Scale=1.0)
+        for key, value in (("Mortar Size", 0.005), ("Mortar Smooth", 0.1), ("Brick Width", 0.11), ("Row Height", 0.045)):
+            brick.inputs[key].default_value = value
+        nodes.link(position(nodes, (1.4, 0.9, 0.03)), brick.inputs["Vector"])
+        nodes.link(brick.outputs["Color"], nodes.surface.inputs["Base Color"])
+        return nodes.material
+    if kind == "granite":
+        return textured(kind, "ShaderNodeTexNoise", (1.4, 0.9, 0.03),
+                        [(0.01,) * 3, (0.02, 0.02, 0.022), (0.04, 0.04, 0.045), (0.25, 0.24, 0.22)], 0.12, 0.5, Scale=130.0,
+                        Detail=4.0, Roughness=0.7)
+    if kind == "plaster":
+        return textured(kind, "ShaderNodeTexNoise", (1, 1, 1), [(0.68, 0.68, 0.67), (0.76, 0.76, 0.75)], 0.5, 0.2, Scale=6.0,
+                        Detail=4.0)
     if kind == "stone":
         return textured(kind, "ShaderNodeTexNoise", (1, 1, 1), [(0.20, 0.20, 0.19), (0.34, 0.33, 0.31), (0.44, 0.43, 0.40)],
                         0.8, 0.15, Scale=60.0, Detail=10.0, Roughness=0.7)
@@ -182,6 +198,18 @@ def mug(centre, material):
     bpy.ops.mesh.primitive_torus_add(location=metres((centre[0] - 40, centre[1], 46)), rotation=(math.pi / 2, 0, 0),
                                      major_radius=24 * SCALE, minor_radius=6 * SCALE)
     placed(bpy.context.object, material, smooth=True)
+
+
+def tall_objects():
+    """A bottle, boxes and rods beside the virtual objects."""
+    cylinder(24, 190, (-140, 92, 95), plain("bottle", (0.06, 0.22, 0.45), 0.3, 0.5))
+    cylinder(10, 30, (-140, 92, 205), plain("cap", (0.8, 0.8, 0.8), 0.4, 0.4))
+    cuboid((60, 60, 170), (138, 96, 85), plain("box", (0.75, 0.32, 0.05), 0.6, 0.2), 24)
+    cuboid((120, 20, 130), (-10, 165, 65), plain("board", (0.05, 0.28, 0.12), 0.5, 0.3), -8)
+    for x in (-150, -130, -110):
+        cylinder(4, 150, (x, -75, 75), plain("rod", (0.6, 0.6, 0.62), 0.3, 0.5))
+    cylinder(16, 120, (140, -60, 60), Nodes("can").set(Base_Color=rgba((0.85, 0.85, 0.86)), Roughness=0.2, Metallic=1.0).material)
+    sphere(26, (205, 20, 26), plain("ball", (0.60, 0.05, 0.08), 0.3, 0.5))
 
 
 def real_objects():
@@ -301,7 +329,14 @@ def build(room, picture, folder, bunny):
     table.name = "table"
     plane((rooms.PAPER_MM,) * 2, (0, 0, 0.15), plain("paper", (0.78,) * 3, 0.9, 0.0)).name = "table paper"
     plane((rooms.MARKER_SIDE_MM,) * 2, (0, 0, 0.25), marker_material(os.path.join(folder, "marker.png"))).name = "table marker"
-    real_objects()
+    if room.tall_objects:
+        tall_objects()
+    else:
+        real_objects()
+    if room.near_walls:
+        behind, beside = (plain("near wall", colour, 0.7, 0.1) for colour in room.near_walls)
+        plane((1400, 700), (0, 275, 350), behind, (90, 0, 0))
+        plane((900, 700), (-285, 0, 350), beside, (90, 0, 90))
     if room.walls:
         wall = plain("wall", room.walls, 0.9, 0.0)
         for size, at, rotation in (((4000, 2600), (-2000, 500, 560), (90, 0, 90)), ((4000, 2600), (2000, 500, 560), (90, 0, 90)),
@@ -424,7 +459,7 @@ def main():
     for number, job in enumerate(jobs):
         name, picture, view = job.split("/")
         os.makedirs(os.path.join(folder, name), exist_ok=True)
-        build(next(each for each in rooms.ROOMS if each.name == name), picture, folder, bunny)
+        build(next(each for each in rooms.ROOMS + rooms.OTHER_ROOMS if each.name == name), picture, folder, bunny)
         moving = view.startswith("m")
         set_camera(rooms.cameras(moving)[int(view.lstrip("m"))], picture == "probe")
         set_quality(samples, 1 if picture == "again" else 0)

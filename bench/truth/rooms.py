@@ -34,6 +34,8 @@ class Room:
     table_roughness: float = 0  # of its gloss, as arhost gets it; 0: matt
     walls: tuple = ()  # albedo; (): outdoors
     sky: float = 0  # radiance of an overcast sky at the zenith
+    near_walls: tuple = ()  # albedo of walls beside and behind the objects, of which arhost is not told
+    tall_objects: bool = False  # real objects that reach the lamps
 
 
 @dataclass
@@ -76,6 +78,26 @@ ROOMS = [
     Room("overcast", "stone", [], sky=1.1),
     Room("spot", "lacquer", [Lamp("spot", (-330, 220, 900), 34, (1.0, 0.86, 0.68), (0, 20, 0), radius=40, outer_degrees=24,
                                   blend=0.35)], table_roughness=0.3, walls=(0.5, 0.48, 0.45)),
+]
+
+# Rooms for which nothing was adjusted: bricks in a hazy sun, dark granite close to coloured walls, a desk with many lamps.
+OTHER_ROOMS = [
+    Room("haze", "brick", [Lamp("sphere", (-65800, 40300, 63700), 630000, (1.0, 0.93, 0.82), radius=5240)], sky=0.45),
+    Room("counter", "granite", [Lamp("rectangle", (20, 150, 240), 0.9, (1.0, 0.95, 0.88), (20, 120, 0), size=(500, 14)),
+                                Lamp("spot", (270, -130, 420), 6.0, (1.0, 0.72, 0.42), (0, 10, 0), radius=14, outer_degrees=30,
+                                     blend=0.3)],
+         table_roughness=0.12, walls=(0.5, 0.48, 0.45), near_walls=((0.60, 0.12, 0.05), (0.10, 0.45, 0.20))),
+    Room("lab", "plaster", [Lamp("rectangle", (150, 200, 1650), 6.5, (0.92, 0.97, 1.0), (150, 200, 0), size=(1600, 600)),
+                            Lamp("sphere", (-290, 130, 150), 0.64, (1.0, 0.80, 0.55), radius=6),
+                            Lamp("sphere", (-120, 330, 240), 0.72, (0.75, 0.85, 1.0), radius=6),
+                            Lamp("sphere", (240, 190, 120), 0.56, (1.0, 0.55, 0.30), radius=6),
+                            Lamp("sphere", (310, -60, 200), 0.56, (0.85, 1.0, 0.80), radius=6),
+                            Lamp("spot", (-200, -150, 260), 1.44, (0.45, 0.60, 1.0), (-30, 0, 10), radius=5, outer_degrees=28,
+                                 blend=0.4),
+                            Lamp("spot", (120, 260, 300), 1.92, (1.0, 0.90, 0.75), (20, 20, 10), radius=5, outer_degrees=22,
+                                 blend=0.2),
+                            Lamp("sphere", (30, -260, 110), 0.32, (1.0, 0.35, 0.65), radius=4)],
+         walls=(0.78, 0.78, 0.76), tall_objects=True),
 ]
 
 # Azimuth (0: from the front) and elevation in degrees, distance in mm, of the camera from LOOK_AT.

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""How far a picture with virtual objects is from the truth: tools/bench truth [--quick] [--moving]. Method:
+"""How far a picture with virtual objects is from the truth: tools/bench truth [--quick] [--moving] [--other]. Method:
 bench/truth/README.md.
 
 Renders rooms with Blender Cycles, without virtual objects (plate) and with them (truth), lets arhost add the objects to
 the plate, and prints the differences. --quick: one view, 32 samples. --moving: also renders the moving camera's frames.
-Pictures are kept in build/truth; what exists is not rendered again. The first run takes hours on two cores."""
+--other: other rooms. Pictures are kept in build/truth; what exists is not rendered again. The first run takes hours on two
+cores."""
 import gzip
 import json
 import os
@@ -34,6 +35,7 @@ import measure  # noqa: E402
 import rooms  # noqa: E402
 import scenes  # noqa: E402
 
+ROOMS = rooms.OTHER_ROOMS if "--other" in sys.argv else rooms.ROOMS
 VIEWS = range(1 if QUICK else len(rooms.VIEWS))
 
 
@@ -133,15 +135,15 @@ def rows_of(room):
 
 def main():
     prepare()
-    jobs = [f"{room.name}/probe/0" for room in rooms.ROOMS]
+    jobs = [f"{room.name}/probe/0" for room in ROOMS]
     for view in VIEWS:
-        jobs += [f"{room.name}/{picture}/{view}" for room in rooms.ROOMS for picture in ("plate", "truth", "catcher", "again")]
+        jobs += [f"{room.name}/{picture}/{view}" for room in ROOMS for picture in ("plate", "truth", "catcher", "again")]
     render(jobs)
     if "--moving" in sys.argv:
-        render([f"{room.name}/{picture}/m{frame}" for frame in range(rooms.MOVING_FRAMES) for room in rooms.ROOMS
+        render([f"{room.name}/{picture}/m{frame}" for frame in range(rooms.MOVING_FRAMES) for room in ROOMS
                 for picture in ("plate", "truth")])
     results = {}
-    for room in rooms.ROOMS:
+    for room in ROOMS:
         rows = rows_of(room)
         truths = [measure.photo(load(room, "truth", view), room.name, view) for view in VIEWS]
         areas = [measure.areas(load(room, "plate", view), load(room, "truth", view),
