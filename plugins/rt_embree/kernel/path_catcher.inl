@@ -344,7 +344,11 @@ ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, 
         photon_irradiance(work, paths, s, active);
     add_radiance(work, paths, filmed.light * (white() + change * relative), active);
     const float sample_ratio = static_cast<float>(count) / static_cast<float>(source_samples(frame, paths.depth));
-    enqueue_bounce(work, paths, s, form_factors, paths.throughput * filmed.light * relative, sample_ratio, active);
+    // If the described light is weaker than that of the video, the surface must not reflect more than it receives.
+    const Vec3 reflectance = filmed.light * relative;
+    const Vec3 albedo{min(reflectance.x, Float(1.0f)), min(reflectance.y, Float(1.0f)),
+                      min(reflectance.z, Float(1.0f))};
+    enqueue_bounce(work, paths, s, form_factors, paths.throughput * albedo, sample_ratio, active);
     return active;
 }
 

@@ -212,7 +212,8 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
             mirrored += by_photons.mirrored;
     }
     if (receiver == FILMED_SURFACE) {
-        relative *= video;
+        // If the described light is weaker than that of the video, the surface must not reflect more than it receives.
+        relative = min(relative * video, vec3(1.0));
         scattered = video * (vec3(1.0) + scattered);
     }
     if (mirrors) // pushed first: when it is popped, the stack has space for the ray behind a virtual object

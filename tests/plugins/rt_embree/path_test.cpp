@@ -316,6 +316,19 @@ TEST(PathIntegrator, MirrorShowsTheLightOfVirtualObjectsOnTheFilmedTable) {
     expect_equal(std::move(bright), "1", 1);
 }
 
+TEST(PathIntegrator, FilmedTableReflectsNoMoreThanItReceives) {
+    const arhost_camera view = camera({0, -150, 100}, {0, 0, 0}, {0, 0, 1});
+    const Video video(view.intrinsics, 128);
+    SceneBuilder scene = table(path_settings(0.01f, 16));
+    scene.add_ball("ball", {0, 20, 20, 19}, mirror(1));
+    const LinearPicture picture = rendered(std::move(scene), view, {{"samples", "16"}}, 0, &video);
+    double brightest = 0;
+    for (std::uint32_t y = 0; y < picture.height; ++y)
+        for (std::uint32_t x = 0; x < picture.width; ++x)
+            brightest = std::max(brightest, double{picture.value(x, y, 0)});
+    EXPECT_LT(brightest, 5);
+}
+
 // The video shows the shadows of real objects.
 TEST(PathIntegrator, VirtualObjectsChangeNothingWhereARealOneHidesTheLamp) {
     const auto shadow = [](bool has_card, bool lamp_is_virtual) {
