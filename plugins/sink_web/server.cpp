@@ -220,23 +220,35 @@ Server::Server(Settings settings, NewestFrame &frame, HostControl &control)
 }
 
 Server::~Server() {
-    MHD_quiesce_daemon(daemon_); // the listening socket stays open for the next worker
     {
-        std::unique_lock lock(mutex_);
-        is_stopping_ = true;
-        for (Viewer *viewer : viewers_)
-            if (std::exchange(viewer->is_waiting, false))
-                MHD_resume_connection(viewer->connection);
-        while (!suspended_.empty()) {
-            const SharedRequest request = *suspended_.begin();
-            resume(request);
-        }
-        // The answer to `quit` may have arrived only now, and pages wait for the event `end`.
-        was_sent_.wait_for(lock, last_answer_time, [this] {
-            return unsent_answers_ == 0 && std::ranges::all_of(viewers_, &Viewer::shows_pictures);
-        });
+        const std::lock_guard lock(mutex_);
+        stop();
     }
     MHD_stop_daemon(daemon_);
+}
+
+void Server::end_run() {
+    std::unique_lock lock(mutex_);
+    has_run_ended_ = true;
+    stop();
+    // The answer to `quit` may have arrived only now, and pages wait for the event `end`.
+    was_sent_.wait_for(lock, last_answer_time, [this] {
+        return unsent_answers_ == 0 && std::ranges::all_of(viewers_, &Viewer::shows_pictures);
+    });
+}
+
+// Resumes all connections, because libmicrohttpd cannot stop while one is suspended. Needs the lock.
+void Server::stop() {
+    if (std::exchange(is_stopping_, true))
+        return;
+    MHD_quiesce_daemon(daemon_); // the listening socket stays open for the next worker
+    for (Viewer *viewer : viewers_)
+        if (std::exchange(viewer->is_waiting, false))
+            MHD_resume_connection(viewer->connection);
+    while (!suspended_.empty()) {
+        const SharedRequest request = *suspended_.begin();
+        resume(request);
+    }
 }
 
 void Server::tick() {
@@ -546,7 +558,7 @@ Server::Next Server::prepare_next(Viewer &viewer) {
     bool has_new = false;
     {
         const std::lock_guard lock(mutex_);
-        if (viewer.has_end || (is_stopping_ && viewer.shows_pictures()))
+        if (viewer.has_end || (is_stopping_ && (viewer.shows_pictures() || !has_run_ended_)))
             return Next::end;
         viewer.position = 0;
         if (is_stopping_) {

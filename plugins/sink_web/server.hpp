@@ -34,6 +34,10 @@ public:
     // frames and closes the connections of clients that exceed their time limit.
     void tick();
 
+    // Call when the run ends: the event `end` tells the pages. A server that is destroyed without this call only
+    // closes its connections, because its host was lost or restarts the plugin.
+    void end_run();
+
 private:
     using Clock = std::chrono::steady_clock;
     struct Callbacks; // callbacks of libmicrohttpd
@@ -46,6 +50,7 @@ private:
         Clock::time_point deadline;
     };
 
+    void stop();
     bool check(const Request &request);
     bool process(const SharedRequest &request);
     bool send_command(const SharedRequest &request);
@@ -79,7 +84,7 @@ private:
     HostControl &control_;
     MHD_Daemon *daemon_ = nullptr;
     std::mutex mutex_; // guards the following members
-    bool is_stopping_ = false, is_status_pending_ = false;
+    bool is_stopping_ = false, has_run_ended_ = false, is_status_pending_ = false;
     std::map<MHD_Connection *, Connection> connections_;
     std::set<Viewer *> viewers_;
     std::set<Download *> downloads_;

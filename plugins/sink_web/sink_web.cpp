@@ -58,7 +58,10 @@ public:
             debug_view_.is_on = changed.boolean(arhost::drawing::DebugView::key);
     }
 
-    void stop() { server_.reset(); }
+    void stop() {
+        server_->end_run();
+        server_.reset();
+    }
 
 private:
     [[noreturn]] static void fail(const std::string &message) {

@@ -181,6 +181,10 @@ private:
             value.integer = std::stoll(text);
         else if (declared.type == ARHOST_OPTION_REAL)
             value.real = std::stod(text);
+        else if (declared.type == ARHOST_OPTION_LISTEN) { // "DESCRIPTOR ADDRESS", or "" for no socket
+            value.integer = text.empty() ? -1 : std::stoll(text);
+            value.text += text.find(' ') + 1;
+        }
         return value;
     }
     static PluginUnderTest &self(const arhost_host *host) { return *static_cast<PluginUnderTest *>(host->context); }

@@ -7,6 +7,7 @@
 #include "sink_under_test.hpp"
 #include "waiting.hpp"
 
+#include "base/listening_socket.hpp"
 #include "base/unique_fd.hpp"
 
 #include <arhost/control.h>
@@ -213,6 +214,20 @@ TEST(SinkWeb, SendsThePosesOfEachFrameAndTheEndAsEvents) {
     run.expect_quit();
     EXPECT_THAT(events.receive_all(), HasSubstr("event: end\ndata: {}\n\n"));
     EXPECT_THAT(end.receive_all(), AllOf(HasSubstr("event: end\n"), testing::Not(HasSubstr("event: frame\n"))));
+}
+
+// A worker that loses its host destroys the plugin without stopping it.
+TEST(SinkWeb, ALostHostIsNoEndOfTheRun) {
+    arhost::base::ListeningSocket socket("127.0.0.1:0");
+    HttpClient end(static_cast<std::uint16_t>(std::stoi(socket.address().substr(socket.address().rfind(':') + 1))));
+    {
+        arhost::test::SinkUnderTest sink("sink_web",
+                                         {{"listen", std::to_string(socket.fd()) + " " + socket.address()}});
+        sink.start_and_write(160, 120, 0, 1);
+        end.send("GET /api/events?only=end HTTP/1.1\r\nHost: localhost\r\n\r\n");
+        EXPECT_THAT(end.receive_to("\r\n\r\n"), StartsWith("HTTP/1.1 200"));
+    }
+    EXPECT_THAT(end.receive_all(), testing::Not(HasSubstr("event: end")));
 }
 
 TEST(SinkWeb, EventsHaveTheLimitsOfViewers) {
