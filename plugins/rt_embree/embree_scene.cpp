@@ -137,7 +137,7 @@ void copy3(const float *from, float *to) {
 } // namespace
 
 EmbreeScene::EmbreeScene(const arhost_scene &arena, unsigned threads, bool robust, const arhost::Host &host)
-    : arena_(arena), host_(host), robust_(robust),
+    : arena_(arena), host_(host), robust_(robust), static_quality_(static_quality(arena)),
       device_(rtcNewDevice(("threads=" + std::to_string(threads) + ",set_affinity=0").c_str())),
       srgb8_(std::make_unique<arhost::shading::Srgb8Table>(arhost::shading::make_srgb8_table())) {
     check();
@@ -329,8 +329,7 @@ SceneHandle EmbreeScene::new_scene(RTCSceneFlags flags) const {
     check();
     rtcSetSceneFlags(scene.get(),
                      static_cast<RTCSceneFlags>(flags | (robust_ ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE)));
-    rtcSetSceneBuildQuality(scene.get(),
-                            flags & RTC_SCENE_FLAG_DYNAMIC ? RTC_BUILD_QUALITY_MEDIUM : static_quality(arena_));
+    rtcSetSceneBuildQuality(scene.get(), flags & RTC_SCENE_FLAG_DYNAMIC ? RTC_BUILD_QUALITY_MEDIUM : static_quality_);
     return scene;
 }
 

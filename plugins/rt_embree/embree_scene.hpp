@@ -73,6 +73,7 @@ private:
     const arhost_scene &arena_;
     arhost::Host host_;
     bool robust_;
+    RTCBuildQuality static_quality_;                      // of objects that do not change
     std::vector<std::unique_ptr<HitFilter>> hit_filters_; // on the heap: Embree holds their addresses
     DeviceHandle device_;
     // The Embree scene of a transformed object; shared by objects with the same geometry and filter.

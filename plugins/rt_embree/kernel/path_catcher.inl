@@ -142,6 +142,20 @@ ARHOST_INLINE Bool is_hidden(const Work &work, const Surface &s, const SourceSam
     return any(active) ? active & ~is_visible(work.frame.scene, s, sample, Int(virtual_masks), active) : active;
 }
 
+// Returns the lanes in which the first object towards the sampled light is virtual.
+ARHOST_INLINE Bool is_virtual_first(const Scene &scene, const Surface &s, const SourceSample &sample, Bool active) {
+    RTCRayHit16 rays;
+    set_ray(rays.ray, s.position + s.lift + s.geometric_normal * s.offset, sample.to_light, sample.t_far,
+            Int(all_masks));
+    const Bool hit = trace(scene, scene.root, make_query(Coherence::incoherent), rays, active);
+    Bool first = bool_of(false);
+    for_each_object(scene, rays.hit, hit, [&](const Object &object, Bool here) {
+        if (object.role == ARHOST_ROLE_VIRTUAL)
+            first = first | here;
+    });
+    return first;
+}
+
 // Returns the share of a real surface's light that virtual objects can shadow: 1 for dielectrics, unless they are
 // black. Metals only mirror.
 ARHOST_INLINE Float shadowed_share(const Surface &s) {
@@ -178,8 +192,12 @@ ARHOST_INLINE Vec3 sampled_change(const Work &work, const Paths &paths, const Su
             changed = hidden;
             if (may_be_hidden && any(hidden))
                 changed = is_visible(frame.scene, s, sample, Int(real_masks), hidden);
-            // The environment shows real objects, too. In front of a lamp, they already cast a shadow in the video.
-            change = change - select(changed | (hidden & sample.is_environment), sample.light * cosine, black());
+            // In front of a lamp, real objects already cast a shadow in the video. The environment shows them, too, so
+            // that virtual objects before them hide its light.
+            Bool darkened = changed;
+            if (const Bool unclear = hidden & ~changed & sample.is_environment; any(unclear))
+                darkened = darkened | is_virtual_first(frame.scene, s, sample, unclear);
+            change = change - select(darkened, sample.light * cosine, black());
         }
         if (any(emitter)) {
             const Bool visible = is_visible(frame.scene, s, sample, Int(all_masks), emitter);
@@ -215,13 +233,15 @@ ARHOST_INLINE void enqueue_bounce(Work &work, const Paths &paths, const Surface 
             Float(sample_ratio) / max(bounce.density, Float(1e-30f)));
 }
 
-// Returns the reciprocal of a real surface's irradiance without virtual objects, for the channels of its light.
-ARHOST_INLINE Vec3 reciprocal(const Frame &frame, Vec3 irradiance) {
+// Returns the ratio of the relative change of a real surface's light to the change of its irradiance. `irradiance`:
+// without virtual objects.
+ARHOST_INLINE Vec3 relative_change(const Frame &frame, const Surface &s, Vec3 irradiance) {
     const float least = frame.path.least_irradiance;
-    const auto inverse = [least](Float a) __attribute__((always_inline)) {
-        return least > 0 ? Float(1.0f) / max(a, Float(least)) : Float(0.0f);
+    const Float share = s.any_rough ? shadowed_share(s) : Float(1.0f);
+    const auto ratio = [&](Float a) __attribute__((always_inline)) {
+        return least > 0 ? share / max(a, Float(least)) : Float(0.0f);
     };
-    return {inverse(irradiance.x), inverse(irradiance.y), inverse(irradiance.z)};
+    return {ratio(irradiance.x), ratio(irradiance.y), ratio(irradiance.z)};
 }
 
 // Adds the change of a catcher's light, relative to its light without virtual objects. Of its gloss, adds the light
@@ -231,11 +251,9 @@ ARHOST_INLINE void change_catcher(Work &work, const Paths &paths, const RTCRayHi
     const Surface s = surface_at(frame.scene, rays, active);
     const Vec3 before = irradiance_without_objects(frame, s);
     Paths relative = paths;
-    relative.throughput = reciprocal(frame, before);
+    relative.throughput = relative_change(frame, s, before);
     const Bool glossy = active & s.is_rough;
     const bool any_glossy = s.any_rough && any(glossy);
-    if (any_glossy)
-        relative.throughput = relative.throughput * shadowed_share(s);
     const Vec3 to_eye = -normalize(direction_of(rays.ray));
     Bool mirrors = bool_of(false);
     if (frame.scene.max_depth > 0 && any_glossy)
@@ -334,7 +352,7 @@ ARHOST_INLINE Bool add_filmed(Work &work, const Surface &s, const Paths &paths, 
     active = filmed.inside;
     if (!any(active))
         return active;
-    const Vec3 relative = reciprocal(frame, irradiance_without_objects(frame, s)) * shadowed_share(s);
+    const Vec3 relative = relative_change(frame, s, irradiance_without_objects(frame, s));
     const Float form_factors = form_factors_of(frame.path, s);
     // The eye sees these surfaces in mirrors and glass, so they get as many light samples as those that it sees
     // directly.

@@ -25,7 +25,7 @@ ARHOST_INLINE Pair photon_pair(Int number, int dimension) {
 struct EmittedPhotons {
     Vec3 origin, direction, power;
     Bool active;
-    Bool grows; // lamps without falloff: the power is to be multiplied by the squared distance to the first surface
+    Bool grows; // lamps without falloff: the power is to be multiplied by the square of the distance travelled
 };
 
 ARHOST_INLINE EmittedPhotons emit_photons(const Frame &frame, Int number, Bool active) {
@@ -54,11 +54,15 @@ ARHOST_INLINE EmittedPhotons emit_photons(const Frame &frame, Int number, Bool a
     const Vec3 lamp_direction = vector(direction_row), position = vector(position_row);
     const Pair uv = photon_pair(number, origin_dimension), aim = photon_pair(number, aim_dimension);
 
-    // The point of the lamp, and the cone from there to the sphere.
+    // The point of the lamp, and the cone from there to the sphere. From its centre, any axis is right.
+    const auto axis = [](Vec3 to) __attribute__((always_inline)) {
+        return select(dot(to, to) > Float(1e-12f), to, Vec3{Float(0.0f), Float(0.0f), Float(1e-6f)});
+    };
     const Float radius = field(radius_row);
     Vec3 origin = position;
     if (any(radius > Float(0.0f)))
-        origin = select(radius > Float(0.0f), centre + vector_to_disc(position - centre, radius, uv.u, uv.v), origin);
+        origin =
+            select(radius > Float(0.0f), centre + vector_to_disc(axis(position - centre), radius, uv.u, uv.v), origin);
     if (any(rectangle))
         origin = select(rectangle, vector_to_rectangle(position, vector(axis_u_row), vector(axis_v_row), uv.u, uv.v),
                         origin);
@@ -70,7 +74,7 @@ ARHOST_INLINE EmittedPhotons emit_photons(const Frame &frame, Int number, Bool a
     };
     const Vec3 to_centre = centre - origin;
     const Float squared = dot(to_centre, to_centre);
-    Vec3 direction = cone_direction(normalize(to_centre), slope_of(sphere_radius, squared), aim.u, aim.v);
+    Vec3 direction = cone_direction(normalize(axis(to_centre)), slope_of(sphere_radius, squared), aim.u, aim.v);
     if (any(directional)) { // parallel light, from a disc outside of the scene
         const Vec3 disc = vector_to_disc(-lamp_direction, sphere_radius, aim.u, aim.v) + lamp_direction;
         origin = select(directional, centre + disc - lamp_direction * Float(caustics.scene_extent), origin);
@@ -113,6 +117,7 @@ ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, 
     Vec3 origin = emitted.origin, direction = emitted.direction, power = emitted.power;
     Bool flying = emitted.active, arrived = bool_of(false);
     Vec3 position = black(), arriving = black();
+    Float travelled(0.0f);
     for (std::uint32_t bounce = 0; bounce <= scene.max_depth && any(flying); ++bounce) {
         RTCRayHit16 rays;
         set_ray(rays.ray, origin, direction, Float(far_away), Int(all_masks));
@@ -120,8 +125,7 @@ ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, 
         if (!any(flying))
             break;
         const Surface s = surface_at(scene, rays, flying);
-        if (bounce == 0)
-            power = select(emitted.grows, power * (s.distance * s.distance), power);
+        travelled = travelled + select(flying, s.distance, Float(0.0f));
         const Float choice = photon_pair(number, first_bounce_dimension + static_cast<int>(bounce)).u;
         Bool specular = bool_of(false);
         Vec3 next_origin = origin, next_direction = direction;
@@ -168,6 +172,7 @@ ARHOST_INLINE void trace_photon_packet(const Frame &frame, std::uint32_t first, 
         origin = next_origin;
         direction = normalize(next_direction);
     }
+    power = select(emitted.grows & arrived, power * (travelled * travelled), power);
     alignas(64) float rows[9][lanes];
     const Float values[] = {position.x,
                             position.y,

@@ -74,13 +74,14 @@ void scatter_path(Path path, Surface s, vec3 direction, uint material, Random ra
 
 // Returns the light of sampled light sources that a lit surface reflects to the eye. For a real surface, returns the
 // change of its irradiance (divided by π) by virtual objects: minus the light that they hide, plus that of emissive
-// ones. Adds the light of a catcher's gloss to `mirrored` and `covered`. `scatters`: whether a scattered ray follows;
-// `mirrors`: whether one of the gloss does.
-vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatters, bool mirrors, Random random) {
+// ones. Adds the light of a catcher's gloss to `mirrored` and `covered`. `form_factors`: of
+// the virtual objects, for a real surface. `scatters`: whether a scattered ray follows; `mirrors`: whether one of the
+// gloss does.
+vec3 sampled_light(int receiver, Surface s, float form_factors, vec3 to_eye, uint depth, bool scatters, bool mirrors,
+                   Random random) {
     // The eye sees filmed surfaces in mirrors and glass, so they get as many samples as those that it sees directly.
     uint count = source_samples(receiver == FILMED_SURFACE ? depth - 1u : depth);
     float specular = receiver == LIT_SURFACE ? specular_chance(s, to_eye) : 0.0;
-    float form_factors = receiver == LIT_SURFACE ? 0.0 : form_factors_of(s);
     vec3 sum = vec3(0.0);
     for (uint i = 0u; i < count; ++i) {
         SourceSample source = sample_source(s, random, i, count);
@@ -93,8 +94,9 @@ vec3 sampled_light(int receiver, Surface s, vec3 to_eye, uint depth, bool scatte
         // Light that passes through glass is not sampled: refracted rays and photons find it.
         bool is_open = (hides && frame.has_several_real == 0u && !has_gloss) ||
                        is_visible(s, source, hides ? CATCHER_MASK | OCCLUDER_MASK : ALL_MASKS);
-        // The environment shows real objects, too. In front of a lamp, they already cast a shadow in the video.
-        if (!is_open && !(hides && source.is_environment))
+        // In front of a lamp, real objects already cast a shadow in the video. The environment shows them, too, so that
+        // virtual objects before them hide its light.
+        if (!is_open && !(hides && source.is_environment && is_virtual_first(s, source)))
             continue;
         float other_density = 0.0; // of scattered rays
         if (scatters && !hides)
@@ -203,11 +205,12 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
         matt = s.diffuse * (vec3(1.0) - schlick(s.specular, dot(s.normal, -direction))) * before;
         mirrors = scatters && mirrors_virtual(s, -direction);
     }
+    float form_factors = receiver == LIT_SURFACE ? 0.0 : form_factors_of(s);
     vec3 scattered = vec3(0.0);
     if (receiver != LIT_SURFACE || is_lit) {
         PhotonLight by_photons = photon_light(receiver != LIT_SURFACE, s, -direction, random);
-        scattered = (sampled_light(receiver, s, -direction, path.depth, scatters, mirrors, random) + by_photons.light) *
-                    relative;
+        scattered = relative * (by_photons.light + sampled_light(receiver, s, form_factors, -direction, path.depth,
+                                                                 scatters, mirrors, random));
         if (receiver == CATCHER_SURFACE) // rays of the gloss do not see lamps behind mirrors and glass
             mirrored += by_photons.mirrored;
     }
@@ -219,7 +222,7 @@ vec3 light_along(Path path, bool is_bounce, Ray ray, Hit hit, int stage, Random 
     if (mirrors) // pushed first: when it is popped, the stack has space for the ray behind a virtual object
         push_mirrored(path, s, -direction, random);
     if (scatters && receiver != LIT_SURFACE && largest(relative) > 0.0)
-        push_bounce(path, s, path.throughput * relative, random);
+        push_bounce(path, s, form_factors, path.throughput * relative, random);
     else if (scatters && receiver == LIT_SURFACE)
         scatter_path(path, s, direction, material, random);
     return sum + scattered;

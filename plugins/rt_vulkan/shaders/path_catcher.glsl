@@ -61,8 +61,7 @@ float bounce_density(Surface s, vec3 direction, float form_factors) {
 }
 
 // Pushes a ray from a real surface towards the virtual objects. `throughput`: of its irradiance, divided by π.
-void push_bounce(Path path, Surface s, vec3 throughput, Random random) {
-    float form_factors = form_factors_of(s);
+void push_bounce(Path path, Surface s, float form_factors, vec3 throughput, Random random) {
     vec2 choice = path_pair(random, CHOICE_DIMENSION, 0u, 1u), uv = path_pair(random, SCATTER_DIMENSION, 0u, 1u);
     if (!(choice.x < bounce_chance(form_factors)))
         return;

@@ -104,6 +104,13 @@ bool is_visible(Surface s, SourceSample source, uint mask) {
     return trace(Ray(s.position + lift, to_light, source.t_max, mask), true, false).object == NONE;
 }
 
+// Returns whether the first object towards a light source is virtual.
+bool is_virtual_first(Surface s, SourceSample source) {
+    Hit hit = trace(Ray(s.position + s.lift + s.geometric_normal * s.offset, source.to_light, source.t_max, ALL_MASKS),
+                    false, false);
+    return hit.object != NONE && objects[hit.object].role == VIRTUAL;
+}
+
 // Expected number of light samples per steradian, at the previous vertex of the path, of an emissive surface that the
 // ray hits. `depth`: number of bounces of the path.
 float density_of_emitter(Surface s, Hit hit, vec3 direction, uint depth) {

@@ -42,10 +42,15 @@ float density_of_photons(uint lamp, vec3 origin, vec3 direction, uint aimed_at) 
     return density;
 }
 
+// Returns the vector to a sphere's centre; from the centre, any vector of 1e-6 mm.
+vec3 axis_to_centre(vec3 to) {
+    return dot(to, to) > 1e-12 ? to : vec3(0.0, 0.0, 1e-6);
+}
+
 // Light that leaves a lamp towards a mirror or glass.
 struct EmittedPhoton {
     vec3 origin, direction, power; // the power is 0 if the lamp sends no light in the direction
-    bool grows; // a lamp without falloff: the power is to be multiplied by the squared distance to the first surface
+    bool grows; // a lamp without falloff: the power is to be multiplied by the square of the distance travelled
 };
 
 EmittedPhoton emit_photon(uint number) {
@@ -63,9 +68,9 @@ EmittedPhoton emit_photon(uint number) {
         if (type == RECTANGLE_LIGHT)
             origin = vector_to_rectangle(origin, lights[lamp].axis_u, lights[lamp].axis_v, uv.x, uv.y);
         else if (is_area_light(lamp))
-            origin = sphere.xyz + vector_to_disc(origin - sphere.xyz, lights[lamp].radius, uv.x, uv.y);
+            origin = sphere.xyz + vector_to_disc(axis_to_centre(origin - sphere.xyz), lights[lamp].radius, uv.x, uv.y);
         vec3 to_centre = sphere.xyz - origin;
-        direction = cone_direction(normalize(to_centre), slope_of_target(sphere, to_centre), aim.x, aim.y);
+        direction = cone_direction(normalize(axis_to_centre(to_centre)), slope_of_target(sphere, to_centre), aim.x, aim.y);
     }
     float density = density_of_photons(lamp, origin, direction, chosen);
     float share = density > 0.0 ? 1.0 / max(density * float(frame.photon_count), 1e-30) : 0.0;
@@ -91,14 +96,14 @@ void trace_photon(uvec2 position) {
     uint number = frame.first_photon + photon;
     EmittedPhoton emitted = emit_photon(number);
     vec3 power = emitted.power;
+    float travelled = 0.0;
     Ray ray = Ray(emitted.origin, emitted.direction, INFINITY, ALL_MASKS);
     for (uint bounce = 0u; bounce <= frame.max_depth && largest(power) > 0.0; ++bounce) {
         Hit hit = trace(ray, false, false);
         if (hit.object == NONE)
             break;
         Surface s = surface_at(ray, hit, true);
-        if (bounce == 0u && emitted.grows)
-            power *= s.distance * s.distance;
+        travelled += s.distance;
         uint material = objects[hit.object].material;
         float choice = photon_pair(number, FIRST_BOUNCE_DIMENSION + bounce).x;
         if (has_glass && materials[material].model == GLASS) {
@@ -123,6 +128,8 @@ void trace_photon(uvec2 position) {
         }
         if (bounce == 0u)
             break;
+        if (emitted.grows)
+            power *= travelled * travelled;
         write_photon(photon, s.position, ray.direction, power * (1.0 / max(1.0 - chance, 1e-6)));
         return;
     }

@@ -160,12 +160,36 @@ TEST(PathIntegrator, GlassFocusesTheLightOfALampOntoACatcher) {
     EXPECT_GT(brightest, 4);
 }
 
+// All light of a lamp in the middle of a glass ball leaves the ball without refraction.
+TEST(PathIntegrator, GlassAroundALampChangesNothing) {
+    for (const float radius : {0.0f, 2.0f}) {
+        SceneBuilder scene = table(path_settings(0, 16));
+        scene.add_light(radius > 0 ? bulb({0, 0, 60}, radius, 1e4f, ARHOST_FALLOFF_INVERSE_SQUARE)
+                                   : light(0, 0, 60, 1e4f, ARHOST_FALLOFF_INVERSE_SQUARE));
+        scene.add_ball("ball", {0, 0, 60, 20}, glass_of());
+        const LinearPicture picture = rendered(std::move(scene), camera({0, -150, 30}, {0, -40, 0}, {0, 0, 1}),
+                                               {{"samples", "16"}, {"photons", "200000"}});
+        EXPECT_NEAR(mean_at(picture, 100, 75, transmittance, 8), 1, 0.03) << radius;
+    }
+}
+
 // A pane of glass, 4 mm thick, at the height of 60 mm.
-void add_pane(SceneBuilder &scene, float roughness, float side = 200) {
+void add_pane(SceneBuilder &scene, float roughness, float side = 200, float index = 1.5f) {
     scene::TriangleMesh pane = cube(0.5f);
     for (glm::vec3 &position : pane.positions)
         position = {position.x * side, position.y * side, position.z * 4 + 60};
-    scene.add_mesh("pane", pane, glass_of(1.5f, roughness), ARHOST_ROLE_VIRTUAL, glm::mat4x3(1));
+    scene.add_mesh("pane", pane, glass_of(index, roughness), ARHOST_ROLE_VIRTUAL, glm::mat4x3(1));
+}
+
+TEST(PathIntegrator, GlassOfIndexOneChangesNoLamp) {
+    for (const arhost_falloff falloff : {ARHOST_FALLOFF_NONE, ARHOST_FALLOFF_INVERSE_SQUARE}) {
+        SceneBuilder scene = table(path_settings(0, 16));
+        scene.add_light(light(0, 0, 100, falloff == ARHOST_FALLOFF_NONE ? 1 : 1e4f, falloff));
+        add_pane(scene, 0, 200, 1);
+        const LinearPicture picture = rendered(std::move(scene), camera({0, -100, 50}, {0, 0, 0}, {0, 0, 1}),
+                                               {{"samples", "16"}, {"photons", "65536"}});
+        EXPECT_NEAR(mean_at(picture, 100, 75, transmittance, 8), 1, 0.02) << falloff;
+    }
 }
 
 // A pane with parallel faces shifts the light, and reflects twice F = 4 % of it, with the reflections inside
@@ -373,6 +397,15 @@ TEST(PathIntegrator, DescribedWallLeavesTheShadowsOfItsWindowAndOfTheSurrounding
         EXPECT_LT(expected, 0.95) << has_window;
         EXPECT_NEAR(shadow(true, has_window), expected, 0.005) << has_window;
     }
+}
+
+TEST(PathIntegrator, BallBehindADescribedWallDoesNotDarkenTheTableBeforeIt) {
+    SceneBuilder scene = table(path_settings(1));
+    scene.add_mesh("wall", quad({-200, 20, 0}, {200, 20, 0}, {200, 20, 300}, {-200, 20, 300}),
+                   diffuse(0.5f, 0.5f, 0.5f), ARHOST_ROLE_OCCLUDER);
+    scene.add_ball("ball", {0, 60, 40, 30}, diffuse(0, 0, 0));
+    const LinearPicture picture = rendered(std::move(scene), camera({0, -100, 60}, {0, 0, 0}, {0, 0, 1}));
+    EXPECT_EQ(mean_at(picture, 100, 75, transmittance), 1);
 }
 
 // A table below a ball. The middle of the picture shows where the table mirrors the middle of the ball.

@@ -164,7 +164,9 @@ SceneBuilder caustics_of_wide_lamps() {
 }
 SceneBuilder caustics_of_small_lamps() {
     SceneBuilder builder = caustics();
-    builder.add_light(coloured(bulb({40, -40, 100}, 1, 8000, ARHOST_FALLOFF_INVERSE_SQUARE), 1, 0, 0));
+    for (const glm::vec3 &position :
+         {glm::vec3(40, -40, 100), glm::vec3(-15, -10, 18)}) // the latter in the glass ball
+        builder.add_light(coloured(bulb(position, 1, 8000, ARHOST_FALLOFF_INVERSE_SQUARE), 1, 0, 0));
     builder.add_light(coloured(light(-20, -60, 80, 1), 0, 1, 0));
     builder.add_light(coloured(sun(-0.6f, 0, -0.8f), 0, 0, 1));
     return builder;
