@@ -151,9 +151,9 @@ void environment(Context &context) {
                       [](std::uint32_t, std::uint32_t) {
                           return Video::Rgb{220, 188, 137};
                       });
-    // srgb_decode() of 220, 188 and 137, divided by 255.
-    expect_scale(&video, {0.716f, 0.503f, 0.250f},
-                 "an environment that follows the video does not have its mean colour");
+    // srgb_decode() of 220, 188 and 137, divided by 255: 0.716, 0.503 and 0.250. Their luminance is 0.530.
+    expect_scale(&video, {0.623f, 0.517f, 0.390f},
+                 "an environment that follows the video does not have half the saturation of its mean colour");
 }
 
 constexpr const char *gate = "raytracer.render";
@@ -164,8 +164,10 @@ constexpr Test tests[] = {
      formats},
     {"raytracer.video-frame", "An image depends on the video of its own request only.", gate, 20s, own_frame},
     {"raytracer.video-environment",
-     "Environments that follow the video are multiplied by its mean colour, or by 0.18 without video.", gate, 20s,
-     environment},
+     "Environments that follow the video are multiplied by its mean colour with half the saturation, or by 0.18 "
+     "without "
+     "video.",
+     gate, 20s, environment},
 };
 
 } // namespace

@@ -106,7 +106,12 @@ std::array<float, 3> environment_scale(const arhost_environment &environment, co
     std::array<float, 3> scale{1, 1, 1};
     if (environment.follows_video) {
         constexpr float mid_grey = 0.18f;
-        scale = video ? video->mean() : std::array{mid_grey, mid_grey, mid_grey};
+        scale = {mid_grey, mid_grey, mid_grey};
+        if (video) {
+            const std::array<float, 3> mean = video->mean();
+            const float luminance = 0.2126f * mean[0] + 0.7152f * mean[1] + 0.0722f * mean[2];
+            std::ranges::transform(mean, scale.begin(), [&](float each) { return (each + luminance) / 2; });
+        }
     }
     for (float &each : scale)
         each *= environment.intensity;

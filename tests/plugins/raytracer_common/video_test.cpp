@@ -51,7 +51,9 @@ TEST(EnvironmentScale, FollowsTheVideoOrIsMidGrey) {
     arhost_environment environment{};
     environment.intensity = 2;
     environment.follows_video = 1;
-    EXPECT_THAT(environment_scale(environment, &video), ElementsAre(2, 1, 1));
+    // The mean is (1, 0.5, 0.5), its luminance 0.6063.
+    EXPECT_THAT(environment_scale(environment, &video),
+                ElementsAre(FloatNear(1.6063f, 1e-4f), FloatNear(1.1063f, 1e-4f), FloatNear(1.1063f, 1e-4f)));
     EXPECT_THAT(environment_scale(environment, nullptr), ElementsAre(0.36f, 0.36f, 0.36f));
 }
 

@@ -246,8 +246,9 @@ typedef struct arhost_environment {
     uint32_t texture;                /* index, RGBA32F; ARHOST_NONE: no environment */
     float intensity;                 /* multiplies the texels */
     float environment_from_world[9]; /* rotation, column-major 3×3 */
-    /* Non-zero: the texels are also multiplied by the mean colour of the video under the overlay, in linear light, or
-     * by 0.18 (mid grey) if the ray tracer does not get the video. */
+    /* Non-zero: the texels are also multiplied by the mean colour of the video under the overlay, in linear light and
+     * with half its saturation: (mean + Y) / 2 in each channel, where Y = 0.2126 R + 0.7152 G + 0.0722 B of the mean.
+     * Without video, they are multiplied by 0.18 (mid grey). */
     uint32_t follows_video;
     /* CDFs (floats, the last of each CDF is 1) for importance sampling with a density proportional to
      * luminance · sin(πv), where the luminance is the mean of the interpolated texture over a texel. */
